@@ -1,0 +1,1 @@
+"""Reduced-order flexible bodies: finite elements in, floating-frame multibody models out."""

@@ -1,0 +1,118 @@
+"""The errors a user can meet, each with the exit code of the command line.
+
+A message says what happened, with the number and the name of the culprit, what it means in
+mechanics, and what to do. Codes: 2 usage, 3 input file or mesh, 4 physics or model, 5 solver or
+quality gate, 6 resources, 7 interrupted; 1 is kept for our own bugs.
+"""
+
+
+class RomError(Exception):
+    """Base of every error raised on purpose.
+
+    Args:
+        message: what happened, with the number and the name of the culprit.
+        where: file, body, joint or interface the message is about; printed in front.
+        hint: what to do; printed behind.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, *, where: str = "", hint: str = ""):
+        self.message, self.where, self.hint = message, where, hint
+        super().__init__(message, where, hint)
+
+    def __str__(self) -> str:
+        head = f"{self.where}: " if self.where else ""
+        return f"{head}{self.message}" + (f" {self.hint}" if self.hint else "")
+
+    def __reduce__(self):
+        """Rebuild with keywords, so that an error survives a broadcast between ranks."""
+        return _rebuild, (type(self), self.message, self.where, self.hint)
+
+
+def _rebuild(kind: type[RomError], message: str, where: str, hint: str) -> RomError:
+    return kind(message, where=where, hint=hint)
+
+
+class ConfigError(RomError):
+    """A wrong argument, option or configuration file."""
+
+    exit_code = 2
+
+
+class FileFormatError(RomError):
+    """A file that is missing, cut, or not what its name promises."""
+
+    exit_code = 3
+
+
+class UnsafeFileError(FileFormatError):
+    """A file that could run code or exhaust the machine when read."""
+
+
+class MeshError(RomError):
+    """A mesh that is not one connected solid of valid cells."""
+
+    exit_code = 3
+
+
+class TagError(RomError):
+    """A physical group that is missing, doubled or ambiguous."""
+
+    exit_code = 3
+
+
+class MaterialError(RomError):
+    """Material numbers no real solid can have."""
+
+    exit_code = 4
+
+
+class InterfaceError(RomError):
+    """An interface that is unknown, empty, overlapping, or cannot carry what is asked."""
+
+    exit_code = 4
+
+
+class ModelError(RomError):
+    """A mechanism or body that contradicts itself: inconsistent joints, singular mass."""
+
+    exit_code = 4
+
+
+class SolverError(RomError):
+    """A linear, eigenvalue or time integration solver that did not deliver."""
+
+    exit_code = 5
+
+
+class ModesMissedError(SolverError):
+    """The eigenvalue solver skipped modes; the inertia count tells how many."""
+
+
+class QualityGateError(RomError):
+    """A quality figure beyond its limit."""
+
+    exit_code = 5
+
+
+class ResourceError(RomError):
+    """Not enough memory or disk, predicted or met."""
+
+    exit_code = 6
+
+
+class ParallelError(RomError):
+    """Another rank failed, or a call needs another number of ranks."""
+
+    exit_code = 6
+
+
+class InterruptedRun(RomError):
+    """Stopped by the user; what was computed so far has been kept."""
+
+    exit_code = 7
+
+
+class RomWarning(UserWarning):
+    """Something legal that a careful user wants to know."""

@@ -1,0 +1,336 @@
+"""The records passed between the stages. Frozen, array-valued, without solvers."""
+
+from dataclasses import dataclass, field
+from math import sqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import MaterialError
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Isotropic linear elastic solid.
+
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio.
+        rho: density [kg/m^3].
+
+    Raises:
+        MaterialError: for E <= 0, rho <= 0, nu outside (-1, 0.5), or a number that is not finite.
+    """
+
+    E: float
+    nu: float
+    rho: float
+
+    def __post_init__(self):
+        for name in ("E", "nu", "rho"):
+            _check_number(name, getattr(self, name))
+        _check_positive("E", self.E, "Pa")
+        _check_positive("rho", self.rho, "kg/m^3")
+        if not -1.0 < self.nu < 0.5:
+            raise MaterialError(
+                f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative.",
+                hint="Metals have 0.27 to 0.35.",
+            )
+
+    @property
+    def stiffness(self) -> Array:
+        """(6, 6) stiffness [Pa]; rows xx, yy, zz, yz, xz, xy with engineering shear strains."""
+        mu, lam = self.E / (2 * (1 + self.nu)), self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
+        C = np.diag([2 * mu] * 3 + [mu] * 3)
+        C[:3, :3] += lam
+        return C
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of a longitudinal wave in a thin bar [m/s]."""
+        return sqrt(self.E / self.rho)
+
+
+@dataclass(frozen=True, slots=True)
+class Orthotropic:
+    """Orthotropic linear elastic solid with principal axes 1, 2, 3.
+
+    Attributes:
+        E: (3,) Young's moduli E1, E2, E3 [Pa].
+        nu: (3,) Poisson's ratios nu12, nu13, nu23; nu_ij = -eps_j / eps_i under stress along i.
+        G: (3,) shear moduli G12, G13, G23 [Pa].
+        rho: density [kg/m^3].
+        axes: (3, 3) rows are the principal axes in the frame of the geometry.
+
+    Raises:
+        MaterialError: if the stiffness is not positive definite or the axes are not orthonormal.
+    """
+
+    E: tuple[float, float, float]
+    nu: tuple[float, float, float]
+    G: tuple[float, float, float]
+    rho: float
+    axes: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    def __post_init__(self):
+        for name in ("E", "nu", "G"):
+            if np.shape(getattr(self, name)) != (3,):
+                raise MaterialError(f"{name} needs three numbers, got {getattr(self, name)!r}.")
+            for value in getattr(self, name):
+                _check_number(name, value)
+        for value in (*self.E, *self.G):
+            _check_positive("E or G", value, "Pa")
+        _check_number("rho", self.rho)
+        _check_positive("rho", self.rho, "kg/m^3")
+        axes = np.asarray(self.axes, dtype=float)
+        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
+            raise MaterialError("axes is not a (3, 3) matrix of orthonormal rows.")
+        lowest = np.linalg.eigvalsh(self._compliance()).min()
+        if lowest <= 0:
+            raise MaterialError(
+                f"the orthotropic compliance has the negative eigenvalue {lowest:.3g} 1/Pa: "
+                "some load would release energy.",
+                hint="Check that |nu_ij| < sqrt(E_i / E_j).",
+            )
+
+    def _compliance(self) -> Array:
+        (E1, E2, E3), (n12, n13, n23), (G12, G13, G23) = self.E, self.nu, self.G
+        C = np.diag([1 / E1, 1 / E2, 1 / E3, 1 / G23, 1 / G13, 1 / G12])
+        C[0, 1] = C[1, 0] = -n12 / E1
+        C[0, 2] = C[2, 0] = -n13 / E1
+        C[1, 2] = C[2, 1] = -n23 / E2
+        return C
+
+    @property
+    def stiffness(self) -> Array:
+        """(6, 6) stiffness [Pa] in the geometry frame; order and shear as in `Material`."""
+        T = _strain_rotation(np.asarray(self.axes, dtype=float))
+        return T.T @ np.linalg.inv(self._compliance()) @ T
+
+    @property
+    def wave_speed(self) -> float:
+        """Largest speed of a longitudinal wave in a thin bar [m/s]."""
+        return sqrt(max(self.E) / self.rho)
+
+
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy
+
+
+def _strain_rotation(Q: Array) -> Array:
+    """(6, 6) map of engineering strains from the geometry frame to the axes in the rows of Q."""
+    T = np.empty((6, 6))
+    for row, (i, j) in enumerate(PAIRS):
+        for column, (k, m) in enumerate(PAIRS):
+            value = Q[i, k] * Q[j, m] + (Q[i, m] * Q[j, k] if k != m else 0.0)
+            T[row, column] = value * (1.0 if i == j else 2.0) / (1.0 if k == m else 2.0)
+    return T
+
+
+def _check_number(name: str, value: Any) -> None:
+    if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
+        raise MaterialError(f"{name} = {value!r} is not a finite number.")
+
+
+def _check_positive(name: str, value: float, unit: str) -> None:
+    if value <= 0:
+        raise MaterialError(f"{name} = {value:g} {unit} must be positive.")
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """Nodes through which a body touches the rest of the mechanism.
+
+    Attributes:
+        name: name of the gmsh physical surface.
+        nodes: (k,) node numbers, rows of ``FEModel.points``; ordered by coordinates, so that the
+            order does not depend on the partition.
+        points: (k, 3) coordinates of the nodes [m].
+        surface_mass: (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2].
+        origin: (3,) reference point in the body frame [m]: the centroid of the surface, or the
+            point chosen by the user.
+    """
+
+    name: str
+    nodes: Index
+    points: Array
+    surface_mass: Any
+    origin: Array
+
+    @property
+    def dofs(self) -> Index:
+        """(3k,) dof numbers, node by node: ``3*node + axis``."""
+        return (3 * self.nodes[:, None] + np.arange(3)).ravel()
+
+    @property
+    def area(self) -> float:
+        """Area of the surface [m^2]."""
+        return float(self.surface_mass.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Attachment:
+    """A rigid body, or a point mass, carried by an interface.
+
+    The carrier follows the area-weighted mean motion of the interface, so that it adds inertia
+    and no stiffness.
+
+    Attributes:
+        interface: name of the interface that carries it.
+        mass: mass [kg].
+        inertia: (3, 3) inertia about its mass centre, axes of the geometry [kg m^2].
+        at: (3,) its mass centre [m]; None for the origin of the interface.
+    """
+
+    interface: str
+    mass: float
+    inertia: Any = ((0.0,) * 3,) * 3
+    at: Any = None
+
+
+@dataclass(frozen=True)
+class FEModel:
+    """Linear finite element model of one free body, no boundary condition applied.
+
+    Attributes:
+        K: (n, n) stiffness [N/m], symmetric, with the six rigid motions in its null space;
+            SciPy sparse, or a PETSc matrix distributed over the ranks.
+        M: (n, n) mass [kg], symmetric positive definite; of the mesh alone when ``attachments``
+            are given.
+        points: (n/3, 3) reference coordinates in the body frame [m], the same on all ranks; dof
+            ``3*i + a`` is axis a of node i.
+        interfaces: interfaces by name.
+        attachments: point masses and rigid bodies carried by interfaces.
+        surface: outer surface for pictures; None when there is none.
+        provenance: how the model was made: geometry file, parameters, material, versions.
+        operators: the five verbs on this model when K and M are not SciPy matrices.
+    """
+
+    K: Any
+    M: Any
+    points: Array
+    interfaces: dict[str, Interface] = field(default_factory=dict)
+    attachments: tuple[Attachment, ...] = ()
+    surface: "SurfaceMesh | None" = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+    operators: Any = None
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of displacement dofs of the whole model."""
+        return 3 * self.points.shape[0]
+
+    @property
+    def interface_names(self) -> tuple[str, ...]:
+        """Names of the interfaces."""
+        return tuple(self.interfaces)
+
+    def mass(self) -> float:
+        """Total mass with attachments [kg]; under mpirun to be called on all ranks."""
+        carried = sum(a.mass for a in self.attachments)
+        if self.operators is None:
+            return float(self.M[::3][:, ::3].sum()) + carried
+        along_x = np.zeros((self.operators.n_local, 1))
+        along_x[::3] = 1.0
+        return self.operators.gram(along_x, self.operators.apply_M(along_x)).item() + carried
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceMesh:
+    """Triangles of the outer surface, for pictures.
+
+    Attributes:
+        nodes: (s,) node numbers, rows of ``FEModel.points``, ordered by coordinates.
+        triangles: (t, 3) corners, as positions in ``nodes``; seen from outside counter-clockwise
+            where the mesh tells.
+    """
+
+    nodes: Index
+    triangles: Index
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """Columns that span the deformations kept.
+
+    Attributes:
+        Psi: (n, r) displacement shapes, interface columns first; under mpirun the rows of this
+            rank.
+        omega: (m,) circular frequencies [rad/s] of the last m columns, ascending.
+        labels: (r,) what each column is, e.g. "constraint 12" or "fixed-interface 3".
+    """
+
+    Psi: Array
+    omega: Array
+    labels: tuple[str, ...]
+
+    def project(self, A: Any) -> Array:
+        """(r, r) symmetric projection Psi^T A Psi; on one process."""
+        B = self.Psi.T @ (A @ self.Psi)
+        return 0.5 * (B + B.T)
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Natural modes, lowest first, mass-normalised, largest entry positive.
+
+    Attributes:
+        omega: (m,) circular frequencies [rad/s]; rigid motions are exactly zero.
+        shapes: (n, m) displacement shapes; under mpirun the rows of this rank.
+        residual: (m,) relative residual norm(K phi - lambda M phi) / norm(K phi).
+    """
+
+    omega: Array
+    shapes: Array
+    residual: Array
+
+    @property
+    def frequencies(self) -> Array:
+        """(m,) natural frequencies [Hz]."""
+        return self.omega / (2 * np.pi)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of a report: a quantity, its value, its limit, and whether it holds."""
+
+    quantity: str
+    value: float
+    limit: str
+    ok: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Outcome of a set of checks; prints as a table.
+
+    Attributes:
+        title: what was checked.
+        rows: the lines, in the order checked.
+    """
+
+    title: str
+    rows: tuple[Row, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True when every row holds."""
+        return all(row.ok for row in self.rows)
+
+    @property
+    def failures(self) -> tuple[Row, ...]:
+        """The rows that do not hold."""
+        return tuple(row for row in self.rows if not row.ok)
+
+    def __str__(self) -> str:
+        width = max((len(row.quantity) for row in self.rows), default=0)
+        lines = [
+            f"  {row.quantity:<{width}}  {row.value:>12.5g}  {row.limit:<16}  "
+            + ("ok" if row.ok else "FAILED")
+            for row in self.rows
+        ]
+        verdict = "ok" if self.ok else f"{len(self.failures)} of {len(self.rows)} failed"
+        return "\n".join([f"{self.title}: {verdict}", *lines])

@@ -1,0 +1,88 @@
+"""Rotations: every sign convention of the project is stated here, once.
+
+* Quaternions are (e0, e1, e2, e3), scalar first, of unit length.
+* ``matrix(p)`` maps components in the body frame to components in the world frame.
+* Angular velocity is in the body frame: dA/dt = A skew(omega), dp/dt = 0.5 * p o (0, omega).
+* ``skew(a) @ b == cross(a, b)``.
+
+All functions take one quaternion or vector; they are small enough to be compiled as they stand.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def skew(a: npt.ArrayLike) -> Array:
+    """(3, 3) matrix of the cross product: skew(a) b = a x b."""
+    x, y, z = np.asarray(a, dtype=float)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def axial(S: npt.ArrayLike) -> Array:
+    """(3,) vector of the skew part of a (3, 3) matrix; the inverse of `skew`."""
+    S = np.asarray(S, dtype=float)
+    return 0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
+
+
+def matrix(p: npt.ArrayLike) -> Array:
+    """(3, 3) rotation matrix of a unit quaternion, body to world."""
+    e0, e1, e2, e3 = np.asarray(p, dtype=float)
+    return np.array(
+        [
+            [1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+            [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)],
+            [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)],
+        ]
+    )
+
+
+def quaternion(A: npt.ArrayLike) -> Array:
+    """(4,) unit quaternion of a rotation matrix, scalar part not negative.
+
+    The largest of the four components is found first, so that no division by a small number occurs.
+
+    Source:
+        Shepperd, Quaternion from rotation matrix, J. Guidance and Control 1 (1978) 223.
+    """
+    A = np.asarray(A, dtype=float)
+    squares = np.array([np.trace(A), A[0, 0], A[1, 1], A[2, 2]])
+    k = int(np.argmax(squares))
+    p = np.empty(4)
+    if k == 0:
+        p[0] = 1 + squares[0]
+        p[1:] = A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]
+    else:
+        i = k - 1
+        j, m = (i + 1) % 3, (i + 2) % 3
+        p[0] = A[m, j] - A[j, m]
+        p[1 + i] = 1 + A[i, i] - A[j, j] - A[m, m]
+        p[1 + j] = A[i, j] + A[j, i]
+        p[1 + m] = A[i, m] + A[m, i]
+    p /= np.linalg.norm(p)
+    return p if p[0] >= 0 else -p
+
+
+def multiply(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
+    """(4,) product p o q; matrix(p o q) = matrix(p) matrix(q)."""
+    p, q = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
+    scalar = p[0] * q[0] - p[1:] @ q[1:]
+    return np.concatenate(([scalar], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])))
+
+
+def exp(theta: npt.ArrayLike) -> Array:
+    """(4,) quaternion of the rotation vector theta [rad]."""
+    theta = np.asarray(theta, dtype=float)
+    angle = np.linalg.norm(theta)
+    return np.concatenate(([np.cos(angle / 2)], 0.5 * np.sinc(angle / (2 * np.pi)) * theta))
+
+
+def log(p: npt.ArrayLike) -> Array:
+    """(3,) rotation vector of a unit quaternion, angle in [0, pi] [rad]."""
+    p = np.asarray(p, dtype=float)
+    p = p if p[0] >= 0 else -p
+    sine = np.linalg.norm(p[1:])
+    if sine == 0.0:
+        return np.zeros(3)
+    return 2 * np.arctan2(sine, p[0]) / sine * p[1:]
