@@ -8,8 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import identity, kron
 
-from rom.model import Array, Index
+from rom.model import Array, Interface
 
 
 class Held(Protocol):
@@ -28,7 +29,7 @@ class Operators(Protocol):
         n: number of dofs of the whole model.
         first: global number of this process's first row.
         n_local: number of this process's rows.
-        rank: number of this process; 0 when there is only one.
+        last: True on the process that owns the end of the rows, and stays so after `transform`.
         rigid: (n_local, 6) rigid motions (three translations, three rotations about the origin of
             coordinates), or None when there is no geometry.
     """
@@ -36,7 +37,7 @@ class Operators(Protocol):
     n: int
     first: int
     n_local: int
-    rank: int
+    last: bool
     rigid: Array | None
 
     def apply_K(self, X: Array) -> Array:
@@ -67,14 +68,99 @@ class Operators(Protocol):
             ModesMissedError: if the inertia count says a mode was skipped.
         """
 
-    def transform(self, T: Any, rigid: Array | None) -> "Operators":
+    def transform(self, T: Any, rigid: Array) -> "Operators":
         """The same body in new coordinates u = T a, with K_a = T^T K T and M_a = T^T M T.
 
         Args:
-            T: sparse (n_local, n_a) rows of this process, global columns. The columns of kept
-                dofs stay on the rank that owns them; the last ``n_masters`` columns on the last rank.
-            rigid: (n_local_a, 6) the rigid motions in a.
+            T: sparse (n_local, n_a) rows of this process, global columns. Columns of kept dofs
+                stay on the rank that owns them, in their order; further columns come last, on the
+                last rank.
+            rigid: (n_local_a, 6) the rigid motions in a; its length is the size of this rank.
         """
 
     def expand(self, A: Array) -> Array:
         """T A: from the coordinates of `transform` back to (rows of the parent, k)."""
+
+    def rows(self, X: Array, dofs: npt.ArrayLike) -> Array:
+        """X[dofs] for global dof numbers, (n_dofs, k) equal on all ranks."""
+
+    def plus_mass(self, dM: Any) -> "Operators":
+        """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
+
+
+def canonical_signs(Phi: Array) -> Array:
+    """Turn each column so that its largest entry is positive; the first of equals decides."""
+    for phi in Phi.T:
+        size = np.abs(phi)
+        if phi[np.argmax(size >= (1 - 1e-6) * size.max(initial=0.0))] < 0:
+            phi *= -1.0
+    return Phi
+
+
+def count_shift(lam: Array, m: int) -> tuple[int, float]:
+    """Where to count: the widest relative gap behind the m-th of some more eigenvalues.
+
+    Args:
+        lam: (k,) ascending eigenvalues, k > m, not all zero.
+        m: number of modes wanted.
+
+    Returns:
+        The number of eigenvalues below the gap and a shift inside it.
+    """
+    upper, lower = lam[m:], lam[m - 1 : -1]
+    j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), np.abs(lam[-1]) * 1e-12)))
+    return m + j, float(0.5 * (upper[j] + lower[j]))
+
+
+def orthonormal(ops: Operators, X: Array) -> Array:
+    """M-orthonormal columns with the span of X, in the order given (Gram-Schmidt, twice)."""
+    Q = np.zeros((X.shape[0], 0))
+    for k in range(X.shape[1]):
+        x = X[:, k : k + 1]
+        for _ in range(2):
+            x = x - Q @ ops.gram(Q, ops.apply_M(x))
+            x = x / np.sqrt(ops.gram(x, ops.apply_M(x)).item())
+        Q = np.hstack([Q, x])
+    return Q
+
+
+def rigid_motions(points: Array) -> Array:
+    """(3k, 6) displacements of k points: unit translations, unit rotations about the origin.
+
+    Args:
+        points: (k, 3) coordinates [m].
+    """
+    R = np.zeros((points.shape[0], 3, 6))
+    R[:, :, :3] = np.eye(3)
+    x, y, z = points.T
+    R[:, 1, 3], R[:, 2, 3] = -z, y
+    R[:, 0, 4], R[:, 2, 4] = z, -x
+    R[:, 0, 5], R[:, 1, 5] = -y, x
+    return R.reshape(-1, 6)
+
+
+def mean_motion(interface: Interface) -> Array:
+    """(6, 3k) translation and rotation of a surface, least squares over its area.
+
+    C = (R^T S R)^-1 R^T S with R the rigid motions about the origin of the interface and S the
+    surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2.
+    """
+    R = rigid_motions(interface.points - interface.origin)
+    SR = kron(interface.surface_mass, identity(3)) @ R
+    return np.linalg.solve(R.T @ SR, SR.T)
+
+
+def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
+    """Modal assurance criterion with the mass as weight, (k, l) in [0, 1].
+
+    Args:
+        ops: operators of the model the shapes belong to.
+        Phi: (n_local, k) shapes.
+        Psi: (n_local, l) shapes.
+    """
+    cross = ops.gram(Phi, ops.apply_M(Psi))
+    return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
+
+
+def _squares(ops: Operators, Phi: Array) -> Array:
+    return np.diag(ops.gram(Phi, ops.apply_M(Phi)))

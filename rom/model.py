@@ -44,7 +44,10 @@ class Material:
     @property
     def stiffness(self) -> Array:
         """(6, 6) stiffness [Pa]; rows xx, yy, zz, yz, xz, xy with engineering shear strains."""
-        mu, lam = self.E / (2 * (1 + self.nu)), self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
+        mu, lam = (
+            self.E / (2 * (1 + self.nu)),
+            self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu)),
+        )
         C = np.diag([2 * mu] * 3 + [mu] * 3)
         C[:3, :3] += lam
         return C

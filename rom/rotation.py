@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 
 def skew(a: npt.ArrayLike) -> Array:
-    """(3, 3) matrix of the cross product: skew(a) b = a x b."""
+    """(3, 3) matrix of the cross product a x b = S b."""
     x, y, z = np.asarray(a, dtype=float)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

@@ -1,0 +1,1 @@
+"""Flexible bodies: inertia integrals, reference conditions, damping."""

@@ -1,0 +1,1 @@
+"""Engineering components on the light layers."""

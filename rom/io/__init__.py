@@ -1,0 +1,1 @@
+"""Files: the native body file and other formats."""

@@ -1,0 +1,1 @@
+"""Reduction bases on operators and on plain matrices; no dolfinx, no PETSc."""

@@ -1,0 +1,252 @@
+"""The flexible body: everything a floating-frame integrator needs, independent of the mesh."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
+from rom.errors import InterfaceError, ModelError
+from rom.model import Array, Index, Report
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """Where a joint or a force acts.
+
+    Attributes:
+        name: name of the interface.
+        point: (3,) undeformed position in the body frame [m].
+        translation: (3, r) displacement per unit of each elastic coordinate.
+        rotation: (3, r) small rotation vector per unit of each elastic coordinate [rad].
+        kind: "rbe2", "rbe3" or "full".
+        hold: (n_c, 6 + r) interface coordinates as a function of rigid motion (translation, then
+            rotation about the body origin) and elastic coordinates; zero when it is held.
+    """
+
+    name: str
+    point: Array
+    translation: Array
+    rotation: Array
+    kind: str
+    hold: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Outer surface of the body, for pictures.
+
+    Attributes:
+        points: (s, 3) undeformed positions [m].
+        triangles: (t, 3) corners.
+        shape: (3 s, r) displacement per unit of each elastic coordinate; row 3*node + axis.
+    """
+
+    points: Array
+    triangles: Index
+    shape: Array
+
+
+@dataclass(frozen=True)
+class FlexibleBody:
+    """A reduced elastic body in its floating frame.
+
+    A material point moves as x = r + A (X + sum_k phi_k q_k); the shapes phi contain no rigid
+    motion, their reference condition says how the frame follows the body.
+
+    Attributes:
+        name: name of the body.
+        mass: mass [kg].
+        first_moment: (3,) integral of rho X [kg m].
+        inertia: (3, 3) inertia about the origin of the body frame [kg m^2].
+        S: (3, r) integral of rho phi_k [kg].
+        Ibar_kl: (3, 3, r) entry [a, b, k] is the integral of rho X_a phi_k,b [kg m].
+        S_kl: (3, 3, r, r) entry [a, b, k, l] is the integral of rho phi_k,a phi_l,b [kg].
+        K: (r, r) stiffness [N/m]; the shapes are mass-normalised, so that it is diag(omega^2).
+        D: (r, r) damping [N s/m].
+        K_geo: (r, r) geometric stiffness per unit load, by name of the load.
+        markers: interfaces by name.
+        surface: outer surface, or None.
+        omega: (r,) natural frequencies of the elastic coordinates, frame held still [rad/s].
+        labels: (r,) what each coordinate is.
+        reference: the reference condition.
+        units: declared unit system.
+        provenance: how the body was made.
+        certificate: evidence that it stands for the full model, or None.
+    """
+
+    name: str
+    mass: float
+    first_moment: Array
+    inertia: Array
+    S: Array
+    Ibar_kl: Array
+    S_kl: Array
+    K: Array
+    D: Array
+    markers: dict[str, Marker]
+    omega: Array
+    labels: tuple[str, ...]
+    reference: str = "mean-axis"
+    K_geo: dict[str, Array] = field(default_factory=dict)
+    surface: Surface | None = None
+    units: str = "SI"
+    provenance: dict[str, Any] = field(default_factory=dict)
+    certificate: Report | None = None
+
+    @property
+    def M(self) -> Array:
+        """(r, r) mass of the elastic coordinates [kg]."""
+        return np.einsum("aakl->kl", self.S_kl)
+
+    @property
+    def n_modes(self) -> int:
+        """Number r of elastic coordinates."""
+        return self.K.shape[0]
+
+    @property
+    def interface_names(self) -> tuple[str, ...]:
+        """Names of the interfaces."""
+        return tuple(self.markers)
+
+    def with_reference(self, reference: Any) -> "FlexibleBody":
+        """The same deformations seen from another floating frame; no finite elements involved.
+
+        Args:
+            reference: "mean-axis" (alias "free"): no linear and angular momentum relative to the
+                frame; the name of an interface: the frame sits on it; a pair of names: the frame
+                sits on the first point, its axis runs through the second (pins).
+
+        Raises:
+            InterfaceError: if an interface is unknown.
+            ModelError: if the condition leaves the frame undetermined.
+        """
+        X = reference_motion(self, reference)
+        body = moved_frame(self, X)
+        omega, V = _normal_modes(body.K, body.M)
+        return _recombined(body, V, omega, reference_label(reference))
+
+    def frequencies(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Array:
+        """Natural frequencies of the reduced body with some interfaces held [Hz].
+
+        Args:
+            n: how many, lowest first; None for all.
+            fixed: names of the interfaces held; with none the six zeros of rigid motion come first.
+
+        Raises:
+            InterfaceError: if an interface is unknown.
+        """
+        return self.modes(n, fixed=fixed)[0] / (2 * np.pi)
+
+    def modes(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> tuple[Array, Array]:
+        """Natural modes of the reduced body: omega (m,) [rad/s], shapes (6 + r, m).
+
+        Rows of the shapes: translation of the frame, rotation about its origin, elastic part.
+        """
+        fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
+        M, K = self.full_matrices()
+        N = self._supported(fixed)
+        lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+        omega = np.sqrt(np.maximum(lam, 0.0))
+        n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed), tol=1e-9)
+        omega[:n_rigid] = 0.0
+        return omega[:n], (N @ V)[:, :n]
+
+    def full_matrices(self) -> tuple[Array, Array]:
+        """(6 + r, 6 + r) mass and stiffness of small motions, rigid coordinates first."""
+        M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])
+        K = np.zeros_like(M)
+        K[6:, 6:] = self.K
+        return M, K
+
+    def _supported(self, fixed: tuple[str, ...]) -> Array:
+        """(6 + r, m) basis of the motions that keep the interfaces still, rigid ones first."""
+        size = self.size
+        scale = np.r_[np.ones(3), np.full(3, 1 / size), np.ones(self.n_modes)]
+        if not fixed:
+            return np.diag(scale)
+        H = np.vstack([self.marker(name).hold for name in fixed]) * scale
+        H = H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300)
+        return scale[:, None] * null_space(H, rcond=1e-10)
+
+    def _rigid_rows(self, fixed: tuple[str, ...]) -> Array:
+        if not fixed:
+            return np.zeros((1, 6))
+        rows = np.vstack([self.marker(name).hold[:, :6] for name in fixed])
+        return rows * np.r_[np.ones(3), np.full(3, 1 / self.size)]
+
+    @property
+    def size(self) -> float:
+        """A length that characterises the body [m]."""
+        if self.surface is not None:
+            return float(np.ptp(self.surface.points, axis=0).max())
+        reach = [float(np.linalg.norm(marker.point)) for marker in self.markers.values()]
+        return max([*reach, float(np.sqrt(np.trace(self.inertia) / self.mass))])
+
+    def marker(self, name: str) -> Marker:
+        """The marker of an interface.
+
+        Raises:
+            InterfaceError: listing the names that exist.
+        """
+        if name not in self.markers:
+            raise InterfaceError(
+                f"body {self.name!r} has no interface {name!r}; it has {sorted(self.markers)}."
+            )
+        return self.markers[name]
+
+
+def reference_label(reference: Any) -> str:
+    """How a reference condition is written in labels and files."""
+    if isinstance(reference, str):
+        return "mean-axis" if reference == "free" else reference
+    return "pins " + " ".join(reference)
+
+
+def _normal_modes(K: Array, M: Array) -> tuple[Array, Array]:
+    smallest = np.linalg.eigvalsh(M).min(initial=np.inf)
+    if smallest <= 0:
+        raise ModelError(
+            f"the elastic mass matrix has the eigenvalue {smallest:.3g}: the elastic coordinates "
+            "contain a rigid motion, which the floating frame already describes.",
+            hint="Choose a reference condition that stops all six rigid motions.",
+        )
+    lam, V = eigh(K, M)
+    signs = np.sign(V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])])
+    return np.sqrt(np.maximum(lam, 0.0)), V * signs
+
+
+def _recombined(body: FlexibleBody, V: Array, omega: Array, reference: str) -> FlexibleBody:
+    """New elastic coordinates q = V q_new."""
+    markers = {
+        name: replace(
+            m,
+            translation=m.translation @ V,
+            rotation=m.rotation @ V,
+            hold=np.hstack([m.hold[:, :6], m.hold[:, 6:] @ V]),
+        )
+        for name, m in body.markers.items()
+    }
+    surface = body.surface
+    if surface is not None:
+        surface = replace(surface, shape=surface.shape @ V)
+    S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
+    return replace(
+        body,
+        S=body.S @ V,
+        Ibar_kl=body.Ibar_kl @ V,
+        S_kl=0.5 * (S_kl + S_kl.transpose(1, 0, 3, 2)),
+        K=np.diag(omega**2),
+        D=_symmetric(V.T @ body.D @ V),
+        K_geo={load: _symmetric(V.T @ A @ V) for load, A in body.K_geo.items()},
+        markers=markers,
+        surface=surface,
+        omega=omega,
+        labels=tuple(f"mode {k + 1}, {reference} frame" for k in range(omega.size)),
+        reference=reference,
+    )
+
+
+def _symmetric(A: Array) -> Array:
+    return 0.5 * (A + A.T)

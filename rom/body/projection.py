@@ -1,0 +1,149 @@
+"""From a basis to a flexible body: rigid motions out, integrals, markers, surface."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from rom.attachment import carried_displacements
+from rom.body.flexible import FlexibleBody, Marker, Surface
+from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
+from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
+from rom.errors import ModelError
+from rom.model import Array, FEModel, Interface
+
+RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
+
+
+@dataclass(frozen=True, slots=True)
+class Elastic:
+    """The part of a basis without rigid motion.
+
+    Attributes:
+        V: (r + 6, r) combinations of the basis columns: free-free modes of the reduced model.
+        omega: (r,) their circular frequencies [rad/s].
+        rigid: (r + 6, 6) combinations that give the six rigid motions.
+        residual: distance of the rigid motions from the basis, relative.
+    """
+
+    V: Array
+    omega: Array
+    rigid: Array
+    residual: float
+
+
+def elastic_part(ops: Operators, Psi: Array) -> Elastic:
+    """Split the span of Psi into rigid motions and mass-normalised free-free modes.
+
+    Raises:
+        ModelError: if a rigid motion is not in the span, or the columns are dependent.
+    """
+    MPsi = ops.apply_M(Psi)
+    M, K = ops.gram(Psi, MPsi), ops.gram(Psi, ops.apply_K(Psi))
+    scale = 1 / np.sqrt(np.diag(M))
+    M, K = _scaled(M, scale), _scaled(K, scale)
+    if np.linalg.eigvalsh(M)[0] < 1e-13:
+        raise ModelError(
+            "the basis has columns that depend on each other.",
+            hint="Ask for fewer modes, or remove an interface that repeats another.",
+        )
+    R = orthonormal(ops, ops.rigid)
+    B = np.linalg.solve(M, scale[:, None] * ops.gram(MPsi, R))
+    gap = R - Psi @ (scale[:, None] * B)
+    residual = float(np.sqrt(np.diag(ops.gram(gap, ops.apply_M(gap))).max()))
+    if residual > RIGID_RESIDUAL:
+        raise ModelError(
+            f"the basis misses a rigid motion by {residual:.1e}: the body could not move freely.",
+            hint="Hold interfaces that stop all rigid motions, or add rigid modes to the basis.",
+        )
+    Z = null_space(B.T @ M)
+    lam, Y = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    V = scale[:, None] * (Z @ Y)
+    return Elastic(V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
+
+
+def flexible_body(
+    model: FEModel,
+    ops: Operators,
+    Psi: Array,
+    elastic: Elastic,
+    *,
+    kinds: dict[str, str],
+    name: str,
+    provenance: dict[str, Any],
+) -> FlexibleBody:
+    """The body in its mean-axis frame.
+
+    Args:
+        model: supplies points, interfaces, attachments and surface.
+        ops: operators with the mass of the mesh alone, in nodal dofs.
+        Psi: (n_local, r + 6) basis in nodal dofs.
+        elastic: what `elastic_part` found in it.
+        kinds: {interface: kind} of the interfaces that become markers.
+        name: name of the body.
+        provenance: how it was made.
+    """
+    E = canonical_columns(ops, Psi @ elastic.V, model)
+    integrals = _integrals(model, ops, E)
+    markers = {n: _marker(ops, model.interfaces[n], kind, E) for n, kind in kinds.items()}
+    r = elastic.omega.size
+    return FlexibleBody(
+        name=name,
+        **{key: getattr(integrals, key) for key in integrals.__slots__},
+        K=np.diag(elastic.omega**2),
+        D=np.zeros((r, r)),
+        markers=markers,
+        omega=elastic.omega,
+        labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(r)),
+        reference="mean-axis",
+        surface=_surface(ops, model, E),
+        provenance=provenance,
+    )
+
+
+def canonical_columns(ops: Operators, E: Array, model: FEModel) -> Array:
+    """Turn the sign of each shape by a measure that does not depend on the numbering of nodes."""
+    first = ops.first // 3
+    x = model.points[first : first + ops.n_local // 3] - model.points.mean(axis=0)
+    x = x / np.abs(model.points - model.points.mean(axis=0)).max()
+    a, b, c = x.T
+    weight = np.column_stack(
+        [1.0 + a + 0.7 * b**2 - c**3, 0.9 - b + 0.8 * c**2 + a**3, 0.8 + c - 0.6 * a**2 + b**3]
+    )
+    sign = np.sign(ops.gram(weight.reshape(-1, 1), ops.apply_M(E)))[0]
+    return E * np.where(sign == 0, 1.0, sign)
+
+
+def _integrals(model: FEModel, ops: Operators, E: Array) -> InertiaIntegrals:
+    first = ops.first // 3
+    total = inertia_integrals(ops, model.points[first : first + ops.n_local // 3], E)
+    for attachment in model.attachments:
+        points, masses, N = carried_displacements(attachment, model)
+        dofs = model.interfaces[attachment.interface].dofs
+        total = total + point_integrals(points, masses, N @ ops.rows(E, dofs))
+    return total
+
+
+def _marker(ops: Operators, interface: Interface, kind: str, E: Array) -> Marker:
+    U = ops.rows(E, interface.dofs)
+    motion = mean_motion(interface) @ U
+    if kind == "full":
+        hold = np.hstack([rigid_motions(interface.points), U])
+    else:
+        rigid = np.vstack([rigid_motions(interface.origin[None]), np.eye(6)[3:]])
+        hold = np.hstack([rigid, motion])
+    return Marker(interface.name, interface.origin, motion[:3], motion[3:], kind, hold)
+
+
+def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
+    if model.surface is None:
+        return None
+    nodes = model.surface.nodes
+    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    return Surface(model.points[nodes], model.surface.triangles, ops.rows(E, dofs))
+
+
+def _scaled(A: Array, scale: Array) -> Array:
+    A = scale[:, None] * A * scale
+    return 0.5 * (A + A.T)

@@ -1,0 +1,123 @@
+"""Reference conditions: how the floating frame follows a deforming body.
+
+A condition C u = 0 (six rows) ties the frame to the body. On shapes Psi it acts as the projector
+Psi' = Psi - R X, X = (C R)^-1 C Psi, with R the rigid motions: stiffness is untouched,
+span{R, Psi} stays the same, and only the inertia coupling of frame and shapes changes. Small
+motions are identical whatever the frame; large ones differ at second order in the deformation.
+
+Source:
+    O'Shea, Jayakumar, Mechergui, Shabana, Wang, Reference conditions and substructuring techniques
+    in flexible multibody system dynamics, J. Comput. Nonlinear Dynam. 13 (2018) 041007 (the claims
+    of the abstract); Agrawal and Shabana, Comput. Struct. 21 (1985) 1303, for the mean axis.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rom.errors import ConfigError, ModelError
+from rom.model import Array
+from rom.rotation import skew
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody, Marker
+
+
+def reference_motion(body: "FlexibleBody", reference: Any) -> Array:
+    """(6, r) rigid motion X hidden in each shape, as the reference condition sees it.
+
+    Raises:
+        ConfigError: if the reference is neither "mean-axis", "free", a name, nor two names.
+        ModelError: if the condition does not determine the frame.
+    """
+    if reference in ("mean-axis", "free"):
+        from_rigid, from_shapes = rigid_mass(body), rigid_elastic(body)
+    elif isinstance(reference, str):
+        from_rigid, from_shapes = _marker_motion(body.marker(reference), body.n_modes)
+    elif isinstance(reference, tuple | list) and len(reference) == 2:
+        from_rigid, from_shapes = _pins(*(body.marker(name) for name in reference), body.n_modes)
+    else:
+        raise ConfigError(
+            f"reference = {reference!r} is not a reference condition.",
+            hint=f'Use "mean-axis", one of {sorted(body.markers)}, or a pair of them.',
+        )
+    scale = np.r_[np.ones(3), np.full(3, 1 / body.size)]
+    if np.linalg.cond(from_rigid * scale) > 1e12:
+        raise ModelError(
+            f"the reference condition {reference!r} leaves the frame undetermined.",
+            hint="The two pins must not coincide.",
+        )
+    return np.linalg.solve(from_rigid, from_shapes)
+
+
+def _marker_motion(marker: "Marker", r: int) -> tuple[Array, Array]:
+    """The six motions of a marker under rigid motions and under the shapes."""
+    rigid = np.block([[np.eye(3), -skew(marker.point)], [np.zeros((3, 3)), np.eye(3)]])
+    return rigid, np.vstack([marker.translation, marker.rotation]).reshape(6, r)
+
+
+def _pins(first: "Marker", second: "Marker", r: int) -> tuple[Array, Array]:
+    """Chord frame: first point fixed, second on the axis, no mean twist at the first point."""
+    axis = second.point - first.point
+    length = np.linalg.norm(axis)
+    if length == 0.0:
+        raise ModelError(f"pins {first.name!r} and {second.name!r} lie in the same point.")
+    axis = axis / length
+    across = np.linalg.svd(axis[None])[2][1:]
+    rows = []
+    for one, other in zip(_marker_motion(first, r), _marker_motion(second, r), strict=True):
+        rows.append(np.vstack([one[:3], across @ other[:3], axis @ one[3:]]))
+    return rows[0], rows[1]
+
+
+def rigid_mass(body: "FlexibleBody") -> Array:
+    """(6, 6) mass of the undeformed body: translation, rotation about the origin."""
+    skew_d = skew(body.first_moment)
+    return np.block([[body.mass * np.eye(3), -skew_d], [skew_d, body.inertia]])
+
+
+def rigid_elastic(body: "FlexibleBody") -> Array:
+    """(6, r) coupling of rigid and elastic coordinates: momentum and angular momentum of shapes."""
+    X = body.Ibar_kl
+    angular = np.array([X[1, 2] - X[2, 1], X[2, 0] - X[0, 2], X[0, 1] - X[1, 0]])
+    return np.vstack([body.S, angular])
+
+
+def moved_frame(body: "FlexibleBody", X: Array) -> "FlexibleBody":
+    """The body with shapes phi_k - (t_k + w_k x X), X = [t; w] (6, r); still not normalised.
+
+    Every integral follows from those of the old shapes and of the undeformed body.
+    """
+    t, w = X[:3], X[3:]
+    W = np.einsum("abc,ck->abk", _skew_tensor(), w)  # W[:, :, k] @ x = w_k x x
+    d, m = body.first_moment, body.mass
+    P = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia  # integral of rho x x^T
+    Wd = np.einsum("abk,b->ak", W, d)
+    S = body.S - m * t - Wd
+    Ibar = body.Ibar_kl - np.einsum("a,bk->abk", d, t) - np.einsum("ac,bck->abk", P, W)
+    cross = np.einsum("ak,bl->abkl", body.S, t) + np.einsum("cak,bcl->abkl", body.Ibar_kl, W)
+    rigid = m * np.einsum("ak,bl->abkl", t, t) + np.einsum("ak,bl->abkl", t, Wd)
+    rigid += np.einsum("ak,bl->abkl", Wd, t)
+    rigid += np.einsum("ack,cd,bdl->abkl", W, P, W, optimize=True)
+    S_kl = body.S_kl - cross - cross.transpose(1, 0, 3, 2) + rigid
+    surface = body.surface
+    if surface is not None:
+        shift = t[None] + np.einsum("abk,nb->nak", W, surface.points)
+        surface = replace(surface, shape=surface.shape - shift.reshape(surface.shape.shape))
+    markers = {name: _moved_marker(marker, X, t, W) for name, marker in body.markers.items()}
+    return replace(body, S=S, Ibar_kl=Ibar, S_kl=S_kl, markers=markers, surface=surface)
+
+
+def _moved_marker(marker: "Marker", X: Array, t: Array, W: Array) -> "Marker":
+    return replace(
+        marker,
+        translation=marker.translation - t - np.einsum("abk,b->ak", W, marker.point),
+        rotation=marker.rotation - X[3:],
+        hold=np.hstack([marker.hold[:, :6], marker.hold[:, 6:] - marker.hold[:, :6] @ X]),
+    )
+
+
+def _skew_tensor() -> Array:
+    """(3, 3, 3): skew(w)_ab = sum_c tensor[a, b, c] w_c."""
+    return np.stack([skew(e) for e in np.eye(3)], axis=-1)

@@ -1,0 +1,191 @@
+"""The certificate: what was measured to show that the reduced body stands for the full model."""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom.body.flexible import FlexibleBody
+from rom.body.projection import Elastic
+from rom.body.reference import rigid_mass
+from rom.eigen import Operators, mac
+from rom.model import Array, Basis, Report, Row
+from rom.reduction.interface import Connection
+
+N_COMPARED = 6  # elastic modes compared in each support
+FREQUENCY_ERROR = 1e-3  # relative; what a structural dynamicist accepts without asking
+CLUSTER = 1e-3  # modes closer than this (relative) are compared as one subspace
+
+
+def certify_body(
+    connection: Connection, ops: Operators, body: FlexibleBody, basis: Basis, elastic: Elastic
+) -> tuple[Report, dict[str, Any]]:
+    """Compare a reduced body with the full model it came from.
+
+    Args:
+        connection: the full model in interface coordinates, so that like is compared with like.
+        ops: the full model in nodal dofs.
+        body: the reduced body.
+        basis: its basis in interface coordinates.
+        elastic: the elastic part of the basis.
+
+    Returns:
+        The report, and a table {support: {"full": [Hz], "reduced": [Hz], "mac": []}}.
+    """
+    rows: list[Row] = []
+    comparison = {}
+    supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts)]
+    for fixed in supports:
+        table = _compared(connection, ops, body, basis, fixed)
+        if table["full"]:
+            comparison[" + ".join(fixed) + " held" if fixed else "free"] = table
+    for support, table in comparison.items():
+        rows += _frequency_rows(support, table)
+    rows += _static_row(connection, body)
+    rows += _rigid_rows(ops, body, elastic)
+    rows += _matrix_rows(connection, basis, body)
+    rows += _effective_mass(body, next(iter(connection.parts)))
+    return Report(f"certificate of {body.name}", tuple(rows)), comparison
+
+
+def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Row:
+    """A line that holds when the value stays below (or above) its limit; NaN never holds."""
+    value = float(value)
+    ok = value >= limit if above else value <= limit
+    return Row(quantity, value, f"{'>=' if above else '<='} {limit:g}", bool(ok))
+
+
+def _compared(
+    connection: Connection, ops: Operators, body: FlexibleBody, basis: Basis, fixed: tuple[str, ...]
+) -> dict[str, list[float]]:
+    """Frequencies of both models in one support, and the best agreement of shapes."""
+    omega_r = body.modes(fixed=fixed)[0]
+    n_rigid = int(np.count_nonzero(omega_r == 0.0))
+    held = connection.held(fixed)
+    n = min(N_COMPARED, omega_r.size - n_rigid)
+    if n <= 0 or n_rigid not in (0, 6):
+        return {"full": [], "reduced": [], "mac": []}
+    omega, Phi = connection.ops.modes(held, n + n_rigid)
+    omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
+    # the reduced shapes again, as combinations of the columns of the basis
+    Psi = connection.ops.expand(_reduced_shapes(connection, basis, fixed, n + n_rigid))
+    agreement = _cluster_mac(mac(ops, Phi, Psi), omega, omega_r[: n + n_rigid])
+    return {
+        "full": (omega / (2 * np.pi)).tolist(),
+        "reduced": (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist(),
+        "mac": agreement.tolist(),
+    }
+
+
+def _reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
+    """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
+    ops = connection.ops
+    drop = [connection.parts[name] for name in fixed]
+    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
+    Psi = basis.Psi[:, keep]
+    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+    scale = 1 / np.sqrt(np.diag(M))
+    K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
+    _, V = eigh(K, M, subset_by_index=(0, n - 1))
+    return Psi @ (scale[:, None] * V)
+
+
+def _cluster_mac(table: Array, full: Array, reduced: Array) -> Array:
+    """For each full mode the part of it spanned by its best partner and that one's neighbours.
+
+    Modes of nearly one frequency may rotate among themselves; they count together.
+    """
+    best = reduced[np.argmax(table, axis=1)]
+    near = np.abs(reduced[None, :] - best[:, None]) <= CLUSTER * best[:, None]
+    return np.minimum((table * near).sum(axis=1), 1.0)
+
+
+def _frequency_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
+    error = np.array(table["reduced"]) / np.array(table["full"]) - 1
+    n = error.size
+    return [
+        row(f"{support}: worst error of {n} frequencies", np.abs(error).max(), FREQUENCY_ERROR),
+        row(f"{support}: reduced never below full", error.min(), -1e-8, above=True),
+        row(f"{support}: lowest MAC of {n} shapes", min(table["mac"]), 0.99, above=True),
+    ]
+
+
+def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:
+    """Deflection under unit loads on the other interfaces, the first one held; exact for CB."""
+    names = tuple(connection.parts)
+    if len(names) < 2:
+        return []
+    ops, first = connection.ops, names[0]
+    loaded = connection.held(names[1:])
+    held = ops.hold(connection.held((first,)))
+    F = np.zeros((ops.n_local, loaded.size))
+    mine = (loaded >= ops.first) & (loaded < ops.first + ops.n_local)
+    F[loaded[mine] - ops.first, np.flatnonzero(mine)] = 1.0
+    full = ops.rows(held(F), loaded)
+    H, G = body.marker(first).hold, np.vstack([body.marker(name).hold for name in names[1:]])
+    rigid = np.linalg.lstsq(H[:, :6], -H[:, 6:], rcond=None)[0]
+    motion = G[:, :6] @ rigid + G[:, 6:]
+    if np.abs(H[:, :6] @ rigid + H[:, 6:]).max() > 1e-9 * np.abs(H[:, 6:]).max():
+        return []  # the first interface deforms: its frame does not follow a rigid motion
+    reduced = motion @ np.linalg.solve(body.K, motion.T)
+    diagonal = np.sqrt(np.diag(full))
+    error = np.abs((reduced - full) / np.outer(diagonal, diagonal)).max()
+    return [row(f"{first} held: static flexibility of the interfaces", error, 1e-6)]
+
+
+def _rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
+    R = ops.rigid
+    KR, MR = ops.apply_K(R), ops.apply_M(R)
+    full = ops.gram(R, MR)
+    size = np.r_[np.ones(3), np.full(3, body.size)]
+    weight = body.mass * np.outer(size, size)
+    stiffness = body.omega[0] ** 2 if body.omega.size else 1.0
+    return [
+        row(
+            "mass, centre, inertia: body against full",
+            np.abs((rigid_mass(body) - full) / weight).max(),
+            1e-9,
+        ),
+        row("rigid motions inside the basis", elastic.residual, 1e-8),
+        row(
+            "energy of rigid motions, over the first mode",
+            np.abs(ops.gram(R, KR) / weight).max() / stiffness,
+            1e-6,
+        ),
+    ]
+
+
+def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> list[Row]:
+    ops = connection.ops
+    M = ops.gram(basis.Psi, ops.apply_M(basis.Psi))
+    K = ops.gram(basis.Psi, ops.apply_K(basis.Psi))
+    scale = 1 / np.sqrt(np.diag(M))
+    lam = np.linalg.eigvalsh(scale[:, None] * (0.5 * (M + M.T)) * scale)
+    off = K[: connection.boundary.size, connection.boundary.size :]
+    unit = np.sqrt(np.outer(np.diag(K)[: off.shape[0]], np.diag(K)[off.shape[0] :]))
+    return [
+        row("asymmetry of projected K and M", max(_asymmetry(K), _asymmetry(M)), 1e-10),
+        row("constraint against normal modes in K", np.abs(off / unit).max(initial=0.0), 1e-8),
+        row("smallest eigenvalue of the scaled mass", lam[0], 1e-13, above=True),
+        row("condition of the scaled mass", lam[-1] / max(lam[0], 1e-300), 1e13),
+        row("mass-normalised shapes", np.abs(body.M - np.eye(body.n_modes)).max(initial=0.0), 1e-8),
+        row("lowest elastic frequency [Hz]", body.omega[0] / (2 * np.pi), 0.0, above=True),
+    ]
+
+
+def _asymmetry(A: Array) -> float:
+    scale = np.sqrt(np.abs(np.diag(A)))
+    scale[scale == 0] = 1.0
+    return float(np.abs((A - A.T) / np.outer(scale, scale)).max())
+
+
+def _effective_mass(body: FlexibleBody, fixed: str) -> list[Row]:
+    """Share of the mass that the kept modes carry when the support shakes; for information."""
+    V = body.modes(fixed=(fixed,))[1]
+    M, _ = body.full_matrices()
+    participation = V.T @ M[:, :3]
+    share = (participation**2).sum(axis=0) / body.mass
+    return [
+        Row(f"{fixed} held: effective mass along {axis}", float(value), "information", True)
+        for axis, value in zip("xyz", share, strict=True)
+    ]

@@ -1,0 +1,65 @@
+"""Files are written whole or not at all."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO
+
+from rom.errors import ConfigError, ResourceError
+
+
+def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file through a temporary one in the same folder, then rename.
+
+    Args:
+        path: final name; a file of that name is replaced only by a complete new one.
+        write: gets the open binary file.
+
+    Raises:
+        ConfigError: if the folder does not exist or may not be written, or the name is a folder.
+        ResourceError: if the disk is full.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise ConfigError(f"{path} is a folder; a file name is needed.")
+    if not path.parent.is_dir():
+        raise ConfigError(f"the folder {path.parent} does not exist.", hint="Make it first.")
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    except PermissionError as error:
+        raise ConfigError(f"the folder {path.parent} is not writable.") from error
+    except OSError as error:
+        raise ResourceError(f"{path} cannot be written: {error.strerror}.") from error
+    try:
+        _fill(handle, write)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise ResourceError(
+            f"{path} was not written: {error.strerror}.", hint="Nothing was left behind."
+        ) from error
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _fill(handle: int, write: Callable[[IO[bytes]], object]) -> None:
+    with os.fdopen(handle, "wb") as file:
+        write(file)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

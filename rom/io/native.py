@@ -1,0 +1,280 @@
+"""The body file: one ``.npz`` without pickle, with a manifest that says what is inside.
+
+The manifest is a JSON text stored as bytes: schema and version, units, names, provenance,
+certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
+"""
+
+import hashlib
+import json
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+from rom.body.flexible import FlexibleBody, Marker, Surface
+from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
+from rom.io.files import write_whole
+from rom.model import Array, Report, Row
+from rom.units import SYSTEMS
+
+SCHEMA = "rom-body"
+VERSION = (1, 0)  # a new major number breaks readers, a new minor number only adds
+LIMIT = 4 * 1024**3  # bytes a body may have in memory before reading is refused
+FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
+
+
+def save(body: FlexibleBody, path: str | Path) -> Path:
+    """Write a flexible body, whole or not at all.
+
+    Args:
+        body: what to write.
+        path: file name, usually ending in ``.rom.npz``.
+
+    Raises:
+        ConfigError: if the folder is missing or not writable.
+        QualityGateError: if an array holds a number that is not finite.
+        ResourceError: if the disk is full.
+    """
+    arrays = _arrays(body)
+    for name, A in arrays.items():
+        if not np.isfinite(A).all():
+            raise QualityGateError(
+                f"{name} of body {body.name!r} is not finite; nothing was written."
+            )
+    manifest = _manifest(body) | {"sha256": {name: _digest(A) for name, A in arrays.items()}}
+    text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
+
+    def write(file: Any) -> None:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+            for name, A in {"manifest": text, **arrays}.items():
+                # a fixed date: the same body gives the same bytes
+                info = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+                with archive.open(info, "w", force_zip64=True) as member:
+                    npy.write_array(member, np.ascontiguousarray(A), allow_pickle=False)
+
+    write_whole(path, write)
+    return Path(path)
+
+
+def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
+    """Read a flexible body.
+
+    Args:
+        path: file written by `save`.
+        limit: bytes the arrays may take in memory.
+
+    Raises:
+        FileFormatError: if the file is missing, cut, changed, or no body file.
+        UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
+        QualityGateError: if the numbers are not those of a body.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError("there is no such file.", where=str(path))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _refuse_oversize(archive, path, limit)
+            manifest = _read_manifest(archive, path)
+            arrays = {n: _read(archive, n, path) for n in sorted(_digests(manifest, path))}
+    except (
+        zipfile.BadZipFile,
+        OSError,
+        EOFError,
+        KeyError,
+        RuntimeError,
+        NotImplementedError,
+    ) as e:
+        raise FileFormatError(
+            f"this is not a complete body file ({e}).",
+            where=str(path),
+            hint="It may have been cut in a transfer; write or copy it again.",
+        ) from e
+    for name, A in arrays.items():
+        if manifest["sha256"][name] != _digest(A):
+            raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
+        if not np.isfinite(A).all():
+            raise QualityGateError(f"{name} holds a number that is not finite.", where=str(path))
+    try:
+        body = _body(manifest, arrays)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise FileFormatError(
+            f"the manifest lacks or misstates {error}.", where=str(path)
+        ) from error
+    _verify(body, path)
+    return body
+
+
+def _arrays(body: FlexibleBody) -> dict[str, Array]:
+    arrays = {name: getattr(body, name) for name in FIELDS}
+    arrays["mass"] = np.array(body.mass)
+    for name, A in body.K_geo.items():
+        arrays[f"K_geo/{name}"] = A
+    for i, marker in enumerate(body.markers.values()):
+        for part in ("point", "translation", "rotation", "hold"):
+            arrays[f"marker/{i}/{part}"] = getattr(marker, part)
+    if body.surface is not None:
+        for part in ("points", "triangles", "shape"):
+            arrays[f"surface/{part}"] = getattr(body.surface, part)
+    return {
+        n: np.asarray(A, dtype=np.int64 if A.dtype.kind == "i" else float)
+        for n, A in arrays.items()
+    }
+
+
+def _manifest(body: FlexibleBody) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "version": list(VERSION),
+        "name": body.name,
+        "units": body.units,
+        "reference": body.reference,
+        "labels": list(body.labels),
+        "markers": [{"name": m.name, "kind": m.kind} for m in body.markers.values()],
+        "geometric_stiffness": list(body.K_geo),
+        "surface": body.surface is not None,
+        "provenance": body.provenance,
+        "certificate": None if body.certificate is None else asdict(body.certificate),
+    }
+
+
+def _body(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
+    markers = {
+        m["name"]: Marker(
+            name=m["name"],
+            kind=m["kind"],
+            **{p: arrays[f"marker/{i}/{p}"] for p in ("point", "translation", "rotation", "hold")},
+        )
+        for i, m in enumerate(manifest["markers"])
+    }
+    parts = ("points", "triangles", "shape")
+    surface = Surface(*(arrays[f"surface/{p}"] for p in parts)) if manifest["surface"] else None
+    report = manifest["certificate"]
+    if report is not None:
+        report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
+    return FlexibleBody(
+        name=manifest["name"],
+        mass=float(arrays["mass"]),
+        **{name: arrays[name] for name in FIELDS},
+        K_geo={name: arrays[f"K_geo/{name}"] for name in manifest["geometric_stiffness"]},
+        markers=markers,
+        surface=surface,
+        labels=tuple(manifest["labels"]),
+        reference=manifest["reference"],
+        units=manifest["units"],
+        provenance=manifest["provenance"],
+        certificate=report,
+    )
+
+
+def _digest(A: Array) -> str:
+    A = np.ascontiguousarray(A)
+    return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
+
+
+def _refuse_oversize(archive: zipfile.ZipFile, path: Path, limit: int) -> None:
+    total = sum(info.file_size for info in archive.infolist())
+    if total > limit:
+        raise UnsafeFileError(
+            f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
+            where=str(path),
+            hint="If it is yours, pass a larger limit to load.",
+        )
+
+
+def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
+    """One array; the header is compared with the size of the member before memory is taken."""
+    info = archive.getinfo(f"{name}.npy")
+    try:
+        with archive.open(info) as member:
+            version = npy.read_magic(member)
+            read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+            shape, fortran, dtype = read(member)
+    except ValueError as error:
+        raise FileFormatError(
+            f"the array {name!r} has a broken header.", where=str(path)
+        ) from error
+    if dtype.str not in ("<f8", "<i8", "|u1"):
+        raise UnsafeFileError(
+            f"the array {name!r} has the type {dtype.str}; a body file holds 8-byte numbers.",
+            where=str(path),
+        )
+    n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
+    if fortran or n_bytes > info.file_size:
+        raise UnsafeFileError(
+            f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}.", where=str(path)
+        )
+    with archive.open(info) as member:
+        try:
+            return npy.read_array(member, allow_pickle=False)
+        except ValueError as error:
+            raise FileFormatError(
+                f"the array {name!r} is cut: {error}.", where=str(path)
+            ) from error
+
+
+def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
+    if "manifest.npy" not in archive.namelist():
+        raise FileFormatError(
+            "this archive is not a body file: it has no manifest.", where=str(path)
+        )
+    try:
+        manifest = json.loads(_read(archive, "manifest", path).tobytes())
+        schema, (major, _) = manifest["schema"], manifest["version"]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
+    if schema != SCHEMA or major != VERSION[0]:
+        raise FileFormatError(
+            f"the file has the schema {schema!r} {manifest['version']}; "
+            f"this program reads {SCHEMA!r} {list(VERSION)}.",
+            where=str(path),
+            hint="Newer files need a newer program.",
+        )
+    if manifest.get("units") not in SYSTEMS:
+        raise FileFormatError(
+            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}.",
+            where=str(path),
+        )
+    return manifest
+
+
+def _digests(manifest: dict[str, Any], path: Path) -> dict[str, str]:
+    digests = manifest.get("sha256")
+    if not isinstance(digests, dict) or not set(FIELDS) <= set(digests):
+        raise FileFormatError("the manifest does not list the arrays of a body.", where=str(path))
+    return digests
+
+
+def _verify(body: FlexibleBody, path: Path) -> None:
+    """Shapes that belong together and matrices a body can have."""
+    r = body.K.shape[0] if body.K.ndim == 2 else -1
+    shapes = {
+        "first_moment": (3,), "inertia": (3, 3), "S": (3, r), "Ibar_kl": (3, 3, r),
+        "S_kl": (3, 3, r, r), "K": (r, r), "D": (r, r), "omega": (r,),
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        if getattr(body, name).shape != shape:
+            raise FileFormatError(
+                f"{name} has the shape {getattr(body, name).shape}, expected {shape}.",
+                where=str(path),
+            )
+    for m in body.markers.values():
+        parts = (m.point.shape, m.translation.shape, m.rotation.shape, m.hold.shape[1:])
+        if parts != ((3,), (3, r), (3, r), (6 + r,)):
+            raise FileFormatError(
+                f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
+            )
+    if body.surface is not None:
+        n = body.surface.points.shape[0]
+        triangles = body.surface.triangles
+        if body.surface.shape.shape != (3 * n, r) or not (
+            triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < n)
+        ):
+            raise FileFormatError("the surface does not fit the body.", where=str(path))
+    for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
+        if np.abs(A - A.T).max(initial=0.0) > 1e-10 * np.abs(A).max(initial=1e-300):
+            raise QualityGateError(f"{name} is not symmetric.", where=str(path))
+    if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):
+        raise QualityGateError("the mass is not positive definite.", where=str(path))

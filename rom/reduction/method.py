@@ -1,0 +1,72 @@
+"""Reduction methods as small records: what `rom.reduce` is asked to do."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rom.eigen import Held, Operators
+from rom.errors import ConfigError
+from rom.model import Array, Basis, Index
+from rom.reduction.fixed_interface import constraint_modes
+
+FIRST_BATCH = 16  # modes computed first when a frequency limit is given
+
+
+@dataclass(frozen=True, slots=True)
+class CraigBampton:
+    """Constraint modes of the interface coordinates and fixed-interface normal modes.
+
+    Attributes:
+        n_modes: number of fixed-interface modes.
+        f_max: alternatively, keep all fixed-interface modes up to this frequency [Hz].
+
+    Source:
+        Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
+    """
+
+    n_modes: int | None = None
+    f_max: float | None = None
+
+    def __post_init__(self):
+        if (self.n_modes is None) == (self.f_max is None):
+            raise ConfigError("CraigBampton needs either n_modes or f_max.")
+        if self.n_modes is not None and (
+            isinstance(self.n_modes, bool) or int(self.n_modes) != self.n_modes or self.n_modes < 0
+        ):
+            raise ConfigError(f"n_modes = {self.n_modes!r} is not a number of modes (0, 1, 2, …).")
+        if self.f_max is not None and not (np.isfinite(self.f_max) and self.f_max > 0):
+            raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates; boundary columns first.
+
+        Raises:
+            ConfigError: without any interface.
+            InterfaceError: if the interfaces leave a rigid motion free.
+            ModesMissedError: if the inertia count says that a mode was skipped.
+        """
+        if boundary.size == 0:
+            raise ConfigError(
+                "Craig-Bampton holds the interfaces of the body, and none is given.",
+                hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
+            )
+        held = ops.hold(boundary)
+        Psi_b = constraint_modes(ops, held, boundary)
+        omega, Phi = self._normal_modes(ops, held)
+        normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
+        return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal))
+
+    def _normal_modes(self, ops: Operators, held: Held) -> tuple[Array, Array]:
+        if self.n_modes is not None:
+            if self.n_modes > held.n_free:
+                raise ConfigError(
+                    f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
+                )
+            return ops.modes(held, int(self.n_modes))
+        m = min(FIRST_BATCH, held.n_free)
+        omega, Phi = ops.modes(held, m)
+        while omega.size and omega[-1] <= 2 * np.pi * self.f_max and m < held.n_free:
+            m = min(2 * m, held.n_free)
+            omega, Phi = ops.modes(held, m)
+        keep = int(np.searchsorted(omega, 2 * np.pi * self.f_max, side="right"))
+        return omega[:keep], Phi[:, :keep]

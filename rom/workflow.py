@@ -1,0 +1,146 @@
+"""The short road: from a finite element model to modes and to a certified flexible body."""
+
+import logging
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom.attachment import added_mass
+from rom.body.damping import ModalDamping, Rayleigh, damped
+from rom.body.flexible import FlexibleBody
+from rom.body.projection import elastic_part, flexible_body
+from rom.certificate import certify_body
+from rom.eigen import Operators, rigid_motions
+from rom.errors import ConfigError
+from rom.model import FEModel, Modes
+from rom.reduction.interface import connect
+from rom.reduction.method import CraigBampton
+from rom.scipy_operators import SciPyOperators
+
+log = logging.getLogger("rom")
+
+
+def mesh_operators(model: FEModel) -> Operators:
+    """The operator verbs on the finite elements of a model, attachments left out."""
+    if model.operators is not None:
+        return model.operators
+    return SciPyOperators(model.K, model.M, rigid_motions(model.points))
+
+
+def operators(model: FEModel) -> Operators:
+    """The operator verbs on a model with everything it carries."""
+    ops = mesh_operators(model)
+    dM = added_mass(model, ops.first, ops.n_local)
+    return ops if dM is None else ops.plus_mass(dM)
+
+
+def modes(
+    model: FEModel,
+    m: int,
+    *,
+    fixed: tuple[str, ...] = (),
+    interfaces: dict[str, Any] | None = None,
+) -> Modes:
+    """Lowest natural modes of the full model.
+
+    Args:
+        model: the body.
+        m: number of modes; without support the six rigid motions come first and count.
+        fixed: names of the interfaces held.
+        interfaces: {name: kind} to give interfaces the kind they have in a reduced body, so that
+            like is compared with like; an interface that is only held keeps all its dofs.
+
+    Raises:
+        InterfaceError: if an interface is unknown.
+        ConfigError: if m is not a positive number of modes.
+        ModesMissedError: if the inertia count says that a mode was skipped.
+    """
+    if isinstance(m, bool) or int(m) != m or m < 1:
+        raise ConfigError(f"m = {m!r} is not a number of modes (1, 2, …).")
+    fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
+    kinds = dict(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
+    connection = connect(operators(model), model, kinds)
+    held = connection.held(fixed)
+    omega, Phi = connection.ops.modes(held, int(m))
+    residual = _residual(connection.ops, held, omega, Phi)
+    return Modes(omega, connection.ops.expand(Phi), residual)
+
+
+def _residual(ops: Operators, held: np.ndarray, omega: np.ndarray, Phi: np.ndarray) -> np.ndarray:
+    """norm(K phi - lambda M phi) / (lambda norm(M phi)) on the free dofs."""
+    free = ~np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
+    inertia = ops.apply_M(Phi)
+    rest = (ops.apply_K(Phi) - inertia * omega**2) * free[:, None]
+    inertia = inertia * free[:, None]
+    scale = np.maximum(omega, omega[omega > 0].min(initial=np.inf)) ** 2
+    scale[~np.isfinite(scale)] = 1.0
+    norms = [np.sqrt(np.diag(ops.gram(X, X))) for X in (rest, inertia)]
+    return norms[0] / (scale * norms[1])
+
+
+def reduce(
+    model: FEModel,
+    *,
+    method: CraigBampton,
+    interfaces: dict[str, Any],
+    reference: Any = "mean-axis",
+    damping: Rayleigh | ModalDamping | None = None,
+    name: str = "body",
+    certify: bool = True,
+) -> FlexibleBody:
+    """A flexible body that stands for the full model, with the evidence for it.
+
+    Args:
+        model: the full model, free-free.
+        method: how to reduce, for example ``CraigBampton(n_modes=20)``.
+        interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3".
+        reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
+        damping: structural damping; none if not given.
+        name: name of the body.
+        certify: compare with the full model; costs one more factorisation per support.
+
+    Returns:
+        FlexibleBody; its ``certificate`` tells how far to trust it.
+
+    Raises:
+        InterfaceError, ConfigError: for a wrong interface, kind, method or reference.
+        ModesMissedError: if the inertia count says that a mode was skipped.
+    """
+    clock = perf_counter()
+    bare, ops = mesh_operators(model), operators(model)
+    connection = connect(ops, model, interfaces)
+    say = log.info if ops.first == 0 else log.debug
+    say("reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)
+    basis = method.basis(connection.ops, connection.boundary, connection.labels)
+    Psi = connection.ops.expand(basis.Psi)
+    elastic = elastic_part(ops, Psi)
+    body = flexible_body(
+        model,
+        bare,
+        Psi,
+        elastic,
+        kinds=connection.kinds,
+        name=name,
+        provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
+    ).with_reference(reference)
+    if damping is not None:
+        body = damped(body, damping)
+    body.provenance["seconds to reduce"] = round(perf_counter() - clock, 3)
+    if not certify:
+        return body
+    say("compare the reduced body with the full model")
+    certificate, comparison = certify_body(connection, ops, body, basis, elastic)
+    return replace(
+        body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
+    )
+
+
+def _described(method: CraigBampton, basis: Any, n: int) -> dict[str, Any]:
+    return {
+        "method": repr(method),
+        "full dofs": n,
+        "columns": list(basis.labels),
+        "fixed-interface frequencies [Hz]": (basis.omega / (2 * np.pi)).tolist(),
+    }
