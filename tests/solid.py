@@ -43,9 +43,7 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
     points = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1).T
     number = np.arange(points.shape[0]).reshape(cells + 1)
     steps = ((CORNERS + 1) / 2).astype(int)
-    nodes = np.array(
-        [[number[tuple(np.array(c) + s)] for s in steps] for c in np.ndindex(*cells)]
-    )
+    nodes = np.array([[number[tuple(np.array(c) + s)] for s in steps] for c in np.ndindex(*cells)])
     K_e, M_e = brick(size / cells, material)
     dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
     K = _assemble(dofs, K_e, 3 * len(points))

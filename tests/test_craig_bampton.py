@@ -96,7 +96,7 @@ def test_without_reference_conditions_the_modes_are_free_free(m, omega):
 def test_conditions_on_reduced_coordinates_solve_that_boundary_problem(held, m, omega, limit):
     """Proposition 3: deleting boundary columns is the same as supporting the beam."""
     found = reduced_frequencies(m, held)[0]
-    assert_allclose(found, omega, rtol=1e-6)
+    assert_allclose(found, omega, rtol=2e-6)  # the table has six digits
     assert found > limit - 1e-6
 
 

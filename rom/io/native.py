@@ -9,6 +9,7 @@ import json
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -192,7 +193,7 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
             version = npy.read_magic(member)
             read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
             shape, fortran, dtype = read(member)
-    except ValueError as error:
+    except (ValueError, SyntaxError, TypeError, TokenError) as error:
         raise FileFormatError(
             f"the array {name!r} has a broken header.", where=str(path)
         ) from error
