@@ -119,7 +119,7 @@ def test_a_file_that_claims_terabytes_is_refused_before_memory_is_taken(file, tm
     path = rewritten(file, tmp_path / "x.npz", lambda n, d: huge if n == "K.npy" else d)
     with pytest.raises((UnsafeFileError, FileFormatError)):
         rom.load(path)
-    with pytest.raises(UnsafeFileError, match="above the limit of 0.00 GB"):
+    with pytest.raises(UnsafeFileError, match="above the limit of 0"):
         rom.load(file, limit=1000)
 
 

@@ -70,7 +70,7 @@ def test_more_modes_never_raise_a_frequency(model):
 
 @pytest.mark.parametrize("reference", ["root", "tip", "mean-axis", "free", ("root", "tip")])
 def test_the_frame_is_a_choice(body, reference):
-    """Whatever the reference condition, every supported frequency stays (A3 of the specification)."""
+    """Whatever the reference condition, every supported frequency stays."""
     other = body.with_reference(reference)
     for fixed in SUPPORTS:
         n = 12
@@ -108,7 +108,7 @@ def test_pins_keep_both_points_on_the_axis(body):
 
 
 def test_the_own_frequencies_depend_on_the_frame(body):
-    """Nodal frame: cantilever; mean-axis frame: free-free. The supported body shows one resonance."""
+    """Nodal frame: cantilever; mean-axis frame: free-free; the supported body has one answer."""
     assert_allclose(body.omega[:2] / (2 * np.pi), body.frequencies(2, fixed=("root",)), rtol=1e-9)
     free = body.with_reference("free")
     assert_allclose(free.omega[:4] / (2 * np.pi), body.frequencies(10)[6:], rtol=1e-8)
@@ -263,7 +263,7 @@ def test_messages_for_wrong_methods_and_attachments(model):
         rom.CraigBampton()
     with pytest.raises(ConfigError, match="n_modes = -1"):
         rom.CraigBampton(-1)
-    with pytest.raises(ConfigError, match="only .* dofs are off the interfaces"):
+    with pytest.raises(ConfigError, match="dofs are off the interfaces"):
         rom.reduce(model, method=rom.CraigBampton(10**6), interfaces=KINDS)
     with pytest.raises(ConfigError, match="m = 0 is not a number of modes"):
         rom.modes(model, 0)
@@ -283,7 +283,7 @@ def test_two_bodies_that_are_not_connected_are_refused(model):
     two = rom.FEModel(
         block_diag([model.K, model.K], "csr"),
         block_diag([model.M, model.M], "csr"),
-        np.vstack([model.points, model.points + [0.0, 5.0, 0.0]]),
+        np.vstack([model.points, model.points + np.array([0.0, 5.0, 0.0])]),
         model.interfaces,
     )
     assert 6 * n > 300
