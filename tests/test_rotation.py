@@ -1,12 +1,13 @@
 """The sign conventions, against the matrix exponential."""
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
 from rom import rotation
-import itertools
 
 
 @pytest.fixture

@@ -1,0 +1,117 @@
+"""Benchmarks: ratios measured in one run, so that the speed of the machine cancels.
+
+Each benchmark is a function that yields figures; ``BENCHMARKS`` lists them, ``rom bench`` runs them.
+"""
+
+import resource
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from rom.errors import ConfigError
+from rom.model import Material
+from rom.reduction.interface import connect
+from rom.reduction.method import CraigBampton
+from rom.workflow import operators, reduce
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One measured number.
+
+    Attributes:
+        benchmark: name of the benchmark.
+        case: what was run.
+        quantity: what was measured.
+        value: the number.
+        unit: its unit; "" for a ratio.
+        aim: what we want it to be, in words; "" when it is for information.
+    """
+
+    benchmark: str
+    case: str
+    quantity: str
+    value: float
+    unit: str = ""
+    aim: str = ""
+
+
+def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
+    """A whole reduction against the bare MUMPS factorisation of the same matrix.
+
+    Two rbe2 interfaces and 20 fixed-interface modes of a beam of quadratic tetrahedra.
+
+    Args:
+        sizes: numbers of dofs aimed at; the meshes come close.
+    """
+    from rom.fe import model as read_model
+
+    for size in sizes:
+        model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
+        connection = connect(operators(model), model, KINDS)
+        bare = _seconds(lambda c=connection: c.ops.hold(c.boundary))
+        whole = _seconds(
+            lambda m=model: reduce(
+                m, method=CraigBampton(20), interfaces=KINDS, reference="root", certify=False
+            )
+        )
+        case = f"{model.n_dofs} dofs"
+        yield Figure("reduction", case, "factorisation of K_ii", bare, "s")
+        yield Figure("reduction", case, "whole reduction", whole, "s")
+        yield Figure("reduction", case, "whole over factorisation", whole / bare, "", "below 3")
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+        yield Figure("reduction", case, "peak memory of the process", peak, "GiB", "below 12")
+
+
+def large_reduction() -> Iterator[Figure]:
+    """The same at 300 000 dofs, in one process."""
+    yield from reduction((300e3,))
+
+
+BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
+    "reduction": reduction,
+    "large-reduction": large_reduction,
+}
+
+
+def run(names: tuple[str, ...] = ()) -> Iterator[Figure]:
+    """Run benchmarks by name; all of them when no name is given.
+
+    Raises:
+        ConfigError: listing the names that exist.
+    """
+    for name in names or tuple(BENCHMARKS):
+        if name not in BENCHMARKS:
+            raise ConfigError(f"there is no benchmark {name!r}; there are {sorted(BENCHMARKS)}.")
+        yield from BENCHMARKS[name]()
+
+
+def geometry(name: str) -> Path:
+    """Path of a geometry that comes with the source tree.
+
+    Raises:
+        ConfigError: if the package was installed without it.
+    """
+    path = Path(__file__).parents[1] / "meshes" / f"{name}.geo"
+    if not path.is_file():
+        raise ConfigError(
+            f"{path} does not exist: benchmarks need the source tree.", hint="Clone the project."
+        )
+    return path
+
+
+def _beam(n_dofs: float) -> dict[str, float]:
+    """A stocky beam 1 m x 0.2 m x 0.1 m with about that many dofs of quadratic tetrahedra."""
+    lc = (0.02 / (n_dofs / 36e3)) ** (1 / 3) * 0.0737
+    return {"L": 1.0, "b": 0.2, "h": 0.1, "lc": lc}
+
+
+def _seconds(work: Callable[[], Any]) -> float:
+    start = perf_counter()
+    work()
+    return perf_counter() - start
