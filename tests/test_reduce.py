@@ -155,6 +155,19 @@ def test_rbe2_surface_stays_rigid_and_rbe3_surface_follows_its_mean(model):
     assert ops.n == model.n_dofs
 
 
+def test_the_mean_motion_is_weighted_by_area(model):
+    """u_x = z^2 on three rows of cells: the mean over the area, not over the nodes."""
+    tip = model.interfaces["tip"]
+    z = tip.points[:, 2] - tip.origin[2]
+    u = np.zeros((z.size, 3))
+    u[:, 0] = z**2
+    rows = np.unique(z.round(12)) ** 2
+    trapezoid = (rows.sum() - 0.5 * (rows[0] + rows[-1])) / (rows.size - 1)
+    motion = mean_motion(tip) @ u.ravel()
+    assert_allclose(motion, [trapezoid, 0, 0, 0, 0, 0], atol=1e-15)
+    assert abs(trapezoid - rows.mean()) > 0.1 * trapezoid
+
+
 def test_holding_the_mean_motion_equals_the_constrained_full_model(model):
     """rbe3 held: the full model with C u = 0, solved in the null space of C."""
     tip = model.interfaces["tip"]
@@ -228,6 +241,8 @@ def test_damping_follows_the_frequencies(body):
     # internal damping acts on the deformation, which no frame changes
     other = rayleigh.with_reference("mean-axis").with_reference("root")
     assert_allclose(other.D, rayleigh.D, atol=1e-7 * rayleigh.D.max())
+    stiff = damped(body, rom.Rayleigh(beta=1e-6)).with_reference("mean-axis")
+    assert_allclose(stiff.D, 1e-6 * stiff.K, atol=1e-9 * stiff.D.max())
     with pytest.raises(ConfigError, match="negative"):
         damped(body, rom.ModalDamping(-0.1))
     with pytest.raises(ConfigError, match="2 ratios for 36"):
