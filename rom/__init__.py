@@ -11,6 +11,7 @@ from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.flexible import FlexibleBody
 from rom.checks import check
 from rom.errors import RomError
+from rom.io.export import export
 from rom.io.native import load, save
 from rom.model import (
     Attachment,
@@ -46,6 +47,7 @@ __all__ = [
     "SurfaceMesh",
     "check",
     "craig_bampton",
+    "export",
     "load",
     "modes",
     "reduce",
