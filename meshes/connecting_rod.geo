@@ -3,7 +3,7 @@
 // Volume "body"; surfaces "pin_a" (bore of the big eye) and "pin_b" (bore of the small eye).
 SetFactory("OpenCASCADE");
 DefineConstant[
-  L = {0.15, Name "L"},              // distance of the bores
+  L = {0.20, Name "L"},              // distance of the bores
   d_a = {0.030, Name "d_a"},         // bore of the big eye
   D_a = {0.046, Name "D_a"},         // outer diameter of the big eye
   t_a = {0.020, Name "t_a"},         // thickness of the big eye, along z
@@ -16,8 +16,29 @@ DefineConstant[
   t_web = {0.004, Name "t_web"},     // thickness of the web of the I
   t_flange = {0.003, Name "t_flange"}, // thickness of the flanges of the I
   R = {0.006, Name "R"},             // fillets between shank and eyes, and ends of the pockets
-  lc = {0.0045, Name "lc"}           // element size
+  lc = {0.0055, Name "lc"}           // element size
 ];
+If (d_a >= D_a || d_b >= D_b)
+  Error("an eye needs a wall: d_a = %g < D_a = %g and d_b = %g < D_b = %g", d_a, D_a, d_b, D_b);
+  Abort;
+EndIf
+If (h_a >= D_a || h_b >= D_b)
+  Error("the shank must be lower than the eyes: h_a = %g < D_a = %g, h_b = %g < D_b = %g",
+    h_a, D_a, h_b, D_b);
+  Abort;
+EndIf
+If (t_web >= w || w > t_a || w > t_b)
+  Error("widths along z must be t_web = %g < w = %g <= t_a = %g, t_b = %g", t_web, w, t_a, t_b);
+  Abort;
+EndIf
+If (2 * t_flange >= h_a || 2 * t_flange >= h_b)
+  Error("flanges of %g leave no room for a web in h_a = %g, h_b = %g", t_flange, h_a, h_b);
+  Abort;
+EndIf
+If (L < D_a / 2 + D_b / 2 + 4 * R)
+  Error("L = %g leaves no shank between the eyes: it must exceed %g", L, D_a / 2 + D_b / 2 + 4 * R);
+  Abort;
+EndIf
 // Fillet arcs touch the straight edge of the shank and the circle of the eye: the centre of the arc
 // lies R beside the edge and D/2 + R from the eye. The edge falls from h_a/2 to h_b/2.
 slope = (h_b - h_a) / 2 / L;
@@ -98,5 +119,9 @@ Physical Surface("pin_a", 11) = Surface In BoundingBox{
   -d_a / 2 - e, -d_a / 2 - e, -t_a / 2 - e, d_a / 2 + e, d_a / 2 + e, t_a / 2 + e};
 Physical Surface("pin_b", 12) = Surface In BoundingBox{
   L - d_b / 2 - e, -d_b / 2 - e, -t_b / 2 - e, L + d_b / 2 + e, d_b / 2 + e, t_b / 2 + e};
-Mesh.MeshSizeMin = lc;
+// The two faces of the thin web get different meshes: the same mesh on both makes flat tetrahedra.
+lower = 0.8;
+MeshSize { PointsOf { Volume{body()}; } } = lc;
+MeshSize { Point In BoundingBox{-L, -D_a, -t_web / 2 - e, 2 * L, D_a, -t_web / 2 + e} } = lower * lc;
+Mesh.MeshSizeMin = lower * lc;
 Mesh.MeshSizeMax = lc;

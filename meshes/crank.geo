@@ -12,6 +12,15 @@ DefineConstant[
   r_web = {0.022, Name "r_web"},         // radius of the web around the pin
   lc = {0.007, Name "lc"}                // element size
 ];
+If (d_shaft > 2 * R_web || d_pin > 2 * r_web)
+  Error("journals must lie within the web: d_shaft = %g <= 2 R_web = %g, d_pin = %g <= 2 r_web = %g",
+    d_shaft, 2 * R_web, d_pin, 2 * r_web);
+  Abort;
+EndIf
+If (Abs(R_web - r_web) >= r)
+  Error("the throw r = %g must exceed the difference of the web's radii %g and %g", r, R_web, r_web);
+  Abort;
+EndIf
 // The web is the hull of two discs: discs and the trapezium between their common tangents.
 Cylinder(1) = {0, 0, 0, 0, 0, -t_web, R_web};
 Cylinder(2) = {r, 0, 0, 0, 0, -t_web, r_web};

@@ -1,0 +1,143 @@
+"""Cell types of a solid mesh: node order, faces, and the Jacobian of the geometry.
+
+Node order is that of gmsh. Every node is the mean of the corners it is supported by, so that one
+table of corner sets gives reference coordinates, face nodes and shape functions.
+
+Source:
+    gmsh reference manual, section "Node ordering".
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from rom.model import Array
+
+TET_CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+TET_FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3))
+HEX_CORNERS = tuple((x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+HEX_FACES = ((0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7))
+HEX_EDGES = (
+    *((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3)),
+    *((2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
+)
+
+
+@dataclass(frozen=True)
+class CellType:
+    """One kind of cell.
+
+    Attributes:
+        name: e.g. "tet10".
+        shape: "tetrahedron" or "hexahedron".
+        degree: polynomial degree of the geometry.
+        corners: (n_corners, 3) reference coordinates of the corners.
+        faces: corner numbers of each face, seen from outside counter-clockwise.
+        supports: for each node the corners whose mean it is.
+    """
+
+    name: str
+    shape: str
+    degree: int
+    corners: tuple[tuple[int, ...], ...]
+    faces: tuple[tuple[int, ...], ...]
+    supports: tuple[tuple[int, ...], ...]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.supports)
+
+    @property
+    def n_corners(self) -> int:
+        """Number of corners; they come first among the nodes."""
+        return len(self.corners)
+
+    @property
+    def corners_per_face(self) -> int:
+        """Number of corners of a face."""
+        return len(self.faces[0])
+
+    @cached_property
+    def nodes(self) -> Array:
+        """(n_nodes, 3) reference coordinates."""
+        corners = np.array(self.corners, dtype=float)
+        return np.array([corners[list(s)].mean(axis=0) for s in self.supports])
+
+    @cached_property
+    def nodes_per_face(self) -> int:
+        """Number of nodes of a face."""
+        return sum(set(s) <= set(self.faces[0]) for s in self.supports)
+
+    @cached_property
+    def mirrored(self) -> tuple[int, ...]:
+        """Node order of the same cell seen in a mirror: swaps the sign of its volume."""
+        flipped = self.nodes[:, [1, 0, 2]]
+        return tuple(int(np.abs(self.nodes - x).sum(axis=1).argmin()) for x in flipped)
+
+    @cached_property
+    def _exponents(self) -> np.ndarray:
+        powers = np.array(list(product(range(self.degree + 1), repeat=3)))
+        return powers if self.shape == "hexahedron" else powers[powers.sum(axis=1) <= self.degree]
+
+    def gradients(self, at: Array) -> Array:
+        """(q, n_nodes, 3) reference gradients of the shape functions at (q, 3) points."""
+        e = self._exponents
+        coefficients = np.linalg.inv(_monomials(self.nodes, e))
+        return np.stack([_derivative(at, e, a) @ coefficients for a in range(3)], axis=-1)
+
+    @cached_property
+    def quadrature(self) -> Array:
+        """(q, 3) Gauss points, exact for the mass matrix of displacements of the same degree."""
+        x, _ = np.polynomial.legendre.leggauss(self.degree + 1)
+        points = np.array(list(product((x + 1) / 2, repeat=3)))
+        if self.shape == "hexahedron":
+            return points
+        u, v, w = points.T  # cube collapsed onto the tetrahedron
+        return np.column_stack([u, v * (1 - u), w * (1 - u) * (1 - v)])
+
+
+def _monomials(x: Array, exponents: np.ndarray) -> Array:
+    return np.prod(x[:, None, :] ** exponents, axis=2)
+
+
+def _derivative(x: Array, exponents: np.ndarray, axis: int) -> Array:
+    lowered = exponents.copy()
+    lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
+    return exponents[:, axis] * _monomials(x, lowered)
+
+
+def _alone(n: int) -> tuple[tuple[int, ...], ...]:
+    return tuple((i,) for i in range(n))
+
+
+_HEX27 = (*_alone(8), *HEX_EDGES, *HEX_FACES, tuple(range(8)))
+
+CELL_TYPES = {
+    kind.name: kind
+    for kind in (
+        CellType("tet4", "tetrahedron", 1, TET_CORNERS, TET_FACES, _alone(4)),
+        CellType("tet10", "tetrahedron", 2, TET_CORNERS, TET_FACES, (*_alone(4), *TET_EDGES)),
+        CellType("hex8", "hexahedron", 1, HEX_CORNERS, HEX_FACES, _alone(8)),
+        CellType("hex27", "hexahedron", 2, HEX_CORNERS, HEX_FACES, _HEX27),
+    )
+}
+
+
+def jacobians(x: Array, gradients: Array) -> Array:
+    """(m, q) determinants of the geometry map.
+
+    Args:
+        x: (m, k, 3) node coordinates of the cells [m].
+        gradients: (q, k, 3) reference gradients of the shape functions.
+    """
+    # one tangent vector per reference direction: (m, 3, q)
+    a, b, c = (np.einsum("mkx,qk->xmq", x, gradients[:, :, i], optimize=True) for i in range(3))
+    return (
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )

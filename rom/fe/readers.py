@@ -1,0 +1,70 @@
+"""The readers, by name; runs in the child process of `rom.fe.child`."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, FileFormatError, RomError
+
+GEOMETRIES = ("geo", "builder", "step")
+
+
+def read(request: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Read or make the mesh a request asks for.
+
+    Returns:
+        Arrays ``points``, ``cells``, ``regions``, ``cell_ids`` and ``facets 0``, ``facets 1``, ...;
+        notes ``cell_type``, ``region_names``, ``facet_names``, ``provenance``, ``warnings``.
+    """
+    try:
+        return _reader(request["reader"])(request)
+    except (RomError, MemoryError):
+        raise
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"reading this file needs {error.name}, which is not installed.",
+            hint=f"On Debian: apt-get install python3-{error.name}",
+        ) from error
+    except Exception as error:  # parsers raise whatever the broken line provokes
+        if request["reader"] in GEOMETRIES:
+            raise
+        raise FileFormatError(
+            f"is not a readable {request['reader']} file ({type(error).__name__}: {error})."
+        ) from error
+
+
+def _reader(name: str) -> Callable[[dict[str, Any]], tuple[dict, dict]]:
+    """The reading function; only its own libraries are loaded."""
+    if name == "abaqus":
+        from rom.fe import abaqus
+
+        return lambda request: abaqus.read(request["path"])
+    if name == "nastran":
+        from rom.fe import nastran
+
+        return lambda request: nastran.read(request["path"])
+    from rom.fe import gmsh_session
+
+    return gmsh_session.run
+
+
+def packed(
+    points: np.ndarray,
+    cells: np.ndarray,
+    cell_type: str,
+    regions: np.ndarray,
+    cell_ids: np.ndarray,
+    **notes: Any,
+) -> tuple[dict, dict]:
+    """Arrays and notes in the form of `read`; ``facets`` and ``region_names`` among the notes."""
+    facets = notes.pop("facets")
+    arrays = {
+        "points": np.asarray(points, dtype=float),
+        "cells": np.asarray(cells, dtype=np.int64),
+        "regions": np.asarray(regions, dtype=np.int64),
+        "cell_ids": np.asarray(cell_ids, dtype=np.int64),
+    }
+    for i, rows in enumerate(facets.values()):
+        arrays[f"facets {i}"] = np.asarray(rows, dtype=np.int64)
+    return arrays, notes | {"cell_type": cell_type, "facet_names": list(facets)}

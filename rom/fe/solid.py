@@ -1,0 +1,60 @@
+"""The record of a solid mesh: plain NumPy arrays, on one process."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rom.fe.elements import CELL_TYPES, CellType
+from rom.model import Array, Index
+
+SHOWN = 5  # culprits named in a message
+
+
+@dataclass(frozen=True, slots=True)
+class SolidMesh:
+    """A solid body cut into cells of one type.
+
+    Attributes:
+        points: (n, 3) node coordinates [m].
+        cells: (m, k) node numbers in gmsh order.
+        cell_type: "tet4", "tet10", "hex8" or "hex27".
+        regions: (m,) region number of each cell.
+        region_names: name of each region number.
+        facets: (f, kf) node numbers in gmsh order of the facets of each named surface; a facet may
+            belong to several surfaces.
+        provenance: where the mesh comes from: path, sha256, parameters, versions.
+        cell_ids: (m,) numbers of the cells in the file, for messages; None for 0, 1, 2, ...
+        warnings: what `rom.fe.validate.validate` found worth saying; None before it was asked.
+    """
+
+    points: Array
+    cells: Index
+    cell_type: str
+    regions: Index
+    region_names: dict[int, str]
+    facets: dict[str, Index]
+    provenance: dict[str, Any] = field(default_factory=dict)
+    cell_ids: Index | None = None
+    warnings: tuple[str, ...] | None = None
+
+    @property
+    def kind(self) -> CellType:
+        """Node order, faces and shape functions of the cells."""
+        return CELL_TYPES[self.cell_type]
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box [m]."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def corners(self) -> Index:
+        """(m, c) corner nodes of the cells."""
+        return self.cells[:, : self.kind.n_corners]
+
+
+def cell_names(mesh: SolidMesh, cells: Index) -> str:
+    """The numbers of the first few of some cells in their file, for messages."""
+    ids = cells if mesh.cell_ids is None else mesh.cell_ids[cells]
+    return ", ".join(map(str, ids[:SHOWN])) + (", ..." if len(ids) > SHOWN else "")

@@ -1,0 +1,380 @@
+"""Broken and hostile mesh files and geometries: the right class of error, the culprit named, fast.
+
+Each case writes one bad file. Several of them bring gmsh or dolfinx down when they are let near.
+"""
+
+import os
+import random
+import socket
+import time
+import warnings
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cells import blocks_of, solid, write_msh
+
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    MeshError,
+    RomError,
+    RomWarning,
+    TagError,
+    UnsafeFileError,
+)
+from rom.fe.mesh import read_mesh
+
+pytest.importorskip("gmsh", reason="gmsh is not installed")
+pytestmark = pytest.mark.fenicsx
+SECONDS = 10.0
+
+BOX = solid()
+BLOCKS, NAMES = blocks_of(BOX)
+GEO = """SetFactory("OpenCASCADE");
+Box(1) = {0, 0, 0, 1, 1, 1};
+Physical Volume("body", 1) = {1};
+Physical Surface("root", 11) = {1};
+Mesh.MeshSizeMin = 1; Mesh.MeshSizeMax = 1;
+"""
+
+
+def text(content):
+    return lambda path: path.write_bytes(
+        content if isinstance(content, bytes) else content.encode()
+    )
+
+
+def msh(points=BOX.points, blocks=BLOCKS, names=NAMES):
+    return lambda path: write_msh(path, points, blocks, names)
+
+
+def cut(fraction):
+    def make(path):
+        write_msh(path, BOX.points, BLOCKS, NAMES)
+        data = path.read_bytes()
+        path.write_bytes(data[: int(fraction * len(data))])
+
+    return make
+
+
+def zipped(path):
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("box.msh", "$MeshFormat")
+
+
+def replaced(old, new):
+    def make(path):
+        write_msh(path, BOX.points, BLOCKS, NAMES)
+        content = path.read_text()
+        assert old in content
+        path.write_text(content.replace(old, new, 1))
+
+    return make
+
+
+def cells(rows, kind="tet4"):
+    return [(kind, 1, 1, np.asarray(rows)), *BLOCKS[1:]]
+
+
+def two_bodies(apart, *, merged=()):
+    """A second box; the nodes `merged` of it are nodes of the first."""
+    number = np.arange(len(BOX.points)) + len(BOX.points)
+    for new, old in merged:
+        number[new] = old
+    points = np.vstack([BOX.points, BOX.points + apart])
+    return points, [("tet4", 1, 1, np.vstack([BOX.cells, number[BOX.cells]]))]
+
+
+def node_at(*x):
+    return int(np.flatnonzero((BOX.points == x).all(axis=1))[0])
+
+
+def moved(node, x):
+    points = BOX.points.copy()
+    points[node] = x
+    return points
+
+
+TIP, ORIGIN = node_at(3, 1, 1), node_at(0, 0, 0)
+EDGE = [(node_at(0, 0, z), node_at(3, 1, z)) for z in (0, 0.5, 1)]
+APART, POINT, HINGE = (
+    two_bodies((9.0, 0, 0)),
+    two_bodies((3.0, 1, 1), merged=[(ORIGIN, TIP)]),
+    two_bodies((3.0, 1, 0), merged=EDGE),
+)
+TOUCHING = two_bodies((3.0, 0, 0))
+FLAT = moved(BOX.cells[5, 3], BOX.points[BOX.cells[5, :3]].mean(axis=0))
+CURVED = solid("tet10")
+CURVED_BLOCKS = blocks_of(CURVED)[0]
+PULLED = CURVED.points.copy()
+PULLED[CURVED.cells[0, 4]] += 1.5 * (
+    CURVED.points[CURVED.cells[0, 8]] - CURVED.points[CURVED.cells[0, 4]]
+)
+DUPLICATE = np.vstack([BOX.cells, BOX.cells[7:8]])
+PIN = (2, 40, "pin")
+
+# name: (file name, maker, error, what the message must contain)
+FILES = {
+    "a folder": ("box.msh", lambda p: p.mkdir(), FileFormatError, "folder"),
+    "a socket": ("box.msh", lambda p: socket.socket(socket.AF_UNIX).bind(str(p)),
+                 FileFormatError, "no such file"),
+    "a pipe": ("box.msh", os.mkfifo, FileFormatError, "no such file"),
+    "missing": ("box.msh", lambda p: None, FileFormatError, "no such file"),
+    "unknown suffix": ("box.stl", text("solid"), ConfigError, "'.stl'"),
+    "empty msh": ("box.msh", text(""), FileFormatError, "$MeshFormat"),
+    "text renamed to msh": ("box.msh", text("hello\n"), UnsafeFileError, "$MeshFormat"),
+    "zip renamed to msh": ("box.msh", zipped, UnsafeFileError, "b'PK"),
+    "script renamed to msh": ("box.msh", text('SystemCall "touch pwned";\n'), UnsafeFileError,
+                              "SystemCall"),
+    "not UTF-8": ("box.msh", text(b"\xff\xfe$\x00M\x00"), UnsafeFileError, "xff"),
+    "bytes after the header": ("box.msh", text(b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n\xff\xfe\n"),
+                               FileFormatError, "cut"),
+    "unknown version": ("box.msh", replaced("2.2 0 8", "9.9 0 8"), FileFormatError, "9.9"),
+    "half": ("box.msh", cut(0.5), FileFormatError, "cut"),
+    "nearly whole": ("box.msh", cut(0.97), FileFormatError, "cut"),
+    "only a header": ("box.msh", cut(0.02), FileFormatError, "cut"),
+    "claims a billion nodes": ("box.msh", replaced("$Nodes\n36", "$Nodes\n999999999999"),
+                               FileFormatError, "box.msh"),
+    "claims more cells": ("box.msh", replaced("$Elements\n88", "$Elements\n99999"),
+                          FileFormatError, "box.msh"),
+    "letters for numbers": ("box.msh", replaced("1 0.0 0.0 0.0", "1 0.0 zero 0.0"),
+                            FileFormatError, "box.msh"),
+    "zip renamed to step": ("box.step", zipped, FileFormatError, "ISO-10303-21"),
+    "cut step": ("box.step", text("ISO-10303-21;\nHEADER;\n"), (FileFormatError, MeshError),
+                 "box.step"),
+    "not UTF-8 inp": ("box.inp", text(b"*NODE\n1, \xff\xfe\n"), FileFormatError,
+                      "UnicodeDecodeError"),
+    "empty inp": ("box.inp", text(""), MeshError, "no volume cells"),
+    "builder with a syntax error": ("box.py", text("def build(gmsh:\n"), FileFormatError, "line 1"),
+    "builder without build": ("box.py", text("x = 1\n"), FileFormatError, "build(gmsh"),
+    "builder that fails": ("box.py", text("def build(gmsh):\n    1 / 0\n"), MeshError,
+                           "box.py, line 2: division by zero"),
+    "builder that needs a value": ("box.py", text("def build(gmsh, lc):\n    pass\n"), ConfigError,
+                                   "'lc'"),
+    "builder that dies": ("box.py", text("import os\ndef build(gmsh):\n    os.abort()\n"),
+                          FileFormatError, "SIGABRT"),
+    "geo syntax error": ("box.geo", text(GEO + "Box(2) = {0, 0, 0\n"), FileFormatError, "line 6"),
+    "geo unknown variable": ("box.geo", text(GEO + "Box(2) = {q, 0, 0, 1, 1, 1};\n"),
+                             FileFormatError, "'q'"),
+    "geo that refuses": ("box.geo", text('Error("too thin");\n'), FileFormatError, "too thin"),
+    "geo without volume": ("box.geo", text("Point(1) = {0, 0, 0};\n"), MeshError, "no volume"),
+    "geo of zero size": ("box.geo", text(GEO.replace("1, 1, 1}", "1, 1, 0}")),
+                         (FileFormatError, MeshError), "box.geo"),
+    "geo without a last newline": ("box.geo", text(GEO + "Box(2) = {1, 0, 0, 1, 1, 1};"),
+                                   FileFormatError, "last line"),
+    "empty geo": ("box.geo", text("\n"), MeshError, "no volume"),
+    "geo with an empty surface": (
+        "box.geo",
+        text(GEO + 'Physical Surface("pin", 12) = Surface In BoundingBox{5, 5, 5, 6, 6, 6};\n'),
+        TagError, "physical surface 'pin' is empty",
+    ),
+}  # fmt: skip
+
+TAGS = {
+    "volume in two groups": (
+        "box.geo", text(GEO + 'Physical Volume("liner", 2) = {1};\n'),
+        TagError, "'body' and 'liner'",
+    ),
+    "volume in two groups, msh": (
+        "box.msh",
+        msh(blocks=[*BLOCKS, ("tet4", 2, 1, BOX.cells)], names=[*NAMES, (3, 2, "liner")]),
+        TagError, "'body' and 'liner'",
+    ),
+    "one of two bodies tagged": (
+        "box.geo", text(GEO + "Box(2) = {1, 0, 0, 1, 1, 1}; Coherence;\n"), TagError, "volume 2",
+    ),
+    "only surfaces tagged, geo": (
+        "box.geo", text(GEO.replace('Physical Volume("body", 1) = {1};', "")), TagError, "['root']",
+    ),
+    "only surfaces tagged, msh": (
+        "box.msh", msh(blocks=BLOCKS[1:], names=NAMES[1:]), MeshError, "['root', 'tip']",
+    ),
+    "one name on two tags": ("box.msh", msh(names=[*NAMES[:2], (2, 12, "root")]), TagError,
+                             "surface 11 and physical surface 12"),
+    "one name on two tags, geo": (
+        "box.geo", text(GEO + 'Physical Surface("root", 12) = {2};\n'),
+        FileFormatError, "surface 11",
+    ),
+    "one name on two dimensions": (
+        "box.geo", text(GEO + 'Physical Surface("body", 12) = {2};\n'), TagError,
+        "surface 12 and physical volume 1",
+    ),
+    "groups gmsh cannot tell apart": (
+        "box.msh",
+        msh(blocks=[BLOCKS[0], *(("tri3", tag, 5, rows) for _, tag, _, rows in BLOCKS[1:])]),
+        TagError, "share their elementary number",
+    ),
+    "declared and absent": ("box.msh", msh(names=[*NAMES, PIN]), TagError, "'pin' is empty"),
+    "facets of no cell": (
+        "box.msh", msh(blocks=[*BLOCKS, ("tri3", 40, 40, [[0, 1, TIP]])], names=[*NAMES, PIN]),
+        TagError, "1 of 1 facets of surface 'pin'",
+    ),
+    "facets of another type": (
+        "box.msh", msh(blocks=[*BLOCKS, ("quad4", 40, 40, [[0, 1, 2, 3]])], names=[*NAMES, PIN]),
+        TagError, "'pin' has 1 facets of 4 nodes",
+    ),
+}  # fmt: skip
+
+CELLS = {
+    "surface mesh": ("box.msh", msh(blocks=[("tri3", 1, 1, BLOCKS[1][3])], names=[(2, 1, "skin")]),
+                     MeshError, "no volume cells, only 8 facets"),
+    "not meshed": ("box.msh", msh(blocks=[], names=[]), MeshError, "not meshed"),
+    "mixed cells": ("box.msh", msh(blocks=[*BLOCKS, ("hex8", 1, 1, [range(8)])]), MeshError,
+                    "several types"),
+    "duplicate cell": ("box.msh", msh(blocks=cells(DUPLICATE)), MeshError, "cells 8, 73"),
+    "flat cell": ("box.msh", msh(FLAT), MeshError, "cells 6"),
+    "repeated node": ("box.msh", msh(blocks=cells([*BOX.cells, [0, 1, 1, 9]])), MeshError,
+                      "use a node twice: cells 73"),
+    "node beyond the end": ("box.msh", msh(blocks=cells([*BOX.cells, [0, 1, 2, 5000]])),
+                            FileFormatError, "5001"),
+    "negative node": ("box.msh", msh(blocks=cells([*BOX.cells, [0, 1, 2, -7]])), FileFormatError,
+                      "-6"),
+    "not a number": ("box.msh", msh(moved(9, [np.nan, 0, 0])), (FileFormatError, MeshError),
+                     "box.msh"),
+    "infinite": ("box.msh", msh(moved(9, [np.inf, 0, 0])), (FileFormatError, MeshError), "box.msh"),
+    "inverted middle node": ("box.msh", msh(PULLED, CURVED_BLOCKS), MeshError, "are inverted"),
+    "two bodies": ("box.msh", msh(*APART, NAMES[:1]), MeshError, "2 parts (72, 72 cells)"),
+    "joined at a point": ("box.msh", msh(*POINT, NAMES[:1]), MeshError, "in an edge or a point"),
+    "joined at an edge": ("box.msh", msh(*HINGE, NAMES[:1]), MeshError, "in an edge or a point"),
+    "not merged": ("box.msh", msh(*TOUCHING, NAMES[:1]), MeshError, "lie on nodes of others"),
+    "two bodies, geo": (
+        "box.geo", text(GEO + 'Box(2) = {1, 0, 0, 1, 1, 1}; Physical Volume("b", 2) = {2};\n'),
+        MeshError, "BooleanFragments",
+    ),
+}  # fmt: skip
+CASES = FILES | TAGS | CELLS
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_file_is_a_clear_error_within_seconds(case, tmp_path, monkeypatch, capfd):
+    name, make, error, culprit = CASES[case]
+    monkeypatch.chdir(tmp_path)
+    make(tmp_path / name)
+    start = time.perf_counter()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        with pytest.raises(error) as caught:
+            read_mesh(name)
+    assert time.perf_counter() - start < SECONDS
+    assert culprit in str(caught.value)
+    assert str(caught.value).startswith(name)
+    assert isinstance(caught.value, RomError) and caught.value.exit_code in (2, 3)
+    assert not Path("pwned").exists()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_script_beside_a_mesh_is_not_run(tmp_path):
+    """gmsh executes box.msh.opt when it opens box.msh."""
+    write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
+    (tmp_path / "box.msh.opt").write_text(f'SystemCall "touch {tmp_path}/pwned";\n')
+    assert len(read_mesh(tmp_path / "box.msh").cells) == 72
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_a_file_without_permission_is_named(tmp_path):
+    path = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
+    path.chmod(0)
+    if os.access(path, os.R_OK):  # root may read everything
+        assert len(read_mesh(path).cells) == 72
+        return
+    with pytest.raises(RomError, match=r"box\.msh"):
+        read_mesh(path)
+
+
+def test_names_with_blanks_and_umlauts_work(tmp_path):
+    folder = tmp_path / "Größe 1"
+    folder.mkdir()
+    names = [(3, 1, "Körper 1"), (2, 11, "root"), (2, 12, "tip")]
+    mesh = read_mesh(write_msh(folder / "Würfel a.msh", BOX.points, BLOCKS, names))
+    assert mesh.region_names == {1: "Körper 1"}
+
+
+def originals(folder):
+    """The box in ASCII 2.2, and through gmsh in binary 2.2 and both forms of 4.1."""
+    import gmsh
+
+    first = write_msh(folder / "a.msh", BOX.points, BLOCKS, NAMES)
+    made = [first]
+    gmsh.initialize([], False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.merge(str(first))
+        for version, binary in ((2.2, 1), (4.1, 0), (4.1, 1)):
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            made.append(folder / f"{version}-{binary}.msh")
+            gmsh.write(str(made[-1]))
+    finally:
+        gmsh.finalize()
+    return made
+
+
+def mutant(data, rng):
+    data = bytearray(data)
+    place = rng.randrange(len(data))
+    kind = rng.choice(("flip", "burst", "insert", "cut"))
+    if kind == "flip":
+        data[place] ^= 1 << rng.randrange(8)
+    elif kind == "burst":
+        data[place : place + 8] = rng.randbytes(8)
+    elif kind == "insert":
+        data[place:place] = rng.randbytes(rng.randrange(1, 9))
+    else:
+        del data[place:]
+    return bytes(data)
+
+
+@pytest.mark.slow
+def test_damaged_files_never_crash_or_hang(tmp_path):
+    """60 mutants; gmsh 4.8 dies of SIGSEGV on about one binary file in twenty.
+
+    A changed coordinate is still a mesh: then the result must be a valid one of the same size.
+    """
+    rng = random.Random(20)
+    made, refused = originals(tmp_path), 0
+    for number in range(60):
+        path = tmp_path / "mutant.msh"
+        path.write_bytes(mutant(made[number % 4].read_bytes(), rng))
+        start = time.perf_counter()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RomWarning)
+                mesh = read_mesh(path)
+        except RomError as error:
+            refused += 1
+            assert "mutant.msh" in str(error)
+        else:
+            assert len(mesh.cells) == 72 and np.isfinite(mesh.points).all()
+        assert time.perf_counter() - start < SECONDS
+    assert 40 <= refused < 60
+
+
+def test_a_reader_that_dies_is_a_typed_error(monkeypatch, tmp_path):
+    """Signals of the child: crash, out of time, killed, Ctrl-C."""
+    import subprocess
+
+    from rom.errors import ResourceError
+    from rom.fe import child
+
+    for signal, error in ((11, FileFormatError), (24, FileFormatError), (9, ResourceError)):
+        done = subprocess.CompletedProcess([], -signal, b"", b"")
+        monkeypatch.setattr(child.subprocess, "run", lambda *a, done=done, **k: done)
+        path = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
+        with pytest.raises(error, match=r"box\.msh"):
+            read_mesh(path)
+    done = subprocess.CompletedProcess([], -2, b"", b"")
+    monkeypatch.setattr(child.subprocess, "run", lambda *a, **k: done)
+    with pytest.raises(KeyboardInterrupt):
+        read_mesh(path)
+
+
+def test_endless_reading_is_stopped_by_the_time_limit(monkeypatch, tmp_path):
+    """The CPU limit of the child, here one second."""
+    from rom.fe import child
+
+    (tmp_path / "box.py").write_text("def build(gmsh):\n    while True:\n        pass\n")
+    monkeypatch.setattr(child, "_limits", lambda *a: {"seconds": 1, "bytes": 2**33})
+    with pytest.raises(FileFormatError, match="did not end within the time"):
+        read_mesh(tmp_path / "box.py")
