@@ -1,6 +1,7 @@
 """Benchmarks: ratios measured in one run, so that the speed of the machine cancels.
 
-Each benchmark is a function that yields figures; ``BENCHMARKS`` lists them, ``rom bench`` runs them.
+Each benchmark is a function that yields figures; ``BENCHMARKS`` lists them, ``rom bench`` runs
+them.
 """
 
 import resource
@@ -54,12 +55,9 @@ def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
     for size in sizes:
         model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
         connection = connect(operators(model), model, KINDS)
-        bare = _seconds(lambda c=connection: c.ops.hold(c.boundary))
-        whole = _seconds(
-            lambda m=model: reduce(
-                m, method=CraigBampton(20), interfaces=KINDS, reference="root", certify=False
-            )
-        )
+        bare = _seconds(connection.ops.hold, connection.boundary)
+        kept = {"method": CraigBampton(20), "interfaces": KINDS, "reference": "root"}
+        whole = _seconds(reduce, model, **kept, certify=False)
         case = f"{model.n_dofs} dofs"
         yield Figure("reduction", case, "factorisation of K_ii", bare, "s")
         yield Figure("reduction", case, "whole reduction", whole, "s")
@@ -111,7 +109,7 @@ def _beam(n_dofs: float) -> dict[str, float]:
     return {"L": 1.0, "b": 0.2, "h": 0.1, "lc": lc}
 
 
-def _seconds(work: Callable[[], Any]) -> float:
+def _seconds(work: Callable[..., Any], *arguments: Any, **named: Any) -> float:
     start = perf_counter()
-    work()
+    work(*arguments, **named)
     return perf_counter() - start

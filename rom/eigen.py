@@ -57,7 +57,9 @@ class Operators(Protocol):
             ResourceError: if the factor is predicted not to fit into memory.
         """
 
-    def modes(self, held: npt.ArrayLike | Held, m: int, sigma: float | None = None):
+    def modes(
+        self, held: npt.ArrayLike | Held, m: int, sigma: float | None = None
+    ) -> tuple[Array, Array]:
         """Lowest m modes with the given dofs held: (omega (m,), Phi (n_local, m)).
 
         Accepts what `hold` returned, to use its factor again. Mass-normalised, ascending, largest

@@ -5,6 +5,8 @@ mechanics, and what to do. Codes: 2 usage, 3 input file or mesh, 4 physics or mo
 quality gate, 6 resources, 7 interrupted; 1 is kept for our own bugs.
 """
 
+from typing import Any
+
 
 class RomError(Exception):
     """Base of every error raised on purpose.
@@ -25,7 +27,7 @@ class RomError(Exception):
         head = f"{self.where}: " if self.where else ""
         return f"{head}{self.message}" + (f" {self.hint}" if self.hint else "")
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild with keywords, so that an error survives a broadcast between ranks."""
         return _rebuild, (type(self), self.message, self.where, self.hint)
 

@@ -30,7 +30,7 @@ class Material:
     nu: float
     rho: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("E", "nu", "rho"):
             _check_number(name, getattr(self, name))
         _check_positive("E", self.E, "Pa")
@@ -79,7 +79,7 @@ class Orthotropic:
     rho: float
     axes: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("E", "nu", "G"):
             if np.shape(getattr(self, name)) != (3,):
                 raise MaterialError(f"{name} needs three numbers, got {getattr(self, name)!r}.")
@@ -134,7 +134,8 @@ def _strain_rotation(Q: Array) -> Array:
 
 
 def _check_number(name: str, value: Any) -> None:
-    if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
+    number = np.isscalar(value) and not isinstance(value, bool | str)
+    if not (number and np.isfinite(value)):
         raise MaterialError(f"{name} = {value!r} is not a finite number.")
 
 

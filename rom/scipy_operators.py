@@ -148,7 +148,7 @@ class SciPyOperators:
         lu = splu(csc_matrix(self.K - sigma * self.M), options={"SymmetricMode": True}, **SYMMETRIC)
         MR = self.M @ R
 
-        def inverse(x):
+        def inverse(x: Array) -> Array:
             y = lu.solve(x - MR @ (R.T @ x))
             return y - R @ (MR.T @ y)
 

@@ -36,7 +36,8 @@ def reference_motion(body: "FlexibleBody", reference: Any) -> Array:
     elif isinstance(reference, str):
         from_rigid, from_shapes = _marker_motion(body.marker(reference), body.n_modes)
     elif isinstance(reference, tuple | list) and len(reference) == 2:
-        from_rigid, from_shapes = _pins(*(body.marker(name) for name in reference), body.n_modes)
+        first, second = map(body.marker, reference)
+        from_rigid, from_shapes = _pins(first, second, body.n_modes)
     else:
         raise ConfigError(
             f"reference = {reference!r} is not a reference condition.",

@@ -4,7 +4,8 @@ from petsc4py import PETSc
 
 import numpy as np
 
-from rom.errors import ResourceError, SolverError
+from rom.errors import SolverError
+from rom.fe.memory import allowed_bytes, too_large
 from rom.model import Array
 
 BLOCK = 32  # right-hand sides solved together: five to eight times cheaper than one by one
@@ -39,13 +40,14 @@ class Factor:
         pc.setFactorSetUpSolverType()
         self.factor = pc.getFactorMatrix()
         self.factor.setMumpsIcntl(24, 1)  # needed by PETSc for the inertia
+        self.factor.setMumpsIcntl(13, 1)  # a root shared by ranks would not report its pivots
+        allowed = allowed_bytes(A.comm.tompi4py())
+        self.factor.setMumpsIcntl(23, max(int(allowed / 1e6), 1))  # obeyed after the analysis
         self.ksp.setUp()
         code = self.factor.getMumpsInfog(1)
         if code in MEMORY_ERRORS:
-            raise ResourceError(
-                f"MUMPS ran out of memory on {A.getSize()[0]} dofs (code {code}).",
-                hint="Use a coarser mesh or a machine with more memory.",
-            )
+            need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
+            raise too_large(A.getSize()[0], need, allowed * A.comm.size)
         self.ok = code >= 0
 
     def solve(self, F: Array) -> Array:

@@ -1,11 +1,15 @@
 """How much memory a factorisation will take, asked before it is taken."""
 
+import os
+import resource
 from pathlib import Path
+
+from mpi4py import MPI
 
 from rom.errors import ResourceError
 
 SHARE = 0.85  # of the memory that is free
-UNLIMITED = 1 << 60  # cgroups write their "no limit" as a number of this size or as "max"
+UNLIMITED = 1 << 60
 
 
 def factor_bytes(n: int) -> float:
@@ -18,37 +22,73 @@ def factor_bytes(n: int) -> float:
 
 
 def free_bytes() -> float:
-    """Memory this process may still take [bytes]: the machine's, or the control group's if less."""
+    """Memory this process may still take [bytes].
+
+    The least of what the machine has free, what its control group leaves, and what its own limit
+    on address space leaves.
+    """
+    return min(_machine(), _control_group(Path("/sys/fs/cgroup")), _address_space())
+
+
+def _machine() -> float:
     lines = Path("/proc/meminfo").read_text().splitlines()
     fields = dict(line.split(":", 1) for line in lines)
-    machine = 1024.0 * float(fields["MemAvailable"].split()[0])
-    group = Path("/sys/fs/cgroup")
-    limit, used = (_number(group / name) for name in ("memory.max", "memory.current"))
-    return machine if limit >= UNLIMITED else min(machine, limit - min(used, limit))
+    return 1024.0 * float(fields["MemAvailable"].split()[0])
 
 
-def check_factor_memory(n: int, n_columns: int = 0) -> None:
+def _address_space() -> float:
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY:
+        return float(UNLIMITED)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    return float(limit - pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def allowed_bytes(comm: MPI.Comm) -> float:
+    """Memory each rank may take for a factor [bytes], the same on all ranks.
+
+    Ranks of one machine share what it has.
+    """
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = SHARE * free_bytes() / node.size
+    node.Free()
+    return comm.allreduce(share, op=MPI.MIN)
+
+
+def check_factor_memory(n: int, n_columns: int = 0, *, comm: MPI.Comm) -> None:
     """Refuse a factorisation that would not fit.
 
     Args:
         n: number of dofs to factor.
         n_columns: dense columns of that length that are kept beside the factor.
+        comm: the ranks that share the factor.
 
     Raises:
         ResourceError: with the need and what there is.
     """
-    need, there = factor_bytes(n) + 8.0 * n * n_columns, free_bytes()
-    if need > SHARE * there:
-        raise ResourceError(
-            f"factoring {n} dofs is predicted to take {need / 2**30:.1f} GiB; "
-            f"{there / 2**30:.1f} GiB are free, of which {SHARE:.0%} may be used.",
-            hint="Use a coarser mesh, more machines, or a machine with more memory.",
-        )
+    need, there = factor_bytes(n) + 8.0 * n * n_columns, allowed_bytes(comm) * comm.size
+    if need > there:
+        raise too_large(n, need, there)
 
 
-def _number(path: Path) -> float:
+def too_large(n: int, need: float, there: float) -> ResourceError:
+    """The error that says by how much a factor of n dofs does not fit."""
+    return ResourceError(
+        f"factoring {n} dofs is predicted to take {need / 2**30:.2f} GiB; "
+        f"{there / 2**30:.2f} GiB may be used ({SHARE:.0%} of what is free).",
+        hint="Use a coarser mesh, more machines, or a machine with more memory.",
+    )
+
+
+def _control_group(folder: Path) -> float:
+    """What the control group leaves; cached files count as free."""
     try:
-        text = path.read_text().strip()
+        text = (folder / "memory.max").read_text().strip()
+        if text == "max":
+            return float(UNLIMITED)
+        used = float((folder / "memory.current").read_text())
+        pairs = (line.split() for line in (folder / "memory.stat").read_text().splitlines())
+        cached = float(dict(pairs).get("file", 0))
     except OSError:
         return float(UNLIMITED)
-    return float(UNLIMITED) if text == "max" else float(text)
+    return max(float(text) - used + cached, 0.0)

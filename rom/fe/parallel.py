@@ -1,8 +1,11 @@
-"""Several ranks, one voice: all raise the same error, none is left waiting."""
+"""What several ranks must agree on: one rank's error is raised on all of them."""
 
 import os
 import sys
-from collections.abc import Callable
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -10,67 +13,119 @@ from mpi4py import MPI
 
 from rom.errors import ParallelError, RomError
 
-Value = TypeVar("Value")
+T = TypeVar("T")
+GRACE = 1.0  # seconds the other ranks leave rank 0 to print an error all of them have
 
 
-def on_root(comm: MPI.Comm, function: Callable[[], Value]) -> Value:
-    """Run on rank 0 and give everyone the value, or the error.
+def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named: Any) -> T:
+    """Call a function on rank 0 and give its value to all ranks.
+
+    Args:
+        comm: the ranks; all of them must call.
+        function: called on rank 0 only; its value must survive pickling.
+        arguments: passed on.
+        named: passed on.
 
     Raises:
-        RomError: the one raised on rank 0, on all ranks.
-        ParallelError: on all ranks, if rank 0 met an error nobody foresaw.
+        RomError: on all ranks, when the function raised one.
+        ParallelError: on all ranks, when the function raised anything else under mpirun.
     """
-    outcome: Any = None
+    value = error = None
     if comm.rank == 0:
-        outcome = _attempt(function)
-    value, error = comm.bcast(outcome)
-    if error is not None:
-        raise error
-    return value
+        try:
+            value = function(*arguments, **named)
+        except Exception as raised:
+            error = raised
+    _raise_together(comm, error)
+    return comm.bcast(value) if comm.size > 1 else value
 
 
-def together(comm: MPI.Comm, function: Callable[[], Value]) -> Value:
-    """Run on every rank, without communication inside; an error of one becomes an error of all.
+@contextmanager
+def collective(comm: MPI.Comm) -> Iterator[None]:
+    """Raise on all ranks what any rank raised inside; the lowest rank's error is shown.
+
+    Also usable as a decorator. The body must not wait for other ranks after the line that can
+    fail, or the ranks that did not fail never get out of it.
 
     Raises:
-        RomError: the error of the lowest rank that failed, on all ranks.
+        RomError: on all ranks, when any rank raised one.
+        ParallelError: on all ranks, when any rank raised anything else under mpirun.
     """
-    value, error = _attempt(function)
-    errors = [e for e in comm.allgather(error) if e is not None]
-    if errors:
-        raise errors[0]
+    error = None
+    try:
+        yield
+    except Exception as raised:
+        error = raised
+    _raise_together(comm, error)
+
+
+def together(comm: MPI.Comm, function: Callable[[], T]) -> T:
+    """Value of a function called on every rank; see `collective` for its errors."""
+    with collective(comm):
+        value = function()
     return value
 
 
-def _attempt(function: Callable[[], Value]) -> tuple[Value | None, RomError | None]:
-    try:
-        return function(), None
-    except RomError as error:
-        return None, error
-    except MemoryError as error:
-        return None, ParallelError(f"a rank ran out of memory: {error}.")
+def _raise_together(comm: MPI.Comm, error: Exception | None) -> None:
+    if comm.size == 1:
+        if error is not None:
+            raise error
+        return
+    shown = next((e for e in comm.allgather(_portable(error, comm.rank)) if e is not None), None)
+    if shown is not None:
+        shown.agreed = True  # rank 0 prints for all, see `install_abort_hook`
+        raise shown from error
 
 
-def install_abort_hook() -> None:
-    """End all ranks when one of them dies of an error: the others would wait for ever."""
-    comm = MPI.COMM_WORLD
+def _portable(error: Exception | None, rank: int) -> RomError | None:
+    if error is None or isinstance(error, RomError):
+        return error
+    text = "".join(traceback.format_exception_only(type(error), error)).strip()
+    return ParallelError(f"rank {rank} failed: {text}", hint="All ranks stop.")
+
+
+def install_abort_hook(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+    """Let an uncaught exception end all ranks, with the exit code of the error.
+
+    Without it the ranks that did not fail wait forever for the one that did. An error that all
+    ranks raise is printed once. Does nothing on one rank.
+    """
     if comm.size == 1:
         return
-    ordinary = sys.excepthook
 
-    def abort(
-        kind: type[BaseException], error: BaseException, trace: TracebackType | None
-    ) -> None:
-        ordinary(kind, error, trace)
+    def abort(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        agreed = getattr(error, "agreed", False)
+        if agreed and comm.rank > 0:
+            time.sleep(GRACE)
+        elif isinstance(error, RomError):
+            who = "" if agreed else f"rank {comm.rank}: "
+            sys.stderr.write(f"{who}{kind.__name__}: {error}\n")
+        else:
+            traceback.print_exception(kind, error, trace)
         sys.stderr.flush()
-        comm.Abort(error.exit_code if isinstance(error, RomError) else 1)
+        comm.Abort(getattr(error, "exit_code", 1))
 
     sys.excepthook = abort
 
 
 def launched_by_mpirun() -> bool:
     """True when this process was started by an MPI launcher with several ranks."""
-    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"):
-        if int(os.environ.get(name, "1")) > 1:
-            return True
-    return False
+    return any(int(os.environ.get(name, "1")) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
+
+
+def stop_all_ranks(code: int, complain: Callable[[], None]) -> None:
+    """End every rank with one exit code, whether one of them failed or all.
+
+    Rank 0 complains at once; another rank does only when rank 0 has not ended it within `GRACE`,
+    because then it is alone with its error.
+
+    Args:
+        code: exit code.
+        complain: prints the error.
+    """
+    if MPI.COMM_WORLD.rank > 0:
+        time.sleep(GRACE)
+    complain()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    MPI.COMM_WORLD.Abort(code)

@@ -4,64 +4,74 @@ from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
-from slepc4py import SLEPc
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
-from rom.eigen import canonical_signs, count_shift, orthonormal
+from rom.eigen import count_shift, orthonormal
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
-from rom.fe.factor import BLOCK, Factor, dense, dense_rows
+from rom.fe.factor import Factor, dense_rows
+from rom.fe.lanczos import BlockLanczos, capacity
 from rom.fe.memory import check_factor_memory
+from rom.fe.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
 from rom.scipy_operators import dof_set
 
 SPARE = 3  # modes computed beyond the ones asked for, so that a gap for counting is found
 ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
-DENSE = 200  # dofs up to which all eigenvalues are computed at once
+DENSE = 300  # dofs up to which all eigenvalues are computed at once
+SHIFT = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 
 
 class HeldPETSc:
-    """K with the held dofs eliminated, factored once by MUMPS; call it to solve."""
+    """K with the held dofs eliminated, factored once by MUMPS; call it to solve.
+
+    Attributes:
+        held: the dofs held, global numbers.
+        n_free: number of the others.
+        inner: operators on the others, None when there are none.
+        factor: of their stiffness.
+    """
 
     def __init__(self, ops: "PETScOperators", held: Index):
         self.ops, self.held = ops, held
         mine = np.arange(ops.first, ops.first + ops.n_local)
         self.mine = np.flatnonzero(~np.isin(mine, held))
-        self.free = PETSc.IS().createGeneral(mine[self.mine].astype(PETSc.IntType), comm=ops.comm)
-        self.n_free = self.free.getSize()
+        self.n_free = ops.n - held.size
+        self.inner = self.factor = None
         if self.n_free:
-            self.K = _submatrix(ops.K, self.free)
-            self.M = _submatrix(ops.M, self.free)
-            check_factor_memory(self.n_free, held.size)
-            self.factor = Factor(self.K, definite=True)
+            free = PETSc.IS().createGeneral(mine[self.mine].astype(PETSc.IntType), comm=ops.comm)
+            check_factor_memory(self.n_free, held.size, comm=ops.comm)
+            K, M = (A.createSubMatrix(free, free) for A in (ops.K, ops.M))
+            self.inner = PETScOperators(K, M, fixed=ops.fixed[self.mine])
+            self.factor = Factor(K, definite=True)
             self._refuse_free_motion()
 
     def __call__(self, F: Array) -> Array:
         """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
         X = np.zeros(F.shape)
-        if self.n_free:
+        if self.factor is not None:
             X[self.mine] = self.factor.solve(F[self.mine])
         return X
 
     def _refuse_free_motion(self) -> None:
         """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
-        ops = self.ops
+        ops, stiffness = self.ops, 0.0
         if self.factor.ok:
-            R = ops.rigid if ops.rigid is not None else np.ones((ops.n_local, 1))
-            X = self(ops.apply_M(R))
+            R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
+            X = self.factor.solve(ops.apply_M(R)[self.mine])
             if ops.all_finite(X):
-                X[np.isin(np.arange(ops.first, ops.first + ops.n_local), self.held)] = 0.0
-                K, M = ops.gram(X, ops.apply_K(X)), ops.gram(X, ops.apply_M(X))
+                K = self.inner.gram(X, self.inner.apply_K(X))
+                M = self.inner.gram(X, self.inner.apply_M(X))
                 stiffness = (np.diag(K) / np.diag(M)).min()
-                if stiffness > ZERO * ops.largest():
-                    return
-        raise InterfaceError(
-            f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
-            hint="Fix at least three nodes that do not lie on one line, or hold another interface.",
-        )
+        if not stiffness > ZERO * ops.largest():
+            raise InterfaceError(
+                f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
+                hint="Fix at least three nodes that do not lie on one line, or hold another "
+                "interface.",
+            )
 
 
 class PETScOperators:
@@ -70,17 +80,27 @@ class PETScOperators:
     Args:
         K: (n, n) stiffness, PETSc AIJ, symmetric.
         M: (n, n) mass with the same layout.
-        rigid: (n_local, 6) rigid motions.
+        rigid: (n_local, 6) rigid motions; node by node, unless these are new coordinates.
         T: (n_parent, n) map to the coordinates these came from.
+        fixed: (n_local,) vector that does not depend on the partition; made from the rigid motions
+            when not given.
+        parent: the operators in the coordinates these came from.
 
     Raises:
         SolverError: if an entry is not finite.
     """
 
     def __init__(
-        self, K: PETSc.Mat, M: PETSc.Mat, rigid: Array | None = None, T: PETSc.Mat | None = None
+        self,
+        K: PETSc.Mat,
+        M: PETSc.Mat,
+        rigid: Array | None = None,
+        *,
+        T: PETSc.Mat | None = None,
+        fixed: Array | None = None,
+        parent: "PETScOperators | None" = None,
     ):
-        self.K, self.M, self.rigid, self.T = K, M, rigid, T
+        self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
         self.comm = K.comm.tompi4py()
         self.n = K.getSize()[0]
         self.first, end = K.getOwnershipRange()
@@ -89,6 +109,9 @@ class PETScOperators:
         for name, A in (("K", K), ("M", M)):
             if not np.isfinite(A.norm()):
                 raise SolverError(f"{name} has an entry that is not finite.")
+        if fixed is None:
+            fixed = fixed_vector(self.comm, rigid, self.first, self.n_local)
+        self.fixed = fixed
 
     def apply_K(self, X: Array) -> Array:
         """K X."""
@@ -131,7 +154,11 @@ class PETScOperators:
         T = csr_matrix(T)
         sizes = ((self.n_local, self.n), (rigid.shape[0], T.shape[1]))
         map_ = _aij(T, sizes, self.comm)
-        return PETScOperators(self.K.ptap(map_), self.M.ptap(map_), rigid, map_)
+        x, y = map_.createVecs()
+        y.array[:] = self.fixed
+        map_.multTranspose(y, x)
+        K, M = (_symmetric(A.ptap(map_)) for A in (self.K, self.M))
+        return PETScOperators(K, M, rigid, T=map_, fixed=x.array.copy(), parent=self)
 
     def expand(self, A: Array) -> Array:
         """T A."""
@@ -142,7 +169,8 @@ class PETScOperators:
         sizes = ((self.n_local, self.n), (self.n_local, self.n))
         M = self.M.copy()
         M.axpy(1.0, _aij(csr_matrix(dM), sizes, self.comm))
-        return PETScOperators(self.K, M, self.rigid, self.T)
+        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
+        return PETScOperators(self.K, M, self.rigid, **fields)
 
     def modes(
         self, held: npt.ArrayLike | HeldPETSc, m: int, sigma: float | None = None
@@ -157,101 +185,69 @@ class PETScOperators:
                 f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
                 f"{held.n_free} interior dofs; ask for 0 to {held.n_free} modes."
             )
-        Phi = np.zeros((self.n_local, m))
-        if m == 0:
-            return np.zeros(0), Phi
-        inner = PETScOperators(held.K, held.M)
-        if held.n_free <= max(DENSE, m + SPARE):
-            lam, Phi_i = inner.all_modes()
-            lam, Phi_i = lam[:m], Phi_i[:, :m]
+        lam, Phi = np.zeros(0), np.zeros((self.n_local, m))
+        if m:
+            lam, Phi[held.mine] = held.inner.supported_modes(m, held.factor)
+        return np.sqrt(lam), signed(self, Phi)
+
+    def supported_modes(self, m: int, factor: Factor) -> tuple[Array, Array]:
+        """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
+        if self.n <= max(DENSE, capacity(m + SPARE)):
+            lam, Phi = self.all_modes()
         else:
-            lam, Phi_i = inner.lowest(m + SPARE, 0.0, held.factor, np.zeros((inner.n_local, 0)))
-            inner.verify_count(lam, m, 0)
-        Phi[held.mine] = Phi_i[:, :m]
-        return np.sqrt(lam[:m]), self.signed(Phi)
+            lam, Phi = self.lowest(m + SPARE, 0.0, factor, np.zeros((self.n_local, 0)))
+            self.verify_count(lam, m, 0)
+        return lam[:m], settled(self, lam, Phi)[:, :m]
 
     def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
-        R = np.zeros((self.n_local, 0)) if self.rigid is None else orthonormal(self, self.rigid)
-        n_rigid = R.shape[1]
         if not 0 <= m <= self.n:
             raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
-        n_elastic = max(m - n_rigid, 0)
-        lam, Phi = np.zeros(0), np.zeros((self.n_local, 0))
-        if self.n <= max(DENSE, m + SPARE):
-            lam, Phi = self.all_modes()
-            lam, Phi = lam[n_rigid:][:n_elastic], Phi[:, n_rigid:][:, :n_elastic]
-        elif n_elastic:
-            sigma = -0.05 * self._first_elastic(R) if sigma is None else sigma
-            check_factor_memory(self.n)
-            shifted = self._shifted(sigma)
-            lam, Phi = self.lowest(n_elastic + SPARE, sigma, Factor(shifted, definite=True), R)
+        R = np.zeros((self.n_local, 0)) if self.rigid is None else orthonormal(self, self.rigid)
+        n_elastic = max(m - R.shape[1], 0)
+        lam, Phi = self._elastic_modes(R, n_elastic, sigma)
+        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(np.maximum(lam, 0.0))])
+        return omega[:m], np.hstack([R, signed(self, Phi)])[:, :m]
+
+    def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
+        """The m modes above the rigid ones."""
+        n_rigid = R.shape[1]
+        if m == 0:
+            return np.zeros(0), np.zeros((self.n_local, 0))
+        if self.n <= max(DENSE, capacity(m + SPARE) + n_rigid):
+            lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
+        else:
+            sigma = -SHIFT * self.first_elastic(R) if sigma is None else sigma
+            check_factor_memory(self.n, comm=self.comm)
+            lam, Phi = self.lowest(m + SPARE, sigma, self._factor(sigma, definite=True), R)
             self._refuse_mechanisms(lam, n_rigid)
-            self.verify_count(lam, n_elastic, n_rigid)
-        omega = np.concatenate([np.zeros(n_rigid), np.sqrt(np.maximum(lam[:n_elastic], 0.0))])
-        return omega[:m], np.hstack([R, self.signed(Phi[:, :n_elastic])])[:, :m]
+            self.verify_count(lam, m, n_rigid)
+        return lam[:m], settled(self, lam, Phi)[:, :m]
 
     def _refuse_mechanisms(self, lam: Array, n_rigid: int) -> None:
-        zeros = int(np.count_nonzero(np.abs(lam) < ZERO * self.largest()))
-        if n_rigid and zeros:
+        n_zero = int(np.count_nonzero(np.abs(lam) < ZERO * self.largest()))
+        if n_rigid and n_zero:
             raise ModelError(
-                f"at least {zeros} more motions without stiffness than the six of a connected body.",
+                f"at least {n_zero} more motions without stiffness than the six of a connected "
+                "body.",
                 hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
             )
 
-    def _shifted(self, sigma: float) -> PETSc.Mat:
-        """K - sigma M."""
+    def _factor(self, sigma: float, *, definite: bool) -> Factor:
+        """K - sigma M, factored."""
         A = self.K.copy()
         A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        return A
+        return Factor(A, definite=definite)
 
     def lowest(self, k: int, sigma: float, factor: Factor, deflated: Array) -> tuple[Array, Array]:
-        """The k eigenvalues nearest to sigma beside the deflated columns; Krylov-Schur."""
-        k = min(k, self.n - deflated.shape[1])
-        solver = SLEPc.EPS().create(self.comm)
-        solver.setOperators(self.K, self.M)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(sigma)
-        solver.setDimensions(k, min(2 * k + 15, self.n - deflated.shape[1]))
-        solver.setTolerances(1e-11, 500)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        transform.setShift(sigma)
-        transform.setKSP(factor.ksp)
-        start = self.K.createVecRight()
-        start.array[:] = np.sin(1.0 + np.arange(self.first, self.first + self.n_local))
-        solver.setInitialSpace([start])
-        if deflated.shape[1]:
-            solver.setDeflationSpace([self._vector(column) for column in deflated.T])
-        solver.solve()
-        return self._pairs(solver, k)
-
-    def _vector(self, values: Array) -> PETSc.Vec:
-        x = self.K.createVecRight()
-        x.array[:] = values
-        return x
-
-    def _pairs(self, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
-        n_found = solver.getConverged()
-        if n_found < k:
-            raise SolverError(
-                f"only {n_found} of {k} modes converged (reason {solver.getConvergedReason()}).",
-                hint="Ask for fewer modes, or check the mesh for cells of extreme shape.",
-            )
-        lam = np.array([solver.getEigenvalue(i).real for i in range(n_found)])
-        x, Phi = self.K.createVecRight(), np.zeros((self.n_local, n_found))
-        for i in range(n_found):
-            solver.getEigenvector(i, x)
-            Phi[:, i] = x.array
-        order = np.argsort(lam)[:k]
-        Phi = Phi[:, order]
-        return lam[order], Phi / np.sqrt(np.diag(self.gram(Phi, self.apply_M(Phi))))
+        """The k eigenvalues above sigma beside the deflated columns, and their modes."""
+        space = BlockLanczos(self, factor, sigma, deflated, k)
+        space.solve()
+        return space.pairs()
 
     def verify_count(self, lam: Array, m: int, n_rigid: int) -> None:
         """Compare the number of modes found with the inertia of K - sigma M (Sylvester)."""
         found, sigma = count_shift(lam, m)
-        count = Factor(self._shifted(sigma), definite=False).negative_pivots() - n_rigid
+        count = self._factor(sigma, definite=False).negative_pivots() - n_rigid
         if count != found:
             raise ModesMissedError(
                 f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
@@ -266,31 +262,37 @@ class PETScOperators:
         lam, Phi = eigh(K, M)
         return lam, Phi[self.first : self.first + self.n_local]
 
-    def _first_elastic(self, R: Array) -> float:
-        """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
+    def first_elastic(self, R: Array) -> float:
+        """Estimate of the first elastic eigenvalue, for the choice of a shift.
+
+        With geometry, an upper bound; new coordinates leave its order of magnitude.
+        """
+        if self.parent is not None:
+            return self.parent.first_elastic(R)
+        if self.rigid is not None:
+            return first_elastic(self)
+        return self._by_inverse_iteration()
+
+    def _by_inverse_iteration(self) -> float:
+        """Smallest eigenvalue that is not zero, estimated without geometry."""
         floor = ZERO * self.largest()
-        factor = Factor(self._shifted(-1e-6 * self.largest()), definite=True)
-        rows = np.arange(self.first, self.first + self.n_local)
-        X = np.sin(np.outer(1.0 + rows, 1.0 + np.arange(8.0)))
+        factor = self._factor(-1e-6 * self.largest(), definite=True)
+        X = self.fixed[:, None] ** np.arange(1.0, 9.0)
         for _ in range(4):
-            X = factor.solve(self.apply_M(X - R @ self.gram(R, self.apply_M(X))))
-            L = np.linalg.cholesky(self.gram(X, X))
-            X = np.linalg.solve(L, X.T).T
-        X -= R @ self.gram(R, self.apply_M(X))
+            X = factor.solve(self.apply_M(X))
+            X = np.linalg.solve(np.linalg.cholesky(self.gram(X, X)), X.T).T
         lam = eigh(self.gram(X, self.apply_K(X)), self.gram(X, self.apply_M(X)), eigvals_only=True)
         return float(max(lam[np.argmax(lam > floor)], floor))
 
-    def signed(self, Phi: Array) -> Array:
-        """Columns turned so that their largest entry, over all ranks, is positive."""
-        if self.comm.size == 1:
-            return canonical_signs(Phi)
-        largest, smallest = Phi.max(axis=0, initial=0.0), Phi.min(axis=0, initial=0.0)
-        largest = self.comm.allreduce(largest, op=MPI.MAX) if Phi.size else largest
-        return Phi * np.where(largest >= -smallest, 1.0, -1.0)
 
-
-def _submatrix(A: PETSc.Mat, free: PETSc.IS) -> PETSc.Mat:
-    return A.createSubMatrix(free, free)
+def _symmetric(A: PETSc.Mat) -> PETSc.Mat:
+    """(A + A^T) / 2: sums over thousands of rows differ in their last digits."""
+    B = PETSc.Mat()
+    A.transpose(B)
+    A.axpy(1.0, B, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    A.scale(0.5)
+    B.destroy()
+    return A
 
 
 def _aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
@@ -299,6 +301,3 @@ def _aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
     matrix = PETSc.Mat().createAIJ(size=sizes, csr=csr, comm=comm)
     matrix.assemble()
     return matrix
-
-
-__all__ = ["BLOCK", "HeldPETSc", "PETScOperators", "dense"]

@@ -169,8 +169,8 @@ def _transform(ops: Operators, pieces: list[_Piece]) -> Operators:
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     T = csr_matrix(coo_matrix(entries, shape=(ops.n_local, n_kept + n_masters)))
     T.eliminate_zeros()
-    masters = np.vstack([piece.rigid for piece in pieces]) if ops.last else np.zeros((0, 6))
-    return ops.transform(T, np.vstack([ops.rigid[stays], masters]))
+    rigid = np.vstack([piece.rigid for piece in pieces]) if ops.last else np.zeros((0, 6))
+    return ops.transform(T, np.vstack([ops.rigid[stays], rigid]))
 
 
 def _renumber(dofs: Index, removed: Index) -> Index:

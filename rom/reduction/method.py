@@ -27,7 +27,7 @@ class CraigBampton:
     n_modes: int | None = None
     f_max: float | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if (self.n_modes is None) == (self.f_max is None):
             raise ConfigError("CraigBampton needs either n_modes or f_max.")
         if self.n_modes is not None and (

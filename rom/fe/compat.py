@@ -1,0 +1,155 @@
+"""The only place that knows which dolfinx this is: 0.5, 0.9, or 0.10 and later, told by feature."""
+
+import logging
+from typing import Any
+
+from petsc4py import PETSc
+
+import basix
+import dolfinx
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+
+from rom.fe.jit import JIT_OPTIONS
+from rom.model import Array
+
+# ffcx routes all warnings of the process into a log; a warning belongs to whoever listens for it.
+logging.captureWarnings(False)
+
+
+def lagrange(mesh: Any, degree: int) -> Any:
+    """Space of continuous displacements: three components at each node."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
+    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+def per_cell(mesh: Any, values: Array) -> Any:
+    """A coefficient with one number or tensor per cell.
+
+    Args:
+        mesh: the mesh.
+        values: (cells of this rank with ghosts, ...) values.
+    """
+    shape = values.shape[1:]
+    if hasattr(fem, "functionspace"):
+        space = fem.functionspace(mesh, ("DG", 0, shape) if shape else ("DG", 0))
+    elif shape:
+        space = fem.TensorFunctionSpace(mesh, ("DG", 0), shape=shape)
+    else:
+        space = fem.FunctionSpace(mesh, ("DG", 0))
+    function = fem.Function(space)
+    block = int(np.prod(shape, dtype=int))
+    dofs = cell_dofs(space)[:, :1].ravel()
+    function.x.array.reshape(-1, block)[dofs] = values.reshape(-1, block)
+    return function
+
+
+def cell_dofs(space: Any) -> np.ndarray:
+    """(cells, k) node numbers of each cell on this rank, ghosts included."""
+    table = space.dofmap.list
+    table = np.asarray(getattr(table, "array", table))
+    cells = space.mesh.topology.index_map(3)
+    rows = cells.size_local + cells.num_ghosts
+    return table.reshape(rows, table.size // max(rows, 1))  # a rank may have no cell
+
+
+def assemble_matrix(form: ufl.Form) -> PETSc.Mat:
+    """Matrix of a bilinear form, distributed over the ranks."""
+    A = fem_petsc.assemble_matrix(compiled(form))
+    A.assemble()
+    return A
+
+
+def compiled(form: ufl.Form) -> Any:
+    """Form ready to assemble; our options win over option files found in the working folder."""
+    name = "jit_options" if hasattr(fem, "functionspace") else "jit_params"
+    return fem.form(form, **{name: dict(JIT_OPTIONS)})
+
+
+def cell_name(mesh: Any) -> str:
+    """Shape of the cells: "tetrahedron" or "hexahedron"."""
+    return mesh.topology.cell_type.name
+
+
+def geometry_degree(mesh: Any) -> int:
+    """Polynomial degree of the map from the reference cell: 2 for curved cells."""
+    cmap = mesh.geometry.cmap
+    return (cmap() if callable(cmap) else cmap).degree
+
+
+def sub_entities(name: str) -> list[list[list[int]]]:
+    """Corner numbers of the vertices, edges, facets and volume of the reference cell."""
+    return basix.topology(getattr(basix.CellType, name))
+
+
+def to_global(index_map: Any, local: np.ndarray) -> np.ndarray:
+    """Global numbers of local entities."""
+    return np.asarray(index_map.local_to_global(local.astype(np.int32)), dtype=np.int64)
+
+
+def versions() -> dict[str, str]:
+    """Versions of the libraries a model was made with."""
+    from slepc4py import SLEPc
+
+    number = {name: ".".join(map(str, package.Sys.getVersion()))
+              for name, package in (("PETSc", PETSc), ("SLEPc", SLEPc))}  # fmt: skip
+    return {"dolfinx": dolfinx.__version__, **number}
+
+
+def create_mesh(comm: Any, cells: np.ndarray, points: Array, shape: str, degree: int) -> Any:
+    """Distributed mesh from arrays on rank 0; the other ranks give none.
+
+    Args:
+        comm: the ranks.
+        cells: (m, k) node numbers in the order of dolfinx.
+        points: (n, 3) node coordinates [m].
+        shape: "tetrahedron" or "hexahedron".
+        degree: polynomial degree of the geometry.
+    """
+    from dolfinx.mesh import create_mesh
+
+    if hasattr(fem, "functionspace"):
+        from basix.ufl import element
+
+        e = element("Lagrange", shape, degree, shape=(3,))
+        return create_mesh(comm, cells=cells, x=points, e=e)
+    e = ufl.VectorElement("Lagrange", ufl.Cell(shape, 3), degree, variant="equispaced")
+    return create_mesh(comm, cells, points, ufl.Mesh(e))
+
+
+def gmsh_order(shape: str, n_nodes: int) -> np.ndarray:
+    """Positions in gmsh's node order, listed in the order of dolfinx."""
+    from dolfinx.cpp.io import perm_gmsh
+    from dolfinx.cpp.mesh import CellType
+
+    return np.array(perm_gmsh(getattr(CellType, shape), n_nodes))
+
+
+def tag_entities(mesh: Any, dim: int, nodes: np.ndarray, values: np.ndarray) -> Any:
+    """MeshTags of cells or facets that rank 0 knows by their nodes.
+
+    Args:
+        mesh: the mesh.
+        dim: 3 for cells, 2 for facets.
+        nodes: (e, k) node numbers given to `create_mesh`, in the order of dolfinx.
+        values: (e,) tags.
+    """
+    from dolfinx.mesh import meshtags_from_entities
+
+    nodes, values = nodes.astype(np.int64), values.astype(np.int32)
+    if hasattr(fem, "functionspace"):
+        from dolfinx.graph import adjacencylist
+        from dolfinx.io import distribute_entity_data
+
+        found, tags = distribute_entity_data(mesh, dim, nodes, values)
+    else:
+        from dolfinx.cpp.graph import AdjacencyList_int32 as adjacencylist
+        from dolfinx.cpp.io import distribute_entity_data
+
+        found, tags = distribute_entity_data(mesh._mesh, dim, nodes, values)
+    mesh.topology.create_connectivity(dim, 0)
+    mesh.topology.create_connectivity(dim, mesh.topology.dim)
+    return meshtags_from_entities(mesh, dim, adjacencylist(found), tags.astype(np.int32))

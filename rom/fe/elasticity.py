@@ -1,0 +1,218 @@
+"""Stiffness and mass of a three-dimensional elastic body on a dolfinx mesh."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+import ufl
+from scipy.sparse import csr_matrix
+
+from rom.eigen import rigid_motions
+from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagError
+from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
+from rom.fe.jit import compiling
+from rom.fe.material import by_region, coefficients, described, doubts, stress
+from rom.fe.nodes import all_points, interface, outer_surface
+from rom.fe.parallel import collective, on_root
+from rom.fe.petsc import PETScOperators
+from rom.model import Array, Attachment, FEModel
+
+WHOLE = "solid"  # name of the only region of a mesh without named regions
+DEGREES = (1, 2, 3)
+
+
+def model(
+    path: str | Path,
+    *,
+    material: Any,
+    degree: int = 2,
+    parameters: dict[str, float] | None = None,
+    attachments: Sequence[Attachment] = (),
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    **mesh_options: Any,
+) -> FEModel:
+    """Finite element model of the solid in a geometry or mesh file.
+
+    Args:
+        path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.inp`` or ``.bdf``, see
+            `rom.fe.mesh.read_mesh`.
+        material: `Material`, `Orthotropic`, or {region name: material}.
+        degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
+        parameters: values of the geometry's parameters.
+        attachments: point masses and rigid bodies carried by interfaces.
+        comm: the ranks that share the model.
+        mesh_options: ``scale``, ``faces``, ``order`` of `rom.fe.mesh.read_mesh`.
+
+    Returns:
+        FEModel, free-free. On one process K and M are SciPy matrices, under mpirun PETSc
+        matrices; ``operators`` are those of PETSc on both.
+
+    Raises:
+        ConfigError, FileFormatError, MeshError, TagError: for a file that is no valid solid.
+        MaterialError: if a region has no material or a material no region.
+        InterfaceError: if an interface is empty or an attachment hangs on none.
+    """
+    from rom.fe.mesh import read_mesh, to_dolfinx
+
+    solid = on_root(comm, read_mesh, path, parameters=parameters, **mesh_options)
+    with compiling(comm):
+        mesh, cell_tags, facet_tags = to_dolfinx(solid, comm)
+    made = assemble(
+        mesh,
+        cell_tags,
+        facet_tags,
+        material=material,
+        degree=degree,
+        regions={name: tag for tag, name in solid.region_names.items()},
+        attachments=attachments,
+    )
+    remarks = [*(solid.warnings or ()), *made.provenance["warnings"]]
+    return replace(made, provenance=solid.provenance | made.provenance | {"warnings": remarks})
+
+
+def assemble(
+    mesh: Any,
+    cell_tags: Any = None,
+    facet_tags: dict[str, Any] | None = None,
+    *,
+    material: Any,
+    degree: int = 2,
+    regions: dict[str, int] | None = None,
+    attachments: Sequence[Attachment] = (),
+) -> FEModel:
+    """Finite element model on a dolfinx mesh.
+
+    Args:
+        mesh: tetrahedra or hexahedra with straight or quadratic edges, coordinates in m.
+        cell_tags: MeshTags of the regions; needed when there are several.
+        facet_tags: {interface name: MeshTags of its facets}; groups may share facets.
+        material: `Material`, `Orthotropic`, or {region name: material}.
+        degree: polynomial degree of the displacement, 1 to 3.
+        regions: {region name: tag}; one region called "solid" when not given.
+        attachments: point masses and rigid bodies carried by interfaces.
+
+    Returns:
+        FEModel, free-free; see `model`.
+
+    Raises:
+        ConfigError, MeshError, TagError, MaterialError, InterfaceError: see `model`.
+    """
+    regions, facet_tags = dict(regions or {WHOLE: 0}), dict(facet_tags or {})
+    name = _check_mesh(mesh, degree)
+    solids = by_region(material, regions)
+    _check_attachments(attachments, facet_tags)
+    with collective(mesh.comm):
+        tags = _cell_regions(mesh, cell_tags, regions)
+    with compiling(mesh.comm):
+        V = lagrange(mesh, degree)
+        points = all_points(V)
+        K, M = (assemble_matrix(f) for f in _forms(V, coefficients(mesh, tags, solids), degree))
+        interfaces = {key: interface(key, value, V, points) for key, value in facet_tags.items()}
+    named = {region: solids[tag] for region, tag in regions.items()}
+    remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
+    _warn(mesh.comm, remarks)
+    fields = {
+        "interfaces": interfaces,
+        "attachments": tuple(attachments),
+        "surface": outer_surface(V, points, degree),
+        "provenance": {
+            "material": described(named),
+            "degree": degree,
+            "cells": {name: mesh.topology.index_map(3).size_global},
+            "units": "SI",
+            "versions": versions(),
+            "warnings": remarks,
+        },
+    }
+    return _finish(K, M, points, fields)
+
+
+def _forms(V: Any, numbers: dict[str, Any], degree: int) -> tuple[ufl.Form, ufl.Form]:
+    """Stiffness and mass; quadrature exact on straight cells, more than enough on curved ones."""
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    q_K, q_M = _quadrature(cell_name(V.mesh), degree, geometry_degree(V.mesh))
+    dx = ufl.Measure("dx", domain=V.mesh)
+    sigma = stress(ufl.sym(ufl.grad(u)), numbers)
+    K = ufl.inner(sigma, ufl.sym(ufl.grad(v))) * dx(metadata={"quadrature_degree": q_K})
+    M = numbers["rho"] * ufl.inner(u, v) * dx(metadata={"quadrature_degree": q_M})
+    return K, M
+
+
+def _quadrature(name: str, degree: int, curved: int) -> tuple[int, int]:
+    """Quadrature degrees of K and M.
+
+    On straight tetrahedra the integrands are polynomials of these degrees. On hexahedra the
+    determinant of the map adds 3 g - 1 per direction to the mass, on curved tetrahedra 3 (g - 1)
+    in total, g the degree of the geometry.
+    """
+    if name == "tetrahedron":
+        return 2 * (degree - 1) + 3 * (curved - 1), 2 * degree + 3 * (curved - 1)
+    return 2 * degree + 2 * (curved - 1), 2 * degree + 3 * curved - 1
+
+
+def _finish(K: PETSc.Mat, M: PETSc.Mat, points: Array, fields: dict[str, Any]) -> FEModel:
+    """On one process, SciPy matrices that are symmetric to the last bit beside the operators."""
+    first, end = K.getOwnershipRange()
+    rigid = rigid_motions(points[first // 3 : end // 3])
+    if K.comm.size > 1:
+        return FEModel(K, M, points, operators=PETScOperators(K, M, rigid), **fields)
+    A, B = _symmetric(K), _symmetric(M)
+    K.destroy()
+    M.destroy()
+    return FEModel(A, B, points, operators=PETScOperators(_aij(A), _aij(B), rigid), **fields)
+
+
+def _symmetric(A: PETSc.Mat) -> csr_matrix:
+    starts, columns, values = A.getValuesCSR()
+    half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
+    return (half + half.T).tocsr()
+
+
+def _aij(A: csr_matrix) -> PETSc.Mat:
+    csr = (A.indptr, A.indices, A.data)
+    return PETSc.Mat().createAIJ(A.shape, bsize=3, csr=csr, comm=MPI.COMM_SELF)
+
+
+def _check_mesh(mesh: Any, degree: int) -> str:
+    name = cell_name(mesh)
+    if name not in ("tetrahedron", "hexahedron"):
+        raise MeshError(f"the mesh has cells of the kind {name}; it takes tetrahedra or hexahedra.")
+    if degree not in DEGREES:
+        raise ConfigError(f"degree = {degree!r}; the displacement may have degree 1, 2 or 3.")
+    return name
+
+
+def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> np.ndarray:
+    """(cells of this rank with ghosts,) tag of each cell."""
+    cells = mesh.topology.index_map(3)
+    tags = np.full(cells.size_local + cells.num_ghosts, min(regions.values()), dtype=np.int64)
+    if len(regions) == 1:
+        return tags
+    if cell_tags is None:
+        raise TagError(f"the regions {sorted(regions)} are named, but no cell is tagged.")
+    tags -= 1
+    tags[cell_tags.indices] = cell_tags.values
+    owned = tags[: cells.size_local]
+    if n_unknown := np.count_nonzero(~np.isin(owned, list(regions.values()))):
+        raise TagError(f"{n_unknown} cells belong to none of the regions {sorted(regions)}.")
+    return tags
+
+
+def _check_attachments(attached: Sequence[Attachment], names: dict[str, Any]) -> None:
+    for item in attached:
+        if item.interface not in names:
+            raise InterfaceError(
+                f"a mass of {item.mass:g} kg hangs on {item.interface!r}, "
+                f"but the interfaces are {sorted(names)}."
+            )
+
+
+def _warn(comm: MPI.Comm, remarks: list[str]) -> None:
+    for remark in remarks if comm.rank == 0 else ():
+        warnings.warn(RomWarning(remark), stacklevel=3)

@@ -1,0 +1,134 @@
+"""The cache of compiled forms: its lock, its stale files, and option files planted beside it."""
+
+import fcntl
+import logging
+import os
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mpi4py import MPI
+
+import dolfinx.jit
+
+from rom.errors import RomWarning
+from rom.fe.parallel import on_root
+
+JIT_OPTIONS = {"cffi_extra_compile_args": ["-O2", "-g0"], "cffi_libraries": None, "timeout": 60}
+PLANTED = ("dolfinx_jit_parameters.json", "dolfinx_jit_options.json",
+           "ffcx_parameters.json", "ffcx_options.json")  # fmt: skip
+STALE_AFTER = 30.0  # seconds after which nobody can still be compiling one of our forms
+
+
+@contextmanager
+def compiling(comm: MPI.Comm) -> Iterator[None]:
+    """Around everything that may compile a form: one job at a time, no stale file in the way.
+
+    A compilation that was killed leaves a source file without a library; every later run waits
+    for the library and gives up. Such files are removed here. Warns of option files in the
+    working folder, from which dolfinx would take compiler flags.
+    """
+    lock = on_root_lock(comm)
+    on_root(comm, clear_stale_cache)
+    if comm.rank == 0:
+        _warn_of_planted_options(Path.cwd())
+    previous = logging.root.manager.disable
+    logging.disable(max(previous, logging.INFO))  # the compiler's command lines
+    try:
+        yield
+    finally:
+        logging.disable(previous)
+        if lock is not None:
+            os.close(lock)
+
+
+def on_root_lock(comm: MPI.Comm) -> int | None:
+    """Descriptor of the locked cache on rank 0, None elsewhere and where locks do not work."""
+    path = on_root(comm, usable_cache)
+    _set_cache(path)
+    if comm.rank > 0:
+        return None
+    try:
+        lock = os.open(path / "rom.lock", os.O_CREAT | os.O_RDWR)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+    except OSError:  # some network file systems have no locks; the age of files must do
+        return None
+    return lock
+
+
+def cache_directory() -> Path:
+    """Where dolfinx keeps compiled forms."""
+    return Path(str(_defaults()["cache_dir"][0])).expanduser()
+
+
+def usable_cache() -> Path:
+    """The cache of dolfinx, or a temporary one when that cannot be written."""
+    path = cache_directory()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        if os.access(path, os.W_OK):
+            return path
+    except OSError:
+        pass
+    warnings.warn(
+        RomWarning(f"{path} cannot be written; forms are compiled anew for this run."), stacklevel=2
+    )
+    return Path(tempfile.mkdtemp(prefix="rom-jit-"))
+
+
+def clear_stale_cache(directory: Path | None = None, age: float = STALE_AFTER) -> list[Path]:
+    """Remove what a killed compilation left behind.
+
+    Args:
+        directory: the cache; that of dolfinx when not given.
+        age: seconds a source must be old; younger ones are waited for, somebody may be at work.
+
+    Returns:
+        The sources removed.
+    """
+    removed = []
+    for source in sorted((directory or cache_directory()).glob("libffcx_*.c")):
+        while _unfinished(source) and time.time() - source.stat().st_mtime < age:
+            time.sleep(0.2)
+        if _unfinished(source):
+            source.unlink(missing_ok=True)
+            removed.append(source)
+    return removed
+
+
+def stale_sources(directory: Path | None = None, age: float = STALE_AFTER) -> list[Path]:
+    """What a killed compilation left behind, without touching it; arguments as above."""
+    sources = sorted((directory or cache_directory()).glob("libffcx_*.c"))
+    return [s for s in sources if _unfinished(s) and time.time() - s.stat().st_mtime >= age]
+
+
+def _unfinished(source: Path) -> bool:
+    return source.exists() and not source.with_suffix(".c.cached").exists()
+
+
+def _defaults() -> dict:
+    for name in ("DOLFINX_DEFAULT_JIT_OPTIONS", "DOLFINX_DEFAULT_JIT_PARAMETERS"):
+        if hasattr(dolfinx.jit, name):
+            return getattr(dolfinx.jit, name)
+    raise AttributeError("dolfinx.jit has no table of default options")
+
+
+def _set_cache(path: Path) -> None:
+    """Coordinate maps are compiled inside dolfinx, where no options can be passed."""
+    defaults = _defaults()
+    defaults["cache_dir"] = (path, *defaults["cache_dir"][1:])
+
+
+def _warn_of_planted_options(folder: Path) -> None:
+    for name in PLANTED:
+        if (folder / name).exists():
+            warnings.warn(
+                RomWarning(
+                    f"{folder / name} gives options to the form compiler. "
+                    "Remove it unless you put it there: it can run any compiler flag."
+                ),
+                stacklevel=2,
+            )

@@ -1,0 +1,143 @@
+"""Material numbers as coefficients of the forms, and what a careful user wants to know of them."""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from rom.errors import MaterialError, TagError
+from rom.fe.compat import per_cell
+from rom.model import Array, Material, Orthotropic
+
+Solid = Material | Orthotropic
+PLAUSIBLE_SPEED = (50.0, 2.0e4)  # m/s, from foams to diamond
+METALLIC_SPEED = 1000.0  # m/s; above it a body is no rubber and no soil
+LARGE = 20.0  # m; most machine parts above it are millimetres read as metres
+NEARLY_INCOMPRESSIBLE = 0.49
+CONTRAST = 1e8  # of the stiffness, beyond which the conditioning eats half the digits
+
+
+def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
+    """{tag: material}, from one material for all or from {region name: material}.
+
+    Raises:
+        MaterialError: if the material is no material, or names a region the mesh does not have.
+        TagError: if a region is left without material.
+    """
+    if isinstance(material, Solid):
+        return dict.fromkeys(regions.values(), material)
+    if not isinstance(material, dict):
+        raise MaterialError(
+            f"material = {material!r} is neither Material, Orthotropic nor a dictionary of them."
+        )
+    for name, value in material.items():
+        if name not in regions:
+            raise MaterialError(f"there is no region {name!r}; the mesh has {sorted(regions)}.")
+        if not isinstance(value, Solid):
+            raise MaterialError(f"the material of region {name!r} is {value!r}.")
+    if missing := sorted(set(regions) - set(material)):
+        raise TagError(
+            f"the region {missing[0]!r} has no material; materials are given for "
+            f"{sorted(material)}.",
+            hint="Give every region of the mesh a material.",
+        )
+    return {regions[name]: value for name, value in material.items()}
+
+
+def coefficients(mesh: Any, tags: Array, solids: dict[int, Solid]) -> dict[str, Any]:
+    """Coefficients of the forms: "rho", and "lam", "mu" or the full stiffness "C".
+
+    Constants for one material, one value per cell for several, so that other numbers never mean
+    another compilation.
+
+    Args:
+        mesh: dolfinx mesh.
+        tags: (cells of this rank with ghosts,) region of each cell.
+        solids: {tag: material}.
+    """
+    tables = {tag: _numbers(solid, _isotropic(solids)) for tag, solid in solids.items()}
+    if len(set(map(id, solids.values()))) == 1:
+        return {
+            name: fem.Constant(mesh, value) for name, value in next(iter(tables.values())).items()
+        }
+    order = sorted(tables)
+    rows = np.searchsorted(order, tags)
+    names = tables[order[0]]
+    return {n: per_cell(mesh, np.array([tables[t][n] for t in order])[rows]) for n in names}
+
+
+def _isotropic(solids: dict[int, Solid]) -> bool:
+    return all(isinstance(solid, Material) for solid in solids.values())
+
+
+def _numbers(solid: Solid, isotropic: bool) -> dict[str, Any]:
+    C = solid.stiffness
+    if isotropic:
+        return {"rho": np.float64(solid.rho), "lam": C[0, 1], "mu": C[3, 3]}
+    return {"rho": np.float64(solid.rho), "C": C}
+
+
+def stress(strain: Any, numbers: dict[str, Any]) -> Any:
+    """Stress of Hooke's law, isotropic or with the (6, 6) stiffness C.
+
+    Args:
+        strain: (3, 3) symmetric strain, a ufl expression.
+        numbers: see `coefficients`.
+    """
+    if "C" not in numbers:
+        return 2 * numbers["mu"] * strain + numbers["lam"] * ufl.tr(strain) * ufl.Identity(3)
+    e = strain
+    voigt = ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[1, 2], 2 * e[0, 2], 2 * e[0, 1]])
+    s = ufl.dot(numbers["C"], voigt)
+    return ufl.as_matrix([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
+
+
+def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Iterator[str]:
+    """Sentences about input that is legal but unusual.
+
+    Args:
+        solids: {region name: material}.
+        size: longest edge of the bounding box [m].
+        cell: shape of the cells.
+        degree: polynomial degree of the displacement.
+    """
+    if degree == 1 and cell == "tetrahedron":
+        yield (
+            "linear tetrahedra lock in bending: frequencies come out too high, often by tens of "
+            "per cent. Use degree=2."
+        )
+    for name, solid in solids.items():
+        slow, fast = PLAUSIBLE_SPEED
+        if not slow <= solid.wave_speed <= fast:
+            yield (
+                f"sound would travel at {solid.wave_speed:.3g} m/s in {name!r}; solids have "
+                f"{slow:g} to {fast:g} m/s. Check the units: E in Pa, rho in kg/m^3."
+            )
+        elif solid.wave_speed > METALLIC_SPEED and size > LARGE:
+            yield (
+                f"the body is {size:.4g} m long and as stiff as metal. If the mesh is in "
+                "millimetres, give scale=1e-3."
+            )
+        if isinstance(solid, Material) and solid.nu > NEARLY_INCOMPRESSIBLE:
+            yield (
+                f"nu = {solid.nu:g} in {name!r} is nearly incompressible: displacement elements "
+                "come out too stiff. Stay below 0.49."
+            )
+    stiffness = [np.linalg.eigvalsh(solid.stiffness) for solid in solids.values()]
+    contrast = max(s[-1] for s in stiffness) / min(s[0] for s in stiffness)
+    if contrast > CONTRAST:
+        yield f"stiffness varies by {contrast:.1g} over the body; expect few correct digits."
+
+
+def described(solids: dict[str, Solid]) -> dict[str, Any]:
+    """The material numbers by region, in plain Python, for the provenance."""
+    return {name: _plain(asdict(solid)) for name, solid in solids.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return np.asarray(value, dtype=float).tolist()

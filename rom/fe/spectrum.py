@@ -1,0 +1,107 @@
+"""What makes modes the same for any number of ranks, and the shift with which they are sought."""
+
+from itertools import pairwise
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom.model import Array
+
+CLUSTER = 1e-7  # relative distance of eigenvalues whose modes are only defined as a plane
+EQUAL = 1e-6  # relative difference of entries that count as equally large
+DIRECTIONS = np.array([[3.1, 1.7, 2.3], [1.3, 3.7, 1.9], [2.1, 1.1, 3.3]])  # no symmetry
+
+
+def fixed_vector(comm: MPI.Comm, rigid: Array | None, first: int, n_local: int) -> Array:
+    """(n_local,) vector that depends on the place of a dof and not on its number.
+
+    A smooth field without symmetry, so that no mode of a symmetric body is orthogonal to it.
+    Without geometry it depends on the number.
+    """
+    if rigid is None:
+        return np.sin(1.0 + np.arange(first, first + n_local))
+    points = points_of(rigid)
+    low = comm.allreduce(points.min(axis=0, initial=np.inf), op=LOWEST)
+    high = comm.allreduce(points.max(axis=0, initial=-np.inf), op=HIGHEST)
+    size = (high - low).max()
+    return np.sin((points - low) / size @ DIRECTIONS + np.arange(1.0, 4.0)).ravel()
+
+
+def points_of(rigid: Array) -> Array:
+    """(n_local/3, 3) coordinates of the nodes whose rigid motions are given [m]."""
+    x, y, z = rigid[1::3, 5], rigid[2::3, 3], rigid[0::3, 4]
+    return np.column_stack([x, y, z])
+
+
+def _elementwise(function: Any) -> MPI.Op:
+    return MPI.Op.Create(lambda a, b, _: function(a, b), commute=True)
+
+
+LOWEST, HIGHEST = _elementwise(np.minimum), _elementwise(np.maximum)
+
+
+def polynomial_fields(comm: MPI.Comm, rigid: Array) -> Array:
+    """(n_local, 60) displacements that are polynomials of degree up to three in the coordinates."""
+    x = points_of(rigid)
+    low = comm.allreduce(x.min(axis=0, initial=np.inf), op=LOWEST)
+    high = comm.allreduce(x.max(axis=0, initial=-np.inf), op=HIGHEST)
+    x = 2.0 * (x - low) / np.maximum(high - low, 1e-9 * (high - low).max()) - 1.0
+    powers = [np.polynomial.legendre.legvander(column, 3).T for column in x.T]
+    scalar = [
+        powers[0][i] * powers[1][j] * powers[2][k]
+        for i in range(4)
+        for j in range(4 - i)
+        for k in range(4 - i - j)
+    ]
+    return np.kron(np.array(scalar).T, np.eye(3))
+
+
+def first_elastic(ops: Any) -> float:
+    """Upper bound of the first elastic eigenvalue: Rayleigh and Ritz with polynomial fields."""
+    X = polynomial_fields(ops.comm, ops.rigid)
+    K, M = ops.gram(X, ops.apply_K(X)), ops.gram(X, ops.apply_M(X))
+    lam, U = eigh(M)
+    kept = lam > 1e-10 * lam[-1]  # few nodes cannot tell all polynomials apart
+    U = U[:, kept] / np.sqrt(lam[kept])
+    lam = eigh(U.T @ K @ U, eigvals_only=True)
+    return float(lam[min(6, lam.size - 1)])
+
+
+def settled(ops: Any, lam: Array, Phi: Array) -> Array:
+    """Modes with equal frequencies turned within their plane to the same place on any machine.
+
+    Args:
+        ops: the operators the modes belong to.
+        lam: (m,) ascending eigenvalues.
+        Phi: (n_local, m) mass-normalised modes.
+    """
+    Phi = Phi.copy()
+    apart = np.diff(lam) > CLUSTER * np.abs(lam[1:])
+    edges = np.concatenate([[0], np.flatnonzero(apart) + 1, [lam.size]])
+    for start, end in pairwise(edges):
+        if end - start > 1:
+            probes = ops.fixed[:, None] ** np.arange(1, end - start + 1)
+            Q, _ = np.linalg.qr(ops.gram(Phi[:, start:end], probes))
+            Phi[:, start:end] = Phi[:, start:end] @ Q
+    return Phi
+
+
+def signed(ops: Any, Phi: Array) -> Array:
+    """Columns turned so that their largest entry, over all ranks, is positive.
+
+    Among equally large entries the place decides, not the numbering.
+    """
+    size = np.abs(Phi)
+    largest = ops.comm.allreduce(size.max(axis=0, initial=0.0), op=HIGHEST)
+    if Phi.shape[0]:
+        key = np.where(size >= (1 - EQUAL) * largest, ops.fixed[:, None], -np.inf)
+        row = key.argmax(axis=0)
+        best = np.vstack([np.take_along_axis(a, row[None], axis=0) for a in (key, Phi)])
+    else:
+        best = np.full((2, Phi.shape[1]), -np.inf)
+    best = np.array(ops.comm.allgather(best))
+    chosen = best[:, 0].argmax(axis=0)
+    return Phi * np.where(best[chosen, 1, np.arange(Phi.shape[1])] < 0, -1.0, 1.0)
