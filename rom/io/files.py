@@ -20,11 +20,7 @@ def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
         ConfigError: if the folder does not exist or may not be written, or the name is a folder.
         ResourceError: if the disk is full.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise ConfigError(f"{path} is a folder; a file name is needed.")
-    if not path.parent.is_dir():
-        raise ConfigError(f"the folder {path.parent} does not exist.", hint="Make it first.")
+    path = check_writable(path)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     except PermissionError as error:
@@ -42,6 +38,22 @@ def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
         ) from error
     finally:
         Path(name).unlink(missing_ok=True)
+
+
+def check_writable(path: str | Path) -> Path:
+    """The path, if a file of that name can be written; to be asked before a long computation.
+
+    Raises:
+        ConfigError: if the folder does not exist or may not be written, or the name is a folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise ConfigError(f"{path} is a folder; a file name is needed.")
+    if not path.parent.is_dir():
+        raise ConfigError(f"the folder {path.parent} does not exist.", hint="Make it first.")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise ConfigError(f"the folder {path.parent} is not writable.")
+    return path
 
 
 def _fill(handle: int, write: Callable[[IO[bytes]], object]) -> None:

@@ -150,14 +150,14 @@ def _body(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         )
         for i, m in enumerate(manifest["markers"])
     }
-    parts = ("points", "triangles", "shape")
-    surface = Surface(*(arrays[f"surface/{p}"] for p in parts)) if manifest["surface"] else None
+    parts: Any = (arrays[f"surface/{part}"] for part in ("points", "triangles", "shape"))
+    surface = Surface(*parts) if manifest["surface"] else None
     report = manifest["certificate"]
     if report is not None:
         report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
     return FlexibleBody(
         name=manifest["name"],
-        mass=float(arrays["mass"]),
+        mass=arrays["mass"].item(),
         **{name: arrays[name] for name in FIELDS},
         K_geo={name: arrays[f"K_geo/{name}"] for name in manifest["geometric_stiffness"]},
         markers=markers,

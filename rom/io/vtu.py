@@ -1,4 +1,4 @@
-"""Mode shapes on the surface of a body, for ParaView (VTK XML, unstructured grid)."""
+"""Mode shapes on the surface of a body, and meshes, for ParaView (VTK XML, unstructured grid)."""
 
 import base64
 from pathlib import Path
@@ -10,6 +10,7 @@ import numpy as np
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.files import write_whole
+from rom.model import Array, Index
 
 TRIANGLE = 5  # VTK's number of this cell
 TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
@@ -35,35 +36,57 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
 def _document(body: FlexibleBody) -> str:
     surface = body.surface
     assert surface is not None
-    n, t = surface.points.shape[0], surface.triangles.shape[0]
-    shapes = surface.shape.reshape(n, 3, -1)
-    fields = [
-        _array(f"{label}, {omega / (2 * np.pi):.6g} Hz", shapes[:, :, k])
+    shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
+    fields = {
+        f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
         for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
-    ]
-    cells = [
-        _array("connectivity", surface.triangles.ravel()),
-        _array("offsets", 3 * np.arange(1, t + 1)),
-        _array("types", np.full(t, TRIANGLE, dtype=np.uint8)),
-    ]
+    }
+    return grid(surface.points, surface.triangles, TRIANGLE, at_points=fields)
+
+
+def grid(
+    points: Array,
+    cells: Index,
+    kind: int,
+    *,
+    at_points: dict[str, Any] | None = None,
+    at_cells: dict[str, Any] | None = None,
+) -> str:
+    """Text of a file with cells of one kind.
+
+    Args:
+        points: (n, 3) positions [m].
+        cells: (m, k) node numbers in VTK's order.
+        kind: VTK's number of the cell.
+        at_points: {name: (n,) or (n, c) values}.
+        at_cells: {name: (m,) or (m, c) values}.
+    """
+    m, k = cells.shape
+    topology = {
+        "connectivity": cells.ravel(),
+        "offsets": k * np.arange(1, m + 1),
+        "types": np.full(m, kind, dtype=np.uint8),
+    }
+    head = (
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64">'
+    )
     return "\n".join(
         [
-            '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-            'header_type="UInt64">',
-            f'<UnstructuredGrid><Piece NumberOfPoints="{n}" NumberOfCells="{t}">',
-            "<Points>",
-            _array("points", surface.points),
-            "</Points>",
-            "<Cells>",
-            *cells,
-            "</Cells>",
-            "<PointData>",
-            *fields,
-            "</PointData>",
+            head,
+            f'<UnstructuredGrid><Piece NumberOfPoints="{len(points)}" NumberOfCells="{m}">',
+            *_section("Points", {"points": points}),
+            *_section("Cells", topology),
+            *_section("PointData", at_points or {}),
+            *_section("CellData", at_cells or {}),
             "</Piece></UnstructuredGrid></VTKFile>",
             "",
         ]
     )
+
+
+def _section(name: str, arrays: dict[str, Any]) -> list[str]:
+    return [f"<{name}>", *(_array(key, values) for key, values in arrays.items()), f"</{name}>"]
 
 
 def _array(name: str, values: Any) -> str:

@@ -1,0 +1,48 @@
+"""Say which versions are installed, what works, and what to type for the rest.
+
+Exit code 0 also when an optional part is missing; 5 when something is installed and does not work.
+"""
+
+import argparse
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from rom.cli.answer import Answer
+
+if TYPE_CHECKING:
+    from rom.doctor.finding import Finding
+
+SUMMARY = "versions, speed of the linear algebra, display, caches, advice"
+EXAMPLES = """\
+  rom doctor
+  rom doctor --fix        # also remove what killed runs left in the caches
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    parser.add_argument("--fix", action="store_true", help="remove damaged files from the caches")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Examine and report."""
+    from rom import __version__
+    from rom.doctor.examination import diagnose
+
+    found = diagnose(fix=args.fix)
+    broken = tuple(f"{f.name} is broken: {f.value}" for f in found if f.state == "broken")
+    data = {"rom": __version__, "findings": [asdict(f) for f in found]}
+    return Answer(data, f"rom {__version__}\n{_text(found)}", failed=broken)
+
+
+def _text(found: "list[Finding]") -> str:
+    width, lines, topic = max(len(f.name) for f in found), [], ""
+    for f in found:
+        if f.topic != topic:
+            topic = f.topic
+            lines += ["", topic]
+        state = "" if f.state == "ok" else f"{f.state}: "
+        lines.append(f"  {f.name:<{width}}  {state}{f.value}")
+        if f.advice:
+            lines.append(f"  {'':<{width}}    -> {f.advice}")
+    return "\n".join(lines)

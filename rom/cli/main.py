@@ -1,0 +1,85 @@
+"""Runs one verb and turns whatever happens into one exit code, the same on all ranks."""
+
+import os
+import sys
+import traceback
+
+from rom.cli.parser import build_parser
+from rom.cli.ranks import ranks, stop_all
+from rom.cli.speech import Manner, complain, manner_of, present, say, speaking
+from rom.errors import ConfigError, InterruptedRun, QualityGateError, ResourceError, RomError
+
+
+class InternalError(RomError):
+    """An exception nobody foresaw."""
+
+    exit_code = 1
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: what stands behind ``rom``; from the system when not given.
+
+    Returns:
+        The exit code.
+    """
+    argv = sys.argv[1:] if argv is None else argv
+    manner = manner_of(argv)
+    try:
+        return run(argv, manner)
+    except SystemExit:  # argparse has printed the help
+        raise
+    except BrokenPipeError:  # the reader, for example head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except BaseException as raised:
+        if manner.debug:
+            traceback.print_exception(raised)
+        error = translated(raised)
+        stop_all(error.exit_code, lambda: complain(error, manner, ranks()[0]))
+        return error.exit_code
+
+
+def run(argv: list[str], manner: Manner) -> int:
+    """Parse, run the verb, write its files, print its answer."""
+    args = build_parser().parse_args(argv)
+    if args.version:
+        from rom import __version__
+
+        say(f"rom {__version__}")
+        return 0
+    if args.verb is None:
+        raise ConfigError("no verb was given.", hint="rom --help lists the verbs.")
+    first = ranks()[0] == 0
+    with speaking(manner, aloud=first) as remarks:
+        answer = args.run(args)
+        if first and answer.write is not None:
+            answer.write()
+    if first:
+        present(answer, remarks, manner)
+    return QualityGateError.exit_code if answer.failed else 0
+
+
+def translated(error: BaseException) -> RomError:
+    """Any exception as an error a user can act on."""
+    if isinstance(error, RomError):
+        return error
+    if isinstance(error, KeyboardInterrupt):
+        return InterruptedRun("interrupted.", hint="No file was left half written.")
+    if isinstance(error, MemoryError):
+        return ResourceError("the memory ran out.", hint="Use larger elements or fewer modes.")
+    if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("rom"):
+        return ResourceError(
+            f"{error.name} is not installed.", hint="rom doctor says what to type."
+        )
+    return InternalError(
+        f"{type(error).__name__}: {error} ({_place(error)})",
+        hint="This is a mistake of ours: please report it with what --debug prints.",
+    )
+
+
+def _place(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{os.path.basename(frames[-1].filename)}, line {frames[-1].lineno}"

@@ -1,0 +1,143 @@
+"""Options several verbs share, and the forms their values may take."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rom.model import FEModel, Material
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a number" + (" (write a decimal point)" if "," in text else "")
+        ) from None
+    if value != value or value in (float("inf"), float("-inf")):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return value
+
+
+def positive(text: str) -> float:
+    """A number above zero."""
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not positive")
+    return value
+
+
+def count(text: str) -> int:
+    """A whole number, zero or more."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+def vector(text: str) -> tuple[float, float, float]:
+    """Three numbers with commas."""
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise argparse.ArgumentTypeError(f"{text!r} is not three numbers with commas, as in 0,0,1")
+    x, y, z = map(number, parts)
+    return x, y, z
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names with commas."""
+    return tuple(filter(None, (part.strip() for part in text.split(","))))
+
+
+def assignment(text: str) -> tuple[str, str]:
+    """NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE")
+    return name, value
+
+
+def number_or_text(pair: tuple[str, str]) -> tuple[str, Any]:
+    """The value of an assignment as a number where it is one."""
+    name, value = pair
+    try:
+        return name, float(value)
+    except ValueError:
+        return name, value
+
+
+def unique(pairs: list[tuple[str, Any]], option: str) -> dict[str, Any]:
+    """A dictionary of assignments.
+
+    Raises:
+        ConfigError: if a name is given twice.
+    """
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise ConfigError(f"{option} {name} is given twice: {found[name]} and {value}.")
+        found[name] = value
+    return found
+
+
+def add_geometry(parser: argparse.ArgumentParser) -> None:
+    """The file and how to read it."""
+    parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .inp or .bdf")
+    parser.add_argument(
+        "-p",
+        "--parameter",
+        metavar="NAME=VALUE",
+        type=assignment,
+        action="append",
+        default=[],
+        help="parameter of the geometry, e.g. lc=4e-3; may be repeated",
+    )
+    parser.add_argument(
+        "--scale", type=positive, default=1.0, help="factor on coordinates; 1e-3 for mm (default 1)"
+    )
+
+
+def add_material(parser: argparse.ArgumentParser) -> None:
+    """Elastic solid and element degree."""
+    parser.add_argument("--E", type=number, required=True, help="Young's modulus [Pa]")
+    parser.add_argument("--nu", type=number, required=True, help="Poisson's ratio")
+    parser.add_argument("--rho", type=number, required=True, help="density [kg/m^3]")
+    parser.add_argument(
+        "--degree", type=count, default=2, help="degree of the displacement, 1 to 3 (default 2)"
+    )
+
+
+def add_interfaces(parser: argparse.ArgumentParser) -> None:
+    """Interfaces by name and kind."""
+    parser.add_argument(
+        "-i",
+        "--interface",
+        metavar="NAME=KIND",
+        type=assignment,
+        action="append",
+        default=[],
+        help="interface and its kind: full, rbe2 (stiff) or rbe3 (average); may be repeated",
+    )
+
+
+def reading(args: argparse.Namespace) -> dict[str, Any]:
+    """Keyword arguments of `rom.fe.mesh.read_mesh`."""
+    pairs = [number_or_text(pair) for pair in args.parameter]
+    return {"parameters": unique(pairs, "-p"), "scale": args.scale}
+
+
+def read_model(args: argparse.Namespace) -> "FEModel":
+    """The finite element model the options ask for."""
+    from rom.fe.elasticity import model
+
+    return model(args.file, material=material(args), degree=args.degree, **reading(args))
+
+
+def material(args: argparse.Namespace) -> "Material":
+    """The material the options ask for."""
+    from rom.model import Material
+
+    return Material(E=args.E, nu=args.nu, rho=args.rho)

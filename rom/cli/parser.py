@@ -1,0 +1,115 @@
+"""The grammar of the command line, with the exit codes and examples that ``--help`` shows."""
+
+import argparse
+from difflib import get_close_matches
+from typing import NoReturn
+
+from rom.cli import bench, check, doctor, export, mesh, modes, reduce, simulate, view
+from rom.errors import ConfigError
+
+VERBS = (doctor, mesh, modes, reduce, check, export, simulate, view, bench)
+EXIT_CODES = """\
+exit codes:
+  0  done
+  1  a mistake of ours, please report it
+  2  usage: an option, a name or an output place that cannot be
+  3  an input file or mesh that is not what it should be
+  4  physics: material, interface or mechanism that cannot be
+  5  a solver did not deliver, or a quality figure is beyond its limit
+  6  not enough memory or disk, or a library is missing
+  7  interrupted; what was finished before is kept
+"""
+EXAMPLES = """\
+examples:
+  rom doctor
+  rom mesh meshes/connecting_rod.geo -p lc=4e-3
+  rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
+      -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz
+  rom check rod.rom.npz
+  rom VERB --help has more for each verb
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports what it does not understand as a `ConfigError` with the nearest thing it knows."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise instead of printing the usage and leaving."""
+        hint = f"{self.prog} --help lists what there is."
+        if "expected one argument" in message:
+            option = message.split()[1].rstrip(":")
+            hint = f"Write {option}=-1 where the value begins with a minus. {hint}"
+        raise ConfigError(f"{message}.", hint=hint)
+
+    def parse_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def]
+        """Parse, and suggest a spelling for an option that does not exist."""
+        found, rest = self.parse_known_args(args, namespace)
+        if rest:
+            known = options_of(self, getattr(found, "verb", None))
+            raise ConfigError(
+                f"unknown option or argument {rest[0]!r}.", hint=suggestion(rest[0], known)
+            )
+        return found
+
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            raise ConfigError(
+                f"the {action.dest} {str(value)!r} does not exist.",
+                hint=suggestion(str(value), known),
+            )
+
+
+def suggestion(word: str, known: list[str]) -> str:
+    """The nearest known word, and the list of them."""
+    near = get_close_matches(word.partition("=")[0], known, n=1)
+    return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(known)}."
+
+
+def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:
+    """Long options of a verb."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction) and verb in action.choices:
+            parser = action.choices[verb]
+    return sorted(s for s in parser._option_string_actions if s.startswith("--"))
+
+
+def build_parser() -> Parser:
+    """The whole grammar; loads nothing heavy."""
+    parser = Parser(
+        prog="rom",
+        description="From a gmsh geometry to a reduced flexible body that moves.",
+        epilog=EXAMPLES + "\n" + EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="store_true", help="print the version and leave")
+    add_common(parser, default=False)
+    verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs", parser_class=Parser)
+    for module in VERBS:
+        name = module.__name__.rpartition(".")[2]
+        sub = verbs.add_parser(
+            name,
+            help=module.SUMMARY,
+            description=module.__doc__,
+            epilog=f"examples:\n{module.EXAMPLES}\n{EXIT_CODES}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        module.add_options(sub)
+        add_common(sub, default=argparse.SUPPRESS)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def add_common(parser: argparse.ArgumentParser, default: object) -> None:
+    """Options that may stand before or behind the verb."""
+    group = parser.add_argument_group("for every verb")
+    for flags, text in (
+        (("--json",), "print one JSON object, also for an error"),
+        (("-q", "--quiet"), "no progress, no warnings"),
+        (("-v", "--verbose"), "more progress"),
+        (("--strict",), "a warning is an error (exit code 5)"),
+        (("--debug",), "show where in the program an error arose"),
+    ):
+        group.add_argument(*flags, action="store_true", default=default, help=text)

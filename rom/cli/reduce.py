@@ -1,0 +1,130 @@
+"""Reduce a finite element model to a flexible body and compare the two.
+
+The body is written even when a quality figure fails, with that verdict inside; the exit code is
+then 5.
+"""
+
+import argparse
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.answer import Answer, failures, report_data
+from rom.cli.options import (
+    add_geometry,
+    add_interfaces,
+    add_material,
+    count,
+    names,
+    number,
+    positive,
+    read_model,
+    unique,
+)
+from rom.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rom.body.damping import ModalDamping, Rayleigh
+    from rom.body.flexible import FlexibleBody
+
+SUMMARY = "reduce a model to a flexible body, with its certificate"
+EXAMPLES = """\
+  rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
+      -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz
+  rom reduce meshes/beam.geo --E 70e9 --nu 0.33 --rho 2700 -i root=rbe2 -i tip=rbe3 \\
+      --f-max 3e3 --reference root,tip --damping-ratio 0.01 -o beam.rom.npz
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_geometry(parser)
+    add_material(parser)
+    add_interfaces(parser)
+    kept = parser.add_mutually_exclusive_group()
+    kept.add_argument("-m", "--modes", type=count, help="fixed-interface modes kept (default 20)")
+    kept.add_argument("--f-max", type=positive, help="keep all of them up to this frequency [Hz]")
+    parser.add_argument(
+        "--reference",
+        metavar="FRAME",
+        type=names,
+        default=("mean-axis",),
+        help="frame: mean-axis, an interface, or two interfaces A,B (default mean-axis)",
+    )
+    damping = parser.add_mutually_exclusive_group()
+    damping.add_argument("--damping-ratio", type=number, help="of every mode, e.g. 0.01")
+    damping.add_argument("--rayleigh", metavar="ALPHA,BETA", help="D = ALPHA M + BETA K [1/s], [s]")
+    parser.add_argument("--name", help="name of the body (default: that of the file)")
+    parser.add_argument("--no-certificate", action="store_true", help="skip the comparison")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="e.g. rod.rom.npz")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Assemble, reduce, compare; the file is written at the end."""
+    from rom.io.files import check_writable
+    from rom.io.native import save
+    from rom.reduction.method import CraigBampton
+    from rom.workflow import reduce
+
+    check_writable(args.output)
+    kept = (
+        {"f_max": args.f_max}
+        if args.f_max
+        else {"n_modes": 20 if args.modes is None else args.modes}
+    )
+    method, damping = CraigBampton(**kept), _damping(args)
+    kinds = unique(args.interface, "-i")
+    if not kinds:
+        raise ConfigError("a body needs an interface.", hint="For example -i pin_a=rbe2.")
+    body = reduce(
+        read_model(args),
+        method=method,
+        interfaces=kinds,
+        reference=args.reference[0] if len(args.reference) == 1 else args.reference,
+        damping=damping,
+        name=args.name or args.file.stem,
+        certify=not args.no_certificate,
+    )
+    failed = failures(body.certificate) if body.certificate else ()
+    return Answer(
+        _data(body, args.output), _text(body, args.output), lambda: save(body, args.output), failed
+    )
+
+
+def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
+    from rom.body.damping import ModalDamping, Rayleigh
+
+    if args.damping_ratio is not None:
+        return ModalDamping(args.damping_ratio)
+    if args.rayleigh is None:
+        return None
+    try:
+        alpha, beta = map(float, args.rayleigh.split(","))
+    except ValueError:
+        raise ConfigError(
+            f"--rayleigh {args.rayleigh} is not two numbers, as in 0.1,1e-6."
+        ) from None
+    return Rayleigh(alpha, beta)
+
+
+def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:
+    return {
+        "output": str(output),
+        "name": body.name,
+        "mass": body.mass,
+        "n_modes": body.n_modes,
+        "reference": body.reference,
+        "interfaces": list(body.interface_names),
+        "frequencies": (body.omega / (2 * pi)).tolist(),
+        "certificate": None if body.certificate is None else report_data(body.certificate),
+        "provenance": body.provenance,
+    }
+
+
+def _text(body: "FlexibleBody", output: Path) -> str:
+    full = body.provenance["reduction"]["full dofs"]
+    head = (
+        f"{output}: body {body.name}, {body.mass:.6g} kg, {full} dofs reduced to "
+        f"6 + {body.n_modes}, frame {body.reference}"
+    )
+    return head if body.certificate is None else f"{head}\n\n{body.certificate}"

@@ -1,0 +1,123 @@
+"""What is said where: answers on stdout, progress, warnings and errors on stderr."""
+
+import logging
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from rom.cli.answer import Answer, to_json
+from rom.errors import QualityGateError, RomError, RomWarning
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How to speak; the options of the same names."""
+
+    json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+    strict: bool = False
+    debug: bool = False
+
+
+def manner_of(argv: list[str]) -> Manner:
+    """The common options, read before the grammar: a usage error speaks the same way."""
+    letters = {a[1:] for a in argv if a[:1] == "-" and a[1:2] != "-"}
+    return Manner(
+        json="--json" in argv,
+        quiet="--quiet" in argv or "q" in letters,
+        verbose="--verbose" in argv or "v" in letters,
+        strict="--strict" in argv,
+        debug="--debug" in argv,
+    )
+
+
+def present(answer: Answer, remarks: list[str], manner: Manner) -> None:
+    """Print an answer, and what failed."""
+    if manner.json:
+        whole = {"ok": not answer.failed, **answer.data, "warnings": remarks}
+        say(to_json(whole | ({"failed": answer.failed} if answer.failed else {})))
+    elif answer.text:
+        say(answer.text)
+    if answer.failed:
+        more = f", and {len(answer.failed) - 1} more" if len(answer.failed) > 1 else ""
+        tell(f"error: {answer.failed[0]}{more}.")
+
+
+def complain(error: RomError, manner: Manner, rank: int = 0) -> None:
+    """One line of cause and one line of hint; a rank that is alone with its error says so."""
+    where = f"{error.where}: " if error.where else ""
+    cause = " ".join(f"{where}{error.message}".split())
+    if manner.json:
+        say(
+            to_json(
+                {
+                    "ok": False,
+                    "error": type(error).__name__,
+                    "message": cause,
+                    "hint": error.hint,
+                    "exit_code": error.exit_code,
+                }
+            )
+        )
+    tell("error: " + (f"rank {rank}: " if rank else "") + cause)
+    if error.hint:
+        tell(f"hint: {' '.join(error.hint.split())}")
+
+
+@contextmanager
+def speaking(manner: Manner, *, aloud: bool) -> Iterator[list[str]]:
+    """Progress and warnings on stderr; with ``--strict`` the first warning is an error.
+
+    Args:
+        manner: how.
+        aloud: False on ranks that keep silent.
+
+    Yields:
+        The list that collects the warnings.
+    """
+    remarks: list[str] = []
+
+    def show(message: Any, category: type, *_: Any, **__: Any) -> None:
+        text = " ".join(str(message).split())
+        if not issubclass(category, RomWarning) or text in remarks:
+            return
+        if manner.strict:
+            raise QualityGateError(text, hint="Without --strict this is a warning.")
+        remarks.append(text)
+        if aloud and not manner.quiet:
+            tell(f"warning: {text}")
+
+    log, handler = logging.getLogger("rom"), logging.StreamHandler()
+    log.setLevel(_level(manner) if aloud else logging.CRITICAL)
+    log.addHandler(handler)
+    log.propagate = False  # ffcx gives the root logger a handler of its own
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", RomWarning)
+            warnings.showwarning = show
+            yield remarks
+    finally:
+        log.removeHandler(handler)
+        log.propagate = True
+
+
+def _level(manner: Manner) -> int:
+    if manner.quiet:
+        return logging.ERROR
+    return logging.DEBUG if manner.verbose else logging.INFO
+
+
+def say(text: str) -> None:
+    """A line on stdout."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def tell(text: str) -> None:
+    """A line on stderr."""
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()

@@ -1,0 +1,282 @@
+"""Bad command lines, files and circumstances: the class of error, the culprit, no traceback."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from command import ROOT, environment
+from command import rom as command
+from solid import block
+
+import rom
+from rom.cli import check
+from rom.cli.main import main
+
+BEAM = str(ROOT / "meshes" / "beam.geo")
+STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]
+REDUCE = ["reduce", BEAM, *STEEL, "-i", "root=rbe2"]
+
+
+def steel(**changed):
+    """The options of steel, some changed."""
+    values = {"E": "210e9", "nu": "0.3", "rho": "7850"} | changed
+    return [word for name, value in values.items() for word in (f"--{name}", value)]
+
+
+USAGE = {
+    "no verb": ([], "no verb was given"),
+    "unknown verb": (["redcue", BEAM], "'redcue' does not exist", "Did you mean reduce?"),
+    "unknown option": (["modes", BEAM, *STEEL, "--degre=1"], "'--degre=1'",
+                       "Did you mean --degree?"),
+    "full word for a symbol": (["modes", BEAM, *STEEL, "--youngs-modulus", "1"],
+                               "'--youngs-modulus'", "--E"),
+    "abbreviated option": (["modes", BEAM, *STEEL, "--numb", "3"], "'--numb'", "--number?"),
+    "missing option": (["modes", BEAM, "--E", "210e9"], "--nu, --rho"),
+    "superfluous file": (["check", "a.npz", "b.npz"], "'b.npz'"),
+    "decimal comma": (["modes", BEAM, *steel(nu="0,3")], "'0,3' is not a number", "decimal point"),
+    "word for a number": (["modes", BEAM, *steel(E="steel")], "argument --E: 'steel'"),
+    "not a number": (["modes", BEAM, *steel(rho="nan")], "'nan' is not a finite number"),
+    "infinite": (["mesh", BEAM, "--scale", "inf"], "'inf' is not a finite number"),
+    "negative scale": (["mesh", BEAM, "--scale=-1"], "-1 is not positive"),
+    "half a mode": (["modes", BEAM, *STEEL, "-n", "1.5"], "'1.5' is not a whole number"),
+    "two ways to choose modes": ([*REDUCE, "-m", "3", "--f-max", "3e3", "-o", "x.npz"],
+                                 "not allowed with"),
+    "parameter without value": (["mesh", BEAM, "-p", "lc"], "'lc' is not NAME=VALUE"),
+    "parameter twice": (["mesh", BEAM, "-p", "lc=1", "-p", "lc=2"],
+                        "-p lc is given twice: 1.0 and 2.0"),
+    "interface twice": (["modes", BEAM, *STEEL, "-i", "root=rbe2", "-i", "root=full"],
+                        "-i root is given twice"),
+    "no interface": (["reduce", BEAM, *STEEL, "-o", "x.npz"], "needs an interface"),
+    "axis of two numbers": (["simulate", "x.npz", "--hinge", "a", "--axis", "0,1", "--t-end", "1",
+                             "--dt", "1", "-o", "out"], "'0,1' is not three numbers"),
+    "axis beginning with a minus": (["simulate", "x.npz", "--axis", "-1,0,0"], "--axis",
+                                    "Write --axis=-1"),
+    "no direction": (["simulate", "x.npz", "--hinge", "a", "--axis", "0,0,0", "--t-end", "1",
+                      "--dt", "1", "-o", "out"], "has no direction"),
+    "step longer than the run": (["simulate", "x.npz", "--hinge", "a", "--t-end", "1", "--dt", "2",
+                                  "-o", "out"], "--dt 2 is longer than --t-end 1"),
+    "damping of one number": ([*REDUCE, "--rayleigh", "0.1", "-o", "x.npz"], "--rayleigh 0.1"),
+    "output in a missing folder": ([*REDUCE, "-o", "missing/x.npz"],
+                                   "folder missing does not exist"),
+    "output is a folder": ([*REDUCE, "-o", "."], ". is a folder"),
+    "folder is a file": (["simulate", "x.npz", "--hinge", "a", "--t-end", "1", "--dt", "1", "-o",
+                          "text.npz"], "text.npz is a file"),
+    "mesh saved as something else": (["mesh", BEAM, "--save", "x.stl"], "written as .vtu only"),
+    "picture saved as something else": (["view", "text.npz", "-o", "x.gif"],
+                                    "written as .png only"),
+    "face without a point": (["mesh", "x.step", "--face", "pin=here"], "--face: 'here'"),
+    "unknown benchmark": (["bench", "reducton"], "'reducton'"),
+}  # fmt: skip
+FILES = {
+    "missing mesh": (3, ["mesh", "nope.geo"], "nope.geo: there is no such file"),
+    "mesh is a folder": (3, ["mesh", "."], "is a folder"),
+    "mesh of unknown kind": (2, ["mesh", "text.npz"], "no reader for the suffix '.npz'"),
+    "missing body": (3, ["check", "nope.npz"], "nope.npz"),
+    "body is a folder": (3, ["check", "."], "."),
+    "text as body": (3, ["check", "text.npz"], "text.npz"),
+    "empty body": (3, ["check", "empty.npz"], "empty.npz"),
+    "body cut": (3, ["check", "cut.npz"], "cut.npz"),
+    "geometry as body": (3, ["check", BEAM], "beam.geo"),
+    "export to an unknown format": (2, ["export", "good.npz", "x.fbx"], "'.fbx'"),
+    "hinge misspelt": (4, ["simulate", "good.npz", "--hinge", "rot", "--t-end", "1", "--dt", "1e-3",
+                           "-o", "out"], "no interface 'rot'; it has ['root', 'tip']"),
+}  # fmt: skip
+PHYSICS = {
+    "unknown parameter": (
+        2,
+        ["mesh", BEAM, "-p", "lcc=1"],
+        "no parameter 'lcc'; its parameters are",
+    ),
+    "poisson": (4, ["modes", BEAM, *steel(nu="0.6")], "nu = 0.6"),
+    "massless": (4, ["modes", BEAM, *steel(rho="0")], "rho = 0"),
+    "negative stiffness": (4, ["modes", BEAM, *steel(E="-1")], "E = -1"),
+    "units": (5, ["modes", BEAM, *steel(E="210"), "--strict"], "0.164 m/s"),
+    "degree": (2, ["modes", BEAM, *STEEL, "--degree", "7"], "degree = 7"),
+    "no modes": (2, ["modes", BEAM, *STEEL, "-n", "0"], "m = 0"),
+    "interface misspelt": (4, ["modes", BEAM, *STEEL, "--fixed", "rot"], "'rot'; the model has"),
+    "kind misspelt": (2, ["modes", BEAM, *STEEL, "-i", "root=rbe4"], "rbe4"),
+    "frame misspelt": (4, [*REDUCE, "--reference", "tipp", "-m", "2", "-o", "x.npz"], "'tipp'"),
+}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    body = rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(4),
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+    return rom.save(body, tmp_path_factory.mktemp("good") / "good.npz").read_bytes()
+
+
+@pytest.fixture
+def folder(good, tmp_path, monkeypatch):
+    """A working folder with a good body and some that are not."""
+    for name, data in {"good": good, "cut": good[:-100], "empty": b"", "text": b"hello\n"}.items():
+        (tmp_path / f"{name}.npz").write_bytes(data)
+    monkeypatch.chdir(tmp_path)
+    before = set(os.listdir())
+    yield tmp_path
+    assert set(os.listdir()) == before, "something was left behind"
+
+
+def refused(capsys, code, arguments, *words):
+    """One line of cause with all words, at most one of hint, nothing on stdout."""
+    assert main(list(arguments)) == code
+    out, err = capsys.readouterr()
+    lines = [line for line in err.splitlines() if line[:6] in ("error:", "hint: ")]
+    assert out == "" and "Traceback" not in err
+    assert [line[:6] for line in lines] in (["error:"], ["error:", "hint: "])
+    assert not [word for word in words if word not in err], err
+    return lines
+
+
+@pytest.mark.parametrize("case", USAGE)
+def test_a_wrong_command_line_is_exit_code_2(case, folder, capsys):
+    arguments, *words = USAGE[case]
+    start = time.perf_counter()
+    assert len(refused(capsys, 2, arguments, *words)) >= 1
+    assert time.perf_counter() - start < 1
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_a_wrong_file_is_named(case, folder, capsys):
+    code, arguments, *words = FILES[case]
+    refused(capsys, code, arguments, *words)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("case", PHYSICS)
+def test_a_wrong_model_is_explained(case, folder, capsys):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    code, arguments, *words = PHYSICS[case]
+    refused(capsys, code, arguments, *words)
+
+
+@pytest.mark.parametrize("case", ["unknown option", "output is a folder"])
+def test_json_reports_the_error_too(case, folder, capsys):
+    arguments, *words = USAGE[case]
+    assert main([*arguments, "--json"]) == 2
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is False and found["error"] == "ConfigError" and found["exit_code"] == 2
+    assert words[0] in found["message"]
+
+
+def test_a_read_only_folder_is_found_before_the_computation(folder, capsys, monkeypatch):
+    locked = folder / "locked"
+    locked.mkdir()
+    locked.chmod(0o555)
+    if os.access(locked, os.W_OK):  # root may write everywhere
+        monkeypatch.setattr(os, "access", lambda path, mode: "locked" not in str(path))
+    refused(capsys, 2, ["export", "good.npz", "locked/x.vtu"], "locked is not writable")
+    refused(capsys, 2, [*REDUCE, "-o", "locked/x.npz"], "locked is not writable")
+    locked.rmdir()
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "words"),
+    [
+        (KeyboardInterrupt(), 7, ["interrupted", "half written"]),
+        (MemoryError(), 6, ["memory ran out"]),
+        (ModuleNotFoundError("No module named 'dolfinx'", name="dolfinx"), 6,
+         ["dolfinx is not installed", "rom doctor"]),
+        (RecursionError("too deep"), 1, ["RecursionError: too deep", "please report"]),
+        (AssertionError("a\nb"), 1, ["AssertionError: a b (test_cli_faults.py, line"]),
+        (rom.RomError("several\n lines", where="x.npz"), 1, ["error: x.npz: several lines\n"]),
+    ],
+)  # fmt: skip
+def test_every_exception_becomes_one_line(raised, code, words, monkeypatch, capsys):
+    def run(args):
+        raise raised
+
+    monkeypatch.setattr(check, "run", run)
+    refused(capsys, code, ["check", "x"], *words)
+    assert main(["check", "x", "--debug"]) == code
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_without_fenicsx_a_finite_element_verb_says_what_is_missing(folder):
+    code = "import sys; sys.modules['dolfinx'] = sys.modules['petsc4py'] = None\n"
+    code += "sys.modules['mpi4py'] = None\nfrom rom.cli.main import main\n"
+    code += f"sys.exit(main({['modes', BEAM, *STEEL]!r}))"
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
+                          text=True, timeout=60, check=False)  # fmt: skip
+    assert done.returncode == 6
+    assert "is not installed" in done.stderr and "rom doctor" in done.stderr
+
+
+@pytest.mark.fenicsx
+def test_ctrl_c_ends_with_code_7_and_leaves_nothing(folder):
+    """While gmsh is at work in its own process; both hear Ctrl-C, as from a terminal."""
+    pytest.importorskip("gmsh", reason="gmsh is not installed")
+    source = folder / "slow.py"
+    source.write_text("import time\ndef build(gmsh):\n    open('begun', 'w')\n    time.sleep(60)\n")
+    command_line = [sys.executable, "-m", "rom", "mesh", "slow.py", "--save", "x.vtu"]
+    process = subprocess.Popen(
+        command_line,
+        env=environment(PYTHONDONTWRITEBYTECODE="1"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    wait_for(folder / "begun")
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert (process.returncode, out) == (7, "")
+    assert err.startswith("error: interrupted.") and "Traceback" not in err
+    for name in ("begun", "slow.py"):
+        (folder / name).unlink()
+
+
+def wait_for(path, seconds=20):
+    end = time.monotonic() + seconds
+    while not path.exists():
+        assert time.monotonic() < end, f"{path} did not appear"
+        time.sleep(0.02)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["modes", BEAM, *STEEL, "--degre", "1"], 2, "unknown option"),
+        (["modes", "nope.geo", *STEEL], 3, "nope.geo: there is no such file"),
+        (["modes", BEAM, *STEEL, "--fixed", "rot"], 4, "no interface 'rot'"),
+        (["modes", BEAM, *steel(E="210"), "--strict"], 5, "0.164 m/s"),
+        (["check", "text.npz"], 3, "text.npz"),
+    ],
+)
+def test_two_ranks_complain_once_and_end_within_seconds(arguments, code, words, folder):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    start = time.perf_counter()
+    done = command(*arguments, n=2)
+    assert done.returncode == code, done.stderr
+    assert done.stderr.count("error: ") == 1 and words in done.stderr
+    assert done.stdout == "" and "Traceback" not in done.stderr
+    assert time.perf_counter() - start < 10
+
+
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+def test_a_rank_that_is_alone_with_its_error_ends_all(folder):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    (folder / "alone.py").write_text(
+        "import sys\nfrom mpi4py import MPI\nfrom rom.cli import check\n"
+        "from rom.cli.main import main\nfrom rom.errors import MaterialError\n"
+        "def run(args):\n"
+        "    if MPI.COMM_WORLD.rank == 1:\n        raise MaterialError('rho = 0.')\n"
+        "    MPI.COMM_WORLD.Barrier()\n"
+        "    MPI.COMM_WORLD.Barrier()\n"
+        "check.run = run\nsys.exit(main(['check', 'x']))\n"
+    )
+    start = time.perf_counter()
+    done = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", sys.executable, "alone.py"],
+                          env=environment(), capture_output=True, text=True, timeout=60,
+                          check=False)  # fmt: skip
+    assert done.returncode == 4
+    assert "error: rank 1: rho = 0." in done.stderr
+    assert time.perf_counter() - start < 10
+    (folder / "alone.py").unlink()
