@@ -1,0 +1,1 @@
+"""Multibody dynamics in the floating frame of reference."""

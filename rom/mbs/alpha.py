@@ -1,0 +1,272 @@
+"""Generalised-alpha on R^3 x SO(3) x R^r, constraints on position level (index 3).
+
+Source:
+    Bruels, Cardona, Arnold, Lie group generalized-alpha time integration of constrained flexible
+    multibody systems, Mech. Mach. Theory 48 (2012) 121. Scaling of the multipliers: Bottasso,
+    Bauchau, Cardona, SIAM J. Sci. Comput. 29 (2007) 397.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.mbs.algebra import factorise, range_basis, row, scale, spatial_tangent, unit, vec
+from rom.mbs.compiled import inner, kernel
+from rom.mbs.constraints import constraint_gradient
+from rom.mbs.forces import follow_angles
+from rom.mbs.motion import (
+    border,
+    drive_power,
+    evaluate,
+    fill,
+    least_multipliers,
+    moved,
+    residual,
+    solve_bordered,
+    tangents,
+)
+from rom.model import Array, Index
+
+# what a corrector pass says
+GOES_ON, CONVERGED, FAILED, NOT_FINITE, SINGULAR, ASK = 0, 1, 2, 3, 4, 5
+# entries of Step.count
+STEPS, ITERATIONS, FACTORISATIONS, LAST, FRESH, PASS, BEGAN, ASKS, ASKED = range(9)
+MAX_PASSES = 25
+ROUND_OFF = 4e-16
+
+
+class Step(NamedTuple):
+    """State, the trial state of the step under way, and the method.
+
+    Attributes:
+        q, v, a, vd, lam: coordinates, velocities, algorithmic and true accelerations,
+            multipliers at the last accepted instant.
+        q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
+        work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
+        lost: (3,) the powers at the last accepted instant.
+        count: (9,) steps, iterations, factorisations, iterations of the last step, whether a
+            factorisation is at hand, pass of the present step, steps when the present chunk
+            began, whether Python forces are to be asked for, whether they have been.
+        size: (4,) norm of the last increment, length of the mechanism, tolerance, total mass.
+        method: (5,) h, beta, gamma, alpha_m, alpha_f.
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    vd: Array
+    lam: Array
+    q1: Array
+    v1: Array
+    vd1: Array
+    lam1: Array
+    psi: Array
+    work: Array
+    lost: Array
+    count: Index
+    size: Array
+    method: Array
+
+
+def coefficients(h: float, rho_inf: float) -> Array:
+    """(5,) h, beta, gamma, alpha_m, alpha_f of the method with spectral radius rho_inf."""
+    alpha_m, alpha_f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
+    gamma = 0.5 + alpha_f - alpha_m
+    return np.array([h, 0.25 * (gamma + 0.5) ** 2, gamma, alpha_m, alpha_f])
+
+
+@inner
+def predict(s, T):
+    """Trial state with the accelerations and multipliers of the last step."""
+    h, beta, gamma, alpha_m, _ = T.method
+    for i in range(T.v.size):
+        T.vd1[i] = T.vd[i]
+        a1 = (T.vd[i] - alpha_m * T.a[i]) / (1 - alpha_m)
+        T.v1[i] = T.v[i] + h * ((1 - gamma) * T.a[i] + gamma * a1)
+        T.psi[i] = h * T.v[i] + h * h * ((0.5 - beta) * T.a[i] + beta * a1)
+    T.lam1[:] = T.lam
+    T.size[0] = 0.0
+    if T.count[LAST] > 4:
+        T.count[FRESH] = 0
+    moved(s, T.q, T.psi, T.q1)
+
+
+@inner
+def turn_columns(s, W, T, rank):
+    """Add Kt to S and fill UGT, rotations counted in increments of the rotation vector psi."""
+    n = T.v.size
+    for b in range(s.bodies.mass.size):
+        t = s.bodies.v_at[b]
+        psi = scale(-1.0, vec(T.psi, t + 3))
+        x = spatial_tangent(psi, unit(0))
+        y = spatial_tangent(psi, unit(1))
+        z = spatial_tangent(psi, unit(2))
+        for i in range(n):
+            k = row(W.Kt, i, t + 3)
+            for j, c in ((0, x), (1, y), (2, z)):
+                W.Kt[i, t + 3 + j] = k[0] * c[0] + k[1] * c[1] + k[2] * c[2]
+        for i in range(rank):
+            k = row(W.UG, i, t + 3)
+            for j, c in ((0, x), (1, y), (2, z)):
+                W.UGT[i, t + 3 + j] = k[0] * c[0] + k[1] * c[1] + k[2] * c[2]
+    for i in range(n):
+        for j in range(n):
+            W.S[i, j] += W.Kt[i, j]
+
+
+@inner
+def factorise_step(s, W, T, rank):
+    """Factorise beta h^2 (M beta' + C gamma' + K), bordered; `tangents` first."""
+    n = T.v.size
+    for i in range(n):
+        W.weight[i] = W.S[i, i] / (mass_factor(T) * T.size[3])
+    if rank < T.lam.size:
+        range_basis(W.G, rank, W.rest, W.U_lu)
+    border(W, n, rank)
+    turn_columns(s, W, T, rank)
+    fill(W, n, rank)
+    T.count[FACTORISATIONS] += 1
+    T.count[FRESH] = 1
+    return factorise(W.lu, n + rank, W.pivot)
+
+
+@inner
+def mass_factor(T):
+    """Derivative of beta h^2 times the acceleration by the increment."""
+    return (1 - T.method[3]) / (1 - T.method[4])
+
+
+@inner
+def increment_norm(W, T):
+    """Mass-weighted length of the increment, relative to the size of the mechanism."""
+    total = 0.0
+    for i in range(W.delta.size):
+        total += W.weight[i] * W.delta[i] ** 2
+    return math.sqrt(total) / T.size[1]
+
+
+@inner
+def increment_goal(W, T):
+    """Increment that no longer matters: a fraction of what the acceleration moves in a step."""
+    total, reach, h = 0.0, 0.0, T.method[0]
+    for i in range(T.vd1.size):
+        total += W.weight[i] * T.vd1[i] ** 2
+    for i in range(T.q1.size):
+        reach = max(reach, abs(T.q1[i]))
+    floor = ROUND_OFF * (1.0 + reach / T.size[1])
+    return max(T.size[2] * h * h * math.sqrt(total) / T.size[1], floor), floor
+
+
+@inner
+def correct(s, W, T, rank):
+    """One Newton correction for the residual at hand; says how it went."""
+    h, beta, gamma, _, _ = T.method
+    n, bh2 = T.v.size, beta * h * h
+    for i in range(n):
+        W.rhs[i] = -bh2 * W.residual[i]
+    for k in range(T.lam.size):
+        W.part[k] = -W.value[k]
+    solve_bordered(W, n, rank, W.delta, W.dlam)
+    for i in range(n):
+        T.vd1[i] += mass_factor(T) / bh2 * W.delta[i]
+        T.v1[i] += gamma / (beta * h) * W.delta[i]
+        T.psi[i] += W.delta[i]
+    for k in range(T.lam.size):
+        T.lam1[k] += W.dlam[k] / bh2
+    moved(s, T.q, T.psi, T.q1)
+    T.count[PASS] += 1
+    T.count[ITERATIONS] += 1
+    return verdict(W, T)
+
+
+@inner
+def verdict(W, T):
+    """Judge the increment just applied by its size and by how fast increments shrink."""
+    last, size = T.size[0], increment_norm(W, T)
+    T.size[0] = size
+    if not math.isfinite(size):
+        return NOT_FINITE
+    goal, floor = increment_goal(W, T)
+    shrink = size / last if last > 0.0 else 1.0
+    if size <= floor or (shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal):
+        return CONVERGED
+    if shrink > 0.5 and size < 100 * floor and T.count[PASS] > 3:
+        return CONVERGED
+    if T.count[PASS] >= MAX_PASSES:
+        return FAILED
+    if last > 0.0 and shrink > 0.2:
+        T.count[FRESH] = 0
+    return GOES_ON
+
+
+@inner
+def accept(s, W, T):
+    """Make the trial state the present one and add up the work."""
+    h, _, _, alpha_m, alpha_f = T.method
+    for i in range(T.v.size):
+        rate = (1 - alpha_f) * T.vd1[i] + alpha_f * T.vd[i]
+        T.a[i] = (rate - alpha_m * T.a[i]) / (1 - alpha_m)
+    T.q[:] = T.q1
+    T.v[:] = T.v1
+    T.vd[:] = T.vd1
+    T.lam[:] = T.lam1
+    follow_angles(s, W)
+    drive_power(s, W, T.lam)  # the last correction moved the multipliers
+    for k in range(3):
+        T.work[k] += 0.5 * h * (W.power[k] + T.lost[k])
+        T.lost[k] = W.power[k]
+    T.count[STEPS] += 1
+    T.count[LAST] = T.count[PASS]
+    T.count[PASS] = 0
+
+
+@kernel
+def advance(s, W, T, rank, signals, every, out):
+    """Take one step per row of ``signals``; save every so many. Says how the last one went.
+
+    ``out`` holds arrays for q, v, vd, lam, work and base with one row per saved instant. When
+    forces of Python functions are to be asked for, T.count[ASKS] is 1: then it returns ASK with
+    everything evaluated, and goes on from there in the next call, which has the same arguments.
+    """
+    h, beta, gamma, _, _ = T.method
+    c = (mass_factor(T), gamma * h, beta * h * h)
+    while T.count[STEPS] - T.count[BEGAN] < signals.shape[0]:
+        if T.count[ASKED] == 0:
+            if T.count[PASS] == 0:
+                W.signal[:] = signals[T.count[STEPS] - T.count[BEGAN]]
+                predict(s, T)
+            evaluate(s, W, T.q1, T.v1)
+            if T.count[ASKS] == 1:
+                T.count[ASKED] = 1
+                return ASK
+        T.count[ASKED] = 0
+        residual(s, W, T.q1, T.v1, T.vd1, T.lam1)
+        if T.count[FRESH] == 0:
+            tangents(s, W, T.v1, T.vd1, T.lam1, c)
+            constraint_gradient(s, W)
+            if not factorise_step(s, W, T, rank):
+                return SINGULAR
+        answer = correct(s, W, T, rank)
+        if answer > CONVERGED:
+            return answer
+        if answer == CONVERGED:
+            accept(s, W, T)
+            if T.count[STEPS] % every == 0:
+                save(s, W, T, rank, out, T.count[STEPS] // every - T.count[BEGAN] // every - 1)
+    return CONVERGED
+
+
+@inner
+def save(s, W, T, rank, out, at):
+    """Copy the present state to a row of the output arrays, multipliers of least norm."""
+    Q, V, A, L, X, B = out
+    if rank < T.lam.size:
+        constraint_gradient(s, W)
+        least_multipliers(W, rank, T.lam)
+    B[at] = W.base
+    Q[at] = T.q
+    V[at] = T.v
+    A[at] = T.vd
+    L[at] = T.lam
+    X[at] = T.work

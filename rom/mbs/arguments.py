@@ -1,0 +1,81 @@
+"""Checks of what a user hands over: shapes, finite numbers, rotations."""
+
+from typing import Any
+
+import numpy as np
+
+from rom import rotation
+from rom.errors import ConfigError
+from rom.model import Array
+
+
+def finite(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """The value as a float array of this shape.
+
+    Raises:
+        ConfigError: for another shape, or entries that are not finite numbers.
+    """
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"{name} = {value!r} is not made of numbers.") from error
+    if array.shape != shape:
+        raise ConfigError(f"{name} has shape {array.shape}, needed is {shape}.")
+    if not np.isfinite(array).all():
+        raise ConfigError(f"{name} = {array.tolist()} is not finite.")
+    return array
+
+
+def number(name: str, value: Any) -> float:
+    """The value as a finite float."""
+    return float(finite(name, value, ()))
+
+
+def positive(name: str, value: Any) -> float:
+    """The value as a finite positive float."""
+    x = number(name, value)
+    if x <= 0.0:
+        raise ConfigError(f"{name} = {x:g} must be positive.")
+    return x
+
+
+def unit_vector(name: str, value: Any) -> Array:
+    """The value as a vector of length one."""
+    x = finite(name, value, (3,))
+    length = np.linalg.norm(x)
+    if length == 0.0:
+        raise ConfigError(f"{name} has length zero: it gives no direction.")
+    return x / length
+
+
+def matrix33(name: str, value: Any) -> Array:
+    """A (3, 3) matrix from itself or from its diagonal."""
+    if np.shape(value) == (3,):
+        return np.diag(finite(name, value, (3,)))
+    return finite(name, value, (3, 3))
+
+
+def unit_quaternion(value: Any) -> Array:
+    """(4,) unit quaternion from a (3, 3) rotation matrix, a quaternion, or None.
+
+    Raises:
+        ConfigError: if it is farther than 1e-3 from a rotation.
+    """
+    if value is None:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    if np.shape(value) == (4,):
+        p = finite("orientation", value, (4,))
+        if abs(np.linalg.norm(p) - 1.0) > 1e-3:
+            raise ConfigError(
+                f"the quaternion {p.tolist()} has length {np.linalg.norm(p):.6g}, not one."
+            )
+        return p / np.linalg.norm(p)
+    A = finite("orientation", value, (3, 3))
+    error = np.abs(A @ A.T - np.eye(3)).max()
+    if error > 1e-3 or np.linalg.det(A) < 0.0:
+        raise ConfigError(
+            f"orientation is not a rotation: A A^T differs from 1 by {error:.3g}, "
+            f"its determinant is {np.linalg.det(A):.6g}."
+        )
+    U, _, V = np.linalg.svd(A)
+    return rotation.quaternion(U @ V)

@@ -1,0 +1,214 @@
+"""The mechanism as flat arrays, in tuples that compiled code understands.
+
+``r`` is the number of elastic coordinates of one body, R the largest one, n the number of
+velocities, m the number of constraint rows. Coordinates of a body: position of the origin (3),
+quaternion (4), elastic (r). Velocities: of the origin in the world (3), angular velocity in the
+body frame (3), elastic (r). A marker twist is velocity (3), then angular velocity (3), world.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.model import Array, Index
+
+# kinds of constraint rows
+POINT, ALONG, NORMAL, ANGLE = 0, 1, 2, 3
+# kinds of loads
+FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
+# columns of the work done since the start
+WORK = ("drives", "forces", "damping")
+
+
+class Bodies(NamedTuple):
+    """Inertia, stiffness and damping of all bodies; rigid ones have r = 0.
+
+    Attributes:
+        q_at, v_at: (b,) first coordinate and velocity of each body.
+        r: (b,) number of elastic coordinates.
+        flex: (b,) row in the tables of flexible bodies.
+        mass: (b,) [kg].
+        first: (b, 3) first moment about the origin [kg m].
+        second: (b, 3, 3) integral of rho X X^T [kg m^2].
+        S: (f, 3, R) integral of rho phi_k.
+        S1: (f, R, 9) integral of rho X_a phi_k,b, entry 3 a + b.
+        S2: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho phi_l,a phi_k,b.
+        M, K, C: (f, R, R) elastic mass, stiffness, damping.
+        gravity: (3,) [m/s^2].
+    """
+
+    q_at: Index
+    v_at: Index
+    r: Index
+    flex: Index
+    mass: Array
+    first: Array
+    second: Array
+    S: Array
+    S1: Array
+    S2: Array
+    M: Array
+    K: Array
+    C: Array
+    gravity: Array
+
+
+class Markers(NamedTuple):
+    """Points with axes on bodies: P = r + A (x + shape q), axes A exp(twist q).
+
+    Attributes:
+        body: (k,) body, -1 for the ground.
+        point: (k, 3) undeformed position in the body frame [m].
+        shape: (k, 3, R) displacement per elastic coordinate.
+        twist: (k, 3, R) small rotation per elastic coordinate.
+    """
+
+    body: Index
+    point: Array
+    shape: Array
+    twist: Array
+
+
+class Rows(NamedTuple):
+    """Scalar constraints between marker i and marker j.
+
+    Attributes:
+        kind: (m,) POINT: world component ``a`` of P_j - P_i; ALONG: component of P_j - P_i along
+            the axis ``a`` of i; NORMAL: axis ``a`` of i times axis ``b`` of j; ANGLE: from axis
+            ``a`` of i to axis ``b`` of j, turning towards axis ``c`` of i.
+        i, j: (m,) markers.
+        a, b, c: (m, 3) unit vectors.
+        offset: (m,) value subtracted.
+        signal: (m,) prescribed value subtracted as well, -1 for none.
+        pair: (m,) joint the row belongs to.
+        joint_i, joint_j: (p,) markers of each joint.
+    """
+
+    kind: Index
+    i: Index
+    j: Index
+    a: Array
+    b: Array
+    c: Array
+    offset: Array
+    signal: Index
+    pair: Index
+    joint_i: Index
+    joint_j: Index
+
+
+class Forces(NamedTuple):
+    """Springs, loads and rotational springs.
+
+    Attributes:
+        spring_i, spring_j: (s,) markers.
+        spring: (s, 3) stiffness [N/m], damping [N s/m], free length [m].
+        load_at: (l,) markers; load_kind: (l,) FORCE_WORLD to TORQUE_BODY; load: (l, 3) vector;
+        load_signal: (l,) function of time added to the vector, -1 for none.
+        turn_i, turn_j: (t,) markers; turn_a, turn_b, turn_c: (t, 3) axes as in `Rows`, ANGLE;
+        turn: (t, 3) stiffness [N m/rad], damping [N m s/rad], free angle [rad].
+    """
+
+    spring_i: Index
+    spring_j: Index
+    spring: Array
+    load_at: Index
+    load_kind: Index
+    load: Array
+    load_signal: Index
+    turn_i: Index
+    turn_j: Index
+    turn_a: Array
+    turn_b: Array
+    turn_c: Array
+    turn: Array
+
+
+class System(NamedTuple):
+    """Everything that stays constant during a run."""
+
+    bodies: Bodies
+    markers: Markers
+    rows: Rows
+    forces: Forces
+
+
+class Work(NamedTuple):
+    """Memory for the quantities of one instant; nothing is allocated during a time step."""
+
+    A: Array  # (b, 3, 3) orientation
+    d: Array  # (b, 3) first moment
+    dd: Array  # (b, 3) rate of the first moment in the body frame
+    J: Array  # (b, 3, 3) inertia about the origin
+    SP: Array  # (b, R, 9) integral of rho P phi_k, P the deformed position
+    Sd: Array  # (b, R, 9) integral of rho (dP/dt) phi_k
+    SPd: Array  # (b, 3, 3) integral of rho P (dP/dt)
+    Sa: Array  # (R, 9) integral of rho (d2P/dt2) phi_k
+    P: Array  # (k, 3) marker positions
+    E: Array  # (k, 3, 3) marker axes
+    V: Array  # (k, 6) marker twists
+    conv: Array  # (k, 6) marker accelerations at zero accelerations of the coordinates
+    H: Array  # (k, 6, 6 + R) marker twist as a function of the body velocities
+    u: Array  # (k, 3) marker positions in the body frame
+    theta: Array  # (k, 3) marker rotation vectors
+    wrench: Array  # (k, 6) force and moment on each marker
+    user: Array  # (k, 6) force and moment from Python functions
+    signal: Array  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
+    value: Array  # (m,) constraint residual
+    g: Array  # (m, 12) constraint gradient in the twists of its two markers
+    gamma: Array  # (m,) convective term of the constraint acceleration
+    G: Array  # (m, n) constraint gradient in the velocities
+    base: Array  # (t,) angle of each rotational spring at the last accepted instant
+    power: Array  # (3,) of drives, forces, dampers
+    residual: Array  # (n,) equations of motion
+    S: Array  # (n, n) mass and damping part of the iteration matrix
+    Kt: Array  # (n, n) stiffness part
+    Q: Array  # (12, 12) stiffness of a pair of markers
+    QH: Array  # (12, 12 + 2 R)
+    lu: Array  # (n + m, n + m)
+    pivot: Index  # (n + m,)
+    rhs: Array  # (n + m,)
+    scaling: Array  # (n + m,)
+    weight: Array  # (n,) mass weights of the norm of increments
+    U: Array  # (m, m) range of the constraints, leading rows
+    U_lu: Array  # (m, m) the range that is built into lu
+    UG: Array  # (m, n) U_lu^T G, leading rows
+    UGT: Array  # (m, n) the same in increments of the rotation vectors of a step
+    rest: Array  # (n, m)
+    part: Array  # (m,)
+    delta: Array  # (n,) increment
+    dlam: Array  # (m,) increment of the multipliers
+
+
+def workspace(system: System, n_signals: int) -> Work:
+    """Zeroed memory that fits the system."""
+    bodies, markers, rows = system.bodies, system.markers, system.rows
+    b, k, m, t = bodies.mass.size, markers.body.size, rows.kind.size, system.forces.turn.shape[0]
+    R = bodies.K.shape[1]
+    n = int(6 * b + bodies.r.sum())
+    shapes = {
+        **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
+        **dict.fromkeys(("d", "dd"), (b, 3)),
+        **dict.fromkeys(("SP", "Sd"), (b, R, 9)),
+        "Sa": (R, 9),
+        **dict.fromkeys(("P", "u", "theta"), (k, 3)),
+        "E": (k, 3, 3),
+        **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),
+        "H": (k, 6, 6 + R),
+        "signal": (n_signals, 3),
+        **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
+        "g": (m, 12),
+        **dict.fromkeys(("G", "UG", "UGT"), (m, n)),
+        "rest": (n, m),
+        "base": (t,),
+        "power": (3,),
+        **dict.fromkeys(("residual", "weight", "delta"), (n,)),
+        **dict.fromkeys(("S", "Kt"), (n, n)),
+        "Q": (12, 12),
+        "QH": (12, 12 + 2 * R),
+        "lu": (n + m, n + m),
+        **dict.fromkeys(("rhs", "scaling"), (n + m,)),
+        **dict.fromkeys(("U", "U_lu"), (m, m)),
+    }
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    return Work(**arrays, pivot=np.zeros(n + m, dtype=np.int64))

@@ -1,0 +1,41 @@
+"""The compiler of the kernels, and the guard of its cache.
+
+Numba keeps compiled code beside the source and notices when that file changes, but not when
+another file changes whose functions were built in. Therefore the cache as a whole is dropped when
+any kernel source differs from the one it was made from.
+"""
+
+import hashlib
+from pathlib import Path
+
+from numba import njit
+
+FOLDER = Path(__file__).parent
+STAMP = FOLDER / "__pycache__" / "kernels.sha256"
+
+
+def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:
+    """Remove compiled kernels that were made from other sources; True when some were."""
+    digest = hashlib.sha256()
+    for source in sorted(folder.glob("*.py")):
+        digest.update(source.read_bytes())
+    try:
+        if stamp.exists() and stamp.read_text() == digest.hexdigest():
+            return False
+        for compiled in stamp.parent.glob("*.nb[ic]"):
+            compiled.unlink(missing_ok=True)
+        stamp.parent.mkdir(exist_ok=True)
+        stamp.write_text(digest.hexdigest())
+    except OSError:  # read-only installation: Numba keeps its cache in the user's folder
+        return False
+    return True
+
+
+drop_stale_cache()
+
+# reassociation lets sums be vectorised; NaN and infinity keep their meaning
+_OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc"}}
+# callable from Python
+kernel = njit(**_OPTIONS)
+# callable from other kernels only: the way in from Python costs most of the compile time
+inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)

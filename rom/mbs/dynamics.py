@@ -1,0 +1,248 @@
+"""Inertia of one body in its floating frame: residual, mass matrix and analytic tangents.
+
+With P = X + sum q_k phi_k, and S(U, V) the integral of rho U V^T, the inertia is exact to second
+order in the elastic coordinates. The rows are force in the world, moment about the origin of the
+body in the body frame, and generalised force of each elastic coordinate.
+"""
+
+from rom.mbs.algebra import (
+    add,
+    col,
+    cross,
+    dot,
+    mtv,
+    mv,
+    place,
+    place_row,
+    put,
+    rotation,
+    scale,
+    sub,
+    unit,
+    vec,
+)
+from rom.mbs.compiled import inner
+
+
+@inner
+def dual(s, at):
+    """Integral of rho U x V from the nine entries of S(U, V)."""
+    return s[at + 5] - s[at + 7], s[at + 6] - s[at + 2], s[at + 1] - s[at + 3]
+
+
+@inner
+def trace(s, at):
+    """Trace of nine entries."""
+    return s[at] + s[at + 4] + s[at + 8]
+
+
+@inner
+def times(s, x):
+    """Nine entries, as a matrix, times x."""
+    return (
+        s[0] * x[0] + s[1] * x[1] + s[2] * x[2],
+        s[3] * x[0] + s[4] * x[1] + s[5] * x[2],
+        s[6] * x[0] + s[7] * x[1] + s[8] * x[2],
+    )
+
+
+@inner
+def transposed_times(s, x):
+    """Nine entries, as a matrix, transposed, times x."""
+    return (
+        s[0] * x[0] + s[3] * x[1] + s[6] * x[2],
+        s[1] * x[0] + s[4] * x[1] + s[7] * x[2],
+        s[2] * x[0] + s[5] * x[1] + s[8] * x[2],
+    )
+
+
+@inner
+def contract(S2, x, at, r, out):
+    """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out."""
+    for l in range(r):
+        factor = x[at + l]
+        for k in range(r):
+            for p in range(9):
+                out[k, p] += factor * S2[l, 9 * k + p]
+
+
+@inner
+def body_states(B, W, q, v):
+    """Orientation and inertia integrals of the deformed bodies at the coordinates q."""
+    for b in range(B.mass.size):
+        f, r, at, vt = B.flex[b], B.r[b], B.q_at[b], B.v_at[b]
+        rotation(q, at + 3, W.A[b])
+        SP, Sd, SPd, J = W.SP[b], W.Sd[b], W.SPd[b], W.J[b]
+        for k in range(r):
+            for p in range(9):
+                SP[k, p] = B.S1[f, k, p]
+                Sd[k, p] = 0.0
+        contract(B.S2[f], q, at + 7, r, SP)
+        contract(B.S2[f], v, vt + 6, r, Sd)
+        for i in range(3):
+            W.d[b, i], W.dd[b, i] = B.first[b, i], 0.0
+            for k in range(r):
+                W.d[b, i] += B.S[f, i, k] * q[at + 7 + k]
+                W.dd[b, i] += B.S[f, i, k] * v[vt + 6 + k]
+            for j in range(3):
+                J[i, j], SPd[i, j] = -B.second[b, i, j], 0.0
+                for k in range(r):
+                    J[i, j] -= q[at + 7 + k] * (B.S1[f, k, 3 * j + i] + SP[k, 3 * i + j])
+                    SPd[i, j] += v[vt + 6 + k] * SP[k, 3 * i + j]
+        spur = -(J[0, 0] + J[1, 1] + J[2, 2])
+        for i in range(3):
+            J[i, i] += spur
+
+
+@inner
+def body_residuals(B, W, q, v, a):
+    """Add inertia, gravity, elastic and damping forces of all bodies to W.residual.
+
+    The power lost in damping is added to W.power[2].
+
+    Source:
+        Shabana, Dynamics of Multibody Systems, chapter 5; in the inertia integrals of Zwoelfer
+        and Gerstmayr, Acta Mechanica 232 (2021).
+    """
+    for b in range(B.mass.size):
+        f, r, at, vt = B.flex[b], B.r[b], B.q_at[b], B.v_at[b]
+        w, dw, d, dd = vec(v, vt + 3), vec(a, vt + 3), vec(W.d[b], 0), vec(W.dd[b], 0)
+        lift = mtv(W.A[b], sub(vec(a, vt), vec(B.gravity, 0)))
+        force = add(scale(B.mass[b], lift), add(cross(dw, d), cross(w, cross(w, d))))
+        force = add(force, scale(2.0, cross(w, dd)))
+        SPd = W.SPd[b]
+        spread = SPd[0, 0] + SPd[1, 1] + SPd[2, 2]
+        moment = add(cross(d, lift), mv(W.J[b], dw))
+        moment = add(moment, cross(w, mv(W.J[b], w)))
+        moment = add(moment, scale(2.0, sub(scale(spread, w), mtv(SPd, w))))
+        for k in range(r):
+            s, da = W.SP[b, k], a[vt + 6 + k]
+            S_k, Cr_k = col(B.S[f], k), dual(s, 0)
+            force, moment = add(force, scale(da, S_k)), add(moment, scale(da, Cr_k))
+            total = dot(S_k, lift) + dot(Cr_k, dw) + 2.0 * dot(w, dual(W.Sd[b, k], 0))
+            total += dot(w, times(s, w)) - dot(w, w) * trace(s, 0)
+            damping = 0.0
+            for l in range(r):
+                total += B.M[f, k, l] * a[vt + 6 + l] + B.K[f, k, l] * q[at + 7 + l]
+                damping += B.C[f, k, l] * v[vt + 6 + l]
+            W.residual[vt + 6 + k] += total + damping
+            W.power[2] += damping * v[vt + 6 + k]
+        put(W.residual, vt, mv(W.A[b], force))
+        put(W.residual, vt + 3, moment)
+
+
+@inner
+def body_mass(B, W, b, c, S):
+    """Add c times the mass matrix of body b to its block of S."""
+    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    d, A, J = vec(W.d[b], 0), W.A[b], W.J[b]
+    for j in range(3):
+        S[t + j, t + j] += c * B.mass[b]
+        lever = mv(A, cross(unit(j), d))
+        place(S, t, t + 3 + j, c, lever)
+        place_row(S, t + 3 + j, t, c, lever)
+        for i in range(3):
+            S[t + 3 + i, t + 3 + j] += c * J[i, j]
+    for k in range(r):
+        e = t + 6 + k
+        push, Cr_k = mv(A, col(B.S[f], k)), dual(W.SP[b, k], 0)
+        place(S, t, e, c, push)
+        place_row(S, e, t, c, push)
+        place(S, t + 3, e, c, Cr_k)
+        place_row(S, e, t + 3, c, Cr_k)
+        for l in range(r):
+            S[e, t + 6 + l] += c * B.M[f, k, l]
+
+
+@inner
+def body_damping(B, W, b, v, c, S):
+    """Add c times the derivative of the residual of body b by its velocities to S."""
+    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    w, d, dd, A, J = vec(v, t + 3), vec(W.d[b], 0), vec(W.dd[b], 0), W.A[b], W.J[b]
+    SPd = W.SPd[b]
+    spread = SPd[0, 0] + SPd[1, 1] + SPd[2, 2]
+    for j in range(3):
+        e = unit(j)
+        force = sub(add(scale(dot(w, d), e), scale(d[j], w)), scale(2.0 * w[j], d))
+        place(S, t, t + 3 + j, c, mv(A, add(force, scale(2.0, cross(e, dd)))))
+        moment = add(cross(w, mv(J, e)), cross(e, mv(J, w)))
+        moment = add(moment, scale(2.0, sub(scale(spread, e), mtv(SPd, e))))
+        place(S, t + 3, t + 3 + j, c, moment)
+    for k in range(r):
+        s, e = W.SP[b, k], t + 6 + k
+        place(S, t, e, c, mv(A, scale(2.0, cross(w, col(B.S[f], k)))))
+        spin = sub(scale(trace(s, 0), w), transposed_times(s, w))
+        place(S, t + 3, e, c, scale(2.0, spin))
+        row = add(times(s, w), transposed_times(s, w))
+        row = add(row, scale(2.0, dual(W.Sd[b, k], 0)))
+        place_row(S, e, t + 3, c, sub(row, scale(2.0 * trace(s, 0), w)))
+        for l in range(r):
+            coriolis = 2.0 * dot(w, dual(B.S2[f, l], 9 * k))
+            S[e, t + 6 + l] += c * (B.C[f, k, l] + coriolis)
+
+
+@inner
+def body_stiffness(B, W, b, v, a, c, S):
+    """Add c times the derivative of the residual of body b by its coordinates to S.
+
+    Rotations are perturbed in the body frame: dA = A skew(dtheta).
+    """
+    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    w, dw, d, A = vec(v, t + 3), vec(a, t + 3), vec(W.d[b], 0), W.A[b]
+    lift = mtv(A, sub(vec(a, t), vec(B.gravity, 0)))
+    pull = add(cross(dw, d), add(cross(w, cross(w, d)), scale(2.0, cross(w, vec(W.dd[b], 0)))))
+    for k in range(r):
+        pull = add(pull, scale(a[t + 6 + k], col(B.S[f], k)))
+    for j in range(3):
+        e = unit(j)
+        turned_lift = cross(lift, e)
+        place(S, t, t + 3 + j, c, mv(A, cross(e, pull)))
+        place(S, t + 3, t + 3 + j, c, cross(d, turned_lift))
+        for k in range(r):
+            S[t + 6 + k, t + 3 + j] += c * dot(col(B.S[f], k), turned_lift)
+    elastic_stiffness(B, W, b, v, a, c, S)
+
+
+@inner
+def elastic_stiffness(B, W, b, v, a, c, S):
+    """The columns of `body_stiffness` that belong to the elastic coordinates."""
+    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
+    lift = mtv(A, sub(vec(a, t), vec(B.gravity, 0)))
+    for k in range(r):
+        for p in range(9):
+            W.Sa[k, p] = 0.0
+    contract(B.S2[f], a, t + 6, r, W.Sa)
+    for l in range(r):
+        s, e, S_l = W.SP[b, l], t + 6 + l, col(B.S[f], l)
+        place(S, t, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))
+        tr = 2.0 * trace(s, 0)
+        Jdw = sub(scale(tr, dw), add(times(s, dw), transposed_times(s, dw)))
+        Jw = sub(scale(tr, w), add(times(s, w), transposed_times(s, w)))
+        moment = add(add(cross(S_l, lift), Jdw), cross(w, Jw))
+        moment = sub(moment, dual(W.Sa[l], 0))
+        Sd = W.Sd[b, l]
+        spin = sub(scale(trace(Sd, 0), w), times(Sd, w))
+        place(S, t + 3, e, c, add(moment, scale(2.0, spin)))
+        for k in range(r):
+            s2 = B.S2[f, l, 9 * k : 9 * k + 9]
+            softening = dot(w, times(s2, w)) - dot(w, w) * trace(s2, 0)
+            S[t + 6 + k, e] += c * (B.K[f, k, l] + softening + dot(dw, dual(s2, 0)))
+
+
+@inner
+def body_energy(B, W, b, q, v):
+    """Kinetic, strain and gravity energy of body b."""
+    f, r, at, vt = B.flex[b], B.r[b], B.q_at[b], B.v_at[b]
+    w, d, A = vec(v, vt + 3), vec(W.d[b], 0), W.A[b]
+    u = mtv(A, vec(v, vt))
+    momentum = add(scale(0.5 * B.mass[b], u), add(cross(w, d), vec(W.dd[b], 0)))
+    kinetic = dot(u, momentum) + 0.5 * dot(w, mv(W.J[b], w))
+    strain = 0.0
+    for k in range(r):
+        kinetic += v[vt + 6 + k] * dot(w, dual(W.SP[b, k], 0))
+        for l in range(r):
+            kinetic += 0.5 * v[vt + 6 + k] * v[vt + 6 + l] * B.M[f, k, l]
+            strain += 0.5 * q[at + 7 + k] * q[at + 7 + l] * B.K[f, k, l]
+    centre = add(scale(B.mass[b], vec(q, at)), mv(A, d))
+    return kinetic, strain, -dot(vec(B.gravity, 0), centre)

@@ -1,0 +1,97 @@
+"""Simulate a mechanism in time."""
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, InterruptedRun, RomError
+from rom.mbs.arrays import workspace
+from rom.mbs.explicit import run_explicit
+from rom.mbs.implicit import run_implicit
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.packing import pack
+from rom.mbs.record import Record, Settings
+from rom.mbs.solution import Solution
+from rom.mbs.state import State, initial_state
+
+METHODS = {"generalized-alpha": run_implicit, "dop853": run_explicit}
+
+
+def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
+    mechanism: Mechanism,
+    *,
+    t_end: float,
+    dt: float,
+    method: str = "generalized-alpha",
+    rho_inf: float = 0.9,
+    tolerance: float = 1e-9,
+    rtol: float = 1e-12,
+    atol: float = 1e-12,
+    progress: bool = False,
+    save_every: int = 1,
+    t_start: float | None = None,
+    state: State | None = None,
+) -> Solution:
+    """Move the mechanism from the start to ``t_end``.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        t_end: end time [s].
+        dt: time step of generalised-alpha, output interval of dop853 [s]; shortened a little if
+            the duration is not a multiple of it.
+        method: "generalized-alpha" (implicit, second order, for everything), or "dop853"
+            (explicit, eighth order, variable step: references for smooth, not too stiff motion).
+        rho_inf: spectral radius of generalised-alpha at infinite frequency: 1 keeps energy, but
+            reactions then collect round-off over many steps; 0 removes what the time step does
+            not resolve in one step.
+        tolerance: of the Newton iteration, relative to what the accelerations move in one step.
+        rtol: relative tolerance of dop853.
+        atol: absolute tolerance of dop853.
+        progress: report on stderr.
+        save_every: keep every so many steps.
+        t_start: start time [s]; None for 0, or for the time of ``state``.
+        state: state of an earlier run of the same mechanism to go on from, e.g. ``sol.final``.
+
+    Returns:
+        The motion, start and end included.
+
+    Raises:
+        ConfigError: for a wrong argument.
+        ModelError: if joints contradict each other.
+        SolverError: naming time and culprit; ``error.solution`` holds the motion up to there.
+        InterruptedRun: after Ctrl-C; ``error.solution`` holds the motion up to there.
+    """
+    if method not in METHODS:
+        raise ConfigError(f"no method {method!r}; there are {sorted(METHODS)}.")
+    if t_start is None:
+        t_start = 0.0 if state is None else state.t
+    settings = Settings(t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol, progress)
+    packed = pack(mechanism)
+    if state is None:
+        state = initial_state(packed, t_start, settings.spacing)
+    _check_fit(state, packed.q.size, packed.v.size)
+    W = workspace(packed.system, len(packed.signals))
+    record = Record(mechanism, packed, settings, perf_counter())
+    status = f"Reached t = {t_end:g} s."
+    try:
+        METHODS[method](record, W, state)
+    except RomError as error:
+        error.solution = record.solution(f"Stopped: {error}")
+        raise
+    except KeyboardInterrupt:
+        error = InterruptedRun(
+            f"interrupted at t = {record.t:.6g} s of {t_end:g} s.",
+            hint="The motion up to there is kept in error.solution.",
+        )
+        error.solution = record.solution(str(error))
+        raise error from None
+    return record.solution(status)
+
+
+def _check_fit(state: Any, n_q: int, n_v: int) -> None:
+    if np.shape(state.q) != (n_q,) or np.shape(state.v) != (n_v,):
+        raise ConfigError(
+            f"the state has {np.size(state.q)} coordinates and {np.size(state.v)} velocities; "
+            f"this mechanism has {n_q} and {n_v}."
+        )

@@ -1,0 +1,133 @@
+"""Markers: where a body touches the rest of the mechanism, with exact large rotations."""
+
+from rom.mbs.algebra import (
+    add,
+    col,
+    cross,
+    dot,
+    mtv,
+    mv,
+    place,
+    row,
+    scale,
+    spatial_tangent,
+    spatial_tangent_rate,
+    unit,
+    vec,
+)
+from rom.mbs.compiled import inner
+
+
+@inner
+def elastic_sum(table, x, at, r):
+    """Sum of the columns of table (3, R) times x[at:at+r]."""
+    a0, a1, a2 = 0.0, 0.0, 0.0
+    for k in range(r):
+        a0 += table[0, k] * x[at + k]
+        a1 += table[1, k] * x[at + k]
+        a2 += table[2, k] * x[at + k]
+    return a0, a1, a2
+
+
+@inner
+def axes_of(A, theta, E):
+    """Write A exp(theta) into E; exp(theta) x = x + T (theta x x) with the spatial tangent T."""
+    for j in range(3):
+        e = mv(A, add(unit(j), spatial_tangent(theta, cross(theta, unit(j)))))
+        E[0, j], E[1, j], E[2, j] = e
+
+
+@inner
+def marker_states(s, W, q, v):
+    """Position, axes, twist, convective acceleration and Jacobian of all markers."""
+    B, K = s.bodies, s.markers
+    for m in range(K.body.size):
+        b = K.body[m]
+        if b < 0:
+            for i in range(3):
+                W.P[m, i], W.E[m, i, i] = K.point[m, i], 1.0
+            continue
+        r, at, vt, A = B.r[b], B.q_at[b], B.v_at[b], W.A[b]
+        shape, twist = K.shape[m], K.twist[m]
+        u = add(row(K.point, m, 0), elastic_sum(shape, q, at + 7, r))
+        theta, w = elastic_sum(twist, q, at + 7, r), vec(v, vt + 3)
+        slip, rate = elastic_sum(shape, v, vt + 6, r), elastic_sum(twist, v, vt + 6, r)
+        spin = spatial_tangent(theta, rate)
+        swirl = add(cross(w, spin), spatial_tangent_rate(theta, rate))
+        push = cross(w, add(cross(w, u), scale(2.0, slip)))
+        write(W.P, m, 0, add(vec(q, at), mv(A, u)))
+        write(W.u, m, 0, u)
+        write(W.theta, m, 0, theta)
+        write(W.V, m, 0, add(vec(v, vt), mv(A, add(cross(w, u), slip))))
+        write(W.V, m, 3, mv(A, add(w, spin)))
+        write(W.conv, m, 0, mv(A, push))
+        write(W.conv, m, 3, mv(A, swirl))
+        axes_of(A, theta, W.E[m])
+        marker_jacobian(shape, twist, A, u, theta, r, W.H[m])
+
+
+@inner
+def write(A, i, at, x):
+    """Write three entries of row i of a matrix from column ``at``."""
+    A[i, at], A[i, at + 1], A[i, at + 2] = x
+
+
+@inner
+def marker_jacobian(shape, twist, A, u, theta, r, H):
+    """Twist of a marker per unit of each body velocity: H (6, 6 + r)."""
+    for j in range(3):
+        lever = mv(A, cross(unit(j), u))
+        for i in range(3):
+            H[i, j] = 1.0 if i == j else 0.0
+            H[i, 3 + j] = lever[i]
+            H[3 + i, 3 + j] = A[i, j]
+    for k in range(r):
+        move = mv(A, col(shape, k))
+        spin = mv(A, spatial_tangent(theta, col(twist, k)))
+        for i in range(3):
+            H[i, 6 + k] = move[i]
+            H[3 + i, 6 + k] = spin[i]
+
+
+@inner
+def spread_wrench(s, W, sign, out):
+    """Add sign H^T wrench of all markers to the generalised forces ``out``."""
+    B, K = s.bodies, s.markers
+    for m in range(K.body.size):
+        b = K.body[m]
+        if b < 0:
+            continue
+        H, t, w = W.H[m], B.v_at[b], W.wrench[m]
+        for j in range(6 + B.r[b]):
+            total = 0.0
+            for i in range(6):
+                total += H[i, j] * w[i]
+            out[t + j] += sign * total
+
+
+@inner
+def wrench_stiffness(s, W, c, S):
+    """Add c times the derivative of -H^T wrench to S, the wrench kept constant in the world.
+
+    The change of the tangent operator of an elastically rotating marker is kept to first order.
+    """
+    B, K = s.bodies, s.markers
+    for m in range(K.body.size):
+        b = K.body[m]
+        if b < 0:
+            continue
+        r, t, A = B.r[b], B.v_at[b], W.A[b]
+        f, n = mtv(A, vec(W.wrench[m], 0)), mtv(A, vec(W.wrench[m], 3))
+        u, theta = vec(W.u[m], 0), vec(W.theta[m], 0)
+        for j in range(3):
+            e = unit(j)
+            df, dn = cross(f, e), cross(n, e)
+            place(S, t + 3, t + 3 + j, -c, add(cross(u, df), dn))
+            for k in range(r):
+                spin = spatial_tangent(theta, col(K.twist[m], k))
+                S[t + 6 + k, t + 3 + j] -= c * (dot(col(K.shape[m], k), df) + dot(spin, dn))
+        for l in range(r):
+            place(S, t + 3, t + 6 + l, -c, cross(col(K.shape[m], l), f))
+            half = scale(0.5, cross(n, col(K.twist[m], l)))
+            for k in range(r):
+                S[t + 6 + k, t + 6 + l] -= c * dot(col(K.twist[m], k), half)

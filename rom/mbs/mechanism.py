@@ -1,0 +1,362 @@
+"""The mechanism as the user describes it: bodies, joints, drives and forces, by name."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.errors import ConfigError
+from rom.mbs import joints
+from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion, unit_vector
+from rom.mbs.joints import Joint
+from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
+from rom.model import Array
+
+TimeFunction = Callable[[float], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A joint coordinate prescribed in time, with its rate and acceleration or None."""
+
+    joint: str
+    function: TimeFunction
+    rate: TimeFunction | None
+    acceleration: TimeFunction | None
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """Spring and damper between two markers, along the line that joins them."""
+
+    i: Marker
+    j: Marker
+    stiffness: float
+    damping: float
+    free_length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Rotational spring and damper about the axis of a joint."""
+
+    joint: str
+    stiffness: float
+    damping: float
+    free_angle: float
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Force or torque on one marker: constant, or a function of time."""
+
+    marker: Marker
+    kind: int
+    vector: Array
+    function: TimeFunction | None
+
+
+@dataclass(frozen=True, slots=True)
+class UserForce:
+    """Force and moment from a Python function of time and of the markers' motion."""
+
+    function: Callable[..., Any]
+    i: Marker
+    j: Marker | None
+
+
+@dataclass
+class Mechanism:
+    """Rigid and flexible bodies, connected and loaded.
+
+    Joints are defined in the position in which the bodies are added, flexible bodies
+    undeformed: axes are given in the world there, and joint coordinates count from there.
+
+    Args:
+        gravity: (3,) acceleration of gravity [m/s^2].
+    """
+
+    gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
+    parts: dict[str, Part] = field(default_factory=dict, init=False)
+    joints: dict[str, Joint] = field(default_factory=dict, init=False)
+    drives: dict[str, Drive] = field(default_factory=dict, init=False)
+    springs: dict[str, Spring] = field(default_factory=dict, init=False)
+    turns: dict[str, Turn] = field(default_factory=dict, init=False)
+    loads: dict[str, Load] = field(default_factory=dict, init=False)
+    user_forces: dict[str, UserForce] = field(default_factory=dict, init=False)
+
+    def __post_init__(self):
+        self.gravity = finite("gravity", self.gravity, (3,))
+        self.ground = ground_part()
+
+    def add_rigid(  # noqa: PLR0913  one keyword per property of a body
+        self,
+        name: str,
+        *,
+        mass: float,
+        inertia: npt.ArrayLike,
+        at: npt.ArrayLike,
+        orientation: npt.ArrayLike | None = None,
+        markers: dict[str, npt.ArrayLike] | None = None,
+        velocity: npt.ArrayLike | None = None,
+        omega: npt.ArrayLike | None = None,
+    ) -> Part:
+        """Add a rigid body; its frame sits at the mass centre.
+
+        Args:
+            name: name of the body.
+            mass: mass [kg].
+            inertia: (3,) or (3, 3) about the mass centre, body frame [kg m^2].
+            at: (3,) mass centre at the start, world [m].
+            orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+            markers: {name: (3,) point from the mass centre, body frame [m]}.
+            velocity: (3,) of the mass centre, world [m/s].
+            omega: (3,) angular velocity, body frame [rad/s].
+
+        Raises:
+            ConfigError: for a name in use, a wrong shape or a number that is not finite.
+            ModelError: if mass or inertia are not those of a real body.
+        """
+        pose = _pose(at, orientation, velocity, omega)
+        points = {key: finite(f"marker {key}", x, (3,)) for key, x in (markers or {}).items()}
+        part = rigid_part(name, positive("mass", mass), matrix33("inertia", inertia), pose, points)
+        return self._enter(part)
+
+    def add_flexible(  # noqa: PLR0913  one keyword per property of a body
+        self,
+        name: str,
+        body: Any,
+        *,
+        at: npt.ArrayLike = (0.0, 0.0, 0.0),
+        orientation: npt.ArrayLike | None = None,
+        velocity: npt.ArrayLike | None = None,
+        omega: npt.ArrayLike | None = None,
+        q: npt.ArrayLike | None = None,
+        qd: npt.ArrayLike | None = None,
+    ) -> Part:
+        """Add a flexible body.
+
+        Args:
+            name: name of the body in this mechanism.
+            body: a ``FlexibleBody`` with r elastic coordinates.
+            at: (3,) origin of its frame at the start, world [m].
+            orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+            velocity: (3,) of the origin, world [m/s].
+            omega: (3,) angular velocity of the frame, body frame [rad/s].
+            q: (r,) elastic coordinates at the start; None for undeformed.
+            qd: (r,) their rates.
+
+        Raises:
+            ConfigError: for a name in use, a wrong shape or a number that is not finite.
+            ModelError: if the mass matrix of the body is singular: rigid motions left in it.
+        """
+        r = body.K.shape[0]
+        elastic = (
+            finite("q", np.zeros(r) if q is None else q, (r,)),
+            finite("qd", np.zeros(r) if qd is None else qd, (r,)),
+        )
+        return self._enter(
+            flexible_part(name, body, _pose(at, orientation, velocity, omega), elastic)
+        )
+
+    def revolute(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+        """Hinge about ``axis`` (3,), world at the start; five constraints."""
+        self._join(name, m1, m2, joints.revolute, axis)
+
+    def cylindrical(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+        """Rotation about and sliding along ``axis`` (3,), world at the start; four constraints."""
+        self._join(name, m1, m2, joints.cylindrical, axis)
+
+    def prismatic(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+        """Sliding along ``axis`` (3,), world at the start; five constraints."""
+        self._join(name, m1, m2, joints.prismatic, axis)
+
+    def spherical(self, name: str, m1: Marker, m2: Marker) -> None:
+        """Ball joint; three constraints."""
+        self._join(name, m1, m2, joints.spherical)
+
+    def universal(
+        self, name: str, m1: Marker, m2: Marker, *, axis1: npt.ArrayLike, axis2: npt.ArrayLike
+    ) -> None:
+        """Cardan joint: ``axis1`` on m1 stays perpendicular to ``axis2`` on m2; four constraints.
+
+        Raises:
+            ConfigError: if the axes are not perpendicular at the start.
+        """
+        self._join(name, m1, m2, joints.universal, axis1, axis2)
+
+    def fixed(self, name: str, m1: Marker, m2: Marker) -> None:
+        """Weld; six constraints."""
+        self._join(name, m1, m2, joints.fixed)
+
+    def drive(
+        self,
+        name: str,
+        joint: str,
+        function: TimeFunction,
+        *,
+        rate: TimeFunction | None = None,
+        acceleration: TimeFunction | None = None,
+    ) -> None:
+        """Prescribe the angle of a revolute or cylindrical joint, or the way of a prismatic one.
+
+        The coordinate is that of the second marker relative to the first, from the position in
+        which the bodies were added. Missing derivatives are taken by finite differences.
+
+        Raises:
+            ConfigError: if the joint is unknown or has no coordinate to drive.
+        """
+        self._check_new(name)
+        self._joint_with_axis(joint, "drive")
+        for what, f in (("function", function), ("rate", rate), ("acceleration", acceleration)):
+            if f is not None and not callable(f):
+                raise ConfigError(f"{what} of drive {name!r} is {f!r}, not a function of time.")
+        self.drives[name] = Drive(joint, function, rate, acceleration)
+
+    def spring_damper(
+        self,
+        name: str,
+        m1: Marker,
+        m2: Marker,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        free_length: float | None = None,
+    ) -> None:
+        """Spring [N/m] and damper [N s/m] along the line between two markers.
+
+        Args:
+            name: name of the spring.
+            m1: one end.
+            m2: other end.
+            stiffness: [N/m].
+            damping: [N s/m].
+            free_length: length without force [m]; None for the length at the start.
+        """
+        self._check_new(name)
+        self._check_markers(name, m1, m2)
+        gap = self.design_point(m2) - self.design_point(m1)
+        free = np.linalg.norm(gap) if free_length is None else number("free_length", free_length)
+        k, c = number("stiffness", stiffness), number("damping", damping)
+        self.springs[name] = Spring(m1, m2, k, c, float(free))
+
+    def rotational_spring(
+        self,
+        name: str,
+        joint: str,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        free_angle: float = 0.0,
+    ) -> None:
+        """Spring [N m/rad] and damper [N m s/rad] about the axis of a revolute joint."""
+        self._check_new(name)
+        if self._joint_with_axis(joint, "rotational spring").turn is None:
+            raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
+        k, c = number("stiffness", stiffness), number("damping", damping)
+        self.turns[name] = Turn(joint, k, c, number("free_angle", free_angle))
+
+    def force(self, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
+        """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker."""
+        self._load(name, marker, vector, frame, 0)
+
+    def torque(self, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
+        """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker."""
+        self._load(name, marker, vector, frame, 2)
+
+    def user_force(
+        self, name: str, function: Callable[..., Any], m1: Marker, m2: Marker | None = None
+    ) -> None:
+        """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
+
+        ``a`` and ``b`` are `rom.mbs.user.MarkerMotion`. The function returns (force, moment) in
+        the world that act on the first marker; the reaction, at the same place in space, acts on
+        the body of the second one, so that momentum is conserved whatever the law.
+        """
+        self._check_new(name)
+        self._check_markers(name, m1, *(() if m2 is None else (m2,)))
+        if not callable(function):
+            raise ConfigError(f"user force {name!r} is {function!r}, not a function.")
+        self.user_forces[name] = UserForce(function, m1, m2)
+
+    def design_point(self, marker: Marker) -> Array:
+        """(3,) position of a marker where its body was added, undeformed [m]."""
+        part = self.part(marker.body)
+        return part.at + rotation.matrix(part.p) @ part.point(marker)
+
+    def part(self, name: str) -> Part:
+        """The body of a name.
+
+        Raises:
+            ConfigError: listing the names that exist.
+        """
+        if name == GROUND:
+            return self.ground
+        if name not in self.parts:
+            raise ConfigError(f"no body {name!r}; the mechanism has {sorted(self.parts)}.")
+        return self.parts[name]
+
+    def _enter(self, part: Part) -> Part:
+        self._check_new(part.name)
+        self.parts[part.name] = part
+        return part
+
+    def _join(self, name: str, m1: Marker, m2: Marker, kind: Callable[..., Joint], *axes: Any):
+        self._check_new(name)
+        self._check_markers(name, m1, m2)
+        if m1.body == m2.body:
+            raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself.")
+        A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
+        gap = self.design_point(m2) - self.design_point(m1)
+        directions = [unit_vector(f"axis of {name}", axis) for axis in axes]
+        self.joints[name] = kind(name, (m1, m2), (A1, A2), gap, *directions)
+
+    def _joint_with_axis(self, joint: str, what: str) -> Joint:
+        if joint not in self.joints:
+            raise ConfigError(f"{what}: no joint {joint!r}; there are {sorted(self.joints)}.")
+        if self.joints[joint].coordinate is None:
+            raise ConfigError(
+                f"{what}: joint {joint!r} is {self.joints[joint].kind}; only revolute, "
+                "cylindrical and prismatic joints have a coordinate."
+            )
+        return self.joints[joint]
+
+    def _load(self, name: str, marker: Marker, vector: Any, frame: str, kind: int) -> None:
+        self._check_new(name)
+        self._check_markers(name, marker)
+        if frame not in ("world", "body"):
+            raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
+        function = vector if callable(vector) else None
+        constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
+        self.loads[name] = Load(marker, kind + (frame == "body"), constant, function)
+
+    def _check_new(self, name: str) -> None:
+        if not isinstance(name, str) or not name:
+            raise ConfigError(f"a name must be a text that is not empty, got {name!r}.")
+        taken = [
+            *(GROUND, *self.parts, *self.joints, *self.drives, *self.springs),
+            *(*self.turns, *self.loads, *self.user_forces),
+        ]
+        if name in taken:
+            raise ConfigError(f"the name {name!r} is used twice; in use are {sorted(taken)}.")
+
+    def _check_markers(self, name: str, *markers: Marker) -> None:
+        for marker in markers:
+            if not isinstance(marker, Marker):
+                raise ConfigError(
+                    f"{name!r} needs markers, got {marker!r}.", hint="Use part.marker(...)."
+                )
+            self.part(marker.body).point(marker)
+
+
+def _pose(at: Any, orientation: Any, velocity: Any, omega: Any) -> tuple[Array, ...]:
+    zero = np.zeros(3)
+    return (
+        finite("at", at, (3,)),
+        unit_quaternion(orientation),
+        finite("velocity", zero if velocity is None else velocity, (3,)),
+        finite("omega", zero if omega is None else omega, (3,)),
+    )

@@ -1,0 +1,225 @@
+"""Equations of motion of the whole mechanism: residual, iteration matrix, accelerations."""
+
+import math
+
+from rom.mbs.algebra import back_substitute, factorise, range_basis, scale, turned, vec
+from rom.mbs.compiled import inner, kernel
+from rom.mbs.constraints import (
+    constraint_gradient,
+    constraint_stiffness,
+    constraint_wrench,
+    row_states,
+)
+from rom.mbs.dynamics import (
+    body_damping,
+    body_mass,
+    body_residuals,
+    body_states,
+    body_stiffness,
+)
+from rom.mbs.forces import applied_wrenches, follow_angles, force_tangents
+from rom.mbs.kinematics import marker_states, spread_wrench, wrench_stiffness
+
+
+@kernel
+def evaluate(s, W, q, v):
+    """All quantities that depend on coordinates, velocities and signals only."""
+    body_states(s.bodies, W, q, v)
+    marker_states(s, W, q, v)
+    row_states(s.rows, W)
+
+
+@inner
+def body_masses(s, W):
+    """Set W.S to the mass matrix of all bodies; `evaluate` first."""
+    W.S[:] = 0.0
+    for b in range(s.bodies.mass.size):
+        body_mass(s.bodies, W, b, 1.0, W.S)
+
+
+@kernel
+def linearise(s, W, q, v):
+    """`evaluate`, then set W.G to the constraint gradient and W.S to the mass matrix."""
+    evaluate(s, W, q, v)
+    constraint_gradient(s, W)
+    body_masses(s, W)
+
+
+@inner
+def residual(s, W, q, v, a, lam):
+    """Set W.residual = M a + h - Q + G^T lam at the state of the last `evaluate`."""
+    W.residual[:] = 0.0
+    W.power[:] = 0.0
+    body_residuals(s.bodies, W, q, v, a)
+    applied_wrenches(s, W)
+    constraint_wrench(s, W, lam)
+    spread_wrench(s, W, -1.0, W.residual)
+    drive_power(s, W, lam)
+
+
+@inner
+def drive_power(s, W, lam):
+    """Set the power of the drives."""
+    W.power[0] = 0.0
+    for k in range(s.rows.kind.size):
+        if s.rows.signal[k] >= 0:
+            W.power[0] -= lam[k] * W.signal[s.rows.signal[k], 1]
+
+
+@inner
+def tangents(s, W, v, a, lam, c):
+    """Set W.S = c0 M + c1 dr/dv and W.Kt = c2 dr/dq for the coefficients c; `residual` first."""
+    W.S[:] = 0.0
+    W.Kt[:] = 0.0
+    for b in range(s.bodies.mass.size):
+        body_mass(s.bodies, W, b, c[0], W.S)
+        body_damping(s.bodies, W, b, v, c[1], W.S)
+        body_stiffness(s.bodies, W, b, v, a, c[2], W.Kt)
+    wrench_stiffness(s, W, c[2], W.Kt)
+    constraint_stiffness(s, W, lam, c[2], W.Kt)
+    force_tangents(s, W, c[2], c[1], W.Kt, W.S)
+
+
+@inner
+def border(W, n, rank):
+    """Project the constraint gradient on the range W.U_lu: W.UG, and its copy W.UGT."""
+    m = W.G.shape[0]
+    for k in range(rank):
+        for j in range(n):
+            W.UG[k, j] = W.G[k, j] if rank == m else 0.0
+        if rank < m:
+            for p in range(m):
+                u = W.U_lu[k, p]
+                for j in range(n):
+                    W.UG[k, j] += u * W.G[p, j]
+        for j in range(n):
+            W.UGT[k, j] = W.UG[k, j]
+
+
+@inner
+def fill(W, n, rank):
+    """Write [S, UG^T; UGT, 0] into W.lu, scaled so that masses and gradients have size one."""
+    for i in range(n):
+        W.scaling[i] = 1.0 / math.sqrt(W.S[i, i]) if W.S[i, i] > 0.0 else 1.0
+    for k in range(rank):
+        total = 0.0
+        for j in range(n):
+            total += (W.UG[k, j] * W.scaling[j]) ** 2
+        W.scaling[n + k] = 1.0 / math.sqrt(total) if total > 0.0 else 1.0
+    for i in range(n):
+        for j in range(n):
+            W.lu[i, j] = W.S[i, j] * W.scaling[i] * W.scaling[j]
+    for k in range(rank):
+        for l in range(rank):
+            W.lu[n + k, n + l] = 0.0
+        for j in range(n):
+            W.lu[n + k, j] = W.UGT[k, j] * W.scaling[n + k] * W.scaling[j]
+            W.lu[j, n + k] = W.UG[k, j] * W.scaling[n + k] * W.scaling[j]
+
+
+@inner
+def solve_bordered(W, n, rank, x, lam):
+    """Solve for x (n,) and lam (m,); W.rhs[:n] and W.part (m,) hold the right-hand side."""
+    m = W.G.shape[0]
+    for i in range(n):
+        W.rhs[i] *= W.scaling[i]
+    for k in range(rank):
+        total = W.part[k]
+        if rank < m:
+            total = 0.0
+            for p in range(m):
+                total += W.U_lu[k, p] * W.part[p]
+        W.rhs[n + k] = total * W.scaling[n + k]
+    back_substitute(W.lu, n + rank, W.pivot, W.rhs)
+    for i in range(n):
+        x[i] = W.rhs[i] * W.scaling[i]
+    for p in range(m):
+        lam[p] = W.rhs[n + p] * W.scaling[n + p] if rank == m else 0.0
+        if rank < m:
+            for k in range(rank):
+                lam[p] += W.U_lu[k, p] * W.scaling[n + k] * W.rhs[n + k]
+
+
+@inner
+def least_multipliers(W, rank, lam):
+    """Replace lam by the multipliers of least norm that give the same forces."""
+    m = lam.size
+    range_basis(W.G, rank, W.rest, W.U)
+    for k in range(rank):
+        total = 0.0
+        for p in range(m):
+            total += W.U[k, p] * lam[p]
+        W.part[k] = total
+    for p in range(m):
+        lam[p] = 0.0
+        for k in range(rank):
+            lam[p] += W.U[k, p] * W.part[k]
+
+
+@kernel
+def moved(s, q, psi, out):
+    """Coordinates q o exp(psi): positions and elastic add up, rotations turn in the body frame."""
+    B = s.bodies
+    for b in range(B.mass.size):
+        at, vt = B.q_at[b], B.v_at[b]
+        for i in range(3):
+            out[at + i] = q[at + i] + psi[vt + i]
+        turned(q, at + 3, vec(psi, vt + 3), out)
+        for k in range(B.r[b]):
+            out[at + 7 + k] = q[at + 7 + k] + psi[vt + 6 + k]
+
+
+@inner
+def coordinate_rates(s, q, v, out):
+    """Time derivatives of the coordinates for the velocities v."""
+    B = s.bodies
+    for b in range(B.mass.size):
+        at, vt = B.q_at[b], B.v_at[b]
+        e0, e1, e2, e3 = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
+        x, y, z = scale(0.5, vec(v, vt + 3))
+        for i in range(3):
+            out[at + i] = v[vt + i]
+        out[at + 3] = -e1 * x - e2 * y - e3 * z
+        out[at + 4] = e0 * x + e2 * z - e3 * y
+        out[at + 5] = e0 * y + e3 * x - e1 * z
+        out[at + 6] = e0 * z + e1 * y - e2 * x
+        for k in range(B.r[b]):
+            out[at + 7 + k] = v[vt + 6 + k]
+
+
+@kernel
+def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code has no keywords
+    """Rates of coordinates, velocities and works in y; False when the equations are singular.
+
+    Accelerations a and multipliers lam solve [M G^T; G 0]. At accepted states the range of the
+    constraints is renewed, which makes the multipliers those of least norm; in between the range
+    of the last one gives the same accelerations.
+    """
+    n, m = a.size, lam.size
+    n_q = y.size - n - 3
+    q, v = y[:n_q], y[n_q : n_q + n]
+    evaluate(s, W, q, v)
+    a[:] = 0.0
+    lam[:] = 0.0
+    residual(s, W, q, v, a, lam)
+    body_masses(s, W)
+    constraint_gradient(s, W)
+    if accepted and rank < m:
+        range_basis(W.G, rank, W.rest, W.U_lu)
+    border(W, n, rank)
+    fill(W, n, rank)
+    if not factorise(W.lu, n + rank, W.pivot):
+        return False
+    for i in range(n):
+        W.rhs[i] = -W.residual[i]
+    for k in range(m):
+        drive = W.signal[s.rows.signal[k], 2] if s.rows.signal[k] >= 0 else 0.0
+        W.part[k] = drive - W.gamma[k]
+    solve_bordered(W, n, rank, a, lam)
+    drive_power(s, W, lam)
+    if accepted:
+        follow_angles(s, W)
+    coordinate_rates(s, q, v, out[:n_q])
+    out[n_q : n_q + n] = a
+    out[n_q + n :] = W.power
+    return True

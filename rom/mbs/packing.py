@@ -1,0 +1,222 @@
+"""From the described mechanism to the flat arrays of compiled code."""
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, RomWarning
+from rom.mbs import joints
+from rom.mbs.arrays import Bodies, Forces, Markers, Rows, System
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts import GROUND, Marker, Part
+from rom.mbs.signals import Signal, drive_signal, load_signal
+from rom.model import Array
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A mechanism ready to run.
+
+    Attributes:
+        system: the arrays.
+        names: bodies in the order of the arrays.
+        markers: row of each marker.
+        row_owner: (m,) joint or drive of each constraint row.
+        signals: functions of time, in the order of the arrays.
+        q, v: coordinates and velocities as given by the user.
+        length: size of the mechanism [m].
+        mass: total mass [kg].
+    """
+
+    system: System
+    names: tuple[str, ...]
+    markers: dict[Marker, int]
+    row_owner: tuple[str, ...]
+    signals: tuple[Signal, ...]
+    q: Array
+    v: Array
+    length: float
+    mass: float
+
+    def rows_of(self, joint: str) -> Array:
+        """Numbers of the constraint rows of a joint or drive."""
+        return np.array([k for k, owner in enumerate(self.row_owner) if owner == joint], dtype=int)
+
+    def row(self, marker: Marker) -> int:
+        """Row of a marker in the arrays."""
+        return self.markers[marker]
+
+
+def pack(mechanism: Mechanism) -> Packed:
+    """Write the mechanism into arrays.
+
+    Raises:
+        ConfigError: if there is no body.
+    """
+    parts = tuple(mechanism.parts.values())
+    if not parts:
+        raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")
+    _warn_of_stiffening(parts)
+    handles = _all_markers(mechanism, parts)
+    index = {marker: k for k, marker in enumerate(handles)}
+    rows, owners, signals = _rows(mechanism, index)
+    forces, loads = _forces(mechanism, index, len(signals))
+    R = max(part.r for part in parts)
+    system = System(
+        _bodies(parts, R, np.asarray(mechanism.gravity)),
+        _markers(mechanism, handles, R),
+        rows,
+        forces,
+    )
+    return Packed(
+        system,
+        tuple(mechanism.parts),
+        index,
+        owners,
+        (*signals, *loads),
+        np.concatenate([np.r_[part.at, part.p, part.q] for part in parts]),
+        np.concatenate([np.r_[part.velocity, part.omega, part.qd] for part in parts]),
+        _length(parts),
+        sum(part.mass for part in parts),
+    )
+
+
+def _warn_of_stiffening(parts: tuple[Part, ...]) -> None:
+    for part in parts:
+        if part.flexible is not None and getattr(part.flexible, "K_geo", None):
+            warnings.warn(
+                f"body {part.name!r}: its geometric stiffness is not used; fast rotation will "
+                "not stiffen it.",
+                RomWarning,
+                stacklevel=4,
+            )
+
+
+def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
+    """Every named marker, every marker in use, and the origin of every body."""
+    found = [Marker(part.name, name) for part in parts for name in part.names]
+    found += [m for joint in mechanism.joints.values() for m in joint.markers]
+    found += [m for s in mechanism.springs.values() for m in (s.i, s.j)]
+    found += [load.marker for load in mechanism.loads.values()]
+    for law in mechanism.user_forces.values():
+        found += [law.i] if law.j is None else [law.i, law.j]
+    return list(dict.fromkeys([*found, Marker(GROUND, (0.0, 0.0, 0.0))]))
+
+
+def _length(parts: tuple[Part, ...]) -> float:
+    """Largest reach of a body, or its radius of gyration."""
+    reach = [np.sqrt(np.trace(part.second) / part.mass) for part in parts]
+    for part in parts:
+        reach += [np.linalg.norm(part.point(part.marker(name))) for name in part.names]
+    return float(max(reach))
+
+
+def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
+    r = np.array([part.r for part in parts], dtype=np.int64)
+    flexible = [part for part in parts if part.r]
+    flex = np.zeros(len(parts), dtype=np.int64)
+    flex[r > 0] = np.arange(len(flexible))
+    tables = _flexible_tables(flexible, max(len(flexible), 1), R)
+    return Bodies(
+        _starts(7 + r),
+        _starts(6 + r),
+        r,
+        flex,
+        np.array([part.mass for part in parts]),
+        np.array([part.first for part in parts]),
+        np.array([part.second for part in parts]),
+        *tables,
+        gravity,
+    )
+
+
+def _starts(lengths: Any) -> Any:
+    return np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
+
+
+def _flexible_tables(parts: list[Part], n: int, R: int) -> tuple[Array, ...]:
+    S, S1, S2 = np.zeros((n, 3, R)), np.zeros((n, R, 9)), np.zeros((n, R, 9 * R))
+    M, K, C = (np.zeros((n, R, R)) for _ in range(3))
+    for f, part in enumerate(parts):
+        body, r = part.flexible, part.r
+        S[f, :, :r] = body.S
+        S1[f, :r] = np.transpose(body.Ibar_kl, (2, 0, 1)).reshape(r, 9)
+        S2[f, :r, : 9 * r] = np.transpose(body.S_kl, (2, 3, 0, 1)).reshape(r, 9 * r)
+        M[f, :r, :r], K[f, :r, :r], C[f, :r, :r] = body.M, body.K, body.D
+    return S, S1, S2, M, K, C
+
+
+def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
+    order = {name: b for b, name in enumerate(mechanism.parts)} | {GROUND: -1}
+    shape, twist = np.zeros((len(handles), 3, R)), np.zeros((len(handles), 3, R))
+    for k, marker in enumerate(handles):
+        part = mechanism.part(marker.body)
+        shape[k, :, : part.r], twist[k, :, : part.r] = part.shapes(marker)
+    return Markers(
+        np.array([order[m.body] for m in handles], dtype=np.int64),
+        np.array([mechanism.part(m.body).point(m) for m in handles]),
+        shape,
+        twist,
+    )
+
+
+def _rows(mechanism: Mechanism, index: dict[Marker, int]) -> tuple[Rows, tuple, list[Signal]]:
+    entries, signals = [], []
+    for pair, (name, joint) in enumerate(mechanism.joints.items()):
+        entries += [(name, pair, joint, row, -1) for row in joint.rows]
+    for name, drive in mechanism.drives.items():
+        joint = mechanism.joints[drive.joint]
+        pair = list(mechanism.joints).index(drive.joint)
+        entries.append((name, pair, joint, joint.coordinate, len(signals)))
+        signals.append(drive_signal(name, drive))
+    sides = [[index[joint.markers[side]] for _, _, joint, _, _ in entries] for side in (0, 1)]
+    joint_sides = [[index[j.markers[side]] for j in mechanism.joints.values()] for side in (0, 1)]
+    rows = [row for _, _, _, row, _ in entries]
+    packed = Rows(
+        _integers([row.kind for row in rows]),
+        _integers(sides[0]),
+        _integers(sides[1]),
+        *(_vectors([getattr(row, axis) for row in rows]) for axis in "abc"),
+        np.array([row.offset for row in rows], dtype=float),
+        _integers([entry[4] for entry in entries]),
+        _integers([entry[1] for entry in entries]),
+        _integers(joint_sides[0]),
+        _integers(joint_sides[1]),
+    )
+    return packed, tuple(entry[0] for entry in entries), signals
+
+
+def _integers(values: Any) -> Any:
+    return np.array(list(values), dtype=np.int64)
+
+
+def _vectors(values: Any) -> Array:
+    return np.array(list(values), dtype=float).reshape(-1, 3)
+
+
+def _forces(
+    mechanism: Mechanism, index: dict[Marker, int], n_drives: int
+) -> tuple[Forces, list[Signal]]:
+    springs, loads = mechanism.springs.values(), mechanism.loads
+    turns = [(mechanism.joints[t.joint], t) for t in mechanism.turns.values()]
+    axes: list[joints.Row] = [joint.turn for joint, _ in turns]
+    signals, at = [], []
+    for name, load in loads.items():
+        at.append(n_drives + len(signals) if load.function else -1)
+        signals += [load_signal(name, load.function)] if load.function else []
+    forces = Forces(
+        _integers([index[s.i] for s in springs]),
+        _integers([index[s.j] for s in springs]),
+        _vectors([(s.stiffness, s.damping, s.free_length) for s in springs]),
+        _integers([index[load.marker] for load in loads.values()]),
+        _integers([load.kind for load in loads.values()]),
+        _vectors([load.vector for load in loads.values()]),
+        _integers(at),
+        _integers([index[joint.markers[0]] for joint, _ in turns]),
+        _integers([index[joint.markers[1]] for joint, _ in turns]),
+        *(_vectors([getattr(row, axis) for row in axes]) for axis in "abc"),
+        _vectors([(t.stiffness, t.damping, t.free_angle) for _, t in turns]),
+    )
+    return forces, signals

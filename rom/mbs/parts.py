@@ -1,0 +1,174 @@
+"""Bodies of a mechanism with their start position, and the markers on them."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, ModelError
+from rom.mbs.arguments import finite
+from rom.model import Array
+
+GROUND = "ground"
+# smallest over largest eigenvalue of the scaled mass matrix below which a body counts as singular
+SINGULAR_MASS = 1e-11
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """A point on a body: a name, or three coordinates in the body frame."""
+
+    body: str
+    place: str | tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A body in a mechanism.
+
+    Attributes:
+        name: name of the body.
+        mass: [kg].
+        first: (3,) first moment about the origin of the frame [kg m].
+        second: (3, 3) integral of rho X X^T [kg m^2].
+        at, p: (3,), (4,) origin and quaternion of the frame at the start.
+        velocity, omega: (3,), (3,) of the frame at the start; world, body frame.
+        points: named points of a rigid body, body frame [m].
+        flexible: the ``FlexibleBody``, None for a rigid body.
+        q, qd: (r,) elastic coordinates and rates at the start.
+    """
+
+    name: str
+    mass: float
+    first: Array
+    second: Array
+    at: Array
+    p: Array
+    velocity: Array
+    omega: Array
+    points: dict[str, Array] = field(default_factory=dict)
+    flexible: Any = None
+    q: Array = field(default_factory=lambda: np.zeros(0))
+    qd: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def r(self) -> int:
+        """Number of elastic coordinates."""
+        return self.q.size
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the markers."""
+        return tuple(self.points if self.flexible is None else self.flexible.markers)
+
+    def marker(self, place: Any) -> Marker:
+        """Handle of a named marker, or of a point (3,) in the body frame.
+
+        Raises:
+            ConfigError: if the name is unknown, or for a free point on a flexible body, where
+                only the interfaces have known deformations.
+        """
+        if isinstance(place, str):
+            if place not in self.names:
+                raise ConfigError(
+                    f"body {self.name!r} has no marker {place!r}; it has {sorted(self.names)}."
+                )
+            return Marker(self.name, place)
+        if self.flexible is not None:
+            raise ConfigError(
+                f"body {self.name!r} is flexible: its markers are {sorted(self.names)}."
+            )
+        point = finite(f"marker of {self.name}", place, (3,))
+        return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
+
+    def point(self, marker: Marker) -> Array:
+        """(3,) undeformed position of a marker in the body frame [m]."""
+        if not isinstance(marker.place, str):
+            return np.array(marker.place)
+        self.marker(marker.place)
+        if self.flexible is None:
+            return self.points[marker.place]
+        return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
+
+    def shapes(self, marker: Marker) -> tuple[Array, Array]:
+        """(3, r) displacement and (3, r) rotation of a marker per elastic coordinate."""
+        if self.flexible is None:
+            return np.zeros((3, 0)), np.zeros((3, 0))
+        m = self.flexible.markers[marker.place]
+        return np.asarray(m.translation, dtype=float), np.asarray(m.rotation, dtype=float)
+
+
+def ground_part() -> Part:
+    """The body that never moves, its frame the world."""
+    zero, still = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    return Part(GROUND, 0.0, zero, np.zeros((3, 3)), zero, still, zero, zero)
+
+
+def rigid_part(
+    name: str, mass: float, inertia: Array, pose: tuple[Array, ...], points: dict[str, Array]
+) -> Part:
+    """A rigid body.
+
+    Raises:
+        ModelError: if no distribution of mass has this inertia.
+    """
+    size = np.abs(inertia).max()
+    moments = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    if np.abs(inertia - inertia.T).max() > 1e-9 * size or moments[0] <= 0.0:
+        raise ModelError(
+            f"inertia has principal moments {moments.tolist()} kg m^2: it must be symmetric and "
+            "positive definite.",
+            where=name,
+        )
+    if moments[2] > (1 + 1e-6) * (moments[0] + moments[1]):
+        raise ModelError(
+            f"the largest principal moment {moments[2]:g} exceeds the sum of the others, "
+            f"{moments[0] + moments[1]:g} kg m^2: no body has this inertia.",
+            where=name,
+        )
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return Part(name, mass, np.zeros(3), second, *pose, points)
+
+
+def flexible_part(name: str, body: Any, pose: tuple[Array, ...], elastic: tuple) -> Part:
+    """A flexible body.
+
+    Raises:
+        ModelError: if its mass matrix is singular.
+    """
+    inertia = np.asarray(body.inertia, dtype=float)
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    first = np.asarray(body.first_moment, dtype=float)
+    part = Part(name, float(body.mass), first, second, *pose, {}, body, *elastic)
+    _check_mass(part)
+    return part
+
+
+def _check_mass(part: Part) -> None:
+    M = mass_at_rest(part)
+    if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
+        raise ModelError("the mass matrix has entries that no body has.", where=part.name)
+    scale = 1 / np.sqrt(np.diag(M))
+    spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
+    if spectrum[0] < SINGULAR_MASS * spectrum[-1]:
+        raise ModelError(
+            f"the mass matrix of the frame and the {part.r} elastic coordinates is singular "
+            f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g}): a rigid motion was left in the "
+            "elastic shapes, which the floating frame already describes.",
+            where=part.name,
+            hint="Give the body a reference condition: body.with_reference('mean-axis').",
+        )
+
+
+def mass_at_rest(part: Part) -> Array:
+    """(6 + r, 6 + r) mass matrix of the undeformed body in its frame."""
+    x, y, z = part.first
+    d = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    J = np.trace(part.second) * np.eye(3) - part.second
+    rigid = np.block([[part.mass * np.eye(3), -d], [d, J]])
+    if part.flexible is None:
+        return rigid
+    B = np.asarray(part.flexible.Ibar_kl)
+    Cr = np.array([B[1, 2] - B[2, 1], B[2, 0] - B[0, 2], B[0, 1] - B[1, 0]])
+    coupling = np.vstack([np.asarray(part.flexible.S), Cr])
+    return np.block([[rigid, coupling], [coupling.T, np.asarray(part.flexible.M)]])

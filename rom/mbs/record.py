@@ -1,0 +1,135 @@
+"""Settings of a run, and the record it fills."""
+
+import sys
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.packing import Packed
+from rom.mbs.signals import sample_all
+from rom.mbs.solution import Solution
+from rom.mbs.state import State
+from rom.model import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Checked arguments of `rom.mbs.integrate.simulate`."""
+
+    t_start: float
+    t_end: float
+    dt: float
+    save_every: int
+    rho_inf: float
+    tolerance: float
+    rtol: float
+    atol: float
+    progress: bool
+
+    def __post_init__(self):
+        for name in ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol"):
+            value = getattr(self, name)
+            if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
+                raise ConfigError(f"{name} = {value!r} is not a finite number.")
+        if self.t_end <= self.t_start:
+            raise ConfigError(f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.")
+        for name in ("dt", "tolerance", "rtol", "atol"):
+            if getattr(self, name) <= 0.0:
+                raise ConfigError(f"{name} = {getattr(self, name):g} must be positive.")
+        if not 0.0 <= self.rho_inf <= 1.0:
+            raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
+        if int(self.save_every) != self.save_every or self.save_every < 1:
+            raise ConfigError(f"save_every = {self.save_every!r} is not a positive whole number.")
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of at most dt."""
+        return max(1, int(np.ceil((self.t_end - self.t_start) / self.dt - 1e-6)))
+
+    @property
+    def h(self) -> float:
+        """Length of a step [s]."""
+        return (self.t_end - self.t_start) / self.steps
+
+    @property
+    def spacing(self) -> float:
+        """Spacing of the finite differences of prescribed functions [s]."""
+        return max(self.h, 1e-4 * (self.t_end - self.t_start)) if self.steps > 4 else 0.05 * self.h
+
+    def time(self, step: Any) -> Any:
+        """Time after so many steps [s]."""
+        return self.t_start + self.h * step
+
+
+@dataclass
+class Record:
+    """What a run has produced so far.
+
+    Attributes:
+        mechanism, packed, settings: of the run.
+        clock: when the stepping began, assembly and compilation done.
+        blocks: saved pieces (t, q, v, a, lam, work, base).
+        t: time reached.
+        final: last state reached.
+        statistics: counts, and seconds in compiled code.
+    """
+
+    mechanism: Mechanism
+    packed: Packed
+    settings: Settings
+    clock: float
+    blocks: list[tuple[Array, ...]] = field(default_factory=list)
+    t: float = 0.0
+    final: State | None = None
+    compiled: float = 0.0
+    counts: dict[str, int] = field(default_factory=dict)
+    shown: float = 0.0
+
+    def keep(self, t: Array, *arrays: Array) -> None:
+        """Add saved instants."""
+        self.blocks.append((np.atleast_1d(t), *arrays))
+
+    def start(self, state: State) -> None:
+        """Save the first instant."""
+        self.t, self.final = state.t, state
+        arrays = (state.q, state.v, state.a, state.lam, np.zeros(3), state.base)
+        self.keep(np.array([state.t]), *(x[None].copy() for x in arrays))
+
+    def show(self) -> None:
+        """Report the time reached on stderr, at most five times a second."""
+        now = perf_counter()
+        if self.settings.progress and now - self.shown > 0.2:
+            self.shown = now
+            span = self.settings.t_end - self.settings.t_start
+            share = (self.t - self.settings.t_start) / span
+            sys.stderr.write(
+                f"\rt = {self.t:.6g} s  {100 * share:3.0f} %  {now - self.clock:.0f} s "
+            )
+            sys.stderr.flush()
+
+    def solution(self, status: str) -> Solution:
+        """The motion so far."""
+        if self.settings.progress and self.shown:
+            sys.stderr.write("\r" + " " * 40 + "\r")
+        t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
+        span, start = self.settings.spacing, self.settings.t_start
+        signals = sample_all(self.packed.signals, t, start, span)
+        return Solution(
+            self.mechanism, self.packed, t, *arrays, signals, self._statistics(), status, self.final
+        )
+
+    def _statistics(self) -> dict[str, Any]:
+        total = perf_counter() - self.clock
+        return {
+            **self.counts,
+            "rank": self.final.rank,
+            "redundant": self.final.lam.size - self.final.rank,
+            "seconds": total,
+            "seconds_compiled": self.compiled,
+            "share_outside": 1.0 - self.compiled / total,
+            "steps_per_second": self.counts.get("steps", 0) / total,
+        }

@@ -1,0 +1,122 @@
+"""Functions of time that a user prescribes, sampled for compiled code."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, SolverError
+from rom.model import Array
+
+# weights of f(t), f(t + s), ... f(t + 4 s) in 12 s f' and 12 s^2 f'', fourth and third order
+FORWARD = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [35.0, -104.0, 114.0, -56.0, 11.0]])
+# weights of f(t - 2 s), ... f(t + 2 s), fourth order
+CENTRAL = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A function of time.
+
+    Attributes:
+        name: drive or load it belongs to.
+        function: t -> number (drive) or (3,) vector (load).
+        rate, acceleration: its derivatives, or None.
+        width: 1 for a drive, 3 for a load.
+    """
+
+    name: str
+    function: Callable[[float], Any]
+    rate: Callable[[float], Any] | None = None
+    acceleration: Callable[[float], Any] | None = None
+    width: int = 1
+
+    def sample(self, t: Array, t_start: float, spacing: float) -> Array:
+        """(n, 3) value, rate, acceleration at the times t; or the vectors of a load.
+
+        Args:
+            t: (n,) times.
+            t_start: no time before this one is asked for.
+            spacing: of the finite differences for missing derivatives [s].
+        """
+        if self.width == 3:
+            return self._values(self.function, t)
+        value = self._values(self.function, t)[:, 0]
+        steps = ((self.rate, 0, spacing), (self.acceleration, 1, spacing**2))
+        given = [
+            self._values(f, t)[:, 0] if f else self._difference(t, t_start, order, spacing) / scale
+            for f, order, scale in steps
+        ]
+        return np.column_stack([value, *given])
+
+    def _difference(self, t: Array, t_start: float, order: int, spacing: float) -> Array:
+        early = t - 2 * spacing < t_start
+        first = np.where(early, t, t - 2 * spacing)
+        grid = first[:, None] + spacing * np.arange(5)
+        values = self._values(self.function, grid.ravel())[:, 0].reshape(-1, 5)
+        weights = np.where(early[:, None], FORWARD[order], CENTRAL[order])
+        # differences to one value first, so that a constant has the derivative zero exactly
+        return ((values - values[:, :1]) * weights).sum(axis=1) / 12
+
+    def _values(self, function: Callable[[float], Any], t: Array) -> Array:
+        many = _at_once(function, t, self.width)
+        if many is not None:
+            return many
+        try:
+            values = [np.asarray(function(float(x)), dtype=float).ravel() for x in t]
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"the function of {self.name!r} failed: {error}") from error
+        for value in values:
+            if value.shape != (self.width,):
+                raise ConfigError(
+                    f"the function of {self.name!r} returns {value.size} numbers, "
+                    f"needed are {self.width}."
+                )
+        return np.array(values).reshape(-1, self.width)
+
+
+def _at_once(function: Callable[[Any], Any], t: Array, width: int) -> Array | None:
+    """Values at all times by one call, if the function can do that and agrees with itself."""
+    if t.size < 4 or width != 1:
+        return None
+    try:
+        many = np.asarray(function(t), dtype=float)
+        probe = [float(function(float(t[k]))) for k in (0, t.size // 2, -1)]
+    except Exception:  # whatever a function of one number does with an array
+        return None
+    if many.shape != t.shape or not np.array_equal(many[[0, t.size // 2, -1]], probe):
+        return None
+    return many[:, None]
+
+
+def drive_signal(name: str, drive: Any) -> Signal:
+    """Signal of a prescribed joint coordinate."""
+    return Signal(name, drive.function, drive.rate, drive.acceleration)
+
+
+def load_signal(name: str, function: Callable[[float], Any]) -> Signal:
+    """Signal of a load that depends on time."""
+    return Signal(name, function, width=3)
+
+
+def sample_all(signals: tuple[Signal, ...], t: Array, t_start: float, spacing: float) -> Array:
+    """(n, s, 3) all signals at all times."""
+    out = np.zeros((t.size, len(signals), 3))
+    for k, signal in enumerate(signals):
+        out[:, k] = signal.sample(t, t_start, spacing)
+    return out
+
+
+def first_failure(signals: tuple[Signal, ...], t: Array, table: Array) -> tuple[int, SolverError]:
+    """Number of good instants before the first one that is not finite, and its error."""
+    bad = ~np.isfinite(table).all(axis=2)
+    if not bad.any():
+        return t.size, SolverError("")
+    k = int(np.argmax(bad.any(axis=1)))
+    name = signals[int(np.argmax(bad[k]))].name
+    return k, SolverError(
+        f"the function of {name!r} gives {table[k, int(np.argmax(bad[k]))].tolist()} at "
+        f"t = {t[k]:.9g} s.",
+        hint="The motion up to there is kept in error.solution.",
+    )

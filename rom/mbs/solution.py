@@ -1,0 +1,169 @@
+"""What a run leaves behind, and the questions it answers."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError
+from rom.mbs.arrays import WORK
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.packing import Packed
+from rom.mbs.parts import Marker
+from rom.mbs.state import State
+from rom.mbs.tracks import Tracks, follow
+from rom.model import Array
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies and works over time, each (n_t,) [J]; works count from the start.
+
+    Attributes:
+        kinetic: of all bodies.
+        strain: elastic energy of bodies and springs.
+        potential: of gravity.
+        drives: work done by the drives.
+        forces: work done by forces, torques and user forces.
+        damping: work lost in dampers.
+    """
+
+    kinetic: Array
+    strain: Array
+    potential: Array
+    drives: Array
+    forces: Array
+    damping: Array
+
+    @property
+    def total(self) -> Array:
+        """Mechanical energy: kinetic, strain and potential."""
+        return self.kinetic + self.strain + self.potential
+
+    @property
+    def balance(self) -> Array:
+        """Mechanical energy gained minus work put in; zero for an exact motion."""
+        supplied = self.drives + self.forces - self.damping
+        return self.total - self.total[0] - supplied
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Motion of a mechanism.
+
+    Attributes:
+        mechanism: what moved.
+        packed: its arrays.
+        t: (n_t,) times [s].
+        q, v, a: (n_t, n_q), (n_t, n), (n_t, n) coordinates, velocities, accelerations, see
+            `rom.mbs.state.State`.
+        lam: (n_t, m) constraint multipliers.
+        work: (n_t, 3) work of drives, of forces, lost in dampers [J].
+        base: (n_t, t) angles of the rotational springs, counted over whole turns [rad].
+        signals: (n_t, s, 3) prescribed functions of time.
+        statistics: steps, iterations, times.
+        status: one sentence on how the run ended.
+        final: the last state, from which a run can go on.
+    """
+
+    mechanism: Mechanism
+    packed: Packed
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    lam: Array
+    work: Array
+    base: Array
+    signals: Array
+    statistics: dict[str, Any]
+    status: str
+    final: State
+    _tracks: dict[Any, Tracks] = field(default_factory=dict, repr=False)
+
+    def position(self, body: str, marker: Any = None) -> Array:
+        """(n_t, 3) position of a marker, or of the body origin [m]."""
+        if marker is None:
+            at = self._start_of(body)
+            return self.q[:, at : at + 3]
+        return self._track(body, marker).position
+
+    def velocity(self, body: str, marker: Any = None) -> Array:
+        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]."""
+        if marker is None:
+            at = self._start_of(body, velocity=True)
+            return self.v[:, at : at + 3]
+        return self._track(body, marker).twist[:, :3]
+
+    def axes(self, body: str, marker: Any) -> Array:
+        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included."""
+        return self._track(body, marker).axes
+
+    def orientation(self, body: str) -> Array:
+        """(n_t, 4) quaternion of the body frame."""
+        at = self._start_of(body)
+        return self.q[:, at + 3 : at + 7]
+
+    def omega(self, body: str) -> Array:
+        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]."""
+        at = self._start_of(body, velocity=True)
+        return self.v[:, at + 3 : at + 6]
+
+    def elastic(self, body: str) -> Array:
+        """(n_t, r) elastic coordinates."""
+        at = self._start_of(body)
+        return self.q[:, at + 7 : at + 7 + self.mechanism.part(body).r]
+
+    def reaction(self, name: str) -> Array:
+        """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.
+
+        The moment is about the second marker. A drive is counted apart from its joint.
+        """
+        rows = self.packed.rows_of(name)
+        if not rows.size:
+            raise ConfigError(
+                f"no joint or drive {name!r}; there are {sorted(set(self.packed.row_owner))}."
+            )
+        return self._follow(rows=rows).reaction
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Energies and works over time."""
+        energy = self._follow().energy
+        works = {name: self.work[:, k] for k, name in enumerate(WORK)}
+        return Energy(energy[:, 0], energy[:, 1], energy[:, 2], **works)
+
+    @cached_property
+    def gap(self) -> Array:
+        """(n_t, m) residuals of the constraints [m, or 1]."""
+        return self._follow().gap
+
+    @cached_property
+    def momentum(self) -> tuple[Array, Array]:
+        """(n_t, 3) linear momentum and (n_t, 3) angular momentum about the world origin."""
+        tracks = self._follow()
+        return tracks.momentum[:, :3], tracks.momentum[:, 3:]
+
+    def _follow(self, marker: int = 0, rows: Any = ()) -> Tracks:
+        key = (marker, tuple(rows))
+        if key not in self._tracks:
+            self._tracks[key] = follow(self, marker, np.array(rows, dtype=np.int64))
+        return self._tracks[key]
+
+    def _start_of(self, body: str, *, velocity: bool = False) -> int:
+        if body not in self.packed.names:
+            raise ConfigError(f"no body {body!r}; the mechanism has {sorted(self.packed.names)}.")
+        B = self.packed.system.bodies
+        starts = B.v_at if velocity else B.q_at
+        return int(starts[self.packed.names.index(body)])
+
+    def _track(self, body: str, place: Any) -> Tracks:
+        self._start_of(body)
+        marker = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
+        if marker not in self.packed.markers:
+            raise ConfigError(
+                f"the point {marker.place} of body {body!r} was not a marker of the run.",
+                hint="Name it when the body is added.",
+            )
+        return self._follow(self.packed.row(marker))

@@ -1,0 +1,254 @@
+"""The start of a motion: positions that fit, velocities that fit, accelerations."""
+
+import warnings
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ModelError, RomWarning, SolverError
+from rom.mbs.arrays import Work, workspace
+from rom.mbs.motion import evaluate, linearise, moved, rates
+from rom.mbs.packing import Packed
+from rom.mbs.signals import sample_all
+from rom.model import Array
+
+# relative singular value below which a constraint counts as a copy of others: assembled
+# mechanisms show 1e-12 and less, independent constraints 1e-4 and more
+RANK_TOLERANCE = 1e-8
+# a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh more
+ELASTIC_WEIGHT = 1e8
+GAP_TOLERANCE = 1e-9
+MAX_ASSEMBLY = 60
+
+
+@dataclass(frozen=True)
+class State:
+    """A mechanism at one instant.
+
+    Attributes:
+        t: time [s].
+        q: (n_q,) per body: origin (3), quaternion (4), elastic coordinates (r).
+        v: (n,) per body: velocity of the origin, world (3), angular velocity, body frame (3),
+            elastic rates (r).
+        a: (n,) rates of v.
+        lam: (m,) multipliers of the constraints.
+        rank: number of independent constraints.
+        algorithmic: (n,) acceleration-like variable of generalised-alpha, None at a fresh start.
+        base: (t,) angles of the rotational springs, counted over whole turns; None: as measured.
+    """
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    lam: Array
+    rank: int
+    algorithmic: Array | None = None
+    base: Array | None = None
+
+
+def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> State:
+    """Positions and velocities nearest to the given ones that satisfy all joints and drives.
+
+    Rigid motions are corrected before deformations.
+
+    Args:
+        packed: the mechanism.
+        t: start time [s].
+        spacing: of finite differences of drives [s].
+
+    Raises:
+        ModelError: naming the joint that cannot be satisfied.
+    """
+    W = workspace(packed.system, len(packed.signals))
+    W.signal[:] = sample_all(packed.signals, np.array([t]), t, spacing)[0]
+    q = assembled(packed, W, packed.q)
+    rank = _rank(packed, W, q)
+    _check_start(packed, W, q, rank)
+    v = fitting_velocity(packed, W, q, packed.v)
+    return with_accelerations(packed, W, State(t, q, v, v * 0, np.zeros(W.value.size), rank))
+
+
+def with_accelerations(packed: Packed, W: Work, state: State) -> State:
+    """The state with consistent accelerations and multipliers.
+
+    Raises:
+        SolverError: if the equations of motion are singular there.
+    """
+    a, lam = np.zeros(state.v.size), np.zeros(state.lam.size)
+    y = np.concatenate([state.q, state.v, np.zeros(3)])
+    if not rates(packed.system, W, y, state.rank, True, a, lam, np.zeros_like(y)):
+        raise SolverError(f"the equations of motion are singular at t = {state.t:.9g} s.")
+    return replace(state, a=a, lam=lam, base=W.base.copy())
+
+
+def assembled(packed: Packed, W: Work, q: Array) -> Array:
+    """Coordinates that satisfy the constraints, by weighted Gauss-Newton corrections.
+
+    Raises:
+        ModelError: naming the joint with the largest gap that remains.
+    """
+    q, v = q.copy(), np.zeros(packed.v.size)
+    if not W.value.size:
+        return q
+    scale = _row_scale(packed)
+    weight = None
+    for _ in range(MAX_ASSEMBLY):
+        linearise(packed.system, W, q, v)
+        weight = _weights(packed, W) if weight is None else weight
+        step = -_least_change(W.G / scale[:, None], W.value / scale, weight)
+        largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
+        moved(packed.system, q.copy(), _limited(packed, step), q)
+        if largest < 1e-15 or not np.isfinite(largest):
+            break
+        if largest < 1e-12 and np.abs(W.value / scale).max() < 1e-14:
+            break
+    evaluate(packed.system, W, q, v)
+    _check_gap(packed, W.value / scale)
+    return q
+
+
+def _limited(packed: Packed, step: Array) -> Array:
+    """The step, shortened to half a radian and to the size of the mechanism."""
+    B, largest = packed.system.bodies, 0.0
+    for t in B.v_at:
+        turn, shift = np.linalg.norm(step[t + 3 : t + 6]), np.linalg.norm(step[t : t + 3])
+        largest = max(largest, turn / 0.5, shift / packed.length)
+    return step / max(largest, 1.0)
+
+
+def _check_gap(packed: Packed, gap: Array) -> None:
+    k = int(np.argmax(np.abs(gap)))
+    if not np.isfinite(gap).all() or abs(gap[k]) > GAP_TOLERANCE:
+        raise ModelError(
+            f"the mechanism cannot be assembled: {packed.row_owner[k]!r} stays open by "
+            f"{abs(gap[k]) * packed.length:.3g} m (size {packed.length:.3g} m), or as a rotation "
+            f"by {abs(gap[k]):.3g} rad.",
+            where=packed.row_owner[k],
+            hint="Joints contradict each other: check positions, axes and drives.",
+        )
+
+
+def _row_scale(packed: Packed) -> Array:
+    """Lengths are measured by the size of the mechanism, rows of axes and angles as they are."""
+    return np.where(packed.system.rows.kind <= 1, packed.length, 1.0)
+
+
+def _weights(packed: Packed, W: Work) -> Array:
+    """(n,) inverse square root of what a unit of each velocity coordinate costs."""
+    B = packed.system.bodies
+    mass = np.zeros(packed.v.size)
+    for b, t in enumerate(B.v_at):
+        mass[t : t + 6] = np.diag(W.S)[t : t + 6]
+        mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
+        e = slice(t + 6, t + 6 + B.r[b])
+        mass[e] = ELASTIC_WEIGHT * np.diag(W.S)[e]
+    return 1 / np.sqrt(mass)
+
+
+def _least_change(G: Array, gap: Array, weight: Array) -> Array:
+    """Solution x of G x = gap with the least weighted norm."""
+    rows = np.linalg.norm(G * weight, axis=1)
+    rows = np.where(rows > 0, rows, 1.0)
+    A = G * weight / rows[:, None]
+    return weight * np.linalg.lstsq(A, gap / rows, rcond=RANK_TOLERANCE)[0]
+
+
+def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
+    """The velocities nearest to v that satisfy joints and drives.
+
+    Raises:
+        ModelError: naming a joint or drive that contradicts others.
+    """
+    if not W.value.size:
+        return v.copy()
+    linearise(packed.system, W, q, v)
+    weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
+    for _ in range(2):  # the second pass removes the round-off of the first
+        v = v + _least_change(W.G, wanted - W.G @ v, weight)
+    miss = np.abs(W.G @ v - wanted)
+    size = np.abs(W.G) @ np.abs(v) + np.abs(wanted)
+    k = int(np.argmax(miss / np.maximum(size, 1e-300)))
+    if miss[k] > 1e-8 * max(size[k], size.max() * 1e-3):
+        raise ModelError(
+            f"the velocities of joints and drives contradict each other: "
+            f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
+            where=packed.row_owner[k],
+        )
+    return v
+
+
+def _prescribed(packed: Packed, W: Work, derivative: int) -> Array:
+    signal = packed.system.rows.signal
+    if not W.signal.shape[0]:
+        return np.zeros(signal.size)
+    return np.where(signal >= 0, W.signal[np.maximum(signal, 0), derivative], 0.0)
+
+
+def _singular(packed: Packed, W: Work, q: Array) -> tuple[Array, Array]:
+    """Left singular vectors (m, m) and relative singular values of the scaled constraints."""
+    linearise(packed.system, W, q, np.zeros(packed.v.size))
+    A = W.G * _weights(packed, W)
+    norms = np.linalg.norm(A, axis=1)
+    A = A / np.where(norms > 0, norms, 1.0)[:, None]
+    U, s, _ = np.linalg.svd(A)
+    s = np.concatenate([s, np.zeros(U.shape[1] - s.size)])
+    return U, s / s.max()
+
+
+def _rank(packed: Packed, W: Work, q: Array) -> int:
+    """Number of independent constraints; warns of redundant ones by the names of their joints."""
+    m = W.value.size
+    if not m:
+        return 0
+    U, s = _singular(packed, W, q)
+    rank = int((s > RANK_TOLERANCE).sum())
+    if rank < m:
+        share = np.abs(U[:, rank:]).max(axis=1)
+        names = dict.fromkeys(o for o, x in zip(packed.row_owner, share, strict=True) if x > 1e-6)
+        warnings.warn(
+            f"{m - rank} of {m} constraints repeat others; joints {', '.join(names)} share loads "
+            "that only their deformation could divide. The motion is exact, the reactions are "
+            "those of least norm.",
+            RomWarning,
+            stacklevel=4,
+        )
+    return rank
+
+
+def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
+    """Refuse a start in a singular position, where the rank is less than beside it.
+
+    Raises:
+        ModelError: if a small motion along the free directions raises the rank.
+    """
+    if rank == W.value.size or rank == 0:
+        return
+    _singular(packed, W, q)
+    weight = _weights(packed, W)
+    free = np.linalg.svd(W.G * weight)[2][rank:]
+    if not free.size:
+        return
+    step = weight * free.sum(axis=0)
+    reach = max(_largest_turn(packed, step), 1e-300)
+    beside = np.empty_like(q)
+    moved(packed.system, q, step * (1e-2 / reach), beside)
+    try:
+        beside = assembled(packed, W, beside)
+    except ModelError:
+        return
+    raised = int((_singular(packed, W, beside)[1] > RANK_TOLERANCE).sum())
+    if raised > rank:
+        raise ModelError(
+            f"the mechanism starts in a singular position: {rank} independent constraints there, "
+            f"{raised} beside it; its motion could branch.",
+            hint="Start from a position in which the parts are not all in line.",
+        )
+
+
+def _largest_turn(packed: Packed, step: Array) -> float:
+    B: Any = packed.system.bodies
+    turns = [np.linalg.norm(step[t + 3 : t + 6]) for t in B.v_at]
+    shifts = [np.linalg.norm(step[t : t + 3]) / packed.length for t in B.v_at]
+    return float(max(*turns, *shifts))

@@ -1,0 +1,88 @@
+"""Force laws written in Python."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, SolverError
+from rom.mbs.arrays import Work
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.packing import Packed
+from rom.model import Array
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerMotion:
+    """How a marker moves.
+
+    Attributes:
+        position: (3,) world [m].
+        axes: (3, 3) orientation of the marker, to world.
+        velocity: (3,) world [m/s].
+        omega: (3,) angular velocity, world [rad/s].
+    """
+
+    position: Array
+    axes: Array
+    velocity: Array
+    omega: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A user force with the rows of its markers; j is -1 without a second one."""
+
+    name: str
+    function: Any
+    i: int
+    j: int
+
+
+def laws(mechanism: Mechanism, packed: Packed) -> tuple[Law, ...]:
+    """The user forces of a mechanism."""
+    return tuple(
+        Law(name, u.function, packed.row(u.i), -1 if u.j is None else packed.row(u.j))
+        for name, u in mechanism.user_forces.items()
+    )
+
+
+def motion_of(W: Work, m: int) -> MarkerMotion:
+    """Motion of marker m at the state of the last evaluation."""
+    return MarkerMotion(W.P[m].copy(), W.E[m].copy(), W.V[m, :3].copy(), W.V[m, 3:].copy())
+
+
+def apply_laws(forces: tuple[Law, ...], W: Work, t: float) -> None:
+    """Call all laws and set the wrenches of the user.
+
+    Raises:
+        SolverError: naming time and force if a value is not finite.
+    """
+    W.user[:] = 0.0
+    for law in forces:
+        a = motion_of(W, law.i)
+        motions = (a,) if law.j < 0 else (a, motion_of(W, law.j))
+        force, moment = _checked(law, t, law.function(t, *motions))
+        W.user[law.i, :3] += force
+        W.user[law.i, 3:] += moment
+        if law.j >= 0:
+            lever = a.position - motions[1].position
+            W.user[law.j, :3] -= force
+            W.user[law.j, 3:] -= moment + np.cross(lever, force)
+
+
+def _checked(law: Law, t: float, value: Any) -> tuple[Array, Array]:
+    try:
+        force, moment = (np.asarray(x, dtype=float).reshape(3) for x in value)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(
+            f"user force {law.name!r} returned {value!r}; needed are two vectors of three "
+            "numbers: force and moment."
+        ) from error
+    if not (np.isfinite(force).all() and np.isfinite(moment).all()):
+        raise SolverError(
+            f"user force {law.name!r} gives force {force.tolist()} and moment "
+            f"{moment.tolist()} at t = {t:.9g} s.",
+            hint="The motion up to the last good step is kept in error.solution.",
+        )
+    return force, moment

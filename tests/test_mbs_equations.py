@@ -1,0 +1,180 @@
+"""The equations of motion: against direct nodal dynamics and finite differences."""
+
+import numpy as np
+import pytest
+from mbs_cases import (
+    nodal_body,
+    prepared,
+    random_body,
+    random_nodes,
+    random_pose,
+    random_state,
+    residual_at,
+    tangents_at,
+)
+from numpy.testing import assert_allclose
+from scipy.linalg import null_space
+
+from rom import rotation
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.motion import evaluate, linearise, moved, rates
+from rom.mbs.state import initial_state
+
+GRAVITY = np.array([0.3, -9.0, 2.0])
+
+
+def nodal_accelerations(nodes, q_f, qd, p, w):
+    """Accelerations of frame and elastic coordinates from the nodes themselves.
+
+    Nodes at r + A (x + sum q phi), with the full scalar mass matrix; the equations are the normal
+    equations of Gauss's principle, no inertia integral occurs.
+    """
+    x, Ms, phi, K, D = nodes
+    r, n = phi.shape[0], x.shape[0]
+    A = rotation.matrix(p)
+    P = x + np.einsum("k,kia->ia", q_f, phi)
+    Pd = np.einsum("k,kia->ia", qd, phi)
+    J = np.zeros((3 * n, 6 + r))
+    for i in range(n):
+        J[3 * i : 3 * i + 3, :3] = np.eye(3)
+        J[3 * i : 3 * i + 3, 3:6] = -A @ rotation.skew(P[i])
+        J[3 * i : 3 * i + 3, 6:] = A @ phi[:, i].T
+    conv = (np.cross(w, np.cross(w, P)) + 2 * np.cross(w, Pd)) @ A.T
+    M = np.kron(Ms, np.eye(3))
+    force = J.T @ M @ (np.tile(GRAVITY, n) - conv.ravel())
+    force[6:] -= K @ q_f + D @ qd
+    return np.linalg.solve(J.T @ M @ J, force)
+
+
+def test_frame_equations_equal_direct_nodal_dynamics():
+    """C1: a dropped inertia integral, sign or transpose changes the accelerations."""
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        nodes = random_nodes(rng)
+        mech = Mechanism(gravity=GRAVITY)
+        pose = random_pose(rng)
+        q, qd = rng.normal(size=4), rng.normal(size=4)
+        mech.add_flexible("body", nodal_body(*nodes), q=q, qd=qd, **pose)
+        packed, W = prepared(mech)
+        y = np.concatenate([packed.q, packed.v, np.zeros(3)])
+        a = np.zeros(10)
+        assert rates(packed.system, W, y, 0, True, a, np.zeros(0), np.zeros_like(y))
+        exact = nodal_accelerations(nodes, q, qd, pose["orientation"], pose["omega"])
+        assert_allclose(a, exact, rtol=1e-10, atol=1e-10 * np.abs(exact).max())
+
+
+def everything(rng, *, angles=True):
+    """Two flexible bodies and a rigid one with every joint, spring, load and drive."""
+    mech = Mechanism(gravity=GRAVITY)
+    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    box = mech.add_rigid(
+        "box",
+        mass=2.0,
+        inertia=(1.0, 1.5, 2.0),
+        markers={"a": (0.3, 0.2, -0.1)},
+        **random_pose(rng),
+    )
+    m1, m2, m3 = one.marker("a"), two.marker("b"), box.marker("a")
+    x, y = np.array([1.0, 2, 2]) / 3, np.array([2.0, 1, -2]) / 3
+    mech.revolute("revolute", m1, m2, axis=x)
+    mech.cylindrical("cylindrical", m2, m3, axis=y)
+    mech.prismatic("prismatic", m3, one.marker("b"), axis=x)
+    mech.universal("universal", mech.ground.marker((1, 1, 0)), m3, axis1=x, axis2=y)
+    mech.fixed("fixed", two.marker("a"), m1)
+    mech.spherical("spherical", m1, mech.ground.marker((0, 1, 1)))
+    if angles:
+        mech.drive("motor", "revolute", lambda t: 0.1 + t)
+        mech.rotational_spring("coil", "cylindrical", stiffness=5.0, damping=0.4)
+    mech.drive("jack", "prismatic", lambda t: 0.1 + t)
+    mech.spring_damper("spring", m2, m3, stiffness=30.0, damping=2.0, free_length=0.7)
+    mech.force("push", m1, (1.0, 2.0, 3.0), frame="body")
+    mech.torque("twist", m3, (0.3, -2.0, 1.0), frame="body")
+    mech.torque("wind", m2, (0.3, -2.0, 1.0))
+    return mech
+
+
+def difference(f, n, step=1e-6):
+    """Central differences of f by n parameters, as columns."""
+    columns = [(f(step * e) - f(-step * e)) / (2 * step) for e in np.eye(n)]
+    return np.array(columns).T
+
+
+def shifted(packed, q, delta):
+    out = np.empty_like(q)
+    moved(packed.system, q, delta, out)
+    return out
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_constraint_gradient_and_convective_term_are_derivatives_of_the_residual(seed):
+    """All kinds of rows, between flexible, rigid and ground markers."""
+    rng = np.random.default_rng(seed)
+    packed, W = prepared(everything(rng))
+    s, (q, v, _, _) = packed.system, random_state(rng, packed)
+    n = v.size
+
+    def value(delta):
+        evaluate(s, W, shifted(packed, q, delta), v)
+        return W.value.copy()
+
+    def rate(time):
+        linearise(s, W, shifted(packed, q, time * v + 0.0), v)
+        return W.G @ v
+
+    G = difference(value, n)
+    convective = difference(lambda x: rate(x[0]), 1)[:, 0]
+    linearise(s, W, q, v)
+    assert_allclose(W.G, G, atol=2e-8 * np.abs(G).max())
+    assert_allclose(W.gamma, convective, atol=1e-7 * np.abs(convective).max())
+
+
+def check_tangents(packed, W, state, motions, tolerance):
+    """Mass, velocity and position blocks along the columns of ``motions``.
+
+    The change of a damper's velocity with the position is left out of the iteration matrix: the
+    position block is compared without dampers.
+    """
+    s, (q, v, a, lam) = packed.system, state
+    zero = np.zeros(v.size)
+
+    def at(dq, dv, da):
+        residual_at(s, W, shifted(packed, q, dq), v + dv, a + da, lam)
+        return W.residual.copy()
+
+    C = difference(lambda x: at(zero, x, zero), v.size)
+    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
+    s.forces.spring[:, 1] = s.forces.turn[:, 1] = 0.0
+    M = difference(lambda x: at(zero, zero, x), v.size)
+    K = difference(lambda x: at(motions @ x, zero, zero), motions.shape[1])
+    tangents_at(s, W, q, v, a, lam, (1.0, 0.0, 1.0))
+    assert_allclose(W.S, M, atol=1e-7 * np.abs(M).max())
+    assert_allclose(W.Kt @ motions, K, atol=tolerance * np.abs(K).max())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_iteration_matrix_is_the_derivative_of_the_residual(seed):
+    """For small elastic twists of the markers, see `wrench_stiffness`."""
+    rng = np.random.default_rng(seed)
+    packed, W = prepared(everything(rng, angles=False))
+    packed.system.markers.twist[:] *= 1e-3
+    check_tangents(packed, W, random_state(rng, packed), np.eye(packed.v.size), 1e-6)
+
+
+def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
+    rng = np.random.default_rng(4)
+    mech = Mechanism(gravity=GRAVITY)
+    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    mech.revolute("hinge", one.marker("a"), two.marker("b"), axis=(1.0, 2.0, 2.0))
+    mech.drive("motor", "hinge", lambda t: 0.4 + t)
+    mech.rotational_spring("coil", "hinge", stiffness=5.0, damping=0.4)
+    packed, W = prepared(mech)
+    packed.system.markers.twist[:] *= 1e-3
+    start = initial_state(packed)
+    W.signal[:, 0] = 0.4
+    linearise(packed.system, W, start.q, start.v)
+    motions = null_space(W.G[:5])
+    _, v, a, lam = random_state(rng, packed)
+    check_tangents(packed, W, (start.q, v, a, lam), motions, 1e-6)
