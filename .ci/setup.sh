@@ -1,0 +1,55 @@
+#!/bin/sh
+# Sets up a Debian machine: system packages, a virtual environment over them, the package itself,
+# and a second environment without FEniCSx for the tests of the light half.
+# Safe to run again: what is there is left alone, and then no network is needed.
+set -eu
+cd "$(dirname "$0")/.."
+
+packages="python3-dolfinx python3-petsc4py python3-slepc4py python3-gmsh python3-meshio
+  python3-scipy python3-numba python3-h5py python3-venv python3-dev libopenblas0-pthread
+  gcc g++ pkg-config libgl1 libegl1 libxrender1"
+
+fail() {
+  echo "setup: $1" >&2
+  exit 1
+}
+
+installed() {
+  dpkg-query -W -f='${db:Status-Abbrev}' "$1" 2>/dev/null | grep -q '^ii'
+}
+
+command -v dpkg-query >/dev/null || fail "this is no Debian; README.md has lines for conda and Docker"
+missing=""
+for package in $packages; do
+  installed "$package" || missing="$missing $package"
+done
+if [ -n "$missing" ]; then
+  as_root=""
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || fail "no sudo here; as root run: apt-get install$missing"
+    as_root="sudo"
+  fi
+  echo "setup: installing$missing"
+  $as_root apt-get update -qq
+  # shellcheck disable=SC2086
+  $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+    $missing >/dev/null
+fi
+
+# A stamp holds the checksum of everything an environment depends on; where it fits, nothing is done.
+wanted=$({ pwd; /usr/bin/python3 -V; cat Makefile pyproject.toml constraints.txt .ci/setup.sh \
+  .ci/light.txt; } | sha256sum)
+
+environment() { # folder, options of venv, what pip installs
+  [ -x "$1/bin/python" ] && [ "$(cat "$1/.stamp" 2>/dev/null)" = "$wanted" ] && return
+  echo "setup: making $1"
+  # shellcheck disable=SC2086
+  /usr/bin/python3 -m venv $2 "$1"
+  folder="$1"
+  shift 2
+  "$folder/bin/python" -m pip install -q --disable-pip-version-check "$@"
+  echo "$wanted" >"$folder/.stamp"
+}
+
+environment .venv --system-site-packages -c constraints.txt -e '.[view,dev]'
+environment .venv-light "" -r .ci/light.txt

@@ -1,0 +1,25 @@
+# make setup   Debian packages, .venv over them, .venv-light without FEniCSx; seconds when done
+# make demo    the main job: a flexible slider-crank; pictures and a report in out/
+# make test    style, types, all tests, then those of the light half without FEniCSx
+# make clean   remove what the others have left, but not the environments
+PYTHON = .venv/bin/python
+# its own cache: two versions of Numba would compile over each other's code
+LIGHT = NUMBA_CACHE_DIR=$(CURDIR)/.venv-light/numba .venv-light/bin/python
+
+.PHONY: setup demo test clean
+setup:
+	@.ci/setup.sh
+
+demo: setup
+	$(PYTHON) demos/demo_slider_crank.py
+
+test: setup
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
+	$(PYTHON) -m pytest
+	$(LIGHT) -m pytest -m "not fenicsx" -p no:cacheprovider
+
+clean:
+	rm -rf out .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	find rom tests demos meshes -name __pycache__ -prune -exec rm -rf {} +

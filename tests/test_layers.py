@@ -1,0 +1,119 @@
+"""Who may import whom, and what works without FEniCSx."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
+DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
+LIGHT = {"attachment", "body", "eigen", "errors", "io", "mbs", "model", "reduction", "rotation",
+         "scipy_operators", "units"}  # fmt: skip
+ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor"}  # they stand in front
+MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
+    "errors": set(),
+    "model": {"errors"},
+    "units": {"errors"},
+    "rotation": {"errors"},
+    "eigen": {"model", "errors"},
+    "attachment": {"model", "eigen", "errors"},
+    "scipy_operators": {"model", "eigen", "errors"},
+    "reduction": {"model", "eigen", "scipy_operators", "errors"},
+    "body": {"model", "eigen", "rotation", "attachment", "errors"},
+    "mbs": {"model", "rotation", "errors"},
+    "io": {"model", "units", "body", "errors"},
+    "checks": {"model", "eigen", "body", "scipy_operators", "errors"},
+    "certificate": {"model", "eigen", "body", "reduction", "errors"},
+    "workflow": LIGHT | {"certificate"},
+    "fe": {"model", "eigen", "units", "scipy_operators", "errors"},
+    "components": LIGHT,
+    "view": {"model", "mbs", "io", "errors"},
+    "report": {"model", "mbs", "view", "io", "errors"},
+}
+MODULES = sorted((ROOT / "rom").rglob("*.py"))
+
+
+def part_of(path):
+    return path.relative_to(ROOT / "rom").with_suffix("").parts[0]
+
+
+def imports(path):
+    """(line, module) of every import in a file, functions included."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: write absolute imports"
+            if node.module == "rom":
+                yield from ((node.lineno, f"rom.{alias.name}") for alias in node.names)
+            else:
+                yield node.lineno, node.module
+
+
+def wrong(part, name):
+    """What is wrong with an import, or nothing."""
+    package, _, rest = name.partition(".")
+    if package in HEAVY and part != "fe":
+        return f"{name}; only rom.fe may"
+    if package in DRAWING and part not in ("view", "report", "doctor"):
+        return f"{name}; only rom.view may"
+    target = rest.split(".")[0]
+    if package == "rom" and part not in ANYTHING and target != part:
+        if not target:
+            return "the package root"
+        if target not in MAY_IMPORT[part]:
+            return f"rom.{target}"
+    return None
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_follow_the_layers(path):
+    found = [(line, wrong(part_of(path), name)) for line, name in imports(path)]
+    bad = [f"{path.name}:{line} imports {what}" for line, what in found if what]
+    assert not bad, "\n".join(bad)
+
+
+def test_every_part_has_a_place_in_the_layers():
+    assert {part_of(path) for path in MODULES} <= set(MAY_IMPORT) | ANYTHING
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [("io", "rom.fe.mesh"), ("mbs", "rom.body.flexible"), ("model", "rom"), ("fe", "rom.workflow"),
+     ("cli", "dolfinx"), ("io", "meshio"), ("mbs", "matplotlib.pyplot")],
+)  # fmt: skip
+def test_the_rules_forbid_something(part, name):
+    assert wrong(part, name)
+
+
+def run_blocked(code, *, blocked):
+    """Run code in a process where some packages cannot be imported."""
+    block = f"import sys; sys.modules.update(dict.fromkeys({sorted(blocked)!r}))\n"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-c", block + code],
+        env=environment, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+
+
+def test_the_front_door_opens_without_fenicsx_and_pictures():
+    """Every public name resolves where only NumPy, SciPy and Numba are installed."""
+    code = "import rom\nfor name in rom.__all__: getattr(rom, name)"
+    done = run_blocked(code, blocked=HEAVY | DRAWING)
+    assert done.returncode == 0, done.stderr
+
+
+def test_importing_rom_loads_nothing_heavy():
+    """Start-up time: the command line imports rom before it knows what it is asked."""
+    code = f"import rom; print(sorted(({HEAVY | DRAWING!r} | {{'numba'}}) & set(sys.modules)))"
+    done = run_blocked(code, blocked=())
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_the_mesh_checks_run_without_gmsh_and_dolfinx():
+    done = run_blocked("import rom.fe.validate, rom.fe.mesh, rom.fe.summary", blocked=HEAVY)
+    assert done.returncode == 0, done.stderr
