@@ -5,7 +5,7 @@ lives in ``rom.fe`` and is imported when it is first used.
 """
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.flexible import FlexibleBody
@@ -26,7 +26,13 @@ from rom.model import (
 )
 from rom.reduction.fixed_interface import craig_bampton
 from rom.reduction.method import CraigBampton
-from rom.workflow import modes, reduce
+from rom.report import write_report
+from rom.workflow import mass_properties, modes, reduce
+
+if TYPE_CHECKING:
+    from rom.mbs.audit import audit
+    from rom.mbs.integrate import simulate
+    from rom.mbs.mechanism import Mechanism
 
 __version__ = "0.1.0"
 
@@ -38,6 +44,7 @@ __all__ = [
     "FlexibleBody",
     "Interface",
     "Material",
+    "Mechanism",
     "ModalDamping",
     "Modes",
     "Orthotropic",
@@ -45,18 +52,26 @@ __all__ = [
     "Report",
     "RomError",
     "SurfaceMesh",
+    "audit",
     "check",
     "craig_bampton",
     "export",
     "load",
+    "mass_properties",
     "modes",
     "reduce",
     "save",
+    "simulate",
+    "write_report",
 ]
+PACKAGES = ("fe", "mbs", "view")
+LATER = {"Mechanism": "mechanism", "audit": "audit", "simulate": "integrate"}  # they load Numba
 
 
 def __getattr__(name: str) -> Any:
-    """Import ``rom.fe``, ``rom.view`` and ``rom.mbs`` on first use."""
-    if name in ("fe", "view", "mbs"):
+    """Import packages, and names whose modules load slowly, on first use."""
+    if name in PACKAGES:
         return importlib.import_module(f"rom.{name}")
+    if name in LATER:
+        return getattr(importlib.import_module(f"rom.mbs.{LATER[name]}"), name)
     raise AttributeError(f"module 'rom' has no attribute {name!r}")

@@ -1,7 +1,7 @@
 """The short road: from a finite element model to modes and to a certified flexible body."""
 
 import logging
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -14,7 +14,7 @@ from rom.body.projection import elastic_part, flexible_body
 from rom.certificate import certify_body
 from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
-from rom.model import FEModel, Modes
+from rom.model import Array, FEModel, Modes
 from rom.reduction.interface import connect
 from rom.reduction.method import CraigBampton
 from rom.scipy_operators import SciPyOperators
@@ -34,6 +34,38 @@ def operators(model: FEModel) -> Operators:
     ops = mesh_operators(model)
     dM = added_mass(model, ops.first, ops.n_local)
     return ops if dM is None else ops.plus_mass(dM)
+
+
+@dataclass(frozen=True, slots=True)
+class MassProperties:
+    """What a rigid body needs to know of a solid.
+
+    Attributes:
+        mass: mass [kg].
+        centre: (3,) mass centre [m].
+        inertia: (3, 3) about the mass centre, axes of the geometry [kg m^2].
+    """
+
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+def mass_properties(model: FEModel) -> MassProperties:
+    """Mass, mass centre and inertia of a finite element model with all it carries.
+
+    From the rigid part R^T M R of the mass matrix; under mpirun to be called on all ranks.
+
+    Args:
+        model: the body.
+    """
+    ops = operators(model)
+    R = rigid_motions(model.points[ops.first // 3 : (ops.first + ops.n_local) // 3])
+    M = ops.gram(R, ops.apply_M(R))
+    mass, first = float(np.trace(M[:3, :3])) / 3, 0.5 * (M[:3, 3:] - M[:3, 3:].T)
+    centre = np.array([first[1, 2], first[2, 0], first[0, 1]]) / mass
+    steiner = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    return MassProperties(mass, centre, 0.5 * (M[3:, 3:] + M[3:, 3:].T) - steiner)
 
 
 def modes(

@@ -31,7 +31,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "workflow": LIGHT | {"certificate"},
     "fe": {"model", "eigen", "units", "scipy_operators", "errors"},
     "components": LIGHT,
-    "view": {"model", "mbs", "io", "errors"},
+    "view": {"model", "mbs", "rotation", "io", "errors"},
     "report": {"model", "mbs", "view", "io", "errors"},
 }
 MODULES = sorted((ROOT / "rom").rglob("*.py"))

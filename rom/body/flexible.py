@@ -147,6 +147,8 @@ class FlexibleBody:
         fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
         M, K = self.full_matrices()
         N = self._supported(fixed)
+        if not N.size:  # everything is held
+            return np.zeros(0), N
         lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
         omega = np.sqrt(np.maximum(lam, 0.0))
         n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed), tol=1e-9)

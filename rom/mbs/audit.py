@@ -23,6 +23,12 @@ def audit(solution: Solution) -> Report:
     the mechanism, length of the quaternions, Newton corrections per step, and the largest elastic
     displacement relative to the size of its body: beyond a tenth, linear elasticity in a floating
     frame is no longer to be trusted.
+
+    Args:
+        solution: what `rom.simulate` returned.
+
+    Returns:
+        Report with a row per check.
     """
     rows = [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
     return Report(f"audit of {solution.t[-1] - solution.t[0]:g} s of motion", tuple(rows))

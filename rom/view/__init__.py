@@ -1,0 +1,18 @@
+"""Pictures and films, drawn off-screen in a process that never loads dolfinx."""
+
+from rom.view.curves import frequencies, history
+from rom.view.film import animate, instants
+from rom.view.part import mesh
+from rom.view.shapes import mode_shapes
+from rom.view.solids import box, cylinder
+
+__all__ = [
+    "animate",
+    "box",
+    "cylinder",
+    "frequencies",
+    "history",
+    "instants",
+    "mesh",
+    "mode_shapes",
+]

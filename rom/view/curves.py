@@ -1,0 +1,113 @@
+"""Curves over time, and how far reduced frequencies are from full ones."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError
+from rom.view import page
+
+WIDTH, PANEL = 1400, 330  # pixel
+LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
+EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
+
+
+def history(
+    path: str | Path,
+    t: npt.ArrayLike,
+    panels: Sequence[tuple[str, dict[str, npt.ArrayLike]]],
+    *,
+    title: str,
+    caption: str,
+) -> Path:
+    """Draw quantities over time, one panel below the other.
+
+    Args:
+        path: picture to write, .png.
+        t: (n,) time [s].
+        panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    t = np.asarray(t, dtype=float)
+    unit, factor = ("ms", 1e3) if np.ptp(t) < 1.0 else ("s", 1.0)
+    with page.styled():
+        figure, areas = _panels(len(panels), title, caption)
+        for axes, (label, curves) in zip(areas, panels, strict=True):
+            for k, (name, values) in enumerate(curves.items()):
+                y = np.asarray(values, dtype=float)
+                if y.shape != t.shape:
+                    raise ConfigError(f"{name!r} has {y.size} values for {t.size} times.")
+                look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
+                axes.plot(factor * t, y, label=name, **look)
+            axes.set_ylabel(label, size=page.BODY)
+            axes.set_xlim(factor * t[0], factor * t[-1])
+            _finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
+        for axes in areas[:-1]:
+            axes.set_xticklabels([])
+        areas[-1].set_xlabel(f"time [{unit}]", size=page.BODY)
+        return page.save(figure, path)
+
+
+def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> Path:
+    """Draw the relative errors of reduced frequencies in several supports.
+
+    Args:
+        path: picture to write, .png.
+        comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
+        title: heading.
+
+    Raises:
+        ConfigError: without a comparison, or if pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    if not comparison:
+        raise ConfigError("there is no comparison of frequencies to draw.")
+    caption = (
+        "Relative error of the natural frequencies of the reduced body against the full finite "
+        "element model, for each support of its interfaces; the dashed line is 0.1 %. Reduced "
+        "frequencies are never below full ones."
+    )
+    with page.styled():
+        figure, (axes,) = _panels(1, title, caption)
+        longest = 0
+        for k, (support, table) in enumerate(comparison.items()):
+            full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
+            error = np.maximum(np.abs(reduced / full - 1), EXACT)
+            longest = max(longest, full.size)
+            axes.semilogy(
+                np.arange(1, full.size + 1), error, "o-", color=LINES[k % len(LINES)], label=support
+            )
+        axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")
+        axes.set_xticks(range(1, longest + 1))
+        axes.set_xlabel("elastic mode", size=page.BODY)
+        axes.set_ylabel("relative error", size=page.BODY)
+        _finish(axes, legend=True)
+        return page.save(figure, path)
+
+
+def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
+    text, below = page.caption(caption, WIDTH - 60)
+    height = 80 + n * (PANEL + 25) + 60 + below + 25
+    figure = page.sheet(WIDTH, height)
+    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+    areas = [page.area(figure, 150, 85 + k * (PANEL + 25), WIDTH - 190, PANEL) for k in range(n)]
+    page.words(figure, text, 30, height - below - 20, size=page.SMALL)
+    return figure, areas
+
+
+def _finish(axes: Any, *, legend: bool) -> None:
+    axes.tick_params(labelsize=page.SMALL)
+    axes.grid(color="#dfe3e8", lw=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    if legend:
+        axes.legend(fontsize=page.SMALL, frameon=True, framealpha=0.9, edgecolor="none")

@@ -1,0 +1,91 @@
+"""Draws scenes in a child process, because VTK does not live together with dolfinx."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError
+from rom.view.scene import Actor, Camera
+
+Image = npt.NDArray[np.uint8]
+COLOURS = "viridis"
+INSTALL = "pip install 'fenicsx-rom[view]'"
+
+
+def render(
+    actors: Sequence[Actor], camera: Camera, *, limits: tuple[float, float] = (0.0, 1.0)
+) -> Image:
+    """Draw all frames of a scene.
+
+    Args:
+        actors: what is seen; those with one frame stay while the others move.
+        camera: from where.
+        limits: values at the ends of the colour map.
+
+    Returns:
+        (f, height, width, 3) pixels.
+
+    Raises:
+        ConfigError: if pyvista is missing or cannot draw on this machine.
+    """
+    require("pyvista")
+    with tempfile.TemporaryDirectory(prefix="rom-view-") as folder:
+        _write(Path(folder), actors, camera, limits)
+        done = subprocess.run(
+            [sys.executable, "-m", "rom.view.draw", folder],
+            env=_environment(),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+        )
+        pictures = Path(folder, "pictures.npy")
+        if done.returncode or not pictures.exists():
+            raise _failure(done)
+        return np.load(pictures, allow_pickle=False)
+
+
+def require(package: str) -> None:
+    """Make sure that a package for pictures is there.
+
+    Raises:
+        ConfigError: naming it.
+    """
+    if find_spec(package) is None:
+        raise ConfigError(f"pictures need {package}, which is not installed.", hint=f"{INSTALL}.")
+
+
+def _write(
+    folder: Path, actors: Sequence[Actor], camera: Camera, limits: tuple[float, float]
+) -> None:
+    arrays = {"focus": camera.focus, "toward": camera.toward, "up": camera.up}
+    for k, actor in enumerate(actors):
+        arrays |= {f"points {k}": actor.points.astype(np.float32), f"cells {k}": actor.cells}
+        if actor.values is not None:
+            arrays[f"values {k}"] = actor.values.astype(np.float32)
+    np.savez(folder / "arrays.npz", **arrays)
+    style = [{"colour": a.colour, "width": a.width, "opacity": a.opacity} for a in actors]
+    scene = {"height": camera.height, "size": camera.size, "limits": limits, "actors": style}
+    (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOURS}))
+
+
+def _environment() -> dict[str, str]:
+    root = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
+    return os.environ | {"PYTHONPATH": path}
+
+
+def _failure(done: subprocess.CompletedProcess[bytes]) -> ConfigError:
+    said = done.stderr.decode(errors="replace").strip().splitlines()
+    how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
+    return ConfigError(
+        f"the process that draws ended with {how}: {said[-1] if said else 'it said nothing'}.",
+        hint="`rom doctor` tests drawing without a screen and says what to install.",
+    )

@@ -1,0 +1,122 @@
+"""What is drawn and from where: actors, cameras, and the edges that show a shape."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError
+from rom.model import Array, Index
+
+SHARP = np.cos(np.deg2rad(35.0))  # cosine of the angle from which an edge is drawn
+INK, GHOST = "#20242a", "#7c828c"
+MARGIN = 0.03  # of the view, left free on every side
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """One thing in a picture, still or moving.
+
+    Attributes:
+        points: (f, n, 3) positions in f frames [m]; f = 1 for a thing that stays.
+        cells: (m, 3) triangles, (m, 2) lines or (m, 1) dots.
+        values: (f, n) what the colour map shows, or None for a plain colour.
+        colour: plain colour.
+        width: width of lines or size of dots, in pixels of the finished picture.
+        opacity: 0 to 1.
+    """
+
+    points: Array
+    cells: Index
+    values: Array | None = None
+    colour: str = "#9aa5b1"
+    width: float = 1.0
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Parallel projection.
+
+    Attributes:
+        focus: (3,) point in the middle of the picture [m].
+        toward: (3,) unit vector from there to the eye.
+        up: (3,) unit vector that is upright in the picture.
+        height: height of the picture [m].
+        size: width and height [pixel].
+    """
+
+    focus: Array
+    toward: Array
+    up: Array
+    height: float
+    size: tuple[int, int]
+
+
+def aimed(
+    points: Array,
+    width: int,
+    *,
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+    heights: tuple[float, float] = (0.2, 0.75),
+) -> Camera:
+    """A camera that sees all points with little space wasted.
+
+    Args:
+        points: (..., 3) everything to be seen [m].
+        width: of the picture [pixel].
+        view: (3,) direction from the things to the eye; None: mainly along the shortest extent.
+        up: (3,) upright direction; None: across the longest extent.
+        heights: bounds of the height of the picture, as shares of its width.
+
+    Raises:
+        ConfigError: if the directions are parallel or zero.
+    """
+    points = np.asarray(points, dtype=float).reshape(-1, 3)
+    toward, upright = _directions(points, view, up)
+    right = np.cross(upright, toward)
+    seen = points @ np.column_stack([right, upright, toward])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    extent = np.maximum(high - low, 1e-6 * np.ptp(seen) + 1e-12)
+    wide, tall = extent[:2] + 2 * MARGIN * extent[:2].max()
+    pixels = 2 * round(width * float(np.clip(tall / wide, *heights)) / 2)
+    focus = np.column_stack([right, upright, toward]) @ (0.5 * (low + high))
+    return Camera(focus, toward, upright, max(tall, wide * pixels / width), (width, pixels))
+
+
+def _directions(
+    points: Array, view: npt.ArrayLike | None, up: npt.ArrayLike | None
+) -> tuple[Array, Array]:
+    axes = np.eye(3)[np.argsort(np.ptp(points, axis=0), kind="stable")]
+    short, middle, long = axes
+    toward = short + 0.5 * middle - 0.35 * long if view is None else np.asarray(view, dtype=float)
+    upright = middle if up is None else np.asarray(up, dtype=float)
+    if up is None and np.linalg.norm(np.cross(toward, upright)) < 1e-3 * np.linalg.norm(toward):
+        upright = long
+    across = upright - toward * (upright @ toward) / max(toward @ toward, 1e-300)
+    if not np.linalg.norm(across) > 1e-6 * np.linalg.norm(upright) > 0:
+        raise ConfigError(f"view = {view!r} and up = {up!r} are no two directions.")
+    return toward / np.linalg.norm(toward), across / np.linalg.norm(across)
+
+
+def sharp_edges(points: Array, triangles: Index) -> Index:
+    """(m, 2) edges where a surface bends by more than 35 degrees, or ends."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    pairs, owner = directed_edges(triangles)
+    edges, place, count = np.unique(
+        np.sort(pairs, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    total = np.zeros((len(edges), 3))
+    np.add.at(total, place.ravel(), normals[owner])
+    # two unit normals under the angle theta add up to the length 2 cos(theta / 2)
+    flat = (count == 2) & (np.linalg.norm(total, axis=1) > np.sqrt(2 + 2 * SHARP))
+    return edges[~flat]
+
+
+def directed_edges(triangles: Index) -> tuple[Index, Index]:
+    """(3 t, 2) edges of all triangles and (3 t,) the triangle of each."""
+    pairs = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    return pairs, np.repeat(np.arange(len(triangles)), 3)

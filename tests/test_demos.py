@@ -1,0 +1,46 @@
+"""Every demo runs and ends in numbers that agree with what is known."""
+
+import os
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("dolfinx", reason="demos start from finite elements")
+pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
+DEMOS = sorted((Path(__file__).parents[1] / "demos").glob("demo_*.py"))
+LEFT_BEHIND = {
+    "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
+    "demo_slider_crank": {
+        "crank_mesh.png", "instants.png", "motion.png", "report.html", "rod.rom.npz", "rod.vtu",
+        "rod_frequencies.png", "rod_mesh.png", "rod_modes.png", "slider_crank.gif",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
+def test_demo_ends_in_the_numbers_expected(demo, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", [str(demo), "--quiet", "--out", str(tmp_path)])
+    results = runpy.run_path(str(demo), run_name="__main__")["results"]
+    assert len(results) >= 4
+    for name, (value, expected, tolerance) in results.items():
+        assert value == pytest.approx(expected, rel=tolerance, abs=0), name
+    assert {path.name for path in tmp_path.iterdir()} == LEFT_BEHIND[demo.stem]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
+def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
+    allow = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    done = subprocess.run(
+        ["mpirun", "-n", "2", "--oversubscribe", sys.executable, str(demo), "-q", "--out",
+         str(tmp_path)],
+        env=os.environ | allow | {"OMP_NUM_THREADS": "1"},
+        capture_output=True, text=True, timeout=280, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("mass [kg]: ") == 1
+    assert {path.name for path in tmp_path.iterdir()} == LEFT_BEHIND[demo.stem]

@@ -1,0 +1,71 @@
+"""The report is one file that any browser opens."""
+
+import base64
+from html.parser import HTMLParser
+
+import pytest
+
+from rom import report
+from rom.errors import ConfigError
+from rom.model import Report, Row
+
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+M8AAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
+)
+
+
+class Reader(HTMLParser):
+    """Collects tags that do not close, attributes, and text."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.links, self.text = [], [], ""
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+        self.links += [value for key, value in attrs if key in ("src", "href")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def read(path):
+    reader = Reader()
+    reader.feed(path.read_text(encoding="utf-8"))
+    assert not reader.open
+    return reader
+
+
+def test_the_report_needs_no_other_file(tmp_path):
+    (tmp_path / "a.png").write_bytes(PNG)
+    checks = Report("x", (Row("mass", 1.25, "<= 2", True), Row("gap & co", 3.0, "<= 2", False)))
+    path = report.write_report(
+        tmp_path / "r.html",
+        "Beam <1 m>",
+        {
+            "One": [report.paragraph("a < b"), report.picture(tmp_path / "a.png", "It's small")],
+            "Two": [
+                report.table(("f [Hz]", "n"), [(123.456789, 3), ("x<y", 4)], "Numbers"),
+                report.checks(checks, "Checks"),
+            ],
+        },
+    )
+    reader = read(path)
+    assert [base64.b64decode(link.split(",")[1]) for link in reader.links] == [PNG]
+    for words in ("Beam <1 m>", "a < b", "It's small", "123.46", "x<y", "gap & co", "failed"):
+        assert words in reader.text
+
+
+def test_a_report_that_cannot_be_written_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"\.html"):
+        report.write_report(tmp_path / "r.txt", "", {})
+    with pytest.raises(ConfigError, match="does not exist"):
+        report.write_report(tmp_path / "no" / "r.html", "", {})
+    with pytest.raises(ConfigError, match="no picture"):
+        report.picture(tmp_path / "missing.png", "")
+    with pytest.raises(ConfigError, match="a row of 1 cells under a header of 2"):
+        report.table(("a", "b"), [(1,)], "")

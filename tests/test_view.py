@@ -1,0 +1,199 @@
+"""Pictures show what they should: read back pixel by pixel."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pyvista = pytest.importorskip("pyvista", reason="pictures need pyvista")
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+from dataclasses import replace  # noqa: E402
+
+from mbs_cases import lattice, lattice_body  # noqa: E402
+from PIL import Image  # noqa: E402
+
+from rom import view  # noqa: E402
+from rom.body.flexible import Surface  # noqa: E402
+from rom.errors import ConfigError, InterfaceError  # noqa: E402
+from rom.mbs.integrate import simulate  # noqa: E402
+from rom.mbs.mechanism import Mechanism  # noqa: E402
+from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
+from rom.view.offscreen import render  # noqa: E402
+from rom.view.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
+
+
+def pixels(path, frame=0):
+    picture = Image.open(path)
+    picture.seek(frame)
+    return np.asarray(picture.convert("RGB")).astype(int)
+
+
+def colourful(image):
+    """Pixels of the colour map: neither grey nor ink."""
+    return np.ptp(image, axis=2) > 60
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """A lattice bar along x with a surface of its nodes, free, five sections."""
+    data = lattice(stiffness=4e5)
+    body = lattice_body(data)
+    x = data[0]
+    triangles = [
+        (3 * s + a, 3 * s + (a + 1) % 3, 3 * s + 3 + a) for s in range(4) for a in range(3)
+    ] + [(3 * s + 3 + a, 3 * s + (a + 1) % 3, 3 * s + 3 + (a + 1) % 3)
+         for s in range(4) for a in range(3)]  # fmt: skip
+    shape = np.vstack([body.markers[f"n{i}"].translation for i in range(len(x))])
+    return replace(body, surface=Surface(x, np.array(triangles), shape))
+
+
+def swinging(bar):
+    mech = Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("bar", bar, omega=(0, 0, 30.0))
+    mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0.6, 0))
+    mech.spherical("tie", mech.ground.marker((0, 0, 0.15)), part.marker("n7"))
+    return mech, simulate(mech, t_end=0.1, dt=1e-3)
+
+
+def test_a_scene_is_drawn_to_scale_and_the_right_way_up():
+    """A unit square at the upper right of a 4 by 2 window, seen along z."""
+    square = np.array([[1.0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0]])
+    actor = Actor(square[None], np.array([[0, 1, 2], [0, 2, 3]]), colour="#ff0000")
+    camera = Camera(np.zeros(3), np.array([0, 0, 1.0]), np.array([0, 1.0, 0]), 2.0, (400, 200))
+    image = render([actor], camera)[0].astype(int)
+    rows, columns = np.nonzero(image[..., 0] - image[..., 1] > 80)
+    assert image.shape == (200, 400, 3)
+    np.testing.assert_allclose([rows.min(), rows.max() + 1], [0, 100], atol=2)
+    np.testing.assert_allclose([columns.min(), columns.max() + 1], [300, 400], atol=2)
+
+
+def test_the_camera_sees_everything():
+    rng = np.random.default_rng(5)
+    points = rng.normal(size=(50, 3)) * (3.0, 1.0, 0.2)
+    camera = aimed(points, 600, heights=(0.1, 2.0))
+    right = np.cross(camera.up, camera.toward)
+    seen = (points - camera.focus) @ np.column_stack([right, camera.up])
+    half = 0.5 * camera.height * np.array([camera.size[0] / camera.size[1], 1.0])
+    assert (np.abs(seen) < half).all()
+    assert (np.abs(seen).max(axis=0) > 0.8 * half).any()
+
+
+def test_edges_of_a_box_are_its_twelve():
+    points, triangles = view.box((1, 2, 3))
+    edges = sharp_edges(points, triangles)
+    lengths = np.sort(np.linalg.norm(np.diff(points[edges], axis=1)[:, 0], axis=1))
+    np.testing.assert_allclose(lengths, [1] * 4 + [2] * 4 + [3] * 4)
+
+
+@pytest.mark.parametrize(
+    ("solid", "volume"),
+    [
+        (view.box((1, 2, 3), (5, 5, 5)), 6.0),
+        (view.cylinder((0, 1, 0), (0, 3, 0), 2.0, sides=2000), 2 * np.pi),
+    ],
+)
+def test_solids_are_closed_and_face_outwards(solid, volume):
+    points, triangles = solid
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    assert np.einsum("ti,ti->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=1e-5)
+
+
+def test_mode_shapes_fill_one_panel_each(bar, tmp_path):
+    view.mode_shapes(bar, tmp_path / "modes.png", n=4)
+    image = pixels(tmp_path / "modes.png")
+    h, w = image.shape[:2]
+    for half in (image[: h // 2, : w // 2], image[: h // 2, w // 2 :]):
+        assert colourful(half).mean() > 0.01
+
+
+def test_the_colours_of_a_mesh_are_those_of_its_interfaces(tmp_path):
+    points, triangles = view.box((2, 1, 1))
+    right = np.flatnonzero(points[:, 0] > 0)
+    face = Interface("tip", right, points[right], None, points[right].mean(axis=0))
+    model = FEModel(None, None, points, {"tip": face}, surface=SurfaceMesh(np.arange(8), triangles))
+    view.mesh(model, tmp_path / "box.png", view=(1, 0.2, 0.3), up=(0, 0, 1))
+    red = pixels(tmp_path / "box.png")
+    assert ((red[..., 0] - red[..., 1]) > 80).mean() > 0.1
+    view.mesh(model, tmp_path / "box.png", view=(-1, 0.2, 0.3), up=(0, 0, 1))
+    red = pixels(tmp_path / "box.png")
+    assert ((red[..., 0] - red[..., 1]) > 80).mean() < 0.01
+
+
+def test_a_film_moves_and_loops(bar, tmp_path):
+    mech, sol = swinging(bar)
+    view.animate(mech, sol, tmp_path / "film.gif", frames=5, seconds=1.0, magnify=10.0)
+    film = Image.open(tmp_path / "film.gif")
+    assert film.n_frames == 5
+    assert film.info["duration"] == 200
+    assert film.info["loop"] == 0
+    masks = [colourful(pixels(tmp_path / "film.gif", k)) for k in range(5)]
+    assert masks[4].mean() > 0.01
+    assert (masks[0] != masks[2]).mean() > 0.01
+
+
+def test_instants_are_drawn_side_by_side(bar, tmp_path):
+    mech, sol = swinging(bar)
+    shapes = {"ball": view.box((0.1, 0.1, 0.1))}
+    view.instants(mech, sol, tmp_path / "two.png", times=[0.05, 0.1], shapes=shapes)
+    image = colourful(pixels(tmp_path / "two.png"))
+    assert image[:, : image.shape[1] // 2].any()
+    assert image[:, image.shape[1] // 2 :].any()
+
+
+def test_histories_show_every_curve(tmp_path):
+    t = np.linspace(0, 2, 50)
+    panels = [("angle [rad]", {"one": np.sin(t), "two": np.cos(t)}), ("force [N]", {"": t})]
+    view.history(tmp_path / "h.png", t, panels, title="Title", caption="Words.")
+    image = pixels(tmp_path / "h.png")
+    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):
+        assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
+
+
+def test_errors_of_frequencies_are_drawn_per_support(tmp_path):
+    table = {"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}
+    view.frequencies(tmp_path / "f.png", table, title="Title")
+    assert (np.abs(pixels(tmp_path / "f.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12).sum() > 100
+
+
+def test_wrong_requests_are_refused(bar, tmp_path):
+    mech, sol = swinging(bar)
+    with pytest.raises(ConfigError, match=r"ending '.jpg'"):
+        view.mode_shapes(bar, tmp_path / "modes.jpg")
+    with pytest.raises(ConfigError, match="does not exist"):
+        view.animate(mech, sol, tmp_path / "nowhere" / "film.gif")
+    with pytest.raises(ConfigError, match="no body 'boll'"):
+        view.animate(mech, sol, tmp_path / "film.gif", shapes={"boll": view.box((1, 1, 1))})
+    with pytest.raises(ConfigError, match="no surface"):
+        view.mode_shapes(replace(bar, surface=None), tmp_path / "modes.png")
+    with pytest.raises(InterfaceError, match="no interface 'tip'"):
+        view.mode_shapes(bar, tmp_path / "modes.png", fixed=("tip",))
+    with pytest.raises(ConfigError, match="no two directions"):
+        view.mode_shapes(bar, tmp_path / "modes.png", view=(0, 0, 1), up=(0, 0, 2))
+    with pytest.raises(ConfigError, match="'one' has 3 values for 2 times"):
+        view.history(tmp_path / "h.png", [0, 1], [("x", {"one": [1, 2, 3]})], title="", caption="")
+    assert not list(tmp_path.iterdir())
+
+
+def test_vtk_stays_in_the_process_that_draws():
+    """VTK and dolfinx in one process may abort."""
+    script = (
+        "import sys, numpy as np; from rom.view.offscreen import render; "
+        "from rom.view.scene import Actor, Camera; "
+        "camera = Camera(np.zeros(3), np.eye(3)[2], np.eye(3)[1], 2.0, (40, 20)); "
+        "actor = Actor(np.eye(3)[None], np.array([[0, 1, 2]])); "
+        "assert render([actor], camera).shape == (1, 20, 40, 3); "
+        "assert not {'vtkmodules', 'pyvista', 'dolfinx'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    script = "import sys, rom.view.draw, pyvista; assert 'dolfinx' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
+    monkeypatch.setattr("rom.view.offscreen._environment", lambda: {"PYTHONPATH": ""})
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(ConfigError, match="ended with code 1"):
+        view.mode_shapes(bar, tmp_path / "modes.png", n=1)
