@@ -14,6 +14,9 @@ from rom.reduction.interface import Connection
 
 N_COMPARED = 6  # elastic modes compared in each support
 FREQUENCY_ERROR = 1e-3  # relative; what a structural dynamicist accepts without asking
+# Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
+# rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
+ASYMMETRY = 1e-6
 CLUSTER = 1e-3  # modes closer than this (relative) are compared as one subspace
 
 
@@ -164,7 +167,7 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
     off = K[: connection.boundary.size, connection.boundary.size :]
     unit = np.sqrt(np.outer(np.diag(K)[: off.shape[0]], np.diag(K)[off.shape[0] :]))
     return [
-        row("asymmetry of projected K and M", max(_asymmetry(K), _asymmetry(M)), 1e-10),
+        row("asymmetry of projected K and M", max(_asymmetry(K), _asymmetry(M)), ASYMMETRY),
         row("constraint against normal modes in K", np.abs(off / unit).max(initial=0.0), 1e-8),
         row("smallest eigenvalue of the scaled mass", lam[0], 1e-13, above=True),
         row("condition of the scaled mass", lam[-1] / max(lam[0], 1e-300), 1e13),
