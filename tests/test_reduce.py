@@ -1,9 +1,12 @@
 """From a model to a certified body: interfaces, reference conditions, integrals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh, null_space
+from scipy.sparse import diags
 from solid import block
 
 import rom
@@ -311,3 +314,52 @@ def test_two_bodies_that_are_not_connected_are_refused(model):
 def test_rigid_mass_is_that_of_the_full_model(model, body):
     R = rigid_motions(model.points)
     assert_allclose(rigid_mass(body), R.T @ (model.M @ R), atol=1e-9)
+
+
+def test_mass_properties_are_those_of_the_block_and_what_it_carries(model):
+    p = rom.mass_properties(model)
+    m, (a, b, c) = 7850.0 * 1.0 * 0.1 * 0.08, (1.0, 0.1, 0.08)
+    central = np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * m / 12
+    assert_allclose([p.mass, *p.centre], [m, 0.8, -0.15, 0.14], rtol=1e-11)
+    assert_allclose(p.inertia, central, rtol=1e-9, atol=1e-9 * central.max())
+    carried = rom.Attachment("tip", mass=m, at=(1.8, -0.15, 0.14))
+    loaded = rom.mass_properties(replace(model, attachments=(carried,)))
+    assert_allclose([loaded.mass, *loaded.centre], [2 * m, 1.3, -0.15, 0.14], rtol=1e-11)
+    assert_allclose(loaded.inertia[1, 1], central[1, 1] + 2 * m * 0.5**2, rtol=1e-9)
+
+
+def test_a_body_held_everywhere_has_no_frequency(model):
+    guyan = rom.reduce(model, method=rom.CraigBampton(0), interfaces=KINDS, certify=False)
+    assert guyan.frequencies(4, fixed=("root", "tip")).size == 0
+    assert guyan.frequencies(fixed=("root",)).size == 6
+
+
+@pytest.mark.parametrize("change", ["mirror", "renumber"])
+def test_frequencies_survive_a_mirror_and_another_numbering(model, body, change):
+    """Metamorphic: the same solid seen in a mirror, or with its nodes shuffled."""
+    n = model.points.shape[0]
+    nodes, flip = np.arange(n), np.ones(3)
+    if change == "mirror":
+        flip[1] = -1.0
+    else:
+        nodes = np.random.default_rng(3).permutation(n)
+    rows = (3 * nodes[:, None] + np.arange(3)).ravel()
+    signs = diags(np.tile(flip, n))
+    place = np.argsort(nodes)
+    interfaces = {
+        name: replace(i, nodes=place[i.nodes], points=i.points * flip, origin=i.origin * flip)
+        for name, i in model.interfaces.items()
+    }
+    other = rom.FEModel(
+        (signs @ model.K @ signs).tocsr()[rows][:, rows],
+        (signs @ model.M @ signs).tocsr()[rows][:, rows],
+        (model.points * flip)[nodes],
+        interfaces,
+    )
+    seen = rom.reduce(
+        other, method=rom.CraigBampton(30), interfaces=KINDS, reference="root", certify=False
+    )
+    for fixed in SUPPORTS:
+        n_rigid = 0 if fixed else 6
+        expected = body.frequencies(fixed=fixed)[n_rigid:]
+        assert_allclose(seen.frequencies(fixed=fixed)[n_rigid:], expected, rtol=1e-8)
