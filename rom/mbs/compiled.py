@@ -7,6 +7,7 @@ any kernel source differs from the one it was made from.
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 from numba import njit
 
@@ -29,6 +30,12 @@ def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:
     except OSError:  # read-only installation: Numba keeps its cache in the user's folder
         return False
     return True
+
+
+def compiled_before(function: Any) -> bool:
+    """Whether an earlier process left the compiled form of a kernel in the cache."""
+    name = f"*.{function.py_func.__name__}-*.nbi"
+    return any(Path(function.stats.cache_path).glob(name))
 
 
 drop_stale_cache()

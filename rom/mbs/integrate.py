@@ -1,12 +1,15 @@
 """Simulate a mechanism in time."""
 
+import sys
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rom.errors import ConfigError, InterruptedRun, RomError
+from rom.mbs.alpha import advance
 from rom.mbs.arrays import workspace
+from rom.mbs.compiled import compiled_before
 from rom.mbs.explicit import run_explicit
 from rom.mbs.implicit import run_implicit
 from rom.mbs.mechanism import Mechanism
@@ -68,6 +71,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         t_start = 0.0 if state is None else state.t
     settings = Settings(t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol, progress)
     packed = pack(mechanism)
+    if progress and not compiled_before(advance):
+        sys.stderr.write("compile the integrator, once on this machine: about a minute\n")
     if state is None:
         state = initial_state(packed, t_start, settings.spacing)
     _check_fit(state, packed.q.size, packed.v.size)

@@ -65,6 +65,12 @@ class Settings:
         return self.t_start + self.h * step
 
 
+def line(text: str) -> None:
+    """Write text over the line of progress on stderr; an empty one clears it."""
+    sys.stderr.write(f"\r{text:<60}" if text else f"\r{'':<60}\r")
+    sys.stderr.flush()
+
+
 @dataclass
 class Record:
     """What a run has produced so far.
@@ -106,15 +112,12 @@ class Record:
             self.shown = now
             span = self.settings.t_end - self.settings.t_start
             share = (self.t - self.settings.t_start) / span
-            sys.stderr.write(
-                f"\rt = {self.t:.6g} s  {100 * share:3.0f} %  {now - self.clock:.0f} s "
-            )
-            sys.stderr.flush()
+            line(f"t = {self.t:.6g} s  {100 * share:3.0f} %  {now - self.clock:.0f} s")
 
     def solution(self, status: str) -> Solution:
         """The motion so far."""
-        if self.settings.progress and self.shown:
-            sys.stderr.write("\r" + " " * 40 + "\r")
+        if self.settings.progress:
+            line("")
         t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
         span, start = self.settings.spacing, self.settings.t_start
         signals = sample_all(self.packed.signals, t, start, span)
