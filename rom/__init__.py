@@ -26,6 +26,7 @@ from rom.model import (
 )
 from rom.reduction.fixed_interface import craig_bampton
 from rom.reduction.method import CraigBampton
+from rom.reduction.polynomial import FourierLegendre, Polynomial
 from rom.report import write_report
 from rom.workflow import mass_properties, modes, reduce
 
@@ -42,12 +43,14 @@ __all__ = [
     "CraigBampton",
     "FEModel",
     "FlexibleBody",
+    "FourierLegendre",
     "Interface",
     "Material",
     "Mechanism",
     "ModalDamping",
     "Modes",
     "Orthotropic",
+    "Polynomial",
     "Rayleigh",
     "Report",
     "RomError",

@@ -127,7 +127,8 @@ def reduce(
     Args:
         model: the full model, free-free.
         method: how to reduce, for example ``CraigBampton(n_modes=20)``.
-        interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3".
+        interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial` or
+            `FourierLegendre`.
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
         damping: structural damping; none if not given.
         name: name of the body.
@@ -153,7 +154,7 @@ def reduce(
         bare,
         Psi,
         elastic,
-        kinds=connection.kinds,
+        ties=connection.ties,
         name=name,
         provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
     ).with_reference(reference)

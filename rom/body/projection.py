@@ -69,7 +69,7 @@ def flexible_body(
     Psi: Array,
     elastic: Elastic,
     *,
-    kinds: dict[str, str],
+    ties: dict[str, Any],
     name: str,
     provenance: dict[str, Any],
 ) -> FlexibleBody:
@@ -80,13 +80,14 @@ def flexible_body(
         ops: operators with the mass of the mesh alone, in nodal dofs.
         Psi: (n_local, r + 6) basis in nodal dofs.
         elastic: what `elastic_part` found in it.
-        kinds: {interface: kind} of the interfaces that become markers.
+        ties: {interface: tie} of the interfaces that become markers; each has a ``label`` and the
+            map ``coordinates`` (n_c, 3k) from the dofs of the surface to what is zero when held.
         name: name of the body.
         provenance: how it was made.
     """
     E = canonical_columns(ops, Psi @ elastic.V, model)
     integrals = _integrals(model, ops, E)
-    markers = {n: _marker(ops, model.interfaces[n], kind, E) for n, kind in kinds.items()}
+    markers = {n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()}
     r = elastic.omega.size
     return FlexibleBody(
         name=name,
@@ -125,15 +126,11 @@ def _integrals(model: FEModel, ops: Operators, E: Array) -> InertiaIntegrals:
     return total
 
 
-def _marker(ops: Operators, interface: Interface, kind: str, E: Array) -> Marker:
+def _marker(ops: Operators, interface: Interface, tie: Any, E: Array) -> Marker:
     U = ops.rows(E, interface.dofs)
     motion = mean_motion(interface) @ U
-    if kind == "full":
-        hold = np.hstack([rigid_motions(interface.points), U])
-    else:
-        rigid = np.vstack([rigid_motions(interface.origin[None]), np.eye(6)[3:]])
-        hold = np.hstack([rigid, motion])
-    return Marker(interface.name, interface.origin, motion[:3], motion[3:], kind, hold)
+    hold = np.hstack([tie.coordinates @ rigid_motions(interface.points), tie.coordinates @ U])
+    return Marker(interface.name, interface.origin, motion[:3], motion[3:], tie.label, hold)
 
 
 def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:

@@ -1,0 +1,128 @@
+"""Kinds of interfaces: how a few coordinates c = L u govern the dofs u of a surface."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.sparse import identity
+
+from rom.eigen import mean_motion, rigid_motions
+from rom.errors import ConfigError, ResourceError
+from rom.model import Array, Index, Interface
+from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions
+
+RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
+KNOWN = (
+    '"full", "rbe2", "rbe3", rom.Polynomial(order) or "polynomial:3", '
+    'rom.FourierLegendre(harmonics, order) or "fourier:3,2"'
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """One interface: dofs that leave, and how they follow from masters and dofs that stay.
+
+    Attributes:
+        label: name of the kind.
+        names: (m,) what each coordinate is.
+        coordinates: (m, 3k) map L from the dofs of the surface to its coordinates.
+        removed: (d,) dofs replaced; none when the coordinates are the dofs themselves.
+        by_masters: (d, m) how they follow from the coordinates.
+        kept: (s,) dofs that stay and take part.
+        by_kept: (d, s) how the removed ones follow from them.
+    """
+
+    label: str
+    names: tuple[str, ...]
+    coordinates: Any
+    removed: Index
+    by_masters: Array
+    kept: Index
+    by_kept: Array
+
+    @property
+    def n_masters(self) -> int:
+        """Number of new dofs."""
+        return self.by_masters.shape[1] if self.removed.size else 0
+
+
+def tie(interface: Interface, kind: Any) -> Tie:
+    """The tie of an interface of that kind.
+
+    Raises:
+        ConfigError: if the kind is unknown.
+        InterfaceError: if the surface cannot carry it.
+        ResourceError: if an averaging interface has too many dofs.
+    """
+    kind = _parsed(interface.name, kind)
+    if kind == "full":
+        return _full(interface)
+    if kind == "rbe2":
+        R = rigid_motions(interface.points - interface.origin)
+        return _stiff(interface, "rbe2", SIX, mean_motion(interface), R)
+    if kind == "rbe3":
+        return _averaged(interface)
+    Q = interface_functions(kind, interface)
+    names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
+    L = np.kron((interface.surface_mass @ Q).T, np.eye(3))
+    return _stiff(interface, _label(kind), tuple(names), L, np.kron(Q, np.eye(3)))
+
+
+SIX = ("ux", "uy", "uz", "rx", "ry", "rz")
+NO_DOFS = np.zeros(0, dtype=np.int64)
+
+
+def _full(interface: Interface) -> Tie:
+    n = interface.dofs.size
+    names = tuple(f"node {k // 3} u{'xyz'[k % 3]}" for k in range(n))
+    nothing = np.zeros((0, 0))
+    return Tie("full", names, identity(n, format="csr"), NO_DOFS, nothing, NO_DOFS, nothing)
+
+
+def _stiff(
+    interface: Interface, label: str, names: tuple[str, ...], coordinates: Array, shapes: Array
+) -> Tie:
+    """All dofs of the surface follow from its coordinates."""
+    none = np.zeros((shapes.shape[0], 0))
+    return Tie(label, names, coordinates, interface.dofs, shapes, NO_DOFS, none)
+
+
+def _averaged(interface: Interface) -> Tie:
+    """Six well-chosen dofs of the surface follow from the mean motion and the other dofs.
+
+    C_d u_d + C_r u_r = c gives u_d = C_d^-1 c - C_d^-1 C_r u_r; pivoted QR chooses d so that C_d
+    is well conditioned.
+    """
+    if interface.dofs.size > RBE3_DOFS:
+        raise ResourceError(
+            f"interface {interface.name!r} has {interface.dofs.size} dofs; averaging couples all "
+            f"of them, which is refused above {RBE3_DOFS}.",
+            hint='Use "rbe2", or a coarser mesh on this surface.',
+        )
+    C = mean_motion(interface)
+    size = np.ptp(interface.points, axis=0).max()
+    scaled = C * np.r_[np.ones(3), np.full(3, size)][:, None]
+    _, _, pivots = qr(scaled, mode="economic", pivoting=True)
+    d, r = np.sort(pivots[:6]), np.sort(pivots[6:])
+    inverse = np.linalg.inv(C[:, d])
+    dofs = interface.dofs
+    return Tie("rbe3", SIX, C, dofs[d], inverse, dofs[r], -inverse @ C[:, r])
+
+
+def _label(kind: Polynomial | FourierLegendre) -> str:
+    if isinstance(kind, Polynomial):
+        return f"polynomial:{kind.order}"
+    return f"fourier:{kind.harmonics},{kind.order}"
+
+
+def _parsed(name: str, kind: Any) -> Any:
+    if isinstance(kind, Polynomial | FourierLegendre) or kind in ("full", "rbe2", "rbe3"):
+        return kind
+    if isinstance(kind, str):
+        word, _, numbers = kind.partition(":")
+        family = {"polynomial": (Polynomial, 1), "fourier": (FourierLegendre, 2)}.get(word)
+        values = numbers.split(",")
+        if family and len(values) == family[1] and all(v.strip().isdecimal() for v in values):
+            return family[0](*map(int, values))
+    raise ConfigError(f"interface {name!r} has the kind {kind!r}; known kinds: {KNOWN}.")

@@ -1,0 +1,170 @@
+"""A-priori interface functions: the shapes a surface may take are chosen before anything is solved.
+
+A surface of k nodes follows m orthogonal functions per direction, u_b = (Q (x) I_3) a. The
+constraint modes are then 3 m solutions instead of 3 k, and nothing of the full size is formed.
+
+Source:
+    Carassale and Maurici, Interface reduction in Craig-Bampton component mode synthesis by
+    orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); in our own reconstruction:
+    polynomials in the three ambient coordinates, orthonormal on the actual nodes with the surface
+    mass, dependent ones dropped. That needs no parametrisation of a curved surface.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, Interface
+
+DEPENDENT = 1e-9  # share of a function that is new, below which it is dropped
+THIN = 1e-9  # extent of a surface, of its largest one, that counts as none
+
+
+@dataclass(frozen=True, slots=True)
+class Polynomial:
+    """All polynomials up to a total degree.
+
+    On a plane that makes (p+1)(p+2)/2 functions, on cylinders, spheres and other quadrics (p+1)^2,
+    on any other surface (p+1)(p+2)(p+3)/6, per direction.
+
+    Attributes:
+        order: total degree p >= 1; with p = 1 the surface moves rigidly or strains uniformly.
+    """
+
+    order: int
+
+    def __post_init__(self) -> None:
+        _check_whole("order", self.order, 1, "a constant alone is a ball joint, not a surface")
+
+    def functions(self, interface: Interface) -> Array:
+        """(k, n) functions at the nodes, from low to high degree; some may depend on others."""
+        x = _local(interface)
+        values = [legvander(column, self.order) for column in x.T]
+        degrees = sorted(
+            ((i, j, k) for i in range(self.order + 1) for j in range(self.order + 1 - i)
+             for k in range(self.order + 1 - i - j)),
+            key=sum,
+        )  # fmt: skip
+        return np.column_stack(
+            [values[0][:, i] * values[1][:, j] * values[2][:, k] for i, j, k in degrees]
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FourierLegendre:
+    """Harmonics around an axis times Legendre polynomials along it, for cylindrical seats.
+
+    Attributes:
+        harmonics: highest harmonic n >= 1 in cos(n theta) and sin(n theta).
+        order: highest degree along the axis, >= 0.
+    """
+
+    harmonics: int
+    order: int
+
+    def __post_init__(self) -> None:
+        _check_whole("harmonics", self.harmonics, 1, "a tilted seat needs the first one")
+        _check_whole("order", self.order, 0, "a degree is not negative")
+
+    def functions(self, interface: Interface) -> Array:
+        """(k, n) functions at the nodes; the linear ones first, so that rigid motions are exact."""
+        theta, zeta = cylinder_coordinates(interface)
+        around = [np.ones_like(theta)]
+        for n in range(1, self.harmonics + 1):
+            around += [np.cos(n * theta), np.sin(n * theta)]
+        along = legvander(zeta, self.order).T
+        products = [ring * line for line in along for ring in around]
+        return np.column_stack([np.ones_like(theta), _local(interface), *products])
+
+
+def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface) -> Array:
+    """(k, m) functions with Q^T S Q = I, S the surface mass; dependent ones are left out.
+
+    Raises:
+        InterfaceError: if the functions cannot move the surface as a rigid body: nodes on a line.
+    """
+    Q = orthonormal_in(interface.surface_mass, kind.functions(interface))
+    linear = np.linalg.matrix_rank(_local(interface), tol=1e-6)
+    if linear < 2 or Q.shape[1] < 3:
+        raise InterfaceError(
+            f"the {interface.nodes.size} nodes of interface {interface.name!r} lie on a line: "
+            "its rotation about that line is undetermined.",
+            hint="Choose a surface with an area, or hold another interface.",
+        )
+    return Q
+
+
+def orthonormal_in(S: object, V: Array) -> Array:
+    """Gram-Schmidt, twice, in the order given; columns that add nothing new are dropped.
+
+    The order makes the bases of growing degree nested, so that frequencies fall with it.
+    """
+    Q, SQ = np.zeros((V.shape[0], 0)), np.zeros((V.shape[0], 0))
+    for v in V.T:
+        before = _norm(S, v)
+        for _ in range(2):
+            v = v - Q @ (SQ.T @ v)
+        after = _norm(S, v)
+        if before == 0.0 or after < DEPENDENT * before or Q.shape[1] == V.shape[0]:
+            continue
+        v = v / after
+        v = v - Q @ (SQ.T @ v)  # after strong cancellation the second pass is not enough
+        v = (v / _norm(S, v))[:, None]
+        Q, SQ = np.hstack([Q, v]), np.hstack([SQ, S @ v])  # type: ignore[operator]
+    return Q
+
+
+def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
+    """(k,) angle about the axis of a surface of revolution, and (k,) place along it in [-1, 1].
+
+    The axis is the principal direction of the area whose moment differs from the two others; for
+    a bore or a journal that is its axis. The angle counts from the ambient axis farthest from it.
+
+    Raises:
+        InterfaceError: if no direction stands out.
+    """
+    x = interface.points - _centroid(interface)
+    moments, axes = np.linalg.eigh((interface.surface_mass @ x).T @ x)
+    gaps = np.diff(moments)
+    if gaps.max() < 1e-3 * moments[-1]:
+        raise InterfaceError(
+            f"interface {interface.name!r} has no axis: its area is spread alike in all "
+            "directions.",
+            hint="Use `Polynomial` on it.",
+        )
+    axis = axes[:, 2] if gaps[1] > gaps[0] else axes[:, 0]
+    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
+    e = np.eye(3)[np.argmin(np.abs(axis))]
+    e = (e - (e @ axis) * axis) / np.linalg.norm(e - (e @ axis) * axis)
+    along = x @ axis - 0.5 * ((x @ axis).max() + (x @ axis).min())
+    reach = np.abs(along).max()
+    flat = reach < THIN * np.ptp(interface.points, axis=0).max()
+    return np.arctan2(x @ np.cross(axis, e), x @ e), along * 0.0 if flat else along / reach
+
+
+def _centroid(interface: Interface) -> Array:
+    weight = np.asarray(interface.surface_mass.sum(axis=1)).ravel()
+    return weight @ interface.points / weight.sum()
+
+
+def _local(interface: Interface) -> Array:
+    """(k, 3) nodes from the centroid of the area, each coordinate scaled to [-1, 1].
+
+    The axes are those of the geometry: principal ones of a disc or a square hang on round-off, and
+    two bodies that meet on one surface would choose different functions.
+    """
+    x = interface.points - _centroid(interface)
+    reach = np.abs(x).max(axis=0)
+    thin = reach < THIN * reach.max()
+    return np.where(thin, 0.0, x / np.where(thin, 1.0, reach))
+
+
+def _check_whole(name: str, value: int, lowest: int, reason: str) -> None:
+    if isinstance(value, bool) or int(value) != value or value < lowest:
+        raise ConfigError(f"{name} = {value!r}: needed is a whole number from {lowest}; {reason}.")
+
+
+def _norm(S: object, v: Array) -> float:
+    return float(np.sqrt(max(v @ (S @ v), 0.0)))  # type: ignore[operator]
