@@ -24,8 +24,10 @@ from rom.model import (
     Report,
     SurfaceMesh,
 )
+from rom.reduction.enhanced import EnhancedCraigBampton
 from rom.reduction.fixed_interface import craig_bampton
-from rom.reduction.method import CraigBampton
+from rom.reduction.free_interface import Herting, Rubin
+from rom.reduction.method import CraigBampton, Guyan
 from rom.reduction.polynomial import FourierLegendre, Polynomial
 from rom.report import write_report
 from rom.workflow import mass_properties, modes, reduce
@@ -41,9 +43,12 @@ __all__ = [
     "Attachment",
     "Basis",
     "CraigBampton",
+    "EnhancedCraigBampton",
     "FEModel",
     "FlexibleBody",
     "FourierLegendre",
+    "Guyan",
+    "Herting",
     "Interface",
     "Material",
     "Mechanism",
@@ -54,6 +59,7 @@ __all__ = [
     "Rayleigh",
     "Report",
     "RomError",
+    "Rubin",
     "SurfaceMesh",
     "audit",
     "check",

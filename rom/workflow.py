@@ -16,7 +16,7 @@ from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Modes
 from rom.reduction.interface import connect
-from rom.reduction.method import CraigBampton
+from rom.reduction.method import Method
 from rom.scipy_operators import SciPyOperators
 
 log = logging.getLogger("rom")
@@ -115,7 +115,7 @@ def _residual(ops: Operators, held: np.ndarray, omega: np.ndarray, Phi: np.ndarr
 def reduce(
     model: FEModel,
     *,
-    method: CraigBampton,
+    method: Method,
     interfaces: dict[str, Any],
     reference: Any = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
@@ -126,7 +126,8 @@ def reduce(
 
     Args:
         model: the full model, free-free.
-        method: how to reduce, for example ``CraigBampton(n_modes=20)``.
+        method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
+            `Herting`, `EnhancedCraigBampton`.
         interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial` or
             `FourierLegendre`.
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
@@ -170,10 +171,10 @@ def reduce(
     )
 
 
-def _described(method: CraigBampton, basis: Any, n: int) -> dict[str, Any]:
+def _described(method: Method, basis: Any, n: int) -> dict[str, Any]:
     return {
         "method": repr(method),
         "full dofs": n,
         "columns": list(basis.labels),
-        "fixed-interface frequencies [Hz]": (basis.omega / (2 * np.pi)).tolist(),
+        "frequencies of the modes kept [Hz]": (basis.omega / (2 * np.pi)).tolist(),
     }

@@ -26,7 +26,9 @@ from rom.errors import ConfigError
 if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
+    from rom.reduction.method import Method
 
+METHODS = ("craig-bampton", "enhanced", "guyan", "rubin", "herting")
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
   rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
@@ -41,9 +43,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_geometry(parser)
     add_material(parser)
     add_interfaces(parser)
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=METHODS[0],
+        help="craig-bampton (default), enhanced (the same, corrected), guyan (statics only), "
+        "rubin or herting (free-free modes)",
+    )
     kept = parser.add_mutually_exclusive_group()
-    kept.add_argument("-m", "--modes", type=count, help="fixed-interface modes kept (default 20)")
-    kept.add_argument("--f-max", type=positive, help="keep all of them up to this frequency [Hz]")
+    kept.add_argument("-m", "--modes", type=count, help="modes kept (default 20)")
+    kept.add_argument(
+        "--f-max", type=positive, help="craig-bampton: keep all modes up to this frequency [Hz]"
+    )
     parser.add_argument(
         "--reference",
         metavar="FRAME",
@@ -63,16 +74,10 @@ def run(args: argparse.Namespace) -> Answer:
     """Assemble, reduce, compare; the file is written at the end."""
     from rom.io.files import check_writable
     from rom.io.native import save
-    from rom.reduction.method import CraigBampton
     from rom.workflow import reduce
 
     check_writable(args.output)
-    kept = (
-        {"f_max": args.f_max}
-        if args.f_max
-        else {"n_modes": 20 if args.modes is None else args.modes}
-    )
-    method, damping = CraigBampton(**kept), _damping(args)
+    method, damping = _method(args), _damping(args)
     kinds = unique(args.interface, "-i")
     if not kinds:
         raise ConfigError("a body needs an interface.", hint="For example -i pin_a=rbe2.")
@@ -89,6 +94,23 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(
         _data(body, args.output), _text(body, args.output), lambda: save(body, args.output), failed
     )
+
+
+def _method(args: argparse.Namespace) -> "Method":
+    from rom.reduction.enhanced import EnhancedCraigBampton
+    from rom.reduction.free_interface import Herting, Rubin
+    from rom.reduction.method import CraigBampton, Guyan
+
+    if args.f_max:
+        if args.method != METHODS[0]:
+            raise ConfigError(f"--f-max belongs to {METHODS[0]}; give {args.method} a number -m.")
+        return CraigBampton(f_max=args.f_max)
+    if args.method == "guyan":
+        if args.modes is not None:
+            raise ConfigError("guyan keeps no modes: leave -m out.")
+        return Guyan()
+    made = {"enhanced": EnhancedCraigBampton, "rubin": Rubin, "herting": Herting}
+    return made.get(args.method, CraigBampton)(n_modes=20 if args.modes is None else args.modes)
 
 
 def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":

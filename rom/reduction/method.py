@@ -1,6 +1,7 @@
 """Reduction methods as small records: what `rom.reduce` is asked to do."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -10,6 +11,26 @@ from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
 
 FIRST_BATCH = 16  # modes computed first when a frequency limit is given
+
+
+class Method(Protocol):
+    """What `rom.reduce` needs of a method."""
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates; boundary columns first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Guyan:
+    """Constraint modes alone: exact statics, mass condensed to the interfaces.
+
+    Source:
+        Guyan, Reduction of stiffness and mass matrices, AIAA J. 3 (1965) 380.
+    """
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates."""
+        return CraigBampton(n_modes=0).basis(ops, boundary, labels)
 
 
 @dataclass(frozen=True, slots=True)
