@@ -109,7 +109,7 @@ def _method(args: argparse.Namespace) -> "Method":
         if args.modes is not None:
             raise ConfigError("guyan keeps no modes: leave -m out.")
         return Guyan()
-    made = {"enhanced": EnhancedCraigBampton, "rubin": Rubin, "herting": Herting}
+    made: dict[str, Any] = {"enhanced": EnhancedCraigBampton, "rubin": Rubin, "herting": Herting}
     return made.get(args.method, CraigBampton)(n_modes=20 if args.modes is None else args.modes)
 
 

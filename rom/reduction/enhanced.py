@@ -48,8 +48,8 @@ class EnhancedCraigBampton:
         T0 = np.hstack([Psi_b, Phi])
         K0, M0 = projected(ops, T0)
         H = np.linalg.solve(M0, K0)
-        T1 = T0 + residual_shapes(ops, held, Psi_b, omega, Phi) @ H[: boundary.size]
-        return Basis(T1, omega, (*labels, *numbered("enhanced", omega.size)))
+        T0 += residual_shapes(ops, held, Psi_b, omega, Phi) @ H[: boundary.size]
+        return Basis(T0, omega, (*labels, *numbered("enhanced", omega.size)))
 
 
 def residual_shapes(ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi: Array) -> Array:

@@ -160,7 +160,8 @@ def _attached(ops: Operators, boundary: Index, G: Array) -> Array:
 
 def _without_dependent(ops: Operators, X: Array) -> tuple[Array, list[int]]:
     """Columns of X, mass-orthonormal in their order; those that add nothing are left out."""
-    Q, kept = np.zeros((X.shape[0], 0)), []
+    Q = np.zeros((X.shape[0], 0))
+    kept: list[int] = []
     for k in range(X.shape[1]):
         x = X[:, k : k + 1]
         before = np.sqrt(ops.gram(x, ops.apply_M(x)).item())

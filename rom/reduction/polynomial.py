@@ -112,7 +112,7 @@ def orthonormal_in(S: object, V: Array) -> Array:
         v = v / after
         v = v - Q @ (SQ.T @ v)  # after strong cancellation the second pass is not enough
         v = (v / _norm(S, v))[:, None]
-        Q, SQ = np.hstack([Q, v]), np.hstack([SQ, S @ v])  # type: ignore[operator]
+        Q, SQ = np.hstack([Q, v]), np.hstack([SQ, S @ v])
     return Q
 
 
