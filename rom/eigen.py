@@ -10,7 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import identity, kron
 
+from rom.errors import InterfaceError
 from rom.model import Array, Interface
+
+ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
 
 
 class Held(Protocol):
@@ -146,10 +149,23 @@ def mean_motion(interface: Interface) -> Array:
 
     C = (R^T S R)^-1 R^T S with R the rigid motions about the origin of the interface and S the
     surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2.
+
+    Raises:
+        InterfaceError: if the nodes lie on a line, whose rotation about itself no node feels.
     """
-    R = rigid_motions(interface.points - interface.origin)
+    x = interface.points - interface.origin
+    size = np.linalg.norm(x, axis=1).max(initial=0.0) or 1.0
+    R = rigid_motions(x / size)
     SR = kron(interface.surface_mass, identity(3)) @ R
-    return np.linalg.solve(R.T @ SR, SR.T)
+    gram = R.T @ SR
+    spectrum = np.linalg.eigvalsh(gram)
+    if not spectrum[0] > ON_A_LINE * spectrum[-1]:
+        raise InterfaceError(
+            f"the {interface.nodes.size} nodes of interface {interface.name!r} lie on a line or in "
+            "one point: its rotation is undetermined.",
+            hint="Choose a surface with an area.",
+        )
+    return np.linalg.solve(gram, SR.T) / np.r_[np.ones(3), np.full(3, size)][:, None]
 
 
 def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:

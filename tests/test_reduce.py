@@ -71,7 +71,9 @@ def test_more_modes_never_raise_a_frequency(model):
         previous = now
 
 
-@pytest.mark.parametrize("reference", ["root", "tip", "mean-axis", "free", ("root", "tip")])
+@pytest.mark.parametrize(
+    "reference", ["root", "tip", "mean-axis", "buckens", "free", ("root", "tip")]
+)
 def test_the_frame_is_a_choice(body, reference):
     """Whatever the reference condition, every supported frequency stays."""
     other = body.with_reference(reference)
@@ -108,6 +110,45 @@ def test_pins_keep_both_points_on_the_axis(body):
     assert_allclose(second.translation[1:], 0.0, atol=1e-9 * scale)  # the chord is along x
     assert_allclose(first.rotation[0], 0.0, atol=1e-8 * scale)
     assert np.abs(second.translation[0]).max() > 1e-3 * scale  # it may still stretch
+
+
+def test_three_points_span_the_frame(model):
+    """3-2-1: the first stays, the second on its line, the third in the plane; nothing else."""
+    x = model.points
+    middle = np.flatnonzero((x[:, 1] > -0.11) & (abs(x[:, 0] - 0.8) < 0.15))
+    patch = _patch(model, "c", middle)
+    spots = replace(model, interfaces=model.interfaces | {"c": patch})
+    kinds = KINDS | {"c": "full"}
+    body = rom.reduce(spots, method=rom.CraigBampton(8), interfaces=kinds, certify=False)
+    body = replace(body, markers=body.markers | {"a": body.markers["root"]})
+    seen = body.with_reference(("a", "tip", "c"))
+    assert seen.reference == "3-2-1 a tip c"
+    a, b, c = (seen.markers[name] for name in ("a", "tip", "c"))
+    axis = b.point - a.point
+    normal = np.cross(axis, c.point - a.point)
+    size = np.abs(seen.surface.shape).max()
+    assert_allclose(a.translation, 0, atol=1e-9 * size)
+    assert_allclose(np.cross(axis, b.translation.T), 0, atol=1e-9 * size)
+    assert_allclose(normal @ c.translation, 0, atol=1e-9 * size)
+    assert np.abs(c.translation).max() > 1e-2 * size
+    assert_allclose(seen.frequencies()[6:], body.frequencies()[6:], rtol=1e-9)
+    with pytest.raises(ModelError, match="lie on one line"):
+        body.with_reference(("a", "tip", "tip"))
+
+
+def _patch(model, name, nodes):
+    """Some nodes of the surface, of equal weight, as an interface of their own."""
+    at = model.points[nodes]
+    return rom.Interface(name, nodes, at, diags(np.ones(len(nodes))).tocsr(), at.mean(axis=0))
+
+
+def test_an_interface_on_a_line_is_refused(model):
+    edge = np.flatnonzero((model.points[:, 1] > -0.11) & (model.points[:, 2] > 0.17))
+    for nodes in (edge, edge[:1]):
+        lined = replace(model, interfaces=model.interfaces | {"edge": _patch(model, "edge", nodes)})
+        for kind in ("full", "rbe2", "rbe3", "polynomial:1"):
+            with pytest.raises(InterfaceError, match="line"):
+                rom.reduce(lined, method=rom.CraigBampton(2), interfaces={"edge": kind})
 
 
 def test_the_own_frequencies_depend_on_the_frame(body):

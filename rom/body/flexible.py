@@ -115,8 +115,11 @@ class FlexibleBody:
 
         Args:
             reference: "mean-axis" (alias "free"): no linear and angular momentum relative to the
-                frame; the name of an interface: the frame sits on it; a pair of names: the frame
-                sits on the first point, its axis runs through the second (pins).
+                frame; "buckens": smallest mean square of the deformation, which for small
+                deformations is the same frame; the name of an interface: the frame sits on it; a
+                pair of names: the frame sits on the first point, its axis runs through the second
+                (pins, chord frame); three names: first point fixed, second on a line, third on a
+                plane (3-2-1, simply supported).
 
         Raises:
             InterfaceError: if an interface is unknown.
@@ -203,7 +206,7 @@ def reference_label(reference: Any) -> str:
     """How a reference condition is written in labels and files."""
     if isinstance(reference, str):
         return "mean-axis" if reference == "free" else reference
-    return "pins " + " ".join(reference)
+    return ("pins " if len(reference) == 2 else "3-2-1 ") + " ".join(reference)
 
 
 def _normal_modes(K: Array, M: Array) -> tuple[Array, Array]:

@@ -24,30 +24,39 @@ if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody, Marker
 
 
+# The frame of Tisserand carries no momentum of the deformation, that of Buckens keeps its mean
+# square smallest; linearised, both say that the shapes are orthogonal to rigid motion in the mass.
+MEAN = ("mean-axis", "buckens", "free")
+
+
 def reference_motion(body: "FlexibleBody", reference: Any) -> Array:
     """(6, r) rigid motion X hidden in each shape, as the reference condition sees it.
 
     Raises:
-        ConfigError: if the reference is neither "mean-axis", "free", a name, nor two names.
+        ConfigError: if the reference is neither "mean-axis", "buckens", "free", nor one to three
+            names.
         ModelError: if the condition does not determine the frame.
     """
-    if reference in ("mean-axis", "free"):
+    if isinstance(reference, str) and reference in MEAN:
         from_rigid, from_shapes = rigid_mass(body), rigid_elastic(body)
     elif isinstance(reference, str):
         from_rigid, from_shapes = _marker_motion(body.marker(reference), body.n_modes)
     elif isinstance(reference, tuple | list) and len(reference) == 2:
         first, second = map(body.marker, reference)
         from_rigid, from_shapes = _pins(first, second, body.n_modes)
+    elif isinstance(reference, tuple | list) and len(reference) == 3:
+        points = [body.marker(name) for name in reference]
+        from_rigid, from_shapes = _three_two_one(points, body.n_modes)
     else:
         raise ConfigError(
             f"reference = {reference!r} is not a reference condition.",
-            hint=f'Use "mean-axis", one of {sorted(body.markers)}, or a pair of them.',
+            hint=f'Use "mean-axis", "buckens", or one to three of {sorted(body.markers)}.',
         )
     scale = np.r_[np.ones(3), np.full(3, 1 / body.size)]
     if np.linalg.cond(from_rigid * scale) > 1e12:
         raise ModelError(
             f"the reference condition {reference!r} leaves the frame undetermined.",
-            hint="The two pins must not coincide.",
+            hint="Pins must not coincide, three points not lie on one line.",
         )
     return np.linalg.solve(from_rigid, from_shapes)
 
@@ -69,6 +78,26 @@ def _pins(first: "Marker", second: "Marker", r: int) -> tuple[Array, Array]:
     rows = []
     for one, other in zip(_marker_motion(first, r), _marker_motion(second, r), strict=True):
         rows.append(np.vstack([one[:3], across @ other[:3], axis @ one[3:]]))
+    return rows[0], rows[1]
+
+
+def _three_two_one(points: "list[Marker]", r: int) -> tuple[Array, Array]:
+    """Simply supported: first point fixed, second on a line, third on a plane through all three."""
+    first, second, third = points
+    axis = second.point - first.point
+    normal = np.cross(axis, third.point - first.point)
+    size = max(np.linalg.norm(axis), np.linalg.norm(third.point - first.point))
+    if np.linalg.norm(normal) < 1e-9 * size**2 or size == 0.0:
+        raise ModelError(
+            f"the points {', '.join(repr(p.name) for p in points)} lie on one line.",
+            hint="Choose three interfaces that span a plane.",
+        )
+    axis, normal = axis / np.linalg.norm(axis), normal / np.linalg.norm(normal)
+    across = np.array([normal, np.cross(normal, axis)])
+    rows = []
+    for motions in zip(*(_marker_motion(point, r) for point in points), strict=True):
+        one, other, last = (motion[:3] for motion in motions)
+        rows.append(np.vstack([one, across @ other, normal @ last]))
     return rows[0], rows[1]
 
 

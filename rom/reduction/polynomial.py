@@ -140,7 +140,7 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
     e = (e - (e @ axis) * axis) / np.linalg.norm(e - (e @ axis) * axis)
     along = x @ axis - 0.5 * ((x @ axis).max() + (x @ axis).min())
     reach = np.abs(along).max()
-    flat = reach < THIN * np.ptp(interface.points, axis=0).max()
+    flat = reach <= THIN * np.ptp(interface.points, axis=0).max()
     return np.arctan2(x @ np.cross(axis, e), x @ e), along * 0.0 if flat else along / reach
 
 
@@ -157,7 +157,7 @@ def _local(interface: Interface) -> Array:
     """
     x = interface.points - _centroid(interface)
     reach = np.abs(x).max(axis=0)
-    thin = reach < THIN * reach.max()
+    thin = reach <= THIN * reach.max()
     return np.where(thin, 0.0, x / np.where(thin, 1.0, reach))
 
 
