@@ -197,3 +197,14 @@ def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(ConfigError, match="ended with code 1"):
         view.mode_shapes(bar, tmp_path / "modes.png", n=1)
+
+
+def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
+    curves = {"one": ([1, 2, 4], [1e-1, 1e-2, 0.0]), "two": ([1, 2, 4], [1e-2, 1e-3, 1e-4])}
+    look = {"xlabel": "modes", "title": "Title", "caption": "Words."}
+    view.convergence(tmp_path / "c.png", [("error", curves)] * 2, **look)
+    image = pixels(tmp_path / "c.png")
+    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):
+        assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
+    with pytest.raises(ConfigError, match="'x' has 1 errors for 2 sizes"):
+        view.convergence(tmp_path / "d.png", [("error", {"x": ([1, 2], [1.0])})], **look)

@@ -1,6 +1,6 @@
 """Pictures and films, drawn off-screen in a process that never loads dolfinx."""
 
-from rom.view.curves import frequencies, history
+from rom.view.curves import convergence, frequencies, history
 from rom.view.film import animate, instants
 from rom.view.part import mesh
 from rom.view.shapes import mode_shapes
@@ -9,6 +9,7 @@ from rom.view.solids import box, cylinder
 __all__ = [
     "animate",
     "box",
+    "convergence",
     "cylinder",
     "frequencies",
     "history",

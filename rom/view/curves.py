@@ -12,6 +12,7 @@ from rom.view import page
 
 WIDTH, PANEL = 1400, 330  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
+MARKERS = ("o", "s", "^", "D", "v", "x")
 EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
@@ -91,6 +92,53 @@ def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> 
         axes.set_ylabel("relative error", size=page.BODY)
         _finish(axes, legend=True)
         return page.save(figure, path)
+
+
+def convergence(
+    path: str | Path,
+    panels: Sequence[tuple[str, dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]]],
+    *,
+    xlabel: str,
+    title: str,
+    caption: str,
+) -> Path:
+    """Draw errors that fall with the size of a model, on logarithmic axes.
+
+    Args:
+        path: picture to write, .png.
+        panels: (label of the axis, {name: (sizes (n,), errors (n,))}) from top to bottom; errors
+            at or below round-off are drawn at 1e-12.
+        xlabel: what the sizes count.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    with page.styled():
+        figure, areas = _panels(len(panels), title, caption)
+        for axes, (label, curves) in zip(areas, panels, strict=True):
+            for k, (name, (sizes, errors)) in enumerate(curves.items()):
+                x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
+                if x.shape != y.shape:
+                    raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
+                look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
+                axes.loglog(x, np.maximum(np.abs(y), EXACT), label=name, **look)
+            axes.set_ylabel(label, size=page.BODY)
+            _whole_ticks(axes, [x for x, _ in curves.values()])
+            _finish(axes, legend=True)
+        for axes in areas[:-1]:
+            axes.set_xticklabels([])
+        areas[-1].set_xlabel(xlabel, size=page.BODY)
+        return page.save(figure, path)
+
+
+def _whole_ticks(axes: Any, sizes: list[Any]) -> None:
+    """Ticks at the sizes themselves: powers of ten say little about small numbers."""
+    ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
+    axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
+    axes.minorticks_off()
 
 
 def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
