@@ -320,7 +320,7 @@ def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
         gap = y[j] - y[i]
         now = np.linalg.norm(gap, axis=1)
         pull = (k * (now - rest) / now)[:, None] * gap
-        f = outer(t, y)
+        f = np.array(outer(t, y))
         np.add.at(f, i, pull)
         np.add.at(f, j, -pull)
         a = f / masses[:, None]
