@@ -11,7 +11,7 @@ from rom.model import Report, Row
 ENERGY = 1e-2
 GAP = 1e-9
 QUATERNION = 1e-12
-MOMENTUM = 1e-8
+MOMENTUM = 1e-5  # a method of second order conserves it to the error of its steps, not exactly
 CORRECTIONS = 8.0
 DEFORMATION = 0.1
 

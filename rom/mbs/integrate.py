@@ -62,7 +62,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     Raises:
         ConfigError: for a wrong argument.
         ModelError: if joints contradict each other.
-        SolverError: naming time and culprit; ``error.solution`` holds the motion up to there.
+        SolverError: naming time and culprit; ``error.solution`` holds the motion up to there, None
+            if it never started.
         InterruptedRun: after Ctrl-C; ``error.solution`` holds the motion up to there.
     """
     if method not in METHODS:
@@ -82,14 +83,14 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     try:
         METHODS[method](record, W, state)
     except RomError as error:
-        error.solution = record.solution(f"Stopped: {error}")
+        error.solution = record.solution(f"Stopped: {error}") if record.blocks else None
         raise
     except KeyboardInterrupt:
         error = InterruptedRun(
             f"interrupted at t = {record.t:.6g} s of {t_end:g} s.",
             hint="The motion up to there is kept in error.solution.",
         )
-        error.solution = record.solution(str(error))
+        error.solution = record.solution(str(error)) if record.blocks else None
         raise error from None
     return record.solution(status)
 
