@@ -69,3 +69,19 @@ def test_the_body_has_the_same_content_on_any_number_of_processes(bodies, n):
     assert bodies[n].labels == bodies[1].labels
     for one, many in zip(bodies[1].certificate.rows, bodies[n].certificate.rows, strict=True):
         assert (one.quantity, one.ok) == (many.quantity, many.ok)
+
+
+def test_a_script_that_fails_on_one_rank_after_the_model_ends_on_all():
+    """Nobody installed a hook: the model did."""
+    script = (
+        "from mpi4py import MPI; import rom; "
+        f"model = rom.fe.model({str(ROD)!r}, material=rom.Material(E=2e11, nu=0.3, rho=7850.0), "
+        "parameters={'lc': 0.012}); "
+        "1 / (MPI.COMM_WORLD.rank - 1); MPI.COMM_WORLD.Barrier()"
+    )
+    done = subprocess.run(
+        ["mpirun", "--oversubscribe", "-n", "3", sys.executable, "-c", script],
+        env=ENVIRONMENT, timeout=60, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode != 0
+    assert done.stderr.count("ZeroDivisionError: division by zero") == 1

@@ -60,7 +60,15 @@ def assemble_matrix(form: ufl.Form) -> PETSc.Mat:
     """Matrix of a bilinear form, distributed over the ranks."""
     A = fem_petsc.assemble_matrix(compiled(form))
     A.assemble()
-    return A
+    if not hasattr(fem, "functionspace"):
+        return A
+    # dolfinx 0.9 on PETSc 3.22: createSubMatrix of such a matrix crashes on several ranks; one made
+    # anew from its rows does not
+    rows = A.getValuesCSR()
+    copy = PETSc.Mat().createAIJ(A.getSizes(), bsize=A.getBlockSize(), csr=rows, comm=A.comm)
+    copy.assemble()
+    A.destroy()
+    return copy
 
 
 def compiled(form: ufl.Form) -> Any:

@@ -19,7 +19,7 @@ from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange,
 from rom.fe.jit import compiling
 from rom.fe.material import by_region, coefficients, described, doubts, stress
 from rom.fe.nodes import all_points, interface, outer_surface
-from rom.fe.parallel import collective, on_root
+from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
 from rom.model import Array, Attachment, FEModel
 
@@ -60,6 +60,7 @@ def model(
     """
     from rom.fe.mesh import read_mesh, to_dolfinx
 
+    install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
     solid = on_root(comm, read_mesh, path, parameters=parameters, **mesh_options)
     with compiling(comm):
         mesh, cell_tags, facet_tags = to_dolfinx(solid, comm)
