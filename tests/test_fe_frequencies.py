@@ -132,8 +132,8 @@ SetFactory("OpenCASCADE");
 Sphere(1) = {0, 0, 0, 6.0, 0, Pi/2, Pi/2};
 Sphere(2) = {0, 0, 0, 1.8, 0, Pi/2, Pi/2};
 BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
-Mesh.CharacteristicLengthMax = 1.0;
-Mesh.CharacteristicLengthMin = 1.0;
+Mesh.CharacteristicLengthMax = 0.85;
+Mesh.CharacteristicLengthMin = 0.85;
 Physical Volume("body") = {3};
 """
 
