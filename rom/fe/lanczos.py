@@ -13,7 +13,7 @@ from rom.errors import SolverError
 from rom.fe.factor import Factor
 from rom.model import Array
 
-BLOCK = 8  # columns solved together: fewer make solving dearer, more make the space larger
+BLOCK = 6  # columns solved together: fewer make solving dearer, more make the space larger
 ROOM = 20  # blocks beside the modes sought before the space is restarted; twenty are seldom used
 RESTARTS = 20  # after which the method has failed
 TOLERANCE = 1e-10  # of an eigenvalue of the inverse: its residual when it counts as converged
