@@ -112,7 +112,7 @@ def test_a_krylov_space_that_closes_early_is_left_for_another():
 def test_more_equal_modes_than_a_block_has_columns_are_noticed():
     lam = np.repeat([1.0, 4.0], 350)
     ops = diagonal_operators(lam)
-    with pytest.raises(ModesMissedError, match="inertia of K - sigma M counts [36]"):
+    with pytest.raises(ModesMissedError, match=r"inertia of K - sigma M counts [36]"):
         ops.modes(ops.hold([699]), 2 * lanczos.BLOCK + 1)
 
 
