@@ -7,6 +7,7 @@ lives in ``rom.fe`` and is imported when it is first used.
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from rom.body.assembly import Assembly
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.flexible import FlexibleBody
 from rom.checks import check
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Assembly",
     "Attachment",
     "Basis",
     "CraigBampton",

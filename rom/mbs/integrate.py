@@ -74,13 +74,13 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     packed = pack(mechanism)
     if progress and not compiled_before(advance):
         sys.stderr.write("compile the integrator, once on this machine: about a minute\n")
-    if state is None:
-        state = initial_state(packed, t_start, settings.spacing)
-    _check_fit(state, packed.q.size, packed.v.size)
     W = workspace(packed.system, len(packed.signals))
     record = Record(mechanism, packed, settings, perf_counter())
     status = f"Reached t = {t_end:g} s."
     try:
+        if state is None:
+            state = initial_state(packed, t_start, settings.spacing)
+        _check_fit(state, packed.q.size, packed.v.size)
         METHODS[method](record, W, state)
     except RomError as error:
         error.solution = record.solution(f"Stopped: {error}") if record.blocks else None

@@ -83,9 +83,9 @@ class Part:
 
     def point(self, marker: Marker) -> Array:
         """(3,) undeformed position of a marker in the body frame [m]."""
+        self.marker(marker.place)
         if not isinstance(marker.place, str):
             return np.array(marker.place)
-        self.marker(marker.place)
         if self.flexible is None:
             return self.points[marker.place]
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)

@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass, field
+from numbers import Real
 from time import perf_counter
 from typing import Any
 
@@ -31,9 +32,10 @@ class Settings:
     progress: bool
 
     def __post_init__(self):
-        for name in ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol"):
+        numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
+        for name in numbers:
             value = getattr(self, name)
-            if isinstance(value, bool | str) or not np.isscalar(value) or not np.isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
                 raise ConfigError(f"{name} = {value!r} is not a finite number.")
         if self.t_end <= self.t_start:
             raise ConfigError(f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.")

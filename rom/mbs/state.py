@@ -10,7 +10,7 @@ from rom.errors import ModelError, RomWarning, SolverError
 from rom.mbs.arrays import Work, workspace
 from rom.mbs.motion import evaluate, linearise, moved, rates
 from rom.mbs.packing import Packed
-from rom.mbs.signals import sample_all
+from rom.mbs.signals import first_failure, sample_all
 from rom.model import Array
 
 # relative singular value below which a constraint counts as a copy of others: assembled
@@ -60,9 +60,14 @@ def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> Stat
 
     Raises:
         ModelError: naming the joint that cannot be satisfied.
+        SolverError: if a drive or load is not finite at the start.
     """
     W = workspace(packed.system, len(packed.signals))
-    W.signal[:] = sample_all(packed.signals, np.array([t]), t, spacing)[0]
+    table = sample_all(packed.signals, np.array([t]), t, spacing)
+    good, failure = first_failure(packed.signals, np.array([t]), table)
+    if not good:
+        raise failure
+    W.signal[:] = table[0]
     q = assembled(packed, W, packed.q)
     rank = _rank(packed, W, q)
     _check_start(packed, W, q, rank)
@@ -169,8 +174,9 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
         v = v + _least_change(W.G, wanted - W.G @ v, weight)
     miss = np.abs(W.G @ v - wanted)
     size = np.abs(W.G) @ np.abs(v) + np.abs(wanted)
+    size = np.maximum(size, 1e-3 * size.max())  # rows at rest hold nothing but round-off
     k = int(np.argmax(miss / np.maximum(size, 1e-300)))
-    if miss[k] > 1e-8 * max(size[k], size.max() * 1e-3):
+    if miss[k] > 1e-8 * size[k]:
         raise ModelError(
             f"the velocities of joints and drives contradict each other: "
             f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
