@@ -56,6 +56,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--f-max", type=positive, help="craig-bampton: keep all modes up to this frequency [Hz]"
     )
     parser.add_argument(
+        "--tol",
+        type=positive,
+        help="with --f-max: the fewest modes with this relative error of all frequencies in the "
+        "band, e.g. 1e-3",
+    )
+    parser.add_argument(
         "--reference",
         metavar="FRAME",
         type=names,
@@ -104,7 +110,9 @@ def _method(args: argparse.Namespace) -> "Method":
     if args.f_max:
         if args.method != METHODS[0]:
             raise ConfigError(f"--f-max belongs to {METHODS[0]}; give {args.method} a number -m.")
-        return CraigBampton(f_max=args.f_max)
+        return CraigBampton(f_max=args.f_max, tol=args.tol)
+    if args.tol is not None:
+        raise ConfigError("--tol needs the band --f-max.")
     if args.method == "guyan":
         if args.modes is not None:
             raise ConfigError("guyan keeps no modes: leave -m out.")

@@ -9,6 +9,7 @@ from rom.eigen import Held, Operators
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
+from rom.reduction.selection import enough_modes
 
 FIRST_BATCH = 16  # modes computed first when a frequency limit is given
 
@@ -40,6 +41,8 @@ class CraigBampton:
     Attributes:
         n_modes: number of fixed-interface modes.
         f_max: alternatively, keep all fixed-interface modes up to this frequency [Hz].
+        tol: with f_max, keep instead the fewest modes whose estimated error of every natural
+            frequency of the free body up to f_max is at most this, e.g. 1e-3.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
@@ -47,6 +50,7 @@ class CraigBampton:
 
     n_modes: int | None = None
     f_max: float | None = None
+    tol: float | None = None
 
     def __post_init__(self) -> None:
         if (self.n_modes is None) == (self.f_max is None):
@@ -57,6 +61,10 @@ class CraigBampton:
             raise ConfigError(f"n_modes = {self.n_modes!r} is not a number of modes (0, 1, 2, …).")
         if self.f_max is not None and not (np.isfinite(self.f_max) and self.f_max > 0):
             raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
+        if self.tol is not None and (self.f_max is None or not 0 < self.tol < 1):
+            raise ConfigError(
+                f"tol = {self.tol!r} is a relative error between 0 and 1, and needs f_max."
+            )
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis in interface coordinates; boundary columns first.
@@ -73,7 +81,11 @@ class CraigBampton:
             )
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
-        omega, Phi = self._normal_modes(ops, held)
+        if self.tol is None:
+            omega, Phi = self._normal_modes(ops, held)
+        else:
+            band = 2 * np.pi * self.f_max
+            omega, Phi = enough_modes(ops, held, Psi_b, band, self.tol, FIRST_BATCH)
         normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
         return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal))
 
