@@ -364,3 +364,37 @@ def test_two_ranks_print_one_answer_with_the_same_numbers(geometry):
 def test_fixed_interfaces_may_be_written_with_blanks():
     args = build_parser().parse_args(["modes", "x.geo", *STEEL, "--fixed", "a, b,"])
     assert args.fixed == ("a", "b")
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(
+    ("options", "label", "n_modes"),
+    [
+        (("--method", "rubin", "-m", 30), "free 30", 15 + 30),
+        (("--method", "herting", "-m", 25), "free 25", 15 + 25),
+        (("--f-max", 700, "--tol", 1e-3), "fixed-interface", None),
+    ],
+)
+def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, options, label, n_modes):
+    """A rigid end and one with linear functions: 6 and 9 coordinates."""
+    path = tmp_path / "beam.rom.npz"
+    kinds = ("-i", "root=rbe2", "-i", "tip=polynomial:1")
+    found = answer(
+        capsys, "reduce", geometry, *STEEL, *kinds, *options, "--no-certificate", "-o", path
+    )
+    body = rom.load(path)
+    assert body.provenance["reduction"]["columns"][-1].startswith(label)
+    assert n_modes is None or found["n_modes"] == n_modes
+    # the ends are hardly stiffer than those of the full model
+    full = answer(capsys, "modes", geometry, *STEEL, "-n", 7)["frequencies"]
+    assert body.frequencies(7)[6] == pytest.approx(full[6], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--method", "guyan", "-m", 3), ("--method", "rubin", "--f-max", 10), ("--tol", 1e-3)],
+)
+def test_options_that_contradict_each_other_are_refused(options, tmp_path, capsys):
+    steel = ("reduce", "meshes/beam.geo", *STEEL, "-i", "root=rbe2", "-o", tmp_path / "b.npz")
+    assert main([*map(str, steel), *map(str, options)]) == 2
+    assert capsys.readouterr().err.startswith("error: ")
