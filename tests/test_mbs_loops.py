@@ -5,7 +5,7 @@ import pytest
 from mbs_cases import random_body, simulate_quietly, slider_crank
 from numpy.testing import assert_allclose
 
-from rom.errors import ModelError, RomWarning
+from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.audit import audit
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
@@ -154,3 +154,23 @@ def test_a_run_in_two_pieces_is_the_run_in_one(build, options, tolerance):
         limit = tolerance * share * np.abs(wanted).max()
         assert_allclose(getattr(second, name), wanted, atol=limit)
     assert_allclose(second.base, whole.base[200:], atol=1e-10)
+
+
+@pytest.mark.parametrize("build", [hinge_and_ball, coil])
+def test_a_state_of_the_same_bodies_with_other_joints_is_refused(build):
+    """Compiled code would write beyond the end of its arrays."""
+    joined = build()
+    free = Mechanism(gravity=(0, 0, 0))
+    free.parts.update(joined.parts)
+    for one, other in ((joined, free), (free, joined)):
+        state = simulate(one, t_end=0.01, dt=1e-3).final
+        with pytest.raises(ConfigError, match=r"the state has .* constraints and \d rotational"):
+            simulate(other, t_end=0.02, dt=1e-3, state=state)
+
+
+def test_a_state_without_the_coil_is_refused():
+    bare, wound = coil(), coil()
+    bare.turns.clear()
+    state = simulate(bare, t_end=0.01, dt=1e-3).final
+    with pytest.raises(ConfigError, match="0 rotational springs; this mechanism has 7, 6, 5 and 1"):
+        simulate(wound, t_end=0.02, dt=1e-3, state=state)

@@ -13,7 +13,7 @@ from rom.mbs.compiled import compiled_before
 from rom.mbs.explicit import run_explicit
 from rom.mbs.implicit import run_implicit
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.packing import pack
+from rom.mbs.packing import Packed, pack
 from rom.mbs.record import Record, Settings
 from rom.mbs.solution import Solution
 from rom.mbs.state import State, initial_state
@@ -80,7 +80,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     try:
         if state is None:
             state = initial_state(packed, t_start, settings.spacing)
-        _check_fit(state, packed.q.size, packed.v.size)
+        _check_fit(state, packed)
         METHODS[method](record, W, state)
     except RomError as error:
         error.solution = record.solution(f"Stopped: {error}") if record.blocks else None
@@ -95,9 +95,15 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     return record.solution(status)
 
 
-def _check_fit(state: Any, n_q: int, n_v: int) -> None:
-    if np.shape(state.q) != (n_q,) or np.shape(state.v) != (n_v,):
+def _check_fit(state: Any, packed: Packed) -> None:
+    """Compiled code does not look at the size of its arrays, so this is the place to do it."""
+    none = np.zeros(packed.system.forces.turn.shape[0])
+    has = [np.size(x) for x in (state.q, state.v, state.lam)]
+    has.append(np.size(none if state.base is None else state.base))
+    needed = [packed.q.size, packed.v.size, packed.system.rows.kind.size, none.size]
+    if has != needed:
         raise ConfigError(
-            f"the state has {np.size(state.q)} coordinates and {np.size(state.v)} velocities; "
-            f"this mechanism has {n_q} and {n_v}."
+            "the state has {} coordinates and {} velocities, {} constraints and {} rotational "
+            "springs; ".format(*has)
+            + "this mechanism has {}, {}, {} and {}.".format(*needed)
         )
