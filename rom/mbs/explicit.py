@@ -37,7 +37,7 @@ class Equations:
         packed, settings = self.record.packed, self.record.settings
         if packed.signals:
             times = np.array([t])
-            table = sample_all(packed.signals, times, settings.t_start, settings.spacing)
+            table = sample_all(packed.signals, times, settings.span, settings.spacing)
             good, failure = first_failure(packed.signals, times, table)
             if not good:
                 raise failure

@@ -70,8 +70,8 @@ def _power(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> Ar
 
 
 def _signals_at(record: Record, W: Work, t: float) -> None:
-    start, spacing = record.settings.t_start, record.settings.spacing
-    W.signal[:] = sample_all(record.packed.signals, np.array([t]), start, spacing)[0]
+    span, spacing = record.settings.span, record.settings.spacing
+    W.signal[:] = sample_all(record.packed.signals, np.array([t]), span, spacing)[0]
 
 
 def _measured(
@@ -130,7 +130,7 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     """Take up to ``count`` steps and keep what is to be saved; returns how many were taken."""
     packed, settings = record.packed, record.settings
     t = settings.time(np.arange(done + 1, done + count + 1))
-    table = sample_all(packed.signals, t, settings.t_start, settings.spacing)
+    table = sample_all(packed.signals, t, settings.span, settings.spacing)
     good, failure = first_failure(packed.signals, t, table)
     every = settings.save_every
     out = _space(W, T, (done + good) // every - done // every)

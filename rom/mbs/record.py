@@ -11,7 +11,7 @@ import numpy as np
 from rom.errors import ConfigError
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
-from rom.mbs.signals import sample_all
+from rom.mbs.signals import Span, sample_all
 from rom.mbs.solution import Solution
 from rom.mbs.state import State
 from rom.model import Array
@@ -46,6 +46,11 @@ class Settings:
             raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
         if int(self.save_every) != self.save_every or self.save_every < 1:
             raise ConfigError(f"save_every = {self.save_every!r} is not a positive whole number.")
+
+    @property
+    def span(self) -> Span:
+        """Start and end time [s]."""
+        return self.t_start, self.t_end
 
     @property
     def steps(self) -> int:
@@ -121,8 +126,7 @@ class Record:
         if self.settings.progress:
             line("")
         t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
-        span, start = self.settings.spacing, self.settings.t_start
-        signals = sample_all(self.packed.signals, t, start, span)
+        signals = sample_all(self.packed.signals, t, self.settings.span, self.settings.spacing)
         return Solution(
             self.mechanism, self.packed, t, *arrays, signals, self._statistics(), status, self.final
         )

@@ -9,8 +9,12 @@ import numpy as np
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
 
+# first and last time a function may be asked for
+Span = tuple[float, float]
 # weights of f(t), f(t + s), ... f(t + 4 s) in 12 s f' and 12 s^2 f'', fourth and third order
 FORWARD = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [35.0, -104.0, 114.0, -56.0, 11.0]])
+# weights of f(t - 4 s), ... f(t)
+BACKWARD = np.array([[3.0, -16.0, 36.0, -48.0, 25.0], [11.0, -56.0, 114.0, -104.0, 35.0]])
 # weights of f(t - 2 s), ... f(t + 2 s), fourth order
 CENTRAL = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
 
@@ -32,30 +36,32 @@ class Signal:
     acceleration: Callable[[float], Any] | None = None
     width: int = 1
 
-    def sample(self, t: Array, t_start: float, spacing: float) -> Array:
+    def sample(self, t: Array, span: Span, spacing: float) -> Array:
         """(n, 3) value, rate, acceleration at the times t; or the vectors of a load.
 
         Args:
             t: (n,) times.
-            t_start: no time before this one is asked for.
+            span: no time before the first or after the second one is asked for.
             spacing: of the finite differences for missing derivatives [s].
         """
+        t = np.clip(t, *span)
         if self.width == 3:
             return self._values(self.function, t)
         value = self._values(self.function, t)[:, 0]
         steps = ((self.rate, 0, spacing), (self.acceleration, 1, spacing**2))
         given = [
-            self._values(f, t)[:, 0] if f else self._difference(t, t_start, order, spacing) / scale
+            self._values(f, t)[:, 0] if f else self._difference(t, span, order, spacing) / scale
             for f, order, scale in steps
         ]
         return np.column_stack([value, *given])
 
-    def _difference(self, t: Array, t_start: float, order: int, spacing: float) -> Array:
-        early = t - 2 * spacing < t_start
-        first = np.where(early, t, t - 2 * spacing)
-        grid = first[:, None] + spacing * np.arange(5)
+    def _difference(self, t: Array, span: Span, order: int, spacing: float) -> Array:
+        early, late = t - 2 * spacing < span[0], t + 2 * spacing > span[1]
+        first = np.where(early, t, np.where(late, t - 4 * spacing, t - 2 * spacing))
+        grid = np.clip(first[:, None] + spacing * np.arange(5), *span)  # round-off leads beyond
         values = self._values(self.function, grid.ravel())[:, 0].reshape(-1, 5)
-        weights = np.where(early[:, None], FORWARD[order], CENTRAL[order])
+        weights = np.where(late[:, None], BACKWARD[order], CENTRAL[order])
+        weights = np.where(early[:, None], FORWARD[order], weights)
         # differences to one value first, so that a constant has the derivative zero exactly
         return ((values - values[:, :1]) * weights).sum(axis=1) / 12
 
@@ -100,11 +106,11 @@ def load_signal(name: str, function: Callable[[float], Any]) -> Signal:
     return Signal(name, function, width=3)
 
 
-def sample_all(signals: tuple[Signal, ...], t: Array, t_start: float, spacing: float) -> Array:
+def sample_all(signals: tuple[Signal, ...], t: Array, span: Span, spacing: float) -> Array:
     """(n, s, 3) all signals at all times."""
     out = np.zeros((t.size, len(signals), 3))
     for k, signal in enumerate(signals):
-        out[:, k] = signal.sample(t, t_start, spacing)
+        out[:, k] = signal.sample(t, span, spacing)
     return out
 
 

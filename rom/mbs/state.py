@@ -63,7 +63,7 @@ def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> Stat
         SolverError: if a drive or load is not finite at the start.
     """
     W = workspace(packed.system, len(packed.signals))
-    table = sample_all(packed.signals, np.array([t]), t, spacing)
+    table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
