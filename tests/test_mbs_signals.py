@@ -33,6 +33,16 @@ def wheel(function):
     return mech, body
 
 
+def test_round_off_asks_for_nothing_outside_the_span():
+    rng = np.random.default_rng(0)
+    for start, length, parts in rng.uniform((-1, 0.1, 5), (1, 2, 50), size=(200, 3)):
+        asked = []
+        span = (start, start + length)
+        signal = Signal("motor", lambda t, asked=asked: asked.append(float(t)) or float(t))
+        signal.sample(np.array(span), span, length / parts)
+        assert (min(asked), max(asked)) == span
+
+
 @pytest.mark.parametrize("dt", [0.01, 0.1 / 3, 0.3])
 @pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
 def test_nobody_asks_a_function_for_times_outside_the_run(method, dt):

@@ -105,3 +105,19 @@ def test_a_damped_dumbbell_settles_where_the_spring_carries_the_masses():
     assert lost > 0.1
     assert_allclose(sol.energy.total[0] - sol.energy.total[-1], lost, rtol=1e-4)
     assert rotation.matrix(sol.orientation("bell")[-1])[2, 2] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_work_of_laws_is_force_times_way_and_moment_times_angle():
+    """Two newtons push the masses apart, three newton metres turn the body about its axis."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    bell = mech.add_flexible("bell", dumbbell(), omega=(0, 0, 5.0))
+    right, left = bell.marker("right"), bell.marker("left")
+    mech.user_force("push", lambda t, a, b: (2.0 * a.axes[:, 0], np.zeros(3)), right, left)
+    mech.user_force("turn", lambda t, a: (np.zeros(3), (0, 0, 3.0)), right)
+    sol = simulate(mech, t_end=0.5, dt=0.01, method="dop853")
+    p = sol.orientation("bell")
+    angle = 2 * np.unwrap(np.arctan2(p[:, 3], p[:, 0]), period=np.pi)
+    work = 2.0 * 2 * sol.elastic("bell")[:, 0] + 3.0 * angle
+    assert work[-1] > 5.0
+    assert_allclose(sol.energy.forces, work, atol=1e-8)
+    assert_allclose(sol.energy.total - sol.energy.total[0], work, atol=1e-8)
