@@ -66,7 +66,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             if it never started.
         InterruptedRun: after Ctrl-C; ``error.solution`` holds the motion up to there.
     """
-    if method not in METHODS:
+    if not isinstance(mechanism, Mechanism):
+        raise ConfigError(f"{mechanism!r} is no Mechanism.")
+    if not isinstance(method, str) or method not in METHODS:
         raise ConfigError(f"no method {method!r}; there are {sorted(METHODS)}.")
     if t_start is None:
         t_start = 0.0 if state is None else state.t

@@ -150,9 +150,14 @@ class Mechanism:
             qd: (r,) their rates.
 
         Raises:
-            ConfigError: for a name in use, a wrong shape or a number that is not finite.
+            ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
             ModelError: if the mass matrix of the body is singular: rigid motions left in it.
         """
+        if not hasattr(body, "S_kl"):
+            raise ConfigError(
+                f"body {name!r} is {body!r}; a FlexibleBody is needed.",
+                hint="Make one with rom.reduce, or read one with rom.load.",
+            )
         r = body.K.shape[0]
         elastic = (
             finite("q", np.zeros(r) if q is None else q, (r,)),
