@@ -1,0 +1,87 @@
+"""What the benchmarks measure is what they say they measure."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from rom import bench
+from rom.eigen import rigid_motions
+
+SIZE = np.array([0.16, 0.02, 0.012])
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return bench._bar(tuple(SIZE), (16, 2, 1))
+
+
+def test_the_bar_has_the_mass_centre_and_inertia_of_a_bar(bar):
+    m = 7850.0 * SIZE.prod()
+    R = rigid_motions(bar.points - SIZE / 2)
+    expected = np.diag([m, m, m, *(m / 12 * ((SIZE**2).sum() - SIZE**2))])
+    assert_allclose(R.T @ (bar.M @ R), expected, atol=1e-12 * m)
+    assert np.abs(bar.K @ R).max() < 1e-14 * abs(bar.K).max()
+
+
+def test_the_energy_of_any_constant_strain_is_that_of_steel(bar):
+    A = np.random.default_rng(3).normal(size=(3, 3))
+    e = 0.5 * (A + A.T)
+    voigt = np.array([e[0, 0], e[1, 1], e[2, 2], 2 * e[1, 2], 2 * e[0, 2], 2 * e[0, 1]])
+    u = (bar.points @ A.T).ravel()
+    energy = SIZE.prod() * voigt @ bench.STEEL.stiffness @ voigt
+    assert_allclose(u @ (bar.K @ u), energy, rtol=1e-11)
+
+
+def test_the_bar_vibrates_like_a_bar(bar):
+    """Free bending about both axes below the slender beam, and close to it; stretching above."""
+    f = rom.modes(bar, 13).frequencies[6:]
+    slender = 22.373285 * bench.STEEL.wave_speed * SIZE[[2, 1]] / np.sqrt(12) / SIZE[0] ** 2
+    assert_allclose(f[:2], slender / (2 * np.pi), rtol=0.06)
+    assert np.all(f[:2] < slender / (2 * np.pi))
+    assert_allclose(f[6], bench.STEEL.wave_speed / (2 * SIZE[0]), rtol=2e-3)
+
+
+def test_the_ends_of_the_bar_are_its_interfaces(bar):
+    for name, x in (("root", 0.0), ("tip", SIZE[0])):
+        face = bar.interfaces[name]
+        assert_allclose(face.origin, [x, SIZE[1] / 2, SIZE[2] / 2], atol=1e-12)
+        assert_allclose(face.area, SIZE[1] * SIZE[2], rtol=1e-12)
+        y, z = face.points[:, 1], face.points[:, 2]
+        exact = SIZE[1] ** 3 / 3 * SIZE[2] ** 2 / 2  # integral of y^2 z
+        assert_allclose(y @ face.surface_mass @ (y * z), exact, rtol=1e-12)
+
+
+def test_the_integrator_is_measured_without_fenicsx():
+    """After one turn of 1000 steps that compiles, and on a rod of twenty normal modes."""
+    code = (
+        "import sys; sys.modules.update(dict.fromkeys(['dolfinx', 'petsc4py', 'gmsh', 'mpi4py']))\n"
+        "from rom.bench import integrator\n"
+        "for figure in integrator(turns=2): print(figure.case, figure.quantity, figure.value > 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": str(Path(rom.__file__).parents[1])},
+        capture_output=True, text=True, timeout=200, check=False,
+    )  # fmt: skip
+    case = "26 elastic coordinates, 2000 steps"
+    expected = [f"{case} steps per second True", f"{case} share outside compiled code True"]
+    assert done.stdout.splitlines() == expected, done.stderr
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("size", [30e3, 100e3])
+def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    from rom.fe.mesh import read_mesh
+
+    solid = read_mesh(bench.geometry("beam"), parameters=bench._beam(size))
+    edges = solid.cells[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
+    n_edges = len(np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0))
+    n_dofs = 3 * (len(np.unique(solid.cells[:, :4])) + n_edges)  # one node more on each edge
+    assert_allclose(n_dofs, size, rtol=0.1)
