@@ -86,8 +86,9 @@ def integrator(turns: int = 40) -> Iterator[Figure]:
     """
     from rom.mbs.integrate import simulate
 
-    kept = {"method": CraigBampton(20), "interfaces": KINDS, "certify": False}
-    rod = reduce(_bar((0.16, 0.02, 0.012), (16, 2, 1)), reference=tuple(KINDS), **kept)
+    bar = _bar((0.16, 0.02, 0.012), (16, 2, 1))
+    method, kinds = CraigBampton(20), dict(KINDS)
+    rod = reduce(bar, method=method, interfaces=kinds, reference=tuple(kinds), certify=False)
     mechanism, turn = _slider_crank(rod), 2 * pi / SPEED
     warm = simulate(mechanism, t_end=turn, dt=turn / 1000)
     run = simulate(mechanism, t_end=(turns + 1) * turn, dt=turn / 1000, state=warm.final)
