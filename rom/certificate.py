@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
-from rom.eigen import Operators, mac
+from rom.eigen import Held, Operators, mac
 from rom.model import Array, Basis, Report, Row
 from rom.reduction.interface import Connection
 
@@ -17,6 +17,8 @@ FREQUENCY_ERROR = 1e-3  # relative; what a structural dynamicist accepts without
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
 # rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
 ASYMMETRY = 1e-6
+JUDGED = 1e-6  # frequency error above which an estimate must be right
+CREDIBLE = 2.0  # factor by which a frequency error may exceed its estimate
 CLUSTER = 1e-3  # modes closer than this (relative) are compared as one subspace
 
 
@@ -33,17 +35,23 @@ def certify_body(
         elastic: the elastic part of the basis.
 
     Returns:
-        The report, and a table {support: {"full": [Hz], "reduced": [Hz], "mac": []}}.
+        The report, and a table {support: {"reduced": [Hz], "estimated": [relative errors],
+        "full": [Hz], "mac": []}}; the last two are empty when full modes cannot be afforded, and
+        the estimates when the method has none.
     """
     rows: list[Row] = []
     comparison = {}
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts)]
+    inner = connection.ops.hold(connection.boundary)
     for fixed in supports:
-        table = _compared(connection, ops, body, basis, fixed)
-        if table["full"]:
+        table = _compared(connection, ops, body, (basis, inner), fixed)
+        if table["reduced"]:
             comparison[" + ".join(fixed) + " held" if fixed else "free"] = table
+    if not connection.ops.affordable:
+        rows.append(Row("dofs; full modes are too dear, errors estimated", ops.n, "--", True))
     for support, table in comparison.items():
-        rows += _frequency_rows(support, table)
+        rows += _frequency_rows(support, table) if table["full"] else []
+        rows += _estimate_rows(support, table)
     rows += _static_row(connection, body)
     rows += _rigid_rows(ops, body, elastic)
     rows += _matrix_rows(connection, basis, body)
@@ -59,25 +67,44 @@ def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Ro
 
 
 def _compared(
-    connection: Connection, ops: Operators, body: FlexibleBody, basis: Basis, fixed: tuple[str, ...]
+    connection: Connection,
+    ops: Operators,
+    body: FlexibleBody,
+    reduction: tuple[Basis, Held],
+    fixed: tuple[str, ...],
 ) -> dict[str, list[float]]:
-    """Frequencies of both models in one support, and the best agreement of shapes."""
+    """Frequencies of both models in one support, their errors, and the agreement of shapes."""
     omega_r = body.modes(fixed=fixed)[0]
     n_rigid = int(np.count_nonzero(omega_r == 0.0))
-    held = connection.held(fixed)
     n = min(N_COMPARED, omega_r.size - n_rigid)
+    table: dict[str, list[float]] = {"full": [], "reduced": [], "mac": [], "estimated": []}
     if n <= 0 or n_rigid not in (0, 6):
-        return {"full": [], "reduced": [], "mac": []}
-    omega, Phi = connection.ops.modes(held, n + n_rigid)
-    omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
+        return table
     # the reduced shapes again, as combinations of the columns of the basis
-    Psi = connection.ops.expand(_reduced_shapes(connection, basis, fixed, n + n_rigid))
-    agreement = _cluster_mac(mac(ops, Phi, Psi), omega, omega_r[: n + n_rigid])
-    return {
-        "full": (omega / (2 * np.pi)).tolist(),
-        "reduced": (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist(),
-        "mac": agreement.tolist(),
-    }
+    basis, inner = reduction
+    shapes = _reduced_shapes(connection, basis, fixed, n + n_rigid)
+    table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
+    if not any(label.startswith("enhanced") for label in basis.labels):
+        table["estimated"] = _estimates(connection.ops, inner, shapes[:, n_rigid:]).tolist()
+    if connection.ops.affordable:
+        omega, Phi = connection.ops.modes(connection.held(fixed), n + n_rigid)
+        omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
+        agreement = mac(ops, Phi, connection.ops.expand(shapes))
+        table["full"] = (omega / (2 * np.pi)).tolist()
+        table["mac"] = _cluster_mac(agreement, omega, omega_r[: n + n_rigid]).tolist()
+    return table
+
+
+def _estimates(ops: Operators, inner: Held, X: Array) -> Array:
+    """Frequency errors r^T K_ii^-1 r / (2 x^T K x), r = K x - lam M x, of the modes x of a basis.
+
+    A basis that contains the constraint modes leaves no residual on them, so that the inverse is
+    that of the inner stiffness in every support. Asymptotically exact, not a bound.
+    """
+    KX, MX = ops.apply_K(X), ops.apply_M(X)
+    lam = np.diag(ops.gram(X, KX)) / np.diag(ops.gram(X, MX))
+    rest = KX - MX * lam
+    return np.diag(ops.gram(rest, inner(rest))) / (2 * np.diag(ops.gram(X, KX)))
 
 
 def _reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
@@ -111,6 +138,23 @@ def _frequency_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
         row(f"{support}: reduced never below full", error.min(), -1e-8, above=True),
         row(f"{support}: lowest MAC of {n} shapes", min(table["mac"]), 0.99, above=True),
     ]
+
+
+def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
+    """The estimates; against the truth where that is known and more than round-off."""
+    if not table["estimated"]:
+        return []
+    estimate = np.array(table["estimated"])
+    worst = row(
+        f"{support}: estimated error of {estimate.size} frequencies",
+        estimate.max(),
+        FREQUENCY_ERROR,
+    )
+    if not table["full"]:
+        return [worst]
+    error = np.array(table["reduced"]) / np.array(table["full"]) - 1
+    ratio = (error / np.maximum(estimate, JUDGED)).max()
+    return [worst, row(f"{support}: largest error over its estimate", ratio, CREDIBLE)]
 
 
 def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:

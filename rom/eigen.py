@@ -33,6 +33,7 @@ class Operators(Protocol):
         first: global number of this process's first row.
         n_local: number of this process's rows.
         last: True on the process that owns the end of the rows, and stays so after `transform`.
+        affordable: True when modes of the whole model cost a few factorisations, not hours.
         rigid: (n_local, 6) rigid motions (three translations, three rotations about the origin of
             coordinates), or None when there is no geometry.
     """
@@ -41,6 +42,7 @@ class Operators(Protocol):
     first: int
     n_local: int
     last: bool
+    affordable: bool
     rigid: Array | None
 
     def apply_K(self, X: Array) -> Array:

@@ -61,6 +61,7 @@ class SciPyOperators:
 
     first = 0
     last = True
+    affordable = True
 
     def __init__(self, K: Any, M: Any, rigid: Array | None = None, T: csr_matrix | None = None):
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)

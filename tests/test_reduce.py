@@ -232,6 +232,16 @@ def test_statics_of_the_reduced_body_are_exact(body, model):
     assert rom.check(body).ok
 
 
+def test_the_certificate_estimates_errors_as_they_are(model):
+    body = rom.reduce(model, method=rom.CraigBampton(6), interfaces=KINDS)
+    for support, table in body.provenance["comparison"].items():
+        error = np.array(table["reduced"]) / table["full"] - 1
+        # asymptotically exact (Kim and Lee): right to 10 % while errors are below 1 %
+        small = (error > 1e-6) & (error < 1e-2)
+        assert small.sum() >= 3, support
+        assert np.array(table["estimated"])[small] == pytest.approx(error[small], rel=0.1)
+
+
 def test_the_certificate_fails_when_the_basis_is_too_small(model):
     body = rom.reduce(model, method=rom.CraigBampton(0), interfaces=KINDS)
     assert not body.certificate.ok

@@ -69,6 +69,7 @@ def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> 
         ConfigError: without a comparison, or if pictures cannot be made here.
     """
     path = page.checked(path, ".png")
+    comparison = {support: table for support, table in comparison.items() if table["full"]}
     if not comparison:
         raise ConfigError("there is no comparison of frequencies to draw.")
     caption = (
