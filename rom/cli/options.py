@@ -108,6 +108,12 @@ def add_material(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--degree", type=count, default=2, help="degree of the displacement, 1 to 3 (default 2)"
     )
+    parser.add_argument(
+        "--solver",
+        default="direct",
+        help="direct (default), low-rank, out-of-core, low-rank+out-of-core, or iterative for "
+        "meshes whose factor does not fit",
+    )
 
 
 def add_interfaces(parser: argparse.ArgumentParser) -> None:
@@ -134,7 +140,8 @@ def read_model(args: argparse.Namespace) -> "FEModel":
     """The finite element model the options ask for."""
     from rom.fe.elasticity import model
 
-    return model(args.file, material=material(args), degree=args.degree, **reading(args))
+    numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
+    return model(args.file, **numbers, **reading(args))
 
 
 def material(args: argparse.Namespace) -> "Material":

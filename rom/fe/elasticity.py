@@ -21,6 +21,7 @@ from rom.fe.material import by_region, coefficients, described, doubts, stress
 from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
+from rom.fe.solver import parsed
 from rom.model import Array, Attachment, FEModel
 
 WHOLE = "solid"  # name of the only region of a mesh without named regions
@@ -34,6 +35,7 @@ def model(
     degree: int = 2,
     parameters: dict[str, float] | None = None,
     attachments: Sequence[Attachment] = (),
+    solver: str = "direct",
     comm: MPI.Comm = MPI.COMM_WORLD,
     **mesh_options: Any,
 ) -> FEModel:
@@ -46,6 +48,10 @@ def model(
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
         parameters: values of the geometry's parameters.
         attachments: point masses and rigid bodies carried by interfaces.
+        solver: how equations are solved. "direct": a MUMPS factor, the fastest when it fits;
+            "low-rank" or "low-rank:1e-8": the same with compressed blocks; "out-of-core": the
+            factor on disk; "low-rank+out-of-core"; "iterative": multigrid, with little memory
+            and without the count that proves no mode missed.
         comm: the ranks that share the model.
         mesh_options: ``scale``, ``faces``, ``order`` of `rom.fe.mesh.read_mesh`.
 
@@ -54,12 +60,14 @@ def model(
         matrices; ``operators`` are those of PETSc on both.
 
     Raises:
-        ConfigError, FileFormatError, MeshError, TagError: for a file that is no valid solid.
+        ConfigError, FileFormatError, MeshError, TagError: for a file that is no valid solid, or
+            an unknown solver.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
     """
     from rom.fe.mesh import read_mesh, to_dolfinx
 
+    way = parsed(solver)  # before a mesh is made in vain
     install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
     solid = on_root(comm, read_mesh, path, parameters=parameters, **mesh_options)
     with compiling(comm):
@@ -74,7 +82,8 @@ def model(
         attachments=attachments,
     )
     remarks = [*(solid.warnings or ()), *made.provenance["warnings"]]
-    return replace(made, provenance=solid.provenance | made.provenance | {"warnings": remarks})
+    provenance = solid.provenance | made.provenance | {"warnings": remarks}
+    return replace(made, operators=made.operators.solved_by(way), provenance=provenance)
 
 
 def assemble(

@@ -6,6 +6,7 @@ import numpy as np
 
 from rom.errors import SolverError
 from rom.fe.memory import allowed_bytes, too_large
+from rom.fe.solver import DIRECT, Solver
 from rom.model import Array
 
 BLOCK = 32  # right-hand sides solved together: five to eight times cheaper than one by one
@@ -18,6 +19,7 @@ class Factor:
     Args:
         A: the matrix.
         definite: promise that it is positive definite (Cholesky, no pivoting).
+        solver: says whether blocks of the factor are compressed, and where it lives.
 
     Attributes:
         ksp: the PETSc solver that holds the factor.
@@ -27,7 +29,7 @@ class Factor:
         ResourceError: if MUMPS runs out of memory.
     """
 
-    def __init__(self, A: PETSc.Mat, *, definite: bool):
+    def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT):
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setOption(PETSc.Mat.Option.SPD, definite)
         self.A = A
@@ -41,6 +43,11 @@ class Factor:
         self.factor = pc.getFactorMatrix()
         self.factor.setMumpsIcntl(24, 1)  # needed by PETSc for the inertia
         self.factor.setMumpsIcntl(13, 1)  # a root shared by ranks would not report its pivots
+        if solver.low_rank:
+            self.factor.setMumpsIcntl(35, 1)
+            self.factor.setMumpsCntl(7, solver.low_rank)
+        if solver.out_of_core:
+            self.factor.setMumpsIcntl(22, 1)
         allowed = allowed_bytes(A.comm.tompi4py())
         self.factor.setMumpsIcntl(23, max(int(allowed / 1e6), 1))  # obeyed after the analysis
         self.ksp.setUp()

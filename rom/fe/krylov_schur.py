@@ -46,20 +46,22 @@ def krylov_schur(
     transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setShift(sigma)
     transform.setKSP(factor.ksp)
-    solver.setInitialSpace([_vector(ops, ops.fixed)])  # depends on the place, not on the rank
+    solver.setInitialSpace([vector(ops.K, ops.fixed)])  # depends on the place, not on the rank
     if deflated.shape[1]:
-        solver.setDeflationSpace([_vector(ops, column) for column in deflated.T])
+        solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
     solver.solve()
-    return _pairs(ops, solver, k)
+    return mode_pairs(ops, solver, k)
 
 
-def _vector(ops: Any, values: Array) -> Any:
-    x = ops.K.createVecRight()
+def vector(A: Any, values: Array) -> Any:
+    """A PETSc vector with the layout of the columns of A."""
+    x = A.createVecRight()
     x.array[:] = values
     return x
 
 
-def _pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
+def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
+    """The k lowest eigenvalues a solver has found, and their mass-normalised modes."""
     n_found = solver.getConverged()
     if n_found < k:
         raise SolverError(

@@ -76,7 +76,8 @@ def too_large(n: int, need: float, there: float) -> ResourceError:
     return ResourceError(
         f"factoring {n} dofs is predicted to take {need / 2**30:.2f} GiB; "
         f"{there / 2**30:.2f} GiB may be used ({SHARE:.0%} of what is free).",
-        hint="Use a coarser mesh, more machines, or a machine with more memory.",
+        hint='Use a coarser mesh, more machines, solver="out-of-core" (the factor on disk) or '
+        'solver="iterative" (no factor).',
     )
 
 

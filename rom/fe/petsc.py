@@ -18,9 +18,11 @@ from scipy.sparse import csr_matrix
 from rom.eigen import count_shift, orthonormal
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
 from rom.fe.factor import Factor, dense_rows
+from rom.fe.iterative import ConjugateGradients, davidson, multigrid, refined
 from rom.fe.krylov_schur import krylov_schur
 from rom.fe.lanczos import BlockLanczos, capacity
 from rom.fe.memory import check_factor_memory
+from rom.fe.solver import DIRECT, Solver
 from rom.fe.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
 from rom.scipy_operators import dof_set
@@ -28,6 +30,7 @@ from rom.scipy_operators import dof_set
 SPARE = 3  # modes computed beyond the ones asked for, so that a gap for counting is found
 ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
 DENSE = 300  # dofs up to which all eigenvalues are computed at once
+Inverse = Factor | ConjugateGradients
 SHIFT = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 
 
@@ -49,10 +52,15 @@ class HeldPETSc:
         self.inner = self.factor = None
         if self.n_free:
             free = PETSc.IS().createGeneral(mine[self.mine].astype(PETSc.IntType), comm=ops.comm)
-            check_factor_memory(self.n_free, held.size, comm=ops.comm)
+            if ops.n % 3 == 0 and whole_nodes(ops, mine[self.mine]):
+                free.setBlockSize(3)  # multigrid then aggregates nodes
             K, M = (A.createSubMatrix(free, free) for A in (ops.K, ops.M))
-            self.inner = PETScOperators(K, M, fixed=ops.fixed[self.mine])
-            self.factor = Factor(K, definite=True)
+            fields = {"fixed": ops.fixed[self.mine], "solver": ops.solver}
+            self.inner = PETScOperators(K, M, **fields)
+            near = None if ops.rigid is None else ops.rigid[self.mine]
+            if ops.solver.iterative:
+                self._refuse_loose(near)
+            self.factor = self.inner.inverse(K, near, held.size)
             self._refuse_free_motion()
 
     def __call__(self, F: Array) -> Array:
@@ -61,6 +69,21 @@ class HeldPETSc:
         if self.factor is not None:
             X[self.mine] = self.factor.solve(F[self.mine])
         return X
+
+    def _refuse_loose(self, near_null: Array | None) -> None:
+        """Iteration on a body that can move would only run on: judge the held dofs first."""
+        if (
+            near_null is not None
+            and np.linalg.matrix_rank(self.ops.rows(self.ops.rigid, self.held), tol=1e-9)
+            < near_null.shape[1]
+        ):
+            raise self._singular()
+
+    def _singular(self) -> InterfaceError:
+        return InterfaceError(
+            f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
+            hint="Fix at least three nodes that do not lie on one line, or hold another interface.",
+        )
 
     def _refuse_free_motion(self) -> None:
         """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
@@ -73,11 +96,7 @@ class HeldPETSc:
                 M = self.inner.gram(X, self.inner.apply_M(X))
                 stiffness = (np.diag(K) / np.diag(M)).min()
         if not stiffness > ZERO * ops.largest():
-            raise InterfaceError(
-                f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
-                hint="Fix at least three nodes that do not lie on one line, or hold another "
-                "interface.",
-            )
+            raise self._singular()
 
 
 class PETScOperators:
@@ -91,6 +110,7 @@ class PETScOperators:
         fixed: (n_local,) vector that does not depend on the partition; made from the rigid motions
             when not given.
         parent: the operators in the coordinates these came from.
+        solver: how equations are solved.
 
     Raises:
         SolverError: if an entry is not finite.
@@ -105,8 +125,10 @@ class PETScOperators:
         T: PETSc.Mat | None = None,
         fixed: Array | None = None,
         parent: "PETScOperators | None" = None,
+        solver: Solver = DIRECT,
     ):
         self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
+        self.solver, self.affordable = solver, not solver.iterative
         self.comm = K.comm.tompi4py()
         self.n = K.getSize()[0]
         self.first, end = K.getOwnershipRange()
@@ -164,7 +186,8 @@ class PETScOperators:
         y.array[:] = self.fixed
         map_.multTranspose(y, x)
         K, M = (_symmetric(A.ptap(map_)) for A in (self.K, self.M))
-        return PETScOperators(K, M, rigid, T=map_, fixed=x.array.copy(), parent=self)
+        fields = {"T": map_, "fixed": x.array.copy(), "parent": self, "solver": self.solver}
+        return PETScOperators(K, M, rigid, **fields)
 
     def expand(self, A: Array) -> Array:
         """T A."""
@@ -175,8 +198,13 @@ class PETScOperators:
         sizes = ((self.n_local, self.n), (self.n_local, self.n))
         M = self.M.copy()
         M.axpy(1.0, _aij(csr_matrix(dM), sizes, self.comm))
-        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
+        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": self.solver}
         return PETScOperators(self.K, M, self.rigid, **fields)
+
+    def solved_by(self, solver: Solver) -> "PETScOperators":
+        """The same body, its equations solved another way."""
+        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": solver}
+        return PETScOperators(self.K, self.M, self.rigid, **fields)
 
     def modes(
         self, held: npt.ArrayLike | HeldPETSc, m: int, sigma: float | None = None
@@ -197,7 +225,7 @@ class PETScOperators:
             lam, Phi[held.mine] = held.inner.supported_modes(m, held.factor, in_blocks=in_blocks)
         return np.sqrt(lam), signed(self, Phi)
 
-    def supported_modes(self, m: int, factor: Factor, *, in_blocks: bool) -> tuple[Array, Array]:
+    def supported_modes(self, m: int, factor: Inverse, *, in_blocks: bool) -> tuple[Array, Array]:
         """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
         if self.n <= max(DENSE, capacity(m + SPARE)):
             lam, Phi = self.all_modes()
@@ -225,8 +253,8 @@ class PETScOperators:
             lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
         else:
             sigma = -SHIFT * self.first_elastic(R) if sigma is None else sigma
-            check_factor_memory(self.n, comm=self.comm)
-            lam, Phi = self.lowest(m + SPARE, sigma, self._factor(sigma, definite=True), R)
+            inverse = self.inverse(self._shifted(sigma), self.rigid)
+            lam, Phi = self.lowest(m + SPARE, sigma, inverse, R)
             self._refuse_mechanisms(lam, n_rigid)
             self.verify_count(lam, m, n_rigid)
         return lam[:m], settled(self, lam, Phi)[:, :m]
@@ -240,24 +268,56 @@ class PETScOperators:
                 hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
             )
 
+    def inverse(self, A: PETSc.Mat, near_null: Array | None, n_columns: int = 0) -> Inverse:
+        """A^-1 of a positive definite matrix by the solver chosen.
+
+        Args:
+            A: the matrix.
+            near_null: (n_local, 6) rigid motions on its rows, which multigrid needs.
+            n_columns: dense columns of that length that will be kept beside a factor.
+
+        Raises:
+            ResourceError: if a factor would not fit.
+            ConfigError: if multigrid has no geometry to go by.
+        """
+        if self.solver.iterative:
+            if near_null is None:
+                raise ConfigError("the iterative solver needs the coordinates of the nodes.")
+            return multigrid(A, near_null)
+        if self.solver == DIRECT:
+            check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
+        factor = Factor(A, definite=True, solver=self.solver)
+        return refined(factor) if self.solver.low_rank and factor.ok else factor
+
     def _factor(self, sigma: float, *, definite: bool) -> Factor:
         """K - sigma M, factored."""
+        return Factor(self._shifted(sigma), definite=definite, solver=self.solver)
+
+    def _shifted(self, sigma: float) -> PETSc.Mat:
+        """K - sigma M."""
         A = self.K.copy()
         A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        return Factor(A, definite=definite)
+        return A
 
     def lowest(
-        self, k: int, sigma: float, factor: Factor, deflated: Array, *, in_blocks: bool = False
+        self, k: int, sigma: float, factor: Inverse, deflated: Array, *, in_blocks: bool = False
     ) -> tuple[Array, Array]:
         """The k eigenvalues above sigma beside the deflated columns, and their modes."""
-        if not in_blocks:
+        if self.solver.iterative:
+            return davidson(self, factor, deflated, k)
+        if not in_blocks and isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)
         space = BlockLanczos(self, factor, sigma, deflated, k)
         space.solve()
         return space.pairs()
 
     def verify_count(self, lam: Array, m: int, n_rigid: int) -> None:
-        """Compare the number of modes found with the inertia of K - sigma M (Sylvester)."""
+        """Compare the number of modes found with the inertia of K - sigma M (Sylvester).
+
+        Without a factor there is nothing to count; `davidson` searches for missed ones instead.
+        """
+        if self.solver.iterative:
+            return
         found, sigma = count_shift(lam, m)
         count = self._factor(sigma, definite=False).negative_pivots() - n_rigid
         if count != found:
@@ -295,6 +355,13 @@ class PETScOperators:
             X = np.linalg.solve(np.linalg.cholesky(self.gram(X, X)), X.T).T
         lam = eigh(self.gram(X, self.apply_K(X)), self.gram(X, self.apply_M(X)), eigvals_only=True)
         return float(max(lam[np.argmax(lam > floor)], floor))
+
+
+def whole_nodes(ops: PETScOperators, dofs: Index) -> bool:
+    """True when, on every rank, the dofs are all three of their nodes."""
+    mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
+    mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
+    return bool(ops.comm.allreduce(mine, op=MPI.LAND))
 
 
 def _symmetric(A: PETSc.Mat) -> PETSc.Mat:

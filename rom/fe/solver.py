@@ -1,0 +1,60 @@
+"""How the equations of a model are solved: by a factor, by a compressed one, or by iteration."""
+
+from dataclasses import dataclass
+
+from rom.errors import ConfigError
+
+KNOWN = '"direct", "low-rank", "low-rank:1e-8", "out-of-core", "low-rank+out-of-core", "iterative"'
+DROPPED = 1e-8  # of a block's norm, below which a compressed factor forgets
+
+
+@dataclass(frozen=True, slots=True)
+class Solver:
+    """A choice among ways to solve.
+
+    Attributes:
+        iterative: conjugate gradients with algebraic multigrid, no factor; modes are then not
+            verified by an inertia count.
+        low_rank: tolerance to which blocks of the factor are compressed; 0 for an exact factor.
+            What is lost comes back by conjugate gradients on top.
+        out_of_core: the factor lives on disk (directory in MUMPS_OOC_TMPDIR, or the current one).
+    """
+
+    iterative: bool = False
+    low_rank: float = 0.0
+    out_of_core: bool = False
+
+
+DIRECT = Solver()
+
+
+def parsed(text: str) -> Solver:
+    """The solver named in words.
+
+    Raises:
+        ConfigError: listing the words that are known.
+    """
+    if text == "direct":
+        return DIRECT
+    if text == "iterative":
+        return Solver(iterative=True)
+    low_rank, out_of_core = 0.0, False
+    for word in str(text).split("+"):
+        name, colon, number = word.partition(":")
+        if name == "low-rank" and not low_rank:
+            low_rank = _tolerance(number, text) if colon else DROPPED
+        elif word == "out-of-core" and not out_of_core:
+            out_of_core = True
+        else:
+            raise ConfigError(f"solver = {text!r} is unknown; known are {KNOWN}.")
+    return Solver(low_rank=low_rank, out_of_core=out_of_core)
+
+
+def _tolerance(number: str, text: str) -> float:
+    try:
+        value = float(number)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= 1e-2:
+        raise ConfigError(f"solver = {text!r}: the tolerance must lie between 0 and 0.01.")
+    return value

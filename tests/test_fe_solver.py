@@ -1,0 +1,99 @@
+"""Ways to solve: each gives the frequencies of the direct factor, and says when it cannot."""
+
+import numpy as np
+import pytest
+
+import rom
+from rom.errors import ConfigError, InterfaceError, ModesMissedError, SolverError
+
+pytestmark = pytest.mark.fenicsx
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+BEAM = {"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.045}
+
+
+def beam(solver):
+    return rom.fe.model("meshes/beam.geo", material=STEEL, parameters=BEAM, solver=solver)
+
+
+@pytest.fixture(scope="module")
+def direct():
+    return beam("direct")
+
+
+def reduced(model):
+    return rom.reduce(model, method=rom.CraigBampton(8), interfaces=KINDS, certify=False)
+
+
+@pytest.mark.parametrize("solver", ["low-rank", "low-rank:1e-3", "out-of-core", "iterative"])
+def test_every_solver_gives_the_frequencies_of_the_direct_one(direct, solver):
+    model = beam(solver)
+    expected, found = (reduced(m).frequencies()[6:] for m in (direct, model))
+    assert found == pytest.approx(expected, rel=1e-8)
+    for fixed in ((), ("root",)):
+        expected, found = (rom.modes(m, 10, fixed=fixed) for m in (direct, model))
+        elastic = expected.omega > 0.0
+        assert elastic.sum() == (10 if fixed else 4)
+        assert found.omega[~elastic] == pytest.approx(0.0, abs=0.0)
+        assert found.omega[elastic] == pytest.approx(expected.omega[elastic], rel=1e-8)
+
+
+def test_static_solutions_by_iteration_are_those_of_the_factor(direct):
+    from rom.workflow import operators
+
+    load = np.random.default_rng(1).standard_normal((direct.n_dofs, 3))
+    held = direct.interfaces["root"].dofs
+    expected, found = (operators(m).hold(held)(load) for m in (direct, beam("iterative")))
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_iteration_refuses_a_body_that_can_move(direct):
+    from rom.workflow import operators
+
+    with pytest.raises(InterfaceError, match="leave a rigid motion free"):
+        operators(beam("iterative")).hold(direct.interfaces["root"].dofs[:3])
+
+
+def test_a_missed_mode_is_found_by_the_second_search(monkeypatch):
+    from rom.fe import iterative
+
+    search = iterative._davidson
+
+    def forgetful(ops, inverse, deflated, k, tolerance):
+        lam, Phi = search(ops, inverse, deflated, k + (k > 1), tolerance)
+        return (lam, Phi) if k == 1 else (np.delete(lam, 2), np.delete(Phi, 2, axis=1))
+
+    monkeypatch.setattr(iterative, "_davidson", forgetful)
+    with pytest.raises(ModesMissedError, match="was missed below the last one"):
+        reduced(beam("iterative"))
+
+
+def test_iteration_without_success_is_an_error(monkeypatch):
+    from rom.fe import iterative
+
+    monkeypatch.setattr(iterative, "ITERATIONS", 3)
+    with pytest.raises(SolverError, match="6 of 6 static solutions did not converge in 3"):
+        reduced(beam("iterative"))
+
+
+@pytest.mark.parametrize(
+    "text", ["fast", "low-rank:0", "low-rank:x", "low-rank+low-rank", "iterative+out-of-core", 3]
+)
+def test_an_unknown_solver_is_named(text):
+    with pytest.raises(ConfigError, match="solver = "):
+        beam(text)
+
+
+def test_the_certificate_estimates_what_it_cannot_afford(direct):
+    bodies = [
+        rom.reduce(m, method=rom.CraigBampton(18), interfaces=KINDS)
+        for m in (direct, beam("iterative"))
+    ]
+    known, estimated = ({r.quantity: r for r in b.certificate.rows} for b in bodies)
+    assert not any("worst error" in quantity for quantity in estimated)
+    assert estimated["dofs; full modes are too dear, errors estimated"].value == direct.n_dofs
+    for support in ("free", "root held", "tip held"):
+        name = f"{support}: estimated error of 6 frequencies"
+        assert estimated[name].value == pytest.approx(known[name].value, rel=1e-6)
+        truth = known[f"{support}: worst error of 6 frequencies"].value
+        assert estimated[name].value == pytest.approx(truth, rel=0.1)
