@@ -55,7 +55,7 @@ def certify_body(
     rows += _static_row(connection, body)
     rows += _rigid_rows(ops, body, elastic)
     rows += _matrix_rows(connection, basis, body)
-    rows += _effective_mass(body, next(iter(connection.parts)))
+    rows += _effective_mass(body, tuple(connection.parts))
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
 
 
@@ -234,13 +234,13 @@ def _asymmetry(A: Array) -> float:
     return float(np.abs((A - A.T) / np.outer(scale, scale)).max())
 
 
-def _effective_mass(body: FlexibleBody, fixed: str) -> list[Row]:
-    """Share of the mass that the kept modes carry when the support shakes; for information."""
-    V = body.modes(fixed=(fixed,))[1]
-    M, _ = body.full_matrices()
-    participation = V.T @ M[:, :3]
-    share = (participation**2).sum(axis=0) / body.mass
+def _effective_mass(body: FlexibleBody, names: tuple[str, ...]) -> list[Row]:
+    """Share of the mass that the kept modes carry when the supports shake; for information."""
+    supports = {f"{names[0]} held": names[:1], "all interfaces held": names}
     return [
-        Row(f"{fixed} held: effective mass along {axis}", float(value), "information", True)
-        for axis, value in zip("xyz", share, strict=True)
+        Row(f"{support}: effective mass along {axis}", float(value), "information", True)
+        for support, fixed in supports.items()
+        for axis, value in zip(
+            "xyz", body.effective_mass(fixed=fixed)[:, :3].sum(axis=0) / body.mass, strict=True
+        )
     ]

@@ -63,11 +63,17 @@ class Operators(Protocol):
         """
 
     def modes(
-        self, held: npt.ArrayLike | Held, m: int, sigma: float | None = None
+        self,
+        held: npt.ArrayLike | Held,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
     ) -> tuple[Array, Array]:
         """Lowest m modes with the given dofs held: (omega (m,), Phi (n_local, m)).
 
-        Accepts what `hold` returned, to use its factor again. Mass-normalised, ascending, largest
+        Accepts what `hold` returned, to use its factor again; with ``finished`` nobody else will,
+        and its memory may be used for counting. Mass-normalised, ascending, largest
         entry positive. The shift sigma is chosen from the model when not given. With nothing held
         the six rigid motions come first with omega exactly zero.
 

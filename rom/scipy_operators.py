@@ -104,7 +104,12 @@ class SciPyOperators:
         return SciPyOperators(self.K, self.M + csr_matrix(dM), self.rigid, self.T)
 
     def modes(
-        self, held: npt.ArrayLike | HeldSciPy, m: int, sigma: float | None = None
+        self,
+        held: npt.ArrayLike | HeldSciPy,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n, m)."""
         if not isinstance(held, HeldSciPy):

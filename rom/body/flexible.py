@@ -158,6 +158,23 @@ class FlexibleBody:
         omega[:n_rigid] = 0.0
         return omega[:n], (N @ V)[:, :n]
 
+    def effective_mass(self, *, fixed: tuple[str, ...] = ()) -> Array:
+        """(m, 6) share of the rigid body inertia each mode carries when its supports shake.
+
+        Squares of phi_j^T M R; masses [kg] for the three translations, moments of inertia about
+        the body origin [kg m^2] for the rotations.
+
+        Args:
+            fixed: names of the interfaces held; with all of them, effective interface masses.
+
+        Source:
+            Kammer and Triller, Selection of component modes for Craig-Bampton substructure
+            representations, J. Vib. Acoust. 118 (1996) 264.
+        """
+        V = self.modes(fixed=fixed)[1]
+        M, _ = self.full_matrices()
+        return (V.T @ M[:, :6]) ** 2
+
     def full_matrices(self) -> tuple[Array, Array]:
         """(6 + r, 6 + r) mass and stiffness of small motions, rigid coordinates first."""
         M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])

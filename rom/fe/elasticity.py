@@ -18,6 +18,7 @@ from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagEr
 from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.jit import compiling
 from rom.fe.material import by_region, coefficients, described, doubts, stress
+from rom.fe.memory import give_back
 from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
@@ -175,6 +176,7 @@ def _finish(K: PETSc.Mat, M: PETSc.Mat, points: Array, fields: dict[str, Any]) -
     A, B = _symmetric(K), _symmetric(M)
     K.destroy()
     M.destroy()
+    give_back()
     return FEModel(A, B, points, operators=PETScOperators(_aij(A), _aij(B), rigid), **fields)
 
 
@@ -185,8 +187,9 @@ def _symmetric(A: PETSc.Mat) -> csr_matrix:
 
 
 def _aij(A: csr_matrix) -> PETSc.Mat:
+    """The same numbers in the same memory, for PETSc."""
     csr = (A.indptr, A.indices, A.data)
-    return PETSc.Mat().createAIJ(A.shape, bsize=3, csr=csr, comm=MPI.COMM_SELF)
+    return PETSc.Mat().createAIJWithArrays(A.shape, csr, bsize=3, comm=MPI.COMM_SELF)
 
 
 def _check_mesh(mesh: Any, degree: int) -> str:

@@ -5,7 +5,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from rom.errors import SolverError
-from rom.fe.memory import allowed_bytes, too_large
+from rom.fe.memory import allowed_bytes, give_back, too_large
 from rom.fe.solver import DIRECT, Solver
 from rom.model import Array
 
@@ -67,6 +67,12 @@ class Factor:
             X[:, columns] = Y.getDenseArray()
             B.destroy(), Y.destroy()
         return X
+
+    def release(self) -> None:
+        """Give the memory back now; PETSc would wait until all ranks collect their garbage."""
+        self.ksp.destroy()
+        self.factor.destroy()
+        give_back()
 
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues of A.

@@ -74,6 +74,10 @@ class ConjugateGradients:
             hint='Use solver="direct" if the factor fits, or improve cells of extreme shape.',
         )
 
+    def release(self) -> None:
+        """Give the memory of the preconditioner back."""
+        self.pc.destroy()
+
     def _dots(self, X: Array, Y: Array) -> Array:
         return self.comm.allreduce(np.einsum("ij,ij->j", X, Y), op=MPI.SUM)
 

@@ -21,7 +21,7 @@ from rom.fe.factor import Factor, dense_rows
 from rom.fe.iterative import ConjugateGradients, davidson, multigrid, refined
 from rom.fe.krylov_schur import krylov_schur
 from rom.fe.lanczos import BlockLanczos, capacity
-from rom.fe.memory import check_factor_memory
+from rom.fe.memory import check_factor_memory, give_back
 from rom.fe.solver import DIRECT, Solver
 from rom.fe.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
@@ -57,26 +57,36 @@ class HeldPETSc:
             K, M = (A.createSubMatrix(free, free) for A in (ops.K, ops.M))
             fields = {"fixed": ops.fixed[self.mine], "solver": ops.solver}
             self.inner = PETScOperators(K, M, **fields)
-            near = None if ops.rigid is None else ops.rigid[self.mine]
             if ops.solver.iterative:
-                self._refuse_loose(near)
-            self.factor = self.inner.inverse(K, near, held.size)
+                self._refuse_loose()
+            self.make()
             self._refuse_free_motion()
 
     def __call__(self, F: Array) -> Array:
         """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
         X = np.zeros(F.shape)
-        if self.factor is not None:
+        if self.inner is not None:
+            if self.factor is None:
+                self.make()
             X[self.mine] = self.factor.solve(F[self.mine])
         return X
 
-    def _refuse_loose(self, near_null: Array | None) -> None:
+    def release(self) -> None:
+        """Give the memory of the factor back; it is made again if it is needed."""
+        self.factor.release()
+        self.factor = None
+
+    def make(self) -> None:
+        """Factor the stiffness."""
+        near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
+        self.factor = self.inner.inverse(self.inner.K, near_null, self.held.size)
+
+    def _refuse_loose(self) -> None:
         """Iteration on a body that can move would only run on: judge the held dofs first."""
-        if (
-            near_null is not None
-            and np.linalg.matrix_rank(self.ops.rows(self.ops.rigid, self.held), tol=1e-9)
-            < near_null.shape[1]
-        ):
+        R = self.ops.rigid
+        if R is None:
+            return
+        if np.linalg.matrix_rank(self.ops.rows(R, self.held), tol=1e-9) < R.shape[1]:
             raise self._singular()
 
     def _singular(self) -> InterfaceError:
@@ -186,6 +196,7 @@ class PETScOperators:
         y.array[:] = self.fixed
         map_.multTranspose(y, x)
         K, M = (_symmetric(A.ptap(map_)) for A in (self.K, self.M))
+        give_back()
         fields = {"T": map_, "fixed": x.array.copy(), "parent": self, "solver": self.solver}
         return PETScOperators(K, M, rigid, **fields)
 
@@ -207,14 +218,21 @@ class PETScOperators:
         return PETScOperators(self.K, self.M, self.rigid, **fields)
 
     def modes(
-        self, held: npt.ArrayLike | HeldPETSc, m: int, sigma: float | None = None
+        self,
+        held: npt.ArrayLike | HeldPETSc,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
         in_blocks = isinstance(held, HeldPETSc)
         if not isinstance(held, HeldPETSc):
             if np.size(held) == 0:
                 return self._free_modes(m, sigma)
-            held = self.hold(held)
+            held, finished = self.hold(held), True
+        elif held.factor is None and held.n_free:
+            held.make()
         if not 0 <= m <= held.n_free:
             raise ConfigError(
                 f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
@@ -222,16 +240,21 @@ class PETScOperators:
             )
         lam, Phi = np.zeros(0), np.zeros((self.n_local, m))
         if m:
-            lam, Phi[held.mine] = held.inner.supported_modes(m, held.factor, in_blocks=in_blocks)
+            how = {"in_blocks": in_blocks, "finished": finished}
+            lam, Phi[held.mine] = held.inner.supported_modes(m, held, **how)
         return np.sqrt(lam), signed(self, Phi)
 
-    def supported_modes(self, m: int, factor: Inverse, *, in_blocks: bool) -> tuple[Array, Array]:
+    def supported_modes(
+        self, m: int, held: HeldPETSc, *, in_blocks: bool, finished: bool
+    ) -> tuple[Array, Array]:
         """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
         if self.n <= max(DENSE, capacity(m + SPARE)):
             lam, Phi = self.all_modes()
         else:
             none = np.zeros((self.n_local, 0))
-            lam, Phi = self.lowest(m + SPARE, 0.0, factor, none, in_blocks=in_blocks)
+            lam, Phi = self.lowest(m + SPARE, 0.0, held.factor, none, in_blocks=in_blocks)
+            if finished:
+                held.release()
             self.verify_count(lam, m, 0)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
@@ -255,6 +278,7 @@ class PETScOperators:
             sigma = -SHIFT * self.first_elastic(R) if sigma is None else sigma
             inverse = self.inverse(self._shifted(sigma), self.rigid)
             lam, Phi = self.lowest(m + SPARE, sigma, inverse, R)
+            inverse.release()  # counting needs its memory
             self._refuse_mechanisms(lam, n_rigid)
             self.verify_count(lam, m, n_rigid)
         return lam[:m], settled(self, lam, Phi)[:, :m]
@@ -319,7 +343,10 @@ class PETScOperators:
         if self.solver.iterative:
             return
         found, sigma = count_shift(lam, m)
-        count = self._factor(sigma, definite=False).negative_pivots() - n_rigid
+        factor = self._factor(sigma, definite=False)
+        count = factor.negative_pivots() - n_rigid
+        factor.release()
+        factor.A.destroy()
         if count != found:
             raise ModesMissedError(
                 f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "

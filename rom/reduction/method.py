@@ -95,7 +95,7 @@ class CraigBampton:
                 raise ConfigError(
                     f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
                 )
-            return ops.modes(held, int(self.n_modes))
+            return ops.modes(held, int(self.n_modes), finished=True)
         m = min(FIRST_BATCH, held.n_free)
         omega, Phi = ops.modes(held, m)
         while omega.size and omega[-1] <= 2 * np.pi * self.f_max and m < held.n_free:
