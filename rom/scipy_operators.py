@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh, eigvalsh
+from scipy.linalg import LinAlgError, eigh, eigvalsh
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
@@ -56,7 +56,7 @@ class SciPyOperators:
     Raises:
         ConfigError: if the shapes do not fit.
         SolverError: if an entry is not finite.
-        QualityGateError: if a matrix is not symmetric.
+        QualityGateError: if a matrix is not symmetric, or M has a diagonal that is not positive.
     """
 
     first = 0
@@ -67,6 +67,7 @@ class SciPyOperators:
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)
         if self.K.shape != self.M.shape:
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
+        _refuse_massless(self.M)
         self.n = self.n_local = self.K.shape[0]
         self.rigid, self.T = rigid, T
 
@@ -133,7 +134,7 @@ class SciPyOperators:
         R = self._zero_modes()
         n_elastic = max(m - R.shape[1], 0)
         if self.n <= DENSE:
-            lam, Phi = eigh(self.K.toarray(), self.M.toarray())
+            lam, Phi = _dense_modes(self.K, self.M, self.n)
             lam, Phi = lam[R.shape[1] :][:n_elastic], Phi[:, R.shape[1] :][:, :n_elastic]
         else:
             lam, Phi = self._elastic_modes(R, n_elastic, sigma)
@@ -236,7 +237,36 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
     ratio = pivots.min() / pivots.max()
     if ratio < SINGULAR:
         raise InterfaceError(f"{advice} (pivot ratio {ratio:.1e})", hint=cure)
+    n_negative = int(np.count_nonzero(lu.U.diagonal() < 0))
+    if n_negative and np.array_equal(lu.perm_r, lu.perm_c):
+        raise _indefinite("K", n_negative, "with the boundary held, deformation would give energy")
     return lu
+
+
+def _refuse_massless(M: csr_matrix) -> None:
+    diagonal = M.diagonal()
+    wrong = np.flatnonzero(diagonal <= 0.0)
+    if wrong.size:
+        raise QualityGateError(
+            f"M has {diagonal[wrong[0]]:.3g} on the diagonal of dof {wrong[0]}; every dof needs a "
+            "positive mass.",
+            hint="Condense dofs without mass statically before you reduce.",
+        )
+
+
+def _indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
+    return QualityGateError(
+        f"{name} has {n_negative} negative eigenvalues: {meaning}.",
+        hint="Check signs and supports where the matrix was made.",
+    )
+
+
+def _dense_modes(K: csr_matrix, M: csr_matrix, m: int) -> tuple[Array, Array]:
+    try:
+        return eigh(K.toarray(), M.toarray(), subset_by_index=(0, m - 1))
+    except LinAlgError as error:
+        n_negative = int(np.count_nonzero(eigvalsh(M.toarray()) < 0))
+        raise _indefinite("M", n_negative, "some motion would have no inertia") from error
 
 
 def _lowest(K: csr_matrix, M: csr_matrix, lu: SuperLU, m: int) -> tuple[Array, Array]:
@@ -244,7 +274,7 @@ def _lowest(K: csr_matrix, M: csr_matrix, lu: SuperLU, m: int) -> tuple[Array, A
     if m == 0:
         return np.zeros(0), np.zeros((n, 0))
     if n <= DENSE or m + SPARE >= n:  # Lanczos cannot return all modes
-        return eigh(K.toarray(), M.toarray(), subset_by_index=(0, m - 1))
+        return _dense_modes(K, M, m)
     inverse = LinearOperator(K.shape, matvec=lu.solve)
     start = np.sin(1.0 + np.arange(n))
     lam, Phi = eigsh(K, m + SPARE, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
@@ -258,6 +288,8 @@ def _verify_count(K: csr_matrix, M: csr_matrix, lam: Array, m: int) -> None:
     """Compare the number of modes found with the inertia of K - sigma M (Sylvester)."""
     found, sigma = count_shift(lam, m)
     count = negative_count(K - sigma * M)
+    if count != found and (n_negative := negative_count(M)):
+        raise _indefinite("M", n_negative, "some motion would have no inertia")
     if count != found:
         raise ModesMissedError(
             f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "

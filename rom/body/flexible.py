@@ -173,7 +173,7 @@ class FlexibleBody:
         """
         V = self.modes(fixed=fixed)[1]
         M, _ = self.full_matrices()
-        return (V.T @ M[:, :6]) ** 2
+        return np.square(V.T @ M[:, :6])
 
     def full_matrices(self) -> tuple[Array, Array]:
         """(6 + r, 6 + r) mass and stiffness of small motions, rigid coordinates first."""

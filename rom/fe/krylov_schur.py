@@ -75,4 +75,5 @@ def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
         Phi[:, i] = x.array
     order = np.argsort(lam)[:k]
     Phi = Phi[:, order]
+    solver.destroy()  # with it goes the last reference to a factor
     return lam[order], Phi / np.sqrt(np.diag(ops.gram(Phi, ops.apply_M(Phi))))

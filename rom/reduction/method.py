@@ -1,16 +1,18 @@
 """Reduction methods as small records: what `rom.reduce` is asked to do."""
 
+import warnings
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from rom.eigen import Held, Operators
-from rom.errors import ConfigError
+from rom.errors import ConfigError, RomWarning
 from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
 from rom.reduction.selection import enough_modes
 
+REPEATED = 1e-6  # relative distance of frequencies that are one
 FIRST_BATCH = 16  # modes computed first when a frequency limit is given
 
 
@@ -39,7 +41,7 @@ class CraigBampton:
     """Constraint modes of the interface coordinates and fixed-interface normal modes.
 
     Attributes:
-        n_modes: number of fixed-interface modes.
+        n_modes: number of fixed-interface modes; a repeated frequency is kept whole.
         f_max: alternatively, keep all fixed-interface modes up to this frequency [Hz].
         tol: with f_max, keep instead the fewest modes whose estimated error of every natural
             frequency of the free body up to f_max is at most this, e.g. 1e-3.
@@ -95,7 +97,7 @@ class CraigBampton:
                 raise ConfigError(
                     f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
                 )
-            return ops.modes(held, int(self.n_modes), finished=True)
+            return whole_clusters(ops, held, int(self.n_modes))
         m = min(FIRST_BATCH, held.n_free)
         omega, Phi = ops.modes(held, m)
         while omega.size and omega[-1] <= 2 * np.pi * self.f_max and m < held.n_free:
@@ -103,3 +105,28 @@ class CraigBampton:
             omega, Phi = ops.modes(held, m)
         keep = int(np.searchsorted(omega, 2 * np.pi * self.f_max, side="right"))
         return omega[:keep], Phi[:, :keep]
+
+
+def whole_clusters(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
+    """The lowest fixed-interface modes, and those beyond that share the last frequency.
+
+    Which member of a repeated frequency comes first is an accident of round-off; a basis that cut
+    it in two would differ from run to run and prefer a direction the body does not have.
+    """
+    if n_modes == 0:
+        return ops.modes(held, 0)
+    n = min(n_modes + 1, held.n_free)
+    omega, Phi = ops.modes(held, n, finished=True)
+    while omega[-1] <= (1.0 + REPEATED) * omega[n_modes - 1] and n < held.n_free:
+        n = min(n + n_modes + 1, held.n_free)
+        omega, Phi = ops.modes(held, n, finished=True)
+    keep = int(np.searchsorted(omega, (1.0 + REPEATED) * omega[n_modes - 1], side="right"))
+    if keep > n_modes and ops.first == 0:
+        warnings.warn(
+            RomWarning(
+                f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share "
+                f"the frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
+            ),
+            stacklevel=4,
+        )
+    return omega[:keep], Phi[:, :keep]
