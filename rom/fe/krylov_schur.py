@@ -50,7 +50,9 @@ def krylov_schur(
     if deflated.shape[1]:
         solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
     solver.solve()
-    return mode_pairs(ops, solver, k)
+    pairs = mode_pairs(ops, solver, k)
+    solver.destroy()  # it refers to the factor, which could not be freed
+    return pairs
 
 
 def vector(A: Any, values: Array) -> Any:
@@ -75,5 +77,4 @@ def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
         Phi[:, i] = x.array
     order = np.argsort(lam)[:k]
     Phi = Phi[:, order]
-    solver.destroy()  # with it goes the last reference to a factor
     return lam[order], Phi / np.sqrt(np.diag(ops.gram(Phi, ops.apply_M(Phi))))

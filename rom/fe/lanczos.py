@@ -38,11 +38,10 @@ class BlockLanczos:
     def __init__(self, ops: Any, factor: Factor, sigma: float, deflated: Array, k: int):
         self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
         self.n_deflated = deflated.shape[1]
-        shape = (ops.n_local, self.n_deflated + capacity(k))
-        self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
+        self.V = np.empty((ops.n_local, self.n_deflated + capacity(k)), order="F")
         self.size = 0
         self.T = np.zeros((0, 0))
-        self._append(deflated, ops.apply_M(deflated))
+        self._append(deflated, deflated)
         phases = np.arange(1.0, BLOCK + 1.0)
         start = np.cos(np.outer(ops.fixed, phases) + phases)  # depends on the place only
         self._append(*self._orthonormal(start)[:2])
@@ -71,14 +70,13 @@ class BlockLanczos:
         return self.sigma + 1.0 / theta, Phi
 
     def _append(self, X: Array, MX: Array) -> None:
-        columns = slice(self.size, self.size + X.shape[1])
-        self.V[:, columns], self.MV[:, columns] = X, MX
+        self.V[:, self.size : self.size + X.shape[1]] = X
+        self.load = MX  # of the next solution
         self.size += X.shape[1]
 
     def _grow(self) -> Array:
         """One more block; returns its (p, p) coupling to the block before."""
-        last = self.MV[:, self.size - BLOCK : self.size]
-        W, MW, H, R = self._orthonormal(self.factor.solve(last))
+        W, MW, H, R = self._orthonormal(self.factor.solve(self.load))
         k, H = self.T.shape[0], H[self.n_deflated :]
         self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
         self._append(W, MW)
@@ -90,10 +88,10 @@ class BlockLanczos:
         When the space holds W already, round-off is left, orthogonal to it after the second pass:
         a random block with which the search goes on.
         """
-        V, MV = self.V[:, : self.size], self.MV[:, : self.size]
+        V = self.V[:, : self.size]  # M V is not kept: it would take as much memory again
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         for _ in range(2):
-            G = self.ops.gram(MV, W)
+            G = self.ops.gram(V, self.ops.apply_M(W))
             W = W - V @ G
             H += G
         MW = self.ops.apply_M(W)
@@ -109,10 +107,9 @@ class BlockLanczos:
         kept = self.k + BLOCK
         theta, S = self._ritz(kept)
         ends = self.n_deflated + np.array([0, kept, kept + BLOCK])
-        for A in (self.V, self.MV):
-            last = A[:, self.size - BLOCK : self.size].copy()
-            A[:, ends[0] : ends[1]] = A[:, ends[0] : self.size - BLOCK] @ S
-            A[:, ends[1] : ends[2]] = last
+        last = self.V[:, self.size - BLOCK : self.size].copy()
+        self.V[:, ends[0] : ends[1]] = self.V[:, ends[0] : self.size - BLOCK] @ S
+        self.V[:, ends[1] : ends[2]] = last
         self.size, self.T = ends[2], np.diag(theta)
 
     def _converged(self, R: Array) -> bool:
