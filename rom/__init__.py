@@ -27,7 +27,7 @@ from rom.model import (
 )
 from rom.reduction.enhanced import EnhancedCraigBampton
 from rom.reduction.fixed_interface import craig_bampton
-from rom.reduction.free_interface import Herting, Rubin
+from rom.reduction.free_interface import FreeFree, Herting, Rubin
 from rom.reduction.method import CraigBampton, Guyan
 from rom.reduction.polynomial import FourierLegendre, Polynomial
 from rom.report import write_report
@@ -49,6 +49,7 @@ __all__ = [
     "FEModel",
     "FlexibleBody",
     "FourierLegendre",
+    "FreeFree",
     "Guyan",
     "Herting",
     "Interface",

@@ -41,8 +41,9 @@ def certify_body(
     """
     rows: list[Row] = []
     comparison = {}
-    supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts)]
-    inner = connection.ops.hold(connection.boundary)
+    statics = body.has_static_shapes
+    supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
+    inner = connection.ops.hold(connection.boundary) if statics else None
     for fixed in supports:
         table = _compared(connection, ops, body, (basis, inner), fixed)
         if table["reduced"]:
@@ -52,10 +53,10 @@ def certify_body(
     for support, table in comparison.items():
         rows += _frequency_rows(support, table) if table["full"] else []
         rows += _estimate_rows(support, table)
-    rows += _static_row(connection, body)
+    rows += _static_row(connection, body) if statics else []
     rows += _rigid_rows(ops, body, elastic)
     rows += _matrix_rows(connection, basis, body)
-    rows += _effective_mass(body, tuple(connection.parts))
+    rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
 
 
@@ -70,7 +71,7 @@ def _compared(
     connection: Connection,
     ops: Operators,
     body: FlexibleBody,
-    reduction: tuple[Basis, Held],
+    reduction: tuple[Basis, Held | None],
     fixed: tuple[str, ...],
 ) -> dict[str, list[float]]:
     """Frequencies of both models in one support, their errors, and the agreement of shapes."""
@@ -84,7 +85,7 @@ def _compared(
     basis, inner = reduction
     shapes = _reduced_shapes(connection, basis, fixed, n + n_rigid)
     table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
-    if not any(label.startswith("enhanced") for label in basis.labels):
+    if inner and not any(label.startswith("enhanced") for label in basis.labels):
         table["estimated"] = _estimates(connection.ops, inner, shapes[:, n_rigid:]).tolist()
     if connection.ops.affordable:
         omega, Phi = connection.ops.modes(connection.held(fixed), n + n_rigid)
@@ -221,16 +222,21 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
 def _coupling_row(connection: Connection, basis: Basis, K: Array) -> list[Row]:
     """Constraint modes and fixed-interface modes do not couple in K; other modes do."""
     n_b = connection.boundary.size
-    if not all(label.startswith("fixed-interface") for label in basis.labels[n_b:]):
+    others = basis.labels[n_b:]
+    if basis.labels[:n_b] != connection.labels or not _normal(others):
         return []
     off, size = K[:n_b, n_b:], np.sqrt(np.diag(K))
     coupling = np.abs(off / np.outer(size[:n_b], size[n_b:])).max(initial=0.0)
     return [row("constraint against normal modes in K", coupling, 1e-8)]
 
 
+def _normal(labels: tuple[str, ...]) -> bool:
+    return all(label.startswith("fixed-interface") for label in labels)
+
+
 def _asymmetry(A: Array) -> float:
     scale = np.sqrt(np.abs(np.diag(A)))
-    scale[scale == 0] = 1.0
+    scale = np.maximum(scale, 1e-6 * scale.max())  # a rigid column has no stiffness of its own
     return float(np.abs((A - A.T) / np.outer(scale, scale)).max())
 
 

@@ -127,7 +127,7 @@ def reduce(
     Args:
         model: the full model, free-free.
         method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
-            `Herting`, `EnhancedCraigBampton`.
+            `Herting`, `EnhancedCraigBampton`, `FreeFree`.
         interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial` or
             `FourierLegendre`.
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
@@ -157,7 +157,7 @@ def reduce(
         elastic,
         ties=connection.ties,
         name=name,
-        provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
+        provenance=model.provenance | {"reduction": _described(method, basis, connection)},
     ).with_reference(reference)
     if damping is not None:
         body = damped(body, damping)
@@ -171,10 +171,12 @@ def reduce(
     )
 
 
-def _described(method: Method, basis: Any, n: int) -> dict[str, Any]:
+def _described(method: Method, basis: Any, connection: Any) -> dict[str, Any]:
+    labels = connection.labels
     return {
         "method": repr(method),
-        "full dofs": n,
+        "full dofs": connection.ops.n,
         "columns": list(basis.labels),
+        "static shapes": basis.labels[: len(labels)] == labels,
         "frequencies of the modes kept [Hz]": (basis.omega / (2 * np.pi)).tolist(),
     }

@@ -106,6 +106,11 @@ class FlexibleBody:
         return self.K.shape[0]
 
     @property
+    def has_static_shapes(self) -> bool:
+        """False for a basis of free-free modes alone, which no joint may clamp."""
+        return bool(self.provenance.get("reduction", {}).get("static shapes", True))
+
+    @property
     def interface_names(self) -> tuple[str, ...]:
         """Names of the interfaces."""
         return tuple(self.markers)
@@ -146,8 +151,18 @@ class FlexibleBody:
         """Natural modes of the reduced body: omega (m,) [rad/s], shapes (6 + r, m).
 
         Rows of the shapes: translation of the frame, rotation about its origin, elastic part.
+
+        Raises:
+            InterfaceError: if an interface is unknown.
+            ModelError: if an interface of a basis of free-free modes alone is held.
         """
         fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
+        if fixed and not self.has_static_shapes:
+            raise ModelError(
+                f"body {self.name!r} has free-free modes only; with {fixed[0]!r} held its "
+                "frequencies would be tens of per cents too high.",
+                hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
+            )
         M, K = self.full_matrices()
         N = self._supported(fixed)
         if not N.size:  # everything is held

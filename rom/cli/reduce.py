@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.reduction.method import Method
 
-METHODS = ("craig-bampton", "enhanced", "guyan", "rubin", "herting")
+METHODS = ("craig-bampton", "enhanced", "guyan", "rubin", "herting", "free-free")
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
   rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=METHODS,
         default=METHODS[0],
         help="craig-bampton (default), enhanced (the same, corrected), guyan (statics only), "
-        "rubin or herting (free-free modes)",
+        "rubin or herting (free-free modes and statics), free-free (no joint may clamp it)",
     )
     kept = parser.add_mutually_exclusive_group()
     kept.add_argument("-m", "--modes", type=count, help="modes kept (default 20)")
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _method(args: argparse.Namespace) -> "Method":
     from rom.reduction.enhanced import EnhancedCraigBampton
-    from rom.reduction.free_interface import Herting, Rubin
+    from rom.reduction.free_interface import FreeFree, Herting, Rubin
     from rom.reduction.method import CraigBampton, Guyan
 
     if args.f_max:
@@ -117,7 +117,12 @@ def _method(args: argparse.Namespace) -> "Method":
         if args.modes is not None:
             raise ConfigError("guyan keeps no modes: leave -m out.")
         return Guyan()
-    made: dict[str, Any] = {"enhanced": EnhancedCraigBampton, "rubin": Rubin, "herting": Herting}
+    made: dict[str, Any] = {
+        "enhanced": EnhancedCraigBampton,
+        "free-free": FreeFree,
+        "herting": Herting,
+        "rubin": Rubin,
+    }
     return made.get(args.method, CraigBampton)(n_modes=20 if args.modes is None else args.modes)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ModelError
 from rom.mbs import joints
 from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion, unit_vector
 from rom.mbs.joints import Joint
@@ -317,7 +317,21 @@ class Mechanism:
         A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
         gap = self.design_point(m2) - self.design_point(m1)
         directions = [unit_vector(f"axis of {name}", axis) for axis in axes]
-        self.joints[name] = kind(name, (m1, m2), (A1, A2), gap, *directions)
+        joint = kind(name, (m1, m2), (A1, A2), gap, *directions)
+        self._refuse_free_free(joint)
+        self.joints[name] = joint
+
+    def _refuse_free_free(self, joint: Joint) -> None:
+        """Free-free modes carry no moment to an interface, so that no joint may transmit one."""
+        for marker in joint.markers if joint.kind != "spherical" else ():
+            body = self.part(marker.body).flexible
+            if body is not None and not body.has_static_shapes:
+                raise ModelError(
+                    f"{joint.kind} joint {joint.name!r} transmits moments, and body "
+                    f"{marker.body!r} has free-free modes only: it would be too stiff by tens of "
+                    "per cents and without stress at the joint.",
+                    hint="Reduce the body with CraigBampton or Rubin, which know the interfaces.",
+                )
 
     def _joint_with_axis(self, joint: str, what: str) -> Joint:
         if joint not in self.joints:
