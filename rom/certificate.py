@@ -19,7 +19,7 @@ FREQUENCY_ERROR = 1e-3  # relative; what a structural dynamicist accepts without
 ASYMMETRY = 1e-6
 JUDGED = 1e-6  # frequency error above which an estimate must be right
 CREDIBLE = 2.0  # factor by which a frequency error may exceed its estimate
-ROUND_OFF = 1e-11  # stiffness, of the largest one of a basis, that is none
+ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
 CLUSTER = 1e-3  # modes closer than this (relative) are compared as one subspace
 
 
@@ -208,12 +208,14 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
     ops = connection.ops
     M = ops.gram(basis.Psi, ops.apply_M(basis.Psi))
     K = ops.gram(basis.Psi, ops.apply_K(basis.Psi))
-    stiff = np.diag(K) > ROUND_OFF * np.diag(K).max()  # a rigid column has no stiffness of its own
+    quotient = np.diag(K) / np.diag(M)
+    stiff = quotient > ROUND_OFF * quotient.max()  # a rigid column has no stiffness of its own
+    asymmetry = max(_asymmetry(K[stiff][:, stiff]), _asymmetry(M))
     scale = 1 / np.sqrt(np.diag(M))
     lam = np.linalg.eigvalsh(scale[:, None] * (0.5 * (M + M.T)) * scale)
     return [
         *_coupling_row(connection, basis, K),
-        row("asymmetry of projected K and M", max(_asymmetry(K[stiff][:, stiff]), _asymmetry(M)), ASYMMETRY),
+        row("asymmetry of projected K and M", asymmetry, ASYMMETRY),
         row("smallest eigenvalue of the scaled mass", lam[0], 1e-13, above=True),
         row("condition of the scaled mass", lam[-1] / max(lam[0], 1e-300), 1e13),
         row("mass-normalised shapes", np.abs(body.M - np.eye(body.n_modes)).max(initial=0.0), 1e-8),
