@@ -55,7 +55,7 @@ for mesh, lc, solver in (
     model = rom.fe.model(GEOMETRY, material=GREY_IRON, parameters={"lc": lc}, solver=solver)
     meshed = perf_counter()
     bodies[mesh] = rom.reduce(
-        model, method=rom.CraigBampton(40), interfaces=KINDS, name="housing", certify=False
+        model, method=rom.CraigBampton(60), interfaces=KINDS, name="housing", certify=False
     )
     done = perf_counter()
     say(

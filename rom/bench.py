@@ -98,10 +98,27 @@ def integrator(turns: int = 40) -> Iterator[Figure]:
     yield Figure("integrator", case, "share outside compiled code", share, "", "below 0.1")
 
 
+def peers(meshes: tuple[float, ...] = (0.005, 0.00285)) -> Iterator[Figure]:
+    """The same reduction by Exudyn and by SciPy with SuperLU and CHOLMOD; two processes too.
+
+    A connecting rod, two bores, 20 modes, one thread per process. The programs are installed from
+    the package index into an environment of their own, ``.venv-peers``.
+
+    Args:
+        meshes: element sizes [m]; about 31 000 and 103 000 dofs.
+    """
+    from rom.peers.compare import compared
+
+    for lc in meshes:
+        for case, quantity, value, unit, aim in compared(lc):
+            yield Figure("peers", case, quantity, value, unit, aim)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "integrator": integrator,
     "reduction": reduction,
     "large-reduction": large_reduction,
+    "peers": peers,
 }
 
 

@@ -1,5 +1,6 @@
 """What the benchmarks measure is what they say they measure."""
 
+import json
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from numpy.testing import assert_allclose
 import rom
 from rom import bench
 from rom.eigen import rigid_motions
+from rom.errors import ResourceError
 
 SIZE = np.array([0.16, 0.02, 0.012])
 
@@ -72,6 +74,33 @@ def test_the_integrator_is_measured_without_fenicsx():
     case = "26 elastic coordinates, 2000 steps"
     expected = [f"{case} steps per second True", f"{case} share outside compiled code True"]
     assert done.stdout.splitlines() == expected, done.stderr
+
+
+def test_other_programs_reduce_the_same_model(bar, tmp_path):
+    """The script that other programs run, here with SciPy: its body has our frequencies."""
+    from rom.peers.compare import SCRIPT
+    from rom.peers.ours import save_matrices
+
+    file = tmp_path / "matrices.npz"
+    save_matrices(bar, str(file), tuple(bench.KINDS))
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), str(file), "superlu", "rbe2", "8"],
+        capture_output=True, text=True, timeout=100, check=True,
+    )  # fmt: skip
+    found = json.loads(done.stdout)
+    body = rom.reduce(bar, method=rom.CraigBampton(8), interfaces=bench.KINDS, certify=False)
+    assert_allclose(found["frequencies"], body.frequencies()[6:16], rtol=1e-8)
+    assert found["seconds"] > 0.0
+
+
+def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
+    from rom.peers import compare
+
+    monkeypatch.setattr(compare, "ENVIRONMENT", tmp_path / "peers")
+    monkeypatch.setattr(compare, "PACKAGES", ("no-such-package-anywhere==0",))
+    with pytest.raises(ResourceError, match="the environment .* could not be made"):
+        compare.interpreter()
+    assert not (tmp_path / "peers" / "complete").exists()
 
 
 @pytest.mark.fenicsx

@@ -13,7 +13,7 @@ HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "g
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
 LIGHT = {"attachment", "body", "eigen", "errors", "io", "mbs", "model", "reduction", "rotation",
          "scipy_operators", "units"}  # fmt: skip
-ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor"}  # they stand in front
+ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor", "peers"}  # they stand in front
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "errors": set(),
     "model": {"errors"},

@@ -1,0 +1,92 @@
+"""Time of other programs over ours, on the same matrices in one run."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ResourceError
+
+# scikit-sparse builds on the CHOLMOD of Debian 12, and for NumPy 1
+PACKAGES = ("exudyn==1.13.6", "scikit-sparse<0.4.13", "scipy<1.14", "numpy<2")
+ENVIRONMENT = Path(".venv-peers")
+N_MODES = 20
+RBE3_DOFS = 40_000  # beyond, Exudyn's rbe3 runs out of memory
+SAME = 1e-6  # relative difference of frequencies that are the same model's
+SCRIPT = Path(__file__).with_name("craig_bampton.py")
+
+
+def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
+    """Case, quantity, value, unit and aim of each figure for one mesh.
+
+    Raises:
+        ResourceError: if a program cannot be installed, or fails.
+    """
+    python = interpreter()
+    with tempfile.TemporaryDirectory() as folder:
+        file = str(Path(folder) / "matrices.npz")
+        rod = [sys.executable, "-m", "rom.peers.ours", str(lc)]
+        ours = _run([*rod, "rbe2", str(N_MODES), file])
+        case = f"{ours['dofs']} dofs, rbe2"
+        yield case, "rom, one process", ours["seconds"], "s", ""
+        two = _run(["mpirun", "--oversubscribe", "-n", "2", *rod, "rbe2", str(N_MODES)])
+        yield case, "one process over two", ours["seconds"] / two["seconds"], "", "above 1"
+        for program, aim in (("superlu", ""), ("cholmod", "above 1"), ("exudyn", "above 10")):
+            theirs = _run([python, str(SCRIPT), file, program, "rbe2", str(N_MODES)])
+            yield case, f"{program} over rom", theirs["seconds"] / ours["seconds"], "", aim
+            gap = np.abs(np.array(theirs["frequencies"]) / ours["frequencies"] - 1).max()
+            yield case, f"{program}: difference of ten frequencies", gap, "", f"below {SAME:g}"
+        if ours["dofs"] <= RBE3_DOFS:
+            mean = _run([*rod, "rbe3", str(N_MODES)])
+            theirs = _run([python, str(SCRIPT), file, "exudyn", "rbe3", str(N_MODES)])
+            ratio = theirs["seconds"] / mean["seconds"]
+            yield f"{ours['dofs']} dofs, rbe3", "exudyn over rom", ratio, "", "above 10"
+
+
+def interpreter() -> str:
+    """The Python of the environment in which the other programs live; made if missing.
+
+    Raises:
+        ResourceError: if a package cannot be installed.
+    """
+    python = ENVIRONMENT / "bin" / "python"
+    done = ENVIRONMENT / "complete"
+    if not done.exists():
+        for command in (
+            [sys.executable, "-m", "venv", "--clear", str(ENVIRONMENT)],
+            [str(python), "-m", "pip", "install", "--quiet", *PACKAGES],
+        ):
+            made = subprocess.run(command, capture_output=True, text=True, check=False)
+            if made.returncode:
+                raise ResourceError(
+                    f"the environment {ENVIRONMENT} could not be made: "
+                    f"{made.stderr.strip().splitlines()[-1]}",
+                    hint="It needs the package index and, for CHOLMOD, apt-get install "
+                    "libsuitesparse-dev.",
+                )
+        done.touch()
+    return str(python)
+
+
+def _run(command: list[str]) -> dict[str, Any]:
+    """The answer of a process with one thread.
+
+    Raises:
+        ResourceError: if it fails.
+    """
+    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    allow = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=os.environ | one | allow
+    )
+    if done.returncode:
+        last = (done.stderr.strip() or "no message").splitlines()[-1]
+        raise ResourceError(f"{' '.join(command[:4])} ended with {done.returncode}: {last}")
+    answer: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
+    return answer
