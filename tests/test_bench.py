@@ -98,7 +98,7 @@ def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
 
     monkeypatch.setattr(compare, "ENVIRONMENT", tmp_path / "peers")
     monkeypatch.setattr(compare, "PACKAGES", ("no-such-package-anywhere==0",))
-    with pytest.raises(ResourceError, match="the environment .* could not be made"):
+    with pytest.raises(ResourceError, match=r"the environment .* could not be made"):
         compare.interpreter()
     assert not (tmp_path / "peers" / "complete").exists()
 
