@@ -25,11 +25,13 @@ from rom.model import (
     Report,
     SurfaceMesh,
 )
+from rom.reduction.characteristic import Characteristic
 from rom.reduction.enhanced import EnhancedCraigBampton
 from rom.reduction.fixed_interface import craig_bampton
 from rom.reduction.free_interface import FreeFree, Herting, Rubin
 from rom.reduction.method import CraigBampton, Guyan
 from rom.reduction.polynomial import FourierLegendre, Polynomial
+from rom.reduction.snapshots import Snapshots
 from rom.report import write_report
 from rom.workflow import mass_properties, modes, reduce
 
@@ -44,6 +46,7 @@ __all__ = [
     "Assembly",
     "Attachment",
     "Basis",
+    "Characteristic",
     "CraigBampton",
     "EnhancedCraigBampton",
     "FEModel",
@@ -63,6 +66,7 @@ __all__ = [
     "Report",
     "RomError",
     "Rubin",
+    "Snapshots",
     "SurfaceMesh",
     "audit",
     "check",

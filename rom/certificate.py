@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
@@ -112,9 +112,13 @@ def _estimates(ops: Operators, inner: Held, X: Array) -> Array:
 def _reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
     """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
     ops = connection.ops
-    drop = [connection.parts[name] for name in fixed]
-    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
-    Psi = basis.Psi[:, keep]
+    if basis.labels[: connection.boundary.size] == connection.labels:
+        drop = [connection.parts[name] for name in fixed]
+        keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
+        Psi = basis.Psi[:, keep]
+    else:  # the columns are combinations of interface coordinates
+        held = ops.rows(basis.Psi, connection.held(fixed))
+        Psi = basis.Psi @ null_space(held, rcond=1e-10) if held.size else basis.Psi
     K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
     scale = 1 / np.sqrt(np.diag(M))
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
@@ -225,17 +229,13 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
 
 def _coupling_row(connection: Connection, basis: Basis, K: Array) -> list[Row]:
     """Constraint modes and fixed-interface modes do not couple in K; other modes do."""
-    n_b = connection.boundary.size
-    others = basis.labels[n_b:]
-    if basis.labels[:n_b] != connection.labels or not _normal(others):
+    normal = [label.startswith("fixed-interface") for label in basis.labels]
+    n_b = normal.index(True) if any(normal) else 0
+    if not any(normal) or not all(normal[n_b:]) or n_b > connection.boundary.size:
         return []
     off, size = K[:n_b, n_b:], np.sqrt(np.diag(K))
     coupling = np.abs(off / np.outer(size[:n_b], size[n_b:])).max(initial=0.0)
     return [row("constraint against normal modes in K", coupling, 1e-8)]
-
-
-def _normal(labels: tuple[str, ...]) -> bool:
-    return all(label.startswith("fixed-interface") for label in labels)
 
 
 def _asymmetry(A: Array) -> float:

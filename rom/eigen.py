@@ -13,6 +13,7 @@ from scipy.sparse import identity, kron
 from rom.errors import InterfaceError
 from rom.model import Array, Interface
 
+CLUSTER = 1e-5  # eigenvalues closer than this (relative) belong to one space
 ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
 
 
@@ -123,6 +124,20 @@ def count_shift(lam: Array, m: int) -> tuple[int, float]:
     upper, lower = lam[m:], lam[m - 1 : -1]
     j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), np.abs(lam[-1]) * 1e-12)))
     return m + j, float(0.5 * (upper[j] + lower[j]))
+
+
+def whole_clusters(lam: Array, m: int) -> int:
+    """The least number of lowest modes, m or more, that cuts through no repeated eigenvalue.
+
+    One of two equal modes would prefer a direction that the structure does not have.
+
+    Args:
+        lam: (k,) ascending eigenvalues.
+        m: number of modes wanted, 1 <= m <= k.
+    """
+    while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER * lam[m]:
+        m += 1
+    return m
 
 
 def orthonormal(ops: Operators, X: Array) -> Array:

@@ -1,6 +1,7 @@
 """The short road: from a finite element model to modes and to a certified flexible body."""
 
 import logging
+import re
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -127,9 +128,9 @@ def reduce(
     Args:
         model: the full model, free-free.
         method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
-            `Herting`, `EnhancedCraigBampton`, `FreeFree`.
-        interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial` or
-            `FourierLegendre`.
+            `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`.
+        interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial`,
+            `FourierLegendre` or `Snapshots`.
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
         damping: structural damping; none if not given.
         name: name of the body.
@@ -157,7 +158,7 @@ def reduce(
         elastic,
         ties=connection.ties,
         name=name,
-        provenance=model.provenance | {"reduction": _described(method, basis, connection)},
+        provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
     ).with_reference(reference)
     if damping is not None:
         body = damped(body, damping)
@@ -171,12 +172,12 @@ def reduce(
     )
 
 
-def _described(method: Method, basis: Any, connection: Any) -> dict[str, Any]:
-    labels = connection.labels
+def _described(method: Method, basis: Any, n: int) -> dict[str, Any]:
+    alone = all(re.fullmatch(r"(rigid|free) \d+", label) for label in basis.labels)
     return {
         "method": repr(method),
-        "full dofs": connection.ops.n,
+        "full dofs": n,
         "columns": list(basis.labels),
-        "static shapes": basis.labels[: len(labels)] == labels,
+        "static shapes": not alone,
         "frequencies of the modes kept [Hz]": (basis.omega / (2 * np.pi)).tolist(),
     }

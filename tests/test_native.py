@@ -131,7 +131,7 @@ def test_other_files_and_newer_versions_are_named(file, tmp_path, body):
         rom.load(tmp_path / "missing.npz")
 
     def newer(name, data):
-        return data.replace(b'"version": [1, 0]', b'"version": [9, 0]')
+        return data.replace(b'"version": [1, 1]', b'"version": [9, 0]')
 
     with pytest.raises(FileFormatError, match=r"schema 'rom-body' \[9, 0\]"):
         rom.load(rewritten(file, tmp_path / "new.npz", newer))

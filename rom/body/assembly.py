@@ -1,48 +1,62 @@
 """Reduced bodies coupled where they touch: modes of the whole from its parts."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag, eigh, null_space
+from scipy.linalg import block_diag
 
+from rom.body.condensed import (
+    CondensedAssembly,
+    check_count,
+    joint_functions,
+    local_traces,
+    natural_modes,
+    partition,
+    per_body,
+    supported,
+    system_functions,
+)
+from rom.body.coupling import coupled_rows
 from rom.body.flexible import FlexibleBody, Marker
-from rom.errors import ConfigError, InterfaceError
+from rom.errors import ConfigError
 from rom.model import Array
 
 Place = tuple[str, str]  # body, interface
-SAME_PLACE = 1e-6  # distance of two interfaces, of the size of the bodies, that still meet
 
 
 @dataclass(frozen=True)
 class Assembly:
     """Bodies that share interfaces, in the position in which they were modelled.
 
-    Interfaces are coupled by their coordinates: all dofs of conforming meshes ("full"), rigid or
-    mean motions, or the coefficients of orthogonal functions, which two surfaces have in common
-    even when their meshes do not match.
+    Interfaces are coupled by their coordinates: all dofs of conforming meshes ("full"), whatever
+    the order of their nodes; rigid or mean motions; or the coefficients of equal functions. Where
+    meshes do not match, a projection couples moments of common functions.
 
     Attributes:
         bodies: {name: body}, all in one system of coordinates.
         couplings: ((body, interface), (body, interface)) pairs that move together.
+        projection: functions that couple deformable interfaces whose coordinates differ, e.g.
+            ``Polynomial(4)``; displacements that they contain pass without error.
 
     Raises:
         ConfigError: if a body is unknown or a coupling is no pair of places.
-        InterfaceError: if two interfaces are of different kind or size, or lie apart.
+        InterfaceError: if two interfaces are of different kind or size, lie apart, or need a
+            projection.
     """
 
     bodies: dict[str, FlexibleBody]
     couplings: tuple[tuple[Place, Place], ...]
+    projection: Any = None
 
     def __post_init__(self) -> None:
-        for coupling in self.couplings:
-            try:
-                one, other = (self._marker(place) for place in coupling)
-            except (TypeError, ValueError) as error:
-                raise ConfigError(
-                    f"coupling {coupling!r} is not a pair of (body, interface)."
-                ) from error
-            _check_pair(coupling, one, other, max(b.size for b in self.bodies.values()))
+        if self.projection is not None and not hasattr(self.projection, "functions"):
+            raise ConfigError(
+                f"projection = {self.projection!r} gives no functions of a surface.",
+                hint="Use for example rom.Polynomial(4).",
+            )
+        _ = self._coupled  # refuses couplings that cannot be
 
     def frequencies(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Array:
         """Natural frequencies of the assembly [Hz].
@@ -60,22 +74,93 @@ class Assembly:
         self, n: int | None = None, *, fixed: tuple[Place, ...] = ()
     ) -> tuple[Array, dict[str, Array]]:
         """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
-        M, K = (block_diag(*parts) for parts in zip(*self._matrices(), strict=True))
+        M, K = self._matrices()
         N = self._free(fixed)
-        if not N.size:
-            return np.zeros(0), {name: np.zeros((w, 0)) for name, w in self._widths().items()}
-        M_n = N.T @ M @ N
-        scale = 1 / np.sqrt(np.diag(M_n))
-        lam, V = eigh(scale[:, None] * (N.T @ K @ N) * scale, scale[:, None] * M_n * scale)
-        omega = np.sqrt(np.maximum(lam, 0.0))
-        omega[: self._n_rigid(fixed)] = 0.0
-        shapes = N @ (scale[:, None] * V)
-        ends = np.cumsum(list(self._widths().values()))[:-1]
-        split = dict(zip(self.bodies, np.split(shapes[:, :n], ends), strict=True))
-        return omega[:n], split
+        omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
+        return omega[:n], per_body(self._widths(), N @ V[:, :n])
 
-    def _matrices(self) -> list[tuple[Array, Array]]:
-        return [body.full_matrices() for body in self.bodies.values()]
+    def reduced(
+        self, n_interface: int, *, level: str = "system", fixed: tuple[Place, ...] = ()
+    ) -> CondensedAssembly:
+        """The assembly with few functions on its coupled interfaces: characteristic modes.
+
+        Other interfaces keep their coordinates. A repeated frequency of the interfaces is kept
+        whole, so that the result may have more functions than asked for; it says how many.
+
+        Args:
+            n_interface: number of functions; with level "local", modes per body.
+            level: "system": lowest modes of all interfaces of the whole, the best choice per
+                function; "local": lowest modes of each body with its interfaces free, both sides
+                of an interface taking the union, so that a body can be replaced alone.
+            fixed: (body, interface) pairs that are held.
+
+        Raises:
+            ConfigError: if the interfaces have fewer coordinates, nothing is coupled, the level
+                is unknown, or "local" meets an interface that is coupled twice.
+            InterfaceError: if an interface is unknown.
+        """
+        if level not in ("system", "local"):
+            raise ConfigError(f'level = {level!r} is neither "system" nor "local".')
+        if not self.couplings:
+            raise ConfigError("nothing is coupled: there are no interfaces to reduce.")
+        M, K = self._matrices()
+        N, H = self._free(fixed), np.vstack([self._placed(term[:1]) for term in self._coupled])
+        parts = partition(M, K, N, H, self._n_rigid(fixed))
+        if level == "system":
+            W = system_functions(parts, n_interface)
+        else:
+            W = joint_functions(H @ parts.C, self._traces(n_interface, fixed))
+        basis = np.hstack([parts.C @ W, parts.F])
+        M, K = basis.T @ M @ basis, basis.T @ K @ basis
+        n, n_rigid = W.shape[1], self._n_rigid(fixed)
+        omega = natural_modes(M[:n, :n], K[:n, :n], n_rigid)[0]
+        return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid)
+
+    def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
+        """Per coupling, the interface motions that the modes of its two bodies ask for."""
+        places = [place for coupling in self.couplings for place in coupling]
+        twice = sorted({place for place in places if places.count(place) > 1})
+        if twice:
+            raise ConfigError(
+                f"{twice[0]} is coupled {places.count(twice[0])} times.",
+                hint='level="local" needs every interface in one coupling; use level="system".',
+            )
+        found: dict[Place, Array] = {}
+        largest = 0
+        for name, body in self.bodies.items():
+            rows = {p: h for term in self._coupled for p, h, _ in term if p[0] == name}
+            if not rows:
+                continue
+            held = [self._marker(place).hold for place in fixed if place[0] == name]
+            N = supported(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
+            n_rigid = self._n_rigid(tuple(place for place in fixed if place[0] == name))
+            parts = partition(*body.full_matrices(), N, np.vstack([*rows.values()]), n_rigid)
+            largest = max(largest, parts.lam.size)
+            traces = local_traces(parts, max(int(n), 1), [*rows.values()], name)
+            found |= dict(zip(rows, traces, strict=True))
+        check_count(n, largest)
+        return [[found[place] for place in coupling] for coupling in self.couplings]
+
+    @cached_property
+    def _coupled(self) -> list[tuple[tuple[Place, Array, float], ...]]:
+        """Per coupling both places with their rows and signs: the sum vanishes."""
+        size = max((body.size for body in self.bodies.values()), default=0.0)
+        terms = []
+        for coupling in self.couplings:
+            try:
+                one, other = (self._marker(place) for place in coupling)
+            except (TypeError, ValueError) as error:
+                raise ConfigError(
+                    f"coupling {coupling!r} is not a pair of (body, interface)."
+                ) from error
+            rows = coupled_rows(coupling, one, other, size, self.projection)
+            terms.append(tuple(zip(coupling, rows, (1.0, -1.0), strict=True)))
+        return terms
+
+    def _matrices(self) -> tuple[Array, Array]:
+        pairs = [body.full_matrices() for body in self.bodies.values()]
+        M, K = (block_diag(*parts) for parts in zip(*pairs, strict=True))
+        return M, K
 
     def _widths(self) -> dict[str, int]:
         return {name: 6 + body.n_modes for name, body in self.bodies.items()}
@@ -93,28 +178,23 @@ class Assembly:
             [np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
              for b in self.bodies.values()]
         )  # fmt: skip
-        C = self._rows(fixed) * scale
-        if not C.size:
-            return np.diag(scale)
-        C = C / np.maximum(np.linalg.norm(C, axis=1, keepdims=True), 1e-300)
-        return scale[:, None] * null_space(C, rcond=1e-10)
+        return scale[:, None] * supported(self._rows(fixed) * scale)
 
     def _rows(self, fixed: tuple[Place, ...]) -> Array:
         """(c, n) what is zero: differences of coupled interfaces, coordinates of held ones."""
+        held = [((place, self._marker(place).hold, 1.0),) for place in fixed]
+        n = sum(self._widths().values())
+        return np.vstack([np.zeros((0, n)), *map(self._placed, [*self._coupled, *held])])
+
+    def _placed(self, term: tuple[tuple[Place, Array, float], ...]) -> Array:
+        """(c, n) sum of rows, each at the columns of its body."""
         widths = self._widths()
         starts = dict(zip(widths, np.cumsum([0, *widths.values()])[:-1], strict=True))
-        rows = [np.zeros((0, sum(widths.values())))]
-        terms: list[tuple[tuple[Any, float], ...]] = [
-            ((one, 1.0), (other, -1.0)) for one, other in self.couplings
-        ]
-        terms += [((place, 1.0),) for place in fixed]
-        for term in terms:
-            block = np.zeros((self._marker(term[0][0]).hold.shape[0], rows[0].shape[1]))
-            for place, sign in term:
-                hold, start = self._marker(place).hold, starts[place[0]]
-                block[:, start : start + hold.shape[1]] += sign * hold
-            rows.append(block)
-        return np.vstack(rows)
+        block = np.zeros((term[0][1].shape[0], sum(widths.values())))
+        for place, rows, sign in term:
+            start = starts[place[0]]
+            block[:, start : start + rows.shape[1]] += sign * rows
+        return block
 
     def _n_rigid(self, fixed: tuple[Place, ...]) -> int:
         """Rigid motions of the whole that supports leave free."""
@@ -122,19 +202,3 @@ class Assembly:
         held = [self._marker(place).hold[:, :6] for place in fixed]
         rows = np.vstack([np.zeros((1, 6)), *held]) * np.r_[np.ones(3), np.full(3, 1 / size)]
         return 6 - int(np.linalg.matrix_rank(rows, tol=1e-9))
-
-
-def _check_pair(coupling: Any, one: Marker, other: Marker, size: float) -> None:
-    if one.kind != other.kind or one.hold.shape[0] != other.hold.shape[0]:
-        raise InterfaceError(
-            f"{coupling[0]} is {one.kind} with {one.hold.shape[0]} coordinates, {coupling[1]} is "
-            f"{other.kind} with {other.hold.shape[0]}: they cannot move together.",
-            hint="Reduce both bodies with the same kind; on meshes that do not match, with "
-            "Polynomial of the same order.",
-        )
-    gap = np.linalg.norm(one.point - other.point)
-    if gap > SAME_PLACE * size:
-        raise InterfaceError(
-            f"{coupling[0]} and {coupling[1]} lie {gap:.3g} m apart.",
-            hint="Model the bodies in the position in which they are assembled.",
-        )

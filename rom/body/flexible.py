@@ -12,6 +12,22 @@ from rom.model import Array, Index, Report
 
 
 @dataclass(frozen=True, slots=True)
+class Patch:
+    """The meshed surface behind a deformable interface, to couple meshes that do not match.
+
+    Attributes:
+        points: (k, 3) undeformed nodes in the body frame [m].
+        surface_mass: (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2].
+        shapes: (3k, n_c) displacement of the nodes per unit of each interface coordinate; None
+            when the coordinates are these displacements.
+    """
+
+    points: Array
+    surface_mass: Any
+    shapes: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Marker:
     """Where a joint or a force acts.
 
@@ -23,6 +39,7 @@ class Marker:
         kind: "rbe2", "rbe3", "full", or the functions it follows, e.g. "polynomial:3".
         hold: (n_c, 6 + r) interface coordinates as a function of rigid motion (translation, then
             rotation about the body origin) and elastic coordinates; zero when it is held.
+        patch: the surface of a deformable interface; None when its motion is rigid or averaged.
     """
 
     name: str
@@ -31,6 +48,7 @@ class Marker:
     rotation: Array
     kind: str
     hold: Array
+    patch: Patch | None = None
 
 
 @dataclass(frozen=True, slots=True)

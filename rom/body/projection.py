@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space
+from scipy.sparse import csr_matrix
 
 from rom.attachment import carried_displacements
-from rom.body.flexible import FlexibleBody, Marker, Surface
+from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
 from rom.errors import ModelError
@@ -130,7 +131,16 @@ def _marker(ops: Operators, interface: Interface, tie: Any, E: Array) -> Marker:
     U = ops.rows(E, interface.dofs)
     motion = mean_motion(interface) @ U
     hold = np.hstack([tie.coordinates @ rigid_motions(interface.points), tie.coordinates @ U])
-    return Marker(interface.name, interface.origin, motion[:3], motion[3:], tie.label, hold)
+    patch = _patch(interface, tie)
+    return Marker(interface.name, interface.origin, motion[:3], motion[3:], tie.label, hold, patch)
+
+
+def _patch(interface: Interface, tie: Any) -> Patch | None:
+    """The surface, if its coordinates let it deform; an averaged one keeps dofs of its own."""
+    if tie.label in ("rbe2", "rbe3"):
+        return None
+    shapes = tie.by_masters if tie.removed.size else None
+    return Patch(interface.points, csr_matrix(interface.surface_mass), shapes)
 
 
 def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:

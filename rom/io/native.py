@@ -14,15 +14,16 @@ from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
+from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.body.flexible import FlexibleBody, Marker, Surface
+from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import write_whole
 from rom.model import Array, Report, Row
 from rom.units import SYSTEMS
 
 SCHEMA = "rom-body"
-VERSION = (1, 0)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 1)  # a new major number breaks readers, a new minor number only adds
 LIMIT = 4 * 1024**3  # bytes a body may have in memory before reading is refused
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 
@@ -116,6 +117,7 @@ def _arrays(body: FlexibleBody) -> dict[str, Array]:
     for i, marker in enumerate(body.markers.values()):
         for part in ("point", "translation", "rotation", "hold"):
             arrays[f"marker/{i}/{part}"] = getattr(marker, part)
+        arrays |= {f"marker/{i}/{part}": A for part, A in _patch_arrays(marker.patch).items()}
     if body.surface is not None:
         for part in ("points", "triangles", "shape"):
             arrays[f"surface/{part}"] = getattr(body.surface, part)
@@ -123,6 +125,23 @@ def _arrays(body: FlexibleBody) -> dict[str, Array]:
         n: np.asarray(A, dtype=np.int64 if A.dtype.kind == "i" else float)
         for n, A in arrays.items()
     }
+
+
+def _patch_arrays(patch: Patch | None) -> dict[str, Array]:
+    if patch is None:
+        return {}
+    S = coo_matrix(patch.surface_mass)
+    arrays = {"points": patch.points, "area": S.data, "area_nodes": np.array([S.row, S.col])}
+    return arrays if patch.shapes is None else arrays | {"shapes": patch.shapes}
+
+
+def _patch(arrays: dict[str, Array], place: str) -> Patch | None:
+    """The surface of an interface; files of version 1.0 have none."""
+    if f"{place}/points" not in arrays:
+        return None
+    points, nodes = arrays[f"{place}/points"], arrays[f"{place}/area_nodes"]
+    S = csr_matrix((arrays[f"{place}/area"], tuple(nodes)), shape=(len(points),) * 2)
+    return Patch(points, S, arrays.get(f"{place}/shapes"))
 
 
 def _manifest(body: FlexibleBody) -> dict[str, Any]:
@@ -147,6 +166,7 @@ def _body(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
             name=m["name"],
             kind=m["kind"],
             **{p: arrays[f"marker/{i}/{p}"] for p in ("point", "translation", "rotation", "hold")},
+            patch=_patch(arrays, f"marker/{i}"),
         )
         for i, m in enumerate(manifest["markers"])
     }
@@ -267,6 +287,7 @@ def _verify(body: FlexibleBody, path: Path) -> None:
             raise FileFormatError(
                 f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
             )
+        _verify_patch(m, path)
     if body.surface is not None:
         n = body.surface.points.shape[0]
         triangles = body.surface.triangles
@@ -279,3 +300,15 @@ def _verify(body: FlexibleBody, path: Path) -> None:
             raise QualityGateError(f"{name} is not symmetric.", where=str(path))
     if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):
         raise QualityGateError("the mass is not positive definite.", where=str(path))
+
+
+def _verify_patch(marker: Marker, path: Path) -> None:
+    if marker.patch is None:
+        return
+    dofs, n_c = 3 * marker.patch.points.shape[0], marker.hold.shape[0]
+    shapes = marker.patch.shapes
+    if (n_c != dofs) if shapes is None else (shapes.shape != (dofs, n_c)):
+        raise FileFormatError(
+            f"the surface of marker {marker.name!r} does not fit {n_c} coordinates.",
+            where=str(path),
+        )

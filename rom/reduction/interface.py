@@ -48,8 +48,8 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
         model: supplies the interfaces.
         interfaces: {name: kind}; "full" keeps every dof, "rbe2" makes the surface rigid (six
             coordinates), "rbe3" adds six coordinates that follow the area-weighted mean motion of
-            the surface and leave it deformable; `Polynomial` and `FourierLegendre` let the surface
-            follow orthogonal functions.
+            the surface and leave it deformable; `Polynomial`, `FourierLegendre` and `Snapshots`
+            let the surface follow orthogonal functions.
 
     Raises:
         InterfaceError: if a name is unknown, two interfaces share nodes, or a surface cannot carry

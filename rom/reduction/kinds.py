@@ -5,17 +5,18 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import identity
+from scipy.sparse import identity, kron
 
 from rom.eigen import mean_motion, rigid_motions
 from rom.errors import ConfigError, ResourceError
 from rom.model import Array, Index, Interface
 from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions
+from rom.reduction.snapshots import Snapshots, snapshot_functions
 
 RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
 KNOWN = (
     '"full", "rbe2", "rbe3", rom.Polynomial(order) or "polynomial:3", '
-    'rom.FourierLegendre(harmonics, order) or "fourier:3,2"'
+    'rom.FourierLegendre(harmonics, order) or "fourier:3,2", rom.Snapshots(values, n=…)'
 )
 
 
@@ -63,6 +64,8 @@ def tie(interface: Interface, kind: Any) -> Tie:
         return _stiff(interface, "rbe2", SIX, mean_motion(interface), R)
     if kind == "rbe3":
         return _averaged(interface)
+    if isinstance(kind, Snapshots):
+        return _seen(interface, kind)
     Q = interface_functions(kind, interface)
     names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
     L = np.kron((interface.surface_mass @ Q).T, np.eye(3))
@@ -86,6 +89,14 @@ def _stiff(
     """All dofs of the surface follow from its coordinates."""
     none = np.zeros((shapes.shape[0], 0))
     return Tie(label, names, coordinates, interface.dofs, shapes, NO_DOFS, none)
+
+
+def _seen(interface: Interface, kind: Snapshots) -> Tie:
+    mean_motion(interface)  # refuses surfaces whose rotation is undetermined
+    Q = snapshot_functions(kind, interface)
+    names = (*SIX, *(f"snapshot {j + 1}" for j in range(Q.shape[1] - 6)))
+    L = (kron(interface.surface_mass, identity(3), format="csr") @ Q).T
+    return _stiff(interface, f"snapshots:{Q.shape[1]}", names, L, Q)
 
 
 def _averaged(interface: Interface) -> Tie:
@@ -117,7 +128,11 @@ def _label(kind: Polynomial | FourierLegendre) -> str:
 
 
 def _parsed(name: str, kind: Any) -> Any:
-    if isinstance(kind, Polynomial | FourierLegendre) or kind in ("full", "rbe2", "rbe3"):
+    if isinstance(kind, Polynomial | FourierLegendre | Snapshots) or kind in (
+        "full",
+        "rbe2",
+        "rbe3",
+    ):
         return kind
     if isinstance(kind, str):
         word, _, numbers = kind.partition(":")

@@ -6,13 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
-from rom.eigen import Held, Operators
+from rom.eigen import Held, Operators, whole_clusters
 from rom.errors import ConfigError, RomWarning
 from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
 from rom.reduction.selection import enough_modes
 
-REPEATED = 1e-6  # relative distance of frequencies that are one
 FIRST_BATCH = 16  # modes computed first when a frequency limit is given
 
 
@@ -97,7 +96,7 @@ class CraigBampton:
                 raise ConfigError(
                     f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
                 )
-            return whole_clusters(ops, held, int(self.n_modes))
+            return _lowest(ops, held, int(self.n_modes))
         m = min(FIRST_BATCH, held.n_free)
         omega, Phi = ops.modes(held, m)
         while omega.size and omega[-1] <= 2 * np.pi * self.f_max and m < held.n_free:
@@ -107,26 +106,25 @@ class CraigBampton:
         return omega[:keep], Phi[:, :keep]
 
 
-def whole_clusters(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
+def _lowest(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
     """The lowest fixed-interface modes, and those beyond that share the last frequency.
 
     Which member of a repeated frequency comes first is an accident of round-off; a basis that cut
-    it in two would differ from run to run and prefer a direction the body does not have.
+    it in two would differ from run to run.
     """
     if n_modes == 0:
         return ops.modes(held, 0)
-    n = min(n_modes + 1, held.n_free)
-    omega, Phi = ops.modes(held, n, finished=True)
-    while omega[-1] <= (1.0 + REPEATED) * omega[n_modes - 1] and n < held.n_free:
-        n = min(n + n_modes + 1, held.n_free)
+    n, keep = n_modes, n_modes
+    while keep == n and n < held.n_free:  # the last frequency may go on beyond the modes computed
+        n = min(n + 1 if n == n_modes else n + 4, held.n_free)
         omega, Phi = ops.modes(held, n, finished=True)
-    keep = int(np.searchsorted(omega, (1.0 + REPEATED) * omega[n_modes - 1], side="right"))
+        keep = whole_clusters(omega**2, n_modes)
+    if n == n_modes:  # there are no others
+        return ops.modes(held, n, finished=True)
     if keep > n_modes and ops.first == 0:
-        warnings.warn(
-            RomWarning(
-                f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share "
-                f"the frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
-            ),
-            stacklevel=4,
+        said = (
+            f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share the "
+            f"frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
         )
+        warnings.warn(RomWarning(said), stacklevel=4)
     return omega[:keep], Phi[:, :keep]

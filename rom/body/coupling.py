@@ -1,0 +1,200 @@
+"""Two interfaces that move together: nodes by position, coefficients, or moments of functions."""
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import block_diag
+from scipy.spatial import cKDTree
+
+from rom.body.flexible import Marker, Patch
+from rom.errors import InterfaceError
+from rom.model import Array, Index, Interface
+
+SAME_PLACE = 1e-6  # distance of two nodes or interfaces, of the size of the bodies, that still meet
+SAME_SURFACE = (0.05, 0.25)  # gap of centroids over extent, and of areas, of two faceted surfaces
+SAME_FUNCTIONS = 1e-6  # difference of functions at equal nodes, of the largest value
+DEPENDENT = 1e-9  # share of a function that is new, below which it is dropped
+SEEN = 0.5  # share of a function that one mesh sees, of what the other sees, to be common to both
+
+
+def coupled_rows(
+    coupling: Any, one: Marker, other: Marker, size: float, projection: Any
+) -> tuple[Array, Array]:
+    """(n_c, 6 + r) of either body: interface coordinates that agree when both move together.
+
+    Nodes that coincide are coupled node by node, whatever their order; equal functions by their
+    coefficients; everything else by moments of common functions, if a projection is given.
+
+    Args:
+        coupling: the two places, for messages.
+        one: first interface.
+        other: second interface.
+        size: size of the bodies [m].
+        projection: functions of the surface, e.g. ``Polynomial(4)``, or None.
+
+    Raises:
+        InterfaceError: if the kinds differ, the surfaces lie apart, or the meshes do not match and
+            no projection is given.
+    """
+    if one.kind != other.kind:
+        _refuse_unequal(coupling, one, other)
+    if one.patch is None or other.patch is None:
+        if one.hold.shape[0] != other.hold.shape[0]:
+            _refuse_unequal(coupling, one, other)
+        _refuse_gap(coupling, one.point - other.point, SAME_PLACE * size)
+        return one.hold, other.hold
+    order = _same_nodes(one.patch, other.patch, SAME_PLACE * size)
+    if order is None:
+        _refuse_other_surface(coupling, one.patch, other.patch)
+    equal = _equal_coordinates(one, other, order)
+    if equal is not None:
+        return equal
+    if projection is None:
+        _refuse_unprojected(coupling, one, other, order)
+    return projected_rows(one, other, projection)
+
+
+def projected_rows(one: Marker, other: Marker, projection: Any) -> tuple[Array, Array]:
+    """Coefficients of the best approximation of both motions by common functions.
+
+    With functions V of the surface, in one frame and scale for both meshes, and the surface mass S
+    of each mesh, c = (V^T S V)^-1 V^T S u. Displacements that the functions contain, rigid motion
+    and uniform strain above all, have the same c on any two meshes and pass without error. On one
+    plane c_1 = c_2 is the condition that all moments of u_1 - u_2 with the functions vanish.
+
+    Source:
+        the projection of the mortar method, Bernardi, Maday and Patera (1994), with polynomials of
+        the whole interface as multipliers.
+    """
+    a, b = one.patch, other.patch
+    V_a, V_b, Q_a, Q_b = _common_functions(a, b, projection)
+    SQ_a, SQ_b = a.surface_mass @ Q_a, b.surface_mass @ Q_b
+    # V = Q T with T = Q^T S V on either side; coefficients of V, in multiples of T_a
+    L_b = (SQ_a.T @ V_a) @ np.linalg.solve(SQ_b.T @ V_b, SQ_b.T)
+    return _nodal(SQ_a.T, one), _nodal(L_b, other)
+
+
+def _nodal(L: Array, marker: Marker) -> Array:
+    """(3m, 6 + r) what (m, k) functionals of the nodal displacements say of the coordinates."""
+    shapes = marker.patch.shapes
+    return np.kron(L, np.eye(3)) @ (marker.hold if shapes is None else shapes @ marker.hold)
+
+
+def _common_functions(a: Patch, b: Patch, projection: Any) -> tuple[Array, ...]:
+    """The same functions on both meshes, in one frame and scale, and orthonormal on each.
+
+    From low to high degree; left out is what depends on earlier ones, or what the meshes see
+    differently: facets of a curved surface, and degrees beyond the resolution of one mesh.
+
+    Returns:
+        V_a (k_a, m), V_b (k_b, m), and Q_a, Q_b with Q^T S Q = I and the span of V.
+    """
+    points = np.vstack([a.points, b.points])
+    S = block_diag([a.surface_mass, b.surface_mass], format="csr")
+    both = Interface("both", np.arange(len(points)), points, S, points.mean(axis=0))
+    V_a, V_b = np.split(projection.functions(both), [a.points.shape[0]])
+    kept: list[int] = []
+    Q_a, Q_b = V_a[:, :0], V_b[:, :0]
+    for j in range(V_a.shape[1]):
+        q_a, new_a = _new_part(Q_a, a.surface_mass, V_a[:, j])
+        q_b, new_b = _new_part(Q_b, b.surface_mass, V_b[:, j])
+        if min(new_a, new_b) > max(DEPENDENT, SEEN * max(new_a, new_b)):
+            Q_a, Q_b, kept = np.column_stack([Q_a, q_a]), np.column_stack([Q_b, q_b]), [*kept, j]
+    return V_a[:, kept], V_b[:, kept], Q_a, Q_b
+
+
+def _new_part(Q: Array, S: Any, v: Array) -> tuple[Array, float]:
+    """What Q does not contain of v, normalised, and its share of v."""
+    before = np.sqrt(v @ (S @ v))
+    for _ in range(3):
+        v = v - Q @ (Q.T @ (S @ v))
+    after = np.sqrt(v @ (S @ v))
+    return (v / after, float(after / before)) if after > DEPENDENT * before else (v, 0.0)
+
+
+def _same_nodes(a: Patch, b: Patch, tolerance: float) -> Index | None:
+    """(k,) where the nodes of a stand in b; None if the meshes do not match."""
+    if a.points.shape != b.points.shape:
+        return None
+    distance, order = cKDTree(b.points).query(a.points)
+    if distance.max() > tolerance or np.unique(order).size < order.size:
+        return None
+    return order
+
+
+def _equal_coordinates(
+    one: Marker, other: Marker, order: Index | None
+) -> tuple[Array, Array] | None:
+    """Rows of the coordinates, if they mean the same on both sides; None otherwise."""
+    one_shapes, other_shapes = one.patch.shapes, other.patch.shapes
+    if one_shapes is None or other_shapes is None:
+        if order is None or _locked(one) or _locked(other):
+            return None
+        dofs = (3 * order[:, None] + np.arange(3)).ravel()
+        return one.hold, other.hold[dofs]
+    if one.hold.shape[0] != other.hold.shape[0]:
+        return None
+    if order is None:
+        # coefficients of rigid motions agree when the functions do, up to the error of the meshes
+        here, there = one.hold[:, :6], other.hold[:, :6]
+    else:
+        here = one_shapes.reshape(order.size, -1)
+        there = other_shapes.reshape(order.size, -1)[order]
+    same = np.abs(here - there).max() <= SAME_FUNCTIONS * np.abs(here).max()
+    return (one.hold, other.hold) if same else None
+
+
+def _locked(marker: Marker) -> bool:
+    """True when the dofs of an interface depend on each other: it moves in few ways only."""
+    rows = marker.hold / np.linalg.norm(marker.hold, axis=1, keepdims=True)
+    spectrum = np.linalg.svd(rows, compute_uv=False)
+    return spectrum.size < rows.shape[0] or bool(spectrum[-1] < 1e-10 * spectrum[0])
+
+
+def _refuse_unequal(coupling: Any, one: Marker, other: Marker) -> None:
+    raise InterfaceError(
+        f"{coupling[0]} is {one.kind} with {one.hold.shape[0]} coordinates, {coupling[1]} is "
+        f"{other.kind} with {other.hold.shape[0]}: they cannot move together.",
+        hint="Reduce both bodies with the same kind; on meshes that do not match, with "
+        "Polynomial of the same order.",
+    )
+
+
+def _refuse_gap(coupling: Any, between: Array, limit: float) -> None:
+    gap = float(np.linalg.norm(between))
+    if gap > limit:
+        raise InterfaceError(
+            f"{coupling[0]} and {coupling[1]} lie {gap:.3g} m apart.",
+            hint="Model the bodies in the position in which they are assembled.",
+        )
+
+
+def _refuse_other_surface(coupling: Any, a: Patch, b: Patch) -> None:
+    """Surfaces meshed differently still have nearly one centroid and one area."""
+    extent = max(np.ptp(a.points, axis=0).max(), np.ptp(b.points, axis=0).max())
+    weights = [np.asarray(p.surface_mass.sum(axis=1)).ravel() for p in (a, b)]
+    centres = [w @ p.points / w.sum() for w, p in zip(weights, (a, b), strict=True)]
+    _refuse_gap(coupling, centres[0] - centres[1], SAME_SURFACE[0] * extent)
+    areas = [w.sum() for w in weights]
+    if abs(areas[0] - areas[1]) > SAME_SURFACE[1] * max(areas):
+        raise InterfaceError(
+            f"{coupling[0]} has an area of {areas[0]:.4g}, {coupling[1]} of {areas[1]:.4g}: they "
+            "do not cover one surface.",
+            hint="Name exactly the surface of contact on both bodies.",
+        )
+
+
+def _refuse_unprojected(coupling: Any, one: Marker, other: Marker, order: Index | None) -> None:
+    n, m = (marker.patch.points.shape[0] for marker in (one, other))
+    if order is None:
+        raise InterfaceError(
+            f"{coupling[0]} has {n} nodes, {coupling[1]} has {m}, and they do not coincide: "
+            f"{one.kind} coordinates mean different motions on the two meshes.",
+            hint="Couple moments of common functions: Assembly(…, projection=rom.Polynomial(4)).",
+        )
+    raise InterfaceError(
+        f"{coupling[0]} and {coupling[1]} share {n} nodes, but each is reduced to functions of its "
+        "own: coupled node by node they would lock.",
+        hint="Reduce both with the same functions, or with full interfaces and reduce the "
+        "assembly: Assembly.reduced(…).",
+    )
