@@ -29,6 +29,7 @@ from rom.reduction.characteristic import Characteristic
 from rom.reduction.enhanced import EnhancedCraigBampton
 from rom.reduction.fixed_interface import craig_bampton
 from rom.reduction.free_interface import FreeFree, Herting, Rubin
+from rom.reduction.krylov import MomentMatching
 from rom.reduction.method import CraigBampton, Guyan
 from rom.reduction.polynomial import FourierLegendre, Polynomial
 from rom.reduction.snapshots import Snapshots
@@ -60,6 +61,7 @@ __all__ = [
     "Mechanism",
     "ModalDamping",
     "Modes",
+    "MomentMatching",
     "Orthotropic",
     "Polynomial",
     "Rayleigh",

@@ -55,11 +55,14 @@ class Operators(Protocol):
     def gram(self, X: Array, Y: Array) -> Array:
         """X^T Y summed over the ranks; any two arrays with equally distributed rows."""
 
-    def hold(self, dofs: npt.ArrayLike) -> Held:
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Held:
         """Eliminate the held dofs (global numbers, equal on all ranks) and factor the rest.
+
+        With a shift [rad^2/s^2] the matrix factored is K - shift M, for answers at a frequency.
 
         Raises:
             InterfaceError: if a rigid motion stays free.
+            SolverError: if the shift is an eigenvalue to the last digit.
             ResourceError: if the factor is predicted not to fit into memory.
         """
 

@@ -29,12 +29,15 @@ SPARE = 3  # modes computed beyond the ones asked for, so that a gap for countin
 class HeldSciPy:
     """K with the held dofs eliminated, factored once; call it to solve."""
 
-    def __init__(self, K: csr_matrix, M: csr_matrix, held: Index):
+    def __init__(self, K: csr_matrix, M: csr_matrix, held: Index, shift: float = 0.0):
         self.held = held
         self.free = np.setdiff1d(np.arange(K.shape[0]), held)
         self.n_free = self.free.size
         self.K, self.M = K[self.free][:, self.free], M[self.free][:, self.free]
-        self.lu = _factor(self.K, n_held=held.size) if self.n_free else None
+        self.lu = None
+        if self.n_free:
+            held_still = shift == 0.0
+            self.lu = _factor(self.K, held.size) if held_still else _shifted(self.K, self.M, shift)
 
     def __call__(self, F: Array) -> Array:
         """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
@@ -87,9 +90,9 @@ class SciPyOperators:
         """X[dofs]."""
         return X[np.asarray(dofs, dtype=np.int64)]
 
-    def hold(self, dofs: npt.ArrayLike) -> HeldSciPy:
-        """Eliminate the held dofs and factor the rest."""
-        return HeldSciPy(self.K, self.M, dof_set(dofs, self.n))
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldSciPy:
+        """Eliminate the held dofs and factor the rest of K - shift M."""
+        return HeldSciPy(self.K, self.M, dof_set(dofs, self.n), shift)
 
     def transform(self, T: Any, rigid: Array) -> "SciPyOperators":
         """The same body in the coordinates a of u = T a."""
@@ -241,6 +244,13 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
     if n_negative and np.array_equal(lu.perm_r, lu.perm_c):
         raise _indefinite("K", n_negative, "with the boundary held, deformation would give energy")
     return lu
+
+
+def _shifted(K_ii: csr_matrix, M_ii: csr_matrix, shift: float) -> SuperLU:
+    try:
+        return splu(csc_matrix(K_ii - shift * M_ii))  # indefinite: with pivoting
+    except RuntimeError as error:
+        raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.") from error
 
 
 def _refuse_massless(M: csr_matrix) -> None:

@@ -44,8 +44,8 @@ class HeldPETSc:
         factor: of their stiffness.
     """
 
-    def __init__(self, ops: "PETScOperators", held: Index):
-        self.ops, self.held = ops, held
+    def __init__(self, ops: "PETScOperators", held: Index, shift: float = 0.0):
+        self.ops, self.held, self.shift = ops, held, shift
         mine = np.arange(ops.first, ops.first + ops.n_local)
         self.mine = np.flatnonzero(~np.isin(mine, held))
         self.n_free = ops.n - held.size
@@ -60,7 +60,8 @@ class HeldPETSc:
             if ops.solver.iterative:
                 self._refuse_loose()
             self.make()
-            self._refuse_free_motion()
+            if not shift:
+                self._refuse_free_motion()
 
     def __call__(self, F: Array) -> Array:
         """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
@@ -77,7 +78,10 @@ class HeldPETSc:
         self.factor = None
 
     def make(self) -> None:
-        """Factor the stiffness."""
+        """Factor the stiffness, or K - shift M."""
+        if self.shift:
+            self.factor = self.inner.indefinite(self.shift)
+            return
         near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
         self.factor = self.inner.inverse(self.inner.K, near_null, self.held.size)
 
@@ -183,9 +187,9 @@ class PETScOperators:
         ratio = self.K.getDiagonal().array / self.M.getDiagonal().array
         return float(self.comm.allreduce(ratio.max(initial=0.0), op=MPI.MAX))
 
-    def hold(self, dofs: npt.ArrayLike) -> HeldPETSc:
-        """Eliminate the held dofs and factor the rest."""
-        return HeldPETSc(self, dof_set(dofs, self.n))
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldPETSc:
+        """Eliminate the held dofs and factor the rest of K - shift M."""
+        return HeldPETSc(self, dof_set(dofs, self.n), shift)
 
     def transform(self, T: Any, rigid: Array) -> "PETScOperators":
         """The same body in the coordinates a of u = T a."""
@@ -312,6 +316,23 @@ class PETScOperators:
             check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
+
+    def indefinite(self, shift: float) -> Factor:
+        """(K - shift M)^-1 for a shift among the eigenvalues.
+
+        Raises:
+            ConfigError: by iteration, which needs a positive definite matrix.
+            SolverError: if the shift is an eigenvalue.
+        """
+        if self.solver.iterative:
+            raise ConfigError(
+                "answers at a frequency above zero need a factor.",
+                hint='Use solver="direct" or "out-of-core", or frequencies=(0.0,).',
+            )
+        factor = Factor(self._shifted(shift), definite=False, solver=DIRECT)
+        if not factor.ok:
+            raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
+        return factor
 
     def _factor(self, sigma: float, *, definite: bool) -> Factor:
         """K - sigma M, factored."""

@@ -52,7 +52,13 @@ def fixed_interface(ops: Operators, boundary: npt.ArrayLike, n_modes: int) -> Ba
 
 def constraint_modes(ops: Operators, held: Held, boundary: npt.NDArray[np.int64]) -> Array:
     """(n_local, n_b) static shapes: one boundary dof moved by one, the other boundary dofs held."""
+    E = unit_motions(ops, boundary)
+    return E - held(ops.apply_K(E))
+
+
+def unit_motions(ops: Operators, boundary: npt.NDArray[np.int64]) -> Array:
+    """(n_local, n_b) columns of the identity: one boundary dof moved, everything else at rest."""
     E = np.zeros((ops.n_local, boundary.size))
     mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
     E[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
-    return E - held(ops.apply_K(E))
+    return E

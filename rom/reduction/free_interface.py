@@ -8,7 +8,7 @@ from scipy.linalg import cho_factor, cho_solve, qr
 from rom.eigen import Operators, orthonormal
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index
-from rom.reduction.fixed_interface import constraint_modes
+from rom.reduction.fixed_interface import constraint_modes, unit_motions
 
 ZERO = 1e-12  # eigenvalue, of a rough vector's Rayleigh quotient, that belongs to a rigid motion
 SPENT = 1e-12  # residual flexibility, of the whole one, that is left to nothing but round-off
@@ -49,7 +49,7 @@ class Rubin:
         Psi_b = _attached(ops, boundary, G)
         X = np.hstack([R, Phi])
         inner = X - Psi_b @ ops.rows(X, boundary)
-        inner, kept = _without_dependent(ops, inner)
+        inner, kept = without_dependent(ops, inner)
         names = [*numbered("rigid", R.shape[1]), *numbered("free", omega.size)]
         return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)))
 
@@ -84,7 +84,7 @@ class Herting:
         R, omega, Phi = free_modes(ops, self.n_modes)
         relief = held(ops.apply_M(R))
         inner = np.hstack([relief, Phi - Psi_b @ ops.rows(Phi, boundary)])
-        inner, kept = _without_dependent(ops, inner)
+        inner, kept = without_dependent(ops, inner)
         names = [*numbered("inertia relief", R.shape[1]), *numbered("free", omega.size)]
         return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)))
 
@@ -149,9 +149,7 @@ def residual_flexibility(
     Loads are balanced by the inertia of the rigid motions, the body is held at as many dofs as it
     has rigid motions, where balanced loads cause no reaction, and rigid motion is taken out.
     """
-    F = np.zeros((ops.n_local, boundary.size))
-    mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
-    F[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
+    F = unit_motions(ops, boundary)
     MR = ops.apply_M(R)
     X = ops.hold(_determinate(ops, boundary, R))(F - MR @ ops.gram(R, F))
     X = X - R @ ops.gram(MR, X)
@@ -190,7 +188,7 @@ def _attached(ops: Operators, boundary: Index, G: Array) -> Array:
     return G @ (scale[:, None] * cho_solve(factor, np.diag(scale)))
 
 
-def _without_dependent(ops: Operators, X: Array) -> tuple[Array, list[int]]:
+def without_dependent(ops: Operators, X: Array) -> tuple[Array, list[int]]:
     """Columns of X, mass-orthonormal in their order; those that add nothing are left out."""
     Q = np.zeros((X.shape[0], 0))
     kept: list[int] = []
