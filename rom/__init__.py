@@ -26,15 +26,17 @@ from rom.model import (
     SurfaceMesh,
 )
 from rom.reduction.characteristic import Characteristic
+from rom.reduction.dual import DualAssembly, FreeSubstructure
 from rom.reduction.enhanced import EnhancedCraigBampton
 from rom.reduction.fixed_interface import craig_bampton
 from rom.reduction.free_interface import FreeFree, Herting, Rubin
 from rom.reduction.krylov import MomentMatching
+from rom.reduction.loads import WithLoads
 from rom.reduction.method import CraigBampton, Guyan
 from rom.reduction.polynomial import FourierLegendre, Polynomial
 from rom.reduction.snapshots import Snapshots
 from rom.report import write_report
-from rom.workflow import mass_properties, modes, reduce
+from rom.workflow import mass_properties, modes, reduce, substructure
 
 if TYPE_CHECKING:
     from rom.mbs.audit import audit
@@ -49,11 +51,13 @@ __all__ = [
     "Basis",
     "Characteristic",
     "CraigBampton",
+    "DualAssembly",
     "EnhancedCraigBampton",
     "FEModel",
     "FlexibleBody",
     "FourierLegendre",
     "FreeFree",
+    "FreeSubstructure",
     "Guyan",
     "Herting",
     "Interface",
@@ -70,6 +74,7 @@ __all__ = [
     "Rubin",
     "Snapshots",
     "SurfaceMesh",
+    "WithLoads",
     "audit",
     "check",
     "craig_bampton",
@@ -80,6 +85,7 @@ __all__ = [
     "reduce",
     "save",
     "simulate",
+    "substructure",
     "write_report",
 ]
 PACKAGES = ("fe", "mbs", "view")

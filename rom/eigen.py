@@ -98,6 +98,9 @@ class Operators(Protocol):
     def expand(self, A: Array) -> Array:
         """T A: from the coordinates of `transform` back to (rows of the parent, k)."""
 
+    def restrict(self, F: Array) -> Array:
+        """T^T F: loads (rows of the parent, k) in the coordinates of `transform`."""
+
     def rows(self, X: Array, dofs: npt.ArrayLike) -> Array:
         """X[dofs] for global dof numbers, (n_dofs, k) equal on all ranks."""
 

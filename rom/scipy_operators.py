@@ -103,6 +103,10 @@ class SciPyOperators:
         """T A."""
         return A if self.T is None else self.T @ A
 
+    def restrict(self, F: Array) -> Array:
+        """T^T F."""
+        return F if self.T is None else self.T.T @ F
+
     def plus_mass(self, dM: Any) -> "SciPyOperators":
         """The same body with the mass M + dM."""
         return SciPyOperators(self.K, self.M + csr_matrix(dM), self.rigid, self.T)

@@ -16,6 +16,7 @@ from rom.certificate import certify_body
 from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Modes
+from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
 from rom.reduction.method import Method
 from rom.scipy_operators import SciPyOperators
@@ -170,6 +171,22 @@ def reduce(
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
+
+
+def substructure(model: FEModel, *, n_modes: int, interfaces: dict[str, Any]) -> FreeSubstructure:
+    """A free body for coupling by interface forces: MacNeal, Rubin, dual Craig-Bampton.
+
+    Args:
+        model: the full model, free-free.
+        n_modes: number of elastic free-free modes.
+        interfaces: {name: kind} as for `reduce`.
+
+    Raises:
+        InterfaceError, ConfigError: for a wrong interface, kind or number of modes.
+    """
+    connection = connect(operators(model), model, interfaces)
+    origins = {name: model.interfaces[name].origin for name in connection.parts}
+    return free_substructure(connection, origins, n_modes)
 
 
 def _described(method: Method, basis: Any, n: int) -> dict[str, Any]:

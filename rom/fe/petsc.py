@@ -208,6 +208,18 @@ class PETScOperators:
         """T A."""
         return A if self.T is None else dense_rows(self.T, A)
 
+    def restrict(self, F: Array) -> Array:
+        """T^T F."""
+        if self.T is None:
+            return F
+        out = np.zeros((self.n_local, F.shape[1]))
+        x, y = self.T.createVecs()
+        for k, column in enumerate(F.T):
+            y.array[:] = column
+            self.T.multTranspose(y, x)
+            out[:, k] = x.array
+        return out
+
     def plus_mass(self, dM: Any) -> "PETScOperators":
         """The same body with the mass M + dM."""
         sizes = ((self.n_local, self.n), (self.n_local, self.n))
