@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
@@ -112,13 +112,9 @@ def _estimates(ops: Operators, inner: Held, X: Array) -> Array:
 def _reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
     """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
     ops = connection.ops
-    if basis.labels[: connection.boundary.size] == connection.labels:
-        drop = [connection.parts[name] for name in fixed]
-        keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
-        Psi = basis.Psi[:, keep]
-    else:  # the columns are combinations of interface coordinates
-        held = ops.rows(basis.Psi, connection.held(fixed))
-        Psi = basis.Psi @ null_space(held, rcond=1e-10) if held.size else basis.Psi
+    drop = [connection.parts[name] for name in fixed]
+    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
+    Psi = basis.Psi[:, keep]
     K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
     scale = 1 / np.sqrt(np.diag(M))
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))

@@ -16,6 +16,7 @@ from rom.certificate import certify_body
 from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Modes
+from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
 from rom.reduction.method import Method
@@ -117,7 +118,7 @@ def _residual(ops: Operators, held: np.ndarray, omega: np.ndarray, Phi: np.ndarr
 def reduce(
     model: FEModel,
     *,
-    method: Method,
+    method: Method | Characteristic,
     interfaces: dict[str, Any],
     reference: Any = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
@@ -149,6 +150,11 @@ def reduce(
     connection = connect(ops, model, interfaces)
     say = log.info if ops.first == 0 else log.debug
     say("reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)
+    described = repr(method)
+    if isinstance(method, Characteristic):
+        connection = connect(ops, model, method.kinds(connection, interfaces))
+        method = method.method
+        say("full interfaces follow %d coordinates", connection.boundary.size)
     basis = method.basis(connection.ops, connection.boundary, connection.labels)
     Psi = connection.ops.expand(basis.Psi)
     elastic = elastic_part(ops, Psi)
@@ -159,7 +165,7 @@ def reduce(
         elastic,
         ties=connection.ties,
         name=name,
-        provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
+        provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
     ).with_reference(reference)
     if damping is not None:
         body = damped(body, damping)
@@ -189,10 +195,10 @@ def substructure(model: FEModel, *, n_modes: int, interfaces: dict[str, Any]) ->
     return free_substructure(connection, origins, n_modes)
 
 
-def _described(method: Method, basis: Any, n: int) -> dict[str, Any]:
+def _described(method: str, basis: Any, n: int) -> dict[str, Any]:
     alone = all(re.fullmatch(r"(rigid|free) \d+", label) for label in basis.labels)
     return {
-        "method": repr(method),
+        "method": method,
         "full dofs": n,
         "columns": list(basis.labels),
         "static shapes": not alone,

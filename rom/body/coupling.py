@@ -128,7 +128,7 @@ def _equal_coordinates(
     """Rows of the coordinates, if they mean the same on both sides; None otherwise."""
     one_shapes, other_shapes = one.patch.shapes, other.patch.shapes
     if one_shapes is None or other_shapes is None:
-        if order is None or _locked(one) or _locked(other):
+        if order is None:
             return None
         dofs = (3 * order[:, None] + np.arange(3)).ravel()
         return one.hold, other.hold[dofs]
@@ -142,13 +142,6 @@ def _equal_coordinates(
         there = other_shapes.reshape(order.size, -1)[order]
     same = np.abs(here - there).max() <= SAME_FUNCTIONS * np.abs(here).max()
     return (one.hold, other.hold) if same else None
-
-
-def _locked(marker: Marker) -> bool:
-    """True when the dofs of an interface depend on each other: it moves in few ways only."""
-    rows = marker.hold / np.linalg.norm(marker.hold, axis=1, keepdims=True)
-    spectrum = np.linalg.svd(rows, compute_uv=False)
-    return spectrum.size < rows.shape[0] or bool(spectrum[-1] < 1e-10 * spectrum[0])
 
 
 def _refuse_unequal(coupling: Any, one: Marker, other: Marker) -> None:

@@ -10,10 +10,12 @@ from scipy.sparse import identity, kron
 from rom.eigen import mean_motion, rigid_motions
 from rom.errors import ConfigError, ResourceError
 from rom.model import Array, Index, Interface
+from rom.reduction.characteristic import CharacteristicFunctions
 from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions
 from rom.reduction.snapshots import Snapshots, snapshot_functions
 
 RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
+RECORDS = (Polynomial, FourierLegendre, Snapshots, CharacteristicFunctions)
 KNOWN = (
     '"full", "rbe2", "rbe3", rom.Polynomial(order) or "polynomial:3", '
     'rom.FourierLegendre(harmonics, order) or "fourier:3,2", rom.Snapshots(values, n=…)'
@@ -65,7 +67,9 @@ def tie(interface: Interface, kind: Any) -> Tie:
     if kind == "rbe3":
         return _averaged(interface)
     if isinstance(kind, Snapshots):
-        return _seen(interface, kind)
+        return _found(interface, "snapshots", snapshot_functions(kind, interface))
+    if isinstance(kind, CharacteristicFunctions):
+        return _found(interface, "characteristic", kind.functions(interface))
     Q = interface_functions(kind, interface)
     names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
     L = np.kron((interface.surface_mass @ Q).T, np.eye(3))
@@ -91,12 +95,15 @@ def _stiff(
     return Tie(label, names, coordinates, interface.dofs, shapes, NO_DOFS, none)
 
 
-def _seen(interface: Interface, kind: Snapshots) -> Tie:
+def _found(interface: Interface, word: str, Q: Array) -> Tie:
+    """Computed functions with all three directions, the six rigid motions first."""
     mean_motion(interface)  # refuses surfaces whose rotation is undetermined
-    Q = snapshot_functions(kind, interface)
-    names = (*SIX, *(f"snapshot {j + 1}" for j in range(Q.shape[1] - 6)))
+    names = (
+        *(f"rigid {j + 1}" for j in range(6)),
+        *(f"{word} {j}" for j in range(7, Q.shape[1] + 1)),
+    )
     L = (kron(interface.surface_mass, identity(3), format="csr") @ Q).T
-    return _stiff(interface, f"snapshots:{Q.shape[1]}", names, L, Q)
+    return _stiff(interface, f"{word}:{Q.shape[1]}", names, L, Q)
 
 
 def _averaged(interface: Interface) -> Tie:
@@ -128,11 +135,7 @@ def _label(kind: Polynomial | FourierLegendre) -> str:
 
 
 def _parsed(name: str, kind: Any) -> Any:
-    if isinstance(kind, Polynomial | FourierLegendre | Snapshots) or kind in (
-        "full",
-        "rbe2",
-        "rbe3",
-    ):
+    if isinstance(kind, RECORDS) or kind in ("full", "rbe2", "rbe3"):
         return kind
     if isinstance(kind, str):
         word, _, numbers = kind.partition(":")
