@@ -127,6 +127,7 @@ def convergence(
                 look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
                 axes.loglog(x, np.maximum(np.abs(y), EXACT), label=name, **look)
             axes.set_ylabel(label, size=page.BODY)
+            _near_ticks(axes)
             _whole_ticks(axes, [x for x, _ in curves.values()])
             _finish(axes, legend=True)
         for axes in areas[:-1]:
@@ -140,6 +141,16 @@ def _whole_ticks(axes: Any, sizes: list[Any]) -> None:
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
     axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
     axes.minorticks_off()
+
+
+def _near_ticks(axes: Any) -> None:
+    """Ticks at 1, 2 and 5 where the values span too little for powers of ten."""
+    low, high = axes.get_ylim()
+    if high < 100 * low:
+        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+        ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
+        ticks = ticks[(ticks >= low) & (ticks <= high)]
+        axes.set_yticks(ticks, [f"{y:g}" for y in ticks])
 
 
 def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
