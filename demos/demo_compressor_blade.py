@@ -44,6 +44,7 @@ given = {
     "path": Path(__file__).parents[1] / "meshes" / "compressor_blade.geo",
     "material": rom.Material(E=E, nu=0.33, rho=rho),
     "parameters": {"lc": 0.006, "lc_flank": 0.0028, "crown": options.crown},
+    "order": 2,  # on crowned flanks, nodes between corners lie on the cylinder as well
 }
 model = rom.fe.model(**given)
 n_b = sum(model.interfaces[name].dofs.size for name in FLANKS)
@@ -139,8 +140,8 @@ if first:
 # ## What to remember
 #
 # `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
-# volume follows from the description of the geometry: parabolic profiles between linear chords and
-# thicknesses, platform, dovetail with its fillets.
+# volume follows from the description of the geometry: parabolic profiles, platform, dovetail, whose
+# fillets add above the flanks what they take below.
 
 z = np.linspace(0.0, 1.0, 2001)[1::2]
 chord, thick, edge = 0.045 - 0.005 * z, 0.0045 - 0.0021 * z, 0.0010
@@ -149,7 +150,7 @@ beta, wide = np.radians(50), (0.012, 0.024)
 depth = (wide[1] - wide[0]) / 2 / np.tan(beta)
 root = 0.044 * (0.004 * sum(wide) + depth * sum(wide) / 2)
 results = {
-    "mass [kg]": (model.mass(), rho * (airfoil + 0.052 * 0.032 * 0.005 + root), 5e-3),
+    "mass [kg]": (model.mass(), rho * (airfoil + 0.052 * 0.032 * 0.005 + root), 1e-3),
     "first frequency, seated, order 4 [Hz]": (
         (1 + seated["polynomial:4"][0]) * exact["seated"][0], exact["seated"][0], 2e-4),
     "worst ratio of ten frequencies, free, order 3": (

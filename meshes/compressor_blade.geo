@@ -27,7 +27,7 @@ DefineConstant[
   R = {0.0015, Name "R"},                    // fillets above and below the flanks
   crown = {0, Name "crown"},                 // radius of crowned flanks; 0 for plane ones
   lc = {0.0045, Name "lc"},                  // element size
-  lc_flank = {0.0025, Name "lc_flank"}       // element size on the flanks
+  lc_flank = {0.0025, Name "lc_flank"}       // element size on the flanks and fillets
 ];
 deg = Pi / 180;
 If (sections < 2 || sections != Floor(sections))
@@ -152,7 +152,8 @@ right() = Surface In BoundingBox{-l_root / 2 - e, y1 + cut * s - e, z2 + cut * c
 Physical Surface("flank_left", 11) = {left()};
 Physical Surface("flank_right", 12) = {right()};
 MeshSize { PointsOf { Volume{blade()}; } } = lc;
-MeshSize { PointsOf { Surface{left(), right()}; } } = lc_flank;
+MeshSize { Point In BoundingBox{-l_root / 2 - e, -y2 - e, z2 - cut - e,
+  l_root / 2 + e, y2 + e, z1 + cut + e} } = lc_flank; // flanks and their fillets
 // Where the thin edges of the airfoil meet the platform, elements must not be much longer than thick.
 foot() = Point In BoundingBox{-x_half - e, -y_half - e, -e, x_half + e, y_half + e, e};
 fine = 3 * t_edge < lc ? 3 * t_edge : lc;

@@ -159,6 +159,43 @@ def test_the_rod_meshes_over_its_range(seed):
     assert set(mesh.facets) == {"pin_a", "pin_b"}
 
 
+BLADE = {
+    "span": 0.12, "chord_root": 0.045, "chord_tip": 0.04, "t_root": 0.0045, "t_tip": 0.0024,
+    "t_edge": 0.001, "stagger": 20.0, "twist": 30.0, "camber": 30.0, "l_platform": 0.052,
+    "w_platform": 0.032, "t_platform": 0.005, "l_root": 0.044, "w_neck": 0.012, "h_neck": 0.004,
+    "w_dovetail": 0.024, "h_foot": 0.004, "beta": 50.0,
+}  # fmt: skip
+
+
+def blade_volume(p):
+    """Parabolic profiles with blunt edges, platform, dovetail; fillets add nothing."""
+    z = np.linspace(0.0, 1.0, 2001)[1::2]
+    chord, t = (
+        p[a] + (p[b] - p[a]) * z for a, b in (("chord_root", "chord_tip"), ("t_root", "t_tip"))
+    )
+    airfoil = p["span"] * (chord * (p["t_edge"] + 2 / 3 * (t - p["t_edge"]))).mean()
+    depth = (p["w_dovetail"] - p["w_neck"]) / 2 / np.tan(np.radians(p["beta"]))
+    root = p["w_neck"] * (p["h_neck"] + depth / 2) + p["w_dovetail"] * (p["h_foot"] + depth / 2)
+    return airfoil + p["l_platform"] * p["w_platform"] * p["t_platform"] + p["l_root"] * root
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_blade_meshes_over_its_range(seed):
+    rng = np.random.default_rng(seed)
+    p = {name: value * rng.uniform(0.85, 1.2) for name, value in BLADE.items()}
+    p["l_platform"] = max(p["l_platform"], 1.2 * p["chord_root"], p["l_root"])
+    p["w_platform"] = max(p["w_platform"], 0.8 * p["chord_root"], p["w_dovetail"])
+    sizes = {"lc": 0.008, "lc_flank": 0.003, "sections": float(rng.integers(3, 8))}
+    mesh = read_mesh(MESHES / "compressor_blade.geo", parameters=p | sizes)
+    assert set(mesh.facets) == {"flank_left", "flank_right"}
+    assert not mesh.warnings
+    assert volume(mesh) == pytest.approx(blade_volume(p), rel=4e-3)
+    top, bottom = mesh.points[:, 2].max(), mesh.points[:, 2].min()
+    depth = (p["w_dovetail"] - p["w_neck"]) / 2 / np.tan(np.radians(p["beta"]))
+    foot = p["t_platform"] + p["h_neck"] + depth + p["h_foot"]
+    assert_allclose((top, -bottom), (p["span"], foot), rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("name", "parameters", "culprit"),
     [
@@ -167,6 +204,14 @@ def test_the_rod_meshes_over_its_range(seed):
         ("connecting_rod", {"t_web": 0.02}, "t_web = 0.02 < w = 0.012"),
         ("connecting_rod", {"t_flange": 0.01}, "flanges of 0.01"),
         ("connecting_rod", {"L": 0.04}, "L = 0.04"),
+        ("compressor_blade", {"sections": 1}, "sections = 1"),
+        ("compressor_blade", {"t_edge": 0.003}, "t_edge = 0.003 < t_tip = 0.0024"),
+        ("compressor_blade", {"camber": 90}, "camber = 90"),
+        ("compressor_blade", {"beta": 80}, "beta = 80"),
+        ("compressor_blade", {"chord_root": 0.06}, "over the platform of l_platform = 0.052"),
+        ("compressor_blade", {"w_neck": 0.03}, "w_neck = 0.03 < w_dovetail = 0.024"),
+        ("compressor_blade", {"R": 0.006}, "R = 0.006"),
+        ("compressor_blade", {"crown": 0.005}, "crown = 0.005"),
         ("crank", {"d_pin": 0.05}, "d_pin = 0.05"),
         ("crank", {"r": 0.005}, "r = 0.005"),
     ],
