@@ -9,6 +9,7 @@ from scipy.linalg import block_diag
 
 from rom.body.condensed import (
     CondensedAssembly,
+    Partition,
     check_count,
     joint_functions,
     local_traces,
@@ -58,6 +59,11 @@ class Assembly:
             )
         _ = self._coupled  # refuses couplings that cannot be
 
+    @property
+    def n_conditions(self) -> tuple[int, ...]:
+        """Number of coordinates, or moments, that each coupling makes equal."""
+        return tuple(term[0][1].shape[0] for term in self._coupled)
+
     def frequencies(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Array:
         """Natural frequencies of the assembly [Hz].
 
@@ -103,9 +109,8 @@ class Assembly:
             raise ConfigError(f'level = {level!r} is neither "system" nor "local".')
         if not self.couplings:
             raise ConfigError("nothing is coupled: there are no interfaces to reduce.")
-        M, K = self._matrices()
-        N, H = self._free(fixed), np.vstack([self._placed(term[:1]) for term in self._coupled])
-        parts = partition(M, K, N, H, self._n_rigid(fixed))
+        (M, K), H = self._matrices(), self._interfaces()
+        parts = self._partition(None, fixed)
         if level == "system":
             W = system_functions(parts, n_interface)
         else:
@@ -125,21 +130,41 @@ class Assembly:
                 f"{twice[0]} is coupled {places.count(twice[0])} times.",
                 hint='level="local" needs every interface in one coupling; use level="system".',
             )
+        coupled = list(dict.fromkeys(body for body, _ in places))
+        parts = {name: self._partition(name, fixed) for name in coupled}
+        check_count(n, max(part.lam.size for part in parts.values()))
         found: dict[Place, Array] = {}
-        largest = 0
-        for name, body in self.bodies.items():
-            rows = {p: h for term in self._coupled for p, h, _ in term if p[0] == name}
-            if not rows:
-                continue
-            held = [self._marker(place).hold for place in fixed if place[0] == name]
-            N = supported(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
-            n_rigid = self._n_rigid(tuple(place for place in fixed if place[0] == name))
-            parts = partition(*body.full_matrices(), N, np.vstack([*rows.values()]), n_rigid)
-            largest = max(largest, parts.lam.size)
-            traces = local_traces(parts, max(int(n), 1), [*rows.values()], name)
+        for name in coupled:
+            rows = self._rows_of(name)
+            traces = local_traces(parts[name], n, [*rows.values()], name)
             found |= dict(zip(rows, traces, strict=True))
-        check_count(n, largest)
         return [[found[place] for place in coupling] for coupling in self.couplings]
+
+    def _partition(self, name: str | None, fixed: tuple[Place, ...]) -> Partition:
+        """Interface motions of one body, or of the whole; kept for other numbers of functions."""
+        key = (name, tuple(map(tuple, fixed)))
+        if key not in self._partitions:
+            if name is None:
+                N, H, matrices = self._free(fixed), self._interfaces(), self._matrices()
+            else:
+                fixed = tuple(place for place in fixed if place[0] == name)
+                body, held = self.bodies[name], [self._marker(place).hold for place in fixed]
+                N = supported(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
+                H, matrices = np.vstack([*self._rows_of(name).values()]), body.full_matrices()
+            self._partitions[key] = partition(*matrices, N, H, self._n_rigid(fixed))
+        return self._partitions[key]
+
+    @cached_property
+    def _partitions(self) -> dict[Any, Partition]:
+        return {}
+
+    def _interfaces(self) -> Array:
+        """(h, n) coordinates of all coupled interfaces."""
+        return np.vstack([self._placed(term[:1]) for term in self._coupled])
+
+    def _rows_of(self, name: str) -> dict[Place, Array]:
+        """Coordinates of the coupled interfaces of one body."""
+        return {p: rows for term in self._coupled for p, rows, _ in term if p[0] == name}
 
     @cached_property
     def _coupled(self) -> list[tuple[tuple[Place, Array, float], ...]]:

@@ -135,8 +135,9 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
             hint="Use `Polynomial` on it.",
         )
     axis = axes[:, 2] if gaps[1] > gaps[0] else axes[:, 0]
-    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    e = np.eye(3)[np.argmin(np.abs(axis))]
+    size = np.round(np.abs(axis), 6)  # bodies that share the surface must choose alike
+    axis = axis * np.sign(axis[np.argmax(size)])
+    e = np.eye(3)[np.argmin(size)]
     e = (e - (e @ axis) * axis) / np.linalg.norm(e - (e @ axis) * axis)
     along = x @ axis - 0.5 * ((x @ axis).max() + (x @ axis).min())
     reach = np.abs(along).max()

@@ -13,6 +13,7 @@ from rom.view import page
 WIDTH, PANEL = 1400, 330  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 MARKERS = ("o", "s", "^", "D", "v", "x")
+FEW = 10  # sizes that have room for a tick each
 EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
@@ -128,19 +129,26 @@ def convergence(
                 axes.loglog(x, np.maximum(np.abs(y), EXACT), label=name, **look)
             axes.set_ylabel(label, size=page.BODY)
             _near_ticks(axes)
-            _whole_ticks(axes, [x for x, _ in curves.values()])
             _finish(axes, legend=True)
+        _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
         for axes in areas[:-1]:
             axes.set_xticklabels([])
         areas[-1].set_xlabel(xlabel, size=page.BODY)
         return page.save(figure, path)
 
 
-def _whole_ticks(axes: Any, sizes: list[Any]) -> None:
-    """Ticks at the sizes themselves: powers of ten say little about small numbers."""
+def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
+    """One horizontal axis for all panels, with ticks at the sizes themselves if they are few."""
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
-    axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
-    axes.minorticks_off()
+    low, high = ticks[0] / 1.15, ticks[-1] * 1.15
+    if ticks.size > FEW:
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+        ticks = np.outer(decades, [1, 2, 5]).ravel()
+        ticks = ticks[(ticks >= low) & (ticks <= high)]
+    for axes in areas:
+        axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
+        axes.minorticks_off()
+        axes.set_xlim(low, high)
 
 
 def _near_ticks(axes: Any) -> None:
