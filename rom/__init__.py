@@ -14,6 +14,7 @@ from rom.checks import check
 from rom.errors import RomError
 from rom.io.export import export
 from rom.io.native import load, save
+from rom.io.vtu import write_stress
 from rom.model import (
     Attachment,
     Basis,
@@ -87,6 +88,7 @@ __all__ = [
     "simulate",
     "substructure",
     "write_report",
+    "write_stress",
 ]
 PACKAGES = ("fe", "mbs", "view")
 LATER = {"Mechanism": "mechanism", "audit": "audit", "simulate": "integrate"}  # they load Numba

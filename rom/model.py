@@ -211,6 +211,8 @@ class FEModel:
         surface: outer surface for pictures; None when there is none.
         provenance: how the model was made: geometry file, parameters, material, versions.
         operators: the five verbs on this model when K and M are not SciPy matrices.
+        stresses: evaluates stress of displacements, `rom.fe.stress.Stresses`; None for a model
+            without finite elements.
     """
 
     K: Any
@@ -221,6 +223,7 @@ class FEModel:
     surface: "SurfaceMesh | None" = None
     provenance: dict[str, Any] = field(default_factory=dict)
     operators: Any = None
+    stresses: Any = None
 
     @property
     def n_dofs(self) -> int:

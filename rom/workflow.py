@@ -115,7 +115,7 @@ def _residual(ops: Operators, held: np.ndarray, omega: np.ndarray, Phi: np.ndarr
     return norms[0] / (scale * norms[1])
 
 
-def reduce(
+def reduce(  # noqa: PLR0913  one keyword per choice
     model: FEModel,
     *,
     method: Method | Characteristic,
@@ -123,6 +123,7 @@ def reduce(
     reference: Any = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
     name: str = "body",
+    stress: bool = False,
     certify: bool = True,
 ) -> FlexibleBody:
     """A flexible body that stands for the full model, with the evidence for it.
@@ -136,6 +137,7 @@ def reduce(
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
         damping: structural damping; none if not given.
         name: name of the body.
+        stress: make the stress on the outer surface recoverable, ``body.stress``.
         certify: compare with the full model; costs one more factorisation per support.
 
     Returns:
@@ -165,6 +167,7 @@ def reduce(
         elastic,
         ties=connection.ties,
         name=name,
+        stress=stress,
         provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
     ).with_reference(reference)
     if damping is not None:

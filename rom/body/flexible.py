@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
-from rom.errors import InterfaceError, ModelError
+from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, Index, Report
 
 
@@ -66,6 +66,44 @@ class Surface:
     shape: Array
 
 
+@dataclass(frozen=True, slots=True)
+class StressRecovery:
+    """Stress on the outer surface as a function of the elastic coordinates.
+
+    Rigid motion has none, so that it does not depend on the floating frame.
+
+    Attributes:
+        points: (p, 3) undeformed positions [m].
+        operator: (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic
+            coordinate [Pa]; row 6*node + component.
+    """
+
+    points: Array
+    operator: Array
+
+    def field(self, q: Array) -> Array:
+        """(p, 6) stress for elastic coordinates q [Pa].
+
+        Raises:
+            ConfigError: if q has another length.
+        """
+        q = np.asarray(q, dtype=float)
+        if q.shape != self.operator.shape[1:]:
+            raise ConfigError(
+                f"q has the shape {q.shape}; the body has {self.operator.shape[1]} elastic "
+                "coordinates."
+            )
+        found: Array = (self.operator @ q).reshape(-1, 6)
+        return found
+
+    def von_mises(self, q: Array) -> Array:
+        """(p,) equivalent stress for elastic coordinates q [Pa]."""
+        xx, yy, zz, yz, xz, xy = self.field(q).T
+        normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+        found: Array = np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
+        return found
+
+
 @dataclass(frozen=True)
 class FlexibleBody:
     """A reduced elastic body in its floating frame.
@@ -86,6 +124,7 @@ class FlexibleBody:
         K_geo: (r, r) geometric stiffness per unit load, by name of the load.
         markers: interfaces by name.
         surface: outer surface, or None.
+        stress: recovery of the stress on it, or None.
         omega: (r,) natural frequencies of the elastic coordinates, frame held still [rad/s].
         labels: (r,) what each coordinate is.
         reference: the reference condition.
@@ -109,6 +148,7 @@ class FlexibleBody:
     reference: str = "mean-axis"
     K_geo: dict[str, Array] = field(default_factory=dict)
     surface: Surface | None = None
+    stress: StressRecovery | None = None
     units: str = "SI"
     provenance: dict[str, Any] = field(default_factory=dict)
     certificate: Report | None = None
@@ -286,6 +326,9 @@ def _recombined(body: FlexibleBody, V: Array, omega: Array, reference: str) -> F
     surface = body.surface
     if surface is not None:
         surface = replace(surface, shape=surface.shape @ V)
+    stress = body.stress
+    if stress is not None:
+        stress = replace(stress, operator=stress.operator @ V)
     S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
     return replace(
         body,
@@ -297,6 +340,7 @@ def _recombined(body: FlexibleBody, V: Array, omega: Array, reference: str) -> F
         K_geo={load: _symmetric(V.T @ A @ V) for load, A in body.K_geo.items()},
         markers=markers,
         surface=surface,
+        stress=stress,
         omega=omega,
         labels=tuple(f"mode {k + 1}, {reference} frame" for k in range(omega.size)),
         reference=reference,

@@ -8,10 +8,10 @@ from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_matrix
 
 from rom.attachment import carried_displacements
-from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
+from rom.body.flexible import FlexibleBody, Marker, Patch, StressRecovery, Surface
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
-from rom.errors import ModelError
+from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Interface
 
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
@@ -64,7 +64,7 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
     return Elastic(V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
 
 
-def flexible_body(
+def flexible_body(  # noqa: PLR0913  what a body is made of
     model: FEModel,
     ops: Operators,
     Psi: Array,
@@ -73,6 +73,7 @@ def flexible_body(
     ties: dict[str, Any],
     name: str,
     provenance: dict[str, Any],
+    stress: bool = False,
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
 
@@ -85,6 +86,7 @@ def flexible_body(
             map ``coordinates`` (n_c, 3k) from the dofs of the surface to what is zero when held.
         name: name of the body.
         provenance: how it was made.
+        stress: whether the stress on the surface can be recovered.
     """
     E = canonical_columns(ops, Psi @ elastic.V, model)
     integrals = _integrals(model, ops, E)
@@ -100,6 +102,7 @@ def flexible_body(
         labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(r)),
         reference="mean-axis",
         surface=_surface(ops, model, E),
+        stress=_recovery(model, E) if stress else None,
         provenance=provenance,
     )
 
@@ -149,6 +152,17 @@ def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
     nodes = model.surface.nodes
     dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
     return Surface(model.points[nodes], model.surface.triangles, ops.rows(E, dofs))
+
+
+def _recovery(model: FEModel, E: Array) -> StressRecovery:
+    if model.stresses is None or model.surface is None:
+        raise ConfigError(
+            "the model has no finite elements, from which alone stress follows.",
+            hint="Make it with rom.fe.model, or reduce with stress=False.",
+        )
+    nodes = model.surface.nodes
+    operator = model.stresses.at_nodes(E, nodes).reshape(6 * nodes.size, -1)
+    return StressRecovery(model.points[nodes], operator)
 
 
 def _scaled(A: Array, scale: Array) -> Array:

@@ -1,5 +1,6 @@
 """The only place that knows which dolfinx this is: 0.5, 0.9, or 0.10 and later, told by feature."""
 
+import inspect
 import logging
 from typing import Any
 
@@ -161,3 +162,22 @@ def tag_entities(mesh: Any, dim: int, nodes: np.ndarray, values: np.ndarray) -> 
     mesh.topology.create_connectivity(dim, 0)
     mesh.topology.create_connectivity(dim, mesh.topology.dim)
     return meshtags_from_entities(mesh, dim, adjacencylist(found), tags.astype(np.int32))
+
+
+def reference_points(space: Any) -> Array:
+    """(k, 3) where the nodes of a cell lie in the reference cell."""
+    points = space.element.interpolation_points
+    return np.asarray(points() if callable(points) else points)
+
+
+def quadrature_points(mesh: Any, degree: int) -> Array:
+    """(k, 3) points of a quadrature that is exact for that degree, in the reference cell."""
+    kind = getattr(basix.CellType, cell_name(mesh))
+    return np.asarray(basix.make_quadrature(kind, max(degree, 1))[0])
+
+
+def evaluated(expression: Any, mesh: Any, cells: np.ndarray) -> Array:
+    """Values of an expression at its points in some cells."""
+    parameters = inspect.signature(expression.eval).parameters
+    arguments = (mesh, cells) if "mesh" in parameters else (cells,)
+    return np.asarray(expression.eval(*arguments))

@@ -23,6 +23,7 @@ from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
 from rom.fe.solver import parsed
+from rom.fe.stress import Stresses
 from rom.model import Array, Attachment, FEModel
 
 WHOLE = "solid"  # name of the only region of a mesh without named regions
@@ -123,7 +124,8 @@ def assemble(
     with compiling(mesh.comm):
         V = lagrange(mesh, degree)
         points = all_points(V)
-        K, M = (assemble_matrix(f) for f in _forms(V, coefficients(mesh, tags, solids), degree))
+        numbers = coefficients(mesh, tags, solids)
+        K, M = (assemble_matrix(f) for f in _forms(V, numbers, degree))
         interfaces = {key: interface(key, value, V, points) for key, value in facet_tags.items()}
     named = {region: solids[tag] for region, tag in regions.items()}
     remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
@@ -132,6 +134,7 @@ def assemble(
         "interfaces": interfaces,
         "attachments": tuple(attachments),
         "surface": outer_surface(V, points, degree),
+        "stresses": Stresses(V, numbers, degree),
         "provenance": {
             "material": described(named),
             "degree": degree,

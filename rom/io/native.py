@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib import format as npy
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
+from rom.body.flexible import FlexibleBody, Marker, Patch, StressRecovery, Surface
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import write_whole
 from rom.model import Array, Report, Row
@@ -121,6 +121,9 @@ def _arrays(body: FlexibleBody) -> dict[str, Array]:
     if body.surface is not None:
         for part in ("points", "triangles", "shape"):
             arrays[f"surface/{part}"] = getattr(body.surface, part)
+    if body.stress is not None:
+        for part in ("points", "operator"):
+            arrays[f"stress/{part}"] = getattr(body.stress, part)
     return {
         n: np.asarray(A, dtype=np.int64 if A.dtype.kind == "i" else float)
         for n, A in arrays.items()
@@ -172,6 +175,9 @@ def _body(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     }
     parts: Any = (arrays[f"surface/{part}"] for part in ("points", "triangles", "shape"))
     surface = Surface(*parts) if manifest["surface"] else None
+    stress = None  # bodies whose stress is not recovered have none, and so have older files
+    if "stress/points" in arrays:
+        stress = StressRecovery(arrays["stress/points"], arrays["stress/operator"])
     report = manifest["certificate"]
     if report is not None:
         report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
@@ -182,6 +188,7 @@ def _body(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         K_geo={name: arrays[f"K_geo/{name}"] for name in manifest["geometric_stiffness"]},
         markers=markers,
         surface=surface,
+        stress=stress,
         labels=tuple(manifest["labels"]),
         reference=manifest["reference"],
         units=manifest["units"],
@@ -288,6 +295,10 @@ def _verify(body: FlexibleBody, path: Path) -> None:
                 f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
             )
         _verify_patch(m, path)
+    if body.stress is not None:
+        n = body.stress.points.shape[0]
+        if body.stress.points.shape != (n, 3) or body.stress.operator.shape != (6 * n, r):
+            raise FileFormatError("the stress recovery does not fit the body.", where=str(path))
     if body.surface is not None:
         n = body.surface.points.shape[0]
         triangles = body.surface.triangles

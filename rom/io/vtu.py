@@ -33,6 +33,33 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
     return Path(path)
 
 
+def write_stress(body: FlexibleBody, q: Array, path: str | Path) -> Path:
+    """Write the outer surface with displacement, stress and von Mises stress.
+
+    Args:
+        body: a body reduced with ``stress=True``.
+        q: (r,) elastic coordinates.
+        path: file ending in ``.vtu``.
+
+    Raises:
+        ConfigError: if the stress of the body cannot be recovered, q has another length, or the
+            place is not writable.
+    """
+    if body.stress is None or body.surface is None:
+        raise ConfigError(
+            f"the stress of body {body.name!r} cannot be recovered.",
+            hint="Reduce it with stress=True.",
+        )
+    fields = {
+        "stress xx yy zz yz xz xy [Pa]": body.stress.field(q),
+        "von Mises stress [Pa]": body.stress.von_mises(q),
+        "displacement [m]": (body.surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
+    }
+    text = grid(body.surface.points, body.surface.triangles, TRIANGLE, at_points=fields)
+    write_whole(path, lambda file: file.write(text.encode()))
+    return Path(path)
+
+
 def _document(body: FlexibleBody) -> str:
     surface = body.surface
     assert surface is not None

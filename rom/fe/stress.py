@@ -1,0 +1,99 @@
+"""Stress of displacement fields: averaged at nodes, or at the quadrature points of the cells."""
+
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from rom.fe.compat import cell_dofs, evaluated, quadrature_points, reference_points, to_global
+from rom.fe.jit import compiling
+from rom.fe.material import stress
+from rom.model import PAIRS, Array, Index
+
+
+class Stresses:
+    """Hooke's law on the mesh of a model.
+
+    Args:
+        V: displacement space.
+        numbers: coefficients of the material, see `rom.fe.material.coefficients`.
+        degree: of the displacement.
+    """
+
+    def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
+        self.V, self.numbers, self.degree = V, numbers, degree
+        self.mesh = V.mesh
+        self.n_cells = self.mesh.topology.index_map(3).size_local
+
+    def at_nodes(self, U: Array, nodes: Index) -> Array:
+        """Stress at nodes: the mean of what their cells say, not weighted.
+
+        Args:
+            U: (n_local, k) displacements [m].
+            nodes: (p,) node numbers, equal on all ranks.
+
+        Returns:
+            (p, 6, k) stress xx, yy, zz, yz, xz, xy [Pa], equal on all ranks.
+        """
+        cells, table = self._cells_at(nodes)
+        X = reference_points(self.V)
+        order = self._order(cells, X)
+        place = np.full(self.V.dofmap.index_map.size_global, -1)
+        place[nodes] = np.arange(nodes.size)
+        to = place[table]  # (cells, points of a cell): where each value belongs, or -1
+        sums = np.zeros((nodes.size, 6, U.shape[1]))
+        for k, values in enumerate(self._evaluated(U, cells, X)):
+            ordered = np.take_along_axis(values, order[:, :, None], axis=1)
+            np.add.at(sums[:, :, k], to[to >= 0], ordered[to >= 0])
+        count = np.bincount(to[to >= 0], minlength=nodes.size).astype(float)
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, count)
+        return sums / count[:, None, None]
+
+    def at_gauss_points(self, U: Array) -> tuple[Array, Array]:
+        """Stress at the quadrature points of this rank's cells.
+
+        Args:
+            U: (n_local, k) displacements [m].
+
+        Returns:
+            (g, 3) points [m] and (g, 6, k) stress xx, yy, zz, yz, xz, xy [Pa].
+        """
+        cells = np.arange(self.n_cells, dtype=np.int32)
+        X = quadrature_points(self.mesh, 2 * (self.degree - 1))
+        with compiling(self.mesh.comm):
+            x = fem.Expression(ufl.SpatialCoordinate(self.mesh), X)
+        points = evaluated(x, self.mesh, cells).reshape(-1, 3)
+        found = [values.reshape(-1, 6) for values in self._evaluated(U, cells, X)]
+        return points, np.stack(found, axis=2)
+
+    def _evaluated(self, U: Array, cells: np.ndarray, X: Array) -> Any:
+        """(cells, points, 6) stress of each column."""
+        u = fem.Function(self.V)
+        s = stress(ufl.sym(ufl.grad(u)), self.numbers)
+        voigt = ufl.as_vector([s[i, j] for i, j in PAIRS])
+        with compiling(self.mesh.comm):
+            expression = fem.Expression(voigt, X)
+        for column in U.T:
+            u.x.array[: column.size] = column
+            u.x.scatter_forward()
+            yield evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), 6)
+
+    def _cells_at(self, nodes: Index) -> tuple[np.ndarray, np.ndarray]:
+        """Cells of this rank that touch the nodes, and the global numbers of their nodes."""
+        local = cell_dofs(self.V)[: self.n_cells]
+        table = to_global(self.V.dofmap.index_map, local.ravel()).reshape(local.shape)
+        touching = np.isin(table, nodes).any(axis=1)
+        return np.flatnonzero(touching).astype(np.int32), table[touching]
+
+    def _order(self, cells: np.ndarray, X: Array) -> np.ndarray:
+        """(cells, k) which evaluated point is which node: edges may run either way."""
+        with compiling(self.mesh.comm):
+            expression = fem.Expression(ufl.SpatialCoordinate(self.mesh), X)
+        x = evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), 3)
+        nodes = self.V.tabulate_dof_coordinates()[cell_dofs(self.V)[cells]]
+        gaps = np.linalg.norm(nodes[:, :, None] - x[:, None], axis=3)
+        return np.argmin(gaps, axis=2)

@@ -1,0 +1,135 @@
+"""Stress recovery against closed forms, and the reduced static stress against the full one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from rom.errors import ConfigError
+from rom.reduction.interface import connect
+from rom.workflow import operators
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = pytest.mark.fenicsx
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+L, B, H = 0.4, 0.05, 0.03
+
+
+def beam(degree=2, lc=0.02):
+    parameters = {"L": L, "b": B, "h": H, "lc": lc}
+    return rom.fe.model("meshes/beam.geo", material=STEEL, parameters=parameters, degree=degree)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return beam()
+
+
+def displacement(model, gradient):
+    return (model.points @ np.asarray(gradient).T).reshape(-1, 1)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_a_uniform_strain_has_its_stress_everywhere(degree):
+    """Patch test with Hooke's law in closed form; a rotation beside it has no stress."""
+    model = beam(degree, 0.03)
+    A = 1e-3 * np.array([[1.0, 0.4, -0.2], [0.1, -0.5, 0.3], [0.7, -0.6, 0.2]])
+    e = 0.5 * (A + A.T)
+    voigt = [e[0, 0], e[1, 1], e[2, 2], 2 * e[1, 2], 2 * e[0, 2], 2 * e[0, 1]]
+    exact = STEEL.stiffness @ voigt
+    found = model.stresses.at_nodes(displacement(model, A), model.surface.nodes)
+    assert_allclose(found[:, :, 0], np.tile(exact, (len(found), 1)), atol=1e-9 * abs(exact).max())
+    _, gauss = model.stresses.at_gauss_points(displacement(model, A))
+    assert_allclose(gauss[:, :, 0], np.tile(exact, (len(gauss), 1)), atol=1e-9 * abs(exact).max())
+
+
+def test_pure_bending_is_linear_over_the_height(model):
+    """Prismatic bar bent about y by the curvature kappa: sigma_xx = -E kappa z alone."""
+    x, y, z = model.points.T
+    nu, kappa = STEEL.nu, 1e-2
+    u = kappa * np.stack([-x * z, nu * y * z, 0.5 * (x**2 + nu * (z**2 - y**2))], axis=1)
+    nodes = model.surface.nodes
+    found = model.stresses.at_nodes(u.reshape(-1, 1), nodes)[:, :, 0]
+    exact = np.zeros_like(found)
+    exact[:, 0] = -STEEL.E * kappa * z[nodes]
+    assert_allclose(found, exact, atol=1e-8 * np.abs(exact).max())
+    points, gauss = model.stresses.at_gauss_points(u.reshape(-1, 1))
+    assert_allclose(gauss[:, 0, 0], -STEEL.E * kappa * points[:, 2], atol=1e-8 * exact.max())
+
+
+@pytest.mark.parametrize("kind", ["rbe2", "rbe3", "polynomial:2"])
+@pytest.mark.parametrize("reference", ["mean-axis", "root"])
+def test_the_reduced_static_stress_is_the_full_one(model, kind, reference):
+    """Loads on the tip, the root held: constraint modes are exact, and so is their stress."""
+    kinds = {"root": "rbe2", "tip": kind}
+    body = rom.reduce(
+        model, method=rom.CraigBampton(3), interfaces=kinds, reference=reference, stress=True,
+        certify=False,
+    )  # fmt: skip
+    connection = connect(operators(model), model, kinds)
+    ops, root, tip = connection.ops, connection.held(("root",)), connection.held(("tip",))
+    F = np.zeros((ops.n_local, 6))
+    F[tip[:6], np.arange(6)] = 1e3
+    full = model.stresses.at_nodes(ops.expand(ops.hold(root)(F)), model.surface.nodes)
+    held, tip_rows = body.marker("root").hold, body.marker("tip").hold
+    rigid = -np.linalg.lstsq(held[:, :6], held[:, 6:], rcond=None)[0]
+    motion = tip_rows[:6, :6] @ rigid + tip_rows[:6, 6:]  # of the coordinates that carry loads
+    for k in range(6):
+        q = np.linalg.solve(body.K, motion[k] * 1e3)
+        size = np.abs(full[:, :, k]).max()
+        assert_allclose(body.stress.field(q), full[:, :, k], atol=1e-9 * size)
+
+
+def test_stress_survives_a_file_and_a_change_of_frame(model, tmp_path):
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(
+        model, method=rom.CraigBampton(4), interfaces=kinds, stress=True, certify=False
+    )
+    q = np.linspace(1.0, 2.0, body.n_modes)
+    rom.save(body, tmp_path / "beam.rom.npz")
+    again = rom.load(tmp_path / "beam.rom.npz")
+    assert np.array_equal(again.stress.field(q), body.stress.field(q))
+    xx, yy, zz, yz, xz, xy = body.stress.field(q).T
+    deviator = np.array([xx, yy, zz]) - (xx + yy + zz) / 3
+    second = 0.5 * (deviator**2).sum(axis=0) + yz**2 + xz**2 + xy**2
+    assert_allclose(body.stress.von_mises(q), np.sqrt(3 * second), rtol=1e-10)
+    # the same deformation seen from another frame has the same stress: largest over a mode
+    for fixed in ((), ("root",)):
+        one, other = (b.modes(9, fixed=fixed)[1][6:, 8] for b in (body, body.with_reference("tip")))
+        stresses = [body.stress.field(one), body.with_reference("tip").stress.field(other)]
+        sign = np.sign(np.sum(stresses[0] * stresses[1]))
+        assert_allclose(stresses[1], sign * stresses[0], atol=1e-7 * np.abs(stresses[0]).max())
+
+
+def test_paraview_reads_the_stress(model, tmp_path):
+    import meshio
+
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(
+        model, method=rom.CraigBampton(4), interfaces=kinds, stress=True, certify=False
+    )
+    q = np.linspace(1.0, 2.0, body.n_modes)
+    rom.write_stress(body, q, tmp_path / "beam.vtu")
+    seen = meshio.read(tmp_path / "beam.vtu").point_data
+    assert_allclose(seen["stress xx yy zz yz xz xy [Pa]"], body.stress.field(q))
+    assert_allclose(seen["von Mises stress [Pa]"].ravel(), body.stress.von_mises(q))
+    assert_allclose(seen["displacement [m]"].ravel(), body.surface.shape @ q)
+
+
+def test_messages(model):
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(
+        model, method=rom.CraigBampton(2), interfaces=kinds, stress=True, certify=False
+    )
+    with pytest.raises(ConfigError, match="cannot be recovered"):
+        rom.write_stress(replace(body, stress=None), np.zeros(8), "x.vtu")
+    with pytest.raises(ConfigError, match=r"q has the shape \(3,\)"):
+        body.stress.field(np.zeros(3))
+    from rom.bench import _bar
+
+    with pytest.raises(ConfigError, match="has no finite elements"):
+        rom.reduce(
+            _bar((0.4, 0.05, 0.03), (4, 1, 1)), method=rom.Guyan(), interfaces=kinds, stress=True
+        )
