@@ -27,11 +27,14 @@ def half(side, kind, cells=(4, 2, 2), n_modes=None):
     )
 
 
-def joined(kind, cells=((4, 2, 2), (4, 2, 2)), n_modes=None):
-    bodies = {
+def halves(kind, cells=((4, 2, 2), (4, 2, 2)), n_modes=None):
+    return {
         side: half(side, kind, c, n_modes) for side, c in zip(("left", "right"), cells, strict=True)
     }
-    return rom.Assembly(bodies, COUPLED)
+
+
+def joined(*arguments, **options):
+    return rom.Assembly(halves(*arguments, **options), COUPLED)
 
 
 def whole(cells=(8, 2, 2), fixed=("root",), n=12):
@@ -128,9 +131,8 @@ STUDY = {
 }
 
 
-@pytest.mark.fenicsx
-@pytest.mark.parametrize("kind", STUDY)
-def test_study_of_interface_orders_on_two_blocks(kind):
+def study(kind, cells=(10, 4, 2)):
+    """Bodies and couplings of the two blocks; the right one with these cells."""
     pytest.importorskip("dolfinx", reason="needs quadratic hexahedra")
     from boxes import box
 
@@ -141,13 +143,20 @@ def test_study_of_interface_orders_on_two_blocks(kind):
         ("left", 0.0, {"x0": "rbe2", "x1": kind}),
         ("right", 0.5, {"x0": kind}),
     ):
-        mesh, tags = box((0.5, 0.2, 0.1), (10, 4, 2), "hexahedron")
+        mesh, tags = box((0.5, 0.2, 0.1), cells if name == "right" else (10, 4, 2), "hexahedron")
         mesh.geometry.x[:, 0] += start
         model = assemble(mesh, None, tags, material=STEEL, degree=2)
         bodies[name] = rom.reduce(
             model, method=rom.CraigBampton(30), interfaces=kinds, certify=False
         )
-    assembly = rom.Assembly(bodies, ((("left", "x1"), ("right", "x0")),))
+    return bodies, ((("left", "x1"), ("right", "x0")),)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("kind", STUDY)
+def test_study_of_interface_orders_on_two_blocks(kind):
+    bodies, couplings = study(kind)
+    assembly = rom.Assembly(bodies, couplings)
     error = assembly.frequencies(10, fixed=(("left", "x0"),)) / FULL - 1
     worst, first = STUDY[kind]
     assert_allclose(error.max(), worst, rtol=5e-3)

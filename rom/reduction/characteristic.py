@@ -75,24 +75,35 @@ class Characteristic:
         ops, full = connection.ops, np.concatenate([connection.parts[name] for name in names])
         basis = Guyan().basis(ops, connection.boundary, connection.labels)
         rigid = ops.rows(ops.rigid, connection.boundary[full])
-        chi = self._modes(ops, basis.Psi[:, full], rigid)
-        parts = np.split(chi, np.cumsum(sizes)[:-1])
-        return interfaces | {
-            name: CharacteristicFunctions(part) for name, part in zip(names, parts, strict=True)
-        }
+        lam, chi = _interface_modes(ops, basis.Psi[:, full], rigid)
+        ends, found = np.cumsum(sizes)[:-1], {}
+        for name, part, R in zip(names, np.split(chi, ends), np.split(rigid, ends), strict=True):
+            m = self._number(part, R)
+            kept = whole_clusters(lam, m) if m else 0
+            found[name] = CharacteristicFunctions(part[:, :kept])
+            if kept > m and ops.first == 0:
+                repeated = np.sqrt(lam[m - 1]) / (2 * np.pi)
+                log.info("interface %r: more than %d functions, %.4g Hz is repeated", name, self.n,
+                         repeated)  # fmt: skip
+        return interfaces | found
 
-    def _modes(self, ops: Operators, Psi: Array, rigid: Array) -> Array:
-        """(b, n - 6) lowest modes of the interfaces that are M-orthogonal to rigid motion."""
-        K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
-        R = orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9)
-        Z = null_space(R.T @ M)
-        lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
-        m = min(self.n - 6, lam.size)
-        kept = whole_clusters(lam, m) if m else 0
-        if kept > m and ops.first == 0:
-            repeated = np.sqrt(lam[kept - 1]) / (2 * np.pi)
-            log.info("%d functions instead of %d, %.4g Hz is repeated", kept + 6, self.n, repeated)
-        return Z @ V[:, :kept]
+    def _number(self, part: Array, rigid: Array) -> int:
+        """How many modes give an interface n functions; mirrored ends see some modes twice."""
+        X = np.hstack([rigid, part])
+        X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+        m = self.n - 6
+        while m < part.shape[1] and np.linalg.matrix_rank(X[:, : 6 + m], tol=1e-8) < self.n:
+            m += 1
+        return m
+
+
+def _interface_modes(ops: Operators, Psi: Array, rigid: Array) -> tuple[Array, Array]:
+    """Eigenvalues and modes (b, b - 6) of the interfaces that are M-orthogonal to rigid motion."""
+    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+    R = orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9)
+    Z = null_space(R.T @ M)
+    lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    return lam, Z @ V
 
 
 @dataclass(frozen=True, slots=True, eq=False)
