@@ -33,9 +33,9 @@ say = print if first and not options.quiet else lambda *_: None
 
 # ## The blade
 #
-# Titanium, 120 mm of airfoil. On both flanks the disk is a bed of springs, 10 mm of titanium deep:
-# softer than the root, so that the flanks move and deform. Held flanks would prove nothing, for
-# every kind of interface is exact there.
+# Titanium, 120 mm of airfoil. Under both flanks the disk is a bed of springs as soft as 10 mm of
+# titanium, so that the flanks move and deform. Held flanks would prove nothing: every kind of
+# interface is exact there.
 
 E, rho = 114e9, 4430.0
 BED = E / 0.010  # N/m^3
@@ -43,7 +43,7 @@ FLANKS = ("flank_left", "flank_right")
 given = {
     "path": Path(__file__).parents[1] / "meshes" / "compressor_blade.geo",
     "material": rom.Material(E=E, nu=0.33, rho=rho),
-    "parameters": {"lc": 0.006, "lc_flank": 0.0028, "crown": options.crown},
+    "parameters": {"lc": 0.008, "lc_flank": 0.0028, "crown": options.crown},
     "order": 2,  # on crowned flanks, nodes between corners lie on the cylinder as well
 }
 model = rom.fe.model(**given)
@@ -52,7 +52,7 @@ say(f"{model.n_dofs} dofs, {n_b} of them on the flanks, {1e3 * model.mass():.1f}
 
 # ## What the finite elements say
 #
-# The blade on its bed is solved without `rom`: a sparse eigenproblem, whole on each process.
+# SciPy solves the blade on its bed with all its dofs, whole on each process.
 
 alone = model if MPI.COMM_WORLD.size == 1 else rom.fe.model(**given, comm=MPI.COMM_SELF)
 K = alone.K.tocsc()
@@ -128,20 +128,22 @@ if first:
         ],
         xlabel="interface coordinates of both flanks",
         title="A dovetailed compressor blade: how its interface is reduced",
-        caption=f"Titanium blade of {model.n_dofs} dofs whose two dovetail flanks ({n_b} dofs) sit "
-        "on an elastic bed, as soft as 10 mm of titanium. Top: worst relative error of its first "
-        "ten natural frequencies against the full finite element model; middle: worst disagreement "
-        "of the mode shapes; bottom: time of the whole reduction. Every variant keeps 60 "
-        "fixed-interface modes. Polynomials are chosen before anything is solved; all dofs need "
-        "one solution each. A rigid flank is too stiff, one that feels only the mean motion of its "
-        "nodes too soft.",
+        caption=f"Titanium blade of {model.n_dofs} dofs whose two dovetail flanks, "
+        f"{'crowned' if options.crown else 'plane'}, with {n_b} dofs, sit on an elastic bed "
+        "as soft as 10 mm of titanium. Top: worst relative error of its first ten natural "
+        "frequencies against the full finite element model; middle: worst disagreement of the "
+        "mode shapes; bottom: time of the whole reduction. All keep 60 fixed-interface modes. "
+        "Polynomials are chosen before anything is solved; all dofs need one solution each. Order "
+        f"3 reaches {100 * np.abs(seated['polynomial:3']).max():.2f} % with "
+        f"{coordinates['polynomial:3']} coordinates. A rigid flank is too stiff; one that the bed "
+        "moves only in the mean is too soft.",
     )
 
 # ## What to remember
 #
 # `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
 # volume follows from the description of the geometry: parabolic profiles, platform, dovetail, whose
-# fillets add above the flanks what they take below.
+# fillets add above the flanks what they take below; crowns add little.
 
 z = np.linspace(0.0, 1.0, 2001)[1::2]
 chord, thick, edge = 0.045 - 0.005 * z, 0.0045 - 0.0021 * z, 0.0010
@@ -150,20 +152,18 @@ beta, wide = np.radians(50), (0.012, 0.024)
 depth = (wide[1] - wide[0]) / 2 / np.tan(beta)
 root = 0.044 * (0.004 * sum(wide) + depth * sum(wide) / 2)
 results = {
-    "mass [kg]": (model.mass(), rho * (airfoil + 0.052 * 0.032 * 0.005 + root), 1e-3),
-    "first frequency, seated, order 4 [Hz]": (
-        (1 + seated["polynomial:4"][0]) * exact["seated"][0], exact["seated"][0], 2e-4),
+    "mass [kg]": (model.mass(), rho * (airfoil + 0.052 * 0.032 * 0.005 + root), 3e-3),
     "worst ratio of ten frequencies, free, order 3": (
         1 + np.abs(free["polynomial:3"]).max(), 1.0, 1e-3),
-    "worst ratio of ten frequencies, seated, order 4": (
-        1 + np.abs(seated["polynomial:4"]).max(), 1.0, 1e-3),
+    "worst ratio of ten frequencies, seated, order 3": (
+        1 + np.abs(seated["polynomial:3"]).max(), 1.0, 1e-3),
     "worst ratio of ten frequencies, seated, all dofs": (
-        1 + np.abs(seated["full"]).max(), 1.0, 1e-3),
-    "lowest MAC, seated, order 4": (1 - lost["polynomial:4"], 1.0, 1e-3),
-    "order 4 against all dofs, both capped at a tenth": (
-        max(coordinates["polynomial:4"] / n_b, 0.1), 0.1, 1e-12),
-    "all dofs against order 4, times, capped at 5": (
-        min(seconds["full"] / seconds["polynomial:4"], 5.0), 5.0, 1e-12),
+        1 + np.abs(seated["full"]).max(), 1.0, 1e-4),
+    "lowest MAC, seated, order 3": (1 - lost["polynomial:3"], 1.0, 1e-4),
+    "share of the interface dofs, order 3, at least a tenth": (
+        max(coordinates["polynomial:3"] / n_b, 0.1), 0.1, 1e-12),
+    "time of all dofs over order 3, at most 5": (
+        min(seconds["full"] / seconds["polynomial:3"], 5.0), 5.0, 1e-12),
 }  # fmt: skip
 if first:
     for name, (value, expected, tolerance) in results.items():

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import eigh
 
 import rom
 from rom import bench
@@ -57,6 +58,22 @@ def test_the_ends_of_the_bar_are_its_interfaces(bar):
         y, z = face.points[:, 1], face.points[:, 2]
         exact = SIZE[1] ** 3 / 3 * SIZE[2] ** 2 / 2  # integral of y^2 z
         assert_allclose(y @ face.surface_mass @ (y * z), exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["full", "polynomial:4"])
+def test_a_bed_under_the_interfaces_is_that_of_the_full_model(bar, kind):
+    """Ten frequencies of the bar with springs under both ends, from all its dofs by LAPACK."""
+    K, M = bar.K.toarray(), bar.M.toarray()
+    for face in bar.interfaces.values():
+        K[np.ix_(face.dofs, face.dofs)] += bench.BED * np.kron(
+            face.surface_mass.toarray(), np.eye(3)
+        )
+    exact = np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * np.pi)
+    kinds = dict.fromkeys(bar.interfaces, kind)
+    body = rom.reduce(bar, method=rom.CraigBampton(40), interfaces=kinds, certify=False)
+    f = bench._on_a_bed(body, bar)
+    assert np.all(f > exact * (1 - 1e-9))
+    assert_allclose(f, exact, rtol=1e-3)
 
 
 def test_the_integrator_is_measured_without_fenicsx():

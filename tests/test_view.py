@@ -214,6 +214,23 @@ def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
         view.mode_shapes(bar, tmp_path / "modes.png", n=1)
 
 
+def test_values_within_two_decades_have_ticks_at_one_two_five():
+    from matplotlib.figure import Figure
+
+    from rom.view.curves import _near_ticks
+
+    axes = Figure().subplots()
+    axes.loglog([1, 10], [2.5, 40])
+    axes.set_ylim(2.5, 40)
+    _near_ticks(axes)
+    assert list(axes.get_yticks()) == [5, 10, 20]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["5", "10", "20"]
+    axes.set_ylim(1e-3, 1)
+    before = list(axes.get_yticks())
+    _near_ticks(axes)
+    assert list(axes.get_yticks()) == before
+
+
 def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
     curves = {"one": ([1, 2, 4], [1e-1, 1e-2, 0.0]), "two": ([1, 2, 4], [1e-2, 1e-3, 1e-4])}
     look = {"xlabel": "modes", "title": "Title", "caption": "Words."}
