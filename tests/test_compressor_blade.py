@@ -92,6 +92,17 @@ def test_flanks_are_planes_or_cylinders_where_the_dovetail_has_them(crown, chang
         assert areas(mesh)[name] == pytest.approx(arc * p["l_root"], rel=2e-3)
 
 
+@pytest.mark.parametrize(("stagger", "twist"), [(20.0, 30.0), (10.0, -25.0)])
+def test_the_tip_is_turned_by_stagger_and_twist(stagger, twist):
+    p = {"stagger": stagger, "twist": twist, "camber": 0.0}
+    mesh = read_mesh(GEOMETRY, parameters=COARSE | p)
+    tip = mesh.points[mesh.points[:, 2] > 0.12 - 1e-9, :2]
+    angle = np.radians(stagger + twist)
+    along, across = tip @ [np.cos(angle), np.sin(angle)], tip @ [-np.sin(angle), np.cos(angle)]
+    assert_allclose((along.min(), along.max()), (-0.020, 0.020), rtol=1e-6)
+    assert_allclose(np.abs(across).max(), 0.0012, rtol=0.05)
+
+
 def test_mass_is_that_of_profiles_platform_and_dovetail(blade):
     """Fillets add above the flanks what they take below; a crown adds a segment of its circle."""
     model, _, crown = blade
