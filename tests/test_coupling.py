@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse import identity
 from solid import block
 from test_assembly import COUPLED, ROOT, half, halves, joined, study, whole
 from test_polynomial import surface
@@ -14,6 +15,7 @@ from rom.body import coupling
 from rom.body.flexible import Marker, Patch
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError
+from rom.model import Interface
 
 COARSE, FINE = (4, 2, 2), (4, 3, 3)
 
@@ -82,6 +84,26 @@ def test_displacements_of_the_functions_pass_without_error(shape, functions, n):
         assert gap(lambda x, k=k: rigid_motions(x)[:, k]) < 1e-10
     beyond = functions.order + 1
     assert gap(lambda x: ((x - centre) @ np.ones((3, 3)) / 0.05) ** beyond) > 1e-3
+
+
+def faceted(n, turn=0.0):
+    """Cylinder of n flat facets around, with nodes in the middle of their edges."""
+    angle = turn + 2 * np.pi * np.arange(n) / n
+    corner = np.column_stack([np.cos(angle), np.sin(angle)])
+    ring = np.vstack([corner, 0.5 * (corner + np.roll(corner, -1, axis=0))])
+    x = np.vstack([np.column_stack([ring, np.full(2 * n, z)]) for z in np.linspace(-1, 1, 7)])
+    return Interface("ring", np.arange(len(x)), x, identity(len(x), format="csr") / n, np.zeros(3))
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_facets_are_not_taken_for_functions(order):
+    """On the cylinder they stand for there are (p+1)^2 polynomials; x^2 + y^2 is a constant."""
+    one, other = faceted(8), faceted(20, turn=0.1)
+    A, B = coupling.projected_rows(bare(one), bare(other), rom.Polynomial(order))
+    assert A.shape[0] == B.shape[0] == 3 * (order + 1) ** 2
+    for k in range(6):
+        a, b = (L @ rigid_motions(i.points)[:, k] for L, i in ((A, one), (B, other)))
+        assert_allclose(a, b, atol=1e-10 * np.abs(a).max())
 
 
 def test_equal_coefficients_mean_that_moments_of_the_difference_vanish():
@@ -174,11 +196,22 @@ def test_functions_of_unequal_surfaces_need_a_projection():
 
 
 def test_a_saved_body_is_coupled_like_the_one_it_was(tmp_path):
+    model = block(size=(0.5, 0.1, 0.08), cells=FINE, origin=(0.5, 0, 0))
+    model = turned(model, "root", np.random.default_rng(6).permutation(16))
     for kind in ("full", "polynomial:2"):
-        bodies = halves(kind, (COARSE, FINE), n_modes=10)
+        right = rom.reduce(
+            model, method=rom.CraigBampton(10), interfaces={"root": kind, "tip": "rbe2"},
+            certify=False,
+        )  # fmt: skip
+        bodies = {"left": half("left", kind, n_modes=10), "right": right}
         read = {n: rom.load(rom.save(b, tmp_path / f"{n}.npz")) for n, b in bodies.items()}
+        before, after = (b["right"].marker("root").patch for b in (bodies, read))
+        assert_allclose(after.surface_mass.toarray(), before.surface_mass.toarray(), rtol=1e-15)
+        assert (after.points == before.points).all()
+        assert (after.shapes is None) == (kind == "full")
+        assert read["left"].marker("root").patch is None
         pairs = [rom.Assembly(b, COUPLED, projection=rom.Polynomial(2)) for b in (bodies, read)]
-        assert_allclose(pairs[1].frequencies(9), pairs[0].frequencies(9), rtol=1e-12, atol=1e-9)
+        assert_allclose(pairs[1].frequencies(9), pairs[0].frequencies(9), rtol=1e-9, atol=1e-6)
 
 
 def test_messages_for_surfaces_that_do_not_meet():

@@ -130,6 +130,26 @@ def test_volume_of_the_crank_is_that_of_hull_and_cylinders():
     assert_allclose((pin[:, 2].min(), pin[:, 2].max()), (0.0, 0.026), atol=1e-12)
 
 
+def test_parts_of_the_frame_meet_in_their_nodes_and_fill_the_whole():
+    whole, left, beam, right = (
+        read_mesh(MESHES / "frame.geo", parameters={"part": part}) for part in range(4)
+    )
+    parts = (left, beam, right)
+    assert sum(map(volume, parts)) == pytest.approx(volume(whole), rel=1e-9)
+    exact = 2 * np.pi * 0.02**2 * 0.25 + 0.47 * 0.07 * 0.05
+    assert volume(whole) == pytest.approx(exact, rel=0.03)
+    for column, bore, x in ((left, "bore_left", 0.0), (right, "bore_right", 0.4)):
+        seat = column.points[np.unique(column.facets["seat"])]
+        hole = beam.points[np.unique(beam.facets[bore])]
+        assert_allclose(np.hypot(seat[:, 0] - x, seat[:, 1]), 0.02, rtol=1e-9)
+        assert_allclose(*(y[np.lexsort(y.T.round(9))] for y in (seat, hole)), atol=1e-12)
+        assert_allclose((seat[:, 2].min(), seat[:, 2].max()), (0.25, 0.3))
+        assert (column.points[np.unique(column.facets["foot"]), 2] == 0.0).all()
+        assert areas(column)["seat"] == pytest.approx(areas(beam)[bore], rel=1e-12)
+    other = read_mesh(MESHES / "frame.geo", parameters={"part": 3, "n_right": 6, "n_along": 5})
+    assert np.unique(other.facets["seat"]).size == 12 * 6
+
+
 @pytest.mark.parametrize("hexahedra", [0, 1])
 def test_beam_is_a_box_with_two_ends(hexahedra):
     p = {"L": 0.7, "b": 0.04, "h": 0.1, "hex": hexahedra, "nx": 5, "ny": 3, "nz": 1}

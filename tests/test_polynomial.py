@@ -85,6 +85,19 @@ def test_the_angle_runs_around_the_axis_of_a_bore():
     assert_allclose(np.abs(zeta), np.abs(2 * height.ravel() / 0.3 - 1), atol=1e-9)
 
 
+def test_two_bodies_around_one_bore_choose_the_same_functions():
+    """Where two directions lie equally far from the axis, round-off must not choose."""
+    angle, height = np.meshgrid(2 * np.pi * (np.arange(24) + 0.3) / 24, [0.0, 0.1, 0.2, 0.3])
+    ring = [np.cos(angle.ravel()), np.sin(angle.ravel()), 10 * height.ravel()]
+    S, found = diags(np.ones(96)).tocsr(), []
+    for seed in range(6):
+        x = 0.1 * np.column_stack(ring) + np.random.default_rng(seed).normal(size=(96, 3)) * 1e-15
+        bore = Interface("bore", np.arange(96), x, S, np.zeros(3))
+        found.append(interface_functions(rom.FourierLegendre(2, 1), bore))
+    for Q in found[1:]:
+        assert_allclose(Q, found[0], atol=1e-9 * np.abs(Q).max())
+
+
 def frequencies(model, kind, n=6, m=15):
     body = rom.reduce(
         model,
