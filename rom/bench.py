@@ -120,7 +120,8 @@ def peers(meshes: tuple[float, ...] = (0.005, 0.00285)) -> Iterator[Figure]:
 def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:
     """All dofs of the dovetail flanks of a compressor blade against polynomials on them.
 
-    Errors are those of ten frequencies of the blade on an elastic bed, against all dofs.
+    With 20 fixed-interface modes. Errors are those of ten frequencies of the blade on an elastic
+    bed, against all dofs.
 
     Args:
         parameters: of the geometry; the defaults put 1700 dofs on the flanks.
@@ -132,7 +133,7 @@ def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:
     taken, f = {}, {}
     for kind in ("polynomial:3", "polynomial:4", "full"):
         kinds = dict.fromkeys(model.interface_names, kind)
-        body = reduce(model, method=CraigBampton(60), interfaces=kinds, certify=False)
+        body = reduce(model, method=CraigBampton(20), interfaces=kinds, certify=False)
         taken[kind], f[kind] = body.provenance["seconds to reduce"], _on_a_bed(body, model)
         columns = sum(len(marker.hold) for marker in body.markers.values())
         case = f"{model.n_dofs} dofs, {kind}"
