@@ -26,6 +26,7 @@ from rom.model import (
     Report,
     SurfaceMesh,
 )
+from rom.reduction.balanced import BalancedTruncation, second_order_balanced_truncation
 from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import DualAssembly, FreeSubstructure
 from rom.reduction.enhanced import EnhancedCraigBampton
@@ -49,6 +50,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Assembly",
     "Attachment",
+    "BalancedTruncation",
     "Basis",
     "Characteristic",
     "CraigBampton",
@@ -85,6 +87,7 @@ __all__ = [
     "modes",
     "reduce",
     "save",
+    "second_order_balanced_truncation",
     "simulate",
     "substructure",
     "write_report",
