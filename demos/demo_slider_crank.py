@@ -204,7 +204,9 @@ done("draw")
 frequencies = [
     (support, k + 1, full, reduced, f"{reduced / full - 1:.1e}", mac)
     for support, rows in comparison.items()
-    for k, (full, reduced, mac) in enumerate(zip(*rows.values(), strict=True))
+    for k, (full, reduced, mac) in enumerate(
+        zip(*(rows[key] for key in ("full", "reduced", "mac")), strict=True)
+    )
 ]
 report.write_report(
     out / "report.html",

@@ -19,6 +19,7 @@ from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
 
 DEPENDENT = 1e-9  # share of a function that is new, below which it is dropped
+ON_AXIS = 1e-6  # distance from an axis, of the size, where the angle about it is round-off
 THIN = 1e-9  # extent of a surface, of its largest one, that counts as none
 
 
@@ -73,7 +74,7 @@ class FourierLegendre:
         theta, zeta = cylinder_coordinates(interface)
         around = [np.ones_like(theta)]
         for n in range(1, self.harmonics + 1):
-            around += [np.cos(n * theta), np.sin(n * theta)]
+            around += [np.nan_to_num(wave(n * theta)) for wave in (np.cos, np.sin)]
         along = legvander(zeta, self.order).T
         products = [ring * line for line in along for ring in around]
         return np.column_stack([np.ones_like(theta), _local(interface), *products])
@@ -85,7 +86,10 @@ def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface
     Raises:
         InterfaceError: if the functions cannot move the surface as a rigid body: nodes on a line.
     """
-    Q = orthonormal_in(interface.surface_mass, kind.functions(interface))
+    S, V = interface.surface_mass, kind.functions(interface)
+    size = np.sqrt(S.sum())  # of the constant function; all others reach one
+    V = V[:, [_norm(S, v) > DEPENDENT * size for v in V.T]]  # cosines of right angles are round-off
+    Q = orthonormal_in(S, V)
     linear = np.linalg.matrix_rank(_local(interface), tol=1e-6)
     if linear < 2 or Q.shape[1] < 3:
         raise InterfaceError(
@@ -119,6 +123,8 @@ def orthonormal_in(S: object, V: Array) -> Array:
 def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
     """(k,) angle about the axis of a surface of revolution, and (k,) place along it in [-1, 1].
 
+    On the axis itself the angle is NaN, and harmonics are zero.
+
     The axis is the principal direction of the area whose moment differs from the two others; for
     a bore or a journal that is its axis. The angle counts from the ambient axis farthest from it.
 
@@ -142,7 +148,10 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
     along = x @ axis - 0.5 * ((x @ axis).max() + (x @ axis).min())
     reach = np.abs(along).max()
     flat = reach <= THIN * np.ptp(interface.points, axis=0).max()
-    return np.arctan2(x @ np.cross(axis, e), x @ e), along * 0.0 if flat else along / reach
+    across = x @ e, x @ np.cross(axis, e)
+    theta = np.arctan2(across[1], across[0])
+    theta[np.hypot(*across) < ON_AXIS * np.ptp(interface.points, axis=0).max()] = np.nan
+    return theta, along * 0.0 if flat else along / reach
 
 
 def _centroid(interface: Interface) -> Array:
