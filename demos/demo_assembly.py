@@ -24,6 +24,7 @@ options = argparse.ArgumentParser(description="a frame assembled from reduced pa
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
+finite_elements = rom.fe.model  # PETSc starts here, on all processes together
 if MPI.COMM_WORLD.rank:
     raise SystemExit  # small dense matrices are work for one process
 say = (lambda *_: None) if options.quiet else print
@@ -38,7 +39,7 @@ names = ("left", "beam", "right")
 
 def meshed(part, **numbers):
     """Finite element model of one part, or of the whole frame."""
-    return rom.fe.model(
+    return finite_elements(
         Path(__file__).parents[1] / "meshes" / "frame.geo",
         material=rom.Material(E=210e9, nu=0.3, rho=7850.0),
         parameters={"part": part, "L": L, "H": H, "R": R, "t": t, "w": w, "a": a} | numbers,
