@@ -53,3 +53,9 @@ environment() { # folder, options of venv, what pip installs
 
 environment .venv --system-site-packages -c constraints.txt -e '.[view,dev]'
 environment .venv-light "" -r .ci/light.txt
+
+# Python runs lines of .pth files when it starts, before OpenBLAS is loaded.
+for folder in .venv/lib/python3*/site-packages; do
+  env -u OPENBLAS_CORETYPE PYTHONPATH=. /usr/bin/python3 -m rom.doctor.core \
+    >"$folder/openblas_core.pth"
+done

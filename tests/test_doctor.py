@@ -12,6 +12,7 @@ from command import environment
 from command import rom as command
 
 from rom.doctor.caches import damaged_files
+from rom.doctor.core import abilities, better
 from rom.doctor.libraries import PACKAGES, fenicsx
 from rom.doctor.machine import blas, light
 from rom.doctor.pictures import pictures
@@ -99,15 +100,41 @@ def test_libraries_after_a_crash_are_not_called_missing():
 )  # fmt: skip
 def test_the_slow_reference_blas_is_told_from_fast_ones(mapped, state):
     """With NumPy from a wheel it is PETSc's BLAS that counts."""
-    library, speed = blas(["/usr/lib/libc.so.6", *mapped])
+    library, *_, speed = blas(["/usr/lib/libc.so.6", *mapped])
     assert library.state == state
     assert ("libopenblas0-pthread" in library.advice) == (state == "note")
     assert float(speed.value.split()[0]) > 0.1
 
 
 def test_blas_of_this_process_is_found():
-    library, _ = blas([])
+    library, *_ = blas([])
     assert "not found" not in library.value
+
+
+@pytest.mark.parametrize(
+    ("core", "flags", "wanted"),
+    [("Prescott", "sse2 avx2 fma avx512f avx512bw avx512dq avx512vl", "SkylakeX"),
+     ("Prescott", "sse2 avx2 fma avx512f", "Haswell"), ("Prescott", "sse2", ""),
+     ("Zen", "sse2 avx2 fma", ""), ("", "sse2 avx2 fma", "")],
+)  # fmt: skip
+def test_a_processor_that_openblas_does_not_know_is_named(core, flags, wanted):
+    assert better(core, set(flags.split())) == wanted
+
+
+def test_the_abilities_of_a_processor_are_read_from_its_first_core(tmp_path):
+    told = tmp_path / "cpuinfo"
+    told.write_text("processor\t: 0\nflags\t\t: fpu avx2\n\nprocessor\t: 1\nflags\t\t: fma\n")
+    assert abilities(told) == {"fpu", "avx2"}
+    assert abilities(tmp_path / "nothing") == set()
+
+
+def test_a_mistaken_openblas_is_reported_with_its_cure(monkeypatch):
+    from rom.doctor import machine
+
+    monkeypatch.setattr(machine, "taken_for", lambda: "Prescott")
+    monkeypatch.setattr(machine, "abilities", lambda: {"avx2", "fma"})
+    note = next(finding for finding in blas([OPENBLAS]) if finding.name == "processor")
+    assert (note.state, note.advice[-7:]) == ("note", "Haswell")
 
 
 def test_a_missing_light_library_is_essential(monkeypatch):

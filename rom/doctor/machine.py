@@ -9,6 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
+from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.finding import Finding
 from rom.fe.probe import mapped_files
 
@@ -42,6 +43,10 @@ def blas(mapped: list[str]) -> list[Finding]:
     found = [Finding("BLAS", "library", shown)]
     if slow:
         found = [Finding("BLAS", "library", f"reference, {shown}", "note", SLOW_ADVICE)]
+    wanted = better(taken_for(), abilities())
+    if wanted:
+        advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
+        found.append(Finding("BLAS", "processor", f"taken for a {taken_for()}", "note", advice))
     return [*found, Finding("BLAS", "matrix product", f"{speed:.1f} GFlop/s")]
 
 

@@ -17,6 +17,7 @@ BLOCK = 6  # columns solved together: fewer make solving dearer, more make the s
 ROOM = 20  # blocks beside the modes sought before the space is restarted; twenty are seldom used
 RESTARTS = 20  # after which the method has failed
 TOLERANCE = 1e-10  # of an eigenvalue of the inverse: its residual when it counts as converged
+ROUGH = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
 
 
 class BlockLanczos:
@@ -28,6 +29,7 @@ class BlockLanczos:
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
         k: number of modes sought.
+        spare: how many of them only need good eigenvalues.
 
     Source:
         Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
@@ -35,8 +37,11 @@ class BlockLanczos:
         orthogonalisation, and the thick restart of Wu and Simon, ibid. 22 (2000) 602.
     """
 
-    def __init__(self, ops: Any, factor: Factor, sigma: float, deflated: Array, k: int):
+    def __init__(
+        self, ops: Any, factor: Factor, sigma: float, deflated: Array, k: int, spare: int = 0
+    ):
         self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
+        self.tolerance = np.repeat([TOLERANCE, ROUGH], [k - spare, spare])
         self.n_deflated = deflated.shape[1]
         self.V = np.empty((ops.n_local, self.n_deflated + capacity(k)), order="F")
         self.size = 0
@@ -118,7 +123,7 @@ class BlockLanczos:
             return False
         theta, S = self._ritz(self.k)
         residual = np.linalg.norm(R @ S[-BLOCK:], axis=0)
-        return bool((residual <= TOLERANCE * theta).all())
+        return bool((residual <= self.tolerance * theta).all())
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
         theta, S = np.linalg.eigh(self.T)

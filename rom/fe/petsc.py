@@ -5,6 +5,7 @@ stiffness is factored already, come from our block Lanczos, which asks for many 
 and needs half the time. A certificate thereby compares two eigensolvers that share no line.
 """
 
+from functools import cached_property
 from typing import Any
 
 from mpi4py import MPI
@@ -16,8 +17,9 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
 from rom.eigen import count_shift, orthonormal
-from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
+from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.fe.factor import Factor, dense_rows
+from rom.fe.held import ZERO, HeldPETSc
 from rom.fe.iterative import ConjugateGradients, davidson, multigrid, refined
 from rom.fe.krylov_schur import krylov_schur
 from rom.fe.lanczos import BlockLanczos, capacity
@@ -28,89 +30,9 @@ from rom.model import Array, Index
 from rom.scipy_operators import dof_set
 
 SPARE = 3  # modes computed beyond the ones asked for, so that a gap for counting is found
-ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
 DENSE = 300  # dofs up to which all eigenvalues are computed at once
 Inverse = Factor | ConjugateGradients
 SHIFT = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
-
-
-class HeldPETSc:
-    """K with the held dofs eliminated, factored once by MUMPS; call it to solve.
-
-    Attributes:
-        held: the dofs held, global numbers.
-        n_free: number of the others.
-        inner: operators on the others, None when there are none.
-        factor: of their stiffness.
-    """
-
-    def __init__(self, ops: "PETScOperators", held: Index, shift: float = 0.0):
-        self.ops, self.held, self.shift = ops, held, shift
-        mine = np.arange(ops.first, ops.first + ops.n_local)
-        self.mine = np.flatnonzero(~np.isin(mine, held))
-        self.n_free = ops.n - held.size
-        self.inner = self.factor = None
-        if self.n_free:
-            free = PETSc.IS().createGeneral(mine[self.mine].astype(PETSc.IntType), comm=ops.comm)
-            if ops.n % 3 == 0 and whole_nodes(ops, mine[self.mine]):
-                free.setBlockSize(3)  # multigrid then aggregates nodes
-            K, M = (A.createSubMatrix(free, free) for A in (ops.K, ops.M))
-            fields = {"fixed": ops.fixed[self.mine], "solver": ops.solver}
-            self.inner = PETScOperators(K, M, **fields)
-            if ops.solver.iterative:
-                self._refuse_loose()
-            self.make()
-            if not shift:
-                self._refuse_free_motion()
-
-    def __call__(self, F: Array) -> Array:
-        """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
-        X = np.zeros(F.shape)
-        if self.inner is not None:
-            if self.factor is None:
-                self.make()
-            X[self.mine] = self.factor.solve(F[self.mine])
-        return X
-
-    def release(self) -> None:
-        """Give the memory of the factor back; it is made again if it is needed."""
-        self.factor.release()
-        self.factor = None
-
-    def make(self) -> None:
-        """Factor the stiffness, or K - shift M."""
-        if self.shift:
-            self.factor = self.inner.indefinite(self.shift)
-            return
-        near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
-        self.factor = self.inner.inverse(self.inner.K, near_null, self.held.size)
-
-    def _refuse_loose(self) -> None:
-        """Iteration on a body that can move would only run on: judge the held dofs first."""
-        R = self.ops.rigid
-        if R is None:
-            return
-        if np.linalg.matrix_rank(self.ops.rows(R, self.held), tol=1e-9) < R.shape[1]:
-            raise self._singular()
-
-    def _singular(self) -> InterfaceError:
-        return InterfaceError(
-            f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
-            hint="Fix at least three nodes that do not lie on one line, or hold another interface.",
-        )
-
-    def _refuse_free_motion(self) -> None:
-        """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
-        ops, stiffness = self.ops, 0.0
-        if self.factor.ok:
-            R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
-            X = self.factor.solve(ops.apply_M(R)[self.mine])
-            if ops.all_finite(X):
-                K = self.inner.gram(X, self.inner.apply_K(X))
-                M = self.inner.gram(X, self.inner.apply_M(X))
-                stiffness = (np.diag(K) / np.diag(M)).min()
-        if not stiffness > ZERO * ops.largest():
-            raise self._singular()
 
 
 class PETScOperators:
@@ -191,18 +113,18 @@ class PETScOperators:
         """Eliminate the held dofs and factor the rest of K - shift M."""
         return HeldPETSc(self, dof_set(dofs, self.n), shift)
 
+    def part(self, rows: Index) -> "PETScOperators":
+        """The body with all dofs held but these: numbers on this rank."""
+        dofs = self.first + rows
+        some = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=self.comm)
+        if self.n % 3 == 0 and whole_nodes(self, dofs):
+            some.setBlockSize(3)  # multigrid then aggregates nodes
+        K, M = (A.createSubMatrix(some, some) for A in (self.K, self.M))
+        return PETScOperators(K, M, fixed=self.fixed[rows], solver=self.solver)
+
     def transform(self, T: Any, rigid: Array) -> "PETScOperators":
         """The same body in the coordinates a of u = T a."""
-        T = csr_matrix(T)
-        sizes = ((self.n_local, self.n), (rigid.shape[0], T.shape[1]))
-        map_ = _aij(T, sizes, self.comm)
-        x, y = map_.createVecs()
-        y.array[:] = self.fixed
-        map_.multTranspose(y, x)
-        K, M = (_symmetric(A.ptap(map_)) for A in (self.K, self.M))
-        give_back()
-        fields = {"T": map_, "fixed": x.array.copy(), "parent": self, "solver": self.solver}
-        return PETScOperators(K, M, rigid, **fields)
+        return TiedOperators(self, csr_matrix(T), rigid)
 
     def expand(self, A: Array) -> Array:
         """T A."""
@@ -364,7 +286,7 @@ class PETScOperators:
             return davidson(self, factor, deflated, k)
         if not in_blocks and isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)
-        space = BlockLanczos(self, factor, sigma, deflated, k)
+        space = BlockLanczos(self, factor, sigma, deflated, k, min(SPARE, k - 1))
         space.solve()
         return space.pairs()
 
@@ -415,6 +337,80 @@ class PETScOperators:
             X = np.linalg.solve(np.linalg.cholesky(self.gram(X, X)), X.T).T
         lam = eigh(self.gram(X, self.apply_K(X)), self.gram(X, self.apply_M(X)), eigvals_only=True)
         return float(max(lam[np.argmax(lam > floor)], floor))
+
+
+class TiedOperators(PETScOperators):
+    """A body in the coordinates a of u = T a.
+
+    T^T K T is formed when it is needed. A reduction whose interface coordinates are all held needs
+    the rows of dofs that T leaves alone, and those stand in K already.
+
+    Args:
+        parent: operators in the coordinates u.
+        T: (n_local of u, n of a) rows of the map.
+        rigid: (n_local, 6) rigid motions in the coordinates a.
+    """
+
+    def __init__(self, parent: PETScOperators, T: csr_matrix, rigid: Array):
+        self.parent, self.rigid, self.comm, self.solver = parent, rigid, parent.comm, parent.solver
+        self.affordable = parent.affordable
+        sizes = ((parent.n_local, parent.n), (rigid.shape[0], T.shape[1]))
+        self.T = _aij(T, sizes, self.comm)
+        self.n = T.shape[1]
+        self.first, end = self.T.getOwnershipRangeColumn()
+        self.n_local, self.last = end - self.first, parent.last
+        x, y = self.T.createVecs()
+        y.array[:] = parent.fixed
+        self.T.multTranspose(y, x)
+        self.fixed = x.array.copy()
+        self.plain = self._plain(T)
+
+    def _plain(self, T: csr_matrix) -> Index:
+        """(n_local,) row of the parent that is this coordinate and no other's; -1 if there is none.
+
+        Kept dofs stay on their rank, so that their rows are here.
+        """
+        alone = np.flatnonzero(np.diff(T.indptr) == 1)
+        alone = alone[T.data[T.indptr[alone]] == 1.0]
+        others = np.setdiff1d(np.arange(T.shape[0]), alone)
+        shared = np.concatenate(self.comm.allgather(np.unique(T[others].indices)))
+        column = T.indices[T.indptr[alone]]
+        here = (column >= self.first) & (column < self.first + self.n_local)
+        plain = np.full(self.n_local, -1)
+        plain[column[here] - self.first] = alone[here]
+        shared = shared[(shared >= self.first) & (shared < self.first + self.n_local)]
+        plain[shared.astype(np.int64) - self.first] = -1
+        return plain
+
+    def part(self, rows: Index) -> PETScOperators:
+        """The body with all coordinates held but these."""
+        same = self.plain[rows]
+        if self.comm.allreduce(bool((same >= 0).all()), op=MPI.LAND):
+            return self.parent.part(same)
+        return super().part(rows)
+
+    def apply_K(self, X: Array) -> Array:
+        """T^T K T X."""
+        return self.restrict(self.parent.apply_K(self.expand(X)))
+
+    def apply_M(self, X: Array) -> Array:
+        """T^T M T X."""
+        return self.restrict(self.parent.apply_M(self.expand(X)))
+
+    @cached_property
+    def K(self) -> PETSc.Mat:
+        """T^T K T."""
+        return self._projected(self.parent.K)
+
+    @cached_property
+    def M(self) -> PETSc.Mat:
+        """T^T M T."""
+        return self._projected(self.parent.M)
+
+    def _projected(self, A: PETSc.Mat) -> PETSc.Mat:
+        projected = _symmetric(A.ptap(self.T))
+        give_back()
+        return projected
 
 
 def whole_nodes(ops: PETScOperators, dofs: Index) -> bool:

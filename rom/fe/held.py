@@ -1,0 +1,84 @@
+"""A body with some dofs held: its stiffness factored once, for many answers."""
+
+from typing import Any
+
+import numpy as np
+
+from rom.errors import InterfaceError
+from rom.model import Array, Index
+
+ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
+
+
+class HeldPETSc:
+    """K with the held dofs eliminated, factored once by MUMPS; call it to solve.
+
+    Attributes:
+        held: the dofs held, global numbers.
+        n_free: number of the others.
+        inner: operators on the others, None when there are none.
+        factor: of their stiffness.
+    """
+
+    def __init__(self, ops: Any, held: Index, shift: float = 0.0):
+        self.ops, self.held, self.shift = ops, held, shift
+        mine = np.arange(ops.first, ops.first + ops.n_local)
+        self.mine = np.flatnonzero(~np.isin(mine, held))
+        self.n_free = ops.n - held.size
+        self.inner = self.factor = None
+        if self.n_free:
+            self.inner = ops.part(self.mine)
+            if ops.solver.iterative:
+                self._refuse_loose()
+            self.make()
+            if not shift:
+                self._refuse_free_motion()
+
+    def __call__(self, F: Array) -> Array:
+        """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
+        X = np.zeros(F.shape)
+        if self.inner is not None:
+            if self.factor is None:
+                self.make()
+            X[self.mine] = self.factor.solve(F[self.mine])
+        return X
+
+    def release(self) -> None:
+        """Give the memory of the factor back; it is made again if it is needed."""
+        self.factor.release()
+        self.factor = None
+
+    def make(self) -> None:
+        """Factor the stiffness, or K - shift M."""
+        if self.shift:
+            self.factor = self.inner.indefinite(self.shift)
+            return
+        near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
+        self.factor = self.inner.inverse(self.inner.K, near_null, self.held.size)
+
+    def _refuse_loose(self) -> None:
+        """Iteration on a body that can move would only run on: judge the held dofs first."""
+        R = self.ops.rigid
+        if R is None:
+            return
+        if np.linalg.matrix_rank(self.ops.rows(R, self.held), tol=1e-9) < R.shape[1]:
+            raise self._singular()
+
+    def _singular(self) -> InterfaceError:
+        return InterfaceError(
+            f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
+            hint="Fix at least three nodes that do not lie on one line, or hold another interface.",
+        )
+
+    def _refuse_free_motion(self) -> None:
+        """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
+        ops, stiffness = self.ops, 0.0
+        if self.factor.ok:
+            R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
+            X = self.factor.solve(ops.apply_M(R)[self.mine])
+            if ops.all_finite(X):
+                K = self.inner.gram(X, self.inner.apply_K(X))
+                M = self.inner.gram(X, self.inner.apply_M(X))
+                stiffness = (np.diag(K) / np.diag(M)).min()
+        if not stiffness > ZERO * self.inner.largest():
+            raise self._singular()
