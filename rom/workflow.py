@@ -20,6 +20,7 @@ from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
 from rom.reduction.method import Method
+from rom.reduction.order import with_orders
 from rom.scipy_operators import SciPyOperators
 
 log = logging.getLogger("rom")
@@ -133,7 +134,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
             `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`.
         interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial`,
-            `FourierLegendre` or `Snapshots`.
+            `FourierLegendre` or `Snapshots`; ``Polynomial()`` has its order chosen from the band
+            and the tolerance of the method.
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
         damping: structural damping; none if not given.
         name: name of the body.
@@ -149,6 +151,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     """
     clock = perf_counter()
     bare, ops = mesh_operators(model), operators(model)
+    interfaces, method = with_orders(ops, model, interfaces, method)
     connection = connect(ops, model, interfaces)
     say = log.info if ops.first == 0 else log.debug
     say("reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)

@@ -1,9 +1,9 @@
 """The command line: verbs, answers for people and programs, exit codes, start-up time."""
 
 import json
+import resource
 import subprocess
 import sys
-import time
 import warnings
 
 import numpy as np
@@ -57,12 +57,13 @@ def test_verbs_are_those_of_the_design():
 
 
 def test_help_answers_within_half_a_second():
-    """Best of three: the claim is about the program, not about a busy machine."""
+    """Processor time: the claim is about the program, not about a busy machine."""
     seconds = []
     for _ in range(3):
-        start = time.perf_counter()
+        start = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = command("--help")
-        seconds.append(time.perf_counter() - start)
+        end = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds.append(end.ru_utime + end.ru_stime - start.ru_utime - start.ru_stime)
     assert done.returncode == 0
     for verb in NAMES:
         assert f"\n    {verb} " in done.stdout
@@ -373,6 +374,8 @@ def test_fixed_interfaces_may_be_written_with_blanks():
         (("--method", "rubin", "-m", 30), "free 30", 15 + 30),
         (("--method", "herting", "-m", 25), "free 25", 15 + 25),
         (("--f-max", 700, "--tol", 1e-3), "fixed-interface", None),
+        (("--method", "moment-matching", "--at", "0,300", "-m", 1), "moment", None),
+        (("--method", "balanced", "-m", 12, "--gravity-shapes"), "balanced", 9 + 12 + 3),
     ],
 )
 def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, options, label, n_modes):
@@ -392,7 +395,13 @@ def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, option
 
 @pytest.mark.parametrize(
     "options",
-    [("--method", "guyan", "-m", 3), ("--method", "rubin", "--f-max", 10), ("--tol", 1e-3)],
+    [
+        ("--method", "guyan", "-m", 3),
+        ("--method", "rubin", "--f-max", 10),
+        ("--tol", 1e-3),
+        ("--at", 5),
+        ("--characteristic", 8),
+    ],
 )
 def test_options_that_contradict_each_other_are_refused(options, tmp_path, capsys):
     steel = ("reduce", "meshes/beam.geo", *STEEL, "-i", "root=rbe2", "-o", tmp_path / "b.npz")

@@ -61,6 +61,24 @@ def test_the_selection_works_on_meshes_too():
     assert body.n_modes < 60
 
 
+@pytest.mark.fenicsx
+def test_the_order_is_chosen_on_meshes_too():
+    """Beside an averaging interface, which PETSc has to project."""
+    pytest.importorskip("dolfinx", reason="needs finite elements")
+    from boxes import box
+
+    from rom.fe.elasticity import assemble
+
+    mesh, tags = box((0.3, 0.2, 0.1), (4, 3, 2))
+    model = assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    kinds = {"x0": "rbe3", "x1": rom.Polynomial()}
+    exact = rom.modes(model, 12, interfaces={"x0": "rbe3"}).frequencies[6:]
+    method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=1e-3)
+    error, body = surface_error(model, kinds, exact, method)
+    assert error <= 1e-3
+    assert body.marker("x1").kind in ("polynomial:2", "polynomial:3", "polynomial:4")
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -74,3 +92,34 @@ def test_the_selection_works_on_meshes_too():
 def test_messages_for_wrong_tolerances(options, words):
     with pytest.raises(ConfigError, match=words):
         rom.CraigBampton(**options)
+
+
+def surface_error(model, kinds, exact, method):
+    body = rom.reduce(model, method=method, interfaces=kinds, certify=False)
+    found = body.frequencies()[6 : 6 + exact.size]
+    return np.abs(found / exact - 1).max(), body
+
+
+@pytest.mark.parametrize("tol", [3e-2, 3e-3])
+@pytest.mark.parametrize(("size", "cells"), BODIES)
+def test_the_order_of_a_surface_is_the_lowest_that_meets_the_tolerance(size, cells, tol):
+    """Against the model whose tip keeps all its dofs; two orders less would not do."""
+    model = block(size=size, cells=cells)
+    exact = rom.modes(model, 12, interfaces={"root": "rbe2"}).frequencies[6:]
+    method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=tol)
+    error, body = surface_error(model, {"root": "rbe2", "tip": "polynomial"}, exact, method)
+    assert error <= tol
+    order = int(body.marker("tip").kind.split(":")[1])
+    if order > 2:
+        kinds = {"root": "rbe2", "tip": rom.Polynomial(order - 2)}
+        assert surface_error(model, kinds, exact, rom.CraigBampton(60))[0] > tol
+
+
+def test_an_open_order_needs_an_accuracy():
+    model = block(cells=(4, 2, 2))
+    kinds = {"root": "rbe2", "tip": rom.Polynomial()}
+    for method in (rom.CraigBampton(5), rom.CraigBampton(f_max=1e3), rom.Rubin(5)):
+        with pytest.raises(ConfigError, match="states no accuracy"):
+            rom.reduce(model, method=method, interfaces=kinds)
+    with pytest.raises(ConfigError, match="is open"):
+        rom.modes(model, 8, interfaces=kinds)

@@ -125,8 +125,8 @@ def add_interfaces(parser: argparse.ArgumentParser) -> None:
         type=assignment,
         action="append",
         default=[],
-        help="interface and its kind: full, rbe2 (stiff), rbe3 (average), polynomial:ORDER or "
-        "fourier:HARMONICS,ORDER; may be repeated",
+        help="interface and its kind: full, rbe2 (stiff), rbe3 (average), polynomial:ORDER "
+        "(polynomial alone: chosen with --tol) or fourier:HARMONICS,ORDER; may be repeated",
     )
 
 

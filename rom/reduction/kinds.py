@@ -58,7 +58,7 @@ def tie(interface: Interface, kind: Any) -> Tie:
         InterfaceError: if the surface cannot carry it.
         ResourceError: if an averaging interface has too many dofs.
     """
-    kind = _parsed(interface.name, kind)
+    kind = parsed(interface.name, kind)
     if kind == "full":
         return _full(interface)
     if kind == "rbe2":
@@ -134,9 +134,16 @@ def _label(kind: Polynomial | FourierLegendre) -> str:
     return f"fourier:{kind.harmonics},{kind.order}"
 
 
-def _parsed(name: str, kind: Any) -> Any:
+def parsed(name: str, kind: Any) -> Any:
+    """The kind of an interface as a record, or one of the words "full", "rbe2", "rbe3".
+
+    Raises:
+        ConfigError: if it is unknown.
+    """
     if isinstance(kind, RECORDS) or kind in ("full", "rbe2", "rbe3"):
         return kind
+    if kind == "polynomial":
+        return Polynomial()
     if isinstance(kind, str):
         word, _, numbers = kind.partition(":")
         family = {"polynomial": (Polynomial, 1), "fourier": (FourierLegendre, 2)}.get(word)

@@ -32,15 +32,27 @@ class Polynomial:
 
     Attributes:
         order: total degree p >= 1; with p = 1 the surface moves rigidly or strains uniformly.
+            Without a number the lowest one is chosen that meets the band and the tolerance of
+            ``CraigBampton(f_max=…, tol=…)``.
     """
 
-    order: int
+    order: int | None = None
 
     def __post_init__(self) -> None:
-        _check_whole("order", self.order, 1, "a constant alone is a ball joint, not a surface")
+        if self.order is not None:
+            _check_whole("order", self.order, 1, "a constant alone is a ball joint, not a surface")
 
     def functions(self, interface: Interface) -> Array:
-        """(k, n) functions at the nodes, from low to high degree; some may depend on others."""
+        """(k, n) functions at the nodes, from low to high degree; some may depend on others.
+
+        Raises:
+            ConfigError: if the order is still open.
+        """
+        if self.order is None:
+            raise ConfigError(
+                f"the order of the polynomials on {interface.name!r} is open.",
+                hint="Give one: only rom.reduce with CraigBampton(f_max=…, tol=…) can choose it.",
+            )
         x = _local(interface)
         values = [legvander(column, self.order) for column in x.T]
         degrees = sorted(

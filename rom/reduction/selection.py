@@ -60,7 +60,7 @@ def truncation_errors(
     moved = M[n_b : n_b + m, :n_b] / (omega**2)[:, None]  # Phi^T M Psi_b / omega^2
 
     def error(k: int) -> float:
-        lam, V = _reduced_modes(K[: n_b + k, : n_b + k], M[: n_b + k, : n_b + k])
+        lam, V = reduced_modes(K[: n_b + k, : n_b + k], M[: n_b + k, : n_b + k])
         near = (lam > 1e-9 * lam[-1]) & (lam <= (REACH * omega_max) ** 2)
         lam, V = lam[near], V[:, near]
         t, d = np.zeros((2, K.shape[0], lam.size))
@@ -74,7 +74,8 @@ def truncation_errors(
     return error
 
 
-def _reduced_modes(K: Array, M: Array) -> tuple[Array, Array]:
+def reduced_modes(K: Array, M: Array) -> tuple[Array, Array]:
+    """All eigenvalues of a reduced body and its mass-normalised modes."""
     scale = 1 / np.sqrt(np.diag(M))
     lam, V = eigh(scale[:, None] * K * scale, scale[:, None] * M * scale)
     return lam, scale[:, None] * V
