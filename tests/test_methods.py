@@ -83,9 +83,11 @@ def test_rigid_motions_and_statics_of_the_boundary_are_exact(ops, model, method)
 
 @pytest.mark.parametrize(
     "method",
-    [rom.CraigBampton(10), rom.EnhancedCraigBampton(10), rom.Rubin(8), rom.Herting(8)],
+    [rom.CraigBampton(10), rom.EnhancedCraigBampton(10), rom.Rubin(8), rom.Herting(8),
+     rom.MomentMatching((0.0, 5.0), 2), rom.BalancedTruncation(10, pool=10),
+     rom.WithLoads(rom.CraigBampton(9), np.eye(14)[:, [5]])],
     ids=lambda method: type(method).__name__,
-)
+)  # fmt: skip
 def test_all_modes_make_every_basis_the_full_model(method):
     """A beam of six elements on its ends: four dofs of 14, rigid motions among the free modes."""
     K, M = hermite_beam(6)
