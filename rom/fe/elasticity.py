@@ -22,6 +22,7 @@ from rom.fe.memory import give_back
 from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
+from rom.fe.solid import SolidMesh
 from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
 from rom.model import Array, Attachment, FEModel
@@ -71,20 +72,26 @@ def model(
 
     way = parsed(solver)  # before a mesh is made in vain
     install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
-    solid = on_root(comm, read_mesh, path, parameters=parameters, **mesh_options)
+    read: list[SolidMesh] = []  # on rank 0; the others never hold the whole mesh
+
+    def head() -> tuple[dict[int, str], list[str], dict[str, Any]]:
+        read.append(read_mesh(path, parameters=parameters, **mesh_options))
+        return read[0].region_names, list(read[0].warnings or ()), read[0].provenance
+
+    region_names, warnings, origin = on_root(comm, head)
     with compiling(comm):
-        mesh, cell_tags, facet_tags = to_dolfinx(solid, comm)
+        mesh, cell_tags, facet_tags = to_dolfinx(read.pop() if read else None, comm)
     made = assemble(
         mesh,
         cell_tags,
         facet_tags,
         material=material,
         degree=degree,
-        regions={name: tag for tag, name in solid.region_names.items()},
+        regions={name: tag for tag, name in region_names.items()},
         attachments=attachments,
     )
-    remarks = [*(solid.warnings or ()), *made.provenance["warnings"]]
-    provenance = solid.provenance | made.provenance | {"warnings": remarks}
+    remarks = [*warnings, *made.provenance["warnings"]]
+    provenance = origin | made.provenance | {"warnings": remarks}
     return replace(made, operators=made.operators.solved_by(way), provenance=provenance)
 
 
