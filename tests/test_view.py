@@ -240,3 +240,19 @@ def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
         assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
     with pytest.raises(ConfigError, match="'x' has 1 errors for 2 sizes"):
         view.convergence(tmp_path / "d.png", [("error", {"x": ([1, 2], [1.0])})], **look)
+
+
+def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
+    x = np.linspace(0, 1, 9)
+    path = view.Panel("Path", "x [m]", "y [m]", {"one": (x, x)}, {"seen": (x, 1 - x)}, equal=True)
+    bars = view.Panel("Bars", "change [%]", bars={"first": (-2.0, 3.0), "second": (-1.0, 1.0)})
+    view.panels(tmp_path / "p.png", [[path, bars], [path]], title="Title", caption="Words.")
+    blue = np.abs(pixels(tmp_path / "p.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12
+    middle = blue.shape[0] // 2
+    assert blue[middle:].sum() > 300
+    assert blue[:middle, :700].sum() > 100
+    rows = blue[:middle, 800:].sum(axis=1)
+    assert rows.max() > 1.5 * rows[rows > 50].min()  # the first bar is 2.5 times as long
+    wrong = view.Panel("", "", curves={"one": ([1, 2], [1])})
+    with pytest.raises(ConfigError, match="'one' has 1 values for 2 places"):
+        view.panels(tmp_path / "q.png", [[wrong]], title="", caption="")

@@ -2,11 +2,13 @@
 
 from rom.view.curves import convergence, frequencies, history
 from rom.view.film import animate, instants
+from rom.view.panels import Panel, panels
 from rom.view.part import mesh
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 
 __all__ = [
+    "Panel",
     "animate",
     "box",
     "convergence",
@@ -16,4 +18,5 @@ __all__ = [
     "instants",
     "mesh",
     "mode_shapes",
+    "panels",
 ]

@@ -51,7 +51,7 @@ def history(
                 axes.plot(factor * t, y, label=name, **look)
             axes.set_ylabel(label, size=page.BODY)
             axes.set_xlim(factor * t[0], factor * t[-1])
-            _finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
+            finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
         for axes in areas[:-1]:
             axes.set_xticklabels([])
         areas[-1].set_xlabel(f"time [{unit}]", size=page.BODY)
@@ -92,7 +92,7 @@ def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> 
         axes.set_xticks(range(1, longest + 1))
         axes.set_xlabel("elastic mode", size=page.BODY)
         axes.set_ylabel("relative error", size=page.BODY)
-        _finish(axes, legend=True)
+        finish(axes, legend=True)
         return page.save(figure, path)
 
 
@@ -129,7 +129,7 @@ def convergence(
                 axes.loglog(x, np.maximum(np.abs(y), EXACT), label=name, **look)
             axes.set_ylabel(label, size=page.BODY)
             _near_ticks(axes)
-            _finish(axes, legend=True)
+            finish(axes, legend=True)
         _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
         for axes in areas[:-1]:
             axes.set_xticklabels([])
@@ -171,11 +171,12 @@ def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
     return figure, areas
 
 
-def _finish(axes: Any, *, legend: bool) -> None:
+def finish(axes: Any, *, legend: bool, loc: str = "best") -> None:
+    """Grid, spines and legend of the house."""
     axes.tick_params(labelsize=page.SMALL)
     axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     if legend:
-        axes.legend(fontsize=page.SMALL, frameon=True, framealpha=0.9, edgecolor="none")
+        axes.legend(fontsize=page.SMALL, framealpha=0.9, edgecolor="none", loc=loc)

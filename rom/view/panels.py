@@ -1,0 +1,117 @@
+"""Several small diagrams on one sheet: paths, curves, points and bars."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError
+from rom.view import page
+from rom.view.curves import LINES, WIDTH, finish
+
+HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 370, 95, 30, 55, 75  # pixel, of a diagram and around it
+GUIDE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
+Line = tuple[npt.ArrayLike, npt.ArrayLike]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One diagram.
+
+    Attributes:
+        title: what it shows.
+        xlabel, ylabel: labels of the axes with their units.
+        curves: {name: (x (n,), y (n,))} drawn as lines; thin, without legend, if the name starts
+            with "_".
+        points: {name: (x (n,), y (n,))} drawn as small circles over them.
+        bars: {name: (low, high)} horizontal bars from low to high, from top to bottom.
+        equal: the same scale along both axes.
+    """
+
+    title: str
+    xlabel: str
+    ylabel: str = ""
+    curves: Mapping[str, Line] = field(default_factory=dict)
+    points: Mapping[str, Line] = field(default_factory=dict)
+    bars: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    equal: bool = False
+
+
+def panels(path: str | Path, rows: Sequence[Sequence[Panel]], *, title: str, caption: str) -> Path:
+    """Draw rows of diagrams.
+
+    Args:
+        path: picture to write, .png.
+        rows: diagrams from top to bottom, and from left to right in each row.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    with page.styled():
+        text, below = page.caption(caption, WIDTH - 60)
+        step = ABOVE + HEIGHT + BELOW
+        total = 65 + len(rows) * step + below + 25
+        figure = page.sheet(WIDTH, total)
+        page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+        for i, row in enumerate(rows):
+            width = (WIDTH - 2 * RIGHT) / len(row)
+            for j, panel in enumerate(row):
+                left = RIGHT + j * width + LEFT + (90 if panel.bars else 0)
+                right = RIGHT + (j + 1) * width - RIGHT
+                area = page.area(figure, left, 65 + i * step + ABOVE, right - left, HEIGHT)
+                _draw(area, panel, (right - left, HEIGHT))
+        page.words(figure, text, 30, total - below - 20, size=page.SMALL)
+        return page.save(figure, path)
+
+
+def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
+    for k, (name, line) in enumerate(panel.curves.items()):
+        look = {"color": LINES[k % len(LINES)], "lw": 1.4, "ls": "--" if k % 2 else "-"}
+        look = GUIDE if name.startswith("_") else look
+        axes.plot(*_paired(name, line), label=name, **look)
+    for name, line in panel.points.items():
+        look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
+        axes.plot(*_paired(name, line), "o", label=name, **look)
+    if panel.bars:
+        _draw_bars(axes, panel.bars)
+    axes.set_title(panel.title, size=page.BODY, loc="left")
+    axes.set_xlabel(panel.xlabel, size=page.SMALL)
+    axes.set_ylabel(panel.ylabel, size=page.SMALL)
+    named = sum(not name.startswith("_") for name in (*panel.curves, *panel.points))
+    low, high = axes.get_ylim()
+    if named and not panel.bars:  # room for the legend above all lines
+        axes.set_ylim(low, high + 0.11 * (named + 0.5) * (high - low))
+    if panel.equal:
+        _same_scale(axes, shape)
+    finish(axes, legend=named > 0, loc="upper left")
+
+
+def _same_scale(axes: Any, shape: tuple[float, float]) -> None:
+    """Widen the shorter axis until a metre is as long on both; the shape is that of the area."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    metre = (np.ptp(limits, axis=1) / shape).max()
+    half = 0.5 * metre * np.array(shape)
+    x, y = limits.mean(axis=1)
+    axes.set_xlim(x - half[0], x + half[0])
+    axes.set_ylim(y - half[1], y + half[1])
+
+
+def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]]) -> None:
+    low, high = np.array(list(bars.values()), dtype=float).T
+    axes.barh(np.arange(len(bars)), high - low, left=low, height=0.6, color=LINES[0])
+    axes.axvline(0.0, color="#22262b", lw=0.8)
+    axes.set_yticks(np.arange(len(bars)), list(bars))
+    axes.invert_yaxis()
+
+
+def _paired(name: str, line: Line) -> Line:
+    x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
+    if x.shape != y.shape:
+        raise ConfigError(f"{name!r} has {y.size} values for {x.size} places.")
+    return x, y
