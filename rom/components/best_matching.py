@@ -12,8 +12,8 @@ deformations both are. The toys of N bodies, which are Newton's, show what remai
 shapes, and a time read off them. Nothing here is about gravity as geometry.
 
 Source:
-    After Mercati, Shape dynamics: perspectives and problems, a chapter on gravity of which this
-    module takes the toys of N bodies alone; Barbour and Bertotti, Proc. R. Soc. A 382 (1982) 295;
+    After Mercati's chapter on shape dynamics, a theory of gravity of which this module takes the
+    toys of N bodies alone; Barbour and Bertotti, Proc. R. Soc. A 382 (1982) 295;
     Barbour, Koslowski and Mercati, Phys. Rev. Lett. 113 (2014) 181101, for the point that divides
     the two arrows of time. Equations derived here.
 """
