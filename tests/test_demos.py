@@ -19,6 +19,7 @@ LEFT_BEHIND = {
     "demo_compressor_blade": {"compressor_blade.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_reference_conditions": {"reference_conditions.png"},
+    "demo_rockfall": {"rockfall.png"},
     "demo_slider_crank": {
         "crank_mesh.png", "instants.png", "motion.png", "report.html", "rod.rom.npz", "rod.vtu",
         "rod_frequencies.png", "rod_mesh.png", "rod_modes.png", "slider_crank.gif",

@@ -23,7 +23,7 @@ class Panel:
 
     Attributes:
         title: what it shows.
-        xlabel, ylabel: labels of the axes with their units.
+        xlabel, ylabel: labels of the axes with their units; a sketch has none, and no axes.
         curves: {name: (x (n,), y (n,))} drawn as lines; thin, without legend, if the name starts
             with "_".
         points: {name: (x (n,), y (n,))} drawn as small circles over them.
@@ -87,6 +87,8 @@ def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
     low, high = axes.get_ylim()
     if named and not panel.bars:  # room for the legend above all lines
         axes.set_ylim(low, high + 0.11 * (named + 0.5) * (high - low))
+    if not (panel.xlabel or panel.ylabel):
+        axes.set_axis_off()
     if panel.equal:
         _same_scale(axes, shape)
     finish(axes, legend=named > 0, loc="upper left")
@@ -107,6 +109,8 @@ def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]]) -> None:
     axes.barh(np.arange(len(bars)), high - low, left=low, height=0.6, color=LINES[0])
     axes.axvline(0.0, color="#22262b", lw=0.8)
     axes.set_yticks(np.arange(len(bars)), list(bars))
+    axes.use_sticky_edges = False
+    axes.margins(x=0.06)
     axes.invert_yaxis()
 
 
