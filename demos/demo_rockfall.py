@@ -133,8 +133,8 @@ if first:
         "3.5 m x 0.25 m, held along two edges; parameters for illustration. The boulder presses "
         "the cushion (blue), a plug of cushion and concrete is pushed into the slab (red), the "
         "slab bends (yellow). Top: the force in each spring when the slab is one mass, and when it "
-        f"is a reduced finite element model of {model.n_dofs} dofs. Bottom left: one mode alone is too "
-        "stiff; where the slab yields, a deflection stays. Bottom right: how much the largest "
+        f"is a reduced finite element model of {model.n_dofs} dofs. Bottom left: one mode alone is "
+        "too stiff; where the slab yields, a deflection stays. Bottom right: how much the largest "
         "force in the slab changes. The fall and the cushion decide; plug and shear hardly matter. "
         "A prediction is as good as what is known of the cushion.",
     )  # fmt: skip

@@ -210,6 +210,33 @@ def test_concrete_cracks_reinforcement_holds_or_fails():
     assert punched.z[-1, 1] > 0.1
 
 
+def test_a_boulder_in_a_cushion_of_air_falls_freely():
+    g = replace(stiff(1e3, 10.0, 1e6), cushion=Cushion(1e-9), weight=True)
+    got = strike(g, t_end=0.05, dt=1e-5)
+    assert_allclose(got.z[:, 0], g.speed * got.t + 0.5 * 9.81 * got.t**2, atol=1e-10)
+
+
+def test_the_plug_rings_down_at_its_share_of_critical_damping():
+    rigid = Slab.of_mass(1e6, 1e13, damping=0.0)
+    g = Gallery(100.0, 1.0, 1e3, Cushion(1e9), Shear(1e8, damping=0.05), rigid, weight=False)
+    z = strike(g, t_end=0.2, keep=10**5).z[:, 1]
+    peaks = z[1:-1][(z[1:-1] > z[:-2]) & (z[1:-1] >= z[2:])]
+    decrement = 2 * np.pi * 0.05 / np.sqrt(1 - 0.05**2)
+    assert_allclose(np.log(peaks[1:-1] / peaks[2:]), decrement, rtol=5e-3)
+    assert peaks.size > 5
+
+
+def test_a_slab_yields_upwards_as_well():
+    """Plug and slab exchange their energy; the first swing up is stronger than that down."""
+    slab = Slab.of_mass(1e3, 1e8, damping=0.0, capacity=6e5)
+    g = Gallery(300.0, 1.0, 500.0, Cushion(1e9), Shear(3e7, damping=0.0), slab, weight=False)
+    got = strike(g, t_end=0.6, keep=10**4)
+    assert got.forces[:, 2].min() == pytest.approx(-6e5, rel=1e-9)
+    assert got.plastic < -2e-4
+    assert got.energy[-1, 5] > 6e5 * abs(got.plastic)
+    assert np.abs(got.balance).max() < 2e-3 * got.energy[0, 0]
+
+
 # --- plates ---
 
 
