@@ -1,0 +1,394 @@
+"""Updating of a model by measured frequency responses, after Berriet, Fillod and Bouhaddi.
+
+Unknown are relative changes of stiffness and mass and the damping ratios of the modes. The model
+can be condensed to the sensors, and test and model together to one common basis.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.optimize import least_squares
+
+from rom.errors import ConfigError, ModelError
+from rom.model import Array
+from rom.reduction.fixed_interface import craig_bampton
+
+Complex = NDArray[np.complex128]
+DEPENDENT = 1e-7  # singular value of a basis, relative, below which a column says nothing new
+STEPS, CLIP = 40, 0.2  # linear solutions, and the largest change of a parameter in each
+LEAST = -0.95  # a change that leaves a twentieth of the stiffness or mass
+EQUAL = 1e-12  # relative distance of eigenvalues that are one; their modes have no derivative
+
+
+@dataclass(frozen=True, slots=True)
+class ParametricModel:
+    """K(p) = K + sum p_i dK_i and M(p) = M + sum p_i dM_i, seen at sensors.
+
+    Attributes:
+        K: (n, n) stiffness at p = 0 [N/m].
+        M: (n, n) mass at p = 0 [kg].
+        dK: (n_p, n, n) what each parameter adds to K; zeros where it does not.
+        dM: (n_p, n, n) what each parameter adds to M.
+        sensors: (n_s, n) rows that give the measured displacements.
+        n_rigid: number of rigid motions, 0 for a supported and 6 for a free structure.
+    """
+
+    K: Array
+    M: Array
+    dK: Array
+    dM: Array
+    sensors: Array
+    n_rigid: int = 0
+
+    def __post_init__(self) -> None:
+        n, n_p = len(self.K), len(self.dK)
+        wanted = {"M": (n, n), "dK": (n_p, n, n), "dM": (n_p, n, n)}
+        wanted["sensors"] = (len(self.sensors), n)
+        for name, shape in wanted.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise ConfigError(f"{name} is {found} where {shape} belongs to {n} dofs.")
+
+    def at(self, p: ArrayLike) -> "ParametricModel":
+        """The model with its origin moved to p (n_p,)."""
+        p = np.asarray(p, dtype=float)
+        if p.shape != (len(self.dK),):
+            raise ConfigError(f"p has the shape {p.shape}; the model has {len(self.dK)} of them.")
+        K, M = (A + np.tensordot(p, dA, 1) for A, dA in ((self.K, self.dK), (self.M, self.dM)))
+        return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
+
+    def in_basis(self, T: Array) -> "ParametricModel":
+        """The model reduced to u = T a, T (n, r) the same for all p: fast, still parametric."""
+        K, M, dK, dM = (T.T @ A @ T for A in (self.K, self.M, self.dK, self.dM))
+        return ParametricModel(K, M, dK, dM, self.sensors @ T, self.n_rigid)
+
+
+@dataclass(frozen=True, slots=True)
+class AtSensors:
+    """A parametric model condensed statically to its sensors, anew for each p.
+
+    With T = [1; -K_oo^-1 K_os] the stiffness at the sensors has the derivative T^T dK T, and the
+    mass also that of T. What is between the sensors follows them statically, so that frequencies
+    are too high however good the data.
+
+    Attributes:
+        full: the model; its sensors are dofs.
+    """
+
+    full: ParametricModel
+
+    def at(self, p: ArrayLike) -> ParametricModel:
+        """The condensed model with its origin at p and the derivatives there.
+
+        Raises:
+            ConfigError, ModelError: if sensors are no dofs, or do not stop all rigid motions.
+        """
+        model = self.full.at(p)
+        s = _sensor_dofs(model)
+        o = np.setdiff1d(np.arange(len(model.K)), s)
+        try:
+            K_oo = cho_factor(model.K[np.ix_(o, o)])
+        except LinAlgError as error:
+            raise ModelError("held at its sensors, the structure can still move.") from error
+        T = np.zeros((len(model.K), s.size))
+        T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
+        dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
+        moved = np.swapaxes(dT, 1, 2) @ (model.M @ T)[o]
+        K, M, dK, dM = (T.T @ A @ T for A in (model.K, model.M, model.dK, model.dM))
+        dM = dM + moved + np.swapaxes(moved, 1, 2)
+        return ParametricModel(K, M, dK, dM, np.eye(s.size), model.n_rigid)
+
+
+Model = ParametricModel | AtSensors
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Measured receptances.
+
+    Attributes:
+        omega: (n_f,) circular frequencies [rad/s].
+        H: (n_f, n_s, n_e) displacement at each sensor per unit force at each exciter [m/N].
+        inputs: (n_e,) which sensors have an exciter.
+        weights: (n_f, n_s, n_e), (n_f, 1, 1) or one number: how far to trust each value.
+    """
+
+    omega: Array
+    H: Complex
+    inputs: tuple[int, ...]
+    weights: Any = 1.0
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
+            n = (len(self.omega), len(self.inputs))
+            raise ConfigError(f"H is {np.shape(self.H)} for {n[0]} frequencies, {n[1]} exciters.")
+        if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
+            raise ConfigError("H has entries that are zero or not finite: a dead channel.")
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """What updating found.
+
+    Attributes:
+        p: (n_p,) relative changes of stiffness and mass.
+        zeta: (m,) damping ratios of the lowest elastic modes.
+        deviation: (n_p + m,) standard deviations of p and ln zeta that the residual implies.
+        history: (k, n_p) p after each step.
+        residual: root mean square of the weighted residual.
+    """
+
+    p: Array
+    zeta: Array
+    deviation: Array
+    history: Array
+    residual: float
+
+
+@dataclass(frozen=True, slots=True)
+class Modal:
+    """A model in its own modes: Z^-1 = Phi diag(g(omega)) Phi^T with modal damping.
+
+    Attributes:
+        lam: (n,) eigenvalues [rad^2/s^2].
+        Phi: (n, n) modes, mass-normalised.
+        d: (n,) damping 2 zeta omega [rad/s] of each mode.
+    """
+
+    lam: Array
+    Phi: Array
+    d: Array
+
+    def g(self, omega: Array) -> Complex:
+        """(n_f, n) receptance of each mode."""
+        w = omega[:, None]
+        return 1.0 / (self.lam - w**2 + 1j * w * self.d)
+
+
+def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
+    """Modes of a model at its origin; zeta (m,) for the lowest elastic ones, the others undamped.
+
+    Raises:
+        ConfigError, ModelError: for more ratios than modes; for mass or stiffness not positive.
+    """
+    try:
+        lam, Phi = eigh(model.K, model.M)
+    except LinAlgError as error:
+        raise ModelError("the changes leave a mass matrix that is not positive.") from error
+    elastic = slice(model.n_rigid, None)
+    lam[: model.n_rigid] = 0.0
+    if not (lam[elastic] > 0).all():
+        raise ModelError(
+            f"{model.n_rigid} rigid motions leave the eigenvalue {lam[elastic].min():.3g}"
+            " rad^2/s^2: the stiffness is not positive."
+        )
+    zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
+    if zeta.size > lam.size - model.n_rigid:
+        raise ConfigError(f"{zeta.size} damping ratios for {lam.size - model.n_rigid} modes.")
+    damped = slice(model.n_rigid, model.n_rigid + zeta.size)
+    d[damped] = 2 * zeta * np.sqrt(lam[damped])
+    return Modal(lam, Phi, d)
+
+
+def damping_matrix(model: ParametricModel, zeta: ArrayLike) -> Array:
+    """(n, n) C = sum 2 zeta omega (M phi)(M phi)^T at the origin of the model [N s/m]."""
+    modes = modal(model, zeta)
+    return (model.M @ modes.Phi * modes.d) @ (model.M @ modes.Phi).T
+
+
+def responses(
+    model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
+) -> Complex:
+    """Receptances at the sensors, (n_f, n_s, n_e) [m/N].
+
+    Args:
+        model: full, reduced, or condensed to the sensors.
+        p: (n_p,) parameters.
+        zeta: (m,) damping ratios of the lowest elastic modes.
+        omega: (n_f,) circular frequencies [rad/s].
+        inputs: (n_e,) sensors where forces act.
+    """
+    here = model.at(p)
+    return _receptance(here, modal(here, zeta), omega, inputs)
+
+
+def _receptance(
+    model: ParametricModel, modes: Modal, omega: Array, inputs: tuple[int, ...]
+) -> Complex:
+    seen = model.sensors @ modes.Phi
+    return np.einsum("sn,fn,en->fse", seen, modes.g(omega), seen[list(inputs)], optimize=True)
+
+
+def _modal_sensitivity(model: ParametricModel, modes: Modal, m: int) -> tuple[Array, Array, Array]:
+    """Phi^T dZ Phi = A - omega^2 B + i omega C for p and the logarithms of m damping ratios.
+
+    The damping changes with its modes; of their derivatives remain divided differences of d.
+    """
+    A, B = (modes.Phi.T @ dA @ modes.Phi for dA in (model.dK, model.dM))
+    lam, d = modes.lam, modes.d
+    gap = lam - lam[:, None]  # lam_j - lam_i in row i, column j
+    apart = np.abs(gap) > EQUAL * lam[-1]
+    gap = np.where(apart, gap, 1.0)
+    C = ((d - d[:, None]) * A - (d * lam[:, None] - d[:, None] * lam) * B) / gap * apart
+    i = np.arange(lam.size)
+    own = np.divide(d, 2 * lam, out=np.zeros_like(d), where=lam > 0)  # d = 2 zeta sqrt(lam)
+    C[:, i, i] = own * (A[:, i, i] - lam * B[:, i, i]) + d * B[:, i, i]
+    ratios = np.zeros((m, lam.size, lam.size))
+    e = model.n_rigid + np.arange(m)
+    ratios[np.arange(m), e, e] = d[e]
+    none = np.zeros_like(ratios)
+    return np.vstack([A, none]), np.vstack([B, none]), np.vstack([C, ratios])
+
+
+def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) -> Complex:
+    """Left (A - omega^2 B + i omega C) right: (n_f, a, n), (n_q, n, n), (n_f, n, b).
+
+    The narrower side is pushed through all matrices at once.
+    """
+    if left.shape[1] < right.shape[2]:
+        turned = tuple(np.swapaxes(part, 1, 2) for part in S)
+        flipped = _through(np.swapaxes(right, 1, 2), turned, np.swapaxes(left, 1, 2), omega)
+        return np.swapaxes(flipped, 1, 2)
+    n_f, n, b = right.shape
+    columns = np.moveaxis(right, 1, 0).reshape(n, n_f * b)
+    w = np.repeat(omega, b)
+    A, B, C = (part.reshape(-1, n) for part in S)
+    pushed = A @ columns - B @ (columns * w**2) + C @ (columns * (1j * w))
+    pushed = pushed.reshape(-1, n, n_f, b).transpose(2, 1, 3, 0).reshape(n_f, n, -1)
+    return (left @ pushed).reshape(n_f, left.shape[1], b, -1)
+
+
+def sensitivity(
+    model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
+) -> tuple[Complex, Complex]:
+    """Receptances (n_f, n_s, n_e), and their derivatives by p and ln zeta, (..., n_p + m)."""
+    here = model.at(p)
+    modes = modal(here, zeta)
+    seen, g = here.sensors @ modes.Phi, modes.g(omega)
+    S = _modal_sensitivity(here, modes, np.size(zeta))
+    right = g[:, :, None] * seen[list(inputs)].T
+    H = _receptance(here, modes, omega, inputs)
+    return H, -_through(seen * g[:, None, :], S, right, omega)
+
+
+def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
+    """Least squares of ln(H / H_test) over p and ln zeta, from a start (n_p,), (m,).
+
+    Each value counts by its relative error, so that antiresonances weigh as much as resonances.
+    """
+    n_p, path = np.size(p), []
+
+    def parts(x: Array) -> tuple[Array, Array]:
+        H, dH = sensitivity(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
+        return _weighted(test.weights, dH / H[..., None], np.log(H / test.H))
+
+    def jacobian(x: Array) -> Array:
+        path.append(x[:n_p].copy())
+        return parts(x)[0]
+
+    start = np.concatenate([p, np.log(zeta)])
+    low = np.concatenate([np.full(n_p, LEAST), np.full(np.size(zeta), -np.inf)])
+    found = least_squares(
+        lambda x: parts(x)[1], start, jacobian, bounds=(low, np.inf),
+        xtol=1e-12, ftol=1e-12, gtol=1e-12,
+    )  # fmt: skip
+    return _update(found.x, n_p, found.fun, found.jac, [*path[1:], found.x[:n_p]])
+
+
+def update_by_input(
+    model: AtSensors, test: Measurement, p: ArrayLike, zeta: ArrayLike, *, rank: int
+) -> Update:
+    """Least squares of U^T Z^-1 (Z(p) U U^T y - f): linear in p and zeta in each step.
+
+    U spans the strongest ``rank`` directions of all test and model responses together; both sets
+    are condensed with it. The rank, at most the number of sensors, must reach the number of modes
+    in the band. Otherwise as `update_by_output`.
+    """
+    if not 1 <= rank <= test.H.shape[1]:
+        raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
+    p, zeta = np.array(p, dtype=float), np.array(zeta, dtype=float)
+    weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
+    weights, path = weights.mean(axis=1, keepdims=True), []
+    for _ in range(STEPS):
+        here = model.at(p)
+        modes = modal(here, zeta)
+        H = _receptance(here, modes, test.omega, test.inputs)
+        U = common_basis(test.H, H, rank)
+        S = _modal_sensitivity(here, modes, zeta.size)
+        y = modes.Phi.T @ here.M @ (U @ (U.T @ test.H))  # Phi^-1 = Phi^T M
+        left = (U.T @ modes.Phi) * modes.g(test.omega)[:, None, :]
+        J, r = _weighted(weights, _through(left, S, y, test.omega), U.T @ (test.H - H))
+        step = np.clip(-np.linalg.lstsq(J, r, rcond=None)[0], -CLIP, CLIP)
+        p, zeta = np.maximum(p + step[: p.size], LEAST), zeta * np.exp(step[p.size :])
+        path.append(p)
+    return _update(np.concatenate([p, np.log(zeta)]), p.size, r, J, path)
+
+
+def response_function_method(
+    model: ParametricModel, test: Measurement, p: ArrayLike, C: Array, *, steps: int = 1
+) -> Update:
+    """Solve H - H_test = H dZ(p) H_test, linear in p.
+
+    Exact in one step when every dof is measured without noise. Else unmeasured rows of H_test
+    follow the measured ones as the model at the last p says. Of several steps none changes a
+    parameter by more than 0.2. The damping C (n, n) [N s/m] is known, sensors are dofs.
+
+    Source:
+        The identity is that of the response function method of Lin and Ewins.
+    """
+    p, path, s = np.array(p, dtype=float), [], _sensor_dofs(model)
+    clip = CLIP if steps > 1 else np.inf
+    o = np.setdiff1d(np.arange(len(model.K)), s)
+    w = test.omega[:, None, None]
+    F = np.eye(len(model.K))[:, s[list(test.inputs)]]
+    for _ in range(steps):
+        here = model.at(p)
+        Z = here.K - w**2 * here.M + 1j * w * C
+        H = np.linalg.inv(Z)[:, s]
+        known = np.empty((w.size, *F.shape), dtype=complex)
+        known[:, s] = test.H
+        known[:, o] = np.linalg.solve(Z[:, o][:, :, o], F[o] - Z[:, o][:, :, s] @ test.H)
+        J = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
+        J, r = _weighted(test.weights, J, H @ F - test.H)
+        step = np.linalg.lstsq(J, r, rcond=None)[0]
+        p = np.maximum(p + np.clip(step, -clip, clip), LEAST)
+        path.append(p)
+    return _update(p, p.size, r - J @ step, J, path)
+
+
+def common_basis(test: Complex, model: Complex, rank: int) -> Array:
+    """(n_s, rank) orthonormal directions of test and model responses, each of norm one."""
+    Y = np.concatenate([np.moveaxis(H, 1, 0).reshape(H.shape[1], -1) for H in (test, model)], 1)
+    Y = Y / np.linalg.norm(Y, axis=0)
+    return np.linalg.svd(np.hstack([Y.real, Y.imag]), full_matrices=False)[0][:, :rank]
+
+
+def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -> Array:
+    """(n, r) basis for a range of p: Craig-Bampton at samples (k, n_p), held at the sensors."""
+    s = _sensor_dofs(model)
+    at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]
+    Psi = np.hstack([craig_bampton(here.K, here.M, s, n_modes).Psi for here in at])
+    U, size, _ = np.linalg.svd(Psi / np.linalg.norm(Psi, axis=0), full_matrices=False)
+    return U[:, size > DEPENDENT * size[0]]
+
+
+def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update:
+    variance = (r @ r) / max(r.size - x.size, 1)
+    spread = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)) * variance)
+    return Update(x[:n_p], np.exp(x[n_p:]), spread, np.array(path), np.sqrt((r @ r) / r.size))
+
+
+def _weighted(weights: Any, J: Complex, r: Complex) -> tuple[Array, Array]:
+    """Weighted derivatives (.., n_q) and residual, real parts above imaginary parts."""
+    J, r = (np.broadcast_to(weights, r.shape)[..., None] * J).reshape(-1, J.shape[-1]), weights * r
+    return np.vstack([J.real, J.imag]), np.concatenate([r.real.ravel(), r.imag.ravel()])
+
+
+def _sensor_dofs(model: ParametricModel) -> Any:
+    s = model.sensors.argmax(axis=1)
+    if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
+        raise ConfigError("the sensors are no dofs of the model; condense before reducing.")
+    return s

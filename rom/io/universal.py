@@ -1,0 +1,229 @@
+"""Functions at nodal dofs in universal files: dataset 58, in text and in binary (58b)."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.model import Array
+
+LARGEST = 2**30  # bytes of a file that is still read
+MARK = b"    -1"
+HEADER = 11  # records before the values
+FREQUENCY_RESPONSE = 4
+PER_RECEPTANCE = {8: 0, 11: 1, 12: 2}  # displacement, velocity, acceleration: powers of i omega
+FORCE = 13
+COMPLEX, DOUBLE = (5, 6), (4, 6)  # types of ordinate
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """One dataset 58.
+
+    Attributes:
+        kind: type of function; 4 is a frequency response, 6 a coherence, 1 a time response.
+        x: (n,) abscissa, mostly frequency [Hz] or time [s].
+        y: (n,) real or complex ordinate.
+        response: node and direction (1 to 3 translation, 4 to 6 rotation, negative against it).
+        reference: node and direction of the force.
+        numerator: type of the ordinate: 8 displacement, 11 velocity, 12 acceleration, 13 force.
+        denominator: type of what it is divided by.
+        labels: the first five lines, stripped.
+    """
+
+    kind: int
+    x: Array
+    y: Any
+    response: tuple[int, int]
+    reference: tuple[int, int]
+    numerator: int
+    denominator: int
+    labels: tuple[str, ...]
+
+    def receptance(self) -> npt.NDArray[np.complex128]:
+        """(n,) displacement per force [m/N], whatever was measured.
+
+        Raises:
+            ConfigError: if this is no motion per force.
+        """
+        if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE:
+            raise ConfigError(f"{_name(self)}: the function is no response to a force.")
+        if self.numerator not in PER_RECEPTANCE:
+            raise ConfigError(f"{_name(self)}: its numerator {self.numerator} is no motion.")
+        power = PER_RECEPTANCE[self.numerator]
+        if power and not self.x.all():
+            raise ConfigError(f"{_name(self)}: no displacement follows from motion at 0 Hz.")
+        return np.asarray(self.y / (2j * np.pi * self.x) ** power, dtype=np.complex128)
+
+
+def read_universal(path: str | Path) -> tuple[Function, ...]:
+    """All datasets 58 of a universal file; others are passed over.
+
+    Args:
+        path: the file, .unv or .uff.
+
+    Raises:
+        FileFormatError: if the file is missing, cut, or holds no function.
+        UnsafeFileError: if it is larger than 1 GiB.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError(f"{path} does not exist.")
+    if path.stat().st_size > LARGEST:
+        raise UnsafeFileError(f"{path} is larger than 1 GiB.")
+    data, place = path.read_bytes(), 0
+    found: list[Function] = []
+    while (place := _mark(data, place)) >= 0:
+        place = _line_end(data, place)
+        head = data[place : (after := _line_end(data, place))].split()
+        try:
+            place, function = _dataset(data, after, head)
+        except (ValueError, IndexError, OverflowError) as error:
+            where = f"dataset {len(found) + 1}"
+            raise FileFormatError(f"{path}: {where} is cut or no dataset 58: {error}.") from error
+        found += [function] if function else []
+    if not found:
+        raise FileFormatError(f"{path} holds no function at nodal dofs (dataset 58).")
+    return tuple(found)
+
+
+def assemble(
+    functions: tuple[Function, ...],
+    responses: list[tuple[int, int]],
+    references: list[tuple[int, int]],
+) -> tuple[Array, npt.NDArray[np.complex128]]:
+    """Frequencies (n_f,) [Hz] and receptances (n_f, n_s, n_e) [m/N] of chosen dofs.
+
+    A dof measured against its direction counts with the opposite sign.
+
+    Args:
+        functions: as read.
+        responses: (n_s) nodes and directions of the sensors.
+        references: (n_e) nodes and directions of the exciters.
+
+    Raises:
+        ConfigError: if a function is missing or has other frequencies.
+    """
+    known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
+    columns, x = [], None
+    for wanted in ((r, e) for r in responses for e in references):
+        if wanted not in known:
+            raise ConfigError(f"no frequency response of {wanted[0]} to a force at {wanted[1]}.")
+        f = known[wanted]
+        x = f.x if x is None else x
+        if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=1e-5, atol=0):
+            raise ConfigError(f"{_name(f)} has other frequencies than those before.")
+        sign = np.sign(f.response[1]) * np.sign(f.reference[1])
+        columns.append(sign * f.receptance())
+    H = np.array(columns).reshape(len(responses), len(references), -1)
+    return x, np.moveaxis(H, 2, 0)
+
+
+def _key(f: Function) -> tuple[tuple[int, int], tuple[int, int]]:
+    return (f.response[0], abs(f.response[1])), (f.reference[0], abs(f.reference[1]))
+
+
+def _name(f: Function) -> str:
+    return f"function of {f.response} by {f.reference}"
+
+
+def _line_end(data: bytes, place: int) -> int:
+    """Behind the end of the line that starts here."""
+    end = data.find(b"\n", place)
+    return len(data) if end < 0 else end + 1
+
+
+def _mark(data: bytes, place: int) -> int:
+    """Start of the next line that is the mark of datasets, or -1."""
+    while 0 <= (place := data.find(MARK, place)):
+        alone = data[place : _line_end(data, place)].strip() == b"-1"
+        if alone and (place == 0 or data[place - 1 : place] == b"\n"):
+            return place
+        place += 1
+    return -1
+
+
+def _dataset(data: bytes, place: int, head: list[bytes]) -> tuple[int, Function | None]:
+    """The place behind the dataset whose first record starts here, and what it holds."""
+    binary = bool(head) and head[0].lower().startswith(b"58b")
+    if not head or not (binary or head[0] == b"58"):
+        return _behind(data, place), None
+    lines = []
+    for _ in range(HEADER):
+        end = _line_end(data, place)
+        lines.append(data[place:end].decode("ascii", "replace").rstrip("\r\n"))
+        place = end
+    kind, spacing = int(lines[6][:10]), int(lines[6][20:30])
+    n, parts = int(lines[6][10:20]), 2 if kind in COMPLEX else 1
+    width = parts + (spacing == 0)
+    if binary:
+        if spacing == 0 and kind in DOUBLE:
+            raise ValueError("uneven abscissas of double values are not read from binary")
+        values, place = _binary(data, place, head, kind, n * width)
+        place = _behind(data, place)
+    else:
+        end = _mark(data, place)
+        if end < 0:
+            raise ValueError("the closing -1 is missing")
+        values = _numbers(data[place:end].decode("ascii"), kind, spacing == 0, parts)
+        place = _line_end(data, end)
+    if values.size < n * width:
+        raise ValueError(f"{values.size} numbers where {n * width} are announced")
+    return place, _function(lines, values[: n * width].reshape(n, width), spacing, parts)
+
+
+def _function(lines: list[str], values: Array, spacing: int, parts: int) -> Function:
+    dof, form = lines[5], lines[6]
+    x = (
+        values[:, 0]
+        if spacing == 0
+        else float(form[30:43]) + np.arange(len(values)) * float(form[43:56])
+    )
+    y = values[:, -1] if parts == 1 else values[:, -2] + 1j * values[:, -1]
+    return Function(
+        kind=int(dof[:5]),
+        x=x,
+        y=y,
+        response=(int(dof[41:51]), int(dof[51:55])),
+        reference=(int(dof[66:76]), int(dof[76:80])),
+        numerator=int(lines[8][:10]),
+        denominator=int(lines[9][:10]),
+        labels=tuple(line.strip() for line in lines[:5]),
+    )
+
+
+def _numbers(text: str, kind: int, uneven: bool, parts: int) -> Array:
+    """Values in columns that may touch: E13.5, or E20.12 for double ordinates."""
+    widths = [20] * 4 if kind in DOUBLE else [13] * 6
+    if kind in DOUBLE and uneven:
+        widths = [13, 20, 20] if parts == 2 else [13, 20] * 2
+    ends = np.cumsum([0, *widths])
+    found = []
+    for line in text.splitlines():
+        cells = (line[a:b].strip() for a, b in pairwise(ends))
+        found += [float(cell.replace("D", "E")) for cell in cells if cell]
+    return np.array(found)
+
+
+def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -> tuple[Array, int]:
+    """Values of a 58b, whose head tells byte order (1 little) and floating point (2 IEEE)."""
+    fields = [int(word) for word in b" ".join(head)[3:].split()]
+    if fields[1] != 2:
+        raise ValueError("its numbers are not IEEE floating point")
+    if len(data) < place + fields[3]:
+        raise ValueError(f"{fields[3]} bytes announced, {len(data) - place} left")
+    order = "<" if fields[0] == 1 else ">"
+    size = 8 if kind in DOUBLE else 4
+    if fields[3] < count * size:
+        raise ValueError(f"{fields[3]} bytes for {count} numbers of {size}")
+    values = np.frombuffer(data, f"{order}f{size}", count, place).astype(float)
+    return values, place + fields[3]
+
+
+def _behind(data: bytes, place: int) -> int:
+    end = _mark(data, place)
+    return len(data) if end < 0 else _line_end(data, end)

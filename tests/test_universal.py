@@ -1,0 +1,117 @@
+"""Universal files: numbers of known files come back, broken files are named."""
+
+import struct
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from rom.errors import ConfigError, FileFormatError
+from rom.io.universal import assemble, read_universal
+
+
+def header(kind, n, spacing, *, response=(7, 3), numerator=12, x=(2.0, 0.5)):
+    """Records 1 to 11 of a dataset 58, written by the columns of the format."""
+    low, step = x if spacing else (0.0, 0.0)
+    lines = ["wing tip", "run 3", "12-MAY-26", "NONE", "NONE"]
+    lines += [
+        f"{4:5d}{1:10d}{0:5d}{0:10d} {'NONE':<10}{response[0]:10d}{response[1]:4d}"
+        f" {'NONE':<10}{11:10d}{-3:4d}",
+        f"{kind:10d}{n:10d}{spacing:10d}{low:13.5e}{step:13.5e}{0:13.5e}",
+    ]
+    for what in (18, numerator, 13, 0):
+        lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}")
+    return "\n".join(lines) + "\n"
+
+
+def text(numbers, widths):
+    """Numbers in columns; those of width 13 have five decimals, those of 20 twelve."""
+    out = ""
+    for i, number in enumerate(numbers):
+        width = widths[i % len(widths)]
+        out += f"{number:{width}.{5 if width == 13 else 12}E}"
+        if (i + 1) % len(widths) == 0:
+            out += "\n"
+    return out.rstrip("\n") + "\n"
+
+
+def dataset(kind, spacing, values, **options):
+    """A whole text dataset; kind 2 and 5 single, 4 and 6 double; 5 and 6 complex."""
+    n = len(values[0])
+    numbers = np.column_stack(values).ravel()
+    widths = [13] * 6
+    if kind in (4, 6):
+        widths = [20] * 4 if spacing else ([13, 20] * 2 if kind == 4 else [13, 20, 20])
+    body = header(kind, n, spacing, **options) + text(numbers, widths)
+    return f"{-1:6d}\n{58:6d}\n{body}{-1:6d}\n"
+
+
+X = np.array([2.0, 2.5, 3.0, 3.5, 4.0])
+RE, IM = np.array([1.5, -2.25, 3e-7, 4.0, -5e6]), np.array([-1.0, 0.5, 2e-3, -7e-9, 8.0])
+
+
+@pytest.mark.parametrize("spacing", [0, 1])
+@pytest.mark.parametrize("kind", [2, 4, 5, 6])
+def test_all_eight_forms_of_numbers_are_read(kind, spacing, tmp_path):
+    parts = [RE, IM] if kind > 4 else [RE]
+    (tmp_path / "a.unv").write_text(dataset(kind, spacing, ([] if spacing else [X]) + parts))
+    (f,) = read_universal(tmp_path / "a.unv")
+    assert_allclose(f.x, X, rtol=1e-12)
+    assert_allclose(f.y, RE + 1j * IM if kind > 4 else RE, rtol=1e-12)
+    assert (f.response, f.reference, f.kind) == ((7, 3), (11, -3), 4)
+    assert f.labels[0] == "wing tip"
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("kind", [5, 6])
+def test_binary_datasets_are_read_in_both_byte_orders(kind, order, tmp_path):
+    numbers = np.column_stack([RE, IM]).ravel()
+    packed = struct.pack(f"{'<>'[order - 1]}10{'fd'[kind - 5]}", *numbers)
+    head = f"    58b{order:6d}{2:6d}{11:12d}{len(packed):12d}" + " 0 0 0 0"
+    data = f"{-1:6d}\n{head}\n{header(kind, 5, 1)}".encode() + packed + b"\n    -1\n"
+    (tmp_path / "b.uff").write_bytes(data)
+    (f,) = read_universal(tmp_path / "b.uff")
+    assert_allclose(f.y, RE + 1j * IM, rtol=1e-6)
+    assert_allclose(f.x, X)
+
+
+def test_other_datasets_and_line_ends_do_not_disturb(tmp_path):
+    other = f"{-1:6d}\n   151\nname\n{-1:6d}\n"
+    content = other + dataset(6, 1, [RE, IM]) + other + dataset(5, 1, [RE, IM], response=(8, 1))
+    (tmp_path / "c.unv").write_bytes(content.replace("\n", "\r\n").encode())
+    found = read_universal(tmp_path / "c.unv")
+    assert [f.response for f in found] == [(7, 3), (8, 1)]
+    assert_allclose(found[0].y, RE + 1j * IM)
+
+
+def test_acceleration_becomes_displacement(tmp_path):
+    """x'' = -omega^2 x."""
+    (tmp_path / "a.unv").write_text(dataset(6, 1, [RE, IM]))
+    (f,) = read_universal(tmp_path / "a.unv")
+    assert_allclose(f.receptance(), -(RE + 1j * IM) / (2 * np.pi * X) ** 2)
+
+
+def test_functions_are_assembled_by_sensor_and_exciter(tmp_path):
+    """The exciter pushes against its direction: the sign turns."""
+    sets = [dataset(6, 1, [k * RE, IM], response=(k, -2), numerator=8) for k in (5, 9)]
+    (tmp_path / "a.unv").write_text("".join(sets))
+    functions = read_universal(tmp_path / "a.unv")
+    f, H = assemble(functions, [(9, 2), (5, 2)], [(11, 3)])
+    assert_array_equal(f, X)
+    assert_allclose(H[:, :, 0], np.column_stack([9 * RE + 1j * IM, 5 * RE + 1j * IM]))
+    with pytest.raises(ConfigError, match=r"\(6, 2\)"):
+        assemble(functions, [(6, 2)], [(11, 3)])
+
+
+def test_broken_files_are_named(tmp_path):
+    path = tmp_path / "x.unv"
+    with pytest.raises(FileFormatError, match="does not exist"):
+        read_universal(path)
+    whole = dataset(6, 1, [RE, IM])
+    for bad in (whole[: len(whole) // 2], whole.replace("E+00", "Q+00"), whole[:-40] + whole[-7:]):
+        path.write_text(bad)
+        with pytest.raises(FileFormatError, match=r"x\.unv: dataset 1"):
+            read_universal(path)
+    path.write_text("no universal file")
+    with pytest.raises(FileFormatError, match="holds no function"):
+        read_universal(path)
