@@ -1,0 +1,206 @@
+"""A test bed like an aircraft: beams with the dimensions of GARTEUR SM-AG19, without its layer.
+
+Fuselage, wing, drums at the wing tips, fin and tailplane of aluminium; where neutral axes do not
+meet, a rigid link joins them.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
+
+from rom.errors import ConfigError
+from rom.model import Array, Index, Material
+
+ALUMINIUM = Material(E=72e9, nu=0.3, rho=2700.0)
+KINDS = ("axial", "torsion", "bending", "sideways")  # bending: across the thin side
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Beams of one rectangular section.
+
+    Attributes:
+        name: name of the part.
+        path: (k, 3) corners its neutral axis passes [m].
+        broad: unit vector along the broad side of the section.
+        size: broad and thin side [m].
+    """
+
+    name: str
+    path: tuple[tuple[float, float, float], ...]
+    broad: tuple[float, float, float]
+    size: tuple[float, float]
+
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+PARTS = (
+    Part("fuselage", ((0.6, 0, 0), (0, 0, 0), (-0.85, 0, 0), (-0.9, 0, 0)), Z, (0.15, 0.05)),
+    Part(
+        "wing",
+        ((0, 1, 0.096), (0, 0.95, 0.096), (0, 0, 0.096), (0, -0.95, 0.096), (0, -1, 0.096)),
+        X,
+        (0.1, 0.01),
+    ),
+    Part("left drum", ((0.2, 0.95, 0.106), (0, 0.95, 0.106), (-0.2, 0.95, 0.106)), Y, (0.1, 0.01)),
+    Part(
+        "right drum", ((0.2, -0.95, 0.106), (0, -0.95, 0.106), (-0.2, -0.95, 0.106)), Y, (0.1, 0.01)
+    ),
+    Part("fin", ((-0.85, 0, 0.05), (-0.85, 0, 0.35)), X, (0.1, 0.01)),
+    Part(
+        "tailplane", ((-0.85, 0.2, 0.355), (-0.85, 0, 0.355), (-0.85, -0.2, 0.355)), X, (0.1, 0.01)
+    ),
+)
+LINKS = (  # a point of one part follows a point of another rigidly
+    ((0, 0, 0.096), (0, 0, 0)),
+    ((0, 0.95, 0.106), (0, 0.95, 0.096)),
+    ((0, -0.95, 0.106), (0, -0.95, 0.096)),
+    ((-0.85, 0, 0.05), (-0.85, 0, 0)),
+    ((-0.85, 0, 0.355), (-0.85, 0, 0.35)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Airframe:
+    """The free structure, taken apart into what can be wrong with it.
+
+    Attributes:
+        points: (n, 3) nodes [m].
+        beams: (m, 2) nodes of each element.
+        K: {(part, kind): (r, r)} stiffness by part and kind of deformation.
+        M: {part: (r, r)} mass by part.
+        T: (6 n, r) displacements and rotations of all nodes from the independent coordinates.
+    """
+
+    points: Array
+    beams: Index
+    K: dict[tuple[str, str], Array]
+    M: dict[str, Array]
+    T: Array
+
+    def node(self, point: npt.ArrayLike) -> int:
+        """Number of the node at a point (3,) [m].
+
+        Raises:
+            ConfigError: if none is within a tenth of a millimetre.
+        """
+        far = np.linalg.norm(self.points - np.asarray(point, dtype=float), axis=1)
+        if far.min() > 1e-4:
+            raise ConfigError(f"no node at {point}; the nearest is {far.min():.3g} m away.")
+        return int(far.argmin())
+
+    def sensor(self, point: npt.ArrayLike, axis: int) -> Array:
+        """(r,) the row that gives the displacement of a node along an axis 0, 1, 2."""
+        return self.T[6 * self.node(point) + axis]
+
+
+def airframe(size: float = 0.05, *, material: Material = ALUMINIUM) -> Airframe:
+    """The structure with beam elements no longer than ``size`` [m].
+
+    The section of a beam is rigid: no shear, no warping; masses are consistent.
+    """
+    points, beams, owners = _meshed(size)
+    T = _linked(points)
+    K, M = {}, {}
+    for part in PARTS:
+        own = [b for b, owner in zip(beams, owners, strict=True) if owner == part.name]
+        for kind in KINDS:
+            K[part.name, kind] = T.T @ _summed(points, own, part, material, kind) @ T
+        M[part.name] = T.T @ _summed(points, own, part, material, "mass") @ T
+    return Airframe(points, np.array(beams), K, M, T)
+
+
+def _meshed(size: float) -> tuple[Array, list[tuple[int, int]], list[str]]:
+    points: list[Array] = []
+    beams: list[tuple[int, int]] = []
+    owners: list[str] = []
+    for part in PARTS:
+        path = np.array(part.path, dtype=float)
+        points.append(path[0])
+        for a, b in pairwise(path):
+            n = int(np.ceil(np.linalg.norm(b - a) / size - 1e-9))
+            for k in range(1, n + 1):
+                points.append(a + (b - a) * k / n)
+                beams.append((len(points) - 2, len(points) - 1))
+                owners.append(part.name)
+    return np.array(points), beams, owners
+
+
+def _linked(points: Array) -> Array:
+    """T of u = T a, with the links' first points following the second ones."""
+    T = np.eye(6 * len(points))
+    dependent = []
+    for first, second in LINKS:
+        a, b = (int(np.abs(points - np.array(p)).sum(axis=1).argmin()) for p in (first, second))
+        x, y, z = points[a] - points[b]
+        rows = slice(6 * a, 6 * a + 6)
+        T[rows] = T[6 * b : 6 * b + 6]
+        T[rows][:3] -= np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ T[6 * b + 3 : 6 * b + 6]
+        dependent += range(6 * a, 6 * a + 6)
+    return np.delete(T, dependent, axis=1)
+
+
+def _summed(
+    points: Array, beams: list[tuple[int, int]], part: Part, material: Material, what: str
+) -> Array:
+    A = np.zeros((6 * len(points),) * 2)
+    for i, j in beams:
+        along = points[j] - points[i]
+        L = np.linalg.norm(along)
+        e = along / L
+        R = np.array([e, part.broad, np.cross(e, part.broad)])
+        local = _mass(L, part, material) if what == "mass" else _stiffness(L, part, material, what)
+        Q = block_diag(*[R] * 4)
+        dofs = np.r_[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
+        A[np.ix_(dofs, dofs)] += Q.T @ local @ Q
+    return A
+
+
+# local dofs: u v w and rotations about x y z of both ends; x along the beam, y along the broad side
+AXIAL, TWIST = [0, 6], [3, 9]
+IN_Y, IN_Z = [1, 5, 7, 11], [2, 4, 8, 10]  # deflection and slope; w' is minus the rotation
+TURNED = np.array([1.0, -1.0, 1.0, -1.0])
+BAR_K, BAR_M = np.array([[1.0, -1], [-1, 1]]), np.array([[2.0, 1], [1, 2]]) / 6
+
+
+def _stiffness(L: float, part: Part, material: Material, kind: str) -> Array:
+    """(12, 12) of one kind of deformation."""
+    (a, b), E = part.size, material.E
+    K = np.zeros((12, 12))
+    if kind == "axial":
+        K[np.ix_(AXIAL, AXIAL)] = E * a * b / L * BAR_K
+    elif kind == "torsion":
+        GJ = E / (2 * (1 + material.nu)) * torsion_constant(a, b)
+        K[np.ix_(TWIST, TWIST)] = GJ / L * BAR_K
+    else:
+        scale = np.array([1, L, 1, L])
+        k = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+        k = k * np.outer(scale, scale) / L**3 * E / 12
+        if kind == "sideways":  # deflection along the broad side
+            K[np.ix_(IN_Y, IN_Y)] = k * b * a**3
+        else:
+            K[np.ix_(IN_Z, IN_Z)] = k * a * b**3 * np.outer(TURNED, TURNED)
+    return K
+
+
+def _mass(L: float, part: Part, material: Material) -> Array:
+    (a, b), M = part.size, np.zeros((12, 12))
+    m, scale = material.rho * a * b * L, np.array([1, L, 1, L])
+    h = np.array(
+        [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
+    ) * np.outer(scale, scale) * (m / 420)  # fmt: skip
+    M[np.ix_(AXIAL, AXIAL)] = m * BAR_M
+    M[np.ix_(TWIST, TWIST)] = m * (a**2 + b**2) / 12 * BAR_M
+    M[np.ix_(IN_Y, IN_Y)] = h
+    M[np.ix_(IN_Z, IN_Z)] = h * np.outer(TURNED, TURNED)
+    return M
+
+
+def torsion_constant(a: float, b: float) -> float:
+    """Of a rectangle a >= b [m^4]: Saint-Venant's series."""
+    a, b = max(a, b), min(a, b)
+    k = np.arange(1, 40, 2)
+    series = (np.tanh(k * np.pi * a / (2 * b)) / k**5).sum()
+    return float(a * b**3 / 3 * (1 - 192 / np.pi**5 * b / a * series))
