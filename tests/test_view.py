@@ -69,6 +69,25 @@ def test_a_scene_is_drawn_to_scale_and_the_right_way_up():
     np.testing.assert_allclose([columns.min(), columns.max() + 1], [300, 400], atol=2)
 
 
+def test_an_update_is_drawn_with_its_changes(tmp_path):
+    """The bar of a change of 40 % ends where the axis says; wrong lengths are refused."""
+    f = np.linspace(1.0, 9.0, 50)
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 1]])
+    beams = np.array([[0, 1], [1, 2], [0, 3]])
+    more = {
+        "changes": {"stiffness": (0.4, 0.38, 0.02), "mass": (-0.1, -0.1, 0.01)},
+        "structure": (points, beams, points, points[:1]),
+        "label": "displacement per force [m/N]", "title": "update", "caption": "words",
+    }  # fmt: skip
+    curves = {"test": 1 / (30 - f**2 + 0.1j), "before": 1 / (20 - f**2 + 0.1j)}
+    image = pixels(view.updating(tmp_path / "u.png", f, curves, **more))
+    assert colourful(image).sum() > 1000
+    bars = (image == (213, 218, 225)).all(axis=2).sum(axis=1)
+    assert bars.max() == pytest.approx(4 * bars[bars > 60].min(), rel=0.05)
+    with pytest.raises(ConfigError, match="7 values for 50"):
+        view.updating(tmp_path / "u.png", f, {"test": f[:7]}, **more)
+
+
 def test_the_camera_sees_everything():
     rng = np.random.default_rng(5)
     points = rng.normal(size=(50, 3)) * (3.0, 1.0, 0.2)

@@ -6,6 +6,7 @@ from rom.view.panels import Panel, panels
 from rom.view.part import mesh
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
+from rom.view.spectra import updating
 
 __all__ = [
     "Panel",
@@ -19,4 +20,5 @@ __all__ = [
     "mesh",
     "mode_shapes",
     "panels",
+    "updating",
 ]
