@@ -1,0 +1,161 @@
+"""Forces, stiffness and mass of a sheet; equilibrium and explicit motion."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_matrix, csr_matrix, identity, kron
+from scipy.sparse.linalg import spsolve
+
+from rom.components.assumed_strain import kernels
+from rom.components.assumed_strain.triangles import STATES, Sheet
+from rom.errors import SolverError
+from rom.model import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Metal:
+    """Elastic-plastic solid: Hencky elasticity in ln U, or linear in the Green-Lagrange strain.
+
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio.
+        rho: density [kg/m^3].
+        yield_stress: first yield stress [Pa].
+        hardening: slope of the yield stress over plastic strain [Pa].
+        linear: St. Venant and Kirchhoff's law S = D E in place of Hencky's; never yields.
+    """
+
+    E: float
+    nu: float
+    rho: float = 1.0
+    yield_stress: float = np.inf
+    hardening: float = 0.0
+    linear: bool = False
+
+    @property
+    def numbers(self) -> Array:
+        """(5,) bulk modulus, shear modulus, yield stress, hardening [Pa]; 1 for the linear law."""
+        K, mu = self.E / (3 * (1 - 2 * self.nu)), self.E / (2 * (1 + self.nu))
+        return np.array([K, mu, self.yield_stress, self.hardening, float(self.linear)])
+
+    @property
+    def wave_speed(self) -> float:
+        """Fastest elastic wave [m/s]."""
+        K, mu = self.numbers[:2]
+        return float(np.sqrt((K + 4 / 3 * mu) / self.rho))
+
+
+def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -> csr_matrix:
+    """(2n, 2n) tangent stiffness [N/m] at positions x (n, 2); at the initial ones the linear one."""
+    K = np.zeros((len(body.patch), 12, 12))
+    kernels.tangents(np.ascontiguousarray(x), *_parts(body, metal, history), K)
+    dofs = (2 * body.patch[:, :, None] + np.arange(2)).reshape(-1, 12)
+    rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
+    K = 0.5 * (K + np.swapaxes(K, 1, 2))
+    return coo_matrix((K.ravel(), (rows, columns)), shape=(2 * len(x),) * 2).tocsr()
+
+
+def forces(
+    body: Sheet, metal: Metal, x: Array, history: Array | None = None
+) -> tuple[Array, Array]:
+    """Internal forces (n, 2) [N] at positions x (n, 2), and the history after it (t, p, 5).
+
+    The history holds plastic strain 11, 22, 12, 33 and the accumulated one; None: virgin.
+    """
+    f, parts = np.zeros(body.points.shape), _parts(body, metal, history)
+    new = np.empty_like(parts[-1])
+    kernels.forces(np.ascontiguousarray(x), *parts, f, new)
+    return f, new
+
+
+def mass(body: Sheet, metal: Metal) -> csr_matrix:
+    """(2n, 2n) consistent mass [kg]; lumped by its row sums in `fly`."""
+    m = body.weights.sum(axis=1) * metal.rho / 12
+    T = body.triangles
+    data = (m[:, None, None] * (1 + np.eye(3))).ravel()
+    place = (np.repeat(T, 3, axis=1).ravel(), np.tile(T, (1, 3)).ravel())
+    return kron(coo_matrix((data, place), shape=(len(body.points),) * 2), identity(2), "csr")
+
+
+def equilibrium(
+    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
+) -> tuple[Array, Array, int]:
+    """Positions (n, 2), history and the most Newton iterations under dead loads in equal steps.
+
+    Args:
+        body: the sheet.
+        metal: its material.
+        load: (n, 2) dead forces [N].
+        held: dof numbers that do not move.
+        steps: load steps.
+
+    Raises:
+        SolverError: if Newton's method does not find equilibrium.
+    """
+    free = np.setdiff1d(np.arange(load.size), held)
+    x, history, most = body.points.copy(), None, 0
+    for k in range(1, steps + 1):
+        for i in range(30):
+            f, new = forces(body, metal, x, history)
+            r = (k / steps * load - f).ravel()[free]
+            if i and np.linalg.norm(r) < 1e-10 * np.linalg.norm(load):
+                break
+            K = tangent(body, metal, x, history)[free][:, free]
+            x.reshape(-1)[free] += spsolve(K.tocsc(), r)
+        else:
+            raise SolverError(
+                f"no equilibrium in load step {k} of {steps}.", hint="Take more steps."
+            )
+        history, most = new, max(most, i)
+    return x, history, most
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """What happened, picture by picture.
+
+    Attributes:
+        t: (k,) times [s].
+        x: (k, n, 2) positions [m].
+        plastic: (k, t, p) accumulated plastic strain.
+        work: done by the internal forces against the motion [J].
+        steps: number of time steps.
+    """
+
+    t: Array
+    x: Array
+    plastic: Array
+    work: float
+    steps: int
+
+
+def fly(
+    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *, pictures: int = 41
+) -> Flight:
+    """Explicit motion from rest lengths with velocities v (n, 2) [m/s]; held dofs do not move.
+
+    Raises:
+        SolverError: if the motion is lost.
+    """
+    lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
+    free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
+    free.reshape(-1)[held] = False
+    path, seen = np.zeros((pictures, *x.shape)), np.zeros((pictures, *body.weights.shape))
+    steps, work = kernels.fly(
+        x, np.where(free, v, 0.0), lumped, free, (*parts[:4], body.area), *parts[4:6],
+        metal.wave_speed, t_end, (parts[6], parts[6].copy()), path, seen,
+    )  # fmt: skip
+    if steps < 0 or not np.isfinite(path).all():
+        raise SolverError(
+            "the explicit motion was lost.", hint="Use the element F1, or finer time."
+        )
+    return Flight(np.linspace(0, t_end, pictures), path, seen, work, steps)
+
+
+def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:
+    """Arguments of the kernels between positions and results."""
+    history = np.zeros((*body.weights.shape, 5)) if history is None else history
+    numbers, state = metal.numbers, STATES[body.state]
+    return body.patch, body.gradients, body.weights, body.radius, numbers, state, history

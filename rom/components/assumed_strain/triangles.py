@@ -1,0 +1,155 @@
+"""Meshes of triangles, and the gradients at the middles of their sides."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError, MeshError
+from rom.model import Array, Index
+
+STATES = {"plane stress": 0, "plane strain": 1, "axisymmetric": 2}
+ELEMENTS = ("CST", "F1", "F3")  # constant strain; one point of mean metric; three points
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """Triangles with the gradients of their patches; dof 2*node + axis (axis 0 is the radius).
+
+    Attributes:
+        points: (n, 2) initial coordinates [m].
+        triangles: (t, 3) corners, counter-clockwise.
+        patch: (t, 6) corners and the neighbours opposite to them; a corner where there is none.
+        gradients: (t, p, s, 6, 2) of the patch functions; p points of s sides whose metric is
+            averaged [1/m].
+        weights: (t, p) volume of each point [m^3]; per radian 2 pi R for axial symmetry.
+        area: (t,) areas [m^2].
+        state: "plane stress", "plane strain" or "axisymmetric".
+        thickness: initial thickness [m].
+    """
+
+    points: Array
+    triangles: Index
+    patch: Index
+    gradients: Array
+    weights: Array
+    area: Array
+    state: str
+    thickness: float
+
+    @property
+    def radius(self) -> Array:
+        """(t,) radius of each centroid [m]; infinite without axial symmetry."""
+        if self.state != "axisymmetric":
+            return np.full(len(self.triangles), np.inf)
+        return self.points[self.triangles, 0].mean(axis=1)
+
+
+def sheet(
+    points: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    *,
+    element: str = "F3",
+    state: str = "plane stress",
+    thickness: float = 1.0,
+) -> Sheet:
+    """Prepare a mesh.
+
+    Args:
+        points: (n, 2) coordinates [m].
+        triangles: (t, 3) corners, counter-clockwise.
+        element: "F3" for elastic and modal work, "F1" for plastic flow without locking, "CST".
+        state: "plane stress", "plane strain" or "axisymmetric" (first axis is the radius).
+        thickness: of a plane solid [m].
+
+    Raises:
+        ConfigError: for an unknown element or state.
+        MeshError: if a triangle is turned over, or a side belongs to three.
+    """
+    if element not in ELEMENTS or state not in STATES:
+        raise ConfigError(f"{element!r}, {state!r}: known are {ELEMENTS} and {tuple(STATES)}.")
+    X, T = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+    constant, area = _constant_gradients(X, T)
+    patch = np.hstack([T, _opposite(T)])
+    G = np.zeros((len(T), 3, 6, 2))
+    for k in range(3):
+        G[:, k] = _side_gradients(X, patch, constant, k)
+    G = (
+        constant[:, None, None]
+        if element == "CST"
+        else G[:, None]
+        if element == "F1"
+        else G[:, :, None]
+    )
+    alone = patch < 0
+    patch = np.where(alone, np.hstack([T, T]), patch)
+    depth = 2 * np.pi * X[T, 0].mean(axis=1) if state == "axisymmetric" else thickness
+    weights = np.repeat((area * depth / G.shape[1])[:, None], G.shape[1], axis=1)
+    return Sheet(X, T, patch, np.ascontiguousarray(G), weights, area, state, thickness)
+
+
+def _constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
+    """Gradients (t, 6, 2) of the linear triangle, neighbours zero, and areas (t,)."""
+    a, b, c = X[T[:, 0]], X[T[:, 1]], X[T[:, 2]]
+    area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    if not area.min() > 0:
+        raise MeshError(f"triangle {int(area.argmin())} has the area {area.min():.3g} m^2.",
+                        hint="Number its corners counter-clockwise.")  # fmt: skip
+    G = np.zeros((len(T), 6, 2))
+    for k, side in enumerate((c - b, a - c, b - a)):
+        G[:, k] = np.column_stack([-side[:, 1], side[:, 0]]) / (2 * area[:, None])
+    return G, area
+
+
+def _opposite(T: Index) -> Index:
+    """(t, 3) the node behind the side opposite to each corner; -1 on the boundary."""
+    sides = np.sort(np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]]), axis=1)
+    corner, t = T.T.ravel(), len(T)
+    _, place, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    if count.max() > 2:
+        raise MeshError(f"a side belongs to {count.max()} triangles: the sheet branches.")
+    order = np.argsort(place.ravel(), kind="stable")
+    twin = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
+    found = np.full(3 * t, -1)
+    found[order[twin]], found[order[twin + 1]] = corner[order[twin + 1]], corner[order[twin]]
+    return found.reshape(3, t).T
+
+
+def _side_gradients(X: Array, patch: Index, constant: Array, k: int) -> Array:
+    """(t, 6, 2) at the middle of the side opposite to corner k.
+
+    Only the two triangles at the side matter: f,xi = (-f1 + f2 - f3 + f4) / 2 and f,eta likewise.
+    """
+    own = [k, (k + 1) % 3, (k + 2) % 3, 3 + k]
+    local = 0.5 * np.array([[-1.0, 1, -1, 1], [-1, -1, 1, 1]])
+    whole = patch[:, 3 + k] >= 0
+    J = local @ X[patch[whole][:, own]]
+    G = constant.copy()
+    G[whole] = 0.0
+    inside = np.zeros((whole.sum(), 6, 2))
+    inside[:, own] = np.swapaxes(np.linalg.solve(J, np.broadcast_to(local, (len(J), 2, 4))), 1, 2)
+    G[whole] = inside
+    return G
+
+
+def rectangle(
+    n: tuple[int, int], corners: npt.ArrayLike, diagonal: str = "/"
+) -> tuple[Array, Index]:
+    """Points (m, 2) and triangles (t, 3) of a quadrilateral with corners (4, 2), counter-clockwise.
+
+    Rows of points follow each other from the first side to the third; quadrilaterals are split by
+    "/", by the other diagonal, or by both with "x".
+    """
+    s, t = (np.linspace(0, 1, k + 1) for k in n)
+    C = np.asarray(corners, dtype=float)
+    a, b = (x.ravel() for x in np.meshgrid(s, t))
+    X = np.column_stack([(1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b]) @ C
+    i = (np.arange(n[1])[:, None] * (n[0] + 1) + np.arange(n[0])).ravel()
+    p, q, r, u = i, i + 1, i + n[0] + 2, i + n[0] + 1
+    if diagonal == "x":
+        m = len(X) + np.arange(i.size)
+        X = np.vstack([X, (X[p] + X[q] + X[r] + X[u]) / 4])
+        parts = [(p, q, m), (q, r, m), (r, u, m), (u, p, m)]
+    else:
+        parts = [(p, q, r), (p, r, u)] if diagonal == "/" else [(p, q, u), (q, r, u)]
+    return X, np.vstack([np.column_stack(part) for part in parts])
