@@ -175,14 +175,17 @@ def tangents(x, patch, G, weights, radius, numbers, state, history, K):
 
 
 @kernel
-def fly(x, v, mass, free, parts, numbers, state, speed, t_end, histories, path, plastic):
-    """Central differences until t_end; pictures at equal times. Returns steps, and the energies."""
+def fly(x, v, mass, free, parts, numbers, state, speed, times, histories, path, plastic):
+    """Central differences; pictures at or just after the times wanted, which become those reached.
+
+    Returns the number of steps, -1 if the motion was lost, and the energy that went into the solid.
+    """
     patch, G, weights, radius, area = parts
     old, new = histories
     f, t, dt, steps, shot, spent = np.zeros(x.shape), 0.0, 0.0, 0, 0, 0.0
     while True:
-        if t >= shot * t_end / (len(path) - 1) - 1e-12 * t_end:
-            path[shot], plastic[shot] = x, old[:, :, 4]
+        if t >= times[shot]:
+            path[shot], plastic[shot], times[shot] = x, old[:, :, 4], t
             shot += 1
             if shot == len(path):
                 return steps, spent

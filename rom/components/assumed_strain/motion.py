@@ -48,7 +48,7 @@ class Metal:
 
 
 def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -> csr_matrix:
-    """(2n, 2n) tangent stiffness [N/m] at positions x (n, 2); at the initial ones the linear one."""
+    """(2n, 2n) tangent stiffness [N/m] at positions x (n, 2), where they began the linear one."""
     K = np.zeros((len(body.patch), 12, 12))
     kernels.tangents(np.ascontiguousarray(x), *_parts(body, metal, history), K)
     dofs = (2 * body.patch[:, :, None] + np.arange(2)).reshape(-1, 12)
@@ -120,7 +120,7 @@ class Flight:
         t: (k,) times [s].
         x: (k, n, 2) positions [m].
         plastic: (k, t, p) accumulated plastic strain.
-        work: done by the internal forces against the motion [J].
+        work: energy that went from the motion into the solid [J].
         steps: number of time steps.
     """
 
@@ -142,16 +142,17 @@ def fly(
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
     free.reshape(-1)[held] = False
+    t = np.linspace(0, t_end, pictures)
     path, seen = np.zeros((pictures, *x.shape)), np.zeros((pictures, *body.weights.shape))
     steps, work = kernels.fly(
         x, np.where(free, v, 0.0), lumped, free, (*parts[:4], body.area), *parts[4:6],
-        metal.wave_speed, t_end, (parts[6], parts[6].copy()), path, seen,
+        metal.wave_speed, t, (parts[6], parts[6].copy()), path, seen,
     )  # fmt: skip
     if steps < 0 or not np.isfinite(path).all():
         raise SolverError(
             "the explicit motion was lost.", hint="Use the element F1, or finer time."
         )
-    return Flight(np.linspace(0, t_end, pictures), path, seen, work, steps)
+    return Flight(t, path, seen, work, steps)
 
 
 def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
 from rom.components.assumed_strain.motion import Metal, mass, tangent
-from rom.components.assumed_strain.triangles import Sheet, sheet
+from rom.components.assumed_strain.triangles import Sheet
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface, SurfaceMesh
 
@@ -37,26 +37,28 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
 def bending(body: Sheet, metal: Metal) -> csr_matrix:
     """(n, n) stiffness against deflection w [N/m], without rotations as unknowns.
 
-    The curvature of a triangle is the mean of its slopes' gradients, -(1/A) sum of l n grad w over
-    the sides, with grad w at the middle of each side from its two triangles. A free edge takes the
-    slope of its own triangle; linear w has no curvature.
+    The curvature of a triangle is that of the quadratic through the nodes of its patch. At an edge,
+    where nodes are missing, it is the one of least energy: the edge is free. Meshes with diagonals
+    along one direction converge; those of crossed diagonals do not, they are a fifth too soft.
 
     Source:
-        The basic shell triangle of Oñate and Zárate, small displacements.
+        After Nay and Utku, who fit a quadratic to the patch by least squares.
     """
-    G = sheet(body.points, body.triangles).gradients[:, :, 0]
-    X = body.points[body.triangles]
-    B = np.zeros((len(X), 3, 6))
-    for k in range(3):
-        side = X[:, (k + 2) % 3] - X[:, (k + 1) % 3]
-        normal = np.column_stack([side[:, 1], -side[:, 0]]) / body.area[:, None]
-        nx, ny = normal[:, 0, None], normal[:, 1, None]
-        gx, gy = G[:, k, :, 0], G[:, k, :, 1]
-        B -= np.stack([nx * gx, ny * gy, nx * gy + ny * gx], axis=1)
+    X, size = body.points[body.patch], np.sqrt(body.area)[:, None]
+    x, y = np.moveaxis((X - X[:, :3].mean(axis=1, keepdims=True)) / size[..., None], 2, 0)
+    linear = np.stack([np.ones_like(x), x, y], axis=2)
+    quadratic = np.stack([x * x / 2, y * y / 2, x * y], axis=2)
+    L = linear[:, 3:] @ np.linalg.inv(linear[:, :3])  # neighbours from the plane of the corners
+    N = quadratic[:, 3:] - L @ quadratic[:, :3]
+    above = np.concatenate([-L, np.broadcast_to(np.eye(3), L.shape)], axis=2)
+    alone = body.patch[:, 3:] == body.triangles
+    N[alone], above[alone] = 0.0, 0.0
     t, nu = body.thickness, metal.nu
     D = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
     D *= metal.E * t**3 / 12 / (1 - nu**2)
-    K = np.swapaxes(B, 1, 2) @ D @ B * body.area[:, None, None]
+    root = np.linalg.inv(np.linalg.cholesky(D).T)  # curvature = root y has the energy y^T y / 2
+    Y = np.linalg.pinv(N @ root, rcond=1e-9) @ above / size[..., None]
+    K = np.swapaxes(Y, 1, 2) @ Y  # the area cancels one power of the size in each factor
     rows, columns = np.repeat(body.patch, 6, axis=1).ravel(), np.tile(body.patch, (1, 6)).ravel()
     return coo_matrix((K.ravel(), (rows, columns)), shape=(len(body.points),) * 2).tocsr()
 
