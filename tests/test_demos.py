@@ -21,6 +21,7 @@ LEFT_BEHIND = {
     "demo_reference_conditions": {"reference_conditions.png"},
     "demo_rockfall": {"rockfall.png"},
     "demo_updating": {"updating.png"},
+    "demo_sheet": {"sheet.png", "taylor_bar.gif"},
     "demo_slider_crank": {
         "crank_mesh.png", "instants.png", "motion.png", "report.html", "rod.rom.npz", "rod.vtu",
         "rod_frequencies.png", "rod_mesh.png", "rod_modes.png", "slider_crank.gif",

@@ -89,6 +89,36 @@ def test_an_update_is_drawn_with_its_changes(tmp_path):
         view.updating(tmp_path / "u.png", f, {"test": f[:7]}, **more)
 
 
+def squeezed(amount):
+    """Two triangles of a unit square made narrower, coloured by the amount."""
+    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    now = points * (1 - amount, 1 + amount)
+    return view.Shape("square", now, triangles, points, np.array([amount, 0.0]), "strain")
+
+
+def test_a_plane_body_is_drawn_beside_its_curves(tmp_path):
+    more = {"limit": ("exact", 1.0), "xlabel": "size", "ylabel": "answer", "title": "t"}
+    curves = {"coarse": ([1, 2, 4], [0.2, 0.7, 0.9])}
+    path = view.deformed(tmp_path / "s.png", curves, [squeezed(0.5)], caption="words", **more)
+    image = pixels(path)
+    yellow = (image[..., 0] > 240) & (image[..., 1] > 220) & (image[..., 2] < 60)
+    rows, columns = np.nonzero(yellow[:550])
+    assert np.ptp(rows) == pytest.approx(3 * np.ptp(columns), rel=0.05)  # 1.5 high, 0.5 wide
+    with pytest.raises(ConfigError, match="4 shapes"):
+        view.deformed(tmp_path / "s.png", curves, [squeezed(0.1)] * 4, caption="", **more)
+
+
+def test_a_film_of_a_plane_body_keeps_its_frame_and_colours(tmp_path):
+    shapes = [squeezed(a) for a in (0.0, 0.25, 0.5)]
+    path = view.film(tmp_path / "s.gif", np.array([0.0, 1e-6, 2e-6]), shapes, caption="words")
+    sizes = [int(colourful(pixels(path, frame)[:740]).sum()) for frame in range(3)]
+    assert sizes[0] > sizes[1] > sizes[2]  # the area is 1 - amount^2
+    assert sizes[2] == pytest.approx(0.75 * sizes[0], rel=0.1)
+    with pytest.raises(ConfigError, match="2 times for 3"):
+        view.film(tmp_path / "s.gif", np.zeros(2), shapes, caption="")
+
+
 def test_the_camera_sees_everything():
     rng = np.random.default_rng(5)
     points = rng.normal(size=(50, 3)) * (3.0, 1.0, 0.2)

@@ -4,16 +4,20 @@ from rom.view.curves import convergence, frequencies, history
 from rom.view.film import animate, instants
 from rom.view.panels import Panel, panels
 from rom.view.part import mesh
+from rom.view.plane import Shape, deformed, film
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
 
 __all__ = [
     "Panel",
+    "Shape",
     "animate",
     "box",
     "convergence",
     "cylinder",
+    "deformed",
+    "film",
     "frequencies",
     "history",
     "instants",

@@ -62,7 +62,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     pages = np.repeat(blank[None], len(images), axis=0)
     pages[:, CLOCK : CLOCK + images.shape[1]] = images
     pages[:, :CLOCK] = clocks
-    _write_gif(path, pages, seconds / len(images))
+    write_gif(path, pages, seconds / len(images))
     return path
 
 
@@ -232,7 +232,7 @@ def _bar(figure: Any, stage: Stage, width: int, top: int) -> None:
         page.colour_bar(figure, stage.limits, label, (width / 2 - 250, top + 30, 500, 16))
 
 
-def _write_gif(path: Path, pages: Image, duration: float) -> None:
+def write_gif(path: Path, pages: Image, duration: float) -> None:
     """One palette for all pictures, so that colours do not flicker."""
     require("PIL")
     from PIL import Image as Picture
