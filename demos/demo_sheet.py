@@ -117,7 +117,7 @@ view.deformed(
     "before. Right: a copper bar after it hit a wall at 227 m/s, computed with F1 on half "
     "its section; its foot has flowed to more than twice its radius.",
 )
-view.film(
+view.flow(
     options.out / "taylor_bar.gif",
     flight.t,
     [whole(k) for k in range(len(flight.t))],

@@ -333,6 +333,17 @@ def test_a_strip_bends_like_a_free_beam():
     assert_allclose(f[3:], np.array([4.730041, 7.853205]) ** 2 * unit, rtol=2e-4)
 
 
+def test_a_strip_twists_like_a_free_bar_and_bends_in_spite_of_poisson():
+    """Torsion with G J = G b t^3 / 3; a narrow strip bends with E I, its edges being free."""
+    body, metal, _ = strip()
+    K, M = bending(body, metal).toarray(), mass(body, metal)[::2, ::2].toarray()
+    f = np.sqrt(np.abs(eigh(K, M, eigvals_only=True)[:8])) / (2 * np.pi)
+    unit = np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2 / (2 * np.pi)
+    twist = np.sqrt(210e9 / 2.6 * 4 * 0.002**2 / 0.04**2 / 7850) / (2 * 0.4)
+    assert_allclose(f[3:5], np.array([4.730041, 7.853205]) ** 2 * unit, rtol=4e-3)
+    assert np.abs(f[5:] / twist - 1).min() < 0.03
+
+
 def test_a_sheet_in_space_has_six_rigid_motions():
     X, T = distorted((3, 3))
     model = in_space(sheet(X, T), Metal(1.0, 0.3), {"all": np.arange(len(X))})

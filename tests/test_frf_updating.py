@@ -193,6 +193,16 @@ def test_the_common_basis_works_from_as_many_columns_as_modes(rank):
     assert found[1] < 0.03 and found[2] < 0.08
 
 
+def test_equations_converge_as_newton_does():
+    """Data of the condensed model itself: each step squares the error."""
+    model = AtSensors(BEAM)
+    H = responses(model, TRUE, ZETA, OMEGA, INPUTS)
+    test = Measurement(OMEGA, H, INPUTS)
+    found = update_by_input(model, test, 0.9 * TRUE, ZETA, rank=8)
+    error = np.abs(found.history - TRUE).max(axis=1)
+    assert error[0] < 1e-3 and error[1] < 1e-6 and error[-1] < 1e-9
+
+
 def test_fewer_columns_than_modes_fail():
     found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=4))
     assert found[0] > 0.3

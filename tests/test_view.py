@@ -111,12 +111,12 @@ def test_a_plane_body_is_drawn_beside_its_curves(tmp_path):
 
 def test_a_film_of_a_plane_body_keeps_its_frame_and_colours(tmp_path):
     shapes = [squeezed(a) for a in (0.0, 0.25, 0.5)]
-    path = view.film(tmp_path / "s.gif", np.array([0.0, 1e-6, 2e-6]), shapes, caption="words")
+    path = view.flow(tmp_path / "s.gif", np.array([0.0, 1e-6, 2e-6]), shapes, caption="words")
     sizes = [int(colourful(pixels(path, frame)[:740]).sum()) for frame in range(3)]
     assert sizes[0] > sizes[1] > sizes[2]  # the area is 1 - amount^2
     assert sizes[2] == pytest.approx(0.75 * sizes[0], rel=0.1)
     with pytest.raises(ConfigError, match="2 times for 3"):
-        view.film(tmp_path / "s.gif", np.zeros(2), shapes, caption="")
+        view.flow(tmp_path / "s.gif", np.zeros(2), shapes, caption="")
 
 
 def test_the_camera_sees_everything():

@@ -248,11 +248,10 @@ def _by_all(model: ParametricModel, modes: Modal, m: int, *sides: Any) -> Comple
 def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) -> Complex:
     """Left (A - omega^2 B + i omega C) right: (n_f, a, n), (n_q, n, n), (n_f, n, b).
 
-    The narrower side is pushed through all matrices at once.
+    The narrower side is pushed through all matrices at once; they are symmetric.
     """
     if left.shape[1] < right.shape[2]:
-        turned = tuple(np.swapaxes(part, 1, 2) for part in S)
-        flipped = _through(np.swapaxes(right, 1, 2), turned, np.swapaxes(left, 1, 2), omega)
+        flipped = _through(np.swapaxes(right, 1, 2), S, np.swapaxes(left, 1, 2), omega)
         return np.swapaxes(flipped, 1, 2)
     n_f, n, b = right.shape
     columns = np.ascontiguousarray(np.moveaxis(right, 1, 0).reshape(n, n_f * b))

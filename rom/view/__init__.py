@@ -4,7 +4,7 @@ from rom.view.curves import convergence, frequencies, history
 from rom.view.film import animate, instants
 from rom.view.panels import Panel, panels
 from rom.view.part import mesh
-from rom.view.plane import Shape, deformed, film
+from rom.view.plane import Shape, deformed, flow
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
@@ -17,7 +17,7 @@ __all__ = [
     "convergence",
     "cylinder",
     "deformed",
-    "film",
+    "flow",
     "frequencies",
     "history",
     "instants",

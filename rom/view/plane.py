@@ -100,7 +100,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def film(
+def flow(
     path: str | Path,
     times: Array,
     shapes: Sequence[Shape],

@@ -39,7 +39,7 @@ def bending(body: Sheet, metal: Metal) -> csr_matrix:
 
     The curvature of a triangle is that of the quadratic through the nodes of its patch. At an edge,
     where nodes are missing, it is the one of least energy: the edge is free. Meshes with diagonals
-    along one direction converge; those of crossed diagonals do not, they are a fifth too soft.
+    along one direction converge; with crossed diagonals frequencies of bending stay a fifth too low.
 
     Source:
         After Nay and Utku, who fit a quadratic to the patch by least squares.
@@ -47,7 +47,7 @@ def bending(body: Sheet, metal: Metal) -> csr_matrix:
     X, size = body.points[body.patch], np.sqrt(body.area)[:, None]
     x, y = np.moveaxis((X - X[:, :3].mean(axis=1, keepdims=True)) / size[..., None], 2, 0)
     linear = np.stack([np.ones_like(x), x, y], axis=2)
-    quadratic = np.stack([x * x / 2, y * y / 2, x * y], axis=2)
+    quadratic = np.stack([x * x / 2, y * y / 2, x * y / 2], axis=2)  # the last is twice the twist
     L = linear[:, 3:] @ np.linalg.inv(linear[:, :3])  # neighbours from the plane of the corners
     N = quadratic[:, 3:] - L @ quadratic[:, :3]
     above = np.concatenate([-L, np.broadcast_to(np.eye(3), L.shape)], axis=2)
