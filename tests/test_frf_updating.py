@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import eig
+from test_universal import dataset
 
 from rom.components import airframe as aircraft
 from rom.components import frf_data as data
@@ -23,6 +24,7 @@ from rom.components.frf_updating import (
     update_by_output,
 )
 from rom.errors import ConfigError, ModelError
+from rom.io.universal import assemble, read_universal
 
 TRUE = np.array([0.30, -0.25, 0.0, 0.20, 0.0, -0.35, 0.0, 0.25, -0.20])
 ZETA = np.array([1.2, 0.8, 1.5, 1.0, 2.0]) / 100
@@ -147,6 +149,19 @@ def test_without_noise_all_parameters_come_back():
     found = update_by_output(BEAM, measured(), START, GUESS)
     assert errors(found) < (1e-6, 1e-6, 1e-6)
     assert len(found.history) <= 14
+
+
+def test_a_universal_file_leads_to_the_parameters(tmp_path):
+    """Accelerations in text; frequencies are written with six digits."""
+    f, sets = OMEGA / (2 * np.pi), []
+    for s, e in np.ndindex(8, 2):
+        a = -(OMEGA**2) * EXACT[:, s, e]
+        sets.append(dataset(6, 0, [f, a.real, a.imag], response=(s + 1, 2), reference=(e + 1, 2)))
+    (tmp_path / "test.unv").write_text("".join(sets))
+    sensors, exciters = [(s + 1, 2) for s in range(8)], [(1, 2), (2, 2)]
+    f, H = assemble(read_universal(tmp_path / "test.unv"), sensors, exciters)
+    found = update_by_output(BEAM, Measurement(2 * np.pi * f, H, INPUTS), START, GUESS)
+    assert np.all(np.array(errors(found)) < (1e-4, 1e-4, 1e-3))
 
 
 @pytest.mark.parametrize(
