@@ -17,6 +17,7 @@ LEFT_BEHIND = {
     "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
     "demo_best_matching": {"best_matching.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
+    "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_reference_conditions": {"reference_conditions.png"},
     "demo_rockfall": {"rockfall.png"},

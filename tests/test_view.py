@@ -306,3 +306,21 @@ def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
     wrong = view.Panel("", "", curves={"one": ([1, 2], [1])})
     with pytest.raises(ConfigError, match="'one' has 1 values for 2 places"):
         view.panels(tmp_path / "q.png", [[wrong]], title="", caption="")
+
+
+def test_a_plane_shows_values_outlines_and_the_first_index_along_x(tmp_path):
+    """A field that grows along x: the colour map brightens from left to right."""
+    shade = np.broadcast_to(np.linspace(0, 1, 40)[:, None], (40, 30))
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    drawings = [
+        view.Drawing("map", "x [m]", "y [m]", (0.0, 4.0, 0.0, 3.0), shade, "height [m]"),
+        view.Drawing("stone", "x [m]", "y [m]", polygons=[square], curves={"line": [square]}),
+    ]
+    path = view.plane(tmp_path / "plane.png", drawings, title="T", caption="C " * 20)
+    image = pixels(path)
+    row = image[110 + 240, 120:560]
+    hue = row[colourful(row[None])[0]].sum(axis=1)
+    assert hue.size > 300 and hue[-20:].mean() > 2 * hue[:20].mean()
+    assert (image[:, 700:] == (0xD9, 0xD2, 0xC3)).all(axis=2).sum() > 20000
+    with pytest.raises(ConfigError, match="nothing to draw"):
+        view.plane(tmp_path / "plane.png", [], title="T", caption="C")

@@ -5,6 +5,7 @@ from rom.view.film import animate, instants
 from rom.view.panels import Panel, panels
 from rom.view.part import mesh
 from rom.view.plane import Shape, deformed, flow
+from rom.view.planes import Drawing, plane
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
@@ -12,6 +13,7 @@ from rom.view.spectra import updating
 __all__ = [
     "Panel",
     "Shape",
+    "Drawing",
     "animate",
     "box",
     "convergence",
@@ -25,4 +27,5 @@ __all__ = [
     "mode_shapes",
     "panels",
     "updating",
+    "plane",
 ]
