@@ -1,0 +1,248 @@
+"""Corners that touch edges: positions, the list of contacts, gradients of gap and slip.
+
+A block moves as x = c + A (X + sum phi_k q_k): its frame, and elastic shapes that carry no linear
+momentum. Its edges stay straight between their corners.
+"""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.mbs.compiled import drop_stale_cache, inner, kernel
+from rom.model import Array, Index
+
+HERE = Path(__file__).parent
+drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span two modules
+OPEN, SLIDES, STICKS = 0, 1, 2
+ADMITTED = -math.sin(math.radians(3.0))  # edges of a corner may dive so far below an edge it meets
+BEYOND = 1e-4  # of the length of an edge: corners so far beyond its end still touch it
+
+
+class Blocks(NamedTuple):
+    """What does not change; R is the largest number of shapes.
+
+    Attributes:
+        first: (B + 1,) first corner of each block.
+        corner: (V, 2) corners from the mass centre in body axes, counterclockwise [m].
+        shape: (V, 2, R) displacement of the corners per elastic coordinate, body axes.
+        size: (B,) number of coordinates, 3 + r.
+        equation: (B,) number of the first equation; -1 for a block that is held.
+        M: (B, 3 + R, 3 + R) mass.
+        K: (B, 3 + R, 3 + R) stiffness, zero for the frame.
+        load: (B, 3 + R) constant load [N].
+    """
+
+    first: Index
+    corner: Array
+    shape: Array
+    size: Index
+    equation: Index
+    M: Array
+    K: Array
+    load: Array
+
+
+class Law(NamedTuple):
+    """Contact: stiffness [N/m] along normal and edge, friction, tension lost in round-off [N].
+
+    ``reach`` [m] is how near a corner must be to an edge to be watched.
+    """
+
+    normal: float
+    shear: float
+    friction: float
+    tension: float
+    reach: float
+
+
+class Contacts(NamedTuple):
+    """Corners that are near edges; the first ``count[0]`` rows are in use.
+
+    Attributes:
+        count: (1,) how many.
+        who: (C, 5) block and corner, block and both corners of the edge.
+        state: (C,) OPEN, SLIDES or STICKS.
+        anchor: (C,) place on the edge, 0 to 1, that the corner sticks to.
+        way: (C,) direction of slip along the edge, -1 or 1.
+        gap, slip: (C,) distance from the edge, and from the anchor along it [m].
+        force: (C,) normal force [N].
+        along: (C, 4) place of the corner on the edge, 0 to 1, normal and length of the edge.
+        n, t: (C, 2, 3 + R) gap and slip per coordinate of both blocks.
+    """
+
+    count: Index
+    who: Index
+    state: Index
+    anchor: Array
+    way: Array
+    gap: Array
+    slip: Array
+    force: Array
+    along: Array
+    n: Array
+    t: Array
+
+
+def contacts(capacity: int, m: int) -> Contacts:
+    """Room for contacts of blocks with at most m coordinates."""
+    C = capacity
+    return Contacts(
+        np.zeros(1, dtype=np.int64), np.zeros((C, 5), dtype=np.int64),
+        np.zeros(C, dtype=np.int64), *(np.zeros(C) for _ in range(5)), np.zeros((C, 4)),
+        np.zeros((C, 2, m)), np.zeros((C, 2, m)),
+    )  # fmt: skip
+
+
+@inner
+def place_corners(B, q, P, T):
+    """Positions of all corners, and their velocity per rate of the coordinates of their block."""
+    for b in range(B.size.size):
+        c, s = math.cos(q[b, 2]), math.sin(q[b, 2])
+        for a in range(B.first[b], B.first[b + 1]):
+            x, y = B.corner[a, 0], B.corner[a, 1]
+            for k in range(B.size[b] - 3):
+                x += B.shape[a, 0, k] * q[b, 3 + k]
+                y += B.shape[a, 1, k] * q[b, 3 + k]
+                T[a, 0, 3 + k] = c * B.shape[a, 0, k] - s * B.shape[a, 1, k]
+                T[a, 1, 3 + k] = s * B.shape[a, 0, k] + c * B.shape[a, 1, k]
+            X, Y = c * x - s * y, s * x + c * y
+            P[a, 0], P[a, 1] = q[b, 0] + X, q[b, 1] + Y
+            T[a, 0, 0], T[a, 1, 0], T[a, 0, 1], T[a, 1, 1] = 1.0, 0.0, 0.0, 1.0
+            T[a, 0, 2], T[a, 1, 2] = -Y, X
+
+
+@inner
+def near(B, P, i, j, reach):
+    """Whether the boxes around two blocks are within reach of each other."""
+    for axis in range(2):
+        low_i = high_i = P[B.first[i], axis]
+        for a in range(B.first[i] + 1, B.first[i + 1]):
+            low_i, high_i = min(low_i, P[a, axis]), max(high_i, P[a, axis])
+        low_j = high_j = P[B.first[j], axis]
+        for a in range(B.first[j] + 1, B.first[j + 1]):
+            low_j, high_j = min(low_j, P[a, axis]), max(high_j, P[a, axis])
+        if low_i > high_j + reach or low_j > high_i + reach:
+            return False
+    return True
+
+
+@inner
+def around(B, b, a, step):
+    """The corner of block b before or after corner a."""
+    low, high = B.first[b], B.first[b + 1]
+    return low + (a - low + step) % (high - low)
+
+
+@inner
+def faces(B, P, i, a, nx, ny):
+    """Whether both edges at corner a of block i lead away from an edge with this normal."""
+    for step in (-1, 1):
+        o = around(B, i, a, step)
+        x, y = P[o, 0] - P[a, 0], P[o, 1] - P[a, 1]
+        if x * nx + y * ny < ADMITTED * math.hypot(x, y):
+            return False
+    return True
+
+
+@inner
+def nearest_edge(B, P, i, a, j, reach):
+    """First corner of the edge of block j that corner a meets, and gap, place, normal; -1: none.
+
+    Of several edges the one with the largest gap: out of a convex block the shortest way leads
+    through it.
+    """
+    found, gap, way, nx, ny = -1, -reach, 0.0, 0.0, 0.0
+    for c in range(B.first[j], B.first[j + 1]):
+        o = around(B, j, c, 1)
+        x, y = P[o, 0] - P[c, 0], P[o, 1] - P[c, 1]
+        l = math.hypot(x, y)
+        px, py = P[a, 0] - P[c, 0], P[a, 1] - P[c, 1]
+        w, g = (px * x + py * y) / (l * l), (px * y - py * x) / l
+        if abs(g) >= reach or g <= gap or w < -BEYOND or w > 1 + BEYOND:
+            continue
+        if faces(B, P, i, a, y / l, -x / l):
+            found, gap, way, nx, ny = c, g, w, y / l, -x / l
+    return found, gap, way, nx, ny
+
+
+@inner
+def detect(B, law, P, old, C):
+    """List the contacts of the blocks as they lie; what an old contact remembers is kept."""
+    C.count[0] = 0
+    for i in range(B.size.size):
+        for j in range(B.size.size):
+            if i == j or (B.equation[i] < 0 and B.equation[j] < 0):
+                continue
+            if not near(B, P, i, j, law.reach):
+                continue
+            for a in range(B.first[i], B.first[i + 1]):
+                c, gap, w, nx, ny = nearest_edge(B, P, i, a, j, law.reach)
+                if c >= 0 and C.count[0] < C.state.size:
+                    k = C.count[0]
+                    C.who[k, 0], C.who[k, 1], C.who[k, 2] = i, a, j
+                    C.who[k, 3], C.who[k, 4] = c, around(B, j, c, 1)
+                    C.gap[k], C.along[k, 0], C.along[k, 1], C.along[k, 2] = gap, w, nx, ny
+                    C.count[0] = k + 1
+    drop_doubles(C, P, law.reach)
+    for k in range(C.count[0]):
+        C.state[k], C.anchor[k], C.way[k], C.force[k] = OPEN, C.along[k, 0], 0.0, 0.0
+        for o in range(old.count[0]):
+            if old.who[o, 1] == C.who[k, 1] and old.who[o, 3] == C.who[k, 3]:
+                C.state[k], C.way[k], C.force[k] = old.state[o], old.way[o], old.force[o]
+                if old.state[o] != OPEN:
+                    C.anchor[k] = old.anchor[o]
+
+
+@inner
+def drop_doubles(C, P, reach):
+    """Where two corners meet, let only the edge with the larger gap part the blocks."""
+    kept = 0
+    for k in range(C.count[0]):
+        keep = True
+        for o in range(C.count[0]):
+            if o == k or C.who[o, 0] != C.who[k, 2] or C.who[o, 2] != C.who[k, 0]:
+                continue
+            a, c = C.who[k, 1], C.who[o, 1]
+            apart = math.hypot(P[a, 0] - P[c, 0], P[a, 1] - P[c, 1])
+            dot = C.along[k, 1] * C.along[o, 1] + C.along[k, 2] * C.along[o, 2]
+            if apart < reach and dot > -0.5:
+                if C.gap[k] < C.gap[o] or (C.gap[k] == C.gap[o] and k > o):
+                    keep = False
+        C.way[k] = 1.0 if keep else 0.0
+    for k in range(C.count[0]):
+        if C.way[k] > 0.0:
+            for p in range(5):
+                C.who[kept, p] = C.who[k, p]
+            for p in range(4):
+                C.along[kept, p] = C.along[k, p]
+            C.gap[kept] = C.gap[k]
+            kept += 1
+    C.count[0] = kept
+
+
+@inner
+def contact_rows(B, P, T, C):
+    """Slip of all contacts, and the gradients of gap and slip; `detect` first."""
+    for k in range(C.count[0]):
+        i, a, j, c, o = C.who[k]
+        w, nx, ny = C.along[k, 0], C.along[k, 1], C.along[k, 2]
+        C.along[k, 3] = math.hypot(P[o, 0] - P[c, 0], P[o, 1] - P[c, 1])
+        C.slip[k] = (w - C.anchor[k]) * C.along[k, 3]
+        for p in range(B.size[i]):
+            C.n[k, 0, p] = T[a, 0, p] * nx + T[a, 1, p] * ny
+            C.t[k, 0, p] = T[a, 1, p] * nx - T[a, 0, p] * ny
+        for p in range(B.size[j]):
+            x = (1 - w) * T[c, 0, p] + w * T[o, 0, p]
+            y = (1 - w) * T[c, 1, p] + w * T[o, 1, p]
+            C.n[k, 1, p] = -x * nx - y * ny
+            C.t[k, 1, p] = x * ny - y * nx
+
+
+@kernel
+def find_contacts(B, law, q, old, C, P, T):
+    """Corners, contacts and their gradients at the coordinates q."""
+    place_corners(B, q, P, T)
+    detect(B, law, P, old, C)
+    contact_rows(B, P, T, C)
