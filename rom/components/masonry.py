@@ -112,28 +112,34 @@ def polygon_moments(x: Array) -> tuple[float, Array, Array]:
     return area, centre, np.asarray(S)
 
 
-def reduced_stone(body: FlexibleBody, corners: tuple[str, ...]) -> Stone:
+def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     """A reduced body as a stone in the plane of its x and y axes.
 
     Args:
-        body: the body, symmetric about the plane.
-        corners: its interfaces at the corners, counterclockwise.
+        body: the body with its surface, symmetric about the plane.
+        outline: (k, 2) corners, counterclockwise, where its surface has nodes [m].
 
     Raises:
-        InterfaceError: if an interface is unknown.
-        ModelError: if the corners do not enclose an area counterclockwise.
+        ModelError: if the outline is not one, or has a corner without a node.
     """
-    body = body.with_reference("mean-axis")
-    outline = np.array([body.marker(name).point[:2] for name in corners])
-    if not polygon_moments(outline)[0] > 0:
-        raise ModelError(f"the corners {corners!r} are not listed counterclockwise.")
+    body, corners = body.with_reference("mean-axis"), np.asarray(outline, dtype=float)
+    if body.surface is None or not polygon_moments(corners)[0] > 0:
+        raise ModelError(f"body {body.name!r} has no surface, or its outline is not one.")
+    points, shape = body.surface.points, body.surface.shape.reshape(-1, 3, body.n_modes)
+    far = np.linalg.norm(points[None, :, :2] - corners[:, None], axis=2)
+    at = far < 1e-6 * body.size
+    if not at.any(axis=1).all():
+        k = int(np.argmin(at.any(axis=1)))
+        raise ModelError(
+            f"no node of body {body.name!r} lies at the corner {corners[k].tolist()}; the nearest "
+            f"is {far[k].min():.3g} m away."
+        )
+    shapes = np.array([shape[nodes, :2].mean(axis=0) for nodes in at])
     centre = body.first_moment[:2] / body.mass
-    M = np.zeros((3 + body.n_modes,) * 2)
-    M[0, 0] = M[1, 1] = body.mass
+    M = np.diag(np.r_[body.mass, body.mass, 0.0, np.zeros(body.n_modes)])
     M[2, 2] = body.inertia[2, 2] - body.mass * (centre @ centre)
     M[3:, 3:] = body.M
-    shapes = np.array([body.marker(name).translation[:2] for name in corners])
-    return Stone(outline, centre, M, body.K, shapes)
+    return Stone(corners, centre, M, body.K, shapes)
 
 
 @dataclass(frozen=True)
