@@ -19,6 +19,7 @@ LEFT_BEHIND = {
     "demo_compressor_blade": {"compressor_blade.png"},
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
+    "demo_masonry": {"masonry.png"},
     "demo_reference_conditions": {"reference_conditions.png"},
     "demo_rockfall": {"rockfall.png"},
     "demo_updating": {"updating.png"},

@@ -6,7 +6,7 @@ momentum. Its edges stay straight between their corners.
 
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,10 +58,10 @@ class Law(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """Corners that are near edges; the first ``count[0]`` rows are in use.
+    """Corners that are near edges; the first ``used[0]`` rows are in use.
 
     Attributes:
-        count: (1,) how many.
+        used: (1,) how many.
         who: (C, 5) block and corner, block and both corners of the edge.
         state: (C,) OPEN, SLIDES or STICKS.
         anchor: (C,) place on the edge, 0 to 1, that the corner sticks to.
@@ -72,7 +72,7 @@ class Contacts(NamedTuple):
         n, t: (C, 2, 3 + R) gap and slip per coordinate of both blocks.
     """
 
-    count: Index
+    used: Index
     who: Index
     state: Index
     anchor: Array
@@ -87,12 +87,10 @@ class Contacts(NamedTuple):
 
 def contacts(capacity: int, m: int) -> Contacts:
     """Room for contacts of blocks with at most m coordinates."""
-    C = capacity
-    return Contacts(
-        np.zeros(1, dtype=np.int64), np.zeros((C, 5), dtype=np.int64),
-        np.zeros(C, dtype=np.int64), *(np.zeros(C) for _ in range(5)), np.zeros((C, 4)),
-        np.zeros((C, 2, m)), np.zeros((C, 2, m)),
-    )  # fmt: skip
+    shapes = ((), (), (), (), (), (), (4,), (2, m), (2, m))
+    rows: list[Any] = [np.zeros((capacity, *shape)) for shape in shapes]
+    rows[0] = rows[0].astype(np.int64)
+    return Contacts(np.zeros(1, dtype=np.int64), np.zeros((capacity, 5), dtype=np.int64), *rows)
 
 
 @inner
@@ -170,7 +168,7 @@ def nearest_edge(B, P, i, a, j, reach):
 @inner
 def detect(B, law, P, old, C):
     """List the contacts of the blocks as they lie; what an old contact remembers is kept."""
-    C.count[0] = 0
+    C.used[0] = 0
     for i in range(B.size.size):
         for j in range(B.size.size):
             if i == j or (B.equation[i] < 0 and B.equation[j] < 0):
@@ -179,16 +177,16 @@ def detect(B, law, P, old, C):
                 continue
             for a in range(B.first[i], B.first[i + 1]):
                 c, gap, w, nx, ny = nearest_edge(B, P, i, a, j, law.reach)
-                if c >= 0 and C.count[0] < C.state.size:
-                    k = C.count[0]
+                if c >= 0 and C.used[0] < C.state.size:
+                    k = C.used[0]
                     C.who[k, 0], C.who[k, 1], C.who[k, 2] = i, a, j
                     C.who[k, 3], C.who[k, 4] = c, around(B, j, c, 1)
                     C.gap[k], C.along[k, 0], C.along[k, 1], C.along[k, 2] = gap, w, nx, ny
-                    C.count[0] = k + 1
+                    C.used[0] = k + 1
     drop_doubles(C, P, law.reach)
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         C.state[k], C.anchor[k], C.way[k], C.force[k] = OPEN, C.along[k, 0], 0.0, 0.0
-        for o in range(old.count[0]):
+        for o in range(old.used[0]):
             if old.who[o, 1] == C.who[k, 1] and old.who[o, 3] == C.who[k, 3]:
                 C.state[k], C.way[k], C.force[k] = old.state[o], old.way[o], old.force[o]
                 if old.state[o] != OPEN:
@@ -199,9 +197,9 @@ def detect(B, law, P, old, C):
 def drop_doubles(C, P, reach):
     """Where two corners meet, let only the edge with the larger gap part the blocks."""
     kept = 0
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         keep = True
-        for o in range(C.count[0]):
+        for o in range(C.used[0]):
             if o == k or C.who[o, 0] != C.who[k, 2] or C.who[o, 2] != C.who[k, 0]:
                 continue
             a, c = C.who[k, 1], C.who[o, 1]
@@ -211,7 +209,7 @@ def drop_doubles(C, P, reach):
                 if C.gap[k] < C.gap[o] or (C.gap[k] == C.gap[o] and k > o):
                     keep = False
         C.way[k] = 1.0 if keep else 0.0
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         if C.way[k] > 0.0:
             for p in range(5):
                 C.who[kept, p] = C.who[k, p]
@@ -219,13 +217,13 @@ def drop_doubles(C, P, reach):
                 C.along[kept, p] = C.along[k, p]
             C.gap[kept] = C.gap[k]
             kept += 1
-    C.count[0] = kept
+    C.used[0] = kept
 
 
 @inner
 def contact_rows(B, P, T, C):
     """Slip of all contacts, and the gradients of gap and slip; `detect` first."""
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         i, a, j, c, o = C.who[k]
         w, nx, ny = C.along[k, 0], C.along[k, 1], C.along[k, 2]
         C.along[k, 3] = math.hypot(P[o, 0] - P[c, 0], P[o, 1] - P[c, 1])

@@ -7,8 +7,8 @@ gamma = 1, which is exact for constant forces and damps vibrations by 1 / sqrt(1
 a step. Gyroscopic terms of the deformation are neglected, as usual.
 
 Source:
-    After Shi, Block system modeling by discontinuous deformation analysis. Stick and slip follow
-    by return mapping, and contacts open by force: a tolerance of the gap would carry tension.
+    After Shi (1988). Different here: elastic shapes live in body axes, stick and slip follow by
+    return mapping, and contacts open by force, since a tolerance of the gap would carry tension.
 """
 
 import math
@@ -55,7 +55,7 @@ def envelope(B, C, left):
     for b in range(B.size.size):
         for p in range(B.size[b] if B.equation[b] >= 0 else 0):
             left[B.equation[b] + p] = B.equation[b]
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         i, j = B.equation[C.who[k, 0]], B.equation[C.who[k, 2]]
         if i >= 0 and j >= 0 and C.state[k] != OPEN:
             for p in range(B.size[C.who[k, 0]] if i > j else B.size[C.who[k, 2]]):
@@ -74,7 +74,7 @@ def assemble(B, law, C, h, W):
         for p in range(B.size[b] if at >= 0 else 0):
             for r in range(p + 1):
                 W.A[at + p, at + r] += 2 * B.M[b, p, r] / (h * h) + B.K[b, p, r]
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         if C.state[k] != OPEN:
             add_spring(B, C.who[k], C.n[k], law.normal, W.A)
         if C.state[k] == STICKS:
@@ -138,7 +138,7 @@ def right_hand_side(B, law, C, h, W):
             for r in range(B.size[b]):
                 total += 2 * B.M[b, p, r] * W.v[b, r] / h - B.K[b, p, r] * W.q[b, r]
             W.rhs[at + p] = total
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         if C.state[k] == OPEN:
             continue
         push = -law.normal * C.gap[k]
@@ -166,7 +166,7 @@ def change(B, C, k, g, d):
 def review(B, law, C, d):
     """States and normal forces at the end of the step: contacts that change, friction error."""
     changed, error, largest = 0, 0.0, 0.0
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         force = -law.normal * (C.gap[k] + change(B, C, k, C.n, d))
         trial = law.shear * (C.slip[k] + change(B, C, k, C.t, d))
         state = STICKS
@@ -218,7 +218,7 @@ def step(B, law, C, h, W):
 @inner
 def accept(B, law, C, h, keep, W):
     """Move on by W.d: coordinates, velocities times ``keep``, anchors of what slipped."""
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         if C.state[k] == SLIDES:
             end = C.along[k, 0] + change(B, C, k, C.t, W.d) / C.along[k, 3]
             stretch = C.way[k] * law.friction * C.force[k] / law.shear
@@ -239,7 +239,7 @@ def energy(B, law, C, W):
             for r in range(B.size[b]):
                 total += 0.5 * W.v[b, p] * B.M[b, p, r] * W.v[b, r]
                 total += 0.5 * W.q[b, p] * B.K[b, p, r] * W.q[b, r]
-    for k in range(C.count[0]):
+    for k in range(C.used[0]):
         if C.state[k] != OPEN:
             total += 0.5 * C.force[k] ** 2 / law.normal
         if C.state[k] == SLIDES:
@@ -252,8 +252,8 @@ def energy(B, law, C, W):
 @inner
 def remember(C, old):
     """Copy what the next list of contacts takes over."""
-    n = C.count[0]
-    old.count[0] = n
+    n = C.used[0]
+    old.used[0] = n
     old.who[:n], old.state[:n], old.anchor[:n] = C.who[:n], C.state[:n], C.anchor[:n]
     old.way[:n], old.force[:n] = C.way[:n], C.force[:n]
 

@@ -9,7 +9,7 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -199,9 +199,9 @@ class Masonry:
         free[list(self.held)] = False
         B = Blocks(first, corner, shape, sizes, np.where(free, 0, -1), M, K, load)
         who = _touching(B, self.law, self.start()).who[:, [0, 2]]
-        graph = coo_matrix((np.ones(len(who)), who.T), shape=(len(sizes),) * 2)
-        order = reverse_cuthill_mckee(csr_matrix(graph + graph.T), symmetric_mode=True)
-        order = order[free[order]]
+        graph = csr_matrix(coo_matrix((np.ones(len(who)), who.T), shape=(len(sizes),) * 2))
+        graph = (graph + graph.T)[free][:, free]
+        order = np.flatnonzero(free)[reverse_cuthill_mckee(csr_matrix(graph), symmetric_mode=True)]
         equation = np.full(len(sizes), -1)
         equation[order] = np.cumsum([0, *sizes[order]])[:-1]
         return B._replace(equation=equation)
@@ -216,7 +216,8 @@ def _touching(B: Blocks, law: Law, q: Array) -> Contacts:
     V, m = len(B.corner), B.load.shape[1]
     C, P, T = contacts(8 * V, m), np.zeros((V, 2)), np.zeros((V, 2, m))
     find_contacts(B, law, q, contacts(0, m), C, P, T)
-    return Contacts(*(x[: C.count[0]] if len(x) == 8 * V else x for x in C))
+    rows: list[Any] = [C.used, *(x[: C.used[0]] for x in C[1:])]
+    return Contacts(*rows)
 
 
 @dataclass(frozen=True)
@@ -259,9 +260,10 @@ class Motion:
 
         Both (2,) [m], [N]; the centres along an arch are its line of thrust.
         """
-        C, law, sums = self.contacts, self.masonry.law, {}
+        C, law = self.contacts, self.masonry.law
+        sums: dict[tuple[int, int], tuple[Array, Array, float]] = {}
         corners = np.vstack(self.outlines())
-        for k in range(C.count[0]):
+        for k in range(C.used[0]):
             if C.state[k] == OPEN or C.force[k] <= 0:
                 continue
             (i, a, j), normal = C.who[k, :3], C.along[k, 1:3]

@@ -146,7 +146,7 @@ def stands(masonry: Masonry) -> bool:
     """
     B, C = masonry.blocks(), touching(masonry)
     row = np.where(B.equation >= 0, 3 * (np.cumsum(B.equation >= 0) - 1), -1)
-    n, entries = int(C.count[0]), []
+    n, entries = int(C.used[0]), []
     scale = np.r_[1.0, 1.0, 1 / np.sqrt(B.M[0, 2, 2] / B.M[0, 0, 0])]
     for one in range(2):
         at = row[C.who[:, 2 * one]]
@@ -203,7 +203,7 @@ def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True
             otherwise on the centre line, c = 1.
 
     Source:
-        After Milankovitch (1907), as reviewed by Alexakis and Makris; derived anew.
+        After Milankovitch, as cited by Alexakis and Makris; derived anew.
     """
 
     def lowest(ratio: float) -> tuple[float, float, float]:
