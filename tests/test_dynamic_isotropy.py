@@ -81,6 +81,15 @@ def test_two_link_chain_has_its_textbook_inertia():
     assert_allclose(np.diag(A), [0.583333, 0.106667], atol=1e-6)
 
 
+def test_a_mass_centre_aside_of_the_axis_couples_by_cosine_and_sine():
+    """Velocity of the centre: l1 e1' + (x e2' - y e2), a prime for the direction a quarter ahead."""
+    m, l1, x, y, J = 2.0, 0.5, 0.15, 0.08, 0.03
+    chain = TwoLink(rod(1.0, l1), rigid_link(m, 0.4, (x, y), J))
+    A, turn = chain.inertia(0.4, 1.3), 1.3 - 0.4
+    assert_allclose(A[0, 1], m * l1 * (x * np.cos(turn) - y * np.sin(turn)), rtol=1e-13)
+    assert_allclose(np.diag(A), [l1**2 / 3 + m * l1**2, J + m * (x**2 + y**2)], rtol=1e-13)
+
+
 def test_best_index_of_the_two_link_chain_is_at_right_angles():
     index = isotropy_index(TWO.inertia(*angle_grid(360)))
     assert index.max() == pytest.approx(0.723026, abs=1e-6)
