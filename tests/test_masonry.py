@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
-from scipy.optimize import brentq
 from solid import STEEL, block
 
 import rom
-from rom.components import masonry as module
 from rom.components.masonry import (
     Masonry,
     polygon_moments,
@@ -19,7 +17,7 @@ from rom.components.masonry import (
     stone,
     touching,
 )
-from rom.components.masonry_limits import Rock, arch, minimum_thickness, stands, wall
+from rom.components.masonry_limits import Rock, arch, stands
 from rom.errors import ConfigError, ModelError
 
 G = 9.81
@@ -235,124 +233,6 @@ def test_impact_of_a_rocking_block_takes_as_much_as_housner_says_or_less(rocking
     ratio = line[1] / motion.v[k - 1, 1, 2]
     assert 1 - 1.5 * np.sin(alpha) ** 2 == pytest.approx(0.9118, abs=1e-4)
     assert 0.88 < ratio < 0.97
-
-
-def heyman():
-    """Thrust tangent to the intrados: H = beta cot beta."""
-
-    def gap(x):
-        Ro = 1 + x / 2
-        H = np.pi / 2 - 1 / Ro
-        beta = brentq(lambda b: b / np.tan(b) - H, 0.3, 1.5)
-        r = (H * Ro + 1 - np.cos(beta)) / (H * np.cos(beta) + beta * np.sin(beta))
-        return r - (1 - x / 2), beta, H
-
-    x = brentq(lambda x: gap(x)[0], 0.05, 0.2)
-    return x, *gap(x)[1:]
-
-
-def test_limits_of_the_semicircular_arch():
-    x, beta, H = heyman()
-    assert_allclose([x, np.degrees(beta), H], [0.105965, 58.829, 0.621113], rtol=2e-5)
-    line, true = minimum_thickness(true_weight=False), minimum_thickness()
-    for limit, exact in (
-        (line, (0.107426, 54.496, 0.621772)),
-        (true, (0.107478, 54.484, 0.620881)),
-    ):
-        found = limit.ratio, np.degrees(limit.hinge), limit.thrust
-        assert_allclose(found, exact, rtol=1e-5)
-    assert true.ratio == pytest.approx(0.1075, abs=5e-5)  # Milankovitch, as cited by others
-
-
-@pytest.mark.parametrize("n", [10, 20, 30, 40])
-def test_linear_programming_finds_the_same_limit(n):
-    """54 degrees must be a joint; between joints the line of thrust is free."""
-    assert stands(arch(n, 5.0, 5 * 0.107462)) and not stands(arch(n, 5.0, 5 * 0.107458))
-
-
-@pytest.mark.parametrize("degrees", [60, 75])
-def test_flatter_arches_obey_the_same_two_theories(degrees):
-    """Closed form against linear programming with 150 joints."""
-    limit = minimum_thickness(half_angle=np.radians(degrees)).ratio
-    for factor, answer in ((1.002, True), (0.996, False)):
-        model = arch(150, 1.0, factor * limit, half_angle=np.radians(degrees))
-        assert stands(model) is answer, factor
-
-
-@pytest.mark.parametrize(
-    ("mu", "limit"), [(0.38, 0.12157), (0.35, 0.15185), (0.32, 0.18560), (0.31, 0.19756)]
-)
-def test_friction_below_that_of_hinging_thickens_the_arch(mu, limit):
-    rock = Rock(friction=mu)
-    assert minimum_thickness().thrust / (np.pi / 2) == pytest.approx(0.3953, abs=1e-4)
-    for factor, answer in ((1 + 2e-4, True), (1 - 2e-4, False)):
-        assert stands(arch(100, 1.0, factor * limit, rock=rock)) is answer
-
-
-@pytest.mark.parametrize("ratio", [0.2, 0.5, 1.0])
-def test_too_smooth_an_arch_slides_however_thick(ratio):
-    assert not stands(arch(100, 1.0, ratio, rock=Rock(friction=0.305)))
-
-
-def final_speed(n, ratio, *, settle=200, rock=None):
-    """Speed of an arch, R = 5 m, after coming to rest as statics lets it, and 2 s more."""
-    model = arch(n, 5.0, 5 * ratio, rock=rock)
-    still = simulate(model, t_end=settle * 1e-3, dt=1e-3, keep=0.0, save_every=settle)
-    motion = simulate(model, t_end=2.0, dt=1e-3, keep=0.97, save_every=500, q=still.q[-1])
-    return np.abs(motion.v[1:]).max(axis=(1, 2))
-
-
-@pytest.mark.parametrize(("n", "rests", "moves"), [(10, 0.1075, 0.10725), (20, 0.1085, 0.1065)])
-def test_arch_stands_above_its_limit_and_falls_below(n, rests, moves):
-    assert final_speed(n, rests)[-1] < 1e-10
-    falling = final_speed(n, moves)
-    assert falling[-1] > 1e-5 and (np.diff(falling) > 0).all()
-
-
-def test_contacts_that_pull_would_hold_up_an_impossible_arch(monkeypatch):
-    """The tolerance of the opening is a force: 2e-7 of half the size as a gap is 2e5 N here."""
-    assert final_speed(10, 0.09)[-1] > 1e-3
-    monkeypatch.setattr(module, "TENSION", 15.0)
-    assert final_speed(10, 0.09)[-1] < 1e-6
-
-
-def test_line_of_thrust_of_a_resting_arch():
-    """Statically determined by its centres of pressure: moments of each half about its joints."""
-    model = arch(20, 5.0, 5 * 0.12)
-    motion = simulate(model, t_end=2.0, dt=1e-3, keep=0.97, save_every=2000)
-    joints = motion.joints()
-    assert len(joints) == 21
-    weight = sum(s.M[0, 0] for s in model.stones[1:-1]) * G
-    (a, left), (_, right) = joints[0, 1], joints[20, 21]
-    assert_allclose(left - right, [0, -weight], atol=1e-3 * weight)
-    for (i, _), (x, force) in joints.items():
-        assert 5 * 0.94 - 1e-6 < np.hypot(*x) < 5 * 1.06 + 1e-6
-        if i == 10:
-            assert x[0] == pytest.approx(0.0, abs=1e-3)
-        part = range(1, i + 1)
-        W = np.array([model.stones[k].M[0, 0] * G for k in part])
-        centre = np.array([motion.q[-1, k, 0] for k in part])
-        # vertical balance of the stones left of the joint
-        assert -left[1] + force[1] == pytest.approx(W.sum(), abs=1e-3 * weight)
-        lever = (x - a)[0] * force[1] - (x - a)[1] * force[0]
-        assert lever == pytest.approx((W * (centre - a[0])).sum(), abs=2e-3 * weight)
-    thrust = abs(left[0]) / (weight / np.pi)
-    assert 0.5 < thrust < 0.7
-
-
-def test_wall_with_an_opening_carries_its_weight_to_the_ground():
-    model = wall(3.0, 8, opening=(1.0, 2.0, 2, 5))
-    assert stands(model)
-    motion = simulate(model, t_end=1.0, dt=2e-3, keep=0.9, save_every=500)
-    assert np.abs(motion.v[-1]).max() < 1e-6
-    weight = sum(s.M[0, 0] for s in model.stones[1:]) * G
-    down = sum(-f for (i, _), (_, f) in motion.joints().items() if i == 0)
-    assert_allclose(-down, [0, -weight], atol=1e-5 * weight)
-    whole = wall(3.0, 8)
-    area = 0.5 * 0.25
-    count = sum(s.M[0, 0] for s in whole.stones[1:]) / (2000 * area)
-    assert count == pytest.approx(8 * 3.0 / 0.5)
-    assert weight == pytest.approx((8 * 3.0 * 0.25 - 3 * 0.25) * 2000 * G)
 
 
 @pytest.fixture(scope="module")
