@@ -11,9 +11,9 @@ from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
 
 __all__ = [
+    "Drawing",
     "Panel",
     "Shape",
-    "Drawing",
     "animate",
     "box",
     "convergence",
@@ -26,6 +26,6 @@ __all__ = [
     "mesh",
     "mode_shapes",
     "panels",
-    "updating",
     "plane",
+    "updating",
 ]
