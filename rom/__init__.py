@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from rom.body.assembly import Assembly
 from rom.body.damping import ModalDamping, Rayleigh
+from rom.body.family import BodyFamily
 from rom.body.flexible import FlexibleBody
 from rom.checks import check
 from rom.errors import RomError
 from rom.io.export import export
-from rom.io.native import load, save
+from rom.io.family import load, save
 from rom.io.vtu import write_stress
 from rom.model import (
     Attachment,
@@ -23,9 +24,12 @@ from rom.model import (
     Material,
     Modes,
     Orthotropic,
+    Region,
     Report,
     SurfaceMesh,
 )
+from rom.parameters import Density, YoungsModulus
+from rom.parametric import reduce_parametric
 from rom.reduction.balanced import BalancedTruncation, second_order_balanced_truncation
 from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import DualAssembly, FreeSubstructure
@@ -52,8 +56,10 @@ __all__ = [
     "Attachment",
     "BalancedTruncation",
     "Basis",
+    "BodyFamily",
     "Characteristic",
     "CraigBampton",
+    "Density",
     "DualAssembly",
     "EnhancedCraigBampton",
     "FEModel",
@@ -72,12 +78,14 @@ __all__ = [
     "Orthotropic",
     "Polynomial",
     "Rayleigh",
+    "Region",
     "Report",
     "RomError",
     "Rubin",
     "Snapshots",
     "SurfaceMesh",
     "WithLoads",
+    "YoungsModulus",
     "audit",
     "check",
     "craig_bampton",
@@ -86,6 +94,7 @@ __all__ = [
     "mass_properties",
     "modes",
     "reduce",
+    "reduce_parametric",
     "save",
     "second_order_balanced_truncation",
     "simulate",

@@ -46,16 +46,16 @@ def certify_body(
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     inner = connection.ops.hold(connection.boundary) if statics else None
     for fixed in supports:
-        table = _compared(connection, ops, body, (basis, inner), fixed)
+        table = compared(connection, ops, body, (basis, inner), fixed)
         if table["reduced"]:
             comparison[" + ".join(fixed) + " held" if fixed else "free"] = table
     if not connection.ops.affordable:
         rows.append(Row("dofs; full modes are too dear, errors estimated", ops.n, "--", True))
     for support, table in comparison.items():
-        rows += _frequency_rows(support, table) if table["full"] else []
+        rows += frequency_rows(support, table) if table["full"] else []
         rows += _estimate_rows(support, table)
     rows += _static_row(connection, body) if statics else []
-    rows += _rigid_rows(ops, body, elastic)
+    rows += rigid_rows(ops, body, elastic)
     rows += _matrix_rows(connection, basis, body)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
@@ -68,7 +68,7 @@ def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Ro
     return Row(quantity, value, f"{'>=' if above else '<='} {limit:g}", bool(ok))
 
 
-def _compared(
+def compared(
     connection: Connection,
     ops: Operators,
     body: FlexibleBody,
@@ -84,10 +84,10 @@ def _compared(
         return table
     # the reduced shapes again, as combinations of the columns of the basis
     basis, inner = reduction
-    shapes = _reduced_shapes(connection, basis, fixed, n + n_rigid)
+    shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)
     table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
     if inner and not any(label.startswith("enhanced") for label in basis.labels):
-        table["estimated"] = _estimates(connection.ops, inner, shapes[:, n_rigid:]).tolist()
+        table["estimated"] = estimates(connection.ops, inner, shapes[:, n_rigid:]).tolist()
     if connection.ops.affordable:
         omega, Phi = connection.ops.modes(connection.held(fixed), n + n_rigid)
         omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
@@ -97,7 +97,7 @@ def _compared(
     return table
 
 
-def _estimates(ops: Operators, inner: Held, X: Array) -> Array:
+def estimates(ops: Operators, inner: Held, X: Array) -> Array:
     """Frequency errors r^T K_ii^-1 r / (2 x^T K x), r = K x - lam M x, of the modes x of a basis.
 
     A basis that contains the constraint modes leaves no residual on them, so that the inverse is
@@ -109,7 +109,7 @@ def _estimates(ops: Operators, inner: Held, X: Array) -> Array:
     return np.diag(ops.gram(rest, inner(rest))) / (2 * np.diag(ops.gram(X, KX)))
 
 
-def _reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
+def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
     """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
     ops = connection.ops
     drop = [connection.parts[name] for name in fixed]
@@ -132,11 +132,14 @@ def _cluster_mac(table: Array, full: Array, reduced: Array) -> Array:
     return np.minimum((table * near).sum(axis=1), 1.0)
 
 
-def _frequency_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
+def frequency_rows(
+    support: str, table: dict[str, list[float]], limit: float = FREQUENCY_ERROR
+) -> list[Row]:
+    """Errors and shapes against the full model."""
     error = np.array(table["reduced"]) / np.array(table["full"]) - 1
     n = error.size
     return [
-        row(f"{support}: worst error of {n} frequencies", np.abs(error).max(), FREQUENCY_ERROR),
+        row(f"{support}: worst error of {n} frequencies", np.abs(error).max(), limit),
         row(f"{support}: reduced never below full", error.min(), -1e-8, above=True),
         row(f"{support}: lowest MAC of {n} shapes", min(table["mac"]), 0.99, above=True),
     ]
@@ -182,7 +185,8 @@ def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:
     return [row(f"{first} held: static flexibility of the interfaces", error, 1e-6)]
 
 
-def _rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
+def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
+    """Rigid motions of the body against those of the full model."""
     R = ops.rigid
     KR, MR = ops.apply_K(R), ops.apply_M(R)
     full = ops.gram(R, MR)

@@ -13,6 +13,7 @@ from scipy.sparse import identity, kron
 from rom.errors import InterfaceError
 from rom.model import Array, Interface
 
+Weighted = tuple[float, list[tuple[float, Any]]]
 CLUSTER = 1e-5  # eigenvalues closer than this (relative) belong to one space
 ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
 
@@ -106,6 +107,17 @@ class Operators(Protocol):
 
     def plus_mass(self, dM: Any) -> "Operators":
         """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
+
+    def product(self, A: Any, X: Array) -> Array:
+        """A X for a matrix with the layout of K, (n_local, k)."""
+
+    def varied(self, stiffness: Weighted, mass: Weighted) -> "Operators":
+        """Another body on the same dofs: K' = k K + sum k_i K_i, M' = m M + sum m_i M_i.
+
+        Args:
+            stiffness: (k, [(k_i, K_i), ...]), matrices with the layout of K.
+            mass: (m, [(m_i, M_i), ...]).
+        """
 
 
 def canonical_signs(Phi: Array) -> Array:

@@ -42,6 +42,10 @@ class ConfigError(RomError):
     exit_code = 2
 
 
+class ParameterError(ConfigError):
+    """A parameter of a family of bodies that is unknown or outside its range."""
+
+
 class FileFormatError(RomError):
     """A file that is missing, cut, or not what its name promises."""
 

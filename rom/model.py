@@ -1,5 +1,6 @@
 """The records passed between the stages. Frozen, array-valued, without solvers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any
@@ -195,6 +196,21 @@ class Attachment:
     at: Any = None
 
 
+@dataclass(frozen=True, slots=True)
+class Region:
+    """What one region adds to the matrices of a model.
+
+    Attributes:
+        K: (n, n) stiffness of its elements alone [N/m], with the layout of the model's.
+        M: (n, n) mass of its elements alone [kg].
+        stresses: evaluates the stress that its elements alone carry; None without finite elements.
+    """
+
+    K: Any
+    M: Any
+    stresses: Any = None
+
+
 @dataclass(frozen=True)
 class FEModel:
     """Linear finite element model of one free body, no boundary condition applied.
@@ -213,6 +229,7 @@ class FEModel:
         operators: the five verbs on this model when K and M are not SciPy matrices.
         stresses: evaluates stress of displacements, `rom.fe.stress.Stresses`; None for a model
             without finite elements.
+        regions: {name: share of the region}, for parameters; empty when they are not known.
     """
 
     K: Any
@@ -224,6 +241,7 @@ class FEModel:
     provenance: dict[str, Any] = field(default_factory=dict)
     operators: Any = None
     stresses: Any = None
+    regions: Mapping[str, "Region"] = field(default_factory=dict)
 
     @property
     def n_dofs(self) -> int:

@@ -8,7 +8,7 @@ from scipy.linalg import LinAlgError, eigh, eigvalsh
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
-from rom.eigen import canonical_signs, count_shift, orthonormal
+from rom.eigen import Weighted, canonical_signs, count_shift, orthonormal
 from rom.errors import (
     ConfigError,
     InterfaceError,
@@ -110,6 +110,18 @@ class SciPyOperators:
     def plus_mass(self, dM: Any) -> "SciPyOperators":
         """The same body with the mass M + dM."""
         return SciPyOperators(self.K, self.M + csr_matrix(dM), self.rigid, self.T)
+
+    def product(self, A: Any, X: Array) -> Array:
+        """A X."""
+        return A @ X
+
+    def varied(self, stiffness: Weighted, mass: Weighted) -> "SciPyOperators":
+        """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
+        K, M = (
+            weight * A + sum(c * csr_matrix(part) for c, part in parts)
+            for A, (weight, parts) in ((self.K, stiffness), (self.M, mass))
+        )
+        return SciPyOperators(K, M, self.rigid, self.T)
 
     def modes(
         self,

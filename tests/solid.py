@@ -1,9 +1,11 @@
 """A small finite element block without FEniCSx: eight-node bricks, assembled in NumPy."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
-from rom.model import FEModel, Interface, Material, SurfaceMesh
+from rom.model import FEModel, Interface, Material, Region, SurfaceMesh
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 GAUSS = np.array([-1.0, 1.0]) / np.sqrt(3.0)
@@ -52,6 +54,24 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
     cell = size[1:] / cells[1:]
     interfaces = {name: _interface(name, face, points, cell) for name, face in faces.items()}
     return FEModel(0.5 * (K + K.T), M, points, interfaces, surface=_surface(number))
+
+
+def composite(materials, region, size=(1.0, 0.1, 0.08), cells=(8, 2, 2), origin=(0.0, 0.0, 0.0)):
+    """FEModel of a block of several materials; region(cell) names the one of a cell (i, j, k)."""
+    plain = block(size, cells, STEEL, origin)
+    number = np.arange(plain.n_dofs // 3).reshape(np.array(cells) + 1)
+    steps = ((CORNERS + 1) / 2).astype(int)
+    regions = {}
+    for name, material in materials.items():
+        own = [c for c in np.ndindex(*cells) if region(c) == name]
+        nodes = np.array([[number[tuple(np.array(c) + s)] for s in steps] for c in own])
+        dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
+        K_e, M_e = brick(np.array(size) / cells, material)
+        K = _assemble(dofs, K_e, plain.n_dofs)
+        M = kron(_assemble(nodes, M_e, plain.n_dofs // 3), identity(3), format="csr")
+        regions[name] = Region(0.5 * (K + K.T), M)
+    K, M = (sum(getattr(part, which) for part in regions.values()) for which in "KM")
+    return replace(plain, K=K, M=M, regions=regions)
 
 
 def _assemble(dofs, block_, n):

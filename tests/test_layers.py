@@ -11,8 +11,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
-LIGHT = {"attachment", "body", "eigen", "errors", "io", "mbs", "model", "reduction", "rotation",
-         "scipy_operators", "units"}  # fmt: skip
+LIGHT = {"attachment", "body", "eigen", "errors", "io", "mbs", "model", "parameters", "reduction",
+         "rotation", "scipy_operators", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor", "peers"}  # they stand in front
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "errors": set(),
@@ -23,12 +23,14 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "attachment": {"model", "eigen", "errors"},
     "scipy_operators": {"model", "eigen", "errors"},
     "reduction": {"model", "eigen", "scipy_operators", "errors"},
-    "body": {"model", "eigen", "rotation", "attachment", "errors"},
+    "parameters": {"model", "errors"},
+    "body": {"model", "eigen", "rotation", "attachment", "parameters", "errors"},
     "mbs": {"model", "rotation", "errors"},
-    "io": {"model", "units", "body", "errors"},
+    "io": {"model", "units", "body", "parameters", "errors"},
     "checks": {"model", "eigen", "body", "scipy_operators", "errors"},
     "certificate": {"model", "eigen", "body", "reduction", "errors"},
     "workflow": LIGHT | {"certificate"},
+    "parametric": LIGHT | {"certificate", "workflow"},
     "fe": {"model", "eigen", "units", "scipy_operators", "errors"},
     "components": LIGHT,
     "view": {"model", "mbs", "rotation", "io", "errors"},

@@ -9,6 +9,7 @@ Source:
     formulation, Acta Mech. 230 (2019) 3965, for the idea.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,15 @@ class InertiaIntegrals:
         """Integrals of two bodies that share the shapes."""
         names = ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl")
         return InertiaIntegrals(*(getattr(self, n) + getattr(other, n) for n in names))
+
+
+def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
+    """Integrals of bodies that share the shapes, their densities multiplied by the weights."""
+    sums = (
+        sum(w * getattr(part, name) for w, part in zip(weights, parts, strict=True))
+        for name in InertiaIntegrals.__slots__
+    )
+    return InertiaIntegrals(*sums)
 
 
 def inertia_integrals(ops: Operators, points: Array, Psi: Array) -> InertiaIntegrals:

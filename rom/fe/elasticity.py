@@ -10,19 +10,18 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
-import ufl
-from scipy.sparse import csr_matrix
 
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagError
-from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
+from rom.fe.compat import assemble_matrix, cell_name, lagrange, versions
 from rom.fe.jit import compiling
-from rom.fe.material import by_region, coefficients, described, doubts, stress
+from rom.fe.material import by_region, coefficients, described, doubts
 from rom.fe.memory import give_back
 from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
 from rom.fe.solid import SolidMesh
+from rom.fe.region import Regions, aij, forms, symmetric
 from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
 from rom.model import Array, Attachment, FEModel
@@ -132,7 +131,7 @@ def assemble(
         V = lagrange(mesh, degree)
         points = all_points(V)
         numbers = coefficients(mesh, tags, solids)
-        K, M = (assemble_matrix(f) for f in _forms(V, numbers, degree))
+        K, M = (assemble_matrix(f) for f in forms(V, numbers, degree))
         interfaces = {key: interface(key, value, V, points) for key, value in facet_tags.items()}
     named = {region: solids[tag] for region, tag in regions.items()}
     remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
@@ -142,6 +141,7 @@ def assemble(
         "attachments": tuple(attachments),
         "surface": outer_surface(V, points, degree),
         "stresses": Stresses(V, numbers, degree),
+        "regions": Regions(V, tags, solids, regions, degree),
         "provenance": {
             "material": described(named),
             "degree": degree,
@@ -154,52 +154,17 @@ def assemble(
     return _finish(K, M, points, fields)
 
 
-def _forms(V: Any, numbers: dict[str, Any], degree: int) -> tuple[ufl.Form, ufl.Form]:
-    """Stiffness and mass; quadrature exact on straight cells, more than enough on curved ones."""
-    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    q_K, q_M = _quadrature(cell_name(V.mesh), degree, geometry_degree(V.mesh))
-    dx = ufl.Measure("dx", domain=V.mesh)
-    sigma = stress(ufl.sym(ufl.grad(u)), numbers)
-    K = ufl.inner(sigma, ufl.sym(ufl.grad(v))) * dx(metadata={"quadrature_degree": q_K})
-    M = numbers["rho"] * ufl.inner(u, v) * dx(metadata={"quadrature_degree": q_M})
-    return K, M
-
-
-def _quadrature(name: str, degree: int, curved: int) -> tuple[int, int]:
-    """Quadrature degrees of K and M.
-
-    On straight tetrahedra the integrands are polynomials of these degrees. On hexahedra the
-    determinant of the map adds 3 g - 1 per direction to the mass, on curved tetrahedra 3 (g - 1)
-    in total, g the degree of the geometry.
-    """
-    if name == "tetrahedron":
-        return 2 * (degree - 1) + 3 * (curved - 1), 2 * degree + 3 * (curved - 1)
-    return 2 * degree + 2 * (curved - 1), 2 * degree + 3 * curved - 1
-
-
 def _finish(K: PETSc.Mat, M: PETSc.Mat, points: Array, fields: dict[str, Any]) -> FEModel:
     """On one process, SciPy matrices that are symmetric to the last bit beside the operators."""
     first, end = K.getOwnershipRange()
     rigid = rigid_motions(points[first // 3 : end // 3])
     if K.comm.size > 1:
         return FEModel(K, M, points, operators=PETScOperators(K, M, rigid), **fields)
-    A, B = _symmetric(K), _symmetric(M)
+    A, B = symmetric(K), symmetric(M)
     K.destroy()
     M.destroy()
     give_back()
-    return FEModel(A, B, points, operators=PETScOperators(_aij(A), _aij(B), rigid), **fields)
-
-
-def _symmetric(A: PETSc.Mat) -> csr_matrix:
-    starts, columns, values = A.getValuesCSR()
-    half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
-    return (half + half.T).tocsr()
-
-
-def _aij(A: csr_matrix) -> PETSc.Mat:
-    """The same numbers in the same memory, for PETSc."""
-    csr = (A.indptr, A.indices, A.data)
-    return PETSc.Mat().createAIJWithArrays(A.shape, csr, bsize=3, comm=MPI.COMM_SELF)
+    return FEModel(A, B, points, operators=PETScOperators(aij(A), aij(B), rigid), **fields)
 
 
 def _check_mesh(mesh: Any, degree: int) -> str:

@@ -69,6 +69,15 @@ def coefficients(mesh: Any, tags: Array, solids: dict[int, Solid]) -> dict[str, 
     return {n: per_cell(mesh, np.array([tables[t][n] for t in order])[rows]) for n in names}
 
 
+def of_region(mesh: Any, tags: Array, solids: dict[int, Solid], tag: int) -> dict[str, Any]:
+    """Coefficients that vanish outside one region, one value per cell; see `coefficients`."""
+    inside = tags == tag
+    return {
+        name: per_cell(mesh, np.multiply.outer(inside, value))
+        for name, value in _numbers(solids[tag], _isotropic(solids)).items()
+    }
+
+
 def _isotropic(solids: dict[int, Solid]) -> bool:
     return all(isinstance(solid, Material) for solid in solids.values())
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
-from rom.eigen import count_shift, orthonormal
+from rom.eigen import Weighted, count_shift, orthonormal
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.fe.factor import Factor, dense_rows
 from rom.fe.held import ZERO, HeldPETSc
@@ -149,6 +149,16 @@ class PETScOperators:
         M.axpy(1.0, _aij(csr_matrix(dM), sizes, self.comm))
         fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": self.solver}
         return PETScOperators(self.K, M, self.rigid, **fields)
+
+    def product(self, A: PETSc.Mat, X: Array) -> Array:
+        """A X."""
+        return dense_rows(A, X)
+
+    def varied(self, stiffness: Weighted, mass: Weighted) -> "PETScOperators":
+        """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
+        K, M = _weighted(self.K, *stiffness), _weighted(self.M, *mass)
+        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": self.solver}
+        return PETScOperators(K, M, self.rigid, **fields)
 
     def solved_by(self, solver: Solver) -> "PETScOperators":
         """The same body, its equations solved another way."""
@@ -431,6 +441,15 @@ def _symmetric(A: PETSc.Mat) -> PETSc.Mat:
     A.scale(0.5)
     B.destroy()
     return A
+
+
+def _weighted(A: PETSc.Mat, weight: float, parts: list[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
+    """Weight A + sum of the weighted parts; entries that are zero may be missing from A."""
+    B = A.copy()
+    B.scale(weight)
+    for c, part in parts:
+        B.axpy(c, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    return B
 
 
 def _aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:

@@ -7,6 +7,8 @@ certificate, and the SHA-256 of every array. A reader needs NumPy and this page 
 import hashlib
 import json
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from tokenize import TokenError
@@ -40,13 +42,17 @@ def save(body: FlexibleBody, path: str | Path) -> Path:
         QualityGateError: if an array holds a number that is not finite.
         ResourceError: if the disk is full.
     """
-    arrays = _arrays(body)
+    return write_archive(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
+
+
+def write_archive(
+    path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array], what: str
+) -> Path:
+    """Write a manifest and arrays, whole or not at all; see `save` for what is raised."""
     for name, A in arrays.items():
         if not np.isfinite(A).all():
-            raise QualityGateError(
-                f"{name} of body {body.name!r} is not finite; nothing was written."
-            )
-    manifest = _manifest(body) | {"sha256": {name: _digest(A) for name, A in arrays.items()}}
+            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
+    manifest = manifest | {"sha256": {name: _digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 
     def write(file: Any) -> None:
@@ -74,12 +80,32 @@ def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
         QualityGateError: if the numbers are not those of a body.
     """
     path = Path(path)
+    manifest, arrays = read_archive(path, {SCHEMA: VERSION}, limit)
+    with stated(path):
+        body = body_of(manifest, arrays)
+    verify(body, path)
+    return body
+
+
+def read_archive(
+    path: Path, schemas: dict[str, tuple[int, int]], limit: int
+) -> tuple[dict[str, Any], dict[str, Array]]:
+    """The manifest and the arrays of a file, every array as it was written.
+
+    Args:
+        path: the file.
+        schemas: {schema: version} that can be read.
+        limit: bytes the arrays may take in memory.
+
+    Raises:
+        FileFormatError, UnsafeFileError, QualityGateError: see `load`.
+    """
     if not path.is_file():
         raise FileFormatError("there is no such file.", where=str(path))
     try:
         with zipfile.ZipFile(path) as archive:
             _refuse_oversize(archive, path, limit)
-            manifest = _read_manifest(archive, path)
+            manifest = _read_manifest(archive, path, schemas)
             arrays = {n: _read(archive, n, path) for n in sorted(_digests(manifest, path))}
     except (
         zipfile.BadZipFile,
@@ -99,17 +125,22 @@ def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
             raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
         if not np.isfinite(A).all():
             raise QualityGateError(f"{name} holds a number that is not finite.", where=str(path))
+    return manifest, arrays
+
+
+@contextmanager
+def stated(path: Path) -> Iterator[None]:
+    """Turn what a wrong manifest causes into an error that names the file."""
     try:
-        body = _body(manifest, arrays)
+        yield
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise FileFormatError(
             f"the manifest lacks or misstates {error}.", where=str(path)
         ) from error
-    _verify(body, path)
-    return body
 
 
-def _arrays(body: FlexibleBody) -> dict[str, Array]:
+def body_arrays(body: FlexibleBody) -> dict[str, Array]:
+    """The arrays of a body by their names in the file."""
     arrays = {name: getattr(body, name) for name in FIELDS}
     arrays["mass"] = np.array(body.mass)
     for name, A in body.K_geo.items():
@@ -147,7 +178,8 @@ def _patch(arrays: dict[str, Array], place: str) -> Patch | None:
     return Patch(points, S, arrays.get(f"{place}/shapes"))
 
 
-def _manifest(body: FlexibleBody) -> dict[str, Any]:
+def body_manifest(body: FlexibleBody) -> dict[str, Any]:
+    """What the file says of a body in words."""
     return {
         "schema": SCHEMA,
         "version": list(VERSION),
@@ -163,7 +195,8 @@ def _manifest(body: FlexibleBody) -> dict[str, Any]:
     }
 
 
-def _body(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
+def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
+    """The body that a file describes."""
     markers = {
         m["name"]: Marker(
             name=m["name"],
@@ -243,7 +276,9 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
             ) from error
 
 
-def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
+def _read_manifest(
+    archive: zipfile.ZipFile, path: Path, schemas: dict[str, tuple[int, int]]
+) -> dict[str, Any]:
     if "manifest.npy" not in archive.namelist():
         raise FileFormatError(
             "this archive is not a body file: it has no manifest.", where=str(path)
@@ -253,12 +288,12 @@ def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
         schema, (major, _) = manifest["schema"], manifest["version"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
-    if schema != SCHEMA or major != VERSION[0]:
+    if schema not in schemas or major != schemas[schema][0]:
+        known = " and ".join(f"{name!r} {list(version)}" for name, version in schemas.items())
         raise FileFormatError(
-            f"the file has the schema {schema!r} {manifest['version']}; "
-            f"this program reads {SCHEMA!r} {list(VERSION)}.",
+            f"the file has the schema {schema!r} {manifest['version']}; it was to be {known}.",
             where=str(path),
-            hint="Newer files need a newer program.",
+            hint="Newer files need a newer program, families rom.load.",
         )
     if manifest.get("units") not in SYSTEMS:
         raise FileFormatError(
@@ -275,7 +310,7 @@ def _digests(manifest: dict[str, Any], path: Path) -> dict[str, str]:
     return digests
 
 
-def _verify(body: FlexibleBody, path: Path) -> None:
+def verify(body: FlexibleBody, path: Path) -> None:
     """Shapes that belong together and matrices a body can have."""
     r = body.K.shape[0] if body.K.ndim == 2 else -1
     shapes = {

@@ -1,0 +1,204 @@
+"""Numbers of a model that may still change after its reduction.
+
+Every parameter is a factor of the nominal material, so that one is the model as it was made.
+"""
+
+import itertools
+import warnings
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ParameterError, RomWarning
+from rom.model import Array
+
+FEW = 3  # parameters up to which all corners of their range are visited
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
+SLACK = 1e-12  # relative, by which round-off may leave a range
+Point = dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A factor of a nominal number, in one region or everywhere.
+
+    Attributes:
+        region: name of the region; None for the whole body, masses carried by interfaces excluded.
+        low: smallest factor.
+        high: largest factor.
+
+    Raises:
+        ParameterError: unless 0 < low <= high.
+    """
+
+    region: str | None
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            value = getattr(self, name)
+            if isinstance(value, bool | str) or np.ndim(value) or not np.isfinite(value):
+                raise ParameterError(f"{name} = {value!r} is not a finite factor.", where=str(self))
+        if not 0.0 < self.low <= self.high:
+            raise ParameterError(
+                f"the range {self.low:g} to {self.high:g} of {self} is not one of positive factors."
+            )
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} of {self.region or 'the whole body'}"
+
+    def inside(self, share: float) -> float:
+        """The factor at a share (0 to 1) of the range, in equal ratios."""
+        return float(self.low * (self.high / self.low) ** share)
+
+
+class YoungsModulus(Parameter):
+    """Factor of Young's modulus, Poisson's ratio kept; of all moduli of an orthotropic solid.
+
+    Attributes:
+        region, low, high: see `Parameter`.
+    """
+
+    __slots__ = ()
+
+
+class Density(Parameter):
+    """Factor of the density.
+
+    Attributes:
+        region, low, high: see `Parameter`.
+    """
+
+    __slots__ = ()
+
+
+KINDS = {kind.__name__: kind for kind in (YoungsModulus, Density)}
+
+
+def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
+    """The parameters by name.
+
+    Raises:
+        ParameterError: if there is none, or a name or a parameter is none.
+    """
+    for name, value in parameters.items():
+        if type(value) not in KINDS.values():
+            raise ParameterError(
+                f"parameter {name!r} is {value!r}; known are {sorted(KINDS)}.",
+                hint='For example rom.YoungsModulus("web", 0.5, 2.0).',
+            )
+        if not str(name).isidentifier() or name == "extrapolate":
+            raise ParameterError(f"{name!r} cannot name a parameter: at({name}=1.0) means no call.")
+    if not parameters:
+        raise ParameterError("a family of bodies needs a parameter.", hint="Use rom.reduce.")
+    if len(parameters) > len(PRIMES):
+        raise ParameterError(f"{len(parameters)} parameters are more than {len(PRIMES)}.")
+    return dict(parameters)
+
+
+def complete(
+    parameters: dict[str, Parameter], values: dict[str, Any], *, extrapolate: bool = False
+) -> Point:
+    """Factors of all parameters; one for those not given.
+
+    Args:
+        parameters: by name.
+        values: {name: factor}.
+        extrapolate: warn about factors outside the range instead of refusing them.
+
+    Raises:
+        ParameterError: if a name is unknown, or a factor no positive number or out of its range.
+    """
+    if unknown := sorted(set(values) - set(parameters)):
+        raise ParameterError(
+            f"there is no parameter {unknown[0]!r}; the family has {sorted(parameters)}."
+        )
+    return {
+        name: _checked(name, parameter, values.get(name, 1.0), extrapolate)
+        for name, parameter in parameters.items()
+    }
+
+
+def _checked(name: str, parameter: Parameter, value: Any, extrapolate: bool) -> float:
+    number = np.ndim(value) == 0 and not isinstance(value, bool | str)
+    if not (number and np.isfinite(value) and value > 0):
+        raise ParameterError(f"{name} = {value!r} is not a positive factor.")
+    low, high = parameter.low, parameter.high
+    if not low * (1 - SLACK) <= value <= high * (1 + SLACK):
+        said = f"{name} = {value:g} is outside {low:g} to {high:g}, where the basis was made."
+        if not extrapolate:
+            cure = "Reduce again with a wider range, or ask with extrapolate=True."
+            raise ParameterError(said, hint=cure)
+        warnings.warn(RomWarning(f"{said} Errors there are unknown."), stacklevel=5)
+    return float(value)
+
+
+def centre(parameters: dict[str, Parameter]) -> Point:
+    """The middle of all ranges."""
+    return {name: parameter.inside(0.5) for name, parameter in parameters.items()}
+
+
+def corners(parameters: dict[str, Parameter], moving: list[str]) -> list[Point]:
+    """Ends of the ranges of some parameters: all corners of a few, one at a time of many."""
+    middle, ends = centre(parameters), {n: (parameters[n].low, parameters[n].high) for n in moving}
+    if len(moving) <= FEW:
+        found = [dict(zip(moving, c, strict=True)) for c in itertools.product(*ends.values())]
+    else:
+        found = [{name: end} for name, both in ends.items() for end in both]
+    return [middle | point for point in found if point]
+
+
+def scattered(parameters: dict[str, Parameter], n: int, first: int = 1) -> list[Point]:
+    """Points that fill the ranges evenly, the same in every run.
+
+    Source:
+        Halton, On the efficiency of certain quasi-random sequences, Numer. Math. 2 (1960) 84.
+    """
+    shares = np.array([[_inverse(k, b) for b in PRIMES] for k in range(first, first + n)])
+    return [
+        {name: p.inside(row[j]) for j, (name, p) in enumerate(parameters.items())} for row in shares
+    ]
+
+
+def _inverse(k: int, base: int) -> float:
+    """The digits of k mirrored at the point."""
+    value, weight = 0.0, 1.0 / base
+    while k:
+        k, digit = divmod(k, base)
+        value += digit * weight
+        weight /= base
+    return value
+
+
+def factor(parameters: dict[str, Parameter], kind: type, region: str | None, point: Point) -> float:
+    """Product of all factors of that kind that act on a region; None for what no region names."""
+    acting = [
+        point[name]
+        for name, parameter in parameters.items()
+        if isinstance(parameter, kind) and parameter.region in (None, region)
+    ]
+    return float(np.prod(acting))
+
+
+def factors(
+    parameters: dict[str, Parameter], regions: tuple[str | None, ...], point: Point
+) -> tuple[Array, Array]:
+    """Factors of the stiffness and of the mass of every region."""
+    kinds = (YoungsModulus, Density)
+    k, m = (np.array([factor(parameters, kind, r, point) for r in regions]) for kind in kinds)
+    return k, m
+
+
+def written(parameters: dict[str, Parameter]) -> dict[str, Any]:
+    """The parameters in plain numbers and words."""
+    return {name: {"kind": type(p).__name__, **asdict(p)} for name, p in parameters.items()}
+
+
+def read(text: dict[str, Any]) -> dict[str, Parameter]:
+    """The parameters that were `written`."""
+    return {
+        name: KINDS[entry["kind"]](entry["region"], entry["low"], entry["high"])
+        for name, entry in text.items()
+    }
