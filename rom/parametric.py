@@ -43,7 +43,7 @@ from rom.reduction.samples import CommonBasis, first_sample
 from rom.workflow import mesh_operators
 
 log = logging.getLogger("rom")
-SMALL = 0.03  # of the square root of the tolerance: a shape dropped costs its square in energy
+SMALL = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy
 TRIALS = 2  # points per parameter at which errors are estimated while the basis grows
 METHOD = 2.0  # times the error of the method at the centre is no reason for another point
 HELD_OUT = 3  # points of the certificate, away from those
