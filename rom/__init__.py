@@ -21,6 +21,7 @@ from rom.model import (
     Basis,
     FEModel,
     Interface,
+    Layered,
     Material,
     Modes,
     Orthotropic,
@@ -28,8 +29,8 @@ from rom.model import (
     Report,
     SurfaceMesh,
 )
-from rom.parameters import Density, YoungsModulus
-from rom.parametric import reduce_parametric
+from rom.parameters import Density, Thickness, YoungsModulus
+from rom.parametric.reduce import reduce_parametric
 from rom.reduction.balanced import BalancedTruncation, second_order_balanced_truncation
 from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import DualAssembly, FreeSubstructure
@@ -70,6 +71,7 @@ __all__ = [
     "Guyan",
     "Herting",
     "Interface",
+    "Layered",
     "Material",
     "Mechanism",
     "ModalDamping",
@@ -84,6 +86,7 @@ __all__ = [
     "Rubin",
     "Snapshots",
     "SurfaceMesh",
+    "Thickness",
     "WithLoads",
     "YoungsModulus",
     "audit",

@@ -138,11 +138,14 @@ def frequency_rows(
     """Errors and shapes against the full model."""
     error = np.array(table["reduced"]) / np.array(table["full"]) - 1
     n = error.size
-    return [
+    rows = [
         row(f"{support}: worst error of {n} frequencies", np.abs(error).max(), limit),
         row(f"{support}: reduced never below full", error.min(), -1e-8, above=True),
-        row(f"{support}: lowest MAC of {n} shapes", min(table["mac"]), 0.99, above=True),
     ]
+    if table["mac"]:
+        said = f"{support}: lowest MAC of {n} shapes"
+        rows.append(row(said, min(table["mac"]), 0.99, above=True))
+    return rows
 
 
 def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:

@@ -111,12 +111,15 @@ class Operators(Protocol):
     def product(self, A: Any, X: Array) -> Array:
         """A X for a matrix with the layout of K, (n_local, k)."""
 
-    def varied(self, stiffness: Weighted, mass: Weighted) -> "Operators":
+    def varied(
+        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
+    ) -> "Operators":
         """Another body on the same dofs: K' = k K + sum k_i K_i, M' = m M + sum m_i M_i.
 
         Args:
             stiffness: (k, [(k_i, K_i), ...]), matrices with the layout of K.
             mass: (m, [(m_i, M_i), ...]).
+            rigid: (n_local, 6) its rigid motions; None if they are the same.
         """
 
 

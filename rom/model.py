@@ -1,6 +1,6 @@
 """The records passed between the stages. Frozen, array-valued, without solvers."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any
@@ -204,11 +204,30 @@ class Region:
         K: (n, n) stiffness of its elements alone [N/m], with the layout of the model's.
         M: (n, n) mass of its elements alone [kg].
         stresses: evaluates the stress that its elements alone carry; None without finite elements.
+        stretched: axis (0, 1, 2) -> `Layered`, for parameters of thickness; None when not known.
     """
 
     K: Any
     M: Any
     stresses: Any = None
+    stretched: "Callable[[int], Layered] | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Layered:
+    """A region stretched by t along an axis: K(t) = t K_along + K_mixed + K_across / t.
+
+    Attributes:
+        layers: (low, high) of its elements along the axis [m], ascending, without overlap.
+        K_along: (n, n) strains from derivatives along the layer alone [N/m].
+        K_mixed: (n, n) these with strains from derivatives along the axis.
+        K_across: (n, n) the latter alone.
+    """
+
+    layers: tuple[tuple[float, float], ...]
+    K_along: Any
+    K_mixed: Any
+    K_across: Any
 
 
 @dataclass(frozen=True)

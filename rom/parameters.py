@@ -74,7 +74,26 @@ class Density(Parameter):
     __slots__ = ()
 
 
-KINDS = {kind.__name__: kind for kind in (YoungsModulus, Density)}
+@dataclass(frozen=True, slots=True)
+class Thickness(Parameter):
+    """Factor of the thickness of a layer; what lies beyond it moves along.
+
+    The plane through the origin of coordinates stays where it is.
+
+    Attributes:
+        region, low, high: see `Parameter`.
+        axis: "x", "y" or "z", along which the layer is thin; no other region may lie beside it.
+    """
+
+    axis: str = "z"
+
+    def __post_init__(self) -> None:
+        Parameter.__post_init__(self)
+        if self.axis not in ("x", "y", "z"):
+            raise ParameterError(f"axis = {self.axis!r} of {self} is none of 'x', 'y', 'z'.")
+
+
+KINDS = {kind.__name__: kind for kind in (YoungsModulus, Density, Thickness)}
 
 
 def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
@@ -95,6 +114,9 @@ def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
         raise ParameterError("a family of bodies needs a parameter.", hint="Use rom.reduce.")
     if len(parameters) > len(PRIMES):
         raise ParameterError(f"{len(parameters)} parameters are more than {len(PRIMES)}.")
+    axes = {p.axis for p in parameters.values() if isinstance(p, Thickness)}
+    if len(axes) > 1:
+        raise ParameterError(f"thicknesses along {sorted(axes)} in one family; choose one axis.")
     return dict(parameters)
 
 
@@ -199,6 +221,6 @@ def written(parameters: dict[str, Parameter]) -> dict[str, Any]:
 def read(text: dict[str, Any]) -> dict[str, Parameter]:
     """The parameters that were `written`."""
     return {
-        name: KINDS[entry["kind"]](entry["region"], entry["low"], entry["high"])
+        name: KINDS[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
         for name, entry in text.items()
     }

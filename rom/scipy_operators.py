@@ -115,13 +115,15 @@ class SciPyOperators:
         """A X."""
         return A @ X
 
-    def varied(self, stiffness: Weighted, mass: Weighted) -> "SciPyOperators":
+    def varied(
+        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
+    ) -> "SciPyOperators":
         """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
         K, M = (
             weight * A + sum(c * csr_matrix(part) for c, part in parts)
             for A, (weight, parts) in ((self.K, stiffness), (self.M, mass))
         )
-        return SciPyOperators(K, M, self.rigid, self.T)
+        return SciPyOperators(K, M, self.rigid if rigid is None else rigid, self.T)
 
     def modes(
         self,

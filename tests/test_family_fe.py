@@ -12,7 +12,7 @@ from test_fe_body_mpi import ENVIRONMENT
 
 import rom
 from rom.eigen import rigid_motions
-from rom.parametric import AffineModel
+from rom.parametric.affine import AffineModel
 from rom.scipy_operators import SciPyOperators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")

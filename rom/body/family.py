@@ -17,8 +17,9 @@ import numpy as np
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody, StressRecovery, reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
+from rom.body.stretch import Stretch, stretched_body
 from rom.model import Array, Report
-from rom.parameters import Parameter, Point, complete, factors
+from rom.parameters import Parameter, Point, Thickness, centre, complete, factor, factors
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +29,7 @@ class Share:
     Attributes:
         region: its name; None for all that no parameter names.
         integrals: of its mass.
-        K: (r, r) its stiffness [N/m].
+        K: (r, r) its stiffness [N/m]; with layers (3, 6 + r, 6 + r), see `Stretch`.
         stress: (6 p, r) stress that it carries [Pa], see `StressRecovery`; None without recovery.
         fixed: True for masses that no parameter scales.
     """
@@ -54,6 +55,8 @@ class BodyFamily:
         damping: of the bodies, or None.
         provenance: how the family was made.
         certificate: evidence that its bodies stand for full models, or None.
+        stretch: layers whose thickness is a parameter, or None. Points of the body are nominal
+            ones then, and the shares know [fields of the layers, rigid motions, shapes].
     """
 
     body: FlexibleBody
@@ -63,6 +66,7 @@ class BodyFamily:
     damping: Rayleigh | ModalDamping | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     certificate: Report | None = None
+    stretch: Stretch | None = None
 
     def at(self, *, extrapolate: bool = False, **values: float) -> FlexibleBody:
         """The body for some values of the parameters; no finite elements involved.
@@ -106,7 +110,7 @@ class BodyFamily:
         Raises:
             ConfigError, InterfaceError, ModelError: see `FlexibleBody.with_reference`.
         """
-        self.body.with_reference(reference)
+        self._summed(centre(self.parameters)).with_reference(reference)
         return replace(self, reference=reference)
 
     def _summed(self, point: Point, *, fields: bool = True) -> FlexibleBody:
@@ -114,6 +118,12 @@ class BodyFamily:
         regions = tuple(share.region for share in self.shares)
         k, m = factors(self.parameters, regions, point)
         m[[share.fixed for share in self.shares]] = 1.0
+        made: dict[str, Any] = {
+            "provenance": self.provenance | {"parameters": point},
+            "certificate": self.certificate,
+        }
+        if self.stretch is not None:
+            return replace(self._stretched(self.stretch, point, (k, m)), **made)
         integrals = weighted(m, [share.integrals for share in self.shares])
         stress = self.body.stress
         if stress is not None and fields:
@@ -124,9 +134,17 @@ class BodyFamily:
             **{name: getattr(integrals, name) for name in integrals.__slots__},
             K=_sum(k, [share.K for share in self.shares]),
             stress=stress,
-            provenance=self.provenance | {"parameters": point},
-            certificate=self.certificate,
+            **made,
         )
+
+    def _stretched(
+        self, stretch: Stretch, point: Point, factors: tuple[Array, Array]
+    ) -> FlexibleBody:
+        middle = centre(self.parameters)
+        t = [factor(self.parameters, Thickness, share.region, point) for share in self.shares]
+        terms = [share.integrals for share in self.shares], [share.K for share in self.shares]
+        w, at_centre = (stretch.weights(self.parameters, p) for p in (point, middle))
+        return stretched_body(self.body, stretch, terms, (*factors, np.array(t)), (w, at_centre))
 
     def __str__(self) -> str:
         ranges = [

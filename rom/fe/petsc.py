@@ -154,11 +154,13 @@ class PETScOperators:
         """A X."""
         return dense_rows(A, X)
 
-    def varied(self, stiffness: Weighted, mass: Weighted) -> "PETScOperators":
+    def varied(
+        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
+    ) -> "PETScOperators":
         """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
         K, M = _weighted(self.K, *stiffness), _weighted(self.M, *mass)
         fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": self.solver}
-        return PETScOperators(K, M, self.rigid, **fields)
+        return PETScOperators(K, M, self.rigid if rigid is None else rigid, **fields)
 
     def solved_by(self, solver: Solver) -> "PETScOperators":
         """The same body, its equations solved another way."""

@@ -6,14 +6,17 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
+import numpy as np
 import ufl
 from scipy.sparse import csr_matrix
 
-from rom.fe.compat import assemble_matrix, cell_name, geometry_degree
+from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, geometry_degree
 from rom.fe.jit import compiling
 from rom.fe.material import Solid, of_region, stress
 from rom.fe.stress import Stresses
-from rom.model import Array, Region
+from rom.model import Array, Layered, Region
+
+TOUCH = 1e-9  # of the extent: cells that close belong to one layer
 
 
 class Regions(Mapping[str, Region]):
@@ -39,7 +42,26 @@ class Regions(Mapping[str, Region]):
             K, M = (assemble_matrix(form) for form in forms(self.V, numbers, self.degree))
         if mesh.comm.size == 1:
             K, M = (aij(symmetric(A)) for A in (K, M))
-        return Region(K, M, Stresses(self.V, numbers, self.degree))
+        stresses = Stresses(self.V, numbers, self.degree)
+        return Region(K, M, stresses, lambda axis: self._stretched(tag, numbers, axis))
+
+    def _stretched(self, tag: int, numbers: dict[str, Any], axis: int) -> Layered:
+        mesh = self.V.mesh
+        with compiling(mesh.comm):
+            split = stretched_forms(self.V, numbers, self.degree, axis)
+            parts = [assemble_matrix(form) for form in split]
+        if mesh.comm.size == 1:
+            parts = [aij(symmetric(A)) for A in parts]
+        return Layered(self._layers(tag, axis), *parts)
+
+    def _layers(self, tag: int, axis: int) -> tuple[tuple[float, float], ...]:
+        """Extent of the region along an axis, cells that touch joined; equal on all ranks."""
+        mesh = self.V.mesh
+        n = mesh.topology.index_map(3).size_local
+        own = np.flatnonzero(self.tags[:n] == tag)
+        x = self.V.tabulate_dof_coordinates()[cell_dofs(self.V)[own]][:, :, axis]
+        ends = np.column_stack([x.min(axis=1), x.max(axis=1)]) if own.size else np.zeros((0, 2))
+        return joined(np.vstack(mesh.comm.allgather(np.unique(ends, axis=0))))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -57,6 +79,40 @@ def forms(V: Any, numbers: dict[str, Any], degree: int) -> tuple[ufl.Form, ufl.F
     K = ufl.inner(sigma, ufl.sym(ufl.grad(v))) * dx(metadata={"quadrature_degree": q_K})
     M = numbers["rho"] * ufl.inner(u, v) * dx(metadata={"quadrature_degree": q_M})
     return K, M
+
+
+def stretched_forms(
+    V: Any, numbers: dict[str, Any], degree: int, axis: int
+) -> tuple[ufl.Form, ufl.Form, ufl.Form]:
+    """Stiffness split by whether strains come from derivatives along an axis; see `Layered`."""
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    q_K, _ = _quadrature(cell_name(V.mesh), degree, geometry_degree(V.mesh))
+    dx = ufl.Measure("dx", domain=V.mesh, metadata={"quadrature_degree": q_K})
+    P = ufl.as_matrix([[float(i == j == axis) for j in range(3)] for i in range(3)])
+
+    def strains(w: Any) -> tuple[Any, Any]:
+        across = ufl.sym(ufl.dot(ufl.grad(w), P))
+        return ufl.sym(ufl.grad(w)) - across, across
+
+    (a, c), (b, d) = strains(u), strains(v)
+    mixed = ufl.inner(stress(a, numbers), d) + ufl.inner(stress(c, numbers), b)
+    return (
+        ufl.inner(stress(a, numbers), b) * dx,
+        mixed * dx,
+        ufl.inner(stress(c, numbers), d) * dx,
+    )
+
+
+def joined(ends: Array) -> tuple[tuple[float, float], ...]:
+    """Unions of the intervals (low, high) that touch, ascending."""
+    found: list[list[float]] = []
+    touch = TOUCH * float(np.ptp(ends)) if ends.size else 0.0
+    for low, high in ends[np.argsort(ends[:, 0])].tolist():
+        if found and low <= found[-1][1] + touch:
+            found[-1][1] = max(found[-1][1], high)
+        else:
+            found.append([low, high])
+    return tuple((low, high) for low, high in found)
 
 
 def _quadrature(name: str, degree: int, curved: int) -> tuple[int, int]:

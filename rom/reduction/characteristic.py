@@ -121,3 +121,13 @@ class CharacteristicFunctions:
         S = kron(interface.surface_mass, identity(3), format="csr")
         motions = rigid_motions(interface.points - interface.points.mean(axis=0))
         return orthonormal_in(S, np.hstack([motions, self.values]))
+
+
+class GivenFunctions(CharacteristicFunctions):
+    """Functions that are orthonormal over the area already, and taken as they are."""
+
+    __slots__ = ()
+
+    def functions(self, interface: Interface) -> Array:
+        """(3k, m) the values."""
+        return self.values

@@ -38,20 +38,21 @@ class CommonBasis:
     weight: float
     small: float
 
-    def joined(self, other: Basis, boundary: Index) -> "CommonBasis":
-        """With the columns of another point that are new.
+    def joined(self, shapes: Array, boundary: Index, *, whole: bool = False) -> "CommonBasis":
+        """With what is new in further shapes.
 
         Args:
-            other: basis at that point, in the same interface coordinates.
+            shapes: (n_local, k) shapes in the same interface coordinates.
             boundary: (n_b,) dof numbers of the interface coordinates.
+            whole: drop nothing but round-off.
         """
         ops, Psi = self.ops, self.basis.Psi
         inner = self._orthonormal(Psi[:, self.n_b :], 0.0)
-        size = np.sqrt(np.diag(self._product(other.Psi, other.Psi)))
-        X = (other.Psi - Psi[:, : self.n_b] @ ops.rows(other.Psi, boundary)) / size
+        size = np.sqrt(np.diag(self._product(shapes, shapes)))
+        X = (shapes - Psi[:, : self.n_b] @ ops.rows(shapes, boundary)) / size
         for _ in range(2):
             X = X - inner @ self._product(inner, X)
-        Y = self._orthonormal(X, max(self.small, NEVER))
+        Y = self._orthonormal(X, NEVER if whole else max(self.small, NEVER))
         first = Psi.shape[1] - self.n_b
         labels = tuple(f"sampled {first + k + 1}" for k in range(Y.shape[1]))
         columns = np.hstack([Psi, Y])

@@ -1,0 +1,1 @@
+"""One reduction for a range of parameters: materials and thicknesses of regions."""

@@ -1,0 +1,175 @@
+"""The short road for parameters: one reduction for a range of them."""
+
+import logging
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom.body.damping import ModalDamping, Rayleigh
+from rom.body.family import BodyFamily
+from rom.body.projection import canonical_columns, elastic_part, flexible_body
+from rom.errors import ConfigError, ParameterError
+from rom.model import FEModel
+from rom.parameters import (
+    Parameter,
+    Point,
+    Thickness,
+    centre,
+    checked_parameters,
+    corners,
+    scattered,
+    written,
+)
+from rom.parametric.affine import AffineModel
+from rom.parametric.evidence import certified, estimated
+from rom.parametric.stretched import StretchedModel
+from rom.reduction.characteristic import Characteristic
+from rom.reduction.interface import Connection, connect
+from rom.reduction.method import Method
+from rom.reduction.samples import CommonBasis, first_sample
+
+log = logging.getLogger("rom")
+SMALL = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy
+TRIALS = 2  # points per parameter at which errors are estimated while the basis grows
+METHOD = 2.0  # times the error of the method at the centre is no reason for another point
+
+
+def reduce_parametric(  # noqa: PLR0913  one keyword per choice
+    model: FEModel,
+    *,
+    parameters: dict[str, Parameter],
+    method: Method | Characteristic,
+    interfaces: dict[str, Any],
+    reference: Any = "mean-axis",
+    damping: Rayleigh | ModalDamping | None = None,
+    name: str = "body",
+    stress: bool = False,
+    tol: float = 1e-3,
+    certify: bool = True,
+) -> BodyFamily:
+    """Flexible bodies for a range of moduli, densities and thicknesses, from one reduction.
+
+    Bases at the centre and the corners of the ranges join into one; where the estimated error of a
+    frequency exceeds the tolerance at a point between, the basis of that point joins too.
+
+    Args:
+        model: the full model, free-free, at factors of one.
+        parameters: {name: `YoungsModulus`, `Density` or `Thickness`}; with a thickness all
+            interfaces are "rbe2", nothing hangs on them, and stress is not recovered.
+        method: how to reduce at one point; one that keeps interface coordinates, for example
+            ``CraigBampton(n_modes=20)``.
+        interfaces: {name: kind}, see `rom.reduce`.
+        reference: how the floating frame follows the bodies, see `FlexibleBody.with_reference`.
+        damping: structural damping, made anew at every point.
+        name: name of the bodies.
+        stress: make the stress on the outer surface recoverable.
+        tol: relative error of the first frequencies that is accepted; where the method alone has
+            nearly as much at the centre, more points are no cure.
+        certify: compare with full models at points that were not sampled.
+
+    Returns:
+        BodyFamily; ``family.at(name=factor)`` is a `FlexibleBody`.
+
+    Raises:
+        ParameterError: for a wrong parameter or an unknown region.
+        InterfaceError, ConfigError: for a wrong interface, kind, method, reference or tolerance.
+        ModesMissedError: if the inertia count says that a mode was skipped.
+    """
+    clock = perf_counter()
+    if isinstance(tol, bool) or not 0 < tol < 1:
+        raise ConfigError(f"tol = {tol!r} is not a relative error between 0 and 1.")
+    affine = _affine(model, checked_parameters(parameters), stress)
+    middle = centre(affine.parameters)
+    there, kinds = affine.model_at(middle), affine.kinds(interfaces)
+    connection = connect(affine.at(middle), there, kinds)
+    described = repr(method)
+    if isinstance(method, Characteristic):
+        interfaces = kinds = method.kinds(connection, interfaces)
+        method = method.method
+        connection = connect(affine.at(middle), there, kinds)
+    common, samples = _common_basis(affine, connection, method, kinds, tol)
+    Psi = connection.ops.expand(common.basis.Psi)
+    elastic, bare = elastic_part(affine.at(middle), Psi), affine.bare(middle)
+    provenance = model.provenance | {
+        "reduction": {
+            "method": described,
+            "full dofs": affine.ops.n,
+            "columns": list(common.basis.labels),
+            "static shapes": True,
+            "points sampled": samples,
+        },
+        "ranges": written(affine.parameters),
+    }
+    body = flexible_body(
+        there, bare, Psi, elastic, ties=connection.ties, name=name, stress=stress,
+        provenance=provenance,
+    )  # fmt: skip
+    E = canonical_columns(bare, Psi @ elastic.V, there)
+    family = BodyFamily(
+        parameters=affine.parameters,
+        damping=damping,
+        provenance=provenance,
+        **affine.terms(body, E),
+    )
+    family = family.with_reference(reference)
+    provenance["seconds to reduce"] = round(perf_counter() - clock, 3)
+    if not certify:
+        return family
+    certificate, comparison = certified(
+        affine, family, connection, common.basis, interfaces, tol,
+        first=1 + TRIALS * len(affine.moving),
+    )  # fmt: skip
+    return replace(
+        family, certificate=certificate, provenance=provenance | {"comparison": comparison}
+    )
+
+
+def _affine(model: FEModel, parameters: dict[str, Parameter], stress: bool) -> AffineModel:
+    if not any(isinstance(p, Thickness) for p in parameters.values()):
+        return AffineModel(model, parameters)
+    if stress:
+        raise ParameterError(
+            "stress is not recovered from bodies with a parameter of thickness.",
+            hint="Reduce with stress=False.",
+        )
+    return StretchedModel(model, parameters)
+
+
+def _common_basis(
+    affine: AffineModel,
+    connection: Connection,
+    method: Method,
+    kinds: dict[str, Any],
+    tol: float,
+) -> tuple[CommonBasis, list[Point]]:
+    """The bases of the centre, of the corners, and of trial points whose errors are too large."""
+    boundary = connection.boundary
+    basis = method.basis(connection.ops, boundary, connection.labels)
+    common = first_sample(connection.ops, basis, boundary, SMALL * np.sqrt(tol))
+    samples, moving = [centre(affine.parameters)], affine.moving
+    limit = max(tol, METHOD * estimated(connection, basis)) if moving else tol
+    ends = corners(affine.parameters, moving)
+    for point in ends if affine.stretch is not None else ():
+        there = connect(affine.at(point), affine.model_at(point), kinds)
+        common = common.joined(there.ops.rigid, boundary, whole=True)
+
+    def visit(point: Point, *, whatever: bool) -> bool:
+        nonlocal common
+        here = connect(affine.at(point), affine.model_at(point), kinds)
+        if not whatever and estimated(here, common.basis) <= limit:
+            return False
+        found = method.basis(here.ops, boundary, here.labels)
+        common = common.joined(found.Psi, boundary)
+        samples.append(point)
+        return True
+
+    for point in ends:
+        visit(point, whatever=True)
+    trials = scattered(affine.parameters, TRIALS * len(moving))
+    added = [visit(point, whatever=False) for point in trials]
+    if affine.ops.first == 0:
+        log.info("%d points sampled, %d of them trials; %d columns", len(samples), sum(added),
+                 common.basis.Psi.shape[1])  # fmt: skip
+    return common, samples
