@@ -1,20 +1,24 @@
-"""Run by test_family_fe.py under mpirun: a family of panels, into one file."""
+"""Run by the tests of families under mpirun: a family of panels, into one file."""
 
 import sys
 
 from mpi4py import MPI
 
-from test_family_fe import KINDS, PARAMETERS, panel
+import test_family_fe
+import test_family_thickness
 
 import rom
 
-family = rom.reduce_parametric(
-    panel(),
-    parameters=PARAMETERS,
-    method=rom.CraigBampton(20),
-    interfaces=KINDS,
-    stress=True,
-    certify=False,
-)
+if sys.argv[1] == "thickness":
+    family = test_family_thickness.families(test_family_thickness.panel())
+else:
+    family = rom.reduce_parametric(
+        test_family_fe.panel(),
+        parameters=test_family_fe.PARAMETERS,
+        method=rom.CraigBampton(20),
+        interfaces=test_family_fe.KINDS,
+        stress=True,
+        certify=False,
+    )
 if MPI.COMM_WORLD.rank == 0:
-    rom.save(family, sys.argv[1])
+    rom.save(family, sys.argv[2])

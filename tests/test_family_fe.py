@@ -173,7 +173,7 @@ def families(tmp_path_factory):
     for n in (1, 2, 3):
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
-             str(script / "family_under_mpi.py"), str(folder / f"{n}.npz")],
+             str(script / "family_under_mpi.py"), "material", str(folder / f"{n}.npz")],
             env=ENVIRONMENT, timeout=200, capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip
         assert (folder / f"{n}.npz").exists(), done.stderr

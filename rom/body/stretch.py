@@ -24,6 +24,8 @@ from rom.model import Array
 from rom.parameters import Parameter, Point, Thickness, factor
 from rom.rotation import skew
 
+ROUND_OFF = 1e-12  # of the largest distance from the origin: no length outside the layers
+
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
@@ -56,7 +58,9 @@ class Stretch:
         X = np.zeros((2 + len(lengths), *points.shape))
         X[0] = points
         X[0, :, self.axis] = 0.0
-        X[1:, :, self.axis] = [x - sum(lengths), *lengths]
+        outside = x - sum(lengths)
+        outside[np.abs(outside) < ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
+        X[1:, :, self.axis] = [outside, *lengths]
         return X
 
     def weights(self, parameters: dict[str, Parameter], point: Point) -> Array:

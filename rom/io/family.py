@@ -10,6 +10,7 @@ from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.family import BodyFamily, Share
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
+from rom.body.stretch import Stretch
 from rom.errors import FileFormatError
 from rom.io import native
 from rom.model import Array, Report, Row
@@ -40,6 +41,8 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
         if share.stress is not None:
             found["stress"] = share.stress
         arrays |= {f"share/{i}/{name}": np.asarray(A, dtype=float) for name, A in found.items()}
+    if body.stretch is not None:
+        arrays["stretch/rigid"] = np.asarray(body.stretch.rigid, dtype=float)
     damping, numbers = _damping(body.damping)
     arrays |= numbers
     manifest = native.body_manifest(body.body) | {
@@ -49,6 +52,7 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
         "shares": [{"region": s.region, "fixed": s.fixed} for s in body.shares],
         "frame": body.reference,
         "damping": damping,
+        "stretch": _layers(body.stretch),
         "provenance": body.provenance,
         "certificate": None if body.certificate is None else asdict(body.certificate),
     }
@@ -96,7 +100,25 @@ def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBo
         damping=_damping_of(manifest["damping"], arrays),
         provenance=manifest["provenance"],
         certificate=report,
+        stretch=_stretch(manifest["stretch"], arrays),
     )
+
+
+def _layers(stretch: Stretch | None) -> dict[str, Any] | None:
+    if stretch is None:
+        return None
+    return {
+        "axis": stretch.axis,
+        "regions": list(stretch.regions),
+        "layers": [[list(ends) for ends in layers] for layers in stretch.layers],
+    }
+
+
+def _stretch(entry: dict[str, Any] | None, arrays: dict[str, Array]) -> Stretch | None:
+    if entry is None:
+        return None
+    layers = tuple(tuple((low, high) for low, high in part) for part in entry["layers"])
+    return Stretch(entry["axis"], tuple(entry["regions"]), layers, arrays["stretch/rigid"])
 
 
 def _share(i: int, entry: dict[str, Any], arrays: dict[str, Array]) -> Share:
@@ -129,18 +151,25 @@ def _damping_of(
 
 def _verify(family: BodyFamily, path: Path) -> None:
     """Shares that fit the body."""
-    body = family.body
-    for i, share in enumerate(family.shares):
-        pairs = {name: (getattr(share.integrals, name), getattr(body, name)) for name in INTEGRALS}
-        pairs["K"] = (share.K, body.K)
-        if body.stress is not None and share.stress is not None:
-            pairs["stress"] = (share.stress, body.stress.operator)
-        for name, (part, whole) in pairs.items():
-            if np.shape(part) != np.shape(whole):
-                raise FileFormatError(
-                    f"{name} of term {i} has the shape {np.shape(part)}, "
-                    f"expected {np.shape(whole)}.",
-                    where=str(path),
-                )
+    r, stretch = family.body.n_modes, family.stretch
+    n = r if stretch is None else len(stretch.rigid) + 6 + r
+    expected: dict[str, tuple[int, ...]] = {
+        "first_moment": (3,), "inertia": (3, 3), "S": (3, n), "Ibar_kl": (3, 3, n),
+        "S_kl": (3, 3, n, n), "K": (r, r) if stretch is None else (3, 6 + r, 6 + r),
+    }  # fmt: skip
+    if family.body.stress is not None:
+        expected["stress"] = family.body.stress.operator.shape
+    found = [
+        (f"{name} of term {i}", getattr(share, name, getattr(share.integrals, name, None)), shape)
+        for i, share in enumerate(family.shares)
+        for name, shape in expected.items()
+    ]
+    if stretch is not None:
+        found.append(("rigid", stretch.rigid, (2 + len(stretch.regions), 6 + r, 6)))
+    for name, A, shape in found:
+        if A is not None and np.shape(A) != shape:
+            raise FileFormatError(
+                f"{name} has the shape {np.shape(A)}, expected {shape}.", where=str(path)
+            )
     if not family.shares or not family.parameters:
         raise FileFormatError("the family has no terms or no parameters.", where=str(path))

@@ -153,7 +153,7 @@ def _common_basis(
     ends = corners(affine.parameters, moving)
     for point in ends if affine.stretch is not None else ():
         there = connect(affine.at(point), affine.model_at(point), kinds)
-        common = common.joined(there.ops.rigid, boundary, whole=True)
+        common = common.with_shapes(there.ops.rigid, boundary)
 
     def visit(point: Point, *, whatever: bool) -> bool:
         nonlocal common
@@ -161,7 +161,7 @@ def _common_basis(
         if not whatever and estimated(here, common.basis) <= limit:
             return False
         found = method.basis(here.ops, boundary, here.labels)
-        common = common.joined(found.Psi, boundary)
+        common = common.joined(found, boundary)
         samples.append(point)
         return True
 

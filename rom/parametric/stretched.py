@@ -20,6 +20,7 @@ from rom.reduction.polynomial import orthonormal_in
 
 BESIDE = 1e-6  # of the extent, by which regions may overlap along the axis
 APART = 1e-9  # share of mass and stiffness that may lie outside all regions
+NOTHING = 1e-9  # of the extent: arms of rotations that are round-off
 RIGID = 1e-6  # relative distance of rigid motions from the basis that is still accepted
 
 
@@ -104,9 +105,12 @@ class StretchedModel(AffineModel):
         }
 
     def _functions(self, face: Interface) -> GivenFunctions:
-        motions = self.stretch.motions(face.points)
+        """Orthonormal; rotations of every field on their own."""
+        motions = np.hstack(self.stretch.motions(face.points))
+        size = np.linalg.norm(motions, axis=0)
+        real = size > NOTHING * np.ptp(self.model.points) * size[0]  # a face at x = 1e-17 has none
         S = kron(face.surface_mass, identity(3), format="csr")
-        return GivenFunctions(orthonormal_in(S, np.hstack(motions)))
+        return GivenFunctions(orthonormal_in(S, motions[:, real]))
 
     def bare(self, point: Point) -> Operators:
         """The model at some factors."""

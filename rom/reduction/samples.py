@@ -16,6 +16,7 @@ from rom.eigen import Operators
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
 
+LAST = 0.3  # part of the last normal mode, by size, that is too little to be kept
 NEVER = 1e-7  # size, of its own, below which what is left of a shape is round-off
 
 
@@ -38,21 +39,40 @@ class CommonBasis:
     weight: float
     small: float
 
-    def joined(self, shapes: Array, boundary: Index, *, whole: bool = False) -> "CommonBasis":
-        """With what is new in further shapes.
+    def joined(self, other: Basis, boundary: Index) -> "CommonBasis":
+        """With what is new at another point.
+
+        The error that a normal mode leaves falls with the square of its frequency, and the method
+        stopped at the last one: of the others the more must be kept the lower they are.
 
         Args:
-            shapes: (n_local, k) shapes in the same interface coordinates.
+            other: basis there, in the same interface coordinates.
             boundary: (n_b,) dof numbers of the interface coordinates.
-            whole: drop nothing but round-off.
+        """
+        weight = np.ones(other.Psi.shape[1])
+        if other.omega.size:
+            falling = self.small / LAST * (other.omega[-1] / other.omega) ** 2
+            weight[-other.omega.size :] = np.minimum(falling, 1.0)
+        return self.with_shapes(other.Psi * weight, boundary, max(self.small, NEVER), weight)
+
+    def with_shapes(
+        self, shapes: Array, boundary: Index, small: float = NEVER, weight: Array | float = 1.0
+    ) -> "CommonBasis":
+        """With what is new in some shapes.
+
+        Args:
+            shapes: (n_local, k) in the same interface coordinates.
+            boundary: (n_b,) dof numbers of the interface coordinates.
+            small: size of what is dropped, of a shape of weight one.
+            weight: (k,) of the shapes.
         """
         ops, Psi = self.ops, self.basis.Psi
         inner = self._orthonormal(Psi[:, self.n_b :], 0.0)
-        size = np.sqrt(np.diag(self._product(shapes, shapes)))
+        size = np.sqrt(np.diag(self._product(shapes, shapes))) / weight
         X = (shapes - Psi[:, : self.n_b] @ ops.rows(shapes, boundary)) / size
         for _ in range(2):
             X = X - inner @ self._product(inner, X)
-        Y = self._orthonormal(X, NEVER if whole else max(self.small, NEVER))
+        Y = self._orthonormal(X, small)
         first = Psi.shape[1] - self.n_b
         labels = tuple(f"sampled {first + k + 1}" for k in range(Y.shape[1]))
         columns = np.hstack([Psi, Y])
