@@ -214,6 +214,20 @@ def test_core_and_faces_of_a_panel_change_their_thickness():
 
 
 @pytest.mark.fenicsx
+def test_faces_of_one_thickness_move_with_the_core():
+    """Nothing stretches the faces, but the rigid motions of the whole change."""
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    family = rom.reduce_parametric(
+        panel(), parameters={"t": rom.Thickness("core", 0.7, 1.8)}, method=rom.CraigBampton(16),
+        interfaces=KINDS, certify=False,
+    )  # fmt: skip
+    body, full = family.at(t=1.5), panel(t_core=1.5)
+    expected = rom.modes(full, 4, fixed=("root",), interfaces=KINDS).frequencies
+    assert_allclose(body.frequencies(4, fixed=("root",)), expected, rtol=3e-3)
+    assert_allclose(body.mass, full.mass(), rtol=1e-12)
+
+
+@pytest.mark.fenicsx
 def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     parameters = LAYERS | {"E": rom.YoungsModulus("core", 0.5, 2.0)}

@@ -84,6 +84,10 @@ class AffineModel:
         """Points and interfaces at some factors."""
         return self.model
 
+    def rigid_samples(self) -> Iterator[tuple[Operators, FEModel]]:
+        """Models whose rigid motions the basis needs besides those of the centre."""
+        return iter(())
+
     def kinds(self, interfaces: dict[str, Any]) -> dict[str, Any]:
         """Kinds of the interfaces whose coordinates are the same at all factors."""
         return interfaces

@@ -150,10 +150,8 @@ def _common_basis(
     common = first_sample(connection.ops, basis, boundary, SMALL * np.sqrt(tol))
     samples, moving = [centre(affine.parameters)], affine.moving
     limit = max(tol, METHOD * estimated(connection, basis)) if moving else tol
-    ends = corners(affine.parameters, moving)
-    for point in ends if affine.stretch is not None else ():
-        there = connect(affine.at(point), affine.model_at(point), kinds)
-        common = common.with_shapes(there.ops.rigid, boundary)
+    for ops, moved in affine.rigid_samples():
+        common = common.with_shapes(connect(ops, moved, kinds).ops.rigid, boundary)
 
     def visit(point: Point, *, whatever: bool) -> bool:
         nonlocal common
@@ -165,7 +163,7 @@ def _common_basis(
         samples.append(point)
         return True
 
-    for point in ends:
+    for point in corners(affine.parameters, moving):
         visit(point, whatever=True)
     trials = scattered(affine.parameters, TRIALS * len(moving))
     added = [visit(point, whatever=False) for point in trials]

@@ -1,5 +1,6 @@
 """A finite element model whose layers may change their thickness."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -74,13 +75,24 @@ class StretchedModel(AffineModel):
 
     def model_at(self, point: Point) -> FEModel:
         """Points and interfaces at some factors."""
-        w = self.stretch.weights(self.parameters, point)
+        return self._moved(self.stretch.weights(self.parameters, point))
 
-        def moved(face: Interface) -> Interface:
-            origin = self.stretch.mapped(face.origin[None], w)[0]
-            return replace(face, points=self.stretch.mapped(face.points, w), origin=origin)
+    def rigid_samples(self) -> Iterator[tuple[Operators, FEModel]]:
+        """Models whose rigid motions together span those of every field."""
+        nominal = np.ones(2 + len(self.stretch.regions))
+        for w in (nominal, *(nominal + e for e in np.eye(nominal.size)[1:])):
+            moved = self._moved(w)
+            rigid = rigid_motions(self._local(moved.points))
+            yield self.ops.varied((1.0, []), (1.0, []), rigid), moved
 
-        faces = {name: moved(face) for name, face in self.model.interfaces.items()}
+    def _moved(self, w: Array) -> FEModel:
+        """The model with its fields weighted."""
+
+        def face(nominal: Interface) -> Interface:
+            origin = self.stretch.mapped(nominal.origin[None], w)[0]
+            return replace(nominal, points=self.stretch.mapped(nominal.points, w), origin=origin)
+
+        faces = {name: face(nominal) for name, nominal in self.model.interfaces.items()}
         return replace(
             self.model, points=self.stretch.mapped(self.model.points, w), interfaces=faces
         )

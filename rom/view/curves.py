@@ -24,22 +24,24 @@ def history(
     *,
     title: str,
     caption: str,
+    over: str | None = None,
 ) -> Path:
-    """Draw quantities over time, one panel below the other.
+    """Draw quantities over time, or over something else, one panel below the other.
 
     Args:
         path: picture to write, .png.
-        t: (n,) time [s].
+        t: (n,) time [s], or values of what is named by ``over``.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom.
         title: heading.
         caption: what a stranger has to know.
+        over: label of the horizontal axis, with its unit, when that is not time.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = page.checked(path, ".png")
     t = np.asarray(t, dtype=float)
-    unit, factor = ("ms", 1e3) if np.ptp(t) < 1.0 else ("s", 1.0)
+    unit, factor = ("ms", 1e3) if np.ptp(t) < 1.0 and over is None else ("s", 1.0)
     with page.styled():
         figure, areas = _panels(len(panels), title, caption)
         for axes, (label, curves) in zip(areas, panels, strict=True):
@@ -54,7 +56,7 @@ def history(
             finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
         for axes in areas[:-1]:
             axes.set_xticklabels([])
-        areas[-1].set_xlabel(f"time [{unit}]", size=page.BODY)
+        areas[-1].set_xlabel(over or f"time [{unit}]", size=page.BODY)
         return page.save(figure, path)
 
 
