@@ -181,6 +181,7 @@ def families(tmp_path_factory):
 
 
 @pytest.mark.mpi
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3])
 def test_a_family_is_blind_to_the_number_of_processes(families, n):
     one, many = families[1], families[n]

@@ -10,7 +10,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_matrix
 from solid import STEEL, block
-from test_fe_body_mpi import ENVIRONMENT
 
 import rom
 from rom.body.reference import rigid_elastic
@@ -242,8 +241,11 @@ def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
 
 @pytest.mark.fenicsx
 @pytest.mark.mpi
+@pytest.mark.slow
 def test_layers_are_blind_to_the_number_of_processes(tmp_path):
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    from test_fe_body_mpi import ENVIRONMENT
+
     found = {}
     for n in (1, 2, 3):
         path = tmp_path / f"{n}.npz"
