@@ -40,7 +40,7 @@ def panel(E=1.0, t=1.0):
     return rom.fe.model(
         Path(__file__).parents[1] / "meshes" / "sandwich.geo",
         material={"core": replace(FOAM, E=E * FOAM.E), "faces": ALLOY},
-        parameters={"nx": 10, "ny": 2, "core": 0.02 * t},
+        parameters={"nx": 6, "ny": 2, "core": 0.02 * t},
     )
 
 
