@@ -20,8 +20,8 @@ from rom.fe.memory import give_back
 from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
-from rom.fe.solid import SolidMesh
 from rom.fe.region import Regions, aij, forms, symmetric
+from rom.fe.solid import SolidMesh
 from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
 from rom.model import Array, Attachment, FEModel
