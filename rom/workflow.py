@@ -11,6 +11,7 @@ import numpy as np
 from rom.attachment import added_mass
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
+from rom.body.prestress import UnitLoads
 from rom.body.projection import elastic_part, flexible_body
 from rom.certificate import certify_body
 from rom.eigen import Operators, rigid_motions
@@ -125,6 +126,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     damping: Rayleigh | ModalDamping | None = None,
     name: str = "body",
     stress: bool = False,
+    stiffening: bool = False,
     certify: bool = True,
 ) -> FlexibleBody:
     """A flexible body that stands for the full model, with the evidence for it.
@@ -140,6 +142,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         damping: structural damping; none if not given.
         name: name of the body.
         stress: make the stress on the outer surface recoverable, ``body.stress``.
+        stiffening: give the body the geometric stiffness of centrifugal force and of loads on its
+            interfaces, ``body.K_geo``: fast rotation and tension then stiffen it.
         certify: compare with the full model; costs one more factorisation per support.
 
     Returns:
@@ -171,6 +175,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         ties=connection.ties,
         name=name,
         stress=stress,
+        stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
         provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
     ).with_reference(reference)
     if damping is not None:

@@ -4,9 +4,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import eigh, null_space
 
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
+from rom.body.rotating import rotating_frequencies
+from rom.body.stiffening import moved_stiffening
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, Index, Report
 
@@ -121,7 +124,8 @@ class FlexibleBody:
         S_kl: (3, 3, r, r) entry [a, b, k, l] is the integral of rho phi_k,a phi_l,b [kg].
         K: (r, r) stiffness [N/m]; the shapes are mass-normalised, so that it is diag(omega^2).
         D: (r, r) damping [N s/m].
-        K_geo: (r, r) geometric stiffness per unit load, by name of the load.
+        K_geo: (r, r) geometric stiffness per unit load, by name of the load, see
+            `rom.body.stiffening`.
         markers: interfaces by name.
         surface: outer surface, or None.
         stress: recovery of the stress on it, or None.
@@ -190,6 +194,7 @@ class FlexibleBody:
         """
         X = reference_motion(self, reference)
         body = moved_frame(self, X)
+        body = replace(body, K_geo=moved_stiffening(self, body, X, reference))
         omega, V = _normal_modes(body.K, body.M)
         return _recombined(body, V, omega, reference_label(reference))
 
@@ -247,6 +252,33 @@ class FlexibleBody:
         V = self.modes(fixed=fixed)[1]
         M, _ = self.full_matrices()
         return np.square(V.T @ M[:, :6])
+
+    def rotating_frequencies(
+        self,
+        speed: float,
+        axis: npt.ArrayLike,
+        *,
+        fixed: tuple[str, ...],
+        at: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Natural frequencies in a frame that rotates steadily with the supports [Hz].
+
+        Centrifugal stiffening (``K_geo``), spin softening and Coriolis forces included.
+
+        Args:
+            speed: angular speed [rad/s].
+            axis: (3,) direction of the axis of rotation, axes of the geometry.
+            fixed: names of the interfaces that rotate with the frame; the first holds the body.
+            at: (3,) a point of the axis [m].
+
+        Raises:
+            ConfigError: if no interface is held, or the axis has no direction.
+            InterfaceError: if an interface is unknown.
+
+        Warns:
+            RomWarning: if the body has no geometric stiffness, or rotation makes it unstable.
+        """
+        return rotating_frequencies(self, speed, axis, fixed=fixed, at=at)
 
     def full_matrices(self) -> tuple[Array, Array]:
         """(6 + r, 6 + r) mass and stiffness of small motions, rigid coordinates first."""

@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 from rom.attachment import carried_displacements
 from rom.body.flexible import FlexibleBody, Marker, Patch, StressRecovery, Surface
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
+from rom.body.prestress import UnitLoads
 from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Interface
@@ -74,6 +75,7 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
     name: str,
     provenance: dict[str, Any],
     stress: bool = False,
+    stiffening: UnitLoads | None = None,
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
 
@@ -87,6 +89,7 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
         name: name of the body.
         provenance: how it was made.
         stress: whether the stress on the surface can be recovered.
+        stiffening: the loads whose geometric stiffness the body gets.
     """
     E = canonical_columns(ops, Psi @ elastic.V, model)
     integrals = _integrals(model, ops, E)
@@ -97,6 +100,7 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
         **{key: getattr(integrals, key) for key in integrals.__slots__},
         K=np.diag(elastic.omega**2),
         D=np.zeros((r, r)),
+        K_geo=stiffening.geometric_stiffness(E, markers) if stiffening else {},
         markers=markers,
         omega=elastic.omega,
         labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(r)),

@@ -117,15 +117,15 @@ def rigid_elastic(body: "FlexibleBody") -> Array:
 def moved_frame(body: "FlexibleBody", X: Array) -> "FlexibleBody":
     """The body with shapes phi_k - (t_k + w_k x X), X = [t; w] (6, r); still not normalised.
 
-    Every integral follows from those of the old shapes and of the undeformed body.
+    Every integral follows from those of the old shapes and of the undeformed body. Geometric
+    stiffness stays as it was, see `rom.body.stiffening.moved_stiffening`.
     """
     t, w = X[:3], X[3:]
-    W = np.einsum("abc,ck->abk", _skew_tensor(), w)  # W[:, :, k] @ x = w_k x x
+    W = np.einsum("abc,ck->abk", skew_tensor(), w)  # W[:, :, k] @ x = w_k x x
     d, m = body.first_moment, body.mass
     P = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia  # integral of rho x x^T
     Wd = np.einsum("abk,b->ak", W, d)
-    S = body.S - m * t - Wd
-    Ibar = body.Ibar_kl - np.einsum("a,bk->abk", d, t) - np.einsum("ac,bck->abk", P, W)
+    S, Ibar = moved_integrals(body, X)
     cross = np.einsum("ak,bl->abkl", body.S, t) + np.einsum("cak,bcl->abkl", body.Ibar_kl, W)
     rigid = m * np.einsum("ak,bl->abkl", t, t) + np.einsum("ak,bl->abkl", t, Wd)
     rigid += np.einsum("ak,bl->abkl", Wd, t)
@@ -135,19 +135,31 @@ def moved_frame(body: "FlexibleBody", X: Array) -> "FlexibleBody":
     if surface is not None:
         shift = t[None] + np.einsum("abk,nb->nak", W, surface.points)
         surface = replace(surface, shape=surface.shape - shift.reshape(surface.shape.shape))
-    markers = {name: _moved_marker(marker, X, t, W) for name, marker in body.markers.items()}
+    markers = {name: moved_marker(marker, X) for name, marker in body.markers.items()}
     return replace(body, S=S, Ibar_kl=Ibar, S_kl=S_kl, markers=markers, surface=surface)
 
 
-def _moved_marker(marker: "Marker", X: Array, t: Array, W: Array) -> "Marker":
+def moved_integrals(body: "FlexibleBody", X: Array) -> tuple[Array, Array]:
+    """Integrals S (3, r) and Ibar_kl (3, 3, r) of the shapes without the rigid motion X (6, r)."""
+    t, W = X[:3], np.einsum("abc,ck->abk", skew_tensor(), X[3:])
+    d = body.first_moment
+    P = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+    S = body.S - body.mass * t - np.einsum("abk,b->ak", W, d)
+    Ibar = body.Ibar_kl - np.einsum("a,bk->abk", d, t) - np.einsum("ac,bck->abk", P, W)
+    return S, Ibar
+
+
+def moved_marker(marker: "Marker", X: Array) -> "Marker":
+    """The marker without the rigid motion X (6, r)."""
+    W = np.einsum("abc,ck->abk", skew_tensor(), X[3:])
     return replace(
         marker,
-        translation=marker.translation - t - np.einsum("abk,b->ak", W, marker.point),
+        translation=marker.translation - X[:3] - np.einsum("abk,b->ak", W, marker.point),
         rotation=marker.rotation - X[3:],
         hold=np.hstack([marker.hold[:, :6], marker.hold[:, 6:] - marker.hold[:, :6] @ X]),
     )
 
 
-def _skew_tensor() -> Array:
+def skew_tensor() -> Array:
     """(3, 3, 3): skew(w)_ab = sum_c tensor[a, b, c] w_c."""
     return np.stack([skew(e) for e in np.eye(3)], axis=-1)

@@ -8,9 +8,20 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from rom.fe.compat import cell_dofs, evaluated, quadrature_points, reference_points, to_global
+from rom.fe.compat import (
+    assemble_matrix,
+    cell_dofs,
+    cell_name,
+    evaluated,
+    geometry_degree,
+    quadrature_points,
+    reference_points,
+    to_global,
+)
+from rom.fe.factor import dense_rows
 from rom.fe.jit import compiling
 from rom.fe.material import stress
+from rom.fe.memory import give_back
 from rom.model import PAIRS, Array, Index
 
 
@@ -69,6 +80,44 @@ class Stresses:
         points = evaluated(x, self.mesh, cells).reshape(-1, 3)
         found = [values.reshape(-1, 6) for values in self._evaluated(U, cells, X)]
         return points, np.stack(found, axis=2)
+
+    def geometric_stiffness(self, U: Array, Psi: Array) -> Array:
+        """Stiffness that the stress of loads gives to shapes, at any element degree.
+
+        The second variation of the strain energy: integral of sigma_l : grad(psi_i)^T grad(psi_j).
+
+        Args:
+            U: (n_local, l) displacements under the loads [m].
+            Psi: (n_local, r) shapes.
+
+        Returns:
+            (l, r, r) symmetric, equal on all ranks.
+        """
+        load = fem.Function(self.V)
+        form = self._second_variation(load)
+        out = np.empty((U.shape[1], Psi.shape[1], Psi.shape[1]))
+        for k, column in enumerate(U.T):
+            load.x.array[: column.size] = column
+            load.x.scatter_forward()
+            with compiling(self.mesh.comm):
+                A = assemble_matrix(form)
+            out[k] = Psi.T @ dense_rows(A, Psi)
+            A.destroy()
+        give_back()
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, out)
+        return 0.5 * (out + out.transpose(0, 2, 1))
+
+    def _second_variation(self, load: Any) -> ufl.Form:
+        """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""
+        u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
+        sigma = stress(ufl.sym(ufl.grad(load)), self.numbers)
+        curved = geometry_degree(self.mesh) - 1
+        if cell_name(self.mesh) == "tetrahedron":
+            degree = 3 * (self.degree - 1) + 3 * curved
+        else:
+            degree = 3 * self.degree + 2 * curved
+        dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": max(degree, 1)})
+        return ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * dx
 
     def _evaluated(self, U: Array, cells: np.ndarray, X: Array) -> Any:
         """(cells, points, 6) stress of each column."""

@@ -25,7 +25,7 @@ from rom.model import Array, Report, Row
 from rom.units import SYSTEMS
 
 SCHEMA = "rom-body"
-VERSION = (1, 1)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 2)  # a new major number breaks readers, a new minor number only adds
 LIMIT = 4 * 1024**3  # bytes a body may have in memory before reading is refused
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 
@@ -341,7 +341,14 @@ def verify(body: FlexibleBody, path: Path) -> None:
             triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < n)
         ):
             raise FileFormatError("the surface does not fit the body.", where=str(path))
-    for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
+    for load, A in body.K_geo.items():
+        if A.shape != (r, r):
+            raise FileFormatError(
+                f"the geometric stiffness {load!r} has the shape {A.shape}, expected {(r, r)}.",
+                where=str(path),
+            )
+    stiffness = (("K", body.K), ("D", body.D), *body.K_geo.items())
+    for name, A in (*stiffness, ("inertia", body.inertia)):
         if np.abs(A - A.T).max(initial=0.0) > 1e-10 * np.abs(A).max(initial=1e-300):
             raise QualityGateError(f"{name} is not symmetric.", where=str(path))
     if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):

@@ -1,0 +1,168 @@
+"""Geometric stiffness of a meshed body from the stress of its unit loads.
+
+Every load is balanced by the inertia of the free body (inertia relief), so that no support carries
+a part of it, and its stress comes from the full finite element equations: the tension of a
+spinning bar is exact even when no mode kept stretches it. Acceleration and angular acceleration
+of a free body need no stress; they act through the forces at its interfaces.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from rom.attachment import carried_displacements
+from rom.body.flexible import Marker
+from rom.body.stiffening import CENTRIFUGAL, PRODUCTS, interface_loads
+from rom.eigen import Operators, mean_motion, rigid_motions
+from rom.errors import ConfigError
+from rom.model import Array, FEModel, Index, Interface
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """Point masses on an interface: points (p, 3), masses (p,), N (3 p, 3 k) from its dofs."""
+
+    interface: Interface
+    points: Array
+    masses: Array
+    N: Array
+
+
+@dataclass(frozen=True)
+class UnitLoads:
+    """Centrifugal force and interface loads of a model, and the stress they leave in it.
+
+    Attributes:
+        model: the model, with finite elements.
+        mesh: operators of the mesh alone, nodal dofs.
+        whole: the same with attachments.
+        connection: the model in interface coordinates, see `rom.reduction.interface`.
+    """
+
+    model: FEModel
+    mesh: Operators
+    whole: Operators
+    connection: Any
+
+    def __post_init__(self) -> None:
+        if self.model.stresses is None:
+            raise ConfigError(
+                "the model has no finite elements, from which alone geometric stiffness follows.",
+                hint="Make it with rom.fe.model, or reduce with stiffening=False.",
+            )
+
+    def geometric_stiffness(self, E: Array, markers: dict[str, Marker]) -> dict[str, Array]:
+        """{load: (r, r)} of the shapes E (n_local, r) in their mean-axis frame."""
+        carried = [
+            Carried(self.model.interfaces[a.interface], *carried_displacements(a, self.model))
+            for a in self.model.attachments
+        ]
+        names = [*CENTRIFUGAL, *(load for m in markers for load in interface_loads(m))]
+        accelerations, wrenches = self._balanced(carried, tuple(markers))
+        forces = self.mesh.apply_M(accelerations(self._points))
+        U = self._answer(forces + wrenches + self._carried_load(carried, accelerations))
+        K = self.model.stresses.geometric_stiffness(U, E)
+        K += self._surfaces(U, forces, E, markers, carried)
+        for c in carried:
+            arms = c.points - c.interface.origin
+            f = c.masses[:, None] * accelerations(c.points).reshape(len(arms), -1)
+            moment = np.einsum("pal,pb->lab", f.reshape(len(arms), 3, -1), arms)
+            K -= _turning(moment, self._rotation(c.interface, E))
+        return dict(zip(names, 0.5 * (K + K.transpose(0, 2, 1)), strict=True))
+
+    @property
+    def _points(self) -> Array:
+        first = self.mesh.first // 3
+        return self.model.points[first : first + self.mesh.n_local // 3]
+
+    def _balanced(self, carried: list[Carried], names: tuple[str, ...]) -> tuple[Any, Array]:
+        """Accelerations of body forces as a function of points, and nodal interface loads."""
+        R = rigid_motions(self._points)
+        wrenches = np.zeros((self.mesh.n_local, 6 + 6 * len(names)))
+        for k, name in enumerate(names, start=1):
+            interface = self.model.interfaces[name]
+            self._add(wrenches[:, 6 * k : 6 * k + 6], interface, mean_motion(interface).T)
+
+        def unbalanced(points: Array) -> Array:
+            fields = centrifugal(points)
+            return np.hstack([fields, np.zeros((fields.shape[0], 6 * len(names)))])
+
+        load = self.mesh.apply_M(unbalanced(self._points)) + wrenches
+        load += self._carried_load(carried, unbalanced)
+        rigid = np.linalg.solve(self.whole.gram(R, self.whole.apply_M(R)), self.mesh.gram(R, load))
+        return lambda points: unbalanced(points) - rigid_motions(points) @ rigid, wrenches
+
+    def _carried_load(self, carried: list[Carried], accelerations: Any) -> Array:
+        load = np.zeros((self.mesh.n_local, accelerations(self._points[:1]).shape[1]))
+        for c in carried:
+            f = np.repeat(c.masses, 3)[:, None] * accelerations(c.points)
+            self._add(load, c.interface, c.N.T @ f)
+        return load
+
+    def _add(self, out: Array, interface: Interface, rows: Array) -> None:
+        """Add rows of the dofs of an interface to those this process has."""
+        at = interface.dofs - self.mesh.first
+        mine = (at >= 0) & (at < self.mesh.n_local)
+        out[at[mine]] += rows[mine]
+
+    def _answer(self, F: Array) -> Array:
+        """(n_local, k) displacement of the free body under balanced loads, up to rigid motion."""
+        ops = self.connection.ops
+        held = ops.hold(self._six_dofs())
+        return ops.expand(held(ops.restrict(F)))
+
+    def _six_dofs(self) -> Index:
+        """Six dofs that stop every rigid motion and, as loads are balanced, carry nothing."""
+        ops, candidates = self.connection.ops, self.connection.boundary
+        if candidates.size == 0:
+            x = self.model.points
+            nodes = np.unique(np.r_[x.argmin(axis=0), x.argmax(axis=0)])
+            candidates = (3 * nodes[:, None] + np.arange(3)).ravel()
+        rows = ops.rows(ops.rigid, candidates)
+        rows = rows / np.linalg.norm(rows, axis=0)
+        return np.sort(candidates[qr(rows.T, mode="r", pivoting=True)[1][:6]])
+
+    def _surfaces(
+        self,
+        U: Array,
+        forces: Array,
+        E: Array,
+        markers: dict[str, Marker],
+        carried: list[Carried],
+    ) -> Array:
+        """What the forces on interfaces add when their surfaces turn as a whole.
+
+        An interface that turns by theta carries its points along on circles, by
+        theta x (theta x r) / 2, which no linear map u = T a contains.
+        """
+        tractions, total = self.mesh.apply_K(U) - forces, np.zeros((U.shape[1], *2 * E.shape[1:]))
+        for name in dict.fromkeys([*markers, *(c.interface.name for c in carried)]):
+            interface = self.model.interfaces[name]
+            p = self.mesh.rows(tractions, interface.dofs).reshape(-1, 3, U.shape[1])
+            moment = np.einsum("nal,nb->lab", p, interface.points - interface.origin)
+            total += _turning(moment, self._rotation(interface, E))
+        return total
+
+    def _rotation(self, interface: Interface, E: Array) -> Array:
+        return mean_motion(interface)[3:] @ self.mesh.rows(E, interface.dofs)
+
+
+def centrifugal(points: Array) -> Array:
+    """(3 p, 6) centrifugal acceleration of points per product of angular velocities."""
+    out = np.zeros((points.shape[0], 3, 6))
+    for k, (i, j) in enumerate(PRODUCTS):
+        if i == j:
+            out[:, :, k] = points
+            out[:, i, k] = 0.0
+        else:
+            out[:, i, k], out[:, j, k] = -points[:, j], -points[:, i]
+    return out.reshape(-1, 6)
+
+
+def _turning(moment: Array, theta: Array) -> Array:
+    """(l, r, r) sum of f . theta_k x (theta_l x arm), from the sums of f arm^T (l, 3, 3)."""
+    along = np.einsum("ak,lab,bm->lkm", theta, moment, theta, optimize=True)
+    square = np.einsum("laa,km->lkm", moment, theta.T @ theta)
+    return 0.5 * (along + along.transpose(0, 2, 1)) - square

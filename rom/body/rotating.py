@@ -1,0 +1,125 @@
+"""Natural frequencies of a body that rotates steadily with its supports."""
+
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eigvals, null_space
+
+from rom.body.stiffening import SecondOrder
+from rom.errors import ConfigError, ModelError, RomWarning
+from rom.model import Array
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+
+UNSTABLE = 1e-6  # growth rate, relative to the largest frequency, of a motion that diverges
+
+
+def rotating_frequencies(
+    body: "FlexibleBody",
+    speed: float,
+    axis: npt.ArrayLike,
+    *,
+    fixed: tuple[str, ...],
+    at: npt.ArrayLike = (0.0, 0.0, 0.0),
+) -> Array:
+    """Frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`."""
+    fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
+    w, arm = speed * _direction(axis), np.asarray(at, dtype=float)
+    if not fixed:
+        raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
+    if speed and not body.K_geo:
+        warnings.warn(
+            f"body {body.name!r} has no geometric stiffness: rotation softens it only.",
+            RomWarning,
+            stacklevel=3,
+        )
+    seen = body.with_reference(fixed[0])  # in its frame the first support is at rest
+    H = np.vstack([_held(seen, name) for name in fixed])
+    N = null_space(H, rcond=1e-10) if H.size else np.eye(seen.n_modes)
+    K, G = rotating_matrices(seen, w, arm, fixed[1:])
+    M, K, G = (N.T @ A @ N for A in (seen.M, K, G))
+    return _frequencies(M, K, G, f"body {body.name!r} at {speed:g} rad/s")
+
+
+def _held(body: "FlexibleBody", name: str) -> Array:
+    """(h, r) coordinates of an interface, without those that its frame holds to round-off."""
+    rows = body.marker(name).hold
+    rigid = np.abs(rows[:, :6] * np.r_[np.ones(3), np.full(3, 1 / body.size)]).max()
+    size = np.linalg.norm(rows[:, 6:] / np.sqrt(np.diag(body.M) / body.mass), axis=1)
+    H: Array = rows[size > 1e-9 * rigid, 6:]
+    return H / np.linalg.norm(H, axis=1, keepdims=True)
+
+
+def rotating_matrices(
+    body: "FlexibleBody", w: Array, at: Array, supports: tuple[str, ...] = ()
+) -> tuple[Array, Array]:
+    """Stiffness and gyroscopic matrix (r, r) of small vibrations in a frame that turns steadily.
+
+    Centrifugal stiffening by K_geo, spin softening by the inertia of the shapes themselves, and
+    Coriolis forces, all from the same integrals as the equations of motion.
+
+    Args:
+        body: the body, its frame turning with the angular velocity w.
+        w: (3,) angular velocity, body frame [rad/s].
+        at: (3,) a point of the axis, body frame [m].
+        supports: interfaces held besides the frame; they pull with the force they carry at rest.
+    """
+    psi = SecondOrder.of(body)
+    lift = -np.cross(w, np.cross(w, at))  # acceleration of the body origin
+    K = body.K + np.einsum("a,akl->kl", lift, psi.S)
+    K = K + _centrifugal(psi.Ibar, w) + _centrifugal(body.S_kl, w)
+    load = lift @ body.S + _centrifugal(body.Ibar_kl, w)
+    for name, wrench in _reactions(body, load, supports).items():
+        K -= np.einsum("p,pkl->kl", wrench, psi.markers[name])
+    S = body.S_kl
+    dual = np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
+    return 0.5 * (K + K.T), 2 * np.einsum("c,clk->kl", w, dual)
+
+
+def _centrifugal(S: Array, w: Array) -> Array:
+    """Integral of rho u . (w x (w x v)) from the nine integrals of rho u_a v_b."""
+    found: Array = np.einsum("a,ab...,b->...", w, S, w) - w @ w * np.einsum("aa...->...", S)
+    return found
+
+
+def _reactions(body: "FlexibleBody", load: Array, supports: tuple[str, ...]) -> dict[str, Array]:
+    """{support: (6,) force and moment at its marker} that hold it in place against a load."""
+    if not supports:
+        return {}
+    H = np.vstack([body.marker(name).hold[:, 6:] for name in supports])
+    compliance = np.linalg.solve(body.K, H.T)
+    lam = np.linalg.lstsq(H @ compliance, compliance.T @ load, rcond=1e-10)[0]
+    found, first = {}, 0
+    for name in supports:
+        marker = body.marker(name)
+        n = marker.hold.shape[0]
+        force = marker.hold[:, :6].T @ lam[first : first + n]
+        force[3:] -= np.cross(marker.point, force[:3])
+        found[name], first = force, first + n
+    return found
+
+
+def _frequencies(M: Array, K: Array, G: Array, culprit: str) -> Array:
+    r = M.shape[0]
+    one, zero = np.eye(r), np.zeros((r, r))
+    lam = eigvals(np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]))
+    if not np.isfinite(lam).all():
+        raise ModelError(f"{culprit} has no vibrations: its mass is singular.")
+    if lam.real.max(initial=0.0) > UNSTABLE * np.abs(lam).max(initial=0.0):
+        warnings.warn(
+            f"{culprit} is unstable: rotation has used up its stiffness; motions that run away "
+            "count with their imaginary part, zero if they do not oscillate.",
+            RomWarning,
+            stacklevel=4,
+        )
+    return np.sort(np.abs(lam.imag))[::2] / (2 * np.pi)
+
+
+def _direction(axis: npt.ArrayLike) -> Array:
+    e = np.asarray(axis, dtype=float)
+    if e.shape != (3,) or not np.isfinite(e).all() or not e.any():
+        raise ConfigError(f"axis = {axis!r} is no direction.")
+    return e / np.linalg.norm(e)

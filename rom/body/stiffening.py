@@ -1,0 +1,200 @@
+"""Geometric stiffness per unit load, read as displacements of second order.
+
+A prestressed body resists bending: the load l adds K_l = integral of sigma_l : grad(phi)^T
+grad(phi) to its stiffness. The same matrix says how far the load moves when the body bends,
+because to second order a material point is displaced by::
+
+    u = sum_k phi_k q_k + 1/2 sum_kl psi_kl q_k q_l,    load l . psi_kl = -K_l[k, l]
+
+(foreshortening). Loads of unit acceleration of a body with density rho thereby give the integrals
+of rho psi and rho X psi, loads on an interface the displacements psi of its marker. Body forces
+of the moving frame, gravity, joints and springs then stiffen the body by their virtual work on
+psi, whatever they are, and energy and momentum stay exactly balanced.
+
+Names of the loads: "omega_x^2" and "omega_x omega_y" for centrifugal force, "domega_x" for
+angular acceleration, "a_x" for acceleration of the frame, each per unit of the quantity and as the
+force -rho times acceleration it stands for; "tip f_x" and "tip m_x" for force and moment on the
+interface "tip". A load left out has no geometric stiffness.
+
+Source:
+    Wallrapp and Schwertassek, Representation of geometric stiffening in multibody system
+    simulation, Int. J. Numer. Meth. Engng. 32 (1991) 1833.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rom.body.reference import moved_integrals, moved_marker, reference_motion, skew_tensor
+from rom.errors import ConfigError
+from rom.model import Array
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody, Marker
+
+AXES = "xyz"
+ROUND_OFF = 1e-11  # of the largest displacement of second order
+PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+CENTRIFUGAL = tuple(
+    f"omega_{AXES[i]}^2" if i == j else f"omega_{AXES[i]} omega_{AXES[j]}" for i, j in PRODUCTS
+)
+ANGULAR = tuple(f"domega_{axis}" for axis in AXES)
+LINEAR = tuple(f"a_{axis}" for axis in AXES)
+
+
+def interface_loads(name: str) -> tuple[str, ...]:
+    """Names of the six unit loads of an interface: force, then moment."""
+    return tuple(f"{name} {kind}_{axis}" for kind in "fm" for axis in AXES)
+
+
+def known_loads(body: "FlexibleBody") -> tuple[str, ...]:
+    """All loads a body can have a geometric stiffness for."""
+    interfaces = (load for name in body.markers for load in interface_loads(name))
+    return (*CENTRIFUGAL, *ANGULAR, *LINEAR, *interfaces)
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrder:
+    """Displacements psi_kl of second order, as far as loads see them.
+
+    Attributes:
+        S: (3, r, r) integral of rho psi_kl [kg m].
+        Ibar: (3, 3, r, r) entry [a, b, k, l] is the integral of rho X_a psi_kl,b [kg m^2].
+        markers: {interface: (6, r, r) translation and rotation vector of its marker}.
+    """
+
+    S: Array
+    Ibar: Array
+    markers: dict[str, Array]
+
+    @classmethod
+    def of(cls, body: "FlexibleBody") -> "SecondOrder":
+        """Read from the matrices of a body.
+
+        Raises:
+            ConfigError: if a load is unknown, or a matrix has the wrong shape or is not symmetric.
+        """
+        _check(body)
+        r = body.n_modes
+        K = {load: np.asarray(body.K_geo.get(load, np.zeros((r, r)))) for load in known_loads(body)}
+        squares = np.array([K[load] for load in CENTRIFUGAL[:3]])
+        symmetric = np.zeros((3, 3, r, r))
+        for (i, j), load in zip(PRODUCTS, CENTRIFUGAL, strict=True):
+            # omega_x^2 pulls along y and z, so that K = -(Ibar_yy + Ibar_zz)
+            half = K[load] - 0.5 * squares.sum(axis=0) if i == j else 0.5 * K[load]
+            symmetric[i, j] = symmetric[j, i] = half
+        turning = 0.5 * np.einsum("abc,ckl->bakl", skew_tensor(), [K[load] for load in ANGULAR])
+        markers = {m: -np.array([K[load] for load in interface_loads(m)]) for m in body.markers}
+        return cls(np.array([K[load] for load in LINEAR]), symmetric + turning, markers)
+
+    def without_round_off(self, mass: float, size: float) -> "SecondOrder":
+        """Zeros where a frame leaves nothing: on its own support, or of the mean motion."""
+        scale = np.r_[np.ones(3), np.full(3, size)][:, None, None]
+        parts = [self.S / mass, self.Ibar / (mass * size)]
+        parts += [motion * scale for motion in self.markers.values()]
+        limit = ROUND_OFF * max(np.abs(part).max(initial=0.0) for part in parts)
+        S = np.where(np.abs(self.S).max(initial=0.0) > limit * mass, self.S, 0.0)
+        turning = 0.5 * (self.Ibar - self.Ibar.swapaxes(0, 1))
+        keep = np.abs(turning).max(initial=0.0) > limit * mass * size
+        markers = {
+            name: np.where(np.abs(motion * scale).max(initial=0.0) > limit, motion, 0.0)
+            for name, motion in self.markers.items()
+        }
+        return SecondOrder(S, self.Ibar if keep else self.Ibar - turning, markers)
+
+    def matrices(self) -> dict[str, Array]:
+        """Geometric stiffness per unit load; loads without any are left out."""
+        X, K = self.Ibar, dict(zip(LINEAR, self.S, strict=True))
+        K |= {load: _product(X, i, j) for (i, j), load in zip(PRODUCTS, CENTRIFUGAL, strict=True)}
+        twist = (X[1, 2] - X[2, 1], X[2, 0] - X[0, 2], X[0, 1] - X[1, 0])
+        K |= dict(zip(ANGULAR, twist, strict=True))
+        for name, motion in self.markers.items():
+            K |= dict(zip(interface_loads(name), -motion, strict=True))
+        return {load: 0.5 * (A + A.T) for load, A in K.items() if np.any(A)}
+
+
+def _product(X: Array, i: int, j: int) -> Array:
+    return X[i, i] - np.einsum("aakl->kl", X) if i == j else X[i, j] + X[j, i]
+
+
+def _check(body: "FlexibleBody") -> None:
+    known, r = known_loads(body), body.n_modes
+    for load, A in body.K_geo.items():
+        if load not in known:
+            raise ConfigError(
+                f"body {body.name!r} has a geometric stiffness for the unknown load {load!r}.",
+                hint=f"Loads are {', '.join(known)}.",
+            )
+        A = np.asarray(A)
+        if A.shape != (r, r) or np.abs(A - A.T).max(initial=0.0) > 1e-9 * np.abs(A).max(initial=0):
+            raise ConfigError(
+                f"the geometric stiffness {load!r} of body {body.name!r} is no symmetric matrix "
+                f"of {r} coordinates."
+            )
+
+
+def moved_stiffening(old: "FlexibleBody", new: "FlexibleBody", X: Array, reference: Any) -> Any:
+    """Geometric stiffness seen from another frame.
+
+    The frame turns and moves with the body: rotations compose, and what the reference condition
+    sees of the second order is rigid motion too.
+
+    Args:
+        old: the body in the old frame.
+        new: the same in the new frame, shapes phi - (t + w x X) with X = [t; w].
+        X: (6, r) rigid motion taken out of each shape.
+        reference: the reference condition of the new frame.
+    """
+    if not old.K_geo:
+        return {}
+    psi, w, r = SecondOrder.of(old), X[3:], old.n_modes
+    P = 0.5 * np.trace(old.inertia) * np.eye(3) - old.inertia  # integral of rho X X^T
+    W = np.einsum("abc,ck->abk", skew_tensor(), w)
+    WW = _symmetrised(np.einsum("abk,bcl->ackl", W, W))
+    S = psi.S - _symmetrised(2 * np.einsum("abk,bl->akl", W, new.S))
+    S -= np.einsum("abkl,b->akl", WW, old.first_moment)
+    Ibar = psi.Ibar - _symmetrised(2 * np.einsum("bck,acl->abkl", W, new.Ibar_kl))
+    Ibar -= np.einsum("ac,bckl->abkl", P, WW)
+    markers = {m: _turned(psi.markers[m], old.markers[m], new.markers[m], W) for m in old.markers}
+    found = _without_rigid(old, SecondOrder(S, Ibar, markers), r, reference)
+    return found.without_round_off(old.mass, old.size).matrices()
+
+
+def _turned(motion: Array, old: "Marker", new: "Marker", W: Array) -> Array:
+    """Second-order motion of a marker seen from a frame that turns by W q."""
+    shift = _symmetrised(2 * np.einsum("abk,bl->akl", W, new.translation))
+    WW = _symmetrised(np.einsum("abk,bcl->ackl", W, W))
+    shift += np.einsum("abkl,b->akl", WW, old.point)
+    turn = _symmetrised(np.einsum("abk,bl->akl", W, old.rotation))  # exp(-w) exp(theta)
+    return motion - np.concatenate([shift, turn])
+
+
+def _without_rigid(body: "FlexibleBody", psi: SecondOrder, r: int, reference: Any) -> SecondOrder:
+    """Every pair k, l counts as one shape of a body, whose frame obeys the reference condition."""
+    flat = {name: motion.reshape(6, -1) for name, motion in psi.markers.items()}
+    pairs = replace(
+        body,
+        S=psi.S.reshape(3, -1),
+        Ibar_kl=psi.Ibar.reshape(3, 3, -1),
+        K=np.broadcast_to(0.0, (r * r, r * r)),
+        markers={
+            name: replace(
+                marker,
+                translation=flat[name][:3],
+                rotation=flat[name][3:],
+                hold=np.zeros((0, 6 + r * r)),
+            )
+            for name, marker in body.markers.items()
+        },
+    )
+    X = reference_motion(pairs, reference)
+    S, Ibar = moved_integrals(pairs, X)
+    moved = [moved_marker(marker, X) for marker in pairs.markers.values()]
+    motions = {m.name: np.vstack([m.translation, m.rotation]).reshape(6, r, r) for m in moved}
+    return SecondOrder(S.reshape(3, r, r), Ibar.reshape(3, 3, r, r), motions)
+
+
+def _symmetrised(A: Array) -> Array:
+    """Mean of an array and itself with the last two axes exchanged."""
+    return 0.5 * (A + np.swapaxes(A, -1, -2))
