@@ -1,12 +1,15 @@
-"""Planar Euler-Bernoulli beam of Hermite elements, L = EI = m = 1."""
+"""Planar Euler-Bernoulli beams of Hermite elements, and a body made of one."""
 
 import numpy as np
+from scipy.linalg import eigh
+
+from rom.body.flexible import FlexibleBody, Marker
 
 N = 40  # elements
 
 
 def hermite_beam(n=N):
-    """K and M (2 n + 2 dofs: w, theta per node) of the free beam."""
+    """K and M (2 n + 2 dofs: w, theta per node) of the free beam with L = EI = m = 1."""
     h = 1.0 / n
     k = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / h**3
     m = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
@@ -23,3 +26,69 @@ ENDS = [0, 1, 2 * N, 2 * N + 1]
 FREE_FREE = 22.37328
 CANTILEVER = 3.516015
 PINNED = 9.869604
+
+
+def gauss_hermite(n, length):
+    """Points x (g,), weights (g,), slopes (g, 2 n + 2) and values of the beam functions."""
+    xi, weight = np.polynomial.legendre.leggauss(5)
+    xi, h = 0.5 * (xi + 1), length / n
+    x = np.concatenate([(e + xi) * h for e in range(n)])
+    values, slopes = np.zeros((x.size, 2 * n + 2)), np.zeros((x.size, 2 * n + 2))
+    H = np.array([1 - 3 * xi**2 + 2 * xi**3, h * (xi - 2 * xi**2 + xi**3),
+                  3 * xi**2 - 2 * xi**3, h * (xi**3 - xi**2)])  # fmt: skip
+    dH = np.array([6 * xi**2 - 6 * xi, h * (1 - 4 * xi + 3 * xi**2),
+                   6 * xi - 6 * xi**2, h * (3 * xi**2 - 2 * xi)]) / h  # fmt: skip
+    for e in range(n):
+        block = (slice(5 * e, 5 * e + 5), slice(2 * e, 2 * e + 4))
+        values[block], slopes[block] = H.T, dH.T
+    return x, np.tile(0.5 * weight * h, n), values, slopes
+
+
+def stiffened_beam(length=1.0, EI=1.0, rhoA=1.0, *, n_modes=20, stiffened=True):
+    """Cantilever along x that bends along y, its frame on the root; modes as shapes.
+
+    The geometric stiffness of a load with the tension N(x) is the integral of N w_k' w_l'.
+    """
+    n, r = 40, n_modes
+    K, M = (A[2:, 2:] for A in hermite_beam(n))
+    D = np.tile([1.0, length], n)  # the slope of a beam of unit length
+    K, M = EI / length**3 * K * np.outer(D, D), rhoA * length * M * np.outer(D, D)
+    lam, V = eigh(K, M, subset_by_index=(0, r - 1))
+    x, weight, values, slopes = gauss_hermite(n, length)
+    w, dw = values[:, 2:] @ V, slopes[:, 2:] @ V
+    line = rhoA * weight
+    S, Ibar, S_kl = np.zeros((3, r)), np.zeros((3, 3, r)), np.zeros((3, 3, r, r))
+    S[1], Ibar[0, 1], S_kl[1, 1] = line @ w, (line * x) @ w, (w.T * line) @ w
+    tension = {
+        "omega_y^2": 0.5 * rhoA * (length**2 - x**2),
+        "omega_z^2": 0.5 * rhoA * (length**2 - x**2),
+        "a_x": -rhoA * (length - x),
+        "tip f_x": np.ones_like(x),
+    }
+    K_geo = {load: (dw.T * (weight * N)) @ dw for load, N in tension.items()}
+    tip, turn = np.zeros((3, r)), np.zeros((3, r))
+    tip[1], turn[2] = V[-2], V[-1]
+    mass, hold = rhoA * length, np.zeros((6, 6 + r))
+    hold[:, :6] = np.eye(6)
+    arm = hold.copy()
+    arm[1, 5], arm[2, 4], arm[1, 6:], arm[5, 6:] = length, -length, V[-2], V[-1]
+    zero = np.zeros((3, r))
+    return FlexibleBody(
+        name="beam",
+        mass=mass,
+        first_moment=np.array([mass * length / 2, 0, 0]),
+        inertia=mass * length**2 / 3 * np.diag([1e-6, 1.0, 1.0]),
+        S=S,
+        Ibar_kl=Ibar,
+        S_kl=S_kl,
+        K=np.diag(lam),
+        D=np.zeros((r, r)),
+        markers={
+            "root": Marker("root", np.zeros(3), zero, zero, "rbe2", hold),
+            "tip": Marker("tip", np.array([length, 0, 0]), tip, turn, "rbe2", arm),
+        },
+        omega=np.sqrt(lam),
+        labels=tuple(f"bending {k + 1}" for k in range(r)),
+        reference="root",
+        K_geo={k: 0.5 * (A + A.T) for k, A in K_geo.items()} if stiffened else {},
+    )

@@ -1,6 +1,7 @@
 """Bodies and mechanisms for the multibody tests, and kernels that let tests look inside."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -8,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, eigh
 
 from rom.body.flexible import FlexibleBody, Marker
+from rom.body.stiffening import known_loads
 from rom.errors import RomWarning
 from rom.mbs.arrays import workspace
 from rom.mbs.integrate import simulate
@@ -69,13 +71,17 @@ def random_nodes(rng, n=7, r=4):
     return x, Ms, phi, 20 * (Ck @ Ck.T + np.eye(r)), 0.3 * Cd @ Cd.T
 
 
-def random_body(rng, r=4, *, damped=True):
+def random_body(rng, r=4, *, damped=True, stiffened=False):
     """A body whose two markers move and turn with the elastic coordinates."""
     x, Ms, phi, K, D = random_nodes(rng, r=r)
     markers = {
         key: (x[i], phi[:, i].T, 0.4 * rng.normal(size=(3, r))) for i, key in ((0, "a"), (1, "b"))
     }
-    return nodal_body(x, Ms, phi, K, D if damped else 0 * D, markers)
+    body = nodal_body(x, Ms, phi, K, D if damped else 0 * D, markers)
+    if not stiffened:
+        return body
+    shapes = {load: rng.normal(size=(r, r)) for load in known_loads(body)}
+    return replace(body, K_geo={load: 0.3 * (A + A.T) for load, A in shapes.items()})
 
 
 def random_pose(rng):

@@ -64,9 +64,9 @@ def test_frame_equations_equal_direct_nodal_dynamics():
 
 
 def everything(rng, *, angles=True):
-    """Two flexible bodies and a rigid one with every joint, spring, load and drive."""
+    """Two flexible bodies, one of them stiffened, and a rigid one with every joint and load."""
     mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
+    one = mech.add_flexible("one", random_body(rng, stiffened=True), **random_pose(rng))
     two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
     box = mech.add_rigid(
         "box",
@@ -159,6 +159,7 @@ def test_iteration_matrix_is_the_derivative_of_the_residual(seed):
     rng = np.random.default_rng(seed)
     packed, W = prepared(everything(rng, angles=False))
     packed.system.markers.twist[:] *= 1e-3
+    packed.system.markers.bend[:, 3:] *= 1e-3
     check_tangents(packed, W, random_state(rng, packed), np.eye(packed.v.size), 1e-6)
 
 
@@ -172,6 +173,7 @@ def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     mech.rotational_spring("coil", "hinge", stiffness=5.0, damping=0.4)
     packed, W = prepared(mech)
     packed.system.markers.twist[:] *= 1e-3
+    packed.system.markers.bend[:, 3:] *= 1e-3
     start = initial_state(packed)
     W.signal[:, 0] = 0.4
     linearise(packed.system, W, start.q, start.v)

@@ -47,6 +47,22 @@ def test_what_is_read_equals_what_was_written(body, file):
     assert again.provenance == json.loads(json.dumps(body.provenance))
 
 
+def test_files_of_older_versions_are_read(body, file, tmp_path):
+    """Minor versions only add: what is missing is empty."""
+
+    def older(name, data):
+        return data.replace(b'"version": [1, 2]', b'"version": [1, 0]')
+
+    assert rom.load(rewritten(file, tmp_path / "old.npz", older)).K_geo == {}
+
+
+def test_a_geometric_stiffness_of_another_body_is_refused(body, tmp_path):
+    for A, message in ((np.eye(2), "has the shape"), (np.tri(body.n_modes), "is not symmetric")):
+        path = rom.save(replace(body, K_geo={"a_x": A}), tmp_path / "wrong.npz")
+        with pytest.raises(RomError, match=message):
+            rom.load(path)
+
+
 def test_the_same_body_gives_the_same_bytes(body, file, tmp_path):
     other = rom.save(body, tmp_path / "other.npz")
     assert other.read_bytes() == file.read_bytes()
@@ -131,7 +147,7 @@ def test_other_files_and_newer_versions_are_named(file, tmp_path, body):
         rom.load(tmp_path / "missing.npz")
 
     def newer(name, data):
-        return data.replace(b'"version": [1, 1]', b'"version": [9, 0]')
+        return data.replace(b'"version": [1, 2]', b'"version": [9, 0]')
 
     with pytest.raises(FileFormatError, match=r"schema 'rom-body' \[9, 0\]"):
         rom.load(rewritten(file, tmp_path / "new.npz", newer))

@@ -9,7 +9,7 @@ from scipy.linalg import eigh, null_space
 
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
-from rom.body.stiffening import moved_stiffening
+from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, Index, Report
 
@@ -279,6 +279,14 @@ class FlexibleBody:
             RomWarning: if the body has no geometric stiffness, or rotation makes it unstable.
         """
         return rotating_frequencies(self, speed, axis, fixed=fixed, at=at)
+
+    def second_order(self) -> SecondOrder:
+        """Displacements of second order that say the same as ``K_geo``.
+
+        Raises:
+            ConfigError: if a load is unknown, or a matrix is no symmetric (r, r) matrix.
+        """
+        return SecondOrder.of(self)
 
     def full_matrices(self) -> tuple[Array, Array]:
         """(6 + r, 6 + r) mass and stiffness of small motions, rigid coordinates first."""

@@ -341,18 +341,26 @@ def verify(body: FlexibleBody, path: Path) -> None:
             triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < n)
         ):
             raise FileFormatError("the surface does not fit the body.", where=str(path))
-    for load, A in body.K_geo.items():
-        if A.shape != (r, r):
-            raise FileFormatError(
-                f"the geometric stiffness {load!r} has the shape {A.shape}, expected {(r, r)}.",
-                where=str(path),
-            )
-    stiffness = (("K", body.K), ("D", body.D), *body.K_geo.items())
-    for name, A in (*stiffness, ("inertia", body.inertia)):
+    _verify_stiffening(body, path)
+    for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
         if np.abs(A - A.T).max(initial=0.0) > 1e-10 * np.abs(A).max(initial=1e-300):
             raise QualityGateError(f"{name} is not symmetric.", where=str(path))
     if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):
         raise QualityGateError("the mass is not positive definite.", where=str(path))
+
+
+def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
+    for load, A in body.K_geo.items():
+        if A.shape != body.K.shape:
+            raise FileFormatError(
+                f"the geometric stiffness {load!r} has the shape {A.shape}, expected "
+                f"{body.K.shape}.",
+                where=str(path),
+            )
+        if not np.allclose(A, A.T, rtol=0, atol=1e-10 * np.abs(A).max(initial=0.0)):
+            raise QualityGateError(
+                f"the geometric stiffness {load!r} is not symmetric.", where=str(path)
+            )
 
 
 def _verify_patch(marker: Marker, path: Path) -> None:

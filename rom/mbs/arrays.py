@@ -34,6 +34,9 @@ class Bodies(NamedTuple):
         S1: (f, R, 9) integral of rho X_a phi_k,b, entry 3 a + b.
         S2: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho phi_l,a phi_k,b.
         M, K, C: (f, R, R) elastic mass, stiffness, damping.
+        stiffened: (b,) 1 for bodies with displacements psi_kl of second order, else 0.
+        T: (f, R, 3 R) row l, entry 3 k + a: integral of rho psi_kl,a.
+        T1: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho X_a psi_kl,b.
         gravity: (3,) [m/s^2].
     """
 
@@ -50,23 +53,28 @@ class Bodies(NamedTuple):
     M: Array
     K: Array
     C: Array
+    stiffened: Index
+    T: Array
+    T1: Array
     gravity: Array
 
 
 class Markers(NamedTuple):
-    """Points with axes on bodies: P = r + A (x + shape q), axes A exp(twist q).
+    """Points with axes on bodies: P = r + A (x + shape q + q bend q / 2), axes A exp(twist q).
 
     Attributes:
         body: (k,) body, -1 for the ground.
         point: (k, 3) undeformed position in the body frame [m].
         shape: (k, 3, R) displacement per elastic coordinate.
         twist: (k, 3, R) small rotation per elastic coordinate.
+        bend: (k, 6, R, R) displacement and rotation of second order, of stiffened bodies.
     """
 
     body: Index
     point: Array
     shape: Array
     twist: Array
+    bend: Array
 
 
 class Rows(NamedTuple):
@@ -137,6 +145,7 @@ class Work(NamedTuple):
     """Memory for the quantities of one instant; nothing is allocated during a time step."""
 
     A: Array  # (b, 3, 3) orientation
+    Ct: Array  # (b, 3, R) first moment per elastic coordinate
     d: Array  # (b, 3) first moment
     dd: Array  # (b, 3) rate of the first moment in the body frame
     J: Array  # (b, 3, 3) inertia about the origin
@@ -144,11 +153,16 @@ class Work(NamedTuple):
     Sd: Array  # (b, R, 9) integral of rho (dP/dt) phi_k
     SPd: Array  # (b, 3, 3) integral of rho P (dP/dt)
     Sa: Array  # (R, 9) integral of rho (d2P/dt2) phi_k
+    Td: Array  # (b, R, 3) integral of rho psi_kl dq_l/dt
+    T1d: Array  # (b, R, 9) integral of rho X psi_kl dq_l/dt
+    Ta: Array  # (R, 3) integral of rho psi_kl d2q_l/dt2
+    T1a: Array  # (R, 9) integral of rho X psi_kl d2q_l/dt2
     P: Array  # (k, 3) marker positions
     E: Array  # (k, 3, 3) marker axes
     V: Array  # (k, 6) marker twists
     conv: Array  # (k, 6) marker accelerations at zero accelerations of the coordinates
     H: Array  # (k, 6, 6 + R) marker twist as a function of the body velocities
+    move: Array  # (k, 6, R) displacement and rotation of a marker per elastic rate, body frame
     u: Array  # (k, 3) marker positions in the body frame
     theta: Array  # (k, 3) marker rotation vectors
     wrench: Array  # (k, 6) force and moment on each marker
@@ -190,7 +204,12 @@ def workspace(system: System, n_signals: int) -> Work:
         **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
         **dict.fromkeys(("d", "dd"), (b, 3)),
         **dict.fromkeys(("SP", "Sd"), (b, R, 9)),
-        "Sa": (R, 9),
+        "Ct": (b, 3, R),
+        "Td": (b, R, 3),
+        "T1d": (b, R, 9),
+        "Ta": (R, 3),
+        **dict.fromkeys(("Sa", "T1a"), (R, 9)),
+        "move": (k, 6, R),
         **dict.fromkeys(("P", "u", "theta"), (k, 3)),
         "E": (k, 3, 3),
         **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),

@@ -22,48 +22,8 @@ from rom.mbs.algebra import (
     vec,
 )
 from rom.mbs.compiled import inner
-
-
-@inner
-def dual(s, at):
-    """Integral of rho U x V from the nine entries of S(U, V)."""
-    return s[at + 5] - s[at + 7], s[at + 6] - s[at + 2], s[at + 1] - s[at + 3]
-
-
-@inner
-def trace(s, at):
-    """Trace of nine entries."""
-    return s[at] + s[at + 4] + s[at + 8]
-
-
-@inner
-def times(s, x):
-    """Nine entries, as a matrix, times x."""
-    return (
-        s[0] * x[0] + s[1] * x[1] + s[2] * x[2],
-        s[3] * x[0] + s[4] * x[1] + s[5] * x[2],
-        s[6] * x[0] + s[7] * x[1] + s[8] * x[2],
-    )
-
-
-@inner
-def transposed_times(s, x):
-    """Nine entries, as a matrix, transposed, times x."""
-    return (
-        s[0] * x[0] + s[3] * x[1] + s[6] * x[2],
-        s[1] * x[0] + s[4] * x[1] + s[7] * x[2],
-        s[2] * x[0] + s[5] * x[1] + s[8] * x[2],
-    )
-
-
-@inner
-def contract(S2, x, at, r, out):
-    """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out."""
-    for l in range(r):
-        factor = x[at + l]
-        for k in range(r):
-            for p in range(9):
-                out[k, p] += factor * S2[l, 9 * k + p]
+from rom.mbs.integrals import contract, dual, times, trace, transposed_times
+from rom.mbs.stiffening import bent_integrals, bent_push, bent_stiffness, bent_twist
 
 
 @inner
@@ -72,26 +32,42 @@ def body_states(B, W, q, v):
     for b in range(B.mass.size):
         f, r, at, vt = B.flex[b], B.r[b], B.q_at[b], B.v_at[b]
         rotation(q, at + 3, W.A[b])
-        SP, Sd, SPd, J = W.SP[b], W.Sd[b], W.SPd[b], W.J[b]
-        for k in range(r):
-            for p in range(9):
-                SP[k, p] = B.S1[f, k, p]
-                Sd[k, p] = 0.0
-        contract(B.S2[f], q, at + 7, r, SP)
-        contract(B.S2[f], v, vt + 6, r, Sd)
+        shape_integrals(B, W, b, q, v)
+        SP, Ct, SPd, J = W.SP[b], W.Ct[b], W.SPd[b], W.J[b]
+        if B.stiffened[b] == 1:
+            bent_integrals(B, W, b, q, v)
         for i in range(3):
             W.d[b, i], W.dd[b, i] = B.first[b, i], 0.0
             for k in range(r):
-                W.d[b, i] += B.S[f, i, k] * q[at + 7 + k]
-                W.dd[b, i] += B.S[f, i, k] * v[vt + 6 + k]
+                W.d[b, i] += 0.5 * (B.S[f, i, k] + Ct[i, k]) * q[at + 7 + k]
+                W.dd[b, i] += Ct[i, k] * v[vt + 6 + k]
             for j in range(3):
-                J[i, j], SPd[i, j] = -B.second[b, i, j], 0.0
+                SPd[i, j] = 0.0
                 for k in range(r):
-                    J[i, j] -= q[at + 7 + k] * (B.S1[f, k, 3 * j + i] + SP[k, 3 * i + j])
                     SPd[i, j] += v[vt + 6 + k] * SP[k, 3 * i + j]
         spur = -(J[0, 0] + J[1, 1] + J[2, 2])
         for i in range(3):
             J[i, i] += spur
+
+
+@inner
+def shape_integrals(B, W, b, q, v):
+    """Integrals with the shapes alone; W.J becomes minus the integral of rho P P^T."""
+    f, r, at, vt = B.flex[b], B.r[b], B.q_at[b], B.v_at[b]
+    SP, Sd, Ct, J = W.SP[b], W.Sd[b], W.Ct[b], W.J[b]
+    for k in range(r):
+        for p in range(9):
+            SP[k, p] = B.S1[f, k, p]
+            Sd[k, p] = 0.0
+        for i in range(3):
+            Ct[i, k] = B.S[f, i, k]
+    contract(B.S2[f], q, at + 7, r, SP)
+    contract(B.S2[f], v, vt + 6, r, Sd)
+    for i in range(3):
+        for j in range(3):
+            J[i, j] = -B.second[b, i, j]
+            for k in range(r):
+                J[i, j] -= q[at + 7 + k] * (B.S1[f, k, 3 * j + i] + SP[k, 3 * i + j])
 
 
 @inner
@@ -117,7 +93,7 @@ def body_residuals(B, W, q, v, a):
         moment = add(moment, scale(2.0, sub(scale(spread, w), mtv(SPd, w))))
         for k in range(r):
             s, da = W.SP[b, k], a[vt + 6 + k]
-            S_k, Cr_k = col(B.S[f], k), dual(s, 0)
+            S_k, Cr_k = col(W.Ct[b], k), dual(s, 0)
             force, moment = add(force, scale(da, S_k)), add(moment, scale(da, Cr_k))
             total = dot(S_k, lift) + dot(Cr_k, dw) + 2.0 * dot(w, dual(W.Sd[b, k], 0))
             total += dot(w, times(s, w)) - dot(w, w) * trace(s, 0)
@@ -127,6 +103,9 @@ def body_residuals(B, W, q, v, a):
                 damping += B.C[f, k, l] * v[vt + 6 + l]
             W.residual[vt + 6 + k] += total + damping
             W.power[2] += damping * v[vt + 6 + k]
+        if B.stiffened[b] == 1:
+            force = add(force, bent_push(W, b, r, v, vt))
+            moment = add(moment, bent_twist(W, b, r, v, vt))
         put(W.residual, vt, mv(W.A[b], force))
         put(W.residual, vt + 3, moment)
 
@@ -145,7 +124,7 @@ def body_mass(B, W, b, c, S):
             S[t + 3 + i, t + 3 + j] += c * J[i, j]
     for k in range(r):
         e = t + 6 + k
-        push, Cr_k = mv(A, col(B.S[f], k)), dual(W.SP[b, k], 0)
+        push, Cr_k = mv(A, col(W.Ct[b], k)), dual(W.SP[b, k], 0)
         place(S, t, e, c, push)
         place_row(S, e, t, c, push)
         place(S, t + 3, e, c, Cr_k)
@@ -170,7 +149,7 @@ def body_damping(B, W, b, v, c, S):
         place(S, t + 3, t + 3 + j, c, moment)
     for k in range(r):
         s, e = W.SP[b, k], t + 6 + k
-        place(S, t, e, c, mv(A, scale(2.0, cross(w, col(B.S[f], k)))))
+        place(S, t, e, c, mv(A, scale(2.0, cross(w, col(W.Ct[b], k)))))
         spin = sub(scale(trace(s, 0), w), transposed_times(s, w))
         place(S, t + 3, e, c, scale(2.0, spin))
         row = add(times(s, w), transposed_times(s, w))
@@ -179,6 +158,9 @@ def body_damping(B, W, b, v, c, S):
         for l in range(r):
             coriolis = 2.0 * dot(w, dual(B.S2[f, l], 9 * k))
             S[e, t + 6 + l] += c * (B.C[f, k, l] + coriolis)
+        if B.stiffened[b] == 1:
+            place(S, t, e, c, mv(A, scale(2.0, vec(W.Td[b, k], 0))))
+            place(S, t + 3, e, c, scale(2.0, dual(W.T1d[b, k], 0)))
 
 
 @inner
@@ -187,20 +169,24 @@ def body_stiffness(B, W, b, v, a, c, S):
 
     Rotations are perturbed in the body frame: dA = A skew(dtheta).
     """
-    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    r, t = B.r[b], B.v_at[b]
     w, dw, d, A = vec(v, t + 3), vec(a, t + 3), vec(W.d[b], 0), W.A[b]
     lift = mtv(A, sub(vec(a, t), vec(B.gravity, 0)))
     pull = add(cross(dw, d), add(cross(w, cross(w, d)), scale(2.0, cross(w, vec(W.dd[b], 0)))))
     for k in range(r):
-        pull = add(pull, scale(a[t + 6 + k], col(B.S[f], k)))
+        pull = add(pull, scale(a[t + 6 + k], col(W.Ct[b], k)))
+    if B.stiffened[b] == 1:
+        pull = add(pull, bent_push(W, b, r, v, t))
     for j in range(3):
         e = unit(j)
         turned_lift = cross(lift, e)
         place(S, t, t + 3 + j, c, mv(A, cross(e, pull)))
         place(S, t + 3, t + 3 + j, c, cross(d, turned_lift))
         for k in range(r):
-            S[t + 6 + k, t + 3 + j] += c * dot(col(B.S[f], k), turned_lift)
+            S[t + 6 + k, t + 3 + j] += c * dot(col(W.Ct[b], k), turned_lift)
     elastic_stiffness(B, W, b, v, a, c, S)
+    if B.stiffened[b] == 1:
+        bent_stiffness(B, W, b, v, a, c, S)
 
 
 @inner
@@ -214,7 +200,7 @@ def elastic_stiffness(B, W, b, v, a, c, S):
             W.Sa[k, p] = 0.0
     contract(B.S2[f], a, t + 6, r, W.Sa)
     for l in range(r):
-        s, e, S_l = W.SP[b, l], t + 6 + l, col(B.S[f], l)
+        s, e, S_l = W.SP[b, l], t + 6 + l, col(W.Ct[b], l)
         place(S, t, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))
         tr = 2.0 * trace(s, 0)
         Jdw = sub(scale(tr, dw), add(times(s, dw), transposed_times(s, dw)))

@@ -17,6 +17,7 @@ from rom.mbs.packing import Packed, pack
 from rom.mbs.record import Record, Settings
 from rom.mbs.solution import Solution
 from rom.mbs.state import State, initial_state
+from rom.mbs.validity import warn_of_limits
 
 METHODS = {"generalized-alpha": run_implicit, "dop853": run_explicit}
 
@@ -65,6 +66,10 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         SolverError: naming time and culprit; ``error.solution`` holds the motion up to there, None
             if it never started.
         InterruptedRun: after Ctrl-C; ``error.solution`` holds the motion up to there.
+
+    Warns:
+        RomWarning: if a body left the range of small elastic deformation, or turned faster than
+            it can without geometric stiffness.
     """
     if not isinstance(mechanism, Mechanism):
         raise ConfigError(f"{mechanism!r} is no Mechanism.")
@@ -86,6 +91,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         METHODS[method](record, W, state)
     except RomError as error:
         error.solution = record.solution(f"Stopped: {error}") if record.blocks else None
+        if record.blocks:
+            warn_of_limits(error.solution)
         raise
     except KeyboardInterrupt:
         error = InterruptedRun(
@@ -94,7 +101,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         )
         error.solution = record.solution(str(error)) if record.blocks else None
         raise error from None
-    return record.solution(status)
+    solution = record.solution(status)
+    warn_of_limits(solution)
+    return solution
 
 
 def _check_fit(state: Any, packed: Packed) -> None:

@@ -17,6 +17,8 @@ from rom.mbs.algebra import (
 )
 from rom.mbs.compiled import inner
 
+ZERO = (0.0, 0.0, 0.0)
+
 
 @inner
 def elastic_sum(table, x, at, r):
@@ -48,13 +50,21 @@ def marker_states(s, W, q, v):
                 W.P[m, i], W.E[m, i, i] = K.point[m, i], 1.0
             continue
         r, at, vt, A = B.r[b], B.q_at[b], B.v_at[b], W.A[b]
-        shape, twist = K.shape[m], K.twist[m]
+        shape, twist, w = K.shape[m], K.twist[m], vec(v, vt + 3)
         u = add(row(K.point, m, 0), elastic_sum(shape, q, at + 7, r))
-        theta, w = elastic_sum(twist, q, at + 7, r), vec(v, vt + 3)
+        theta, jerk, whirl = elastic_sum(twist, q, at + 7, r), ZERO, ZERO
+        if B.stiffened[b] == 1:
+            bent_shapes(K, m, q, at + 7, r, W.move[m])
+            shape, twist = W.move[m, :3], W.move[m, 3:]
+            u = scale(0.5, add(add(u, row(K.point, m, 0)), elastic_sum(shape, q, at + 7, r)))
+            theta = scale(0.5, add(theta, elastic_sum(twist, q, at + 7, r)))
+            jerk = bent_sum(K.bend[m], 0, v, vt + 6, r)
+            whirl = bent_sum(K.bend[m], 3, v, vt + 6, r)
         slip, rate = elastic_sum(shape, v, vt + 6, r), elastic_sum(twist, v, vt + 6, r)
         spin = spatial_tangent(theta, rate)
         swirl = add(cross(w, spin), spatial_tangent_rate(theta, rate))
-        push = cross(w, add(cross(w, u), scale(2.0, slip)))
+        swirl = add(swirl, spatial_tangent(theta, whirl))
+        push = add(jerk, cross(w, add(cross(w, u), scale(2.0, slip))))
         write(W.P, m, 0, add(vec(q, at), mv(A, u)))
         write(W.u, m, 0, u)
         write(W.theta, m, 0, theta)
@@ -64,6 +74,30 @@ def marker_states(s, W, q, v):
         write(W.conv, m, 3, mv(A, swirl))
         axes_of(A, theta, W.E[m])
         marker_jacobian(shape, twist, A, u, theta, r, W.H[m])
+
+
+@inner
+def bent_shapes(K, m, q, at, r, move):
+    """Displacement and rotation of a marker per elastic rate, second order included."""
+    for p in range(3):
+        for k in range(r):
+            move[p, k], move[3 + p, k] = K.shape[m, p, k], K.twist[m, p, k]
+            for l in range(r):
+                move[p, k] += K.bend[m, p, k, l] * q[at + l]
+                move[3 + p, k] += K.bend[m, 3 + p, k, l] * q[at + l]
+
+
+@inner
+def bent_sum(bend, p, x, at, r):
+    """Sum of bend[p : p + 3, k, l] x_k x_l."""
+    a0, a1, a2 = 0.0, 0.0, 0.0
+    for k in range(r):
+        for l in range(r):
+            square = x[at + k] * x[at + l]
+            a0 += bend[p, k, l] * square
+            a1 += bend[p + 1, k, l] * square
+            a2 += bend[p + 2, k, l] * square
+    return a0, a1, a2
 
 
 @inner
@@ -119,15 +153,29 @@ def wrench_stiffness(s, W, c, S):
         r, t, A = B.r[b], B.v_at[b], W.A[b]
         f, n = mtv(A, vec(W.wrench[m], 0)), mtv(A, vec(W.wrench[m], 3))
         u, theta = vec(W.u[m], 0), vec(W.theta[m], 0)
+        shape, twist = K.shape[m], K.twist[m]
+        if B.stiffened[b] == 1:
+            shape, twist = W.move[m, :3], W.move[m, 3:]
+            bent_wrench_stiffness(K.bend[m], f, n, theta, t + 6, r, c, S)
         for j in range(3):
             e = unit(j)
             df, dn = cross(f, e), cross(n, e)
             place(S, t + 3, t + 3 + j, -c, add(cross(u, df), dn))
             for k in range(r):
-                spin = spatial_tangent(theta, col(K.twist[m], k))
-                S[t + 6 + k, t + 3 + j] -= c * (dot(col(K.shape[m], k), df) + dot(spin, dn))
+                spin = spatial_tangent(theta, col(twist, k))
+                S[t + 6 + k, t + 3 + j] -= c * (dot(col(shape, k), df) + dot(spin, dn))
         for l in range(r):
-            place(S, t + 3, t + 6 + l, -c, cross(col(K.shape[m], l), f))
-            half = scale(0.5, cross(n, col(K.twist[m], l)))
+            place(S, t + 3, t + 6 + l, -c, cross(col(shape, l), f))
+            half = scale(0.5, cross(n, col(twist, l)))
             for k in range(r):
-                S[t + 6 + k, t + 6 + l] -= c * dot(col(K.twist[m], k), half)
+                S[t + 6 + k, t + 6 + l] -= c * dot(col(twist, k), half)
+
+
+@inner
+def bent_wrench_stiffness(bend, f, n, theta, at, r, c, S):  # noqa: PLR0913  as above
+    """Stiffness that the force and moment on a marker give to its body."""
+    for k in range(r):
+        for l in range(r):
+            move = (bend[0, k, l], bend[1, k, l], bend[2, k, l])
+            spin = spatial_tangent(theta, (bend[3, k, l], bend[4, k, l], bend[5, k, l]))
+            S[at + k, at + l] -= c * (dot(f, move) + dot(n, spin))

@@ -1,12 +1,11 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, RomWarning
+from rom.errors import ConfigError
 from rom.mbs import joints
 from rom.mbs.arrays import Bodies, Forces, Markers, Rows, System
 from rom.mbs.mechanism import Mechanism
@@ -58,7 +57,6 @@ def pack(mechanism: Mechanism) -> Packed:
     parts = tuple(mechanism.parts.values())
     if not parts:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")
-    _warn_of_stiffening(parts)
     handles = _all_markers(mechanism, parts)
     index = {marker: k for k, marker in enumerate(handles)}
     rows, owners, signals = _rows(mechanism, index)
@@ -81,17 +79,6 @@ def pack(mechanism: Mechanism) -> Packed:
         _length(parts),
         sum(part.mass for part in parts),
     )
-
-
-def _warn_of_stiffening(parts: tuple[Part, ...]) -> None:
-    for part in parts:
-        if part.flexible is not None and getattr(part.flexible, "K_geo", None):
-            warnings.warn(
-                f"body {part.name!r}: its geometric stiffness is not used; fast rotation will "
-                "not stiffen it.",
-                RomWarning,
-                stacklevel=4,
-            )
 
 
 def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
@@ -128,6 +115,8 @@ def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
         np.array([part.first for part in parts]),
         np.array([part.second for part in parts]),
         *tables,
+        np.array([bent(part) for part in parts], dtype=np.int64),
+        *_second_order(flexible, max(len(flexible), 1), R),
         gravity,
     )
 
@@ -148,6 +137,35 @@ def _flexible_tables(parts: list[Part], n: int, R: int) -> tuple[Array, ...]:
     return S, S1, S2, M, K, C
 
 
+def bent(part: Part) -> bool:
+    """Whether a body has displacements of second order, its geometric stiffness."""
+    return bool(part.r and part.flexible.K_geo)
+
+
+def _second_order(parts: list[Part], n: int, R: int) -> tuple[Array, Array]:
+    """Tables T and T1 of `rom.mbs.arrays.Bodies`; empty when no body is stiffened."""
+    R = R if any(map(bent, parts)) else 0
+    T, T1 = np.zeros((n, R, 3 * R)), np.zeros((n, R, 9 * R))
+    for f, part in enumerate(parts):
+        if bent(part):
+            psi, r = part.flexible.second_order(), part.r
+            T[f, :r, : 3 * r] = np.transpose(psi.S, (1, 2, 0)).reshape(r, 3 * r)
+            T1[f, :r, : 9 * r] = np.transpose(psi.Ibar, (2, 3, 0, 1)).reshape(r, 9 * r)
+    return T, T1
+
+
+def _bends(mechanism: Mechanism, handles: list[Marker], R: int) -> Array:
+    """(k, 6, R, R) second-order motion of markers; empty when no body is stiffened."""
+    bodies = {name: part for name, part in mechanism.parts.items() if bent(part)}
+    motions = {name: part.flexible.second_order().markers for name, part in bodies.items()}
+    bend = np.zeros((len(handles), 6, *2 * (R if bodies else 0,)))
+    for k, marker in enumerate(handles):
+        if marker.body in bodies and isinstance(marker.place, str):
+            r = bodies[marker.body].r
+            bend[k, :, :r, :r] = motions[marker.body][marker.place]
+    return bend
+
+
 def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
     order = {name: b for b, name in enumerate(mechanism.parts)} | {GROUND: -1}
     shape, twist = np.zeros((len(handles), 3, R)), np.zeros((len(handles), 3, R))
@@ -159,6 +177,7 @@ def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
         np.array([mechanism.part(m.body).point(m) for m in handles]),
         shape,
         twist,
+        _bends(mechanism, handles, R),
     )
 
 

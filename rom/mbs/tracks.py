@@ -7,8 +7,9 @@ import numpy as np
 from rom.mbs.algebra import add, cross, mtv, mv, put, scale, vec
 from rom.mbs.arrays import workspace
 from rom.mbs.compiled import inner, kernel
-from rom.mbs.dynamics import body_energy, dual
+from rom.mbs.dynamics import body_energy
 from rom.mbs.forces import spring_energy
+from rom.mbs.integrals import dual
 from rom.mbs.motion import evaluate
 from rom.model import Array
 

@@ -1,0 +1,45 @@
+"""Integrals S(U, V) of rho U V^T as nine numbers in a row: what the equations do with them."""
+
+from rom.mbs.compiled import inner
+
+
+@inner
+def dual(s, at):
+    """Integral of rho U x V from the nine entries of S(U, V)."""
+    return s[at + 5] - s[at + 7], s[at + 6] - s[at + 2], s[at + 1] - s[at + 3]
+
+
+@inner
+def trace(s, at):
+    """Trace of nine entries."""
+    return s[at] + s[at + 4] + s[at + 8]
+
+
+@inner
+def times(s, x):
+    """Nine entries, as a matrix, times x."""
+    return (
+        s[0] * x[0] + s[1] * x[1] + s[2] * x[2],
+        s[3] * x[0] + s[4] * x[1] + s[5] * x[2],
+        s[6] * x[0] + s[7] * x[1] + s[8] * x[2],
+    )
+
+
+@inner
+def transposed_times(s, x):
+    """Nine entries, as a matrix, transposed, times x."""
+    return (
+        s[0] * x[0] + s[3] * x[1] + s[6] * x[2],
+        s[1] * x[0] + s[4] * x[1] + s[7] * x[2],
+        s[2] * x[0] + s[5] * x[1] + s[8] * x[2],
+    )
+
+
+@inner
+def contract(S2, x, at, r, out):
+    """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out."""
+    for l in range(r):
+        factor = x[at + l]
+        for k in range(r):
+            for p in range(9):
+                out[k, p] += factor * S2[l, 9 * k + p]
