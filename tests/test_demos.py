@@ -29,6 +29,7 @@ LEFT_BEHIND = {
         "crank_mesh.png", "instants.png", "motion.png", "report.html", "rod.rom.npz", "rod.vtu",
         "rod_frequencies.png", "rod_mesh.png", "rod_modes.png", "slider_crank.gif",
     },
+    "demo_spin_up": {"spin_up.png"},
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 def history(
     path: str | Path,
     t: npt.ArrayLike,
-    panels: Sequence[tuple[str, dict[str, npt.ArrayLike]]],
+    panels: Sequence[tuple[str, dict[str, Any]]],
     *,
     title: str,
     caption: str,
@@ -31,7 +31,8 @@ def history(
     Args:
         path: picture to write, .png.
         t: (n,) time [s], or values of what is named by ``over``.
-        panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom.
+        panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
+            (times, values) is drawn as points.
         title: heading.
         caption: what a stranger has to know.
         over: label of the horizontal axis, with its unit, when that is not time.
@@ -46,11 +47,13 @@ def history(
         figure, areas = _panels(len(panels), title, caption)
         for axes, (label, curves) in zip(areas, panels, strict=True):
             for k, (name, values) in enumerate(curves.items()):
-                y = np.asarray(values, dtype=float)
-                if y.shape != t.shape:
-                    raise ConfigError(f"{name!r} has {y.size} values for {t.size} times.")
+                pair = isinstance(values, tuple)
+                x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
+                if y.shape != x.shape:
+                    raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
                 look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
-                axes.plot(factor * t, y, label=name, **look)
+                look |= {"ls": "none", "marker": "o", "ms": 7} if pair else {}
+                axes.plot(factor * x, y, label=name, **look)
             axes.set_ylabel(label, size=page.BODY)
             axes.set_xlim(factor * t[0], factor * t[-1])
             finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
