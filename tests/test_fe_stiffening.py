@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+from beam import gauss_hermite, hermite_beam
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh, eigvalsh
 from test_fe_body_mpi import ENVIRONMENT
@@ -16,7 +17,7 @@ from rom.body.prestress import _turning, centrifugal
 from rom.body.rotating import rotating_matrices
 from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR, interface_loads
 from rom.eigen import rigid_motions
-from rom.errors import ConfigError, RomWarning
+from rom.errors import ConfigError, ModelError, RomWarning
 from rom.reduction.interface import connect
 from rom.workflow import operators
 
@@ -200,7 +201,46 @@ def test_stiffening_does_not_need_the_modes_that_carry_the_load(model):
     assert_allclose(max(lag, flap) ** 2 - at_rest[1] ** 2, 0.193336 * 9, rtol=5e-2)
 
 
+def test_a_mass_beyond_the_tip_pulls_like_a_pendulum():
+    """Point mass on a rigid arm: a beam of Hermite elements whose tip turns the arm out."""
+    m, arm, eta = 0.5 * RHO * AREA * L, 0.25 * L, 4.0
+    mass = rom.Attachment("tip", m, 1e-9 * np.eye(3), at=(L + arm, 0, 0))
+    body = stiffened(solid(nu=0.0, nx=20, ny=1, nz=1, attachments=(mass,)), {"root": "rbe2"})
+    K, M = hermite_beam()
+    x, weight, _, slopes = gauss_hermite(40, 1.0)
+    reach, turn = np.zeros(82), np.zeros(82)
+    reach[-2:], turn[-1] = (1.0, 0.25), 1.0
+    M += 0.5 * np.outer(reach, reach)
+    tension = 0.5 * (1 - x**2) + 0.5 * 1.25
+    pull = (slopes.T * (weight * tension)) @ slopes + 0.5 * 1.25 * 0.25 * np.outer(turn, turn)
+    exact = np.sqrt(eigvalsh((K + eta**2 * pull)[2:, 2:], M[2:, 2:])[:2])
+    found = rotating(body, eta)
+    for value in exact:
+        assert np.abs(found / value - 1).min() < 2e-3
+
+
+@pytest.mark.parametrize("kind", ["full", "rbe3", "polynomial:2"])
+def test_the_kind_of_the_support_hardly_matters(model, kind):
+    """A deformable root held everywhere is the rigid one; an averaged one is a little softer."""
+    rigid = stiffened(model, {"root": "rbe2"}, n_modes=12)
+    other = stiffened(model, {"root": kind}, n_modes=12)
+    tolerance = 1e-2 if kind == "rbe3" else 1e-3
+    assert_allclose(rotating(other, 6)[:3], rotating(rigid, 6)[:3], rtol=tolerance)
+
+
+def test_the_command_line_stiffens_too(tmp_path):
+    from rom.cli.main import main
+
+    path = tmp_path / "beam.rom.npz"
+    asked = "reduce meshes/beam.geo -p lc=0.1 --E 70e9 --nu 0.3 --rho 2700 -i root=rbe2 -m 2 -q"
+    assert main([*asked.split(), "--stiffening", "--no-certificate", "-o", str(path)]) == 0
+    assert "omega_z^2" in rom.load(path).K_geo
+
+
 def test_messages(body, model):
+    free = rom.reduce(model, method=rom.FreeFree(6), interfaces=ENDS, certify=False)
+    with pytest.raises(ModelError, match="free-free modes only"):
+        free.rotating_frequencies(10.0, (0, 0, 1), fixed=("root",))
     with pytest.raises(ConfigError, match="needs a support"):
         body.rotating_frequencies(10.0, (0, 0, 1), fixed=())
     with pytest.raises(ConfigError, match="is no direction"):

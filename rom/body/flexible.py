@@ -220,12 +220,7 @@ class FlexibleBody:
             ModelError: if an interface of a basis of free-free modes alone is held.
         """
         fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
-        if fixed and not self.has_static_shapes:
-            raise ModelError(
-                f"body {self.name!r} has free-free modes only; with {fixed[0]!r} held its "
-                "frequencies would be tens of per cents too high.",
-                hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
-            )
+        self.check_support(fixed)
         M, K = self.full_matrices()
         N = self._supported(fixed)
         if not N.size:  # everything is held
@@ -235,6 +230,19 @@ class FlexibleBody:
         n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed), tol=1e-9)
         omega[:n_rigid] = 0.0
         return omega[:n], (N @ V)[:, :n]
+
+    def check_support(self, fixed: tuple[str, ...]) -> None:
+        """Refuse to hold an interface of a basis of free-free modes alone.
+
+        Raises:
+            ModelError: naming the interface.
+        """
+        if fixed and not self.has_static_shapes:
+            raise ModelError(
+                f"body {self.name!r} has free-free modes only; with {fixed[0]!r} held its "
+                "frequencies would be tens of per cents too high.",
+                hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
+            )
 
     def effective_mass(self, *, fixed: tuple[str, ...] = ()) -> Array:
         """(m, 6) share of the rigid body inertia each mode carries when its supports shake.
@@ -274,6 +282,7 @@ class FlexibleBody:
         Raises:
             ConfigError: if no interface is held, or the axis has no direction.
             InterfaceError: if an interface is unknown.
+            ModelError: if an interface of a basis of free-free modes alone is held.
 
         Warns:
             RomWarning: if the body has no geometric stiffness, or rotation makes it unstable.

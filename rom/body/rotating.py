@@ -30,6 +30,7 @@ def rotating_frequencies(
     w, arm = speed * _direction(axis), np.asarray(at, dtype=float)
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
+    body.check_support(fixed)
     if speed and not body.K_geo:
         warnings.warn(
             f"body {body.name!r} has no geometric stiffness: rotation softens it only.",

@@ -51,6 +51,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     damping = parser.add_mutually_exclusive_group()
     damping.add_argument("--damping-ratio", type=number, help="of every mode, e.g. 0.01")
     damping.add_argument("--rayleigh", metavar="ALPHA,BETA", help="D = ALPHA M + BETA K [1/s], [s]")
+    parser.add_argument(
+        "--stiffening",
+        action="store_true",
+        help="add the geometric stiffness of rotation and of loads on the interfaces",
+    )
     parser.add_argument("--name", help="name of the body (default: that of the file)")
     parser.add_argument("--stress", action="store_true", help="make surface stress recoverable")
     parser.add_argument("--no-certificate", action="store_true", help="skip the comparison")
@@ -76,6 +81,7 @@ def run(args: argparse.Namespace) -> Answer:
         damping=damping,
         name=args.name or args.file.stem,
         stress=args.stress,
+        stiffening=args.stiffening,
         certify=not args.no_certificate,
     )
     failed = failures(body.certificate) if body.certificate else ()
@@ -108,6 +114,7 @@ def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:
         "n_modes": body.n_modes,
         "reference": body.reference,
         "interfaces": list(body.interface_names),
+        "geometric stiffness": list(body.K_geo),
         "frequencies": (body.omega / (2 * pi)).tolist(),
         "certificate": None if body.certificate is None else report_data(body.certificate),
         "provenance": body.provenance,
