@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 
 from rom import rotation
+from rom.body.rotating import rotating_matrices
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.motion import evaluate, linearise, moved, rates
 from rom.mbs.state import initial_state
@@ -161,6 +162,22 @@ def test_iteration_matrix_is_the_derivative_of_the_residual(seed):
     packed.system.markers.twist[:] *= 1e-3
     packed.system.markers.bend[:, 3:] *= 1e-3
     check_tangents(packed, W, random_state(rng, packed), np.eye(packed.v.size), 1e-6)
+
+
+def test_a_rotating_body_is_linearised_as_it_moves():
+    """Stiffness and gyroscopic matrix of the body: the derivatives of its equations of motion."""
+    rng = np.random.default_rng(6)
+    body = random_body(rng, damped=False, stiffened=True)
+    w, arm, pose = rng.normal(size=3), rng.normal(size=3), random_pose(rng)
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible("body", body, **pose | {"omega": w})
+    packed, W = prepared(mech)
+    a, none = np.zeros(10), np.zeros(0)
+    a[:3] = rotation.matrix(pose["orientation"]) @ np.cross(w, np.cross(w, -arm))
+    tangents_at(packed.system, W, packed.q, packed.v, a, none, (0.0, 1.0, 1.0))
+    K, G = rotating_matrices(body, w, arm)
+    assert_allclose(W.Kt[6:, 6:], K, atol=1e-12 * np.abs(K).max())
+    assert_allclose(W.S[6:, 6:], G, atol=1e-12 * np.abs(G).max())
 
 
 def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
