@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -238,6 +239,8 @@ def test_the_command_line_stiffens_too(tmp_path):
 
 
 def test_messages(body, model):
+    with pytest.raises(ConfigError, match="no finite elements, from which alone geometric"):
+        stiffened(replace(model, stresses=None))
     free = rom.reduce(model, method=rom.FreeFree(6), interfaces=ENDS, certify=False)
     with pytest.raises(ModelError, match="free-free modes only"):
         free.rotating_frequencies(10.0, (0, 0, 1), fixed=("root",))
