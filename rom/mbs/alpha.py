@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rom.mbs.algebra import factorise, range_basis, row, scale, spatial_tangent, unit, vec
+from rom.mbs.arrays import ROLL
 from rom.mbs.compiled import inner, kernel
-from rom.mbs.constraints import constraint_gradient
-from rom.mbs.forces import follow_angles
+from rom.mbs.constraints import constraint_gradient, follow_coordinates
 from rom.mbs.motion import (
     border,
     drive_power,
@@ -166,7 +166,8 @@ def correct(s, W, T, rank):
     for i in range(n):
         W.rhs[i] = -bh2 * W.residual[i]
     for k in range(T.lam.size):
-        W.part[k] = -W.value[k]
+        # a velocity moves gamma / (beta h) as fast as the increment that removes it
+        W.part[k] = -W.value[k] * (beta * h / gamma if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(W, n, rank, W.delta, W.dlam)
     for i in range(n):
         T.vd1[i] += mass_factor(T) / bh2 * W.delta[i]
@@ -211,7 +212,7 @@ def accept(s, W, T):
     T.v[:] = T.v1
     T.vd[:] = T.vd1
     T.lam[:] = T.lam1
-    follow_angles(s, W)
+    follow_coordinates(W)
     drive_power(s, W, T.lam)  # the last correction moved the multipliers
     for k in range(3):
         T.work[k] += 0.5 * h * (W.power[k] + T.lost[k])

@@ -13,7 +13,9 @@ import numpy as np
 from rom.model import Array, Index
 
 # kinds of constraint rows
-POINT, ALONG, NORMAL, ANGLE = 0, 1, 2, 3
+POINT, ALONG, NORMAL, ANGLE, DISTANCE, COUPLING, TOUCH, ROLL = range(8)
+# those that measure lengths; a row of kind ROLL measures a velocity
+LENGTHS = (POINT, ALONG, DISTANCE, TOUCH)
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
 # columns of the work done since the start
@@ -83,9 +85,16 @@ class Rows(NamedTuple):
     Attributes:
         kind: (m,) POINT: world component ``a`` of P_j - P_i; ALONG: component of P_j - P_i along
             the axis ``a`` of i; NORMAL: axis ``a`` of i times axis ``b`` of j; ANGLE: from axis
-            ``a`` of i to axis ``b`` of j, turning towards axis ``c`` of i.
+            ``a`` of i to axis ``b`` of j, turning towards axis ``c`` of i; DISTANCE: length of
+            P_j - P_i; COUPLING: sum of two joint coordinates, each times its factor; TOUCH: height
+            of the lowest point of a ball, or of a wheel with the axis ``b`` of j, over the plane
+            through P_i with the normal ``c`` of i; ROLL: velocity with which that point slides
+            over the plane along ``a``.
         i, j: (m,) markers.
-        a, b, c: (m, 3) unit vectors.
+        k, l: (m,) markers of the second joint of a coupling, -1 for others.
+        a, b, c: (m, 3) unit vectors; b is zero for a ball.
+        at: (m, 2) joint coordinates of a coupling, -1 for others.
+        factor: (m, 2) factors of a coupling; radius of a ball or wheel.
         offset: (m,) value subtracted.
         signal: (m,) prescribed value subtracted as well, -1 for none.
         pair: (m,) joint the row belongs to.
@@ -95,14 +104,34 @@ class Rows(NamedTuple):
     kind: Index
     i: Index
     j: Index
+    k: Index
+    l: Index
     a: Array
     b: Array
     c: Array
+    at: Index
+    factor: Array
     offset: Array
     signal: Index
     pair: Index
     joint_i: Index
     joint_j: Index
+
+
+class Coordinates(NamedTuple):
+    """Joint coordinates that forces or couplings act on.
+
+    Attributes:
+        kind: (c,) ALONG or ANGLE; i, j, a, b, c, offset: as in `Rows`.
+    """
+
+    kind: Index
+    i: Index
+    j: Index
+    a: Array
+    b: Array
+    c: Array
+    offset: Array
 
 
 class Forces(NamedTuple):
@@ -113,7 +142,7 @@ class Forces(NamedTuple):
         spring: (s, 3) stiffness [N/m], damping [N s/m], free length [m].
         load_at: (l,) markers; load_kind: (l,) FORCE_WORLD to TORQUE_BODY; load: (l, 3) vector;
         load_signal: (l,) function of time added to the vector, -1 for none.
-        turn_i, turn_j: (t,) markers; turn_a, turn_b, turn_c: (t, 3) axes as in `Rows`, ANGLE;
+        turn_at: (t,) joint coordinates of rotational springs;
         turn: (t, 3) stiffness [N m/rad], damping [N m s/rad], free angle [rad].
     """
 
@@ -124,11 +153,7 @@ class Forces(NamedTuple):
     load_kind: Index
     load: Array
     load_signal: Index
-    turn_i: Index
-    turn_j: Index
-    turn_a: Array
-    turn_b: Array
-    turn_c: Array
+    turn_at: Index
     turn: Array
 
 
@@ -138,6 +163,7 @@ class System(NamedTuple):
     bodies: Bodies
     markers: Markers
     rows: Rows
+    coordinates: Coordinates
     forces: Forces
 
 
@@ -168,11 +194,15 @@ class Work(NamedTuple):
     wrench: Array  # (k, 6) force and moment on each marker
     user: Array  # (k, 6) force and moment from Python functions
     signal: Array  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
+    x: Array  # (c,) joint coordinates, angles followed over whole turns
+    xd: Array  # (c,) their rates
+    xc: Array  # (c,) their convective accelerations
+    xg: Array  # (c, 12) their gradients in the twists of their two markers
     value: Array  # (m,) constraint residual
-    g: Array  # (m, 12) constraint gradient in the twists of its two markers
+    g: Array  # (m, 24) constraint gradient in the twists of its two or four markers
     gamma: Array  # (m,) convective term of the constraint acceleration
     G: Array  # (m, n) constraint gradient in the velocities
-    base: Array  # (t,) angle of each rotational spring at the last accepted instant
+    base: Array  # (c,) joint coordinates at the last accepted instant
     power: Array  # (3,) of drives, forces, dampers
     residual: Array  # (n,) equations of motion
     S: Array  # (n, n) mass and damping part of the iteration matrix
@@ -197,7 +227,7 @@ class Work(NamedTuple):
 def workspace(system: System, n_signals: int) -> Work:
     """Zeroed memory that fits the system."""
     bodies, markers, rows = system.bodies, system.markers, system.rows
-    b, k, m, t = bodies.mass.size, markers.body.size, rows.kind.size, system.forces.turn.shape[0]
+    b, k, m, c = bodies.mass.size, markers.body.size, rows.kind.size, system.coordinates.kind.size
     R = bodies.K.shape[1]
     n = int(6 * b + bodies.r.sum())
     shapes = {
@@ -216,10 +246,11 @@ def workspace(system: System, n_signals: int) -> Work:
         "H": (k, 6, 6 + R),
         "signal": (n_signals, 3),
         **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
-        "g": (m, 12),
+        "g": (m, 24),
+        **dict.fromkeys(("x", "xd", "xc", "base"), (c,)),
+        "xg": (c, 12),
         **dict.fromkeys(("G", "UG", "UGT"), (m, n)),
         "rest": (n, m),
-        "base": (t,),
         "power": (3,),
         **dict.fromkeys(("residual", "weight", "delta"), (n,)),
         **dict.fromkeys(("S", "Kt"), (n, n)),

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.mbs.arrays import ROLL
 from rom.mbs.solution import Solution
 from rom.mbs.validity import DEFORMATION, deformation, softening
 from rom.model import Report, Row
@@ -75,8 +76,14 @@ def _joints(solution: Solution) -> list[Row]:
     if not solution.lam.shape[1]:
         return []
     packed = solution.packed
-    scale = np.where(packed.system.rows.kind <= 1, packed.length, 1.0)
-    return [_row("largest gap in a joint / size", np.abs(solution.gap / scale).max(), GAP)]
+    rolling = packed.system.rows.kind == ROLL
+    gap = np.abs(solution.gap / packed.row_scale)
+    rows = [_row("largest gap in a joint / size", gap[:, ~rolling].max(initial=0.0), GAP)]
+    if rolling.any():
+        speed = max(np.sqrt(2 * solution.energy.kinetic.max() / packed.mass), 1e-300)
+        slip = np.abs(solution.gap[:, rolling]).max() / speed
+        rows.append(_row("largest slip of what rolls / speed", slip, GAP))
+    return rows
 
 
 def _numbers(solution: Solution) -> list[Row]:

@@ -3,8 +3,9 @@
 import math
 
 from rom.mbs.algebra import add, cross, dot, place, row, scale, sub, turn, unit
-from rom.mbs.arrays import ALONG, NORMAL, POINT
+from rom.mbs.arrays import ALONG, ANGLE, COUPLING, DISTANCE, NORMAL, POINT, ROLL, TOUCH
 from rom.mbs.compiled import inner
+from rom.mbs.rolling import rolling_row, rolling_stiffness
 
 
 @inner
@@ -55,6 +56,12 @@ def row_states(R, W):
     zero = (0.0, 0.0, 0.0)
     for k in range(R.kind.size):
         i, j, kind = R.i[k], R.j[k], R.kind[k]
+        if kind == COUPLING:
+            coupling_row(R, k, W)
+            continue
+        if kind in (TOUCH, ROLL):
+            rolling_row(R, k, W)
+            continue
         Oi, Oj, qi, qj = row(W.V, i, 3), row(W.V, j, 3), row(W.conv, i, 3), row(W.conv, j, 3)
         gap = sub(row(W.P, j, 0), row(W.P, i, 0))
         pull = sub(row(W.conv, j, 0), row(W.conv, i, 0))
@@ -65,6 +72,12 @@ def row_states(R, W):
         if kind == POINT:
             W.value[k], W.gamma[k] = dot(a, gap) - target, dot(a, pull)
             set_gradient(W.g, k, scale(-1.0, a), zero, a, zero)
+            continue
+        if kind == DISTANCE:
+            slide = sub(row(W.V, j, 0), row(W.V, i, 0))
+            W.value[k], e, W.gamma[k] = distance_state(gap, slide, pull)
+            W.value[k] -= target
+            set_gradient(W.g, k, scale(-1.0, e), zero, e, zero)
             continue
         a = turn(W.E, i, a)
         if kind == ALONG:
@@ -89,15 +102,65 @@ def row_states(R, W):
 
 
 @inner
+def distance_state(gap, slide, pull):
+    """Length of the gap, its direction and the convective term of its second derivative."""
+    length = math.sqrt(dot(gap, gap))
+    e = scale(1.0 / length, gap)
+    rate = dot(e, slide)
+    return length, e, dot(e, pull) + (dot(slide, slide) - rate * rate) / length
+
+
+@inner
+def coupling_row(R, k, W):
+    """Row k as the weighted sum of two joint coordinates; `coordinate_states` first."""
+    W.value[k], W.gamma[k] = -R.offset[k], 0.0
+    for side in range(2):
+        at, factor = R.at[k, side], R.factor[k, side]
+        W.value[k] += factor * W.x[at]
+        W.gamma[k] += factor * W.xc[at]
+        for p in range(12):
+            W.g[k, 12 * side + p] = factor * W.xg[at, p]
+
+
+@inner
+def coordinate_states(C, W):
+    """Joint coordinates, rates, convective terms and gradients; angles near the last accepted."""
+    zero = (0.0, 0.0, 0.0)
+    for k in range(C.kind.size):
+        i, j = C.i[k], C.j[k]
+        a = turn(W.E, i, row(C.a, k, 0))
+        Vi, Oi, Oj = row(W.V, i, 0), row(W.V, i, 3), row(W.V, j, 3)
+        qi, qj = row(W.conv, i, 3), row(W.conv, j, 3)
+        if C.kind[k] == ALONG:
+            gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), Vi)
+            pull, da = sub(row(W.conv, j, 0), row(W.conv, i, 0)), cross(Oi, a)
+            swing = add(cross(qi, a), cross(Oi, da))
+            W.x[k] = dot(a, gap) - C.offset[k]
+            W.xd[k] = dot(a, slide) + dot(da, gap)
+            W.xc[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+            set_gradient(W.xg, k, scale(-1.0, a), cross(a, gap), a, zero)
+        else:
+            b, c = turn(W.E, j, row(C.b, k, 0)), turn(W.E, i, row(C.c, k, 0))
+            angle, W.xd[k], W.xc[k], axis = angle_state(a, c, b, Oi, Oj, qi, qj)
+            W.x[k] = W.base[k] + wrapped(angle - C.offset[k] - W.base[k])
+            set_gradient(W.xg, k, zero, scale(-1.0, axis), zero, axis)
+
+
+@inner
+def follow_coordinates(W):
+    """Accept the present angles as those the next ones are followed from."""
+    W.base[:] = W.x
+
+
+@inner
 def constraint_gradient(s, W):
     """Assemble G (m, n), the gradient of all rows in the velocities."""
     B, K, R, G = s.bodies, s.markers, s.rows, W.G
     for k in range(R.kind.size):
         for t in range(G.shape[1]):
             G[k, t] = 0.0
-        for side in range(2):
-            m = R.i[k] if side == 0 else R.j[k]
-            b = K.body[m]
+        for side, m in enumerate((R.i[k], R.j[k], R.k[k], R.l[k])):
+            b = K.body[m] if m >= 0 else -1
             if b < 0:
                 continue
             t, H = B.v_at[b], W.H[m]
@@ -116,6 +179,10 @@ def constraint_wrench(s, W, lam):
         for p in range(6):
             W.wrench[R.i[k], p] -= lam[k] * W.g[k, p]
             W.wrench[R.j[k], p] -= lam[k] * W.g[k, 6 + p]
+        if R.k[k] >= 0:
+            for p in range(6):
+                W.wrench[R.k[k], p] -= lam[k] * W.g[k, 12 + p]
+                W.wrench[R.l[k], p] -= lam[k] * W.g[k, 18 + p]
 
 
 @inner
@@ -123,6 +190,15 @@ def add_cross_product(Q, i, j, c, a, b):
     """Add c skew(a) skew(b) to Q from (i, j)."""
     for k in range(3):
         place(Q, i, j + k, c, cross(a, cross(b, unit(k))))
+
+
+@inner
+def place_relative(Q, at, p, c, x):
+    """Add the block column c x of a quantity that acts on j - i, with opposite signs on both."""
+    place(Q, at, at + p, c, x)
+    place(Q, at, 6 + at + p, -c, x)
+    place(Q, 6 + at, at + p, -c, x)
+    place(Q, 6 + at, 6 + at + p, c, x)
 
 
 @inner
@@ -145,7 +221,12 @@ def row_stiffness(kind, a, b, gap, axis, c, Q):
         add_cross_product(Q, 3, 9, -c, a, b)
         add_cross_product(Q, 9, 3, -c, b, a)
         add_cross_product(Q, 9, 9, c, a, b)
-    else:
+    elif kind == DISTANCE:
+        length = math.sqrt(dot(gap, gap))
+        e = scale(1.0 / length, gap)
+        for p in range(3):
+            place_relative(Q, 0, p, c / length, sub(unit(p), scale(e[p], e)))
+    elif kind == ANGLE:
         for p in range(3):
             x = cross(axis, unit(p))
             place(Q, 3, 3 + p, c, x)
@@ -194,6 +275,25 @@ def constraint_stiffness(s, W, lam, c, S):
                 a, b = turn(W.E, i, row(R.a, k, 0)), turn(W.E, j, row(R.b, k, 0))
                 gap = sub(row(W.P, j, 0), row(W.P, i, 0))
                 row_stiffness(R.kind[k], a, b, gap, row(W.g, k, 9), c * lam[k], W.Q)
+                if R.kind[k] in (TOUCH, ROLL):
+                    rolling_stiffness(R, k, W, c * lam[k])
                 found = True
         if found:
             pair_stiffness(s, W, R.joint_i[joint], R.joint_j[joint], S)
+    for k in range(R.kind.size):
+        if R.kind[k] == COUPLING:
+            for side in range(2):
+                W.Q[:] = 0.0
+                coordinate_stiffness(s, W, R.at[k, side], c * lam[k] * R.factor[k, side])
+                C, at = s.coordinates, R.at[k, side]
+                pair_stiffness(s, W, C.i[at], C.j[at], S)
+
+
+@inner
+def coordinate_stiffness(s, W, at, c):
+    """Add c times the derivative of the gradient of a joint coordinate to W.Q."""
+    C = s.coordinates
+    i, j = C.i[at], C.j[at]
+    a, b = turn(W.E, i, row(C.a, at, 0)), turn(W.E, j, row(C.b, at, 0))
+    gap = sub(row(W.P, j, 0), row(W.P, i, 0))
+    row_stiffness(C.kind[at], a, b, gap, row(W.xg, at, 9), c, W.Q)

@@ -5,7 +5,7 @@ import math
 from rom.mbs.algebra import add, cross, dot, place, put, row, scale, sub, turn, unit
 from rom.mbs.arrays import FORCE_BODY, FORCE_WORLD, TORQUE_BODY
 from rom.mbs.compiled import inner
-from rom.mbs.constraints import angle_state, pair_stiffness, wrapped
+from rom.mbs.constraints import coordinate_stiffness, pair_stiffness, place_relative
 
 
 @inner
@@ -19,15 +19,19 @@ def spring_state(spring, k, i, j, P, V):
 
 
 @inner
-def turn_state(F, k, E, V, base):
-    """Angle (followed over whole turns), rate, axis and moment of rotational spring k."""
-    i, j = F.turn_i[k], F.turn_j[k]
-    a, c = turn(E, i, row(F.turn_a, k, 0)), turn(E, i, row(F.turn_c, k, 0))
-    b, zero = turn(E, j, row(F.turn_b, k, 0)), (0.0, 0.0, 0.0)
-    angle, rate, _, axis = angle_state(a, c, b, row(V, i, 3), row(V, j, 3), zero, zero)
-    angle = base[k] + wrapped(angle - base[k])
-    moment = F.turn[k, 0] * (angle - F.turn[k, 2]) + F.turn[k, 1] * rate
-    return angle, rate, axis, moment
+def turn_moment(F, k, W):
+    """Moment with which rotational spring k drives its joint coordinate."""
+    at = F.turn_at[k]
+    return -F.turn[k, 0] * (W.x[at] - F.turn[k, 2]) - F.turn[k, 1] * W.xd[at]
+
+
+@inner
+def push_coordinate(s, W, at, force):
+    """Add the wrenches of a force on joint coordinate ``at`` to its markers."""
+    C = s.coordinates
+    for p in range(6):
+        W.wrench[C.i[at], p] += force * W.xg[at, p]
+        W.wrench[C.j[at], p] += force * W.xg[at, 6 + p]
 
 
 @inner
@@ -53,26 +57,15 @@ def applied_wrenches(s, W):
         put(W.wrench[F.spring_i[k]], 0, scale(tension, e))
         put(W.wrench[F.spring_j[k]], 0, scale(-tension, e))
         W.power[2] += F.spring[k, 1] * rate * rate
-    for k in range(F.turn_i.size):
-        _, rate, axis, moment = turn_state(F, k, W.E, W.V, W.base)
-        put(W.wrench[F.turn_i[k]], 3, scale(moment, axis))
-        put(W.wrench[F.turn_j[k]], 3, scale(-moment, axis))
-        W.power[2] += F.turn[k, 1] * rate * rate
+    for k in range(F.turn_at.size):
+        push_coordinate(s, W, F.turn_at[k], turn_moment(F, k, W))
+        W.power[2] += F.turn[k, 1] * W.xd[F.turn_at[k]] ** 2
     for k in range(F.load_at.size):
         kind = F.load_kind[k]
         at = 0 if kind in (FORCE_WORLD, FORCE_BODY) else 3
         x, m = load_vector(F, k, W.E, W.signal), F.load_at[k]
         put(W.wrench[m], at, x)
         W.power[1] += dot(x, row(W.V, m, at))
-
-
-@inner
-def place_relative(Q, at, p, c, x):
-    """Add the block column c x of a quantity that acts on j - i, with opposite signs on both."""
-    place(Q, at, at + p, c, x)
-    place(Q, at, 6 + at + p, -c, x)
-    place(Q, 6 + at, at + p, -c, x)
-    place(Q, 6 + at, 6 + at + p, c, x)
 
 
 @inner
@@ -100,22 +93,25 @@ def spring_tangent(s, W, k, ck, cc, K, S):
 
 
 @inner
-def turn_tangent(s, W, k, ck, cc, K, S):
-    """Add ck times the stiffness of rotational spring k to K and cc times its damping to S."""
-    F = s.forces
-    _, _, axis, moment = turn_state(F, k, W.E, W.V, W.base)
+def coordinate_tangent(s, W, at, law, K, S):
+    """Add the tangents of a force on joint coordinate ``at`` to K and S.
+
+    ``law`` holds the force and its derivative by the coordinate, both times the factor of K, and
+    the derivative by the rate, times the factor of S.
+    """
+    force, stiffness, damping = law
+    C = s.coordinates
     W.Q[:] = 0.0
-    for p in range(3):
-        place_relative(W.Q, 3, p, ck * F.turn[k, 0] * axis[p], axis)
-        x = cross(axis, unit(p))
-        place(W.Q, 3, 3 + p, ck * moment, x)
-        place(W.Q, 9, 3 + p, -ck * moment, x)
-    pair_stiffness(s, W, F.turn_i[k], F.turn_j[k], K)
-    if F.turn[k, 1] != 0.0:
-        W.Q[:] = 0.0
-        for p in range(3):
-            place_relative(W.Q, 3, p, cc * F.turn[k, 1] * axis[p], axis)
-        pair_stiffness(s, W, F.turn_i[k], F.turn_j[k], S)
+    coordinate_stiffness(s, W, at, -force)
+    for p in range(12):
+        for q in range(12):
+            W.Q[p, q] -= stiffness * W.xg[at, p] * W.xg[at, q]
+    pair_stiffness(s, W, C.i[at], C.j[at], K)
+    if damping != 0.0:
+        for p in range(12):
+            for q in range(12):
+                W.Q[p, q] = -damping * W.xg[at, p] * W.xg[at, q]
+        pair_stiffness(s, W, C.i[at], C.j[at], S)
 
 
 @inner
@@ -124,8 +120,10 @@ def force_tangents(s, W, ck, cc, K, S):
     F = s.forces
     for k in range(F.spring_i.size):
         spring_tangent(s, W, k, ck, cc, K, S)
-    for k in range(F.turn_i.size):
-        turn_tangent(s, W, k, ck, cc, K, S)
+    for k in range(F.turn_at.size):
+        moment, turn = turn_moment(F, k, W), F.turn
+        law = ck * moment, -ck * turn[k, 0], -cc * turn[k, 1]
+        coordinate_tangent(s, W, F.turn_at[k], law, K, S)
     for k in range(F.load_at.size):
         kind, m = F.load_kind[k], F.load_at[k]
         if kind in (FORCE_BODY, TORQUE_BODY):
@@ -144,15 +142,6 @@ def spring_energy(s, W):
     for k in range(F.spring_i.size):
         length = spring_state(F.spring, k, F.spring_i[k], F.spring_j[k], W.P, W.V)[0]
         total += 0.5 * F.spring[k, 0] * (length - F.spring[k, 2]) ** 2
-    for k in range(F.turn_i.size):
-        angle = turn_state(F, k, W.E, W.V, W.base)[0]
-        total += 0.5 * F.turn[k, 0] * (angle - F.turn[k, 2]) ** 2
+    for k in range(F.turn_at.size):
+        total += 0.5 * F.turn[k, 0] * (W.x[F.turn_at[k]] - F.turn[k, 2]) ** 2
     return total
-
-
-@inner
-def follow_angles(s, W):
-    """Accept the present angles as those the next ones are followed from."""
-    F = s.forces
-    for k in range(F.turn_i.size):
-        W.base[k] = turn_state(F, k, W.E, W.V, W.base)[0]

@@ -8,7 +8,7 @@ import numpy as np
 from rom.errors import SolverError
 from rom.mbs import alpha
 from rom.mbs.alpha import Step
-from rom.mbs.arrays import Work
+from rom.mbs.arrays import ROLL, Work
 from rom.mbs.motion import evaluate, linearise, moved
 from rom.mbs.record import Record
 from rom.mbs.signals import first_failure, sample_all
@@ -103,7 +103,8 @@ def _measured(
         shift[t + 3 : t + 6] += np.cross(state.v[t + 3 : t + 6], state.a[t + 3 : t + 6]) / 12
     linearise(record.packed.system, W, state.q, state.v)
     across = W.G @ np.linalg.solve(W.S, W.G.T)
-    y = np.linalg.lstsq(across, W.G @ shift, rcond=1e-10)[0]
+    rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
+    y = np.linalg.lstsq(across, np.where(rolling, 0.0, W.G @ shift), rcond=1e-10)[0]
     v = state.v + h**2 * np.linalg.solve(W.S, W.G.T @ y)
     return replace(state, algorithmic=state.a + lag * h * jerk), v
 

@@ -108,12 +108,12 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
 
 def _check_fit(state: Any, packed: Packed) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
-    turns = packed.system.forces.turn.shape[0]
-    base = np.zeros(turns) if state.base is None else state.base
-    q, v, lam, coils = (np.size(x) for x in (state.q, state.v, state.lam, base))
-    needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size, turns)
-    if (q, v, lam, coils) != needed:
+    followed = packed.system.coordinates.kind.size
+    base = np.zeros(followed) if state.base is None else state.base
+    q, v, lam, angles = (np.size(x) for x in (state.q, state.v, state.lam, base))
+    needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size, followed)
+    if (q, v, lam, angles) != needed:
         raise ConfigError(
-            f"the state has {q} coordinates and {v} velocities, {lam} constraints and {coils} "
-            "rotational springs; this mechanism has {}, {}, {} and {}.".format(*needed)
+            f"the state has {q} coordinates and {v} velocities, {lam} constraints and {angles} "
+            "followed joint coordinates; this mechanism has {}, {}, {} and {}.".format(*needed)
         )

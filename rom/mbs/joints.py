@@ -1,27 +1,33 @@
 """Joints, written as scalar constraints between two markers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.mbs.arrays import ALONG, ANGLE, NORMAL, POINT
+from rom.mbs.arrays import ALONG, ANGLE, COUPLING, DISTANCE, NORMAL, POINT, ROLL, TOUCH
 from rom.mbs.parts import Marker
 from rom.model import Array
 
 ZERO = np.zeros(3)
+TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One scalar constraint; see `rom.mbs.arrays.Rows` for kinds and axes."""
+    """One scalar constraint; see `rom.mbs.arrays.Rows` for kinds and axes.
+
+    A coupling has two terms: the rows that measure joint coordinates, and their factors.
+    """
 
     kind: int
     a: Array
     b: Array
     c: Array
     offset: float = 0.0
+    radius: float = 0.0
+    terms: tuple[tuple["Row", float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +41,7 @@ class Joint:
         rows: the constraints.
         coordinate: the row that measures the joint coordinate, or None.
         turn: the row that measures the angle, or None.
+        way: the row that measures the way along the axis, or None.
     """
 
     name: str
@@ -43,6 +50,7 @@ class Joint:
     rows: tuple[Row, ...]
     coordinate: Row | None = None
     turn: Row | None = None
+    way: Row | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +91,8 @@ def revolute(name: str, markers: Any, frames: Any, _gap: Array, axis: Array) -> 
     """One point and one axis in common."""
     t = triad(axis, frames)
     rows = (*coincidence(), t.normal(0, 2), t.normal(1, 2))
-    return Joint(name, "revolute", markers, rows, t.angle(), t.angle())
+    angle = t.angle()
+    return Joint(name, "revolute", markers, rows, angle, angle)
 
 
 def spherical(name: str, markers: Any, _frames: Any, _gap: Array) -> Joint:
@@ -91,11 +100,12 @@ def spherical(name: str, markers: Any, _frames: Any, _gap: Array) -> Joint:
     return Joint(name, "spherical", markers, coincidence())
 
 
-def cylindrical(name: str, markers: Any, frames: Any, _gap: Array, axis: Array) -> Joint:
+def cylindrical(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> Joint:
     """One axis in common; the second point lies on the axis through the first."""
     t = triad(axis, frames)
     rows = (t.along(0, ZERO), t.along(1, ZERO), t.normal(0, 2), t.normal(1, 2))
-    return Joint(name, "cylindrical", markers, rows, t.angle(), t.angle())
+    angle = t.angle()
+    return Joint(name, "cylindrical", markers, rows, angle, angle, t.along(2, frames[0].T @ gap))
 
 
 def prismatic(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> Joint:
@@ -105,7 +115,8 @@ def prismatic(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> 
         *(t.along(0, ZERO), t.along(1, ZERO)),
         *(t.normal(0, 2), t.normal(1, 2), t.normal(0, 1)),
     )
-    return Joint(name, "prismatic", markers, rows, t.along(2, frames[0].T @ gap))
+    way = t.along(2, frames[0].T @ gap)
+    return Joint(name, "prismatic", markers, rows, way, None, way)
 
 
 def universal(
@@ -125,3 +136,65 @@ def fixed(name: str, markers: Any, frames: Any, _gap: Array) -> Joint:
     t = triad(np.array([0.0, 0.0, 1.0]), frames)
     rows = (*coincidence(), t.normal(0, 1), t.normal(1, 2), t.normal(2, 0))
     return Joint(name, "fixed", markers, rows)
+
+
+def screw(name: str, markers: Any, frames: Any, gap: Array, axis: Array, *, pitch: float) -> Joint:
+    """Cylindrical, the way a multiple of the angle."""
+    joint = cylindrical(name, markers, frames, gap, axis)
+    lead = Row(COUPLING, ZERO, ZERO, ZERO, terms=((joint.way, 1.0), (joint.turn, -pitch / TURN)))
+    return replace(joint, kind="screw", rows=(*joint.rows, lead))
+
+
+def planar(name: str, markers: Any, frames: Any, _gap: Array, normal: Array) -> Joint:
+    """One plane in common: the second point slides in it, the body turns about its normal."""
+    t = triad(normal, frames)
+    angle = t.angle()
+    rows = (t.along(2, ZERO), t.normal(0, 2), t.normal(1, 2))
+    return Joint(name, "planar", markers, rows, angle, angle)
+
+
+def point_on_line(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> Joint:
+    """The second point stays on a line of the first body."""
+    t = triad(axis, frames)
+    way = t.along(2, frames[0].T @ gap)
+    return Joint(
+        name, "point on line", markers, (t.along(0, ZERO), t.along(1, ZERO)), way, None, way
+    )
+
+
+def point_on_plane(name: str, markers: Any, frames: Any, _gap: Array, normal: Array) -> Joint:
+    """The second point stays in a plane of the first body."""
+    return Joint(name, "point on plane", markers, (triad(normal, frames).along(2, ZERO),))
+
+
+def distance(name: str, markers: Any, _frames: Any, gap: Array, *, length: float | None) -> Joint:
+    """Two points stay as far apart as they are, or as said."""
+    apart = float(np.linalg.norm(gap))
+    if apart == 0.0:
+        raise ConfigError(
+            f"the points of joint {name!r} coincide: a rod of length zero has no direction.",
+            hint="Use a spherical joint.",
+        )
+    row = Row(DISTANCE, ZERO, ZERO, ZERO, apart if length is None else length)
+    return Joint(name, "distance", markers, (row,))
+
+
+def rolling(
+    name: str, markers: Any, frames: Any, _gap: Array, *axes: Array, radius: float
+) -> Joint:
+    """A ball, or with a second axis a wheel, that touches a plane and rolls on it."""
+    normal, *spin = axes
+    if spin and abs(normal @ spin[0]) > 1 - 1e-6:
+        raise ConfigError(f"the wheel of joint {name!r} lies flat on its plane: it cannot roll.")
+    t = triad(normal, frames)
+    s = frames[1].T @ spin[0] if spin else ZERO
+    n = t.one[:, 2]
+    touch = Row(TOUCH, n, s, n, radius=radius)
+    rows = tuple(Row(ROLL, t.one[:, i], s, n, radius=radius) for i in (0, 1))
+    return Joint(name, "rolling", markers, (touch, *rows))
+
+
+def coupling(name: str, first: Joint, second: Joint, rows: Any, ratio: float) -> Joint:
+    """The second joint coordinate is a multiple of the first."""
+    row = Row(COUPLING, ZERO, ZERO, ZERO, terms=((rows[1], 1.0), (rows[0], -ratio)))
+    return Joint(name, "coupling", (*second.markers, *first.markers), (row,))

@@ -8,24 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.errors import ConfigError, ModelError
-from rom.mbs import joints
-from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion, unit_vector
+from rom.errors import ConfigError
+from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion
+from rom.mbs.connections import Connections, Drive, TimeFunction
 from rom.mbs.joints import Joint
 from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.model import Array
-
-TimeFunction = Callable[[float], Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """A joint coordinate prescribed in time, with its rate and acceleration or None."""
-
-    joint: str
-    function: TimeFunction
-    rate: TimeFunction | None
-    acceleration: TimeFunction | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +57,7 @@ class UserForce:
 
 
 @dataclass
-class Mechanism:
+class Mechanism(Connections):
     """Rigid and flexible bodies, connected and loaded.
 
     Joints are defined in the position in which the bodies are added, flexible bodies
@@ -167,60 +155,6 @@ class Mechanism:
             flexible_part(name, body, _pose(at, orientation, velocity, omega), elastic)
         )
 
-    def revolute(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-        """Hinge about ``axis`` (3,), world at the start; five constraints."""
-        self._join(name, m1, m2, joints.revolute, axis)
-
-    def cylindrical(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-        """Rotation about and sliding along ``axis`` (3,), world at the start; four constraints."""
-        self._join(name, m1, m2, joints.cylindrical, axis)
-
-    def prismatic(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-        """Sliding along ``axis`` (3,), world at the start; five constraints."""
-        self._join(name, m1, m2, joints.prismatic, axis)
-
-    def spherical(self, name: str, m1: Marker, m2: Marker) -> None:
-        """Ball joint; three constraints."""
-        self._join(name, m1, m2, joints.spherical)
-
-    def universal(
-        self, name: str, m1: Marker, m2: Marker, *, axis1: npt.ArrayLike, axis2: npt.ArrayLike
-    ) -> None:
-        """Cardan joint: ``axis1`` on m1 stays perpendicular to ``axis2`` on m2; four constraints.
-
-        Raises:
-            ConfigError: if the axes are not perpendicular at the start.
-        """
-        self._join(name, m1, m2, joints.universal, axis1, axis2)
-
-    def fixed(self, name: str, m1: Marker, m2: Marker) -> None:
-        """Weld; six constraints."""
-        self._join(name, m1, m2, joints.fixed)
-
-    def drive(
-        self,
-        name: str,
-        joint: str,
-        function: TimeFunction,
-        *,
-        rate: TimeFunction | None = None,
-        acceleration: TimeFunction | None = None,
-    ) -> None:
-        """Prescribe the angle of a revolute or cylindrical joint, or the way of a prismatic one.
-
-        The coordinate is that of the second marker relative to the first, from the position in
-        which the bodies were added. Missing derivatives are taken by finite differences.
-
-        Raises:
-            ConfigError: if the joint is unknown or has no coordinate to drive.
-        """
-        self._check_new(name)
-        self._joint_with_axis(joint, "drive")
-        for what, f in (("function", function), ("rate", rate), ("acceleration", acceleration)):
-            if f is not None and not callable(f):
-                raise ConfigError(f"{what} of drive {name!r} is {f!r}, not a function of time.")
-        self.drives[name] = Drive(joint, function, rate, acceleration)
-
     def spring_damper(
         self,
         name: str,
@@ -308,40 +242,6 @@ class Mechanism:
         self._check_new(part.name)
         self.parts[part.name] = part
         return part
-
-    def _join(self, name: str, m1: Marker, m2: Marker, kind: Callable[..., Joint], *axes: Any):
-        self._check_new(name)
-        self._check_markers(name, m1, m2)
-        if m1.body == m2.body:
-            raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself.")
-        A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
-        gap = self.design_point(m2) - self.design_point(m1)
-        directions = [unit_vector(f"axis of {name}", axis) for axis in axes]
-        joint = kind(name, (m1, m2), (A1, A2), gap, *directions)
-        self._refuse_free_free(joint)
-        self.joints[name] = joint
-
-    def _refuse_free_free(self, joint: Joint) -> None:
-        """Free-free modes carry no moment to an interface, so that no joint may transmit one."""
-        for marker in joint.markers if joint.kind != "spherical" else ():
-            body = self.part(marker.body).flexible
-            if body is not None and not body.has_static_shapes:
-                raise ModelError(
-                    f"{joint.kind} joint {joint.name!r} transmits moments, and body "
-                    f"{marker.body!r} has free-free modes only: it would be too stiff by tens of "
-                    "per cents and without stress at the joint.",
-                    hint="Reduce the body with CraigBampton or Rubin, which know the interfaces.",
-                )
-
-    def _joint_with_axis(self, joint: str, what: str) -> Joint:
-        if joint not in self.joints:
-            raise ConfigError(f"{what}: no joint {joint!r}; there are {sorted(self.joints)}.")
-        if self.joints[joint].coordinate is None:
-            raise ConfigError(
-                f"{what}: joint {joint!r} is {self.joints[joint].kind}; only revolute, "
-                "cylindrical and prismatic joints have a coordinate."
-            )
-        return self.joints[joint]
 
     def _load(self, name: str, marker: Marker, vector: Any, frame: str, kind: int) -> None:
         self._check_new(name)

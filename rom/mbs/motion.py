@@ -8,6 +8,8 @@ from rom.mbs.constraints import (
     constraint_gradient,
     constraint_stiffness,
     constraint_wrench,
+    coordinate_states,
+    follow_coordinates,
     row_states,
 )
 from rom.mbs.dynamics import (
@@ -17,7 +19,7 @@ from rom.mbs.dynamics import (
     body_states,
     body_stiffness,
 )
-from rom.mbs.forces import applied_wrenches, follow_angles, force_tangents
+from rom.mbs.forces import applied_wrenches, force_tangents
 from rom.mbs.kinematics import marker_states, spread_wrench, wrench_stiffness
 
 
@@ -26,6 +28,7 @@ def evaluate(s, W, q, v):
     """All quantities that depend on coordinates, velocities and signals only."""
     body_states(s.bodies, W, q, v)
     marker_states(s, W, q, v)
+    coordinate_states(s.coordinates, W)
     row_states(s.rows, W)
 
 
@@ -218,7 +221,7 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     solve_bordered(W, n, rank, a, lam)
     drive_power(s, W, lam)
     if accepted:
-        follow_angles(s, W)
+        follow_coordinates(W)
     coordinate_rates(s, q, v, out[:n_q])
     out[n_q : n_q + n] = a
     out[n_q + n :] = W.power

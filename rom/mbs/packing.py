@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.mbs import joints
-from rom.mbs.arrays import Bodies, Forces, Markers, Rows, System
+from rom.mbs.arrays import ALONG, LENGTHS, Bodies, Coordinates, Forces, Markers, Rows, System
+from rom.mbs.joints import Joint, Row
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import GROUND, Marker, Part
 from rom.mbs.signals import Signal, drive_signal, load_signal
@@ -43,6 +43,14 @@ class Packed:
         """Numbers of the constraint rows of a joint or drive."""
         return np.array([k for k, owner in enumerate(self.row_owner) if owner == joint], dtype=int)
 
+    @property
+    def row_scale(self) -> Array:
+        """(m,) length of the mechanism for rows that measure lengths, one for the others."""
+        rows = self.system.rows
+        way = [k >= 0 and self.system.coordinates.kind[k] == ALONG for k in rows.at[:, 0]]
+        lengths = np.isin(rows.kind, LENGTHS) | np.array(way, dtype=bool)
+        return np.where(lengths, self.length, 1.0)
+
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""
         return self.markers[marker]
@@ -59,13 +67,15 @@ def pack(mechanism: Mechanism) -> Packed:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")
     handles = _all_markers(mechanism, parts)
     index = {marker: k for k, marker in enumerate(handles)}
-    rows, owners, signals = _rows(mechanism, index)
-    forces, loads = _forces(mechanism, index, len(signals))
+    coordinates = _Coordinates()
+    rows, owners, signals = _rows(mechanism, index, coordinates)
+    forces, loads = _forces(mechanism, index, len(signals), coordinates)
     R = max(part.r for part in parts)
     system = System(
         _bodies(parts, R, np.asarray(mechanism.gravity)),
         _markers(mechanism, handles, R),
         rows,
+        coordinates.packed(index),
         forces,
     )
     return Packed(
@@ -181,7 +191,34 @@ def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
     )
 
 
-def _rows(mechanism: Mechanism, index: dict[Marker, int]) -> tuple[Rows, tuple, list[Signal]]:
+class _Coordinates:
+    """Joint coordinates that something acts on, each once."""
+
+    def __init__(self):
+        self.found: list[tuple[tuple[Marker, Marker], Row]] = []
+
+    def number(self, markers: tuple[Marker, ...], row: Row) -> int:
+        """Number of the coordinate that ``row`` measures between two markers."""
+        for k, (_, known) in enumerate(self.found):
+            if known is row:
+                return k
+        self.found.append(((markers[0], markers[1]), row))
+        return len(self.found) - 1
+
+    def packed(self, index: dict[Marker, int]) -> Coordinates:
+        """All of them as arrays."""
+        rows = [row for _, row in self.found]
+        return Coordinates(
+            _integers([row.kind for row in rows]),
+            *(_integers([index[m[side]] for m, _ in self.found]) for side in (0, 1)),
+            *(_vectors([getattr(row, axis) for row in rows]) for axis in "abc"),
+            np.array([row.offset for row in rows], dtype=float),
+        )
+
+
+def _rows(
+    mechanism: Mechanism, index: dict[Marker, int], coordinates: _Coordinates
+) -> tuple[Rows, tuple, list[Signal]]:
     entries, signals = [], []
     for pair, (name, joint) in enumerate(mechanism.joints.items()):
         entries += [(name, pair, joint, row, -1) for row in joint.rows]
@@ -190,14 +227,16 @@ def _rows(mechanism: Mechanism, index: dict[Marker, int]) -> tuple[Rows, tuple, 
         pair = list(mechanism.joints).index(drive.joint)
         entries.append((name, pair, joint, joint.coordinate, len(signals)))
         signals.append(drive_signal(name, drive))
-    sides = [[index[joint.markers[side]] for _, _, joint, _, _ in entries] for side in (0, 1)]
+    sides = [[_marker(index, joint, row, k) for _, _, joint, row, _ in entries] for k in range(4)]
     joint_sides = [[index[j.markers[side]] for j in mechanism.joints.values()] for side in (0, 1)]
     rows = [row for _, _, _, row, _ in entries]
+    terms = [_terms(joint, row, coordinates) for _, _, joint, row, _ in entries]
     packed = Rows(
         _integers([row.kind for row in rows]),
-        _integers(sides[0]),
-        _integers(sides[1]),
+        *(_integers(side) for side in sides),
         *(_vectors([getattr(row, axis) for row in rows]) for axis in "abc"),
+        _integers([at for at, _ in terms]).reshape(-1, 2),
+        np.array([factor for _, factor in terms], dtype=float).reshape(-1, 2),
         np.array([row.offset for row in rows], dtype=float),
         _integers([entry[4] for entry in entries]),
         _integers([entry[1] for entry in entries]),
@@ -205,6 +244,25 @@ def _rows(mechanism: Mechanism, index: dict[Marker, int]) -> tuple[Rows, tuple, 
         _integers(joint_sides[1]),
     )
     return packed, tuple(entry[0] for entry in entries), signals
+
+
+def _marker(index: dict[Marker, int], joint: Joint, row: Row, k: int) -> int:
+    """Marker of side k of a row; the two terms of a screw share the markers of their joint."""
+    if k >= 2 and not row.terms:
+        return -1
+    return index[joint.markers[k % len(joint.markers)]]
+
+
+def _terms(
+    joint: Joint, row: Row, coordinates: _Coordinates
+) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Joint coordinates of a coupling and their factors; the radius of a rolling row."""
+    if not row.terms:
+        return (-1, -1), (row.radius, 0.0)
+    (one, f1), (two, f2) = row.terms
+    markers = joint.markers
+    at = coordinates.number(markers[:2], one), coordinates.number(markers[-2:], two)
+    return at, (f1, f2)
 
 
 def _integers(values: Any) -> Any:
@@ -216,11 +274,10 @@ def _vectors(values: Any) -> Array:
 
 
 def _forces(
-    mechanism: Mechanism, index: dict[Marker, int], n_drives: int
+    mechanism: Mechanism, index: dict[Marker, int], n_drives: int, coordinates: _Coordinates
 ) -> tuple[Forces, list[Signal]]:
-    springs, loads = mechanism.springs.values(), mechanism.loads
-    turns = [(mechanism.joints[t.joint], t) for t in mechanism.turns.values()]
-    axes: list[joints.Row] = [joint.turn for joint, _ in turns]
+    springs, loads, turns = mechanism.springs.values(), mechanism.loads, mechanism.turns.values()
+    coiled = [mechanism.joints[t.joint] for t in turns]
     signals, at = [], []
     for name, load in loads.items():
         at.append(n_drives + len(signals) if load.function else -1)
@@ -233,9 +290,7 @@ def _forces(
         _integers([load.kind for load in loads.values()]),
         _vectors([load.vector for load in loads.values()]),
         _integers(at),
-        _integers([index[joint.markers[0]] for joint, _ in turns]),
-        _integers([index[joint.markers[1]] for joint, _ in turns]),
-        *(_vectors([getattr(row, axis) for row in axes]) for axis in "abc"),
-        _vectors([(t.stiffness, t.damping, t.free_angle) for _, t in turns]),
+        _integers([coordinates.number(joint.markers, joint.turn) for joint in coiled]),
+        _vectors([(t.stiffness, t.damping, t.free_angle) for t in turns]),
     )
     return forces, signals

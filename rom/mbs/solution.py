@@ -60,7 +60,8 @@ class Solution:
             `rom.mbs.state.State`.
         lam: (n_t, m) constraint multipliers.
         work: (n_t, 3) work of drives, of forces, lost in dampers [J].
-        base: (n_t, t) angles of the rotational springs, counted over whole turns [rad].
+        base: (n_t, c) joint coordinates that forces or couplings act on, angles counted over
+            whole turns [m, or rad].
         signals: (n_t, s, 3) prescribed functions of time.
         statistics: steps, iterations, times.
         status: one sentence on how the run ended.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ModelError, RomWarning, SolverError
-from rom.mbs.arrays import Work, workspace
+from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.motion import evaluate, linearise, moved, rates
 from rom.mbs.packing import Packed
 from rom.mbs.signals import first_failure, sample_all
@@ -35,7 +35,8 @@ class State:
         lam: (m,) multipliers of the constraints.
         rank: number of independent constraints.
         algorithmic: (n,) acceleration-like variable of generalised-alpha, None at a fresh start.
-        base: (t,) angles of the rotational springs, counted over whole turns; None: as measured.
+        base: (c,) joint coordinates that forces or couplings act on, angles counted over whole
+            turns; None: as measured.
     """
 
     t: float
@@ -97,12 +98,12 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
     q, v = q.copy(), np.zeros(packed.v.size)
     if not W.value.size:
         return q
-    scale = _row_scale(packed)
+    scale, held = packed.row_scale, packed.system.rows.kind != ROLL
     weight = None
     for _ in range(MAX_ASSEMBLY):
         linearise(packed.system, W, q, v)
         weight = _weights(packed, W) if weight is None else weight
-        step = -_least_change(W.G / scale[:, None], W.value / scale, weight)
+        step = -_least_change((W.G / scale[:, None])[held], (W.value / scale)[held], weight)
         largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
         moved(packed.system, q.copy(), _limited(packed, step), q)
         if largest < 1e-15 or not np.isfinite(largest):
@@ -133,11 +134,6 @@ def _check_gap(packed: Packed, gap: Array) -> None:
             where=packed.row_owner[k],
             hint="Joints contradict each other: check positions, axes and drives.",
         )
-
-
-def _row_scale(packed: Packed) -> Array:
-    """Lengths are measured by the size of the mechanism, rows of axes and angles as they are."""
-    return np.where(packed.system.rows.kind <= 1, packed.length, 1.0)
 
 
 def _weights(packed: Packed, W: Work) -> Array:
