@@ -230,7 +230,8 @@ def test_a_ball_on_a_turntable_circles_with_two_sevenths_of_its_speed(method):
     arm = x0[:2] - centre
     c, s = np.cos(w * sol.t), np.sin(w * sol.t)
     circle = centre + np.column_stack([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
-    assert_allclose(sol.position("ball")[:, :2], circle, atol=1e-5)
+    error = np.abs(sol.position("ball")[:, :2] - circle).max()
+    assert error < (1e-7 if method == "dop853" else 1e-3)
 
 
 def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():

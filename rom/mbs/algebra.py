@@ -114,6 +114,17 @@ def unit(j):
 
 
 @inner
+def unit_twist(p):
+    """Velocities and angular velocities of two markers in unit motion p of twelve."""
+    zero, x = (0.0, 0.0, 0.0), unit(p % 3)
+    if p < 3:
+        return x, zero, zero, zero
+    if p < 6:
+        return zero, x, zero, zero
+    return (zero, zero, x, zero) if p < 9 else (zero, zero, zero, x)
+
+
+@inner
 def rotation(q, at, A):
     """Write the matrix of the quaternion q[at:at+4], scaled to unit length, into A."""
     e0, e1, e2, e3 = q[at], q[at + 1], q[at + 2], q[at + 3]

@@ -11,10 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rom.mbs.actions import load_columns
 from rom.mbs.algebra import factorise, range_basis, row, scale, spatial_tangent, unit, vec
 from rom.mbs.arrays import ROLL
 from rom.mbs.compiled import inner, kernel
-from rom.mbs.constraints import constraint_gradient, follow_coordinates
+from rom.mbs.constraints import constraint_gradient
+from rom.mbs.coordinates import follow_coordinates
 from rom.mbs.motion import (
     border,
     drive_power,
@@ -125,6 +127,7 @@ def factorise_step(s, W, T, rank):
         range_basis(W.G, rank, W.rest, W.U_lu)
     border(W, n, rank)
     turn_columns(s, W, T, rank)
+    load_columns(s, W, T.lam1, rank)
     fill(W, n, rank)
     T.count[FACTORISATIONS] += 1
     T.count[FRESH] = 1

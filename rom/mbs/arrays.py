@@ -16,6 +16,8 @@ from rom.model import Array, Index
 POINT, ALONG, NORMAL, ANGLE, DISTANCE, COUPLING, TOUCH, ROLL = range(8)
 # those that measure lengths; a row of kind ROLL measures a velocity
 LENGTHS = (POINT, ALONG, DISTANCE, TOUCH)
+# kinds of contacts
+PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
 # columns of the work done since the start
@@ -157,6 +159,77 @@ class Forces(NamedTuple):
     turn: Array
 
 
+class Actions(NamedTuple):
+    """Motors, friction and stops on joint coordinates.
+
+    Attributes:
+        motor_at: (k,) joint coordinates; motor: (k,) addresses of compiled laws, 0 for Python.
+        clock: (1,) signal that tells the time, -1 for none.
+        friction_at: (f,) joint coordinates; friction: (f, 6) constant level [N or N m], level per
+            load of the joint [1 or m], share by which the level is higher at rest, speed over
+            which that fades, viscous coefficient, speed over which the sign changes.
+        load_first, load_count: (f,) constraint rows of the joint.
+        stop_at: (l,) joint coordinates; stop: (l, 5) side +1 or -1, limit, stiffness, exponent,
+            damping factor [s/m or s/rad].
+    """
+
+    motor_at: Index
+    motor: Index
+    clock: Index
+    friction_at: Index
+    friction: Array
+    load_first: Index
+    load_count: Index
+    stop_at: Index
+    stop: Array
+
+
+class Bushings(NamedTuple):
+    """Springs and dampers in six directions.
+
+    Attributes:
+        i, j: (b,) markers.
+        frame_i, frame_j: (b, 3, 3) axes of the bushing in those of its markers.
+        zero: (b, 3) position of j in these axes without force [m].
+        stiffness, damping: (b, 6, 6) translations, then rotations.
+        curve: (b, 6) first piece of a force over displacement, -1 for none; pieces: (b, 6).
+        piece: (n, 7) lower end, origin, four coefficients of powers, energy at the origin.
+    """
+
+    i: Index
+    j: Index
+    frame_i: Array
+    frame_j: Array
+    zero: Array
+    stiffness: Array
+    damping: Array
+    curve: Index
+    pieces: Index
+    piece: Array
+
+
+class Contacts(NamedTuple):
+    """A sphere or disc on marker j that touches something on marker i.
+
+    Attributes:
+        kind: (c,) PLANE, SPHERE, CYLINDER, BORE or DISC.
+        i, j: (c,) markers.
+        e: (c, 3) normal of the plane or axis of the cylinder in the axes of i.
+        s: (c, 3) axis of the disc in the axes of j.
+        radius: (c, 2) on j, and on i [m].
+        law: (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over
+            which friction changes its sign [m/s].
+    """
+
+    kind: Index
+    i: Index
+    j: Index
+    e: Array
+    s: Array
+    radius: Array
+    law: Array
+
+
 class System(NamedTuple):
     """Everything that stays constant during a run."""
 
@@ -165,6 +238,9 @@ class System(NamedTuple):
     rows: Rows
     coordinates: Coordinates
     forces: Forces
+    actions: Actions
+    bushings: Bushings
+    contacts: Contacts
 
 
 class Work(NamedTuple):
@@ -203,7 +279,9 @@ class Work(NamedTuple):
     gamma: Array  # (m,) convective term of the constraint acceleration
     G: Array  # (m, n) constraint gradient in the velocities
     base: Array  # (c,) joint coordinates at the last accepted instant
-    power: Array  # (3,) of drives, forces, dampers
+    power: Array  # (3,) of drives and motors, of forces, lost in dampers and friction
+    driven: Array  # (1,) power of motors
+    motor: Array  # (k,) forces of motors whose law is in Python
     residual: Array  # (n,) equations of motion
     S: Array  # (n, n) mass and damping part of the iteration matrix
     Kt: Array  # (n, n) stiffness part
@@ -252,6 +330,8 @@ def workspace(system: System, n_signals: int) -> Work:
         **dict.fromkeys(("G", "UG", "UGT"), (m, n)),
         "rest": (n, m),
         "power": (3,),
+        "driven": (1,),
+        "motor": (system.actions.motor_at.size,),
         **dict.fromkeys(("residual", "weight", "delta"), (n,)),
         **dict.fromkeys(("S", "Kt"), (n, n)),
         "Q": (12, 12),

@@ -61,7 +61,8 @@ def _momentum(solution: Solution) -> list[Row]:
     grounded = any(m.body == "ground" for j in mechanism.joints.values() for m in j.markers)
     pushed = mechanism.loads or np.any(mechanism.gravity)
     pushed = pushed or any(u.j is None for u in mechanism.user_forces.values())
-    for law in (*mechanism.springs.values(), *mechanism.user_forces.values()):
+    between = (mechanism.springs, mechanism.user_forces, mechanism.bushings, mechanism.contacts)
+    for law in (law for laws in between for law in laws.values()):
         pushed = pushed or "ground" in (law.i.body, law.j.body if law.j else "")
     if grounded or pushed:
         return []

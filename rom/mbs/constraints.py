@@ -112,7 +112,7 @@ def distance_state(gap, slide, pull):
 
 @inner
 def coupling_row(R, k, W):
-    """Row k as the weighted sum of two joint coordinates; `coordinate_states` first."""
+    """Row k as the weighted sum of two joint coordinates, which are evaluated first."""
     W.value[k], W.gamma[k] = -R.offset[k], 0.0
     for side in range(2):
         at, factor = R.at[k, side], R.factor[k, side]
@@ -120,36 +120,6 @@ def coupling_row(R, k, W):
         W.gamma[k] += factor * W.xc[at]
         for p in range(12):
             W.g[k, 12 * side + p] = factor * W.xg[at, p]
-
-
-@inner
-def coordinate_states(C, W):
-    """Joint coordinates, rates, convective terms and gradients; angles near the last accepted."""
-    zero = (0.0, 0.0, 0.0)
-    for k in range(C.kind.size):
-        i, j = C.i[k], C.j[k]
-        a = turn(W.E, i, row(C.a, k, 0))
-        Vi, Oi, Oj = row(W.V, i, 0), row(W.V, i, 3), row(W.V, j, 3)
-        qi, qj = row(W.conv, i, 3), row(W.conv, j, 3)
-        if C.kind[k] == ALONG:
-            gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), Vi)
-            pull, da = sub(row(W.conv, j, 0), row(W.conv, i, 0)), cross(Oi, a)
-            swing = add(cross(qi, a), cross(Oi, da))
-            W.x[k] = dot(a, gap) - C.offset[k]
-            W.xd[k] = dot(a, slide) + dot(da, gap)
-            W.xc[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
-            set_gradient(W.xg, k, scale(-1.0, a), cross(a, gap), a, zero)
-        else:
-            b, c = turn(W.E, j, row(C.b, k, 0)), turn(W.E, i, row(C.c, k, 0))
-            angle, W.xd[k], W.xc[k], axis = angle_state(a, c, b, Oi, Oj, qi, qj)
-            W.x[k] = W.base[k] + wrapped(angle - C.offset[k] - W.base[k])
-            set_gradient(W.xg, k, zero, scale(-1.0, axis), zero, axis)
-
-
-@inner
-def follow_coordinates(W):
-    """Accept the present angles as those the next ones are followed from."""
-    W.base[:] = W.x
 
 
 @inner
@@ -280,20 +250,3 @@ def constraint_stiffness(s, W, lam, c, S):
                 found = True
         if found:
             pair_stiffness(s, W, R.joint_i[joint], R.joint_j[joint], S)
-    for k in range(R.kind.size):
-        if R.kind[k] == COUPLING:
-            for side in range(2):
-                W.Q[:] = 0.0
-                coordinate_stiffness(s, W, R.at[k, side], c * lam[k] * R.factor[k, side])
-                C, at = s.coordinates, R.at[k, side]
-                pair_stiffness(s, W, C.i[at], C.j[at], S)
-
-
-@inner
-def coordinate_stiffness(s, W, at, c):
-    """Add c times the derivative of the gradient of a joint coordinate to W.Q."""
-    C = s.coordinates
-    i, j = C.i[at], C.j[at]
-    a, b = turn(W.E, i, row(C.a, at, 0)), turn(W.E, j, row(C.b, at, 0))
-    gap = sub(row(W.P, j, 0), row(W.P, i, 0))
-    row_stiffness(C.kind[at], a, b, gap, row(W.xg, at, 9), c, W.Q)

@@ -5,7 +5,8 @@ import math
 from rom.mbs.algebra import add, cross, dot, place, put, row, scale, sub, turn, unit
 from rom.mbs.arrays import FORCE_BODY, FORCE_WORLD, TORQUE_BODY
 from rom.mbs.compiled import inner
-from rom.mbs.constraints import coordinate_stiffness, pair_stiffness, place_relative
+from rom.mbs.constraints import pair_stiffness, place_relative
+from rom.mbs.coordinates import coordinate_tangent, push_coordinate
 
 
 @inner
@@ -23,15 +24,6 @@ def turn_moment(F, k, W):
     """Moment with which rotational spring k drives its joint coordinate."""
     at = F.turn_at[k]
     return -F.turn[k, 0] * (W.x[at] - F.turn[k, 2]) - F.turn[k, 1] * W.xd[at]
-
-
-@inner
-def push_coordinate(s, W, at, force):
-    """Add the wrenches of a force on joint coordinate ``at`` to its markers."""
-    C = s.coordinates
-    for p in range(6):
-        W.wrench[C.i[at], p] += force * W.xg[at, p]
-        W.wrench[C.j[at], p] += force * W.xg[at, 6 + p]
 
 
 @inner
@@ -90,28 +82,6 @@ def spring_tangent(s, W, k, ck, cc, K, S):
         for p in range(3):
             place_relative(W.Q, 0, p, cc * F.spring[k, 1] * e[p], e)
         pair_stiffness(s, W, F.spring_i[k], F.spring_j[k], S)
-
-
-@inner
-def coordinate_tangent(s, W, at, law, K, S):
-    """Add the tangents of a force on joint coordinate ``at`` to K and S.
-
-    ``law`` holds the force and its derivative by the coordinate, both times the factor of K, and
-    the derivative by the rate, times the factor of S.
-    """
-    force, stiffness, damping = law
-    C = s.coordinates
-    W.Q[:] = 0.0
-    coordinate_stiffness(s, W, at, -force)
-    for p in range(12):
-        for q in range(12):
-            W.Q[p, q] -= stiffness * W.xg[at, p] * W.xg[at, q]
-    pair_stiffness(s, W, C.i[at], C.j[at], K)
-    if damping != 0.0:
-        for p in range(12):
-            for q in range(12):
-                W.Q[p, q] = -damping * W.xg[at, p] * W.xg[at, q]
-        pair_stiffness(s, W, C.i[at], C.j[at], S)
 
 
 @inner

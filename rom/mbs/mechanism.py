@@ -11,6 +11,8 @@ from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion
 from rom.mbs.connections import Connections, Drive, TimeFunction
+from rom.mbs.elements import Bushing, Contact, Elements
+from rom.mbs.joint_forces import Friction, JointForces, Motor, Stop
 from rom.mbs.joints import Joint
 from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.model import Array
@@ -57,7 +59,7 @@ class UserForce:
 
 
 @dataclass
-class Mechanism(Connections):
+class Mechanism(Connections, JointForces, Elements):
     """Rigid and flexible bodies, connected and loaded.
 
     Joints are defined in the position in which the bodies are added, flexible bodies
@@ -75,6 +77,11 @@ class Mechanism(Connections):
     turns: dict[str, Turn] = field(default_factory=dict, init=False)
     loads: dict[str, Load] = field(default_factory=dict, init=False)
     user_forces: dict[str, UserForce] = field(default_factory=dict, init=False)
+    motors: dict[str, Motor] = field(default_factory=dict, init=False)
+    frictions: dict[str, Friction] = field(default_factory=dict, init=False)
+    stops: dict[str, Stop] = field(default_factory=dict, init=False)
+    bushings: dict[str, Bushing] = field(default_factory=dict, init=False)
+    contacts: dict[str, Contact] = field(default_factory=dict, init=False)
 
     def __post_init__(self):
         self.gravity = finite("gravity", self.gravity, (3,))
@@ -257,7 +264,8 @@ class Mechanism(Connections):
             raise ConfigError(f"a name must be a text that is not empty, got {name!r}.")
         taken = [
             *(GROUND, *self.parts, *self.joints, *self.drives, *self.springs),
-            *(*self.turns, *self.loads, *self.user_forces),
+            *(*self.turns, *self.loads, *self.user_forces, *self.motors, *self.frictions),
+            *(*self.stops, *self.bushings, *self.contacts),
         ]
         if name in taken:
             raise ConfigError(f"the name {name!r} is used twice; in use are {sorted(taken)}.")

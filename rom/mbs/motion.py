@@ -2,16 +2,18 @@
 
 import math
 
+from rom.mbs.actions import action_tangents, action_wrenches, friction_by_load
 from rom.mbs.algebra import back_substitute, factorise, range_basis, scale, turned, vec
+from rom.mbs.bushing import bushing_tangents, bushing_wrenches
 from rom.mbs.compiled import inner, kernel
 from rom.mbs.constraints import (
     constraint_gradient,
     constraint_stiffness,
     constraint_wrench,
-    coordinate_states,
-    follow_coordinates,
     row_states,
 )
+from rom.mbs.contact import contact_tangents, contact_wrenches
+from rom.mbs.coordinates import coordinate_states, coupling_stiffness, follow_coordinates
 from rom.mbs.dynamics import (
     body_damping,
     body_mass,
@@ -21,6 +23,9 @@ from rom.mbs.dynamics import (
 )
 from rom.mbs.forces import applied_wrenches, force_tangents
 from rom.mbs.kinematics import marker_states, spread_wrench, wrench_stiffness
+
+# over the loads of joints with friction; each gains a digit when the friction angle is small
+MAX_PASSES = 60
 
 
 @kernel
@@ -55,6 +60,9 @@ def residual(s, W, q, v, a, lam):
     W.power[:] = 0.0
     body_residuals(s.bodies, W, q, v, a)
     applied_wrenches(s, W)
+    action_wrenches(s, W, lam)
+    bushing_wrenches(s, W)
+    contact_wrenches(s, W)
     constraint_wrench(s, W, lam)
     spread_wrench(s, W, -1.0, W.residual)
     drive_power(s, W, lam)
@@ -62,8 +70,8 @@ def residual(s, W, q, v, a, lam):
 
 @inner
 def drive_power(s, W, lam):
-    """Set the power of the drives."""
-    W.power[0] = 0.0
+    """Set the power of drives and motors."""
+    W.power[0] = W.driven[0]
     for k in range(s.rows.kind.size):
         if s.rows.signal[k] >= 0:
             W.power[0] -= lam[k] * W.signal[s.rows.signal[k], 1]
@@ -80,7 +88,11 @@ def tangents(s, W, v, a, lam, c):
         body_stiffness(s.bodies, W, b, v, a, c[2], W.Kt)
     wrench_stiffness(s, W, c[2], W.Kt)
     constraint_stiffness(s, W, lam, c[2], W.Kt)
+    coupling_stiffness(s, W, lam, c[2], W.Kt)
     force_tangents(s, W, c[2], c[1], W.Kt, W.S)
+    action_tangents(s, W, lam, c[2], c[1], W.Kt, W.S)
+    bushing_tangents(s, W, c[2], c[1], W.Kt, W.S)
+    contact_tangents(s, W, c[2], c[1], W.Kt, W.S)
 
 
 @inner
@@ -196,15 +208,13 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
 
     Accelerations a and multipliers lam solve [M G^T; G 0]. At accepted states the range of the
     constraints is renewed, which makes the multipliers those of least norm; in between the range
-    of the last one gives the same accelerations.
+    of the last one gives the same accelerations. Friction that depends on the loads of its joint
+    is found by passes with the loads of the pass before.
     """
     n, m = a.size, lam.size
     n_q = y.size - n - 3
     q, v = y[:n_q], y[n_q : n_q + n]
     evaluate(s, W, q, v)
-    a[:] = 0.0
-    lam[:] = 0.0
-    residual(s, W, q, v, a, lam)
     body_masses(s, W)
     constraint_gradient(s, W)
     if accepted and rank < m:
@@ -213,12 +223,22 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     fill(W, n, rank)
     if not factorise(W.lu, n + rank, W.pivot):
         return False
-    for i in range(n):
-        W.rhs[i] = -W.residual[i]
-    for k in range(m):
-        drive = W.signal[s.rows.signal[k], 2] if s.rows.signal[k] >= 0 else 0.0
-        W.part[k] = drive - W.gamma[k]
-    solve_bordered(W, n, rank, a, lam)
+    lam[:] = 0.0
+    for _ in range(MAX_PASSES if friction_by_load(s) else 1):
+        a[:] = 0.0
+        residual(s, W, q, v, a, lam)
+        for i in range(n):
+            W.rhs[i] = -W.residual[i]
+        for k in range(m):
+            drive = W.signal[s.rows.signal[k], 2] if s.rows.signal[k] >= 0 else 0.0
+            W.part[k] = drive - W.gamma[k]
+        solve_bordered(W, n, rank, a, W.dlam)
+        change, size = 0.0, 0.0
+        for k in range(m):
+            lam[k] += W.dlam[k]
+            change, size = change + W.dlam[k] ** 2, size + lam[k] ** 2
+        if change <= 1e-30 * size:
+            break
     drive_power(s, W, lam)
     if accepted:
         follow_coordinates(W)

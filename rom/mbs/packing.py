@@ -7,10 +7,11 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.mbs.arrays import ALONG, LENGTHS, Bodies, Coordinates, Forces, Markers, Rows, System
+from rom.mbs.elements_packing import actions, bushings, contacts, integers, table
 from rom.mbs.joints import Joint, Row
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import GROUND, Marker, Part
-from rom.mbs.signals import Signal, drive_signal, load_signal
+from rom.mbs.signals import Signal, clock_signal, drive_signal, load_signal
 from rom.model import Array
 
 
@@ -70,6 +71,13 @@ def pack(mechanism: Mechanism) -> Packed:
     coordinates = _Coordinates()
     rows, owners, signals = _rows(mechanism, index, coordinates)
     forces, loads = _forces(mechanism, index, len(signals), coordinates)
+    clock = (clock_signal(),) if mechanism.motors else ()
+    moved_by = actions(
+        mechanism,
+        coordinates,
+        lambda joint: (owners.index(joint), owners.count(joint)),
+        len(signals) + len(loads) if clock else -1,
+    )
     R = max(part.r for part in parts)
     system = System(
         _bodies(parts, R, np.asarray(mechanism.gravity)),
@@ -77,13 +85,16 @@ def pack(mechanism: Mechanism) -> Packed:
         rows,
         coordinates.packed(index),
         forces,
+        moved_by,
+        bushings(mechanism, index),
+        contacts(mechanism, index),
     )
     return Packed(
         system,
         tuple(mechanism.parts),
         index,
         owners,
-        (*signals, *loads),
+        (*signals, *loads, *clock),
         np.concatenate([np.r_[part.at, part.p, part.q] for part in parts]),
         np.concatenate([np.r_[part.velocity, part.omega, part.qd] for part in parts]),
         _length(parts),
@@ -96,6 +107,8 @@ def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
     found = [Marker(part.name, name) for part in parts for name in part.names]
     found += [m for joint in mechanism.joints.values() for m in joint.markers]
     found += [m for s in mechanism.springs.values() for m in (s.i, s.j)]
+    for pair in (*mechanism.bushings.values(), *mechanism.contacts.values()):
+        found += [pair.i, pair.j]
     found += [load.marker for load in mechanism.loads.values()]
     for law in mechanism.user_forces.values():
         found += [law.i] if law.j is None else [law.i, law.j]
@@ -209,9 +222,9 @@ class _Coordinates:
         """All of them as arrays."""
         rows = [row for _, row in self.found]
         return Coordinates(
-            _integers([row.kind for row in rows]),
-            *(_integers([index[m[side]] for m, _ in self.found]) for side in (0, 1)),
-            *(_vectors([getattr(row, axis) for row in rows]) for axis in "abc"),
+            integers([row.kind for row in rows]),
+            *(integers([index[m[side]] for m, _ in self.found]) for side in (0, 1)),
+            *(table((getattr(row, axis) for row in rows), 3) for axis in "abc"),
             np.array([row.offset for row in rows], dtype=float),
         )
 
@@ -232,16 +245,16 @@ def _rows(
     rows = [row for _, _, _, row, _ in entries]
     terms = [_terms(joint, row, coordinates) for _, _, joint, row, _ in entries]
     packed = Rows(
-        _integers([row.kind for row in rows]),
-        *(_integers(side) for side in sides),
-        *(_vectors([getattr(row, axis) for row in rows]) for axis in "abc"),
-        _integers([at for at, _ in terms]).reshape(-1, 2),
+        integers([row.kind for row in rows]),
+        *(integers(side) for side in sides),
+        *(table((getattr(row, axis) for row in rows), 3) for axis in "abc"),
+        integers([at for at, _ in terms]).reshape(-1, 2),
         np.array([factor for _, factor in terms], dtype=float).reshape(-1, 2),
         np.array([row.offset for row in rows], dtype=float),
-        _integers([entry[4] for entry in entries]),
-        _integers([entry[1] for entry in entries]),
-        _integers(joint_sides[0]),
-        _integers(joint_sides[1]),
+        integers([entry[4] for entry in entries]),
+        integers([entry[1] for entry in entries]),
+        integers(joint_sides[0]),
+        integers(joint_sides[1]),
     )
     return packed, tuple(entry[0] for entry in entries), signals
 
@@ -265,14 +278,6 @@ def _terms(
     return at, (f1, f2)
 
 
-def _integers(values: Any) -> Any:
-    return np.array(list(values), dtype=np.int64)
-
-
-def _vectors(values: Any) -> Array:
-    return np.array(list(values), dtype=float).reshape(-1, 3)
-
-
 def _forces(
     mechanism: Mechanism, index: dict[Marker, int], n_drives: int, coordinates: _Coordinates
 ) -> tuple[Forces, list[Signal]]:
@@ -283,14 +288,14 @@ def _forces(
         at.append(n_drives + len(signals) if load.function else -1)
         signals += [load_signal(name, load.function)] if load.function else []
     forces = Forces(
-        _integers([index[s.i] for s in springs]),
-        _integers([index[s.j] for s in springs]),
-        _vectors([(s.stiffness, s.damping, s.free_length) for s in springs]),
-        _integers([index[load.marker] for load in loads.values()]),
-        _integers([load.kind for load in loads.values()]),
-        _vectors([load.vector for load in loads.values()]),
-        _integers(at),
-        _integers([coordinates.number(joint.markers, joint.turn) for joint in coiled]),
-        _vectors([(t.stiffness, t.damping, t.free_angle) for t in turns]),
+        integers([index[s.i] for s in springs]),
+        integers([index[s.j] for s in springs]),
+        table([(s.stiffness, s.damping, s.free_length) for s in springs], 3),
+        integers([index[load.marker] for load in loads.values()]),
+        integers([load.kind for load in loads.values()]),
+        table([load.vector for load in loads.values()], 3),
+        integers(at),
+        integers([coordinates.number(joint.markers, joint.turn) for joint in coiled]),
+        table([(t.stiffness, t.damping, t.free_angle) for t in turns], 3),
     )
     return forces, signals

@@ -2,7 +2,7 @@
 
 import math
 
-from rom.mbs.algebra import add, cross, dot, row, scale, sub, turn, unit
+from rom.mbs.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
 from rom.mbs.arrays import ROLL
 from rom.mbs.compiled import inner
 
@@ -78,17 +78,8 @@ def rolling_stiffness(R, k, W, c):
     """Add c times the derivative of the gradient of row k to W.Q."""
     vectors = rolling_vectors(R, k, W)
     for p in range(12):
-        slide = (0.0, 0.0, 0.0)
-        Oi, Oj, x = slide, slide, unit(p % 3)
-        if p < 3:
-            slide = scale(-1.0, x)
-        elif p < 6:
-            Oi = x
-        elif p < 9:
-            slide = x
-        else:
-            Oj = x
-        rates = gradient_rate(vectors, R.factor[k, 0], slide, Oi, Oj)
+        vi, Oi, vj, Oj = unit_twist(p)
+        rates = gradient_rate(vectors, R.factor[k, 0], sub(vj, vi), Oi, Oj)
         for side in range(4):
             for q in range(3):
                 W.Q[3 * side + q, p] += c * rates[side][q]

@@ -101,6 +101,11 @@ def drive_signal(name: str, drive: Any) -> Signal:
     return Signal(name, drive.function, drive.rate, drive.acceleration)
 
 
+def clock_signal() -> Signal:
+    """The time itself, for laws that ask for it."""
+    return Signal("clock", lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
+
+
 def load_signal(name: str, function: Callable[[float], Any]) -> Signal:
     """Signal of a load that depends on time."""
     return Signal(name, function, width=3)

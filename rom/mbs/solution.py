@@ -22,11 +22,11 @@ class Energy:
 
     Attributes:
         kinetic: of all bodies.
-        strain: elastic energy of bodies and springs.
+        strain: elastic energy of bodies, springs, bushings, stops and contacts.
         potential: of gravity.
-        drives: work done by the drives.
+        drives: work done by drives and motors.
         forces: work done by forces, torques and user forces.
-        damping: work lost in dampers.
+        damping: work lost in dampers, friction and impacts.
     """
 
     kinetic: Array

@@ -209,6 +209,7 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
     if rank < m:
         share = np.abs(U[:, rank:]).max(axis=1)
         names = dict.fromkeys(o for o, x in zip(packed.row_owner, share, strict=True) if x > 1e-6)
+        _refuse_shared_friction(packed, names)
         warnings.warn(
             f"{m - rank} of {m} constraints repeat others; joints {', '.join(names)} share loads "
             "that only their deformation could divide. The motion is exact, the reactions are "
@@ -217,6 +218,18 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
             stacklevel=4,
         )
     return rank
+
+
+def _refuse_shared_friction(packed: Packed, names: Any) -> None:
+    actions = packed.system.actions
+    for first in actions.load_first[actions.friction[:, 1] != 0.0]:
+        if packed.row_owner[first] in names:
+            raise ModelError(
+                "friction depends on the load of a joint that shares it with others as only "
+                "their deformation could decide.",
+                where=packed.row_owner[first],
+                hint="Let the joints repeat nothing, or give friction a constant level (coulomb).",
+            )
 
 
 def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:

@@ -4,9 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rom.mbs.actions import stop_energy
 from rom.mbs.algebra import add, cross, mtv, mv, put, scale, vec
 from rom.mbs.arrays import workspace
+from rom.mbs.bushing import bushing_energy
 from rom.mbs.compiled import inner, kernel
+from rom.mbs.contact import contact_energy
 from rom.mbs.dynamics import body_energy
 from rom.mbs.forces import spring_energy
 from rom.mbs.integrals import dual
@@ -60,7 +63,8 @@ def track(s, W, motion, marker, rows, out):
         for row in rows:
             for p in range(6):
                 out.reaction[k, p] -= L[k, row] * W.g[row, 6 + p]
-        out.energy[k, 1] = spring_energy(s, W)
+        out.energy[k, 1] = spring_energy(s, W) + stop_energy(s, W)
+        out.energy[k, 1] += bushing_energy(s, W) + contact_energy(s, W)
         for b in range(s.bodies.mass.size):
             kinetic, strain, height = body_energy(s.bodies, W, b, Q[k], V[k])
             out.energy[k, 0] += kinetic

@@ -38,13 +38,57 @@ class Law:
     i: int
     j: int
 
+    def apply(self, W: Work, t: float) -> None:
+        """Add force and reaction to the wrenches of the user."""
+        a = motion_of(W, self.i)
+        motions = (a,) if self.j < 0 else (a, motion_of(W, self.j))
+        force, moment = _checked(self, t, self.function(t, *motions))
+        W.user[self.i, :3] += force
+        W.user[self.i, 3:] += moment
+        if self.j >= 0:
+            lever = a.position - motions[1].position
+            W.user[self.j, :3] -= force
+            W.user[self.j, 3:] -= moment + np.cross(lever, force)
 
-def laws(mechanism: Mechanism, packed: Packed) -> tuple[Law, ...]:
-    """The user forces of a mechanism."""
-    return tuple(
+
+@dataclass(frozen=True, slots=True)
+class MotorLaw:
+    """A motor whose law stays in Python: its number, and that of its joint coordinate."""
+
+    name: str
+    function: Any
+    k: int
+    at: int
+
+    def apply(self, W: Work, t: float) -> None:
+        """Set the force of the motor."""
+        value = self.function(t, float(W.x[self.at]), float(W.xd[self.at]))
+        try:
+            W.motor[self.k] = float(value)
+        except (TypeError, ValueError) as error:
+            raise ConfigError(
+                f"the law of motor {self.name!r} returned {value!r}; needed is a number."
+            ) from error
+        if not np.isfinite(W.motor[self.k]):
+            raise SolverError(
+                f"the law of motor {self.name!r} gives {W.motor[self.k]} at t = {t:.9g} s.",
+                hint="The motion up to the last good step is kept in error.solution.",
+            )
+
+
+def laws(mechanism: Mechanism, packed: Packed) -> tuple[Law | MotorLaw, ...]:
+    """The user forces of a mechanism, and its motors that could not be compiled."""
+    forces = [
         Law(name, u.function, packed.row(u.i), -1 if u.j is None else packed.row(u.j))
         for name, u in mechanism.user_forces.items()
-    )
+    ]
+    motor_at = packed.system.actions.motor_at
+    motors = [
+        MotorLaw(name, motor.law, k, int(motor_at[k]))
+        for k, (name, motor) in enumerate(mechanism.motors.items())
+        if motor.address == 0
+    ]
+    return (*forces, *motors)
 
 
 def motion_of(W: Work, m: int) -> MarkerMotion:
@@ -52,7 +96,7 @@ def motion_of(W: Work, m: int) -> MarkerMotion:
     return MarkerMotion(W.P[m].copy(), W.E[m].copy(), W.V[m, :3].copy(), W.V[m, 3:].copy())
 
 
-def apply_laws(forces: tuple[Law, ...], W: Work, t: float) -> None:
+def apply_laws(forces: tuple[Law | MotorLaw, ...], W: Work, t: float) -> None:
     """Call all laws and set the wrenches of the user.
 
     Raises:
@@ -60,15 +104,7 @@ def apply_laws(forces: tuple[Law, ...], W: Work, t: float) -> None:
     """
     W.user[:] = 0.0
     for law in forces:
-        a = motion_of(W, law.i)
-        motions = (a,) if law.j < 0 else (a, motion_of(W, law.j))
-        force, moment = _checked(law, t, law.function(t, *motions))
-        W.user[law.i, :3] += force
-        W.user[law.i, 3:] += moment
-        if law.j >= 0:
-            lever = a.position - motions[1].position
-            W.user[law.j, :3] -= force
-            W.user[law.j, 3:] -= moment + np.cross(lever, force)
+        law.apply(W, t)
 
 
 def _checked(law: Law, t: float, value: Any) -> tuple[Array, Array]:

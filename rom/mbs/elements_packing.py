@@ -1,0 +1,93 @@
+"""Motors, friction, stops, bushings and contacts as flat arrays."""
+
+from typing import Any
+
+import numpy as np
+
+from rom.mbs.arrays import Actions, Bushings, Contacts
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts import Marker
+from rom.model import Array, Index
+
+
+def integers(values: Any) -> Index:
+    """Whole numbers as an array, empty ones too."""
+    return np.array(list(values), dtype=np.int64)
+
+
+def table(values: Any, *shape: int) -> Array:
+    """Numbers as an array of rows of this shape, empty ones too."""
+    return np.array(list(values), dtype=float).reshape(-1, *shape)
+
+
+def actions(mechanism: Mechanism, coordinates: Any, rows_of: Any, clock: int) -> Actions:
+    """Motors, friction and stops.
+
+    Args:
+        mechanism: with motors, friction and stops.
+        coordinates: numbers joint coordinates.
+        rows_of: joint -> first constraint row and number of rows.
+        clock: signal that tells the time, -1 for none.
+    """
+    motors, frictions = mechanism.motors.values(), mechanism.frictions.values()
+    stops = mechanism.stops.values()
+    numbered = [
+        integers(coordinates.number(mechanism.joints[x.joint].markers, x.row) for x in group)
+        for group in (motors, frictions, [s for s in stops for _ in s.limits])
+    ]
+    loaded = [rows_of(f.joint) for f in frictions]
+    laws = [
+        (side, limit, s.law.stiffness, s.law.exponent, s.law.damping)
+        for s in stops
+        for side, limit in s.limits
+    ]
+    return Actions(
+        numbered[0],
+        integers(m.address for m in motors),
+        integers([clock]),
+        numbered[1],
+        table((f.numbers for f in frictions), 6),
+        integers(first for first, _ in loaded),
+        integers(count for _, count in loaded),
+        numbered[2],
+        table(laws, 5),
+    )
+
+
+def bushings(mechanism: Mechanism, index: dict[Marker, int]) -> Bushings:
+    """Bushings with the pieces of their curves."""
+    found = list(mechanism.bushings.values())
+    curve, pieces = np.full((len(found), 6), -1), np.zeros((len(found), 6))
+    stack, n = [np.zeros((0, 7))], 0
+    for k, bushing in enumerate(found):
+        for p, piece in bushing.curves:
+            curve[k, p], pieces[k, p] = n, len(piece)
+            stack.append(piece)
+            n += len(piece)
+    return Bushings(
+        integers(index[b.i] for b in found),
+        integers(index[b.j] for b in found),
+        *(table((b.frames[side] for b in found), 3, 3) for side in (0, 1)),
+        table((b.zero for b in found), 3),
+        table((b.stiffness for b in found), 6, 6),
+        table((b.damping for b in found), 6, 6),
+        curve.astype(np.int64),
+        pieces.astype(np.int64),
+        np.concatenate(stack),
+    )
+
+
+def contacts(mechanism: Mechanism, index: dict[Marker, int]) -> Contacts:
+    """Contacts."""
+    found = mechanism.contacts.values()
+    laws = [c.law for c in found]
+    numbers = [(x.stiffness, x.exponent, x.damping, x.mu, x.transition_speed) for x in laws]
+    return Contacts(
+        integers(c.kind for c in found),
+        integers(index[c.i] for c in found),
+        integers(index[c.j] for c in found),
+        table((c.e for c in found), 3),
+        table((c.s for c in found), 3),
+        table((c.radius for c in found), 2),
+        table(numbers, 5),
+    )
