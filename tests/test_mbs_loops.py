@@ -195,7 +195,7 @@ def test_a_state_of_the_same_bodies_with_other_joints_is_refused(build):
     free.parts.update(joined.parts)
     for one, other in ((joined, free), (free, joined)):
         state = simulate(one, t_end=0.01, dt=1e-3).final
-        with pytest.raises(ConfigError, match=r"the state has .* constraints and \d rotational"):
+        with pytest.raises(ConfigError, match=r"the state has .* constraints and \d followed"):
             simulate(other, t_end=0.02, dt=1e-3, state=state)
 
 
@@ -203,5 +203,7 @@ def test_a_state_without_the_coil_is_refused():
     bare, wound = coil(), coil()
     bare.turns.clear()
     state = simulate(bare, t_end=0.01, dt=1e-3).final
-    with pytest.raises(ConfigError, match="0 rotational springs; this mechanism has 7, 6, 5 and 1"):
+    with pytest.raises(
+        ConfigError, match="0 followed joint coordinates; this mechanism has 7, 6, 5 and 1"
+    ):
         simulate(wound, t_end=0.02, dt=1e-3, state=state)

@@ -25,7 +25,8 @@ class Impact:
         restitution: speed after over speed before, above 0 and at most 1.
         impact_speed: at which that holds [m/s].
         mu: coefficient of friction at the touching point.
-        transition_speed: sliding speed over which friction changes its sign [m/s].
+        transition_speed: sliding speed over which friction changes its sign [m/s]; implicit steps
+            that change the sliding speed by much more do not converge.
 
     Raises:
         ConfigError: for numbers no contact has.
