@@ -2,15 +2,36 @@
 
 import numpy as np
 import pytest
-from mbs_cases import simulate_quietly, slider_crank
+from mbs_cases import (
+    prepared,
+    random_body,
+    random_pose,
+    random_state,
+    residual_at,
+    simulate_quietly,
+    slider_crank,
+    tangents_at,
+)
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from test_mbs_equations import difference, shifted
 
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.actions import load_columns
 from rom.mbs.audit import audit
+from rom.mbs.constraints import constraint_gradient
 from rom.mbs.impact import Impact
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
+
+
+@njit
+def columns_at(s, W, lam):
+    constraint_gradient(s, W)
+    W.UG[:] = W.G
+    load_columns(s, W, lam, lam.size)
+
 
 X, Y, Z = np.eye(3)
 METHODS = ("generalized-alpha", "dop853")
@@ -94,6 +115,52 @@ def test_a_sliding_block_stops_after_v_over_mu_g(method):
     assert_allclose(sol.position("block")[-1, 0], v0**2 / (2 * mu * g), rtol=2e-3)
     assert_allclose(sol.energy.damping[-1], 0.5 * 2.0 * v0**2, rtol=1e-4)
     assert audit(sol).ok, audit(sol)
+
+
+def loaded(rng):
+    """Two flexible bodies and the ground on joints with every force of this page."""
+    mech = Mechanism()
+    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    mech.cylindrical("tube", one.marker("a"), two.marker("b"), axis=(1, 2, 2))
+    mech.prismatic("guide", mech.ground.marker((0, 1, 0)), one.marker("b"), axis=X)
+    mech.friction("pin", "tube", mu=0.3, radius=0.2, coulomb=0.4, static=1.5, stribeck_speed=2.0,
+                  viscous=0.2, transition_speed=1.0)  # fmt: skip
+    mech.friction("shoes", "guide", mu=0.2, transition_speed=0.5)
+    law = Impact(3.0, exponent=2.0, damping=0.1)
+    mech.stop("end", "tube", law, coordinate="way", lower=20.0)
+    mech.stop("wall", "guide", law, upper=-20.0)
+    mech.motor("motor", "tube", lambda t, x, v: 1.7, compiled=False)
+    return mech
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_tangents_are_derivatives_of_the_forces(seed):
+    """By velocities, by coordinates of the mechanism at rest, and by the multipliers."""
+    rng = np.random.default_rng(seed)
+    packed, W = prepared(loaded(rng))
+    packed.system.markers.twist[:] *= 1e-3
+    s, (q, v, a, lam) = packed.system, random_state(rng, packed)
+    W.motor[:] = 1.7
+    n, m = v.size, lam.size
+
+    def at(dq, dv, dlam):
+        residual_at(s, W, shifted(packed, q, dq), v + dv, a, lam + dlam)
+        return W.residual.copy()
+
+    no, still = np.zeros(n), np.zeros(m)
+    C = difference(lambda x: at(no, x, still), n)
+    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
+    by_load = difference(lambda x: at(no, no, x), m)
+    at(no, no, still)
+    columns_at(s, W, lam)
+    assert_allclose(W.UG.T, by_load, atol=1e-6 * np.abs(by_load).max())
+    assert np.abs(W.UG - W.G).max() > 0.01
+    v[:], W.motor[:] = 0.0, 0.0  # the turning of a torque axis holds where the joint is closed
+    K = difference(lambda x: at(x, no, still), n)
+    tangents_at(s, W, q, v, a, lam, (0.0, 0.0, 1.0))
+    assert_allclose(W.Kt, K, atol=1e-6 * np.abs(K).max())
 
 
 def test_friction_by_load_takes_few_newton_passes():

@@ -80,7 +80,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     settings = Settings(t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol, progress)
     packed = pack(mechanism)
     if progress and not compiled_before(advance):
-        sys.stderr.write("compile the integrator, once on this machine: about a minute\n")
+        sys.stderr.write("compile the integrator, once on this machine: one or two minutes\n")
     W = workspace(packed.system, len(packed.signals))
     record = Record(mechanism, packed, settings, perf_counter())
     status = f"Reached t = {t_end:g} s."

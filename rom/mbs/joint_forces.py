@@ -112,7 +112,8 @@ class JointForces:
         Args:
             name: name of the friction.
             joint: joint with a coordinate.
-            transition_speed: speed over which the sign changes [m/s or rad/s].
+            transition_speed: speed over which the sign changes [m/s or rad/s]; implicit steps that
+                change the speed by much more do not converge.
             coulomb: level that is always there [N or N m].
             mu: coefficient of friction.
             radius: at which friction acts on an angle, that of the pin [m]; none for a way.
