@@ -123,6 +123,9 @@ def test_cardan_shafts_turn_with_the_ratio_of_the_closed_form():
     phi = speed * sol.t + np.pi / 2  # the first pin starts across the plane of the shafts
     ratio = np.cos(beta) / (1 - np.sin(beta) ** 2 * np.cos(phi) ** 2)
     assert_allclose(sol.omega("two")[:, 0], speed * ratio, atol=1e-7)
+    p, a = sol.orientation("two"), speed * sol.t  # and tan(b) = tan(a) cos(beta)
+    b = 2 * np.arctan2(p[:, 1], p[:, 0])
+    assert_allclose(np.sin(b) * np.cos(a), np.cos(b) * np.sin(a) * np.cos(beta), atol=1e-8)
 
 
 def test_the_force_of_a_law_on_two_bodies_conserves_momentum():
