@@ -117,6 +117,21 @@ def ball(law, height=0.5, radius=0.1, mass=2.0, **more):
     return mech
 
 
+def test_one_instant_of_a_spinning_ball_that_comes_down():
+    """Force k depth^1.5 (1 + damping v) upwards, friction against the lowest point."""
+    k, chi, mu, v, spin, depth, radius = 1e6, 0.3, 0.2, 0.5, 4.0, 1e-3, 0.1
+    law = Impact(k, damping=chi, mu=mu, transition_speed=1e-9)
+    mech = ball(law, height=-depth, velocity=(0, 0, -v), omega=(0, spin, 0))
+    packed, W = prepared(mech)
+    residual_at(packed.system, W, packed.q, packed.v, np.zeros(6), np.zeros(0))
+    normal = k * depth**1.5 * (1 + chi * v)
+    force = np.array([mu * normal, 0, normal])
+    moment = np.cross([0, 0, -radius], force)
+    assert_allclose(-W.residual + [0, 0, 2.0 * g, 0, 0, 0], [*force, *moment], rtol=1e-9, atol=1e-9)
+    lost = chi * v * k * depth**1.5 * v + mu * normal * spin * radius
+    assert_allclose(W.power[2], lost, rtol=1e-9)
+
+
 def duration(t, depth):
     """Time of the first contact [s]."""
     inside = depth > 0
