@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from rom.attachment import added_mass
+from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
-from rom.body.flexible import FlexibleBody
+from rom.body.flexible import FlexibleBody, Marker
 from rom.body.prestress import UnitLoads
 from rom.body.projection import elastic_part, flexible_body
 from rom.certificate import certify_body
@@ -167,6 +168,12 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     basis = method.basis(connection.ops, connection.boundary, connection.labels)
     Psi = connection.ops.expand(basis.Psi)
     elastic = elastic_part(ops, Psi)
+
+    def left_out(markers: dict[str, Marker]) -> Array | None:
+        holds = {name: marker.hold for name, marker in markers.items()}
+        own = slice(ops.first // 3, (ops.first + ops.n_local) // 3)
+        return residual_motion(ops, connection, basis, holds, model.points[own])
+
     body = flexible_body(
         model,
         bare,
@@ -174,7 +181,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         elastic,
         ties=connection.ties,
         name=name,
-        stress=stress,
+        stress=left_out if stress else None,
         stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
         provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
     ).with_reference(reference)

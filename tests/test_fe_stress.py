@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import null_space
 
 import rom
 from rom.errors import ConfigError
@@ -133,3 +134,76 @@ def test_messages(model):
         rom.reduce(
             _bar((0.4, 0.05, 0.03), (4, 1, 1)), method=rom.Guyan(), interfaces=kinds, stress=True
         )
+
+
+def inertial_load(model, a, alpha, omega):
+    """Nodal forces of inertia: R^T M R and centrifugal force from the points themselves."""
+    pulls = [-np.cross(omega, np.cross(omega, x)) for x in model.points]
+    fields = -(a + np.cross(alpha, model.points)) + np.array(pulls)
+    return operators(model).apply_M(fields.reshape(-1, 1))
+
+
+MOVING = {"a": np.array([-0.3, 9.81, -2.0]), "alpha": np.array([3.0, -2.0, 5.0]),
+          "omega": np.array([20.0, 30.0, -10.0])}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", [rom.CraigBampton(5), rom.Guyan(), rom.MomentMatching()])
+def test_modes_left_out_follow_inertia(model, method):
+    """A cantilever carried along: its stress is that of the full equilibrium, in any frame."""
+    connection = connect(operators(model), model, {"root": "full", "tip": "rbe2"})
+    ops = connection.ops
+    held = ops.hold(connection.held(("root",)))
+    U = ops.expand(held(ops.restrict(inertial_load(model, **MOVING))))
+    full = model.stresses.at_nodes(U, model.surface.nodes)[:, :, 0]
+    kinds = {"root": "full", "tip": "rbe2"}
+    body = rom.reduce(model, method=method, interfaces=kinds, stress=True, certify=False)
+    for reference in ("mean-axis", "tip"):
+        seen = body.with_reference(reference)
+        q, rigid = at_rest(seen, **MOVING)
+        states = seen.stress.accelerations(**rigid, omega=MOVING["omega"], qdd=0 * q)
+        found = seen.stress.field(q, states)
+        assert_allclose(found, full, atol=1e-8 * np.abs(full).max())
+        plain = seen.stress.field(q)
+        assert np.abs(plain - full).max() > 1e-4 * np.abs(full).max()
+
+
+def at_rest(body, a, alpha, omega):
+    """Elastic coordinates of the body held on its root under its inertia, from its integrals."""
+    J, W = body.inertia, omega[:, None] * omega - omega @ omega * np.eye(3)
+    pull = np.r_[-W @ body.first_moment, -np.cross(omega, J @ omega)]
+    M, K = body.full_matrices()
+    load = -M[:, :6] @ np.r_[a, alpha] + np.r_[pull, -np.einsum("ab,abk->k", W, body.Ibar_kl)]
+    N = null_space(body.marker("root").hold)
+    x = N @ np.linalg.solve(N.T @ K @ N, N.T @ load)
+    return x[6:], {"a": a, "alpha": alpha}
+
+
+def test_the_correction_needs_constraint_modes(model):
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(model, method=rom.Rubin(5), interfaces=kinds, stress=True, certify=False)
+    with pytest.raises(ConfigError, match="stress of the modes it left out"):
+        body.stress.field(np.zeros(body.n_modes), np.zeros(12 + body.n_modes))
+
+
+def test_a_bar_that_spins_in_free_fall_has_the_stress_of_closed_form(model):
+    """sigma = rho omega^2 (L^2 / 8) (1 - (2 x / L)^2) along it; falling adds none."""
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(model, method=rom.CraigBampton(2), interfaces=kinds, stress=True,
+                      damping=rom.ModalDamping(1.0), certify=False)  # fmt: skip
+    speed = 100.0
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    mech.add_flexible("bar", body, omega=(0, 0, speed), velocity=(0, -speed * L / 2, 0))
+    sol = rom.simulate(mech, t_end=0.02, dt=2e-4)
+    x = body.stress.points[:, 0]
+    inner = np.abs(x - L / 2) < 0.25 * L
+    exact = STEEL.rho * speed**2 * L**2 / 8 * (1 - (2 * x[inner] / L - 1) ** 2)
+    assert_allclose(sol.stress("bar", -1)[inner, 0], exact, rtol=0.03)
+    plain = body.stress.field(sol.elastic("bar")[-1])[inner, 0]
+    assert np.abs(plain / exact - 1).max() > 0.1
+
+
+def test_a_rigid_body_has_no_stress():
+    mech = rom.Mechanism()
+    mech.add_rigid("ball", mass=1.0, inertia=np.eye(3), at=(0, 0, 0))
+    with pytest.raises(ConfigError, match="cannot be recovered"):
+        rom.simulate(mech, t_end=1e-3, dt=1e-3).stress("ball", 0)

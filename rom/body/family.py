@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from rom.body.damping import ModalDamping, Rayleigh, damped
-from rom.body.flexible import FlexibleBody, StressRecovery, reference_label
+from rom.body.flexible import FlexibleBody, reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
+from rom.body.recovery import StressRecovery
 from rom.body.stretch import Stretch, stretched_body
 from rom.model import Array, Report
 from rom.parameters import Parameter, Point, Thickness, centre, complete, factor, factors

@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh, null_space
 
+from rom.body.recovery import StressRecovery
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder, moved_stiffening
-from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 
 
@@ -67,44 +68,6 @@ class Surface:
     points: Array
     triangles: Index
     shape: Array
-
-
-@dataclass(frozen=True, slots=True)
-class StressRecovery:
-    """Stress on the outer surface as a function of the elastic coordinates.
-
-    Rigid motion has none, so that it does not depend on the floating frame.
-
-    Attributes:
-        points: (p, 3) undeformed positions [m].
-        operator: (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic
-            coordinate [Pa]; row 6*node + component.
-    """
-
-    points: Array
-    operator: Array
-
-    def field(self, q: Array) -> Array:
-        """(p, 6) stress for elastic coordinates q [Pa].
-
-        Raises:
-            ConfigError: if q has another length.
-        """
-        q = np.asarray(q, dtype=float)
-        if q.shape != self.operator.shape[1:]:
-            raise ConfigError(
-                f"q has the shape {q.shape}; the body has {self.operator.shape[1]} elastic "
-                "coordinates."
-            )
-        found: Array = (self.operator @ q).reshape(-1, 6)
-        return found
-
-    def von_mises(self, q: Array) -> Array:
-        """(p,) equivalent stress for elastic coordinates q [Pa]."""
-        xx, yy, zz, yz, xz, xy = self.field(q).T
-        normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-        found: Array = np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
-        return found
 
 
 @dataclass(frozen=True)
@@ -194,7 +157,9 @@ class FlexibleBody:
         """
         X = reference_motion(self, reference)
         body = moved_frame(self, X)
-        body = replace(body, K_geo=moved_stiffening(self, body, X, reference))
+        stress = None if self.stress is None else self.stress.moved(X)
+        stiffening = moved_stiffening(self, body, X, reference)
+        body = replace(body, K_geo=stiffening, stress=stress)
         omega, V = _normal_modes(body.K, body.M)
         return _recombined(body, V, omega, reference_label(reference))
 
@@ -377,7 +342,7 @@ def _recombined(body: FlexibleBody, V: Array, omega: Array, reference: str) -> F
         surface = replace(surface, shape=surface.shape @ V)
     stress = body.stress
     if stress is not None:
-        stress = replace(stress, operator=stress.operator @ V)
+        stress = stress.recombined(V)
     S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
     return replace(
         body,

@@ -1,5 +1,6 @@
 """From a basis to a flexible body: rigid motions out, integrals, markers, surface."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,9 +9,10 @@ from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_matrix
 
 from rom.attachment import carried_displacements
-from rom.body.flexible import FlexibleBody, Marker, Patch, StressRecovery, Surface
+from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.body.prestress import UnitLoads
+from rom.body.recovery import StressRecovery
 from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Interface
@@ -74,7 +76,7 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
     ties: dict[str, Any],
     name: str,
     provenance: dict[str, Any],
-    stress: bool = False,
+    stress: Callable[[dict[str, Marker]], Array | None] | None = None,
     stiffening: UnitLoads | None = None,
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
@@ -88,7 +90,8 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
             map ``coordinates`` (n_c, 3k) from the dofs of the surface to what is zero when held.
         name: name of the body.
         provenance: how it was made.
-        stress: whether the stress on the surface can be recovered.
+        stress: makes the stress on the surface recoverable: the motion of the modes left out, see
+            `rom.body.correction.residual_motion`, from the markers; None without stress.
         stiffening: the loads whose geometric stiffness the body gets.
     """
     E = canonical_columns(ops, Psi @ elastic.V, model)
@@ -106,7 +109,7 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
         labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(r)),
         reference="mean-axis",
         surface=_surface(ops, model, E),
-        stress=_recovery(model, E) if stress else None,
+        stress=_recovery(model, E, stress(markers)) if stress else None,
         provenance=provenance,
     )
 
@@ -158,15 +161,17 @@ def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
     return Surface(model.points[nodes], model.surface.triangles, ops.rows(E, dofs))
 
 
-def _recovery(model: FEModel, E: Array) -> StressRecovery:
+def _recovery(model: FEModel, E: Array, missing: Array | None) -> StressRecovery:
     if model.stresses is None or model.surface is None:
         raise ConfigError(
             "the model has no finite elements, from which alone stress follows.",
             hint="Make it with rom.fe.model, or reduce with stress=False.",
         )
     nodes = model.surface.nodes
-    operator = model.stresses.at_nodes(E, nodes).reshape(6 * nodes.size, -1)
-    return StressRecovery(model.points[nodes], operator)
+    shapes = E if missing is None else np.hstack([E, missing])
+    operator = model.stresses.at_nodes(shapes, nodes).reshape(6 * nodes.size, -1)
+    inertial = None if missing is None else operator[:, E.shape[1] :]
+    return StressRecovery(model.points[nodes], operator[:, : E.shape[1]], inertial)
 
 
 def _scaled(A: Array, scale: Array) -> Array:

@@ -18,14 +18,15 @@ import numpy as np
 from numpy.lib import format as npy
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.body.flexible import FlexibleBody, Marker, Patch, StressRecovery, Surface
+from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
+from rom.body.recovery import STATES, StressRecovery
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import write_whole
 from rom.model import Array, Report, Row
 from rom.units import SYSTEMS
 
 SCHEMA = "rom-body"
-VERSION = (1, 2)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 3)  # a new major number breaks readers, a new minor number only adds
 LIMIT = 4 * 1024**3  # bytes a body may have in memory before reading is refused
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 
@@ -155,6 +156,8 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     if body.stress is not None:
         for part in ("points", "operator"):
             arrays[f"stress/{part}"] = getattr(body.stress, part)
+        if body.stress.inertial is not None:
+            arrays["stress/inertial"] = body.stress.inertial
     return {
         n: np.asarray(A, dtype=np.int64 if A.dtype.kind == "i" else float)
         for n, A in arrays.items()
@@ -210,7 +213,9 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     surface = Surface(*parts) if manifest["surface"] else None
     stress = None  # bodies whose stress is not recovered have none, and so have older files
     if "stress/points" in arrays:
-        stress = StressRecovery(arrays["stress/points"], arrays["stress/operator"])
+        stress = StressRecovery(
+            arrays["stress/points"], arrays["stress/operator"], arrays.get("stress/inertial")
+        )
     report = manifest["certificate"]
     if report is not None:
         report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
@@ -331,8 +336,9 @@ def verify(body: FlexibleBody, path: Path) -> None:
             )
         _verify_patch(m, path)
     if body.stress is not None:
-        n = body.stress.points.shape[0]
-        if body.stress.points.shape != (n, 3) or body.stress.operator.shape != (6 * n, r):
+        n, A = body.stress.points.shape[0], body.stress.inertial
+        fits = body.stress.points.shape == (n, 3) and body.stress.operator.shape == (6 * n, r)
+        if not fits or (A is not None and A.shape != (6 * n, STATES + r)):
             raise FileFormatError("the stress recovery does not fit the body.", where=str(path))
     if body.surface is not None:
         n = body.surface.points.shape[0]

@@ -33,13 +33,16 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
     return Path(path)
 
 
-def write_stress(body: FlexibleBody, q: Array, path: str | Path) -> Path:
+def write_stress(
+    body: FlexibleBody, q: Array, path: str | Path, *, accelerations: Array | None = None
+) -> Path:
     """Write the outer surface with displacement, stress and von Mises stress.
 
     Args:
         body: a body reduced with ``stress=True``.
         q: (r,) elastic coordinates.
         path: file ending in ``.vtu``.
+        accelerations: see `rom.body.recovery.StressRecovery.accelerations`; None for statics.
 
     Raises:
         ConfigError: if the stress of the body cannot be recovered, q has another length, or the
@@ -51,8 +54,8 @@ def write_stress(body: FlexibleBody, q: Array, path: str | Path) -> Path:
             hint="Reduce it with stress=True.",
         )
     fields = {
-        "stress xx yy zz yz xz xy [Pa]": body.stress.field(q),
-        "von Mises stress [Pa]": body.stress.von_mises(q),
+        "stress xx yy zz yz xz xy [Pa]": body.stress.field(q, accelerations),
+        "von Mises stress [Pa]": body.stress.von_mises(q, accelerations),
         "displacement [m]": (body.surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
     }
     text = grid(body.surface.points, body.surface.triangles, TRIANGLE, at_points=fields)

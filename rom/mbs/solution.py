@@ -14,6 +14,7 @@ from rom.mbs.parts import Marker
 from rom.mbs.state import State
 from rom.mbs.tracks import Tracks, follow
 from rom.model import Array
+from rom.rotation import matrix
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,35 @@ class Solution:
         """(n_t, r) elastic coordinates."""
         at = self._start_of(body)
         return self.q[:, at + 7 : at + 7 + self.mechanism.part(body).r]
+
+    def stress(self, body: str, instant: int) -> Array:
+        """(p, 6) stress xx, yy, zz, yz, xz, xy on the surface of a flexible body [Pa].
+
+        In the axes of the body; modes that its reduction left out follow its inertia without
+        delay, if the body knows them.
+
+        Args:
+            body: name of a body reduced with ``stress=True``.
+            instant: row of ``t``.
+
+        Raises:
+            ConfigError: if the stress of the body cannot be recovered.
+        """
+        part: Any = self.mechanism.part(body)
+        recovery = getattr(part.flexible, "stress", None) if part.r else None
+        if recovery is None:
+            raise ConfigError(
+                f"the stress of body {body!r} cannot be recovered.",
+                hint="Reduce it with stress=True.",
+            )
+        q, moving = self.elastic(body)[instant], None
+        if recovery.inertial is not None:
+            at, A = self._start_of(body, velocity=True), matrix(self.orientation(body)[instant])
+            a = self.a[instant, at : at + 6 + part.r]
+            lift = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
+            moving = recovery.accelerations(lift, a[3:6], self.omega(body)[instant], a[6:])
+        found: Array = recovery.field(q, moving)
+        return found
 
     def reaction(self, name: str) -> Array:
         """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.

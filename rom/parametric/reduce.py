@@ -103,8 +103,8 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         "ranges": written(affine.parameters),
     }
     body = flexible_body(
-        there, bare, Psi, elastic, ties=connection.ties, name=name, stress=stress,
-        provenance=provenance,
+        there, bare, Psi, elastic, ties=connection.ties, name=name, provenance=provenance,
+        stress=(lambda _: None) if stress else None,
     )  # fmt: skip
     E = canonical_columns(bare, Psi @ elastic.V, there)
     family = BodyFamily(

@@ -1,0 +1,95 @@
+"""Stress of a reduced body, with the static correction for the modes left out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rom.body.stiffening import PRODUCTS
+from rom.errors import ConfigError
+from rom.model import Array
+
+STATES = 12  # acceleration and angular acceleration of the frame, products of angular velocities
+
+
+@dataclass(frozen=True, slots=True)
+class StressRecovery:
+    """Stress on the outer surface as a function of the elastic coordinates.
+
+    Rigid motion has none, so that it does not depend on the floating frame. The stress of modes
+    that a reduction left out follows inertia without delay; the accelerations give it back.
+
+    Attributes:
+        points: (p, 3) undeformed positions [m].
+        operator: (6 p, r) stress xx, yy, zz, yz, xz, xy in the body frame per unit of each elastic
+            coordinate [Pa]; row 6*node + component.
+        inertial: (6 p, 12 + r) stress of the modes left out per unit of what `accelerations`
+            returns; None for bases without constraint modes.
+
+    Source:
+        The correction is the mode acceleration method, Craig and Kurdila, Fundamentals of
+        Structural Dynamics (2006), applied to the inner dofs; Coriolis forces are left out.
+    """
+
+    points: Array
+    operator: Array
+    inertial: Array | None = None
+
+    def field(self, q: Array, accelerations: Array | None = None) -> Array:
+        """(p, 6) stress for elastic coordinates q [Pa].
+
+        Args:
+            q: (r,) elastic coordinates.
+            accelerations: (12 + r,) what `accelerations` returns; None for statics.
+
+        Raises:
+            ConfigError: if q has another length, or the modes left out are not known.
+        """
+        q = np.asarray(q, dtype=float)
+        if q.shape != self.operator.shape[1:]:
+            raise ConfigError(
+                f"q has the shape {q.shape}; the body has {self.operator.shape[1]} elastic "
+                "coordinates."
+            )
+        found: Array = self.operator @ q
+        if accelerations is not None:
+            if self.inertial is None:
+                raise ConfigError(
+                    "the basis of the body does not tell the stress of the modes it left out.",
+                    hint="Reduce with CraigBampton and stress=True.",
+                )
+            found = found + self.inertial @ np.asarray(accelerations, dtype=float)
+        return found.reshape(-1, 6)
+
+    def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:
+        """(p,) equivalent stress [Pa]; see `field`."""
+        xx, yy, zz, yz, xz, xy = self.field(q, accelerations).T
+        normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+        found: Array = np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
+        return found
+
+    @staticmethod
+    def accelerations(a: Array, alpha: Array, omega: Array, qdd: Array) -> Array:
+        """(12 + r,) what the stress of the modes left out depends on.
+
+        Args:
+            a: (3,) acceleration of the body origin minus gravity, body frame [m/s^2].
+            alpha: (3,) angular acceleration, body frame [rad/s^2].
+            omega: (3,) angular velocity, body frame [rad/s].
+            qdd: (r,) second derivatives of the elastic coordinates.
+        """
+        return np.concatenate([a, alpha, [omega[i] * omega[j] for i, j in PRODUCTS], qdd])
+
+    def moved(self, X: Array) -> "StressRecovery":
+        """Seen from a frame that takes the rigid motion X (6, r) out of the shapes."""
+        if self.inertial is None:
+            return self
+        A = self.inertial.copy()
+        A[:, STATES:] -= A[:, :6] @ X
+        return StressRecovery(self.points, self.operator, A)
+
+    def recombined(self, V: Array) -> "StressRecovery":
+        """For elastic coordinates q = V q_new."""
+        A = self.inertial
+        if A is not None:
+            A = np.hstack([A[:, :STATES], A[:, STATES:] @ V])
+        return StressRecovery(self.points, self.operator @ V, A)
