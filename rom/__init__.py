@@ -15,7 +15,7 @@ from rom.checks import check
 from rom.errors import RomError
 from rom.io.export import export
 from rom.io.family import load, save
-from rom.io.vtu import write_stress
+from rom.io.vtu import write_stress, write_stress_history
 from rom.model import (
     Attachment,
     Basis,
@@ -104,6 +104,7 @@ __all__ = [
     "substructure",
     "write_report",
     "write_stress",
+    "write_stress_history",
 ]
 PACKAGES = ("fe", "mbs", "view")
 LATER = {"Mechanism": "mechanism", "audit": "audit", "simulate": "integrate"}  # they load Numba

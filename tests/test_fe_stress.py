@@ -185,8 +185,9 @@ def test_the_correction_needs_constraint_modes(model):
         body.stress.field(np.zeros(body.n_modes), np.zeros(12 + body.n_modes))
 
 
-def test_a_bar_that_spins_in_free_fall_has_the_stress_of_closed_form(model):
+def test_a_bar_that_spins_in_free_fall_has_the_stress_of_closed_form(model, tmp_path):
     """sigma = rho omega^2 (L^2 / 8) (1 - (2 x / L)^2) along it; falling adds none."""
+    pv = pytest.importorskip("pyvista", reason="pictures need pyvista")
     kinds = {"root": "rbe2", "tip": "rbe2"}
     body = rom.reduce(model, method=rom.CraigBampton(2), interfaces=kinds, stress=True,
                       damping=rom.ModalDamping(1.0), certify=False)  # fmt: skip
@@ -200,6 +201,14 @@ def test_a_bar_that_spins_in_free_fall_has_the_stress_of_closed_form(model):
     assert_allclose(sol.stress("bar", -1)[inner, 0], exact, rtol=0.03)
     plain = body.stress.field(sol.elastic("bar")[-1])[inner, 0]
     assert np.abs(plain / exact - 1).max() > 0.1
+    series = rom.write_stress_history(sol, "bar", tmp_path / "bar.pvd", every=50)
+    last = pv.get_reader(series)
+    assert_allclose(last.time_values, sol.t[::50])
+    last.set_active_time_value(sol.t[-1])
+    seen = last.read()[0]["stress xx yy zz yz xz xy [Pa]"]
+    assert_allclose(seen, sol.stress("bar", -1))
+    with pytest.raises(ConfigError, match="does not end in"):
+        rom.write_stress_history(sol, "bar", tmp_path / "bar.vtu")
 
 
 def test_a_rigid_body_has_no_stress():

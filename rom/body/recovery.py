@@ -62,10 +62,7 @@ class StressRecovery:
 
     def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:
         """(p,) equivalent stress [Pa]; see `field`."""
-        xx, yy, zz, yz, xz, xy = self.field(q, accelerations).T
-        normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-        found: Array = np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
-        return found
+        return von_mises(self.field(q, accelerations))
 
     @staticmethod
     def accelerations(a: Array, alpha: Array, omega: Array, qdd: Array) -> Array:
@@ -93,3 +90,11 @@ class StressRecovery:
         if A is not None:
             A = np.hstack([A[:, :STATES], A[:, STATES:] @ V])
         return StressRecovery(self.points, self.operator @ V, A)
+
+
+def von_mises(stress: Array) -> Array:
+    """(p,) equivalent stress of (p, 6) stress xx, yy, zz, yz, xz, xy [Pa]."""
+    xx, yy, zz, yz, xz, xy = stress.T
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    found: Array = np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
+    return found

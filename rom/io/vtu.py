@@ -1,6 +1,7 @@
 """Mode shapes on the surface of a body, and meshes, for ParaView (VTK XML, unstructured grid)."""
 
 import base64
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -8,6 +9,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rom.body.flexible import FlexibleBody
+from rom.body.recovery import von_mises
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array, Index
@@ -53,14 +55,58 @@ def write_stress(
             f"the stress of body {body.name!r} cannot be recovered.",
             hint="Reduce it with stress=True.",
         )
-    fields = {
-        "stress xx yy zz yz xz xy [Pa]": body.stress.field(q, accelerations),
-        "von Mises stress [Pa]": body.stress.von_mises(q, accelerations),
-        "displacement [m]": (body.surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
-    }
-    text = grid(body.surface.points, body.surface.triangles, TRIANGLE, at_points=fields)
+    text = _stressed(body, q, body.stress.field(q, accelerations))
     write_whole(path, lambda file: file.write(text.encode()))
     return Path(path)
+
+
+def write_stress_history(solution: Any, body: str, path: str | Path, *, every: int = 1) -> Path:
+    """Write stress and displacement of a moving body as a series for ParaView.
+
+    In the axes of the body. The series is written last, so that it never names a missing file.
+
+    Args:
+        solution: a `rom.mbs.solution.Solution`.
+        body: name of a body reduced with ``stress=True``.
+        path: file ending in ``.pvd``; its instants go into a folder beside it with its stem.
+        every: take every so many instants.
+
+    Raises:
+        ConfigError: if the stress of the body cannot be recovered, or the place is not writable.
+    """
+    path = Path(path)
+    if path.suffix != ".pvd":
+        raise ConfigError(f"{path} does not end in .pvd.")
+    part = solution.mechanism.part(body)
+    folder, lines = path.with_suffix(""), []
+    for k in range(0, solution.t.size, every):
+        stress = solution.stress(body, k)
+        folder.mkdir(parents=True, exist_ok=True)
+        file = folder / f"{folder.name}_{k:06d}.vtu"
+        text = _stressed(part.flexible, solution.elastic(body)[k], stress).encode()
+        write_whole(file, partial(_write, text))
+        name = quoteattr(f"{folder.name}/{file.name}")
+        lines.append(f'<DataSet timestep="{float(solution.t[k])!r}" file={name}/>')
+    series = "\n".join(
+        ['<VTKFile type="Collection" version="1.0"><Collection>', *lines, "</Collection></VTKFile>"]
+    )
+    write_whole(path, partial(_write, f"{series}\n".encode()))
+    return path
+
+
+def _write(text: bytes, file: Any) -> None:
+    file.write(text)
+
+
+def _stressed(body: FlexibleBody, q: Array, stress: Array) -> str:
+    surface = body.surface
+    assert surface is not None
+    fields = {
+        "stress xx yy zz yz xz xy [Pa]": stress,
+        "von Mises stress [Pa]": von_mises(stress),
+        "displacement [m]": (surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
+    }
+    return grid(surface.points, surface.triangles, TRIANGLE, at_points=fields)
 
 
 def _document(body: FlexibleBody) -> str:
