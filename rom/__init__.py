@@ -48,6 +48,7 @@ from rom.workflow import mass_properties, modes, reduce, substructure
 if TYPE_CHECKING:
     from rom.mbs.audit import audit
     from rom.mbs.integrate import simulate
+    from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
 
 __version__ = "0.1.0"
@@ -93,6 +94,7 @@ __all__ = [
     "check",
     "craig_bampton",
     "export",
+    "linearize",
     "load",
     "mass_properties",
     "modes",
@@ -107,7 +109,12 @@ __all__ = [
     "write_stress_history",
 ]
 PACKAGES = ("fe", "mbs", "view")
-LATER = {"Mechanism": "mechanism", "audit": "audit", "simulate": "integrate"}  # they load Numba
+LATER = {  # names whose modules load Numba
+    "Mechanism": "mechanism",
+    "audit": "audit",
+    "linearize": "linearize",
+    "simulate": "integrate",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,297 @@
+"""Small motions around any state of a mechanism: frequencies, damping, shapes."""
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eig, eigh
+
+from rom.errors import ConfigError, ModelError, RomWarning
+from rom.mbs.arrays import ROLL
+from rom.mbs.frames import chosen, small_motions
+from rom.mbs.packing import Packed
+from rom.mbs.parts import Marker
+from rom.mbs.state import State, fitting_velocity, initial_state, with_accelerations
+from rom.mbs.variation import Instant, consistent, free_motions, instant
+from rom.model import Array
+
+# frequencies below this share of the highest one are round-off: a motion that nothing holds
+ZERO = 2e-7
+SYMMETRIC = 1e-9
+TURN = 1e-3  # angle by which the joints are moved on, to see how their free motions change
+DRIFT = 1e-4  # relative change of the matrices in a radian from which they count as periodic
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """Linear equations M y'' + C y' + K y = f of the motions that the joints allow.
+
+    Attributes:
+        state: where.
+        M, C, K: (f, f) mass, damping with gyroscopic terms, stiffness with geometric and
+            centrifugal terms, for the coordinates y of the free motions; M is the unit matrix.
+        basis: (n, f) variation of all coordinates, counted as in `State.v`, per y.
+        test: (n, f) virtual motions that project forces; the basis unless there is friction.
+        packed: the arrays of the mechanism.
+        H: (k, 6, 6 + R) twist of all markers per velocity of their body.
+    """
+
+    state: State
+    M: Array
+    C: Array
+    K: Array
+    basis: Array
+    test: Array
+    packed: Packed
+    H: Array
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array, Array]:
+        return _eigenvalues(self.C, self.K)
+
+    @property
+    def eigenvalues(self) -> Array:
+        """(f,) complex, one per mode [rad/s]; of a pair of real ones the larger."""
+        return self._modes[0]
+
+    @property
+    def frequencies(self) -> Array:
+        """(f,) ascending [Hz]; 0 for motions that are free, or do not oscillate."""
+        return self.eigenvalues.imag / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """(f,) share of critical damping, negative where a motion grows; 0 for free motions."""
+        size = np.abs(self.eigenvalues)
+        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
+
+    @property
+    def shapes(self) -> Array:
+        """(n, f) modes in all coordinates, counted as in `State.v`; unit modal mass.
+
+        Complex where damping or rotation shifts phases. The largest part is real and positive.
+        """
+        return self.basis @ self.vectors
+
+    @property
+    def vectors(self) -> Array:
+        """(f, f) modes in the coordinates y."""
+        return self._modes[1]
+
+    @property
+    def stable(self) -> bool:
+        """Whether no motion grows exponentially."""
+        every = self._modes[2]
+        return bool(every.real.max(initial=0.0) <= 1e-6 * np.abs(every).max(initial=0.0))
+
+    def motion(self, marker: Marker) -> Array:
+        """(6, f) small translation and rotation of a marker, in the world, per coordinate y."""
+        return _jacobian(self.packed, marker, self.H) @ self.basis
+
+    def __str__(self) -> str:
+        lines = ["mode  frequency [Hz]  damping ratio"]
+        for k, (f, d) in enumerate(zip(self.frequencies, self.damping_ratios, strict=True)):
+            lines.append(f"{k + 1:4d}  {f:14.6g}  {d:13.4g}")
+        return "\n".join(lines)
+
+
+def linearize(
+    mechanism: Any, state: State | None = None, *, t: float | None = None, frame: Any = "body"
+) -> Linearization:
+    """Linearise the equations of motion around a state, at rest or moving.
+
+    Variations of the state that satisfy the joints obey M y'' + C y' + K y = 0. K holds the
+    stiffness of bodies and forces, the geometric stiffness of joints and loads, and what
+    rotation and acceleration add; C holds dampers and gyroscopic terms. Around a state that moves,
+    the coefficients are constant if everything turns as one in the axes of ``frame``.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        state: coordinates and velocities, from `equilibrium`, ``sol.final`` or None for the start;
+            accelerations and reactions are computed.
+        t: time at which drives and loads are taken [s]; None for that of the state.
+        frame: axes in which small motions of a body are counted: "body" for what turns as a whole
+            (blades), "world" for axisymmetric rotors that spin in bearings; or {body: frame}.
+
+    Raises:
+        ConfigError: for a state of another mechanism or a wrong frame.
+        ModelError: naming the joint that the state does not satisfy, or one that rolls while it
+            moves.
+        SolverError: if the equations are singular there.
+
+    Warns:
+        RomWarning: if the coefficients change with time: frequencies are then those of an instant.
+
+    Source:
+        Variation of the equations of motion on R^3 x SO(3) x R^r, as in Bruels and Cardona,
+        Mech. Mach. Theory 48 (2012) 121, projected on the tangent space of the constraints.
+    """
+    time = (0.0 if state is None else state.t) if t is None else t
+    now = instant(mechanism, time)
+    world = chosen(frame, now.packed.names)
+    state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
+    _refuse_rolling(now.packed, state)
+    return _reduced(now, state, world)
+
+
+def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearization:
+    """Matrices for the motions the joints leave, and a warning if they change with time."""
+    T, scale = small_motions(now.packed.system, state, world)[0], now.probe()
+    _, G, M = now.gradient(state.q, state.v)
+    Z = free_motions(G @ T, scale, state.rank)
+    mass = np.linalg.cholesky(Z.T @ (T.T @ M @ T) @ Z)
+    path = _Path(now, state, world, np.linalg.solve(mass, Z.T).T)
+    found = _matrices(now, state, world, path)
+    rate = path.rate
+    if state.v.any():
+        later = path.later()
+        moved_on = _matrices(now, later.state, world, later)
+        scale = max(np.abs(found.K).max(initial=0.0), rate * np.abs(found.C).max(initial=0.0))
+        change = max(np.abs(found.K - moved_on.K).max(initial=0.0),
+                     rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
+        if change > DRIFT * TURN * max(scale, rate**2):
+            warnings.warn(
+                f"the linear equations change with time, by {change / TURN / scale:.2g} of their "
+                "size per radian: these frequencies are those of one instant.",
+                RomWarning,
+                stacklevel=4,
+            )
+    return found
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The free motions, of unit mass, and how they follow the joints as these move."""
+
+    now: Instant
+    state: State
+    world: tuple[bool, ...]
+    Z: Array
+
+    @cached_property
+    def rate(self) -> float:
+        """Speed of the mechanism in radians per second."""
+        v, a, length = self.state.v, self.state.a, self.now.packed.length
+        found = [0.0]
+        for t in self.now.packed.system.bodies.v_at:
+            x, o = slice(t, t + 3), slice(t + 3, t + 6)
+            found += [np.linalg.norm(v[o]), np.linalg.norm(v[x]) / length]
+            found += [np.sqrt(np.linalg.norm(a[o])), np.sqrt(np.linalg.norm(a[x]) / length)]
+        return float(max(found))
+
+    def at(self, h: float) -> tuple[Array, Array]:
+        """Coordinates a time h later, and the free motions there nearest to the present ones."""
+        q = self.now.shifted(self.state.q, h * self.state.v + 0.5 * h * h * self.state.a)
+        _, G, _ = self.now.gradient(q, self.state.v)
+        there = replace(self.state, q=q)
+        T = small_motions(self.now.packed.system, there, self.world)[0]
+        scale = self.now.probe()[:, None]
+        N = free_motions(G @ T, scale[:, 0], self.state.rank)
+        return q, N @ ((N / scale).T @ (self.Z / scale))
+
+    def rates(self) -> tuple[Array, Array]:
+        """First and second time derivative of the free motions."""
+        if self.rate == 0.0 or not self.state.rank:
+            return 0 * self.Z, 0 * self.Z
+        h = TURN / self.rate
+        _, before = self.at(-h)
+        _, after = self.at(h)
+        return (after - before) / (2 * h), (after - 2 * self.Z + before) / h**2
+
+    def later(self) -> "_Path":
+        """The same a little later."""
+        h = TURN / self.rate
+        q, Z = self.at(h)
+        v = fitting_velocity(self.now.packed, self.now.W, q, self.state.v + h * self.state.a)
+        self.now.evaluate(q, v)
+        state = with_accelerations(self.now.packed, self.now.W, replace(self.state, q=q, v=v))
+        return replace(self, state=state, Z=Z)
+
+
+def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) -> Linearization:
+    T, T1, T2, T3 = small_motions(now.packed.system, state, world)
+    Z, (Zd, Zdd) = path.Z, path.rates()
+    Kq, Cv = now.stiffness(state), now.damping(state)
+    M = now.gradient(state.q, state.v)[2]
+    H, basis = now.W.H.copy(), T @ Z
+    test = _virtual(now, state, basis)
+    acceleration = T @ Zdd + T2 @ Zd + T3 @ Z
+    M2 = test.T @ M @ basis
+    C2 = test.T @ (M @ (2 * T @ Zd + T2 @ Z) + Cv @ basis)
+    K2 = test.T @ (M @ acceleration + Cv @ (T @ Zd + T1 @ Z) + Kq @ basis)
+    test = np.linalg.solve(M2, test.T).T
+    C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
+    return Linearization(state, np.eye(len(K2)), C2, K2, basis, test, now.packed,
+                         H)  # fmt: skip
+
+
+def _virtual(now: Instant, state: State, basis: Array) -> Array:
+    """Motions in which the reactions do no work; friction adds to what reactions do."""
+    friction = now.packed.system.actions.friction
+    if not friction[:, 1].any():
+        return basis
+    R = now.reactions(state)
+    return basis - np.linalg.lstsq(R.T, R.T @ basis, rcond=1e-9)[0]
+
+
+def _refuse_rolling(packed: Packed, state: State) -> None:
+    """At rest, what rolls without sliding is held like by any other joint."""
+    rolls = packed.system.rows.kind == ROLL
+    if rolls.any() and state.v.any():
+        name = packed.row_owner[int(np.argmax(rolls))]
+        raise ModelError(
+            "a rolling joint binds velocities, not positions: it can be linearised at rest only.",
+            where=name,
+        )
+
+
+def _jacobian(packed: Packed, marker: Marker, H: Array) -> Array:
+    """(6, n) twist of a marker per velocity of the mechanism, from the blocks H of all markers."""
+    if marker not in packed.markers:
+        raise ConfigError(
+            f"the point {marker.place} of body {marker.body!r} is not a marker of the mechanism.",
+            hint="Name it when the body is added.",
+        )
+    k = packed.row(marker)
+    J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
+    if b >= 0:
+        at, r = packed.system.bodies.v_at[b], packed.system.bodies.r[b]
+        J[:, at : at + 6 + r] = H[k, :, : 6 + r]
+    return J
+
+
+def _eigenvalues(C: Array, K: Array) -> tuple[Array, Array, Array]:
+    """Eigenvalue and vector per mode of y'' + C y' + K y = 0, and all 2 f eigenvalues."""
+    symmetric = np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * np.abs(K).max(initial=0.0)
+    if symmetric and not C.any():
+        squares, V = eigh(0.5 * (K + K.T))
+        roots = np.sqrt((-squares).astype(complex))
+        every = np.concatenate([roots, -roots])
+        limit = ZERO * np.abs(every).max(initial=0.0)
+        roots[np.abs(roots) < limit] = 0.0
+        order = np.lexsort((-roots.real, roots.imag))
+        return roots[order], _signed(V[:, order]), every
+    n, s = len(K), max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2))
+    A = np.block([[np.zeros((n, n)), s * np.eye(n)], [-K / s, -C]])
+    every, X = eig(A)
+    limit = ZERO * np.abs(every).max(initial=0.0)
+    swing = np.flatnonzero(every.imag > limit)
+    swing = swing[np.argsort(every[swing].imag)]
+    real = np.flatnonzero(np.abs(every.imag) <= limit)
+    real = real[np.argsort(-every[real].real)][: n - swing.size]
+    roots = every.copy()
+    roots[real] = roots[real].real
+    roots[np.abs(roots) < limit] = 0.0
+    chosen_ones = np.concatenate([real, swing])
+    V = X[:n, chosen_ones]
+    return roots[chosen_ones], _signed(V / np.linalg.norm(V, axis=0)), every
+
+
+def _signed(V: Array) -> Array:
+    """Vectors with a real and positive largest entry."""
+    if not V.size:
+        return V
+    largest = V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])]
+    return V * (np.abs(largest) / largest)

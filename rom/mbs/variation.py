@@ -1,0 +1,204 @@
+"""How the equations of motion change around one state, and which motions the joints leave."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, ModelError
+from rom.mbs.arrays import ROLL, Work, workspace
+from rom.mbs.compiled import kernel
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.motion import evaluate, linearise, moved, residual, tangents
+from rom.mbs.packing import Packed, pack
+from rom.mbs.signals import first_failure, sample_all
+from rom.mbs.state import State, fitting_velocity, with_accelerations
+from rom.mbs.user import Law, MotorLaw, apply_laws, laws
+from rom.model import Array
+
+# central differences: rotations in rad, displacements in sizes of the mechanism
+PROBE = 1e-5
+SPACING = 1e-6  # of the differences of drives [s]
+GAP = 1e-7  # of a joint, relative to the size of the mechanism
+MISS = 1e-3  # of the velocities; what a time integration leaves is far below
+
+
+@kernel
+def balance(s, W, q, v, a, lam):
+    """Set W.residual to M a + h - Q + G^T lam; `evaluate` first."""
+    residual(s, W, q, v, a, lam)
+
+
+@kernel
+def slopes(s, W, v, a, lam, c):
+    """Set W.S and W.Kt to the tangents of the residual, see `tangents`; `balance` first."""
+    tangents(s, W, v, a, lam, c)
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A mechanism at one time, ready to be asked for its equations at any coordinates.
+
+    Attributes:
+        packed: the mechanism.
+        W: memory.
+        t: time [s].
+        laws: forces of Python functions.
+        load: factor of gravity, of loads and of forces of Python functions.
+    """
+
+    packed: Packed
+    W: Work
+    t: float
+    laws: tuple[Law | MotorLaw, ...]
+    load: float = 1.0
+
+    def scaled(self, load: float) -> "Instant":
+        """The same with another factor of the loads."""
+        return replace(self, load=load)
+
+    @property
+    def system(self) -> Any:
+        """The arrays of the mechanism, gravity and loads times their factor."""
+        s = self.packed.system
+        forces = s.forces._replace(load=self.load * s.forces.load)
+        bodies = s.bodies._replace(gravity=self.load * s.bodies.gravity)
+        return s._replace(bodies=bodies, forces=forces)
+
+    def evaluate(self, q: Array, v: Array) -> None:
+        """Everything that depends on coordinates and velocities, Python forces included."""
+        evaluate(self.packed.system, self.W, q, v)
+        apply_laws(self.laws, self.W, self.t)
+        self.W.user[:] *= self.load
+
+    def residual(self, q: Array, v: Array, a: Array, lam: Array) -> Array:
+        """(n,) equations of motion M a + h - Q + G^T lam."""
+        self.evaluate(q, v)
+        balance(self.system, self.W, q, v, a, lam)
+        return self.W.residual.copy()
+
+    def gradient(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        """(m,) gaps of the constraints, their gradient (m, n), and the mass matrix (n, n)."""
+        linearise(self.packed.system, self.W, q, v)
+        return self.W.value.copy(), self.W.G.copy(), self.W.S.copy()
+
+    def damping(self, state: State) -> Array:
+        """(n, n) derivative of the residual by the velocities."""
+        q, v, a, lam = state.q, state.v, state.a, state.lam
+        if self.laws:
+            step = self.probe()
+            return difference(lambda dv: self.residual(q, v + dv, a, lam), step)
+        self.residual(q, v, a, lam)
+        slopes(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
+        return self.W.S.copy()
+
+    def stiffness(self, state: State) -> Array:
+        """(n, n) derivative of the residual by the coordinates, rotations in the body frame."""
+        moving = lambda dq: self.residual(  # noqa: E731
+            self.shifted(state.q, dq), state.v, state.a, state.lam
+        )
+        return difference(moving, self.probe())
+
+    def reactions(self, state: State) -> Array:
+        """(n, m) derivative of the residual by the multipliers; friction may depend on them."""
+        q, v, a = state.q, state.v, state.a
+        step = np.maximum(PROBE * np.abs(state.lam), 1.0)
+        return difference(lambda d: self.residual(q, v, a, state.lam + d), step)
+
+    def shifted(self, q: Array, delta: Array) -> Array:
+        """(n_q,) coordinates q after the small motion delta (n,)."""
+        out = np.empty_like(q)
+        moved(self.packed.system, q, np.ascontiguousarray(delta), out)
+        return out
+
+    def probe(self) -> Array:
+        """(n,) small motion of each coordinate for differences."""
+        B, length = self.packed.system.bodies, self.packed.length
+        step = np.full(self.packed.v.size, PROBE)
+        for b, at in enumerate(B.v_at):
+            r, mass = B.r[b], B.mass[b]
+            step[at : at + 3] *= length
+            modal = np.diag(B.M[B.flex[b]])[:r]
+            step[at + 6 : at + 6 + r] *= length * np.sqrt(mass / modal)
+        return step
+
+
+def difference(f: Any, step: Array) -> Array:
+    """Central differences of f by the entries of its argument, as columns."""
+    columns = [(f(e) - f(-e)) / (2 * e[k]) for k, e in enumerate(np.diag(step))]
+    return np.array(columns).reshape(step.size, -1).T
+
+
+def instant(mechanism: Any, t: float) -> Instant:
+    """The mechanism with its drives and loads at time t.
+
+    Raises:
+        ConfigError: if it is no Mechanism, or t is not finite.
+        SolverError: if a drive or load is not finite.
+    """
+    if not isinstance(mechanism, Mechanism):
+        raise ConfigError(f"{mechanism!r} is no Mechanism.")
+    if not np.isfinite(t):
+        raise ConfigError(f"t = {t!r} is no time.")
+    packed = pack(mechanism)
+    W = workspace(packed.system, len(packed.signals))
+    table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), SPACING)
+    good, failure = first_failure(packed.signals, np.array([t]), table)
+    if not good:
+        raise failure
+    W.signal[:] = table[0]
+    return Instant(packed, W, float(t), laws(mechanism, packed))
+
+
+def consistent(now: Instant, state: Any) -> State:
+    """The state with velocities, accelerations and multipliers that belong together.
+
+    Raises:
+        ConfigError: if the state belongs to another mechanism.
+        ModelError: naming the joint that is open, or whose velocity contradicts it.
+    """
+    packed, W = now.packed, now.W
+    sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
+    needed = (packed.q.size, packed.v.size, W.value.size)
+    if not isinstance(state, State) or sizes != needed:
+        raise ConfigError(
+            f"the state has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
+            "constraints; this mechanism has {}, {} and {}.".format(*needed),
+            hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
+        )
+    if state.base is not None:
+        W.base[:] = state.base
+    value, G, _ = now.gradient(state.q, state.v)
+    rolls = packed.system.rows.kind == ROLL
+    _check(packed, np.where(rolls, 0.0, value) / packed.row_scale, GAP, "stays open by")
+    v = fitting_velocity(packed, W, state.q, state.v)
+    size = (np.abs(G) @ np.maximum(np.abs(v), np.abs(state.v))).max(initial=0.0)
+    if size > 0.0:
+        _check(packed, G @ (v - state.v) / size, MISS, "contradicts the velocities by")
+    state = replace(state, v=v, t=now.t)
+    now.evaluate(state.q, state.v)
+    return with_accelerations(packed, W, state)
+
+
+def _check(packed: Packed, miss: Array, limit: float, what: str) -> None:
+    if not miss.size or np.abs(miss).max() <= limit:
+        return
+    k = int(np.argmax(np.abs(miss)))
+    raise ModelError(
+        f"the state does not fit the mechanism at this time: {packed.row_owner[k]!r} {what} "
+        f"{abs(miss[k]):.3g} (relative).",
+        where=packed.row_owner[k],
+        hint="Take a state of the same mechanism and give its time t.",
+    )
+
+
+def free_motions(G: Array, scale: Array, rank: int) -> Array:
+    """(n, n - rank) motions that the constraints G allow, orthonormal when divided by ``scale``."""
+    A = G * scale
+    norms = np.linalg.norm(A, axis=1)
+    V = (
+        np.linalg.svd(A / np.where(norms > 0, norms, 1.0)[:, None])[2]
+        if rank
+        else np.eye(len(scale))
+    )
+    return scale[:, None] * V[rank:].T

@@ -1,0 +1,203 @@
+"""Small motions around states: closed forms at rest and in rotation."""
+
+import warnings
+
+import numpy as np
+import pytest
+from beam import stiffened_beam
+from numpy.testing import assert_allclose
+
+from rom.errors import RomWarning
+from rom.mbs.linearize import linearize
+from rom.mbs.mechanism import Mechanism
+
+g, TINY = 9.81, (1e-12, 1e-12, 1e-12)
+Y, Z = (0, 1, 0), (0, 0, 1)
+
+
+def pendulum(length=0.7, angle=0.0, inertia=TINY):
+    """A bob that swings about y."""
+    mech = Mechanism(gravity=(0, 0, -g))
+    at = length * np.array([np.sin(angle), 0, -np.cos(angle)])
+    bob = mech.add_rigid("bob", mass=2.0, inertia=inertia, at=at, markers={"pin": -at})
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=Y)
+    return mech
+
+
+def test_pendulum():
+    found = linearize(pendulum())
+    assert_allclose(2 * np.pi * found.frequencies, [np.sqrt(g / 0.7)], rtol=1e-9)
+    turn = found.shapes[4, 0]
+    assert_allclose(found.shapes[:, 0], turn * np.array([-0.7, 0, 0, 0, 1, 0]), atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.3, np.pi / 2, 2.5])
+def test_a_pendulum_let_go_varies_by_the_cosine_of_its_angle(angle):
+    """The bob accelerates: K = m g L cos / (m L^2 + J), which is negative in the upper half."""
+    found = linearize(pendulum(angle=angle, inertia=(0.1, 0.3, 0.3)))
+    stiffness = 2.0 * g * 0.7 * np.cos(angle) / (2.0 * 0.7**2 + 0.3)
+    assert_allclose(found.K, [[stiffness]], rtol=1e-8, atol=1e-8)
+    if angle != np.pi / 2:
+        assert found.stable == (angle < 2)
+        assert_allclose(found.eigenvalues, [np.sqrt(complex(-stiffness))], rtol=1e-8)
+
+
+def test_double_pendulum():
+    """omega^2 = (g / L)(2 -+ sqrt 2) for equal masses and lengths; shapes 1 : +-sqrt 2."""
+    length, mech = 0.5, Mechanism(gravity=(0, 0, -g))
+    marks = {"up": (0, 0, length), "low": (0, 0, 0)}
+    one = mech.add_rigid("one", mass=1.5, inertia=TINY, at=(0, 0, -length), markers=marks)
+    two = mech.add_rigid("two", mass=1.5, inertia=TINY, at=(0, 0, -2 * length), markers=marks)
+    mech.revolute("upper", mech.ground.marker((0, 0, 0)), one.marker("up"), axis=Y)
+    mech.revolute("lower", one.marker("low"), two.marker("up"), axis=Y)
+    found = linearize(mech)
+    squares = g / length * np.array([2 - np.sqrt(2), 2 + np.sqrt(2)])
+    assert_allclose((2 * np.pi * found.frequencies) ** 2, squares, rtol=1e-8)
+    ratio = found.shapes[10] / found.shapes[4]
+    assert_allclose(ratio, [np.sqrt(2), -np.sqrt(2)], rtol=1e-8)
+    assert_allclose(found.shapes.T @ np.diag([1.5] * 3 + [1e-12] * 3 + [1.5] * 3 + [1e-12] * 3)
+                    @ found.shapes, np.eye(2), atol=1e-8)  # fmt: skip
+
+
+def chain(n=3, *, mass=2.0, stiffness=50.0, damping=0.0, held=True):
+    """Masses on a rail along x, joined by springs; the first one to the ground."""
+    mech = Mechanism(gravity=(0, 0, -g))
+    ground = mech.ground.marker((0, 0, 0))
+    last = ground
+    for k in range(n):
+        cart = mech.add_rigid(f"cart {k}", mass=mass, inertia=(1, 1, 1), at=(k + 1.0, 0, 0),
+                              markers={"hook": (0, 0, 0)})  # fmt: skip
+        hook = cart.marker("hook")
+        mech.prismatic(f"rail {k}", ground, hook, axis=(1, 0, 0))
+        if k or held:
+            mech.spring_damper(f"spring {k}", last, hook, stiffness=stiffness, damping=damping)
+        last = hook
+    return mech
+
+
+def test_chains_held_and_free():
+    """omega = 2 sqrt(k / m) sin(...): one end held, or both free with the motion of the whole."""
+    k = np.arange(3)
+    held = 2 * np.sqrt(25.0) * np.sin((2 * k + 1) * np.pi / 14)
+    assert_allclose(2 * np.pi * linearize(chain()).frequencies, held, rtol=1e-8)
+    free = linearize(chain(held=False))
+    assert free.frequencies[0] == 0.0 and free.damping_ratios[0] == 0.0
+    assert_allclose(2 * np.pi * free.frequencies, 2 * np.sqrt(25.0) * np.sin(k * np.pi / 6),
+                    rtol=1e-8)  # fmt: skip
+
+
+@pytest.mark.parametrize("c", [3.0, 40.0])
+def test_one_damped_mass(c):
+    """lambda = -delta +- sqrt(delta^2 - k / m): swings, or creeps with frequency zero."""
+    found, delta = linearize(chain(1, damping=c)), c / 4
+    root = -delta + np.sqrt(complex(delta**2 - 25.0))
+    assert_allclose(found.eigenvalues, [root], rtol=1e-9)
+    assert_allclose(found.damping_ratios, [-root.real / abs(root)], rtol=1e-9)
+    assert_allclose(2 * np.pi * found.frequencies, [root.imag], atol=1e-9)
+    assert found.stable
+
+
+def clamped(body, **pose):
+    mech = Mechanism(gravity=(0, 0, 0))
+    beam = mech.add_flexible("beam", body, **pose)
+    root = beam.marker("root")
+    mech.fixed("clamp", mech.ground.marker(mech.design_point(root)), root)
+    return mech
+
+
+def test_a_clamped_flexible_body_has_its_clamped_frequencies():
+    """Somewhere in space, in its own frame and in that of its free vibrations."""
+    body = stiffened_beam(3.0, 2.0, 0.4, n_modes=8)
+    exact = body.frequencies(fixed=("root",))
+    turned = {"at": (1, 2, 3), "orientation": (0.5, 0.5, -0.1, 0.7)}
+    for one in (body, body.with_reference("mean-axis")):
+        assert_allclose(linearize(clamped(one, **turned)).frequencies, exact, rtol=1e-8)
+
+
+# Southwell's beam: exact flapwise frequencies by speed, in sqrt(EI / m L^3)
+FLAP = {
+    1: (3.68164681, 22.1810112, 61.8417626, 121.050922),
+    5: (6.44954475, 25.4460804, 65.2050405, 124.566421),
+    12: (13.1701505, 37.6031123, 79.6144785, 140.534354),
+}
+
+
+def turning_beam(eta, axis, hub=0.0):
+    """The beam on the rim of a hub that is driven with the speed eta."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    turn = eta * np.array(axis, dtype=float)
+    at = np.array([hub, 0, 0])
+    beam = mech.add_flexible("beam", stiffened_beam(), at=at, velocity=np.cross(turn, at),
+                             omega=turn)  # fmt: skip
+    disc = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=turn,
+                          markers={"rim": at, "axle": (0, 0, 0)})  # fmt: skip
+    mech.fixed("clamp", disc.marker("rim"), beam.marker("root"))
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), disc.marker("axle"), axis=axis)
+    mech.drive("motor", "axle", lambda t: eta * t, rate=lambda t: eta, acceleration=lambda t: 0)
+    return mech
+
+
+@pytest.mark.parametrize("eta", FLAP)
+def test_a_turning_beam_has_southwells_frequencies(eta):
+    """The mechanism knows nothing of rotating frames: centrifugal terms come out of its motion."""
+    flap = 2 * np.pi * linearize(turning_beam(eta, Y)).frequencies
+    assert_allclose(flap[:4], FLAP[eta], rtol=2e-5)
+    lag = 2 * np.pi * linearize(turning_beam(eta, Z)).frequencies
+    assert_allclose(lag**2, flap**2 - eta**2, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("eta", "exact"), [(1, (3.8888235, 22.3750143)), (10, (16.6063628, 44.3682239))]
+)
+def test_a_turning_beam_on_a_hub_as_long_as_itself(eta, exact):
+    flap = 2 * np.pi * linearize(turning_beam(eta, Y, hub=1.0)).frequencies
+    assert_allclose(flap[:2], exact, rtol=5e-6)
+
+
+def rotor(speed, *, across=0.3, along=0.5, kx=400.0, ky=400.0):
+    """A disc on a ball joint, turning about z, two springs against its tilt."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    marks = {"c": (0, 0, 0), "tip": (0, 0, 1)}
+    disc = mech.add_rigid("disc", mass=4.0, inertia=(across, across, along), at=(0, 0, 0),
+                          omega=(0, 0, speed), markers=marks)  # fmt: skip
+    mech.spherical("ball", mech.ground.marker((0, 0, 0)), disc.marker("c"))
+    for name, k, far in (("x", kx, (3, 0, 1)), ("y", ky, (0, 3, 1))):
+        mech.spring_damper(name, mech.ground.marker(far), disc.marker("tip"), stiffness=k)
+    return mech
+
+
+@pytest.mark.parametrize("speed", [0.0, 20.0, 300.0])
+def test_a_disc_that_spins_splits_its_tilt_into_forward_and_backward_whirl(speed):
+    """omega = sqrt(k / A + (C W / 2 A)^2) +- C W / 2 A in the axes of the bearing."""
+    found = linearize(rotor(speed), frame="world")
+    half, mean = 0.5 * 0.5 * speed / 0.3, np.sqrt(400.0 / 0.3 + (0.5 * 0.5 * speed / 0.3) ** 2)
+    exact = [0.0, mean - half, mean + half]
+    assert_allclose(2 * np.pi * found.frequencies, exact, rtol=2e-6)
+    assert found.stable
+    if speed:
+        tilt = found.motion(_tip(found))[:2] @ found.vectors[:, 1:]
+        assert_allclose(tilt[1] / tilt[0], [1j, -1j], atol=1e-4)  # backward, then forward
+
+
+def _tip(found):
+    return next(m for m in found.packed.markers if m.place == "tip")
+
+
+def test_unequal_bearings():
+    """(kx - A w^2)(ky - A w^2) = (C W w)^2 of a disc in anisotropic springs."""
+    A, C, W, kx, ky = 0.3, 0.5, 20.0, 300.0, 500.0
+    b = A * (kx + ky) + (C * W) ** 2
+    root = np.sqrt(b**2 - 4 * A**2 * kx * ky)
+    exact = np.sqrt((b + np.array([-root, root])) / (2 * A**2))
+    found = linearize(rotor(W, kx=kx, ky=ky), frame={"disc": "world"})
+    assert_allclose(2 * np.pi * found.frequencies[1:], exact, rtol=2e-6)
+
+
+def test_coefficients_that_change_with_time_are_noticed():
+    """The same disc in its own axes, where the unequal springs go round."""
+    with pytest.warns(RomWarning, match="change with time"):
+        linearize(rotor(20.0, kx=300.0, ky=500.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        linearize(rotor(20.0, kx=300.0, ky=500.0), frame="world")
+        linearize(turning_beam(5, Z, hub=1.0))
