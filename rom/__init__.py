@@ -47,6 +47,7 @@ from rom.workflow import mass_properties, modes, reduce, substructure
 
 if TYPE_CHECKING:
     from rom.mbs.audit import audit
+    from rom.mbs.equilibrium import equilibrium
     from rom.mbs.integrate import simulate
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
@@ -93,6 +94,7 @@ __all__ = [
     "audit",
     "check",
     "craig_bampton",
+    "equilibrium",
     "export",
     "linearize",
     "load",
@@ -112,6 +114,7 @@ PACKAGES = ("fe", "mbs", "view")
 LATER = {  # names whose modules load Numba
     "Mechanism": "mechanism",
     "audit": "audit",
+    "equilibrium": "equilibrium",
     "linearize": "linearize",
     "simulate": "integrate",
 }

@@ -6,20 +6,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eig, eigh
 
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
+from rom.mbs.modes import modes
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
 from rom.mbs.state import State, fitting_velocity, initial_state, with_accelerations
 from rom.mbs.variation import Instant, consistent, free_motions, instant
 from rom.model import Array
 
-# frequencies below this share of the highest one are round-off: a motion that nothing holds
-ZERO = 2e-7
-SYMMETRIC = 1e-9
 TURN = 1e-3  # angle by which the joints are moved on, to see how their free motions change
 DRIFT = 1e-4  # relative change of the matrices in a radian from which they count as periodic
 
@@ -34,6 +31,7 @@ class Linearization:
             centrifugal terms, for the coordinates y of the free motions; M is the unit matrix.
         basis: (n, f) variation of all coordinates, counted as in `State.v`, per y.
         test: (n, f) virtual motions that project forces; the basis unless there is friction.
+        scale: (n,) small motion of each coordinate, as many rad as sizes of the mechanism.
         packed: the arrays of the mechanism.
         H: (k, 6, 6 + R) twist of all markers per velocity of their body.
     """
@@ -44,12 +42,13 @@ class Linearization:
     K: Array
     basis: Array
     test: Array
+    scale: Array
     packed: Packed
     H: Array
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array]:
-        return _eigenvalues(self.C, self.K)
+        return modes(self.C, self.K)
 
     @property
     def eigenvalues(self) -> Array:
@@ -88,7 +87,22 @@ class Linearization:
 
     def motion(self, marker: Marker) -> Array:
         """(6, f) small translation and rotation of a marker, in the world, per coordinate y."""
-        return _jacobian(self.packed, marker, self.H) @ self.basis
+        return self.jacobian(marker) @ self.basis
+
+    def jacobian(self, marker: Marker) -> Array:
+        """(6, n) small translation and rotation of a marker, in the world, per coordinate."""
+        packed = self.packed
+        if marker not in packed.markers:
+            raise ConfigError(
+                f"{marker!r} is not a marker of the mechanism.",
+                hint="Name it when the body is added, and take it from the part: part.marker(...).",
+            )
+        k = packed.row(marker)
+        J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
+        if b >= 0:
+            at, r = packed.system.bodies.v_at[b], packed.system.bodies.r[b]
+            J[:, at : at + 6 + r] = self.H[k, :, : 6 + r]
+        return J
 
     def __str__(self) -> str:
         lines = ["mode  frequency [Hz]  damping ratio"]
@@ -151,7 +165,8 @@ def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearizati
         scale = max(np.abs(found.K).max(initial=0.0), rate * np.abs(found.C).max(initial=0.0))
         change = max(np.abs(found.K - moved_on.K).max(initial=0.0),
                      rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
-        if change > DRIFT * TURN * max(scale, rate**2):
+        scale = max(scale, rate**2)
+        if change > DRIFT * TURN * scale:
             warnings.warn(
                 f"the linear equations change with time, by {change / TURN / scale:.2g} of their "
                 "size per radian: these frequencies are those of one instant.",
@@ -213,8 +228,7 @@ class _Path:
 def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) -> Linearization:
     T, T1, T2, T3 = small_motions(now.packed.system, state, world)
     Z, (Zd, Zdd) = path.Z, path.rates()
-    Kq, Cv = now.stiffness(state), now.damping(state)
-    M = now.gradient(state.q, state.v)[2]
+    M, Cv, Kq = now.matrices(state)
     H, basis = now.W.H.copy(), T @ Z
     test = _virtual(now, state, basis)
     acceleration = T @ Zdd + T2 @ Zd + T3 @ Z
@@ -223,8 +237,8 @@ def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) 
     K2 = test.T @ (M @ acceleration + Cv @ (T @ Zd + T1 @ Z) + Kq @ basis)
     test = np.linalg.solve(M2, test.T).T
     C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
-    return Linearization(state, np.eye(len(K2)), C2, K2, basis, test, now.packed,
-                         H)  # fmt: skip
+    M2 = np.eye(len(K2))
+    return Linearization(state, M2, C2, K2, basis, test, now.probe(), now.packed, H)
 
 
 def _virtual(now: Instant, state: State, basis: Array) -> Array:
@@ -245,53 +259,3 @@ def _refuse_rolling(packed: Packed, state: State) -> None:
             "a rolling joint binds velocities, not positions: it can be linearised at rest only.",
             where=name,
         )
-
-
-def _jacobian(packed: Packed, marker: Marker, H: Array) -> Array:
-    """(6, n) twist of a marker per velocity of the mechanism, from the blocks H of all markers."""
-    if marker not in packed.markers:
-        raise ConfigError(
-            f"the point {marker.place} of body {marker.body!r} is not a marker of the mechanism.",
-            hint="Name it when the body is added.",
-        )
-    k = packed.row(marker)
-    J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
-    if b >= 0:
-        at, r = packed.system.bodies.v_at[b], packed.system.bodies.r[b]
-        J[:, at : at + 6 + r] = H[k, :, : 6 + r]
-    return J
-
-
-def _eigenvalues(C: Array, K: Array) -> tuple[Array, Array, Array]:
-    """Eigenvalue and vector per mode of y'' + C y' + K y = 0, and all 2 f eigenvalues."""
-    symmetric = np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * np.abs(K).max(initial=0.0)
-    if symmetric and not C.any():
-        squares, V = eigh(0.5 * (K + K.T))
-        roots = np.sqrt((-squares).astype(complex))
-        every = np.concatenate([roots, -roots])
-        limit = ZERO * np.abs(every).max(initial=0.0)
-        roots[np.abs(roots) < limit] = 0.0
-        order = np.lexsort((-roots.real, roots.imag))
-        return roots[order], _signed(V[:, order]), every
-    n, s = len(K), max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2))
-    A = np.block([[np.zeros((n, n)), s * np.eye(n)], [-K / s, -C]])
-    every, X = eig(A)
-    limit = ZERO * np.abs(every).max(initial=0.0)
-    swing = np.flatnonzero(every.imag > limit)
-    swing = swing[np.argsort(every[swing].imag)]
-    real = np.flatnonzero(np.abs(every.imag) <= limit)
-    real = real[np.argsort(-every[real].real)][: n - swing.size]
-    roots = every.copy()
-    roots[real] = roots[real].real
-    roots[np.abs(roots) < limit] = 0.0
-    chosen_ones = np.concatenate([real, swing])
-    V = X[:n, chosen_ones]
-    return roots[chosen_ones], _signed(V / np.linalg.norm(V, axis=0)), every
-
-
-def _signed(V: Array) -> Array:
-    """Vectors with a real and positive largest entry."""
-    if not V.size:
-        return V
-    largest = V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])]
-    return V * (np.abs(largest) / largest)

@@ -44,6 +44,7 @@ class Instant:
         W: memory.
         t: time [s].
         laws: forces of Python functions.
+        signal: (s, 3) drives and loads at that time.
         load: factor of gravity, of loads and of forces of Python functions.
     """
 
@@ -51,10 +52,13 @@ class Instant:
     W: Work
     t: float
     laws: tuple[Law | MotorLaw, ...]
+    signal: Array
     load: float = 1.0
 
     def scaled(self, load: float) -> "Instant":
-        """The same with another factor of the loads."""
+        """The same with another factor of the loads; the memory is shared."""
+        vectors = [k for k, signal in enumerate(self.packed.signals) if signal.width == 3]
+        self.W.signal[vectors] = load * self.signal[vectors]
         return replace(self, load=load)
 
     @property
@@ -98,6 +102,11 @@ class Instant:
             self.shifted(state.q, dq), state.v, state.a, state.lam
         )
         return difference(moving, self.probe())
+
+    def matrices(self, state: State) -> tuple[Array, Array, Array]:
+        """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
+        C, K = self.damping(state), self.stiffness(state)
+        return self.gradient(state.q, state.v)[2], C, K
 
     def reactions(self, state: State) -> Array:
         """(n, m) derivative of the residual by the multipliers; friction may depend on them."""
@@ -147,7 +156,7 @@ def instant(mechanism: Any, t: float) -> Instant:
     if not good:
         raise failure
     W.signal[:] = table[0]
-    return Instant(packed, W, float(t), laws(mechanism, packed))
+    return Instant(packed, W, float(t), laws(mechanism, packed), table[0])
 
 
 def consistent(now: Instant, state: Any) -> State:

@@ -1,0 +1,48 @@
+"""Eigenvalues of small matrices of second order, with or without damping."""
+
+import numpy as np
+from scipy.linalg import eig, eigh
+
+from rom.model import Array
+
+# frequencies below this share of the highest one are round-off: a motion that nothing holds
+ZERO = 2e-7
+SYMMETRIC = 1e-9
+
+
+def modes(C: Array, K: Array) -> tuple[Array, Array, Array]:
+    """Eigenvalue and vector per mode of y'' + C y' + K y = 0, and all 2 f eigenvalues.
+
+    Frequencies ascend. A pair of real eigenvalues is one mode, its larger value is given.
+    """
+    symmetric = np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * np.abs(K).max(initial=0.0)
+    if symmetric and not C.any():
+        squares, V = eigh(0.5 * (K + K.T))
+        roots = np.sqrt((-squares).astype(complex))
+        every = np.concatenate([roots, -roots])
+        limit = ZERO * np.abs(every).max(initial=0.0)
+        roots[np.abs(roots) < limit] = 0.0
+        order = np.lexsort((-roots.real, roots.imag))
+        return roots[order], _signed(V[:, order]), every
+    n, s = len(K), max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2))
+    A = np.block([[np.zeros((n, n)), s * np.eye(n)], [-K / s, -C]])
+    every, X = eig(A)
+    limit = ZERO * np.abs(every).max(initial=0.0)
+    swing = np.flatnonzero(every.imag > limit)
+    swing = swing[np.argsort(every[swing].imag)]
+    real = np.flatnonzero(np.abs(every.imag) <= limit)
+    real = real[np.argsort(-every[real].real)][: n - swing.size]
+    roots = every.copy()
+    roots[real] = roots[real].real
+    roots[np.abs(roots) < limit] = 0.0
+    order = np.concatenate([real, swing])
+    V = X[:n, order]
+    return roots[order], _signed(V / np.linalg.norm(V, axis=0)), every
+
+
+def _signed(V: Array) -> Array:
+    """Vectors with a real and positive largest entry."""
+    if not V.size:
+        return V
+    largest = V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])]
+    return V * (np.abs(largest) / largest)
