@@ -47,10 +47,12 @@ from rom.workflow import mass_properties, modes, reduce, substructure
 
 if TYPE_CHECKING:
     from rom.mbs.audit import audit
+    from rom.mbs.campbell import campbell
     from rom.mbs.equilibrium import equilibrium
     from rom.mbs.integrate import simulate
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
+    from rom.mbs.response import frequency_response, transmissibility
 
 __version__ = "0.1.0"
 
@@ -92,10 +94,12 @@ __all__ = [
     "WithLoads",
     "YoungsModulus",
     "audit",
+    "campbell",
     "check",
     "craig_bampton",
     "equilibrium",
     "export",
+    "frequency_response",
     "linearize",
     "load",
     "mass_properties",
@@ -106,6 +110,7 @@ __all__ = [
     "second_order_balanced_truncation",
     "simulate",
     "substructure",
+    "transmissibility",
     "write_report",
     "write_stress",
     "write_stress_history",
@@ -114,9 +119,12 @@ PACKAGES = ("fe", "mbs", "view")
 LATER = {  # names whose modules load Numba
     "Mechanism": "mechanism",
     "audit": "audit",
+    "campbell": "campbell",
     "equilibrium": "equilibrium",
+    "frequency_response": "response",
     "linearize": "linearize",
     "simulate": "integrate",
+    "transmissibility": "response",
 }
 
 

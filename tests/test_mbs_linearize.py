@@ -1,15 +1,20 @@
 """Small motions around states: closed forms at rest and in rotation."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from beam import stiffened_beam
+from mbs_cases import random_body
 from numpy.testing import assert_allclose
 
-from rom.errors import RomWarning
+import rom
+from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.linearize import linearize
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.state import initial_state
+from rom.mbs.variation import difference, instant
 
 g, TINY = 9.81, (1e-12, 1e-12, 1e-12)
 Y, Z = (0, 1, 0), (0, 0, 1)
@@ -201,3 +206,100 @@ def test_coefficients_that_change_with_time_are_noticed():
         warnings.simplefilter("error")
         linearize(rotor(20.0, kx=300.0, ky=500.0), frame="world")
         linearize(turning_beam(5, Z, hub=1.0))
+
+
+def swinging_arm(seed=0, **pose):
+    """A random stiffened body on a ball joint, held by a spring: every term of the tangent."""
+    rng = np.random.default_rng(seed)
+    mech = Mechanism(gravity=(0.3, -9.0, 2.0))
+    arm = mech.add_flexible("arm", random_body(rng, stiffened=True), **pose)
+    a, b = arm.marker("a"), arm.marker("b")
+    mech.spherical("ball", mech.ground.marker(mech.design_point(a)), a)
+    mech.spring_damper("rope", mech.ground.marker((2, 1, 0)), b, stiffness=30.0, free_length=1.0)
+    mech.force("pull", b, (1.0, 2.0, 3.0), frame="body")
+    return mech
+
+
+def nearby(now, state, y, basis):
+    """Velocity and acceleration of the free motions, at a state moved by the variation basis y."""
+    G_of = lambda q: now.gradient(q, state.v)[1]  # noqa: E731
+    q = now.shifted(state.q, basis @ y)
+    for _ in range(4):  # back onto the joints
+        gap, G, _ = now.gradient(q, state.v)
+        q = now.shifted(q, -np.linalg.pinv(G) @ gap)
+    return q, G_of(q)
+
+
+def test_stiffness_is_the_change_of_the_forces_of_neighbours_at_rest():
+    """Second method: reactionless forces at closed neighbouring positions, by differences."""
+    mech = swinging_arm()
+    state = rom.equilibrium(mech)
+    found, now = rom.linearize(mech, state), instant(mech, 0.0)
+    assert np.abs(found.C - found.basis.T @ now.damping(state) @ found.basis).max() < 1e-9
+
+    def acceleration(y):
+        q, _ = nearby(now, state, y, found.basis)
+        there = initial_state(replace(now.packed, q=q, v=0 * state.v))
+        return there.a
+
+    step = np.full(len(found.K), 1e-5)
+    change = difference(acceleration, step)
+    M = now.gradient(state.q, state.v)[2]
+    assert_allclose(-found.basis.T @ M @ change, found.K, atol=2e-6 * np.abs(found.K).max())
+
+
+def test_exact_tangents_and_differences_agree():
+    """For a moving body whose marker does not turn by deformation; both ways are in use."""
+    mech = swinging_arm(1, omega=(1.0, -2.0, 0.5))
+    now = instant(mech, 0.0)
+    now.packed.system.markers.twist[:] = 0.0
+    now.packed.system.markers.bend[:, 3:] = 0.0
+    rng = np.random.default_rng(3)
+    state = initial_state(now.packed)
+    state = replace(state, a=rng.normal(size=10), v=rng.normal(size=10), lam=rng.normal(size=3))
+    assert now.exact(state)
+    residual = lambda dq: now.residual(  # noqa: E731
+        now.shifted(state.q, dq), state.v, state.a, state.lam
+    )
+    by_differences = difference(residual, now.probe())
+    assert_allclose(now.stiffness(state), by_differences, atol=1e-7 * np.abs(by_differences).max())
+
+
+def test_states_that_do_not_fit_are_named():
+    mech = pendulum()
+    good = initial_state(instant(mech, 0.0).packed)
+    for change, message in (
+        ({"q": good.q + [0, 0, 0.01, 0, 0, 0, 0]}, "'hinge' stays open by 0.0143"),
+        ({"v": good.v + [0.1, 0, 0, 0, 0, 0]}, "'hinge' contradicts the velocities"),
+    ):
+        with pytest.raises(ModelError, match=message):
+            rom.linearize(mech, replace(good, **change))
+    with pytest.raises(ConfigError, match="this mechanism has 21, 18 and 14"):
+        rom.linearize(chain(held=True), good)
+    with pytest.raises(ConfigError, match="frame: no body"):
+        rom.linearize(mech, good, frame={"bib": "world"})
+    with pytest.raises(ConfigError, match="it is 'body' or 'world'"):
+        rom.linearize(mech, good, frame="hub")
+    with pytest.raises(ConfigError, match="is no Mechanism"):
+        rom.linearize(good)
+    with pytest.raises(ConfigError, match="is not a marker"):
+        rom.linearize(mech, good).motion(mech.parts["bob"].marker((1, 2, 3)))
+
+
+def test_a_state_of_a_run_is_good_enough():
+    """A free top in the middle of its motion; the spin of a free body has no stiffness."""
+    mech = rotor(20.0)
+    sol = rom.simulate(mech, t_end=0.05, dt=1e-3)
+    found = rom.linearize(mech, sol.final, frame="world")
+    assert_allclose(found.frequencies, rom.linearize(mech, frame="world").frequencies, rtol=1e-6)
+
+
+def test_a_wheel_that_rolls_is_linearised_at_rest_only():
+    mech = Mechanism(gravity=(0, 0, -g))
+    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0.5),
+                           markers={"c": (0, 0, 0)})  # fmt: skip
+    mech.rolling("road", mech.ground.marker((0, 0, 0)), wheel.marker("c"), radius=0.5, normal=Z)
+    mech.spring_damper("rope", mech.ground.marker((2, 0, 0.5)), wheel.marker("c"), stiffness=80.0)
+    swing = 2 * np.pi * rom.linearize(mech).frequencies
+    assert_allclose(swing[-1], np.sqrt(80.0 / (1.0 + 1.0 / 0.25)), rtol=1e-8)
+    assert_allclose(swing[:-1], 0.0)

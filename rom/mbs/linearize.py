@@ -18,7 +18,9 @@ from rom.mbs.variation import Instant, consistent, free_motions, instant
 from rom.model import Array
 
 TURN = 1e-3  # angle by which the joints are moved on, to see how their free motions change
-DRIFT = 1e-4  # relative change of the matrices in a radian from which they count as periodic
+STEADY = 1e-11  # relative change below which they stay
+ZERO, ZERO_BY_DIFFERENCES = 2e-7, 1e-5  # frequency that is round-off, relative to the highest
+DRIFT = 1e-3  # relative change of the matrices in a radian from which they count as periodic
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class Linearization:
             centrifugal terms, for the coordinates y of the free motions; M is the unit matrix.
         basis: (n, f) variation of all coordinates, counted as in `State.v`, per y.
         test: (n, f) virtual motions that project forces; the basis unless there is friction.
+        round_off: share of the highest frequency below which others count as zero.
         scale: (n,) small motion of each coordinate, as many rad as sizes of the mechanism.
         packed: the arrays of the mechanism.
         H: (k, 6, 6 + R) twist of all markers per velocity of their body.
@@ -42,13 +45,14 @@ class Linearization:
     K: Array
     basis: Array
     test: Array
+    round_off: float
     scale: Array
     packed: Packed
     H: Array
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array]:
-        return modes(self.C, self.K)
+        return modes(self.C, self.K, self.round_off)
 
     @property
     def eigenvalues(self) -> Array:
@@ -213,6 +217,9 @@ class _Path:
         h = TURN / self.rate
         _, before = self.at(-h)
         _, after = self.at(h)
+        change = max(np.abs(after - self.Z).max(), np.abs(before - self.Z).max())
+        if change < STEADY * np.abs(self.Z).max():
+            return 0 * self.Z, 0 * self.Z
         return (after - before) / (2 * h), (after - 2 * self.Z + before) / h**2
 
     def later(self) -> "_Path":
@@ -237,8 +244,8 @@ def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) 
     K2 = test.T @ (M @ acceleration + Cv @ (T @ Zd + T1 @ Z) + Kq @ basis)
     test = np.linalg.solve(M2, test.T).T
     C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
-    M2 = np.eye(len(K2))
-    return Linearization(state, M2, C2, K2, basis, test, now.probe(), now.packed, H)
+    M2, noise = np.eye(len(K2)), ZERO if now.exact(state) else ZERO_BY_DIFFERENCES
+    return Linearization(state, M2, C2, K2, basis, test, noise, now.probe(), now.packed, H)
 
 
 def _virtual(now: Instant, state: State, basis: Array) -> Array:

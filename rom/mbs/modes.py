@@ -5,29 +5,28 @@ from scipy.linalg import eig, eigh
 
 from rom.model import Array
 
-# frequencies below this share of the highest one are round-off: a motion that nothing holds
-ZERO = 2e-7
 SYMMETRIC = 1e-9
 
 
-def modes(C: Array, K: Array) -> tuple[Array, Array, Array]:
+def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
     """Eigenvalue and vector per mode of y'' + C y' + K y = 0, and all 2 f eigenvalues.
 
     Frequencies ascend. A pair of real eigenvalues is one mode, its larger value is given.
+    Below the share ``zero`` of the highest frequency counts as a motion that nothing holds.
     """
     symmetric = np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * np.abs(K).max(initial=0.0)
     if symmetric and not C.any():
         squares, V = eigh(0.5 * (K + K.T))
         roots = np.sqrt((-squares).astype(complex))
         every = np.concatenate([roots, -roots])
-        limit = ZERO * np.abs(every).max(initial=0.0)
+        limit = zero * np.abs(every).max(initial=0.0)
         roots[np.abs(roots) < limit] = 0.0
         order = np.lexsort((-roots.real, roots.imag))
         return roots[order], _signed(V[:, order]), every
     n, s = len(K), max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2))
     A = np.block([[np.zeros((n, n)), s * np.eye(n)], [-K / s, -C]])
     every, X = eig(A)
-    limit = ZERO * np.abs(every).max(initial=0.0)
+    limit = zero * np.abs(every).max(initial=0.0)
     swing = np.flatnonzero(every.imag > limit)
     swing = swing[np.argsort(every[swing].imag)]
     real = np.flatnonzero(np.abs(every.imag) <= limit)

@@ -19,6 +19,7 @@ from rom.model import Array
 # central differences: rotations in rad, displacements in sizes of the mechanism
 PROBE = 1e-5
 SPACING = 1e-6  # of the differences of drives [s]
+ELASTIC_TURN = 1e-4  # rotation of a marker by deformation, up to which tangents are exact [rad]
 GAP = 1e-7  # of a joint, relative to the size of the mechanism
 MISS = 1e-3  # of the velocities; what a time integration leaves is far below
 
@@ -98,10 +99,28 @@ class Instant:
 
     def stiffness(self, state: State) -> Array:
         """(n, n) derivative of the residual by the coordinates, rotations in the body frame."""
-        moving = lambda dq: self.residual(  # noqa: E731
-            self.shifted(state.q, dq), state.v, state.a, state.lam
-        )
-        return difference(moving, self.probe())
+        q, v, a, lam = state.q, state.v, state.a, state.lam
+        if not self.exact(state):
+            return difference(
+                lambda dq: self.residual(self.shifted(q, dq), v, a, lam), self.probe()
+            )
+        self.residual(q, v, a, lam)
+        slopes(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
+        return self.W.Kt.copy()
+
+    def exact(self, state: State) -> bool:
+        """Whether the tangents of the time integration are exact enough at this state.
+
+        They leave out how laws in Python change, how the rates that forces depend on change with
+        the position, and what finite elastic rotations of markers do to moments.
+        """
+        s, stiff = self.packed.system, self.W.theta
+        self.evaluate(state.q, state.v)
+        by_rate = s.forces.spring[:, 1].any() or s.forces.turn[:, 1].any() or s.bushings.i.size
+        by_rate = by_rate or s.contacts.i.size or s.actions.motor_at.size
+        by_rate = by_rate or s.actions.friction_at.size or s.actions.stop_at.size
+        rests = not state.v.any() or not by_rate
+        return bool(not self.laws and rests and np.abs(stiff).max(initial=0.0) < ELASTIC_TURN)
 
     def matrices(self, state: State) -> tuple[Array, Array, Array]:
         """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
