@@ -211,12 +211,12 @@ def test_coefficients_that_change_with_time_are_noticed():
 def swinging_arm(seed=0, **pose):
     """A random stiffened body on a ball joint, held by a spring: every term of the tangent."""
     rng = np.random.default_rng(seed)
-    mech = Mechanism(gravity=(0.3, -9.0, 2.0))
+    mech = Mechanism(gravity=(0.03, -0.3, 0.1))
     arm = mech.add_flexible("arm", random_body(rng, stiffened=True), **pose)
     a, b = arm.marker("a"), arm.marker("b")
     mech.spherical("ball", mech.ground.marker(mech.design_point(a)), a)
-    mech.spring_damper("rope", mech.ground.marker((2, 1, 0)), b, stiffness=30.0, free_length=1.0)
-    mech.force("pull", b, (1.0, 2.0, 3.0), frame="body")
+    mech.spring_damper("rope", mech.ground.marker((2, 1, 0)), b, stiffness=3.0, free_length=1.0)
+    mech.force("pull", b, (0.1, 0.2, 0.3), frame="body")
     return mech
 
 
@@ -269,12 +269,12 @@ def test_states_that_do_not_fit_are_named():
     mech = pendulum()
     good = initial_state(instant(mech, 0.0).packed)
     for change, message in (
-        ({"q": good.q + [0, 0, 0.01, 0, 0, 0, 0]}, "'hinge' stays open by 0.0143"),
-        ({"v": good.v + [0.1, 0, 0, 0, 0, 0]}, "'hinge' contradicts the velocities"),
+        ({"q": good.q + 0.01 * np.eye(7)[2]}, "'hinge' stays open by 0.0143"),
+        ({"v": good.v + 0.1 * np.eye(6)[0]}, "'hinge' contradicts the velocities"),
     ):
         with pytest.raises(ModelError, match=message):
             rom.linearize(mech, replace(good, **change))
-    with pytest.raises(ConfigError, match="this mechanism has 21, 18 and 14"):
+    with pytest.raises(ConfigError, match="this mechanism has 21, 18 and 15"):
         rom.linearize(chain(held=True), good)
     with pytest.raises(ConfigError, match="frame: no body"):
         rom.linearize(mech, good, frame={"bib": "world"})

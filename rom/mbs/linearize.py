@@ -14,7 +14,7 @@ from rom.mbs.modes import modes
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
 from rom.mbs.state import State, fitting_velocity, initial_state, with_accelerations
-from rom.mbs.variation import Instant, consistent, free_motions, instant
+from rom.mbs.variation import Instant, consistent, free_motions, instant, of_unit_mass
 from rom.model import Array
 
 TURN = 1e-3  # angle by which the joints are moved on, to see how their free motions change
@@ -158,9 +158,8 @@ def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearizati
     """Matrices for the motions the joints leave, and a warning if they change with time."""
     T, scale = small_motions(now.packed.system, state, world)[0], now.probe()
     _, G, M = now.gradient(state.q, state.v)
-    Z = free_motions(G @ T, scale, state.rank)
-    mass = np.linalg.cholesky(Z.T @ (T.T @ M @ T) @ Z)
-    path = _Path(now, state, world, np.linalg.solve(mass, Z.T).T)
+    Z = of_unit_mass(free_motions(G @ T, scale, state.rank), T.T @ M @ T)
+    path = _Path(now, state, world, Z)
     found = _matrices(now, state, world, path)
     rate = path.rate
     if state.v.any():

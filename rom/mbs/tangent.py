@@ -7,7 +7,7 @@ import numpy as np
 from rom.mbs.frames import small_motions
 from rom.mbs.packing import Packed
 from rom.mbs.state import State
-from rom.mbs.variation import Instant, free_motions
+from rom.mbs.variation import Instant, free_motions, of_unit_mass
 from rom.model import Array
 
 TURN, SHIFT = 0.3, 0.3  # largest rotation [rad] and displacement [sizes] of one correction
@@ -46,9 +46,7 @@ class Tangent:
         K = K @ T + C @ T1 + M @ T3
         r = T.T @ now.residual(state.q, state.v, state.a, state.lam)
         gap, G, _ = now.gradient(state.q, state.v)
-        Z = free_motions(G @ T, now.probe(), state.rank)
-        mass = np.linalg.cholesky(Z.T @ (T.T @ M @ T) @ Z)
-        Z = np.linalg.solve(mass, Z.T).T
+        Z = of_unit_mass(free_motions(G @ T, now.probe(), state.rank), T.T @ M @ T)
         packed = now.packed
         force = packed.mass * np.linalg.norm(packed.system.bodies.gravity)
         force += np.abs(state.lam).max(initial=0.0) + packed.mass * np.abs(state.a).max()

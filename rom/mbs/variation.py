@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.compiled import kernel
 from rom.mbs.mechanism import Mechanism
@@ -230,3 +230,19 @@ def free_motions(G: Array, scale: Array, rank: int) -> Array:
         else np.eye(len(scale))
     )
     return scale[:, None] * V[rank:].T
+
+
+def of_unit_mass(Z: Array, mass: Array) -> Array:
+    """The same motions, combined so that Z^T mass Z is the unit matrix.
+
+    Raises:
+        SolverError: if the mass matrix is not positive definite.
+    """
+    try:
+        L = np.linalg.cholesky(Z.T @ mass @ Z)
+    except np.linalg.LinAlgError as error:
+        raise SolverError(
+            "the mass matrix is not positive definite: a body is deformed beyond what its linear "
+            "shapes can describe."
+        ) from error
+    return np.linalg.solve(L, Z.T).T
