@@ -16,6 +16,7 @@ from PIL import Image  # noqa: E402
 from rom import view  # noqa: E402
 from rom.body.flexible import Surface  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402
+from rom.mbs.campbell import Campbell  # noqa: E402
 from rom.mbs.integrate import simulate  # noqa: E402
 from rom.mbs.mechanism import Mechanism  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
@@ -326,3 +327,20 @@ def test_a_plane_shows_values_outlines_and_the_first_index_along_x(tmp_path):
     assert (image[:, 700:] == (0xD9, 0xD2, 0xC3)).all(axis=2).sum() > 20000
     with pytest.raises(ConfigError, match="nothing to draw"):
         view.plane(tmp_path / "plane.png", [], title="T", caption="C")
+
+
+def test_a_campbell_diagram_shows_modes_multiples_and_where_they_meet(tmp_path):
+    speeds = np.linspace(0.0, 100.0, 11)
+    modes = np.array([-2.0 + 60j + 0.1j * speeds, -1.0 + 90j - 0.1j * speeds]).T
+    diagram = Campbell(speeds, modes, np.ones((10, 2)))
+    words = {"title": "Rotor", "caption": "Two modes."}
+    file = view.campbell(tmp_path / "c.png", diagram, orders=(1, 2), names=("up", "down"), **words)
+    image = pixels(file)
+    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):  # in both panels
+        rows = np.flatnonzero((np.abs(image - colour).max(axis=2) < 8).any(axis=1))
+        assert np.ptp(rows) > 330
+    undamped = Campbell(speeds, 1j * modes.imag, np.ones((10, 2)))
+    alone = pixels(view.campbell(tmp_path / "alone.png", undamped, **words))
+    assert alone.shape[0] < image.shape[0] - 300
+    with pytest.raises(ConfigError, match="1 names for 2 modes"):
+        view.campbell(tmp_path / "c.png", diagram, names=("up",), **words)

@@ -1,6 +1,6 @@
 """Pictures and films, drawn off-screen in a process that never loads dolfinx."""
 
-from rom.view.curves import convergence, frequencies, history
+from rom.view.curves import campbell, convergence, frequencies, history
 from rom.view.film import animate, instants
 from rom.view.panels import Panel, panels
 from rom.view.part import mesh
@@ -16,6 +16,7 @@ __all__ = [
     "Shape",
     "animate",
     "box",
+    "campbell",
     "convergence",
     "cylinder",
     "deformed",

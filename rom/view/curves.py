@@ -13,6 +13,7 @@ from rom.view import page
 WIDTH, PANEL = 1400, 330  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 MARKERS = ("o", "s", "^", "D", "v", "x")
+GREY = "#5c636e"
 FEW = 10  # sizes that have room for a tick each
 EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 
@@ -140,6 +141,75 @@ def convergence(
             axes.set_xticklabels([])
         areas[-1].set_xlabel(xlabel, size=page.BODY)
         return page.save(figure, path)
+
+
+def campbell(
+    path: str | Path,
+    diagram: Any,
+    *,
+    orders: Sequence[float] = (1.0,),
+    names: Sequence[str] = (),
+    title: str,
+    caption: str,
+) -> Path:
+    """Draw natural frequencies over the speed of rotation, with multiples of the speed.
+
+    A ring marks where a mode meets a multiple of the speed. A second panel shows the damping,
+    unless there is none.
+
+    Args:
+        path: picture to write, .png.
+        diagram: what `rom.campbell` returned.
+        orders: multiples of the speed to draw.
+        names: one per mode, in the order of the columns; without names modes are numbered.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if there is not one name per mode, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    f, damping = diagram.frequencies, 100 * diagram.damping_ratios
+    if names and len(names) != f.shape[1]:
+        raise ConfigError(f"{len(names)} names for {f.shape[1]} modes.")
+    labels = names or [f"mode {k + 1}" for k in range(f.shape[1])]
+    turns = 30 * diagram.speeds / np.pi
+    damped = np.abs(damping).max(initial=0.0) > 1e-3
+    with page.styled():
+        figure, areas = _panels(2 if damped else 1, title, caption)
+        for k, label in enumerate(labels):
+            look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.6}
+            areas[0].plot(turns, f[:, k], label=label, **look)
+            if damped:
+                areas[1].plot(turns, damping[:, k], label=label, **look)
+        _multiples(areas[0], diagram, turns, orders)
+        for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
+            axes.set_ylabel(label, size=page.BODY)
+            axes.set_xlim(turns[0], turns[-1])
+            _finish(axes, legend=True)
+        for axes in areas[:-1]:
+            axes.set_xticklabels([])
+        areas[-1].set_xlabel("speed [1/min]", size=page.BODY)
+        return page.save(figure, path)
+
+
+def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
+    """Rays of the orders, each named where it leaves the picture, and rings where modes meet."""
+    top = 1.12 * diagram.frequencies.max()
+    axes.set_ylim(0.0, top)
+    for k, order in enumerate(orders):
+        end = min(turns[-1], 60 * top / order)
+        label = "multiples of the speed" if k == 0 else None
+        axes.plot([turns[0], end], [order * turns[0] / 60, order * end / 60], color=GREY, lw=0.9,
+                  label=label)  # fmt: skip
+        where = {"xytext": (5, 0), "ha": "left", "va": "center"}
+        if end < turns[-1]:
+            where = {"xytext": (0, 3), "ha": "center", "va": "bottom"}
+        axes.annotate(f"{order:g}x", (end, order * end / 60), textcoords="offset points",
+                      color=GREY, size=page.SMALL, **where)  # fmt: skip
+        for _, speed in diagram.crossings(order):
+            at = 30 * speed / np.pi
+            axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
 
 
 def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
