@@ -8,6 +8,7 @@ import pytest
 from beam import stiffened_beam
 from mbs_cases import random_body
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 
 import rom
 from rom.errors import ConfigError, ModelError, RomWarning
@@ -303,3 +304,81 @@ def test_a_wheel_that_rolls_is_linearised_at_rest_only():
     swing = 2 * np.pi * rom.linearize(mech).frequencies
     assert_allclose(swing[-1], np.sqrt(80.0 / (1.0 + 1.0 / 0.25)), rtol=1e-8)
     assert_allclose(swing[:-1], 0.0)
+
+
+def dry_pendulum(angle, rate):
+    """A pendulum under way whose hinge rubs by its load, with a damper to the ground."""
+    mech, at = Mechanism(gravity=(0, 0, -g)), 0.7 * np.array([np.sin(angle), 0, -np.cos(angle)])
+    turn = (np.cos(angle / 2), 0, -np.sin(angle / 2), 0)
+    marks = {"pin": (0, 0, 0.7), "c": (0, 0, 0)}
+    bob = mech.add_rigid("bob", mass=2.0, inertia=(0.3, 0.2, 0.3), at=at, orientation=turn,
+                         markers=marks, omega=(0, -rate, 0),
+                         velocity=np.cross((0, -rate, 0), at))  # fmt: skip
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=Y)
+    mech.friction("rub", "hinge", transition_speed=2.0, mu=0.4, radius=0.1, coulomb=0.3)
+    mech.spring_damper("rope", mech.ground.marker((1, 0, -1)), bob.marker("c"), stiffness=9.0,
+                       damping=4.0, free_length=0.8)  # fmt: skip
+    return mech
+
+
+@pytest.mark.parametrize(("angle", "rate"), [(0.5, 0.0), (0.5, 1.5), (2.0, -3.0)])
+def test_friction_by_load_and_dampers_of_a_moving_pendulum(angle, rate):
+    """Second method: how its angular acceleration changes with angle and rate."""
+
+    def acceleration(x):
+        packed = instant(dry_pendulum(angle + x[0], rate + x[1]), 0.0).packed
+        return -initial_state(packed).a[4:5]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)  # it swings, its coefficients change
+        found = rom.linearize(dry_pendulum(angle, rate))
+    exact = -difference(acceleration, np.full(2, 1e-5))
+    assert_allclose(np.r_[found.K[0], found.C[0]], exact[0], rtol=2e-6)
+
+
+@pytest.mark.parametrize("speed", [50.0, 150.0])
+def test_a_sleeping_top_stands_if_it_spins_fast_enough(speed):
+    """A w^2 - C W w + m g l = 0: two precessions, or growth below W = sqrt(4 A m g l) / C."""
+    m, length, A, C = 2.0, 0.3, 0.05 + 2.0 * 0.09, 0.04
+    mech = Mechanism(gravity=(0, 0, -g))
+    top = mech.add_rigid("top", mass=m, inertia=(0.05, 0.05, C), at=(0, 0, length),
+                         omega=(0, 0, speed), markers={"foot": (0, 0, -length)})  # fmt: skip
+    mech.spherical("foot", mech.ground.marker((0, 0, 0)), top.marker("foot"))
+    found = rom.linearize(mech, frame="world")
+    roots = np.roots([A, -C * speed, m * g * length])
+    assert found.stable == (speed > 100)
+    assert found.stable == (abs(roots.imag).max() == 0)
+    assert_allclose(2 * np.pi * found.frequencies[1:], np.sort(roots.real), rtol=1e-6)
+    assert_allclose(-found.damping_ratios.min(), abs(roots.imag).max() / abs(roots[0]), atol=1e-6)
+
+
+def column_frequency(P):
+    """Lowest root of w'''' + P w'' = omega^2 w, clamped; no moment and no side force at the tip."""
+
+    def boundary(omega):
+        root = np.sqrt(P**2 / 4 + omega**2)
+        a, b = np.sqrt(root + P / 2), np.sqrt(root - P / 2)
+        C, S, c, s = np.cosh(b), np.sinh(b), np.cos(a), np.sin(a)
+        moment = b**2 * C + a**2 * c, b**2 * S + a * b * s
+        force = b**3 * S - a**3 * s + P * (b * S + a * s), b**3 * C + a**2 * b * c
+        force = force[0], force[1] + P * (b * C - b * c)
+        return moment[0] * force[1] - moment[1] * force[0]
+
+    return brentq(boundary, 0.1, 8.0)
+
+
+@pytest.mark.parametrize("share", [-0.9, 0.5, 3.0])
+def test_the_frequency_of_a_loaded_column(share):
+    """Dead load at the tip, in Euler's loads, tension positive."""
+    load, mech = share * np.pi**2 / 4, clamped(stiffened_beam())
+    mech.force("load", mech.parts["beam"].marker("tip"), (load, 0, 0))
+    found = rom.linearize(mech, rom.equilibrium(mech))
+    assert_allclose(2 * np.pi * found.frequencies[0], column_frequency(-load), rtol=5e-5)
+
+
+def test_beyond_eulers_load_the_straight_column_is_unstable():
+    mech = clamped(stiffened_beam(n_modes=6))
+    mech.force("load", mech.parts["beam"].marker("tip"), (-1.01 * np.pi**2 / 4, 0, 0))
+    with pytest.warns(RomWarning, match="unstable: body 'beam'"):
+        state = rom.equilibrium(mech)
+    assert not rom.linearize(mech, state).stable

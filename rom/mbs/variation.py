@@ -130,7 +130,7 @@ class Instant:
     def reactions(self, state: State) -> Array:
         """(n, m) derivative of the residual by the multipliers; friction may depend on them."""
         q, v, a = state.q, state.v, state.a
-        step = np.maximum(PROBE * np.abs(state.lam), 1.0)
+        step = np.full(state.lam.size, PROBE * np.abs(state.lam).max(initial=0.0) or 1.0)
         return difference(lambda d: self.residual(q, v, a, state.lam + d), step)
 
     def shifted(self, q: Array, delta: Array) -> Array:
