@@ -14,11 +14,12 @@ import rom
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.linearize import linearize
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.modes import modes
 from rom.mbs.state import initial_state
 from rom.mbs.variation import difference, instant
 
 g, TINY = 9.81, (1e-12, 1e-12, 1e-12)
-Y, Z = (0, 1, 0), (0, 0, 1)
+X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 
 def pendulum(length=0.7, angle=0.0, inertia=TINY):
@@ -46,6 +47,37 @@ def test_a_pendulum_let_go_varies_by_the_cosine_of_its_angle(angle):
     if angle != np.pi / 2:
         assert found.stable == (angle < 2)
         assert_allclose(found.eigenvalues, [np.sqrt(complex(-stiffness))], rtol=1e-8)
+
+
+@pytest.mark.parametrize("rate", [0.0, 2.5])
+def test_a_ladder_slides_down_its_walls(rate):
+    """Its joints turn the free motion in its own axes: J x'' = m g L / 2 cos x, J = m L^2 / 3."""
+    length, m, angle = 1.2, 3.0, 0.9
+    foot, top = length * np.array([np.cos(angle), 0, 0]), length * np.array([0, 0, np.sin(angle)])
+    mech = Mechanism(gravity=(0, 0, -g))
+    marks = {"foot": (foot - top) / 2, "top": (top - foot) / 2}
+    rod = mech.add_rigid("rod", mass=m, inertia=(0.2, m * length**2 / 12, 0.2),
+                         at=(foot + top) / 2, markers=marks, omega=(0, rate, 0),
+                         velocity=rate / 2 * np.array([-top[2], 0, foot[0]]))  # fmt: skip
+    corner = mech.ground.marker((0, 0, 0))
+    mech.planar("room", corner, rod.marker("foot"), normal=Y)
+    mech.point_on_plane("floor", corner, rod.marker("foot"), normal=Z)
+    mech.point_on_plane("wall", corner, rod.marker("top"), normal=X)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)  # the stiffness changes on the way
+        found = rom.linearize(mech)
+    assert_allclose(found.K, [[-1.5 * g / length * np.sin(angle)]], rtol=1e-6)
+    assert_allclose(found.C, 0.0, atol=2e-5)
+
+
+def test_eigenvalues_of_matrices_without_symmetry():
+    rng = np.random.default_rng(0)
+    C, K = rng.normal(size=(4, 4)), 3 * rng.normal(size=(4, 4)) + 9 * np.eye(4)
+    roots, V, every = modes(C, K, 1e-7)
+    for root, v in zip(roots, V.T, strict=True):
+        assert np.abs((root**2 * np.eye(4) + root * C + K) @ v).max() < 1e-12 * abs(root) ** 2
+        assert np.abs(every - root).min() < 1e-12
+    assert np.all(np.diff(roots.imag) >= 0) and np.all(roots.imag >= 0)
 
 
 def test_double_pendulum():

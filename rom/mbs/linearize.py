@@ -61,7 +61,10 @@ class Linearization:
 
     @property
     def frequencies(self) -> Array:
-        """(f,) ascending [Hz]; 0 for motions that are free, or do not oscillate."""
+        """(f,) ascending [Hz]; 0 for motions that are free, or do not oscillate.
+
+        Below the share ``round_off`` of the highest one nothing can be told from zero.
+        """
         return self.eigenvalues.imag / (2 * np.pi)
 
     @property
@@ -87,7 +90,7 @@ class Linearization:
     def stable(self) -> bool:
         """Whether no motion grows exponentially."""
         every = self._modes[2]
-        return bool(every.real.max(initial=0.0) <= 1e-6 * np.abs(every).max(initial=0.0))
+        return bool(every.real.max(initial=0.0) <= self.round_off * np.abs(every).max(initial=0.0))
 
     def motion(self, marker: Marker) -> Array:
         """(6, f) small translation and rotation of a marker, in the world, per coordinate y."""
@@ -202,12 +205,13 @@ class _Path:
     def at(self, h: float) -> tuple[Array, Array]:
         """Coordinates a time h later, and the free motions there nearest to the present ones."""
         q = self.now.shifted(self.state.q, h * self.state.v + 0.5 * h * h * self.state.a)
-        _, G, _ = self.now.gradient(q, self.state.v)
+        _, G, M = self.now.gradient(q, self.state.v)
         there = replace(self.state, q=q)
         T = small_motions(self.now.packed.system, there, self.world)[0]
-        scale = self.now.probe()[:, None]
-        N = free_motions(G @ T, scale[:, 0], self.state.rank)
-        return q, N @ ((N / scale).T @ (self.Z / scale))
+        mass = T.T @ M @ T
+        N = of_unit_mass(free_motions(G @ T, self.now.probe(), self.state.rank), mass)
+        U, _, V = np.linalg.svd(N.T @ mass @ self.Z)
+        return q, N @ (U @ V)
 
     def rates(self) -> tuple[Array, Array]:
         """First and second time derivative of the free motions."""
