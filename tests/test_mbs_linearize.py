@@ -9,6 +9,7 @@ from beam import stiffened_beam
 from mbs_cases import random_body
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
+from test_mbs_spin import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 
 import rom
 from rom.errors import ConfigError, ModelError, RomWarning
@@ -414,3 +415,22 @@ def test_beyond_eulers_load_the_straight_column_is_unstable():
     with pytest.warns(RomWarning, match="unstable: body 'beam'"):
         state = rom.equilibrium(mech)
     assert not rom.linearize(mech, state).stable
+
+
+def test_coordinates_of_unit_mass_follow_a_body_that_pulsates():
+    """Inertia J(s) of a dumbbell under way: C = 0, K = -(sqrt J)'' / sqrt J where it tumbles."""
+    stretch, speed = 0.12, 1.7
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible("bell", dumbbell(), q=[stretch], qd=[speed])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)  # inertia changes on the way
+        found = rom.linearize(mech)
+    s, square = REST + stretch, 2 * SPRING / MASS
+    J = 2 * MASS * s**2 + HUB_INERTIA / np.array([2, 1])
+    first, second = 4 * MASS * s * speed, 4 * MASS * (speed**2 - s * square * stretch)
+    tumbling = -(second / (2 * J) - first**2 / (4 * J**2))
+    assert_allclose(found.C, 0.0, atol=1e-4)
+    assert_allclose(found.K, found.K.T, atol=1e-2)
+    assert_allclose(np.linalg.eigvals(found.K).real.max(), square, rtol=1e-6)
+    others = np.sort(np.linalg.eigvals(found.K).real)[-3:-1]
+    assert_allclose(others, np.sort(tumbling), rtol=1e-4)

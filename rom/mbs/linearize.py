@@ -14,7 +14,7 @@ from rom.mbs.modes import modes
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
 from rom.mbs.state import State, fitting_velocity, initial_state, with_accelerations
-from rom.mbs.variation import Instant, consistent, free_motions, instant, of_unit_mass
+from rom.mbs.variation import PROBE, Instant, consistent, free_motions, instant, of_unit_mass
 from rom.model import Array
 
 TURN = 1e-3  # angle by which the joints are moved on, to see how their free motions change
@@ -193,14 +193,10 @@ class _Path:
 
     @cached_property
     def rate(self) -> float:
-        """Speed of the mechanism in radians per second."""
-        v, a, length = self.state.v, self.state.a, self.now.packed.length
-        found = [0.0]
-        for t in self.now.packed.system.bodies.v_at:
-            x, o = slice(t, t + 3), slice(t + 3, t + 6)
-            found += [np.linalg.norm(v[o]), np.linalg.norm(v[x]) / length]
-            found += [np.sqrt(np.linalg.norm(a[o])), np.sqrt(np.linalg.norm(a[x]) / length)]
-        return float(max(found))
+        """Speed of the mechanism in radians, or sizes, per second."""
+        size = self.now.probe() / PROBE
+        v, a = np.abs(self.state.v) / size, np.abs(self.state.a) / size
+        return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
 
     def at(self, h: float) -> tuple[Array, Array]:
         """Coordinates a time h later, and the free motions there nearest to the present ones."""
@@ -215,7 +211,7 @@ class _Path:
 
     def rates(self) -> tuple[Array, Array]:
         """First and second time derivative of the free motions."""
-        if self.rate == 0.0 or not self.state.rank:
+        if self.rate == 0.0:
             return 0 * self.Z, 0 * self.Z
         h = TURN / self.rate
         _, before = self.at(-h)
