@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 import rom
 from rom.errors import ConfigError, ModelError, RomWarning
+from rom.mbs.impact import Impact
 from rom.mbs.mechanism import Mechanism
 
 g = 9.81
@@ -189,3 +190,40 @@ def test_wrong_arguments_are_named():
             rom.equilibrium(mech, **options)
     with pytest.raises(ConfigError, match="is no Mechanism"):
         rom.equilibrium("crane")
+
+
+@pytest.mark.parametrize("height", [-1e-5, 0.0, 0.5])
+def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):
+    """depth = (m g / k)^(2/3), and small vibrations with 3/2 k sqrt(depth)."""
+    mech, k = Mechanism(gravity=(0, 0, -g)), 1e8
+    ball = mech.add_rigid("ball", mass=2.0, inertia=(0.1,) * 3, at=(0, 0, 0.1 + height),
+                          markers={"c": (0, 0, 0)})  # fmt: skip
+    floor = mech.ground.marker((0, 0, 0))
+    mech.prismatic("guide", floor, ball.marker("c"), axis=Z)
+    law = Impact(stiffness=k, exponent=1.5)
+    mech.sphere_on_plane("floor", floor, ball.marker("c"), law, normal=Z, radius=0.1)
+    state, depth = rom.equilibrium(mech), (2.0 * g / k) ** (2 / 3)
+    assert_allclose(0.1 - state.q[2], depth, rtol=1e-9)
+    found = rom.linearize(mech, state)
+    assert_allclose(2 * np.pi * found.frequencies, np.sqrt(1.5 * k * np.sqrt(depth) / 2), rtol=1e-9)
+
+
+def test_a_body_sags_in_its_bushing():
+    """m g / k down, m g a / k_r about y; the overhang turns with it."""
+    mech, k, turn, arm = Mechanism(gravity=(0, 0, -g)), 5e3, 400.0, 0.2
+    box = mech.add_rigid("box", mass=2.0, inertia=(0.1,) * 3, at=(arm, 0, 0),
+                         markers={"foot": (-arm, 0, 0)})  # fmt: skip
+    stiffness = (k, k, k, turn, turn, turn)
+    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), box.marker("foot"), stiffness=stiffness)
+    state = rom.equilibrium(mech)
+    angle = brentq(lambda x: turn * x - 2.0 * g * arm * np.cos(x), 0, 1)
+    height = -2.0 * g / k - arm * np.sin(angle)
+    assert_allclose(state.q[:3], [arm * np.cos(angle), 0, height], atol=1e-10)
+
+
+def test_a_mechanism_that_cannot_move_has_no_frequencies():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        mech = slider_crank(speed=0.0)
+        found = rom.linearize(mech, rom.equilibrium(mech))
+    assert found.frequencies.size == 0 and found.shapes.shape == (18, 0) and found.stable

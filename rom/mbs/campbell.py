@@ -75,7 +75,8 @@ def campbell(
         mechanism: the mechanism, which turns as a whole and takes its equilibrium at each speed;
             or a function of the speed that returns a mechanism already turning, or a pair of
             mechanism and state.
-        speeds: (s,) [rad/s], at least two, in order.
+        speeds: (s,) [rad/s], at least two, in order; above zero if the mechanism as a whole
+            turns freely, for then nothing holds it at speed zero.
         n: number of modes to keep, lowest at the first speed first; None for all. Motions that
             are free at all speeds are left out.
         axis: (3,) axis of the rotation of a mechanism as a whole, world.

@@ -1,7 +1,7 @@
 """Eigenvalues of small matrices of second order, with or without damping."""
 
 import numpy as np
-from scipy.linalg import eig, eigh
+from scipy.linalg import eig
 
 from rom.model import Array
 
@@ -16,7 +16,7 @@ def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
     """
     symmetric = np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * np.abs(K).max(initial=0.0)
     if symmetric and not C.any():
-        squares, V = eigh(0.5 * (K + K.T))
+        squares, V = np.linalg.eigh(0.5 * (K + K.T))
         roots = np.sqrt((-squares).astype(complex))
         every = np.concatenate([roots, -roots])
         limit = zero * np.abs(every).max(initial=0.0)
