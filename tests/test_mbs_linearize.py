@@ -94,6 +94,7 @@ def test_double_pendulum():
     assert_allclose((2 * np.pi * found.frequencies) ** 2, squares, rtol=1e-8)
     ratio = found.shapes[10] / found.shapes[4]
     assert_allclose(ratio, [np.sqrt(2), -np.sqrt(2)], rtol=1e-8)
+    assert found.shapes[6, 0] > 0 and found.shapes[10, 1] > 0  # the largest part is positive
     assert_allclose(found.shapes.T @ np.diag([1.5] * 3 + [1e-12] * 3 + [1.5] * 3 + [1e-12] * 3)
                     @ found.shapes, np.eye(2), atol=1e-8)  # fmt: skip
 

@@ -10,7 +10,7 @@ import numpy as np
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
-from rom.mbs.modes import modes
+from rom.mbs.modes import modes, phases
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
 from rom.mbs.state import State, fitting_velocity, initial_state, with_accelerations
@@ -52,7 +52,8 @@ class Linearization:
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array]:
-        return modes(self.C, self.K, self.round_off)
+        roots, V, every = modes(self.C, self.K, self.round_off)
+        return roots, V * phases(self.basis @ V / self.scale[:, None]), every
 
     @property
     def eigenvalues(self) -> Array:
@@ -77,7 +78,8 @@ class Linearization:
     def shapes(self) -> Array:
         """(n, f) modes in all coordinates, counted as in `State.v`; unit modal mass.
 
-        Complex where damping or rotation shifts phases. The largest part is real and positive.
+        Complex where damping or rotation shifts phases. The largest part, in rad
+        or sizes of the mechanism, is real and positive.
         """
         return self.basis @ self.vectors
 

@@ -22,7 +22,7 @@ def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
         limit = zero * np.abs(every).max(initial=0.0)
         roots[np.abs(roots) < limit] = 0.0
         order = np.lexsort((-roots.real, roots.imag))
-        return roots[order], _signed(V[:, order]), every
+        return roots[order], V[:, order], every
     n, s = len(K), max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2))
     A = np.block([[np.zeros((n, n)), s * np.eye(n)], [-K / s, -C]])
     every, X = eig(A)
@@ -36,12 +36,12 @@ def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
     roots[np.abs(roots) < limit] = 0.0
     order = np.concatenate([real, swing])
     V = X[:n, order]
-    return roots[order], _signed(V / np.linalg.norm(V, axis=0)), every
+    return roots[order], V / np.linalg.norm(V, axis=0), every
 
 
-def _signed(V: Array) -> Array:
-    """Vectors with a real and positive largest entry."""
-    if not V.size:
-        return V
-    largest = V[np.abs(V).argmax(axis=0), np.arange(V.shape[1])]
-    return V * (np.abs(largest) / largest)
+def phases(X: Array) -> Array:
+    """(f,) factors of size one that make the largest entry of each column real and positive."""
+    if not X.size:
+        return np.ones(X.shape[1])
+    largest = X[np.abs(X).argmax(axis=0), np.arange(X.shape[1])]
+    return np.abs(largest) / largest
