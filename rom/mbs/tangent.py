@@ -45,11 +45,13 @@ class Tangent:
         M, C, K = now.matrices(state)
         K = K @ T + C @ T1 + M @ T3
         r = T.T @ now.residual(state.q, state.v, state.a, state.lam)
+        force = (
+            np.abs(now.W.wrench[:, :3]).max(initial=0.0) + now.packed.mass * np.abs(state.a).max()
+        )
         gap, G, _ = now.gradient(state.q, state.v)
         Z = of_unit_mass(free_motions(G @ T, now.probe(), state.rank), T.T @ M @ T)
         packed = now.packed
-        force = packed.mass * np.linalg.norm(packed.system.bodies.gravity)
-        force += np.abs(state.lam).max(initial=0.0) + packed.mass * np.abs(state.a).max()
+        force += packed.mass * np.linalg.norm(packed.system.bodies.gravity)
         return cls(now, T, r, T.T @ K, G @ T, gap, Z, force / packed.mass / packed.length)
 
     @property
