@@ -14,12 +14,17 @@ from numba import njit
 FOLDER = Path(__file__).parent
 STAMP = FOLDER / "__pycache__" / "kernels.sha256"
 
+USER = b"rom.mbs.compiled"  # what kernels import
+BUILT_IN = {"arrays.py", "compiled.py"}  # constants, layouts and options that kernels contain
+
 
 def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:
     """Remove compiled kernels that were made from other sources; True when some were."""
     digest = hashlib.sha256()
     for source in sorted(folder.glob("*.py")):
-        digest.update(source.read_bytes())
+        text = source.read_bytes()
+        if source.name in BUILT_IN or USER in text:
+            digest.update(text)
     try:
         if stamp.exists() and stamp.read_text() == digest.hexdigest():
             return False

@@ -186,7 +186,7 @@ def campbell(
         for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
             axes.set_ylabel(label, size=page.BODY)
             axes.set_xlim(turns[0], turns[-1])
-            _finish(axes, legend=True)
+            finish(axes, legend=True)
         for axes in areas[:-1]:
             axes.set_xticklabels([])
         areas[-1].set_xlabel("speed [1/min]", size=page.BODY)
