@@ -10,6 +10,7 @@ from rom.fe.solver import DIRECT, Solver
 from rom.model import Array
 
 BLOCK = 32  # right-hand sides solved together: five to eight times cheaper than one by one
+PIVOT = 0.01  # threshold of pivoting, the default of MUMPS
 MEMORY_ERRORS = (-8, -9, -11, -13, -19)  # INFOG(1) of MUMPS: work space or allocation too small
 
 
@@ -18,7 +19,7 @@ class Factor:
 
     Args:
         A: the matrix.
-        definite: promise that it is positive definite (Cholesky, no pivoting).
+        definite: promise that it is positive definite: no pivoting.
         solver: says whether blocks of the factor are compressed, and where it lives.
 
     Attributes:
@@ -31,7 +32,7 @@ class Factor:
 
     def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT):
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        A.setOption(PETSc.Mat.Option.SPD, definite)
+        A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
         self.A = A
         self.ksp = PETSc.KSP().create(A.comm)
         self.ksp.setOperators(A)
@@ -50,11 +51,22 @@ class Factor:
             self.factor.setMumpsIcntl(22, 1)
         allowed = allowed_bytes(A.comm.tompi4py())
         self.factor.setMumpsIcntl(23, max(int(allowed / 1e6), 1))  # obeyed after the analysis
+        self.compute(definite=definite)
+
+    def compute(self, *, definite: bool) -> None:
+        """Factor A; again when its values have changed, without a new analysis.
+
+        Raises:
+            ResourceError: if MUMPS runs out of memory.
+        """
+        self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT)
         self.ksp.setUp()
+        self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
         code = self.factor.getMumpsInfog(1)
         if code in MEMORY_ERRORS:
             need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
-            raise too_large(A.getSize()[0], need, allowed * A.comm.size)
+            allowed = allowed_bytes(self.A.comm.tompi4py()) * self.A.comm.size
+            raise too_large(self.A.getSize()[0], need, allowed)
         self.ok = code >= 0
 
     def solve(self, F: Array) -> Array:

@@ -203,9 +203,9 @@ class PETScOperators:
         else:
             none = np.zeros((self.n_local, 0))
             lam, Phi = self.lowest(m + SPARE, 0.0, held.factor, none, in_blocks=in_blocks)
+            self.verify_count(lam, m, 0, held.factor if finished else None)
             if finished:
                 held.release()
-            self.verify_count(lam, m, 0)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
     def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
@@ -302,24 +302,46 @@ class PETScOperators:
         space.solve()
         return space.pairs()
 
-    def verify_count(self, lam: Array, m: int, n_rigid: int) -> None:
+    def verify_count(self, lam: Array, m: int, n_rigid: int, spent: Inverse | None = None) -> None:
         """Compare the number of modes found with the inertia of K - sigma M (Sylvester).
 
         Without a factor there is nothing to count; `davidson` searches for missed ones instead.
+        A factor of K that nobody needs any more gives its place.
         """
         if self.solver.iterative:
             return
         found, sigma = count_shift(lam, m)
-        factor = self._factor(sigma, definite=False)
-        count = factor.negative_pivots() - n_rigid
-        factor.release()
-        factor.A.destroy()
+        count = self._count_below(sigma, spent) - n_rigid
         if count != found:
             raise ModesMissedError(
                 f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
                 f"but the inertia of K - sigma M counts {count}.",
                 hint="Ask for more modes, or give another shift sigma.",
             )
+
+    def _count_below(self, sigma: float, spent: Inverse | None) -> int:
+        """Number of eigenvalues below sigma."""
+        A = self._shifted(sigma)
+        if isinstance(spent, Factor) and spent.A == self.K and _size(A) == _size(self.K):
+            return self._counted_in_place(A, spent)
+        if spent is not None:
+            spent.release()
+        factor = Factor(A, definite=False, solver=self.solver)
+        count = factor.negative_pivots()
+        factor.release()
+        A.destroy()
+        return count
+
+    def _counted_in_place(self, A: PETSc.Mat, factor: Factor) -> int:
+        """The values of A, whose pattern is that of K, go through the analysis of its factor."""
+        same, K = PETSc.Mat.Structure.SAME_NONZERO_PATTERN, self.K.copy()
+        A.copy(self.K, structure=same)
+        A.destroy()
+        factor.compute(definite=False)
+        count = factor.negative_pivots()
+        K.copy(self.K, structure=same)
+        K.destroy()
+        return count
 
     def all_modes(self) -> tuple[Array, Array]:
         """All eigenpairs of a small model, solved densely on every rank."""
@@ -423,6 +445,11 @@ class TiedOperators(PETScOperators):
         projected = _symmetric(A.ptap(self.T))
         give_back()
         return projected
+
+
+def _size(A: PETSc.Mat) -> float:
+    """Number of entries on all ranks."""
+    return float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
 
 
 def whole_nodes(ops: PETScOperators, dofs: Index) -> bool:
