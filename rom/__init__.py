@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from rom.mbs.audit import audit
     from rom.mbs.campbell import campbell
     from rom.mbs.equilibrium import equilibrium
+    from rom.mbs.checkpoint import load_state, save_state
     from rom.mbs.integrate import simulate
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
@@ -102,11 +103,13 @@ __all__ = [
     "frequency_response",
     "linearize",
     "load",
+    "load_state",
     "mass_properties",
     "modes",
     "reduce",
     "reduce_parametric",
     "save",
+    "save_state",
     "second_order_balanced_truncation",
     "simulate",
     "substructure",
@@ -126,6 +129,8 @@ LATER = {  # names whose modules load Numba
     "simulate": "integrate",
     "transmissibility": "response",
 }
+LATER = {"Mechanism": "mechanism", "audit": "audit", "simulate": "integrate",
+         "load_state": "checkpoint", "save_state": "checkpoint"}  # fmt: skip  # they load Numba
 
 
 def __getattr__(name: str) -> Any:

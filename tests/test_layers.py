@@ -25,7 +25,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "reduction": {"model", "eigen", "scipy_operators", "errors"},
     "parameters": {"model", "errors"},
     "body": {"model", "eigen", "rotation", "attachment", "parameters", "errors"},
-    "mbs": {"model", "rotation", "errors"},
+    "mbs": {"model", "rotation", "io", "errors"},
     "io": {"model", "units", "body", "parameters", "errors"},
     "checks": {"model", "eigen", "body", "scipy_operators", "errors"},
     "certificate": {"model", "eigen", "body", "reduction", "errors"},

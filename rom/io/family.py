@@ -13,6 +13,7 @@ from rom.body.inertia import InertiaIntegrals
 from rom.body.stretch import Stretch
 from rom.errors import FileFormatError
 from rom.io import native
+from rom.io.archive import LIMIT, Kind
 from rom.model import Array, Report, Row
 from rom.parameters import read, written
 
@@ -56,10 +57,10 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
         "provenance": body.provenance,
         "certificate": None if body.certificate is None else asdict(body.certificate),
     }
-    return native.write_archive(path, manifest, arrays, f"family {body.body.name!r}")
+    return native.write_finite(path, manifest, arrays, f"family {body.body.name!r}")
 
 
-def load(path: str | Path, *, limit: int = native.LIMIT) -> Any:
+def load(path: str | Path, *, limit: int = LIMIT) -> Any:
     """Read a flexible body, or a family of them.
 
     Args:
@@ -75,8 +76,8 @@ def load(path: str | Path, *, limit: int = native.LIMIT) -> Any:
         QualityGateError: if the numbers are not those of a body.
     """
     path = Path(path)
-    known = {native.SCHEMA: native.VERSION, SCHEMA: VERSION}
-    manifest, arrays = native.read_archive(path, known, limit)
+    known = Kind({native.SCHEMA: native.VERSION, SCHEMA: VERSION}, "body file", native.FIELDS)
+    manifest, arrays = native.read_finite(path, known, limit)
     with native.stated(path):
         body = native.body_of(manifest, arrays)
     native.verify(body, path)

@@ -4,30 +4,24 @@ The manifest is a JSON text stored as bytes: schema and version, units, names, p
 certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
 """
 
-import hashlib
-import json
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
 
 import numpy as np
-from numpy.lib import format as npy
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.recovery import STATES, StressRecovery
-from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import write_whole
+from rom.errors import FileFormatError, QualityGateError
+from rom.io.archive import LIMIT, Kind, read_archive, write_archive
 from rom.model import Array, Report, Row
 from rom.units import SYSTEMS
 
 SCHEMA = "rom-body"
 VERSION = (1, 3)  # a new major number breaks readers, a new minor number only adds
-LIMIT = 4 * 1024**3  # bytes a body may have in memory before reading is refused
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 
 
@@ -43,29 +37,17 @@ def save(body: FlexibleBody, path: str | Path) -> Path:
         QualityGateError: if an array holds a number that is not finite.
         ResourceError: if the disk is full.
     """
-    return write_archive(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
+    return write_finite(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
 
 
-def write_archive(
+def write_finite(
     path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array], what: str
 ) -> Path:
-    """Write a manifest and arrays, whole or not at all; see `save` for what is raised."""
+    """Write a manifest and arrays of finite numbers; see `save` for what is raised."""
     for name, A in arrays.items():
         if not np.isfinite(A).all():
             raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
-    manifest = manifest | {"sha256": {name: _digest(A) for name, A in arrays.items()}}
-    text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
-
-    def write(file: Any) -> None:
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-            for name, A in {"manifest": text, **arrays}.items():
-                # a fixed date: the same body gives the same bytes
-                info = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-                with archive.open(info, "w", force_zip64=True) as member:
-                    npy.write_array(member, np.ascontiguousarray(A), allow_pickle=False)
-
-    write_whole(path, write)
-    return Path(path)
+    return write_archive(path, manifest, arrays)
 
 
 def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
@@ -81,49 +63,22 @@ def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
         QualityGateError: if the numbers are not those of a body.
     """
     path = Path(path)
-    manifest, arrays = read_archive(path, {SCHEMA: VERSION}, limit)
+    manifest, arrays = read_finite(path, Kind({SCHEMA: VERSION}, "body file", FIELDS), limit)
     with stated(path):
         body = body_of(manifest, arrays)
     verify(body, path)
     return body
 
 
-def read_archive(
-    path: Path, schemas: dict[str, tuple[int, int]], limit: int
-) -> tuple[dict[str, Any], dict[str, Array]]:
-    """The manifest and the arrays of a file, every array as it was written.
-
-    Args:
-        path: the file.
-        schemas: {schema: version} that can be read.
-        limit: bytes the arrays may take in memory.
-
-    Raises:
-        FileFormatError, UnsafeFileError, QualityGateError: see `load`.
-    """
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    try:
-        with zipfile.ZipFile(path) as archive:
-            _refuse_oversize(archive, path, limit)
-            manifest = _read_manifest(archive, path, schemas)
-            arrays = {n: _read(archive, n, path) for n in sorted(_digests(manifest, path))}
-    except (
-        zipfile.BadZipFile,
-        OSError,
-        EOFError,
-        KeyError,
-        RuntimeError,
-        NotImplementedError,
-    ) as e:
+def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[str, Array]]:
+    """The manifest and the arrays of a file, as they were written; see `load` for what is raised."""
+    manifest, arrays = read_archive(path, kind, limit)
+    if manifest.get("units") not in SYSTEMS:
         raise FileFormatError(
-            f"this is not a complete body file ({e}).",
+            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}.",
             where=str(path),
-            hint="It may have been cut in a transfer; write or copy it again.",
-        ) from e
+        )
     for name, A in arrays.items():
-        if manifest["sha256"][name] != _digest(A):
-            raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
         if not np.isfinite(A).all():
             raise QualityGateError(f"{name} holds a number that is not finite.", where=str(path))
     return manifest, arrays
@@ -233,86 +188,6 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         provenance=manifest["provenance"],
         certificate=report,
     )
-
-
-def _digest(A: Array) -> str:
-    A = np.ascontiguousarray(A)
-    return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
-
-
-def _refuse_oversize(archive: zipfile.ZipFile, path: Path, limit: int) -> None:
-    total = sum(info.file_size for info in archive.infolist())
-    if total > limit:
-        raise UnsafeFileError(
-            f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
-            where=str(path),
-            hint="If it is yours, pass a larger limit to load.",
-        )
-
-
-def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
-    """One array; the header is compared with the size of the member before memory is taken."""
-    info = archive.getinfo(f"{name}.npy")
-    try:
-        with archive.open(info) as member:
-            version = npy.read_magic(member)
-            read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-            shape, fortran, dtype = read(member)
-    except (ValueError, SyntaxError, TypeError, TokenError) as error:
-        raise FileFormatError(
-            f"the array {name!r} has a broken header.", where=str(path)
-        ) from error
-    if dtype.str not in ("<f8", "<i8", "|u1"):
-        raise UnsafeFileError(
-            f"the array {name!r} has the type {dtype.str}; a body file holds 8-byte numbers.",
-            where=str(path),
-        )
-    n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
-    if fortran or n_bytes > info.file_size:
-        raise UnsafeFileError(
-            f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}.", where=str(path)
-        )
-    with archive.open(info) as member:
-        try:
-            return npy.read_array(member, allow_pickle=False)
-        except ValueError as error:
-            raise FileFormatError(
-                f"the array {name!r} is cut: {error}.", where=str(path)
-            ) from error
-
-
-def _read_manifest(
-    archive: zipfile.ZipFile, path: Path, schemas: dict[str, tuple[int, int]]
-) -> dict[str, Any]:
-    if "manifest.npy" not in archive.namelist():
-        raise FileFormatError(
-            "this archive is not a body file: it has no manifest.", where=str(path)
-        )
-    try:
-        manifest = json.loads(_read(archive, "manifest", path).tobytes())
-        schema, (major, _) = manifest["schema"], manifest["version"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
-    if schema not in schemas or major != schemas[schema][0]:
-        known = " and ".join(f"{name!r} {list(version)}" for name, version in schemas.items())
-        raise FileFormatError(
-            f"the file has the schema {schema!r} {manifest['version']}; it was to be {known}.",
-            where=str(path),
-            hint="Newer files need a newer program, families rom.load.",
-        )
-    if manifest.get("units") not in SYSTEMS:
-        raise FileFormatError(
-            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}.",
-            where=str(path),
-        )
-    return manifest
-
-
-def _digests(manifest: dict[str, Any], path: Path) -> dict[str, str]:
-    digests = manifest.get("sha256")
-    if not isinstance(digests, dict) or not set(FIELDS) <= set(digests):
-        raise FileFormatError("the manifest does not list the arrays of a body.", where=str(path))
-    return digests
 
 
 def verify(body: FlexibleBody, path: Path) -> None:

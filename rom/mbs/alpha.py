@@ -52,6 +52,9 @@ class Step(NamedTuple):
             began, whether Python forces are to be asked for, whether they have been.
         size: (4,) norm of the last increment, length of the mechanism, tolerance, total mass.
         method: (5,) h, beta, gamma, alpha_m, alpha_f.
+        bdf: (3,) weights of the present, last and last but one value in the derivative of BDF,
+            zero for generalised-alpha. There ``a`` is the last but one velocity, and ``psi`` the
+            last increment until the next step begins.
     """
 
     q: Array
@@ -69,6 +72,7 @@ class Step(NamedTuple):
     count: Index
     size: Array
     method: Array
+    bdf: Array
 
 
 def coefficients(h: float, rho_inf: float) -> Array:
@@ -78,15 +82,32 @@ def coefficients(h: float, rho_inf: float) -> Array:
     return np.array([h, 0.25 * (gamma + 0.5) ** 2, gamma, alpha_m, alpha_f])
 
 
+def bdf_coefficients(h: float, before: float) -> tuple[Array, Array]:
+    """(5,) and (3,) method and weights of BDF after a step of length ``before``.
+
+    The order is two, or one if there was no step before (0). The five numbers make an increment
+    move velocities and accelerations as the weights do.
+    """
+    r = h / before if before else 0.0
+    weights = np.array([(1 + 2 * r) / (1 + r), -(1 + r), r * r / (1 + r)]) / h
+    c0h = weights[0] * h
+    return np.array([h, 1 / c0h**2, 1 / c0h, 0.0, 0.0]), weights
+
+
 @inner
 def predict(s, T):
     """Trial state with the accelerations and multipliers of the last step."""
     h, beta, gamma, alpha_m, _ = T.method
+    c0, c1, c2 = T.bdf
     for i in range(T.v.size):
         T.vd1[i] = T.vd[i]
-        a1 = (T.vd[i] - alpha_m * T.a[i]) / (1 - alpha_m)
-        T.v1[i] = T.v[i] + h * ((1 - gamma) * T.a[i] + gamma * a1)
-        T.psi[i] = h * T.v[i] + h * h * ((0.5 - beta) * T.a[i] + beta * a1)
+        if c0 > 0.0:
+            T.v1[i] = (T.vd[i] - c1 * T.v[i] - c2 * T.a[i]) / c0
+            T.psi[i] = (T.v1[i] + c2 * T.psi[i]) / c0
+        else:
+            a1 = (T.vd[i] - alpha_m * T.a[i]) / (1 - alpha_m)
+            T.v1[i] = T.v[i] + h * ((1 - gamma) * T.a[i] + gamma * a1)
+            T.psi[i] = h * T.v[i] + h * h * ((0.5 - beta) * T.a[i] + beta * a1)
     T.lam1[:] = T.lam
     T.size[0] = 0.0
     if T.count[LAST] > 4:
@@ -205,16 +226,19 @@ def verdict(W, T):
 
 
 @inner
-def accept(s, W, T):
-    """Make the trial state the present one and add up the work."""
+def accept(s, W, T, rank):
+    """Make the trial state the present one, multipliers of least norm, and add up the work."""
     h, _, _, alpha_m, alpha_f = T.method
     for i in range(T.v.size):
         rate = (1 - alpha_f) * T.vd1[i] + alpha_f * T.vd[i]
-        T.a[i] = (rate - alpha_m * T.a[i]) / (1 - alpha_m)
+        T.a[i] = T.v[i] if T.bdf[0] > 0.0 else (rate - alpha_m * T.a[i]) / (1 - alpha_m)
     T.q[:] = T.q1
     T.v[:] = T.v1
     T.vd[:] = T.vd1
     T.lam[:] = T.lam1
+    if rank < T.lam.size:
+        constraint_gradient(s, W)
+        least_multipliers(W, rank, T.lam)
     follow_coordinates(W)
     drive_power(s, W, T.lam)  # the last correction moved the multipliers
     for k in range(3):
@@ -255,19 +279,16 @@ def advance(s, W, T, rank, signals, every, out):
         if answer > CONVERGED:
             return answer
         if answer == CONVERGED:
-            accept(s, W, T)
+            accept(s, W, T, rank)
             if T.count[STEPS] % every == 0:
-                save(s, W, T, rank, out, T.count[STEPS] // every - T.count[BEGAN] // every - 1)
+                save(W, T, out, T.count[STEPS] // every - T.count[BEGAN] // every - 1)
     return CONVERGED
 
 
 @inner
-def save(s, W, T, rank, out, at):
-    """Copy the present state to a row of the output arrays, multipliers of least norm."""
+def save(W, T, out, at):
+    """Copy the present state to a row of the output arrays."""
     Q, V, A, L, X, B = out
-    if rank < T.lam.size:
-        constraint_gradient(s, W)
-        least_multipliers(W, rank, T.lam)
     B[at] = W.base
     Q[at] = T.q
     V[at] = T.v

@@ -10,12 +10,14 @@ from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import ROLL, Work
 from rom.mbs.motion import evaluate, linearise, moved
-from rom.mbs.record import Record
+from rom.mbs.record import Record, Settings
 from rom.mbs.signals import first_failure, sample_all
-from rom.mbs.state import State, with_accelerations
+from rom.mbs.state import Memory, State, with_accelerations
 from rom.mbs.user import Law, apply_laws, laws
 from rom.model import Array
 
+# the factorised iteration matrix, with its scaling, its range and the weights of its norm
+FACTOR = ("lu", "pivot", "scaling", "U_lu", "weight")
 # seconds between looks at the keyboard and the progress line
 CHUNK = 0.2
 LARGEST_CHUNK = 4096
@@ -25,6 +27,7 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha."""
     forces = laws(record.mechanism, record.packed)
     T, state = begin(record, W, state, forces)
+    recall(state.memory, W, T)
     none = np.zeros((0, len(record.packed.signals), 3))
     alpha.advance(record.packed.system, W, T, state.rank, none, 1, _space(W, T, 1))
     record.start(state)
@@ -56,7 +59,8 @@ def begin(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> tup
     method = alpha.coefficients(settings.h, settings.rho_inf)
     count, work = np.zeros(9, dtype=np.int64), np.zeros(3)
     count[alpha.ASKS] = bool(forces)
-    return Step(*copies, *zeros, work, _power(record, W, state, forces), count, size, method), state
+    power = _power(record, W, state, forces)
+    return Step(*copies, *zeros, work, power, count, size, method, np.zeros(3)), state
 
 
 def _power(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> Array:
@@ -123,6 +127,24 @@ def _accelerated(
     return with_accelerations(record.packed, W, later)
 
 
+def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
+    """All that the next step depends on and the state does not tell."""
+    arrays = {name: getattr(W, name).copy() for name in FACTOR}
+    arrays["method"] = T.method.copy()
+    arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
+    origin = settings.t_start if settings.origin is None else settings.origin
+    return Memory("generalized-alpha", settings.h, origin, settings.taken + steps, arrays)
+
+
+def recall(memory: Memory | None, W: Work, T: Step) -> None:
+    """Go on with the factorisation of an earlier run, if it belongs to the same method."""
+    if memory is None or not np.array_equal(memory.arrays.get("method", ()), T.method):
+        return
+    for name in FACTOR:
+        getattr(W, name)[:] = memory.arrays[name]
+    T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
+
+
 def _space(W: Work, T: Step, rows: int) -> tuple[Array, ...]:
     return tuple(np.zeros((rows, x.size)) for x in (T.q, T.v, T.vd, T.lam, T.work, W.base))
 
@@ -131,7 +153,9 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     """Take up to ``count`` steps and keep what is to be saved; returns how many were taken."""
     packed, settings = record.packed, record.settings
     t = settings.time(np.arange(done + 1, done + count + 1))
-    table = sample_all(packed.signals, t, settings.span, settings.spacing)
+    # at least four times, for which functions are called at once: the same bits in any chunk
+    padded = np.append(t, np.repeat(t[-1:], max(0, 4 - count)))
+    table = sample_all(packed.signals, padded, settings.span, settings.spacing)[:count]
     good, failure = first_failure(packed.signals, t, table)
     every = settings.save_every
     out = _space(W, T, (done + good) // every - done // every)
@@ -171,7 +195,8 @@ def _note(record: Record, W: Work, T: Step, t: Array, out: tuple[Array, ...]) ->
     if t.size:
         record.t = float(t[-1])
     arrays = (x.copy() for x in (T.q, T.v, T.vd, T.lam))
-    record.final = State(record.t, *arrays, record.final.rank, T.a.copy(), W.base.copy())
+    memory = remember(record.settings, W, T, done + t.size)
+    record.final = State(record.t, *arrays, record.final.rank, T.a.copy(), W.base.copy(), memory)
     names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
     names["factorisations"] = alpha.FACTORISATIONS
     record.counts = {name: int(T.count[k]) for name, k in names.items()}

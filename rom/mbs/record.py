@@ -1,7 +1,7 @@
 """Settings of a run, and the record it fills."""
 
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from time import perf_counter
 from typing import Any
@@ -13,7 +13,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.mbs.signals import Span, sample_all
 from rom.mbs.solution import Solution
-from rom.mbs.state import State
+from rom.mbs.state import Memory, State
 from rom.model import Array
 
 
@@ -30,6 +30,8 @@ class Settings:
     rtol: float
     atol: float
     progress: bool
+    origin: float | None = None
+    taken: int = 0
 
     def __post_init__(self):
         numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
@@ -50,7 +52,7 @@ class Settings:
     @property
     def span(self) -> Span:
         """Start and end time [s]."""
-        return self.t_start, self.t_end
+        return self.t_start, max(self.t_end, self.time(self.steps))
 
     @property
     def steps(self) -> int:
@@ -59,8 +61,12 @@ class Settings:
 
     @property
     def h(self) -> float:
-        """Length of a step [s]."""
-        return (self.t_end - self.t_start) / self.steps
+        """Length of a step [s]: dt itself if the duration is a multiple of it."""
+        duration = self.t_end - self.t_start
+        round_off = 1e-13 * duration + 1e-15 * (abs(self.t_start) + abs(self.t_end))
+        return (
+            self.dt if abs(self.steps * self.dt - duration) < round_off else duration / self.steps
+        )
 
     @property
     def spacing(self) -> float:
@@ -68,8 +74,17 @@ class Settings:
         return max(self.h, 1e-4 * (self.t_end - self.t_start)) if self.steps > 4 else 0.05 * self.h
 
     def time(self, step: Any) -> Any:
-        """Time after so many steps [s]."""
-        return self.t_start + self.h * step
+        """Time after so many steps [s]; the same number in a run and in its continuation."""
+        origin = self.t_start if self.origin is None else self.origin
+        return origin + self.h * (self.taken + step)
+
+    def after(self, memory: Memory | None) -> "Settings":
+        """The settings of a run that goes on, with its steps counted from the first one."""
+        if memory is None or memory.h != self.h:
+            return self
+        if memory.origin + memory.h * memory.taken != self.t_start:
+            return self
+        return replace(self, origin=memory.origin, taken=memory.taken)
 
 
 def line(text: str) -> None:

@@ -1,7 +1,7 @@
 """The start of a motion: positions that fit, velocities that fit, accelerations."""
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,25 @@ MAX_ASSEMBLY = 60
 
 
 @dataclass(frozen=True)
+class Memory:
+    """What an implicit method remembers beside the state: with it, a run goes on bit for bit.
+
+    Attributes:
+        method: name of the method.
+        h: length of the last step [s].
+        origin: time from which steps are counted [s].
+        taken: steps since then.
+        arrays: the factorised iteration matrix and what belongs to it.
+    """
+
+    method: str
+    h: float
+    origin: float
+    taken: int
+    arrays: dict[str, Array] = field(repr=False)
+
+
+@dataclass(frozen=True)
 class State:
     """A mechanism at one instant.
 
@@ -37,6 +56,7 @@ class State:
         algorithmic: (n,) acceleration-like variable of generalised-alpha, None at a fresh start.
         base: (c,) joint coordinates that forces or couplings act on, angles counted over whole
             turns; None: as measured.
+        memory: of the method that arrived here; None at a fresh start.
     """
 
     t: float
@@ -47,6 +67,7 @@ class State:
     rank: int
     algorithmic: Array | None = None
     base: Array | None = None
+    memory: Memory | None = None
 
 
 def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> State:

@@ -1,0 +1,169 @@
+"""Arrays and a manifest in one ``.npz`` without pickle, with a checksum of every array."""
+
+import hashlib
+import json
+import zipfile
+from pathlib import Path
+from tokenize import TokenError
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.lib import format as npy
+
+from rom.errors import FileFormatError, UnsafeFileError
+from rom.io.files import write_whole
+from rom.model import Array
+
+LIMIT = 4 * 1024**3  # bytes the arrays may have in memory before reading is refused
+
+
+class Kind(NamedTuple):
+    """What a file must be.
+
+    Attributes:
+        schemas: {schema: version} that can be read.
+        what: what to call such a file.
+        needed: arrays that must be there.
+    """
+
+    schemas: dict[str, tuple[int, int]]
+    what: str
+    needed: tuple[str, ...]
+
+
+def write_archive(path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array]) -> Path:
+    """Write a file, whole or not at all; the same content gives the same bytes.
+
+    Raises:
+        ConfigError: if the folder is missing or not writable.
+        ResourceError: if the disk is full.
+    """
+    manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
+    text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
+
+    def write(file: Any) -> None:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+            for name, A in {"manifest": text, **arrays}.items():
+                # a fixed date: the same content gives the same bytes
+                info = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+                with archive.open(info, "w", force_zip64=True) as member:
+                    npy.write_array(member, np.ascontiguousarray(A), allow_pickle=False)
+
+    write_whole(path, write)
+    return Path(path)
+
+
+def read_archive(
+    path: str | Path, kind: Kind, limit: int = LIMIT
+) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Manifest and arrays of a file, its checksums compared.
+
+    Args:
+        path: file name.
+        kind: what it must be.
+        limit: bytes the arrays may take in memory.
+
+    Raises:
+        FileFormatError: if the file is missing, cut, changed, or of another kind.
+        UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError("there is no such file.", where=str(path))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _refuse_oversize(archive, path, limit)
+            manifest = _read_manifest(archive, path, kind)
+            names = sorted(_digests(manifest, path, kind))
+            arrays = {name: _read(archive, name, path) for name in names}
+    except (
+        zipfile.BadZipFile,
+        OSError,
+        EOFError,
+        KeyError,
+        RuntimeError,
+        NotImplementedError,
+    ) as e:
+        raise FileFormatError(
+            f"this is not a complete {kind.what} ({e}).",
+            where=str(path),
+            hint="It may have been cut in a transfer; write or copy it again.",
+        ) from e
+    for name, A in arrays.items():
+        if manifest["sha256"][name] != digest(A):
+            raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
+    return manifest, arrays
+
+
+def digest(A: Array) -> str:
+    """SHA-256 of type, shape and content."""
+    A = np.ascontiguousarray(A)
+    return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
+
+
+def _refuse_oversize(archive: zipfile.ZipFile, path: Path, limit: int) -> None:
+    total = sum(info.file_size for info in archive.infolist())
+    if total > limit:
+        raise UnsafeFileError(
+            f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
+            where=str(path),
+            hint="If it is yours, pass a larger limit to load.",
+        )
+
+
+def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
+    """One array; the header is compared with the size of the member before memory is taken."""
+    info = archive.getinfo(f"{name}.npy")
+    try:
+        with archive.open(info) as member:
+            version = npy.read_magic(member)
+            read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+            shape, fortran, dtype = read(member)
+    except (ValueError, SyntaxError, TypeError, TokenError) as error:
+        raise FileFormatError(
+            f"the array {name!r} has a broken header.", where=str(path)
+        ) from error
+    if dtype.str not in ("<f8", "<i8", "|u1"):
+        raise UnsafeFileError(
+            f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers.",
+            where=str(path),
+        )
+    n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
+    if fortran or n_bytes > info.file_size:
+        raise UnsafeFileError(
+            f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}.", where=str(path)
+        )
+    with archive.open(info) as member:
+        try:
+            return npy.read_array(member, allow_pickle=False)
+        except ValueError as error:
+            raise FileFormatError(
+                f"the array {name!r} is cut: {error}.", where=str(path)
+            ) from error
+
+
+def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str, Any]:
+    if "manifest.npy" not in archive.namelist():
+        raise FileFormatError(f"this archive is not a {kind.what}: it has no manifest.", where=str(path))
+    try:
+        manifest = json.loads(_read(archive, "manifest", path).tobytes())
+        schema, (major, _) = manifest["schema"], manifest["version"]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
+    if schema not in kind.schemas or major != kind.schemas[schema][0]:
+        known = " or ".join(f"{name!r} {list(version)}" for name, version in kind.schemas.items())
+        raise FileFormatError(
+            f"the file has the schema {schema!r} {manifest['version']}; it was to be {known}.",
+            where=str(path),
+            hint="Newer files need a newer program.",
+        )
+    return manifest
+
+
+def _digests(manifest: dict[str, Any], path: Path, kind: Kind) -> dict[str, str]:
+    digests = manifest.get("sha256")
+    if not isinstance(digests, dict) or not set(kind.needed) <= set(digests):
+        raise FileFormatError(
+            f"the manifest does not list the arrays of a {kind.what}.", where=str(path)
+        )
+    return digests

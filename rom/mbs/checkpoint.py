@@ -1,0 +1,79 @@
+"""Checkpoints: the state of a mechanism in a file, from which a run goes on bit for bit."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, FileFormatError, QualityGateError
+from rom.io.archive import LIMIT, Kind, read_archive, write_archive
+from rom.mbs.state import Memory, State
+from rom.model import Array
+
+SCHEMA, VERSION = "rom-state", (1, 0)
+NEEDED = ("q", "v", "a", "lam")
+KIND = Kind({SCHEMA: VERSION}, "state file", NEEDED)
+OPTIONAL = ("algorithmic", "base")
+MEMORY = "memory/"
+
+
+def save_state(state: State, path: str | Path) -> Path:
+    """Write a state with what its method remembers, whole or not at all.
+
+    Args:
+        state: e.g. ``sol.final``, or ``error.solution.final`` of an interrupted run.
+        path: file name, usually ending in ``.state.npz``.
+
+    Raises:
+        ConfigError: if it is no state, or the folder is missing or not writable.
+        QualityGateError: if the state holds a number that is not finite.
+        ResourceError: if the disk is full.
+    """
+    if not isinstance(state, State):
+        raise ConfigError(f"{state!r} is no State; save sol.final.")
+    arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED}
+    given = {name: getattr(state, name) for name in OPTIONAL}
+    arrays |= {name: A for name, A in given.items() if A is not None}
+    for name, A in arrays.items():
+        if not np.isfinite(A).all():
+            raise QualityGateError(f"{name} of the state is not finite; nothing was written.")
+    manifest = {"schema": SCHEMA, "version": list(VERSION), "t": float(state.t).hex()}
+    manifest["rank"] = int(state.rank)
+    if state.memory is not None:
+        m = state.memory
+        arrays |= {MEMORY + name: A for name, A in m.arrays.items()}
+        steps = {"h": float(m.h).hex(), "origin": float(m.origin).hex(), "taken": m.taken}
+        manifest["memory"] = {"method": m.method, **steps}
+    return write_archive(path, manifest, dict(sorted(arrays.items())))
+
+
+def load_state(path: str | Path, *, limit: int = LIMIT) -> State:
+    """Read a state to go on from: ``rom.simulate(mechanism, state=..., ...)``.
+
+    Args:
+        path: file written by `save_state`.
+        limit: bytes the arrays may take in memory.
+
+    Raises:
+        FileFormatError: if the file is missing, cut, changed, or no state file.
+        UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
+    """
+    manifest, arrays = read_archive(path, KIND, limit)
+    try:
+        main = {name: arrays[name] for name in NEEDED}
+        rest = {name: arrays.get(name) for name in OPTIONAL}
+        memory = _memory(manifest.get("memory"), arrays)
+        t, rank = float.fromhex(manifest["t"]), int(manifest["rank"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(
+            f"the manifest lacks or misstates {error}.", where=str(path)
+        ) from error
+    return State(t=t, rank=rank, **main, **rest, memory=memory)
+
+
+def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory | None:
+    if manifest is None:
+        return None
+    h, origin = (float.fromhex(manifest[name]) for name in ("h", "origin"))
+    own = {k.removeprefix(MEMORY): A for k, A in arrays.items() if k.startswith(MEMORY)}
+    return Memory(str(manifest["method"]), h, origin, int(manifest["taken"]), own)
