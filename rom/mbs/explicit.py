@@ -62,10 +62,12 @@ def run_explicit(record: Record, W: Work, state: State) -> None:
     y = np.concatenate([state.q, state.v, np.zeros(3)])
     equations(state.t, y, accepted=True)
     record.start(_state_of(equations, state.t, y))
+    if record.watch:
+        record.watch.begin(state.q, state.v)
     record.clock, record.compiled = perf_counter(), 0.0
     solver = DOP853(equations, state.t, y, settings.t_end, rtol=settings.rtol, atol=settings.atol)
     due, steps = 1, 0
-    while solver.status == "running":
+    while solver.status == "running" and not record.stopped:
         message = solver.step()
         if solver.status == "failed":
             raise SolverError(
@@ -73,11 +75,35 @@ def run_explicit(record: Record, W: Work, state: State) -> None:
                 hint="The motion is too stiff for it: use generalized-alpha.",
             )
         steps += 1
+        stop = _first_event(record, equations, solver)
         due = _output(record, equations, solver, due)
-        if solver.t > record.t:
+        if stop is not None:
+            _save(record, equations, stop, solver.dense_output()(stop))
+        elif solver.t > record.t:
             equations(solver.t, solver.y, accepted=True)
         record.counts = {"steps": steps, "evaluations": solver.nfev}
         record.show()
+
+
+def _first_event(record: Record, equations: Equations, solver: DOP853) -> float | None:
+    """Time of a terminal event in the last step."""
+    if record.watch is None:
+        return None
+    dense, n_q, n = solver.dense_output(), equations.n_q, equations.n
+
+    def motion(t: float) -> tuple[Array, Array]:
+        y = _unit(record, dense(t).copy())
+        return y[:n_q], y[n_q : n_q + n]
+
+    record.watch.step(solver.t_old, solver.t, motion)
+    return record.watch.stop[1] if record.watch.stop else None
+
+
+def _unit(record: Record, y: Array) -> Array:
+    """The same with quaternions of unit length."""
+    for at in record.packed.system.bodies.q_at:
+        y[at + 3 : at + 7] /= np.linalg.norm(y[at + 3 : at + 7])
+    return y
 
 
 def _output(record: Record, equations: Equations, solver: DOP853, due: int) -> int:
@@ -85,7 +111,7 @@ def _output(record: Record, equations: Equations, solver: DOP853, due: int) -> i
     settings, dense = record.settings, None
     while due <= settings.steps:
         t = settings.time(due) if due < settings.steps else settings.t_end
-        if t > solver.t:
+        if t > solver.t or (record.stopped and t >= record.stopped):
             break
         if t < solver.t and dense is None:
             dense = solver.dense_output()
@@ -97,8 +123,7 @@ def _output(record: Record, equations: Equations, solver: DOP853, due: int) -> i
 
 
 def _save(record: Record, equations: Equations, t: float, y: Array) -> None:
-    for at in record.packed.system.bodies.q_at:
-        y[at + 3 : at + 7] /= np.linalg.norm(y[at + 3 : at + 7])
+    _unit(record, y)
     equations(t, y, accepted=True)
     record.t, record.final = t, _state_of(equations, t, y)
     f = record.final

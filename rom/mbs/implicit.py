@@ -1,6 +1,5 @@
 """The loop of generalised-alpha: chunks of compiled steps, or steps around Python forces."""
 
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -8,11 +7,12 @@ import numpy as np
 from rom.errors import SolverError
 from rom.mbs import alpha
 from rom.mbs.alpha import Step
-from rom.mbs.arrays import ROLL, Work
-from rom.mbs.motion import evaluate, linearise, moved
+from rom.mbs.arrays import Work
+from rom.mbs.ending import kept_before_the_end
 from rom.mbs.record import Record, Settings
 from rom.mbs.signals import first_failure, sample_all
-from rom.mbs.state import Memory, State, with_accelerations
+from rom.mbs.starting import begin
+from rom.mbs.state import Memory, State
 from rom.mbs.user import Law, apply_laws, laws
 from rom.model import Array
 
@@ -31,100 +31,19 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
     none = np.zeros((0, len(record.packed.signals), 3))
     alpha.advance(record.packed.system, W, T, state.rank, none, 1, _space(W, T, 1))
     record.start(state)
+    if record.watch:
+        record.watch.begin(state.q, state.v)
     record.clock = perf_counter()
     done, chunk, n = 0, 16, record.settings.steps
-    while done < n:
+    while done < n and not record.stopped:
         clock = perf_counter()
         taken = _chunk(record, W, T, forces, done, min(chunk, n - done))
         done += taken
         spent = max(perf_counter() - clock, 1e-6)
         chunk = int(np.clip(CHUNK / spent * taken, 1, LARGEST_CHUNK))
         record.show()
-    if n % record.settings.save_every:
+    if n % record.settings.save_every and not record.stopped:
         record.keep(record.t, *(x[None].copy() for x in (T.q, T.v, T.vd, T.lam, T.work, W.base)))
-
-
-def begin(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> tuple[Step, State]:
-    """Step memory at the start, accelerations consistent to second order."""
-    packed, settings = record.packed, record.settings
-    n, m = state.v.size, state.lam.size
-    v = state.v
-    if state.algorithmic is None:
-        state, v = _measured(record, W, state, forces)
-    else:
-        W.base[:] = state.base
-    zeros = [np.zeros(k) for k in (state.q.size, n, n, m, n)]
-    size = np.array([0.0, packed.length, settings.tolerance, packed.mass])
-    copies = (x.copy() for x in (state.q, v, state.algorithmic, state.a, state.lam))
-    method = alpha.coefficients(settings.h, settings.rho_inf)
-    count, work = np.zeros(9, dtype=np.int64), np.zeros(3)
-    count[alpha.ASKS] = bool(forces)
-    power = _power(record, W, state, forces)
-    return Step(*copies, *zeros, work, power, count, size, method, np.zeros(3)), state
-
-
-def _power(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> Array:
-    """(3,) powers of drives, forces and dampers at a state."""
-    system = record.packed.system
-    _signals_at(record, W, state.t)
-    evaluate(system, W, state.q, state.v)
-    apply_laws(forces, W, state.t)
-    with_accelerations(record.packed, W, state)
-    return W.power.copy()
-
-
-def _signals_at(record: Record, W: Work, t: float) -> None:
-    span, spacing = record.settings.span, record.settings.spacing
-    W.signal[:] = sample_all(record.packed.signals, np.array([t]), span, spacing)[0]
-
-
-def _measured(
-    record: Record, W: Work, state: State, forces: tuple[Law, ...]
-) -> tuple[State, Array]:
-    """Accelerations at the start, and the velocity to start the method from.
-
-    The algorithmic acceleration belongs to the time t + (alpha_m - alpha_f) h. Together with a
-    velocity shifted by a multiple of h^2 across the constraints, as the method itself would have
-    it after many steps, the multipliers converge with second order from the first step on.
-
-    Source:
-        Arnold, Bruels, Cardona, Error analysis of generalized-alpha Lie group time integration
-        methods for constrained mechanical systems, Numer. Math. 129 (2015) 149.
-    """
-    h = record.settings.h
-    _, beta, _, alpha_m, alpha_f = alpha.coefficients(h, record.settings.rho_inf)
-    at_rest = np.zeros_like(state.v)
-    state = _accelerated(record, W, state, forces, 0.0, at_rest)
-    probe = 0.02 * h
-    jerk = (_accelerated(record, W, state, forces, probe, at_rest).a - state.a) / probe
-    ahead = _accelerated(record, W, state, forces, h, jerk)
-    # vibrations that the step does not resolve have no Taylor series over it
-    if np.linalg.norm(ahead.a - state.a - h * jerk) > np.linalg.norm(h * jerk):
-        return replace(state, algorithmic=state.a.copy()), state.v
-    lag = alpha_m - alpha_f
-    shift = (1 / 6 - beta - 0.5 * lag) * jerk
-    for t in record.packed.system.bodies.v_at:
-        shift[t + 3 : t + 6] += np.cross(state.v[t + 3 : t + 6], state.a[t + 3 : t + 6]) / 12
-    linearise(record.packed.system, W, state.q, state.v)
-    across = W.G @ np.linalg.solve(W.S, W.G.T)
-    rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
-    y = np.linalg.lstsq(across, np.where(rolling, 0.0, W.G @ shift), rcond=1e-10)[0]
-    v = state.v + h**2 * np.linalg.solve(W.S, W.G.T @ y)
-    return replace(state, algorithmic=state.a + lag * h * jerk), v
-
-
-def _accelerated(
-    record: Record, W: Work, state: State, forces: tuple[Law, ...], shift: float, jerk: Array
-) -> State:
-    """The state with its accelerations, some time later by its Taylor series."""
-    system = record.packed.system
-    _signals_at(record, W, state.t + shift)
-    q = np.empty_like(state.q)
-    moved(system, state.q, shift * state.v + shift**2 * (state.a / 2 + shift * jerk / 6), q)
-    later = replace(state, q=q, v=state.v + shift * (state.a + shift * jerk / 2))
-    evaluate(system, W, later.q, later.v)
-    apply_laws(forces, W, state.t + shift)
-    return with_accelerations(record.packed, W, later)
 
 
 def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
@@ -157,14 +76,16 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     padded = np.append(t, np.repeat(t[-1:], max(0, 4 - count)))
     table = sample_all(packed.signals, padded, settings.span, settings.spacing)[:count]
     good, failure = first_failure(packed.signals, t, table)
-    every = settings.save_every
+    every = 1 if record.watch else settings.save_every
     out = _space(W, T, (done + good) // every - done // every)
     T.count[alpha.BEGAN] = before = T.count[alpha.STEPS]
     try:
         answer = _advance(record, W, T, forces, (t, table[:good], out))
     finally:
         taken = int(T.count[alpha.STEPS] - before)
-        _note(record, W, T, t[:taken], out)
+        _note(record, W, T, forces, t[:taken], out)
+    if record.stopped:
+        return taken
     if answer != alpha.CONVERGED:
         raise _failure(record, W, T, answer, t[taken])
     if good < count:
@@ -179,27 +100,33 @@ def _advance(record: Record, W: Work, T: Step, forces: tuple[Law, ...], chunk: t
     answer = alpha.ASK
     while answer == alpha.ASK:
         clock = perf_counter()
-        answer = alpha.advance(system, W, T, rank, table, settings.save_every, out)
+        every = 1 if record.watch else settings.save_every
+        answer = alpha.advance(system, W, T, rank, table, every, out)
         record.compiled += perf_counter() - clock
         if answer == alpha.ASK:
             apply_laws(forces, W, float(times[T.count[alpha.STEPS] - T.count[alpha.BEGAN]]))
     return answer
 
 
-def _note(record: Record, W: Work, T: Step, t: Array, out: tuple[Array, ...]) -> None:
+def _note(
+    record: Record, W: Work, T: Step, forces: tuple[Law, ...], t: Array, out: tuple[Array, ...]
+) -> None:
     """Keep the saved steps of a chunk, finished or not."""
+    names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
+    names["factorisations"] = alpha.FACTORISATIONS
+    record.counts = {name: int(T.count[k]) for name, k in names.items()}
     done = int(T.count[alpha.BEGAN])
     saved = np.arange(done + 1, done + t.size + 1) % record.settings.save_every == 0
+    if record.watch and kept_before_the_end(record, W, forces, t, out, saved):
+        return
     if saved.any():
-        record.keep(t[saved], *(x[: saved.sum()] for x in out))
+        chosen = saved if record.watch else slice(saved.sum())
+        record.keep(t[saved], *(x[: t.size][chosen] for x in out))
     if t.size:
         record.t = float(t[-1])
     arrays = (x.copy() for x in (T.q, T.v, T.vd, T.lam))
     memory = remember(record.settings, W, T, done + t.size)
     record.final = State(record.t, *arrays, record.final.rank, T.a.copy(), W.base.copy(), memory)
-    names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
-    names["factorisations"] = alpha.FACTORISATIONS
-    record.counts = {name: int(T.count[k]) for name, k in names.items()}
 
 
 def _failure(record: Record, W: Work, T: Step, answer: int, t: float) -> SolverError:

@@ -10,6 +10,7 @@ from rom.errors import ConfigError, InterruptedRun, RomError
 from rom.mbs.alpha import advance
 from rom.mbs.arrays import workspace
 from rom.mbs.compiled import compiled_before
+from rom.mbs.events import watch_of
 from rom.mbs.explicit import run_explicit
 from rom.mbs.implicit import run_implicit
 from rom.mbs.mechanism import Mechanism
@@ -90,6 +91,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         if state is None:
             state = initial_state(packed, t_start, settings.spacing)
         _check_fit(state, packed)
+        record.watch = watch_of(mechanism, packed, t_start)
         METHODS[method](record, W, state)
     except RomError as error:
         error.solution = record.solution(f"Stopped: {error}") if record.blocks else None
@@ -103,7 +105,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         )
         error.solution = record.solution(str(error)) if record.blocks else None
         raise error from None
-    solution = record.solution(status)
+    stopped = "" if record.watch is None else record.watch.sentence
+    solution = record.solution(stopped or status)
     warn_of_limits(solution)
     return solution
 

@@ -58,6 +58,15 @@ class UserForce:
     j: Marker | None
 
 
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A function of the motion whose zeros are looked for."""
+
+    function: Callable[..., Any]
+    direction: int
+    terminal: bool
+
+
 @dataclass
 class Mechanism(Connections, JointForces, Elements):
     """Rigid and flexible bodies, connected and loaded.
@@ -77,6 +86,7 @@ class Mechanism(Connections, JointForces, Elements):
     turns: dict[str, Turn] = field(default_factory=dict, init=False)
     loads: dict[str, Load] = field(default_factory=dict, init=False)
     user_forces: dict[str, UserForce] = field(default_factory=dict, init=False)
+    events: dict[str, Event] = field(default_factory=dict, init=False)
     motors: dict[str, Motor] = field(default_factory=dict, init=False)
     frictions: dict[str, Friction] = field(default_factory=dict, init=False)
     stops: dict[str, Stop] = field(default_factory=dict, init=False)
@@ -228,6 +238,31 @@ class Mechanism(Connections, JointForces, Elements):
             raise ConfigError(f"user force {name!r} is {function!r}, not a function.")
         self.user_forces[name] = UserForce(function, m1, m2)
 
+    def event(
+        self,
+        name: str,
+        function: Callable[..., Any],
+        *,
+        direction: int = 0,
+        terminal: bool = False,
+    ) -> None:
+        """Look for the times at which ``function(t, instant)`` passes through zero.
+
+        Args:
+            name: key of ``solution.events``.
+            function: of the time and of an `rom.mbs.events.Instant`, which knows positions and
+                velocities; looked at after every step, so that two zeros within one step are
+                not seen.
+            direction: 1 counts rising values only, -1 falling ones, 0 both.
+            terminal: end the run there.
+        """
+        self._check_new(name)
+        if not callable(function):
+            raise ConfigError(f"event {name!r} is {function!r}, not a function.")
+        if direction not in (-1, 0, 1):
+            raise ConfigError(f"direction of event {name!r} is {direction!r}; it is -1, 0 or 1.")
+        self.events[name] = Event(function, int(direction), bool(terminal))
+
     def design_point(self, marker: Marker) -> Array:
         """(3,) position of a marker where its body was added, undeformed [m]."""
         part = self.part(marker.body)
@@ -265,7 +300,7 @@ class Mechanism(Connections, JointForces, Elements):
         taken = [
             *(GROUND, *self.parts, *self.joints, *self.drives, *self.springs),
             *(*self.turns, *self.loads, *self.user_forces, *self.motors, *self.frictions),
-            *(*self.stops, *self.bushings, *self.contacts),
+            *(*self.stops, *self.bushings, *self.contacts, *self.events),
         ]
         if name in taken:
             raise ConfigError(f"the name {name!r} is used twice; in use are {sorted(taken)}.")

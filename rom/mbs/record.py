@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError
+from rom.mbs.events import Watch
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.mbs.signals import Span, sample_all
@@ -104,6 +105,7 @@ class Record:
         t: time reached.
         final: last state reached.
         statistics: counts, and seconds in compiled code.
+        watch: over the events of the mechanism, None if it has none.
     """
 
     mechanism: Mechanism
@@ -116,6 +118,7 @@ class Record:
     compiled: float = 0.0
     counts: dict[str, int] = field(default_factory=dict)
     shown: float = 0.0
+    watch: Watch | None = None
 
     def keep(self, t: Array, *arrays: Array) -> None:
         """Add saved instants."""
@@ -126,6 +129,11 @@ class Record:
         self.t, self.final = state.t, state
         arrays = (state.q, state.v, state.a, state.lam, np.zeros(3), state.base)
         self.keep(np.array([state.t]), *(x[None].copy() for x in arrays))
+
+    @property
+    def stopped(self) -> float | None:
+        """Time of the event that ended the run."""
+        return self.watch.stop[1] if self.watch and self.watch.stop else None
 
     def show(self) -> None:
         """Report the time reached on stderr, at most five times a second."""
@@ -143,7 +151,8 @@ class Record:
         t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
         signals = sample_all(self.packed.signals, t, self.settings.span, self.settings.spacing)
         return Solution(
-            self.mechanism, self.packed, t, *arrays, signals, self._statistics(), status, self.final
+            *(self.mechanism, self.packed, t, *arrays, signals, self._statistics(), status),
+            *(self.final, {} if self.watch is None else self.watch.occurrences),
         )
 
     def _statistics(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """What a run leaves behind, and the questions it answers."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -8,9 +8,12 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.mbs.arrays import WORK
+from rom.mbs.dense import Point, between
+from rom.mbs.events import Occurrences
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
+from rom.mbs.signals import sample_all
 from rom.mbs.state import State
 from rom.mbs.tracks import Tracks, follow
 from rom.model import Array
@@ -67,6 +70,7 @@ class Solution:
         statistics: steps, iterations, times.
         status: one sentence on how the run ended.
         final: the last state, from which a run can go on.
+        events: when each event of the mechanism happened, by name.
     """
 
     mechanism: Mechanism
@@ -82,7 +86,44 @@ class Solution:
     statistics: dict[str, Any]
     status: str
     final: State
+    events: dict[str, Occurrences] = field(default_factory=dict)
     _tracks: dict[Any, Tracks] = field(default_factory=dict, repr=False)
+
+    def at(self, t: Any) -> "Solution":
+        """The motion at other times, with everything that can be asked of a solution.
+
+        Cubic Hermite polynomials between the saved instants, see `rom.mbs.dense`; multipliers,
+        works and followed joint coordinates are linear there.
+
+        Args:
+            t: a time or (k,) times within the motion [s].
+
+        Raises:
+            ConfigError: for a time outside of it.
+        """
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        outside = ~((t >= self.t[0]) & (t <= self.t[-1]))
+        if outside.any():
+            raise ConfigError(
+                f"t = {t[outside][0]:g} s is not within the motion from {self.t[0]:g} s to "
+                f"{self.t[-1]:g} s."
+            )
+        left = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.t.size - 2)
+        rows = zip(left, t, strict=True)
+        curves = (
+            between(self.packed.system, self._point(k), self._point(k + 1), x) for k, x in rows
+        )
+        q, v, a = (np.array(x) for x in zip(*curves, strict=True))
+        share = ((t - self.t[left]) / (self.t[left + 1] - self.t[left]))[:, None]
+        lines = (self.lam, self.work, self.base)
+        lam, work, base = (x[left] + share * (x[left + 1] - x[left]) for x in lines)
+        span, spacing = (self.t[0], self.t[-1]), 0.01 * (self.t[-1] - self.t[0]) / (self.t.size - 1)
+        signals = sample_all(self.packed.signals, t, span, spacing)
+        motion = {"q": q, "v": v, "a": a, "lam": lam, "work": work, "base": base}
+        return replace(self, t=t, **motion, signals=signals, _tracks={})
+
+    def _point(self, k: int) -> Point:
+        return Point(self.t[k], self.q[k], self.v[k], self.a[k])
 
     def position(self, body: str, marker: Any = None) -> Array:
         """(n_t, 3) position of a marker, or of the body origin [m]."""
