@@ -34,7 +34,9 @@ def pendulum(angle=1.2):
     """A ball of 1 kg and 0.1 kg m^2 on a massless rod of 1 m, held by a hinge."""
     mech = Mechanism(gravity=(0, -G, 0))
     at = np.array([np.sin(angle), -np.cos(angle), 0])
-    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1,) * 3, at=at, markers={"pin": -at})
+    bob = mech.add_rigid(
+        "bob", mass=1.0, inertia=(0.1,) * 3, at=at, markers={"pin": -at, "tip": (0, 0, 0)}
+    )
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=(0, 0, 1))
     return mech
 

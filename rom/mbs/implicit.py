@@ -1,4 +1,4 @@
-"""The loop of generalised-alpha: chunks of compiled steps, or steps around Python forces."""
+"""Implicit methods with steps of one length: compiled steps in chunks, or around Python forces."""
 
 from time import perf_counter
 
@@ -9,27 +9,24 @@ from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import Work
 from rom.mbs.ending import kept_before_the_end
-from rom.mbs.record import Record, Settings
+from rom.mbs.record import Record
 from rom.mbs.signals import first_failure, sample_all
-from rom.mbs.starting import begin
-from rom.mbs.state import Memory, State
+from rom.mbs.starting import begin, remember
+from rom.mbs.state import State
 from rom.mbs.user import Law, apply_laws, laws
 from rom.model import Array
 
-# the factorised iteration matrix, with its scaling, its range and the weights of its norm
-FACTOR = ("lu", "pivot", "scaling", "U_lu", "weight")
 # seconds between looks at the keyboard and the progress line
 CHUNK = 0.2
 LARGEST_CHUNK = 4096
 
 
 def run_implicit(record: Record, W: Work, state: State) -> None:
-    """Fill the record by generalised-alpha."""
+    """Fill the record by generalised-alpha or BDF with steps of one length."""
     forces = laws(record.mechanism, record.packed)
-    T, state = begin(record, W, state, forces)
-    recall(state.memory, W, T)
+    T, state = begin(record, W, state, forces, record.settings.h)
     none = np.zeros((0, len(record.packed.signals), 3))
-    alpha.advance(record.packed.system, W, T, state.rank, none, 1, _space(W, T, 1))
+    alpha.advance(record.packed.system, W, T, state.rank, none, 1, space(W, T, 1))
     record.start(state)
     if record.watch:
         record.watch.begin(state.q, state.v)
@@ -46,25 +43,8 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
         record.keep(record.t, *(x[None].copy() for x in (T.q, T.v, T.vd, T.lam, T.work, W.base)))
 
 
-def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
-    """All that the next step depends on and the state does not tell."""
-    arrays = {name: getattr(W, name).copy() for name in FACTOR}
-    arrays["method"] = T.method.copy()
-    arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
-    origin = settings.t_start if settings.origin is None else settings.origin
-    return Memory("generalized-alpha", settings.h, origin, settings.taken + steps, arrays)
-
-
-def recall(memory: Memory | None, W: Work, T: Step) -> None:
-    """Go on with the factorisation of an earlier run, if it belongs to the same method."""
-    if memory is None or not np.array_equal(memory.arrays.get("method", ()), T.method):
-        return
-    for name in FACTOR:
-        getattr(W, name)[:] = memory.arrays[name]
-    T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
-
-
-def _space(W: Work, T: Step, rows: int) -> tuple[Array, ...]:
+def space(W: Work, T: Step, rows: int) -> tuple[Array, ...]:
+    """Arrays for q, v, vd, lam, work and base of so many instants."""
     return tuple(np.zeros((rows, x.size)) for x in (T.q, T.v, T.vd, T.lam, T.work, W.base))
 
 
@@ -77,7 +57,7 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     table = sample_all(packed.signals, padded, settings.span, settings.spacing)[:count]
     good, failure = first_failure(packed.signals, t, table)
     every = 1 if record.watch else settings.save_every
-    out = _space(W, T, (done + good) // every - done // every)
+    out = space(W, T, (done + good) // every - done // every)
     T.count[alpha.BEGAN] = before = T.count[alpha.STEPS]
     try:
         answer = _advance(record, W, T, forces, (t, table[:good], out))
@@ -87,7 +67,7 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     if record.stopped:
         return taken
     if answer != alpha.CONVERGED:
-        raise _failure(record, W, T, answer, t[taken])
+        raise failed_step(record, W, T, answer, t[taken])
     if good < count:
         raise failure
     return taken
@@ -108,13 +88,18 @@ def _advance(record: Record, W: Work, T: Step, forces: tuple[Law, ...], chunk: t
     return answer
 
 
+def counts(T: Step) -> dict[str, int]:
+    """Steps, Newton iterations and factorisations so far."""
+    names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
+    names["factorisations"] = alpha.FACTORISATIONS
+    return {name: int(T.count[k]) for name, k in names.items()}
+
+
 def _note(
     record: Record, W: Work, T: Step, forces: tuple[Law, ...], t: Array, out: tuple[Array, ...]
 ) -> None:
     """Keep the saved steps of a chunk, finished or not."""
-    names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
-    names["factorisations"] = alpha.FACTORISATIONS
-    record.counts = {name: int(T.count[k]) for name, k in names.items()}
+    record.counts = counts(T)
     done = int(T.count[alpha.BEGAN])
     saved = np.arange(done + 1, done + t.size + 1) % record.settings.save_every == 0
     if record.watch and kept_before_the_end(record, W, forces, t, out, saved):
@@ -126,10 +111,11 @@ def _note(
         record.t = float(t[-1])
     arrays = (x.copy() for x in (T.q, T.v, T.vd, T.lam))
     memory = remember(record.settings, W, T, done + t.size)
-    record.final = State(record.t, *arrays, record.final.rank, T.a.copy(), W.base.copy(), memory)
+    before = None if record.settings.method == "bdf" else T.a.copy()
+    record.final = State(record.t, *arrays, record.final.rank, before, W.base.copy(), memory)
 
 
-def _failure(record: Record, W: Work, T: Step, answer: int, t: float) -> SolverError:
+def failed_step(record: Record, W: Work, T: Step, answer: int, t: float) -> SolverError:
     """The error that says why a step did not succeed."""
     what = {
         alpha.FAILED: f"Newton did not converge in {alpha.MAX_PASSES} corrections",
@@ -142,7 +128,7 @@ def _failure(record: Record, W: Work, T: Step, answer: int, t: float) -> SolverE
         culprit = f"; the largest gap is {abs(W.value[k]):.3g} in {record.packed.row_owner[k]!r}"
     return SolverError(
         f"{what} at t = {t:.9g} s (last increment {T.size[0]:.3g} of the size){culprit}.",
-        hint=f"Take a smaller step than {record.settings.h:.3g} s; if that does not help, the "
+        hint=f"Take a smaller step than {T.method[0]:.3g} s; if that does not help, the "
         "mechanism is near a singular position or a force is too stiff. The motion up to there "
         "is kept in error.solution.",
     )

@@ -19,19 +19,22 @@ from rom.mbs.record import Record, Settings
 from rom.mbs.solution import Solution
 from rom.mbs.state import State, initial_state
 from rom.mbs.validity import warn_of_limits
+from rom.mbs.variable import run_variable
 
-METHODS = {"generalized-alpha": run_implicit, "dop853": run_explicit}
+METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run_explicit}
+# tolerance of variable steps, of the explicit method and of implicit ones
+RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
 
 
 def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     mechanism: Mechanism,
     *,
     t_end: float,
-    dt: float,
+    dt: float | None = None,
     method: str = "generalized-alpha",
     rho_inf: float = 0.9,
     tolerance: float = 1e-9,
-    rtol: float = 1e-12,
+    rtol: float | None = None,
     atol: float = 1e-12,
     progress: bool = False,
     save_every: int = 1,
@@ -43,15 +46,19 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     Args:
         mechanism: bodies, joints, forces.
         t_end: end time [s].
-        dt: time step of generalised-alpha, output interval of dop853 [s]; shortened a little if
-            the duration is not a multiple of it.
-        method: "generalized-alpha" (implicit, second order, for everything), or "dop853"
-            (explicit, eighth order, variable step: references for smooth, not too stiff motion).
+        dt: time step of an implicit method, output interval of dop853 [s]; shortened a little if
+            the duration is not a multiple of it. None lets an implicit method choose its steps by
+            ``rtol``; ask the solution for times in between by ``solution.at``.
+        method: "generalized-alpha" (implicit, second order, for everything), "bdf" (implicit,
+            second order, damps all that the step does not resolve), or "dop853" (explicit,
+            eighth order, variable step: references for smooth, not too stiff motion).
         rho_inf: spectral radius of generalised-alpha at infinite frequency: 1 keeps energy, but
             reactions then collect round-off over many steps; 0 removes what the time step does
             not resolve in one step.
         tolerance: of the Newton iteration, relative to what the accelerations move in one step.
-        rtol: relative tolerance of dop853.
+        rtol: relative tolerance of variable steps. dop853 keeps it in every step (1e-12);
+            implicit methods let the errors of all steps add up to it (1e-4), lengths relative to
+            the size of the mechanism, velocities to the largest so far, weighted by mass.
         atol: absolute tolerance of dop853.
         progress: report on stderr.
         save_every: keep every so many steps.
@@ -79,7 +86,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         raise ConfigError(f"no method {method!r}; there are {sorted(METHODS)}.")
     if t_start is None:
         t_start = 0.0 if state is None else state.t
-    settings = Settings(t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol, progress)
+    rtol = RTOL[method] if rtol is None else rtol
+    numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
+    settings = Settings(*numbers, progress, method)
     settings = settings.after(None if state is None else state.memory)
     packed = pack(mechanism)
     if progress and not compiled_before(advance):
@@ -92,7 +101,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             state = initial_state(packed, t_start, settings.spacing)
         _check_fit(state, packed)
         record.watch = watch_of(mechanism, packed, t_start)
-        METHODS[method](record, W, state)
+        run = run_variable if dt is None else METHODS[method]
+        run(record, W, state)
     except RomError as error:
         error.solution = record.solution(f"Stopped: {error}") if record.blocks else None
         if record.blocks:

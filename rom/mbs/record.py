@@ -24,13 +24,14 @@ class Settings:
 
     t_start: float
     t_end: float
-    dt: float
+    dt: float | None
     save_every: int
     rho_inf: float
     tolerance: float
     rtol: float
     atol: float
     progress: bool
+    method: str = "generalized-alpha"
     origin: float | None = None
     taken: int = 0
 
@@ -38,12 +39,14 @@ class Settings:
         numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
         for name in numbers:
             value = getattr(self, name)
+            if name == "dt" and value is None and self.method != "dop853":
+                continue
             if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(value):
                 raise ConfigError(f"{name} = {value!r} is not a finite number.")
         if self.t_end <= self.t_start:
             raise ConfigError(f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.")
         for name in ("dt", "tolerance", "rtol", "atol"):
-            if getattr(self, name) <= 0.0:
+            if getattr(self, name) is not None and getattr(self, name) <= 0.0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must be positive.")
         if not 0.0 <= self.rho_inf <= 1.0:
             raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
@@ -57,13 +60,19 @@ class Settings:
 
     @property
     def steps(self) -> int:
-        """Number of steps of at most dt."""
-        return max(1, int(np.ceil((self.t_end - self.t_start) / self.dt - 1e-6)))
+        """Number of steps of at most dt; 1 if their length is not fixed."""
+        return (
+            1
+            if self.dt is None
+            else max(1, int(np.ceil((self.t_end - self.t_start) / self.dt - 1e-6)))
+        )
 
     @property
     def h(self) -> float:
         """Length of a step [s]: dt itself if the duration is a multiple of it."""
         duration = self.t_end - self.t_start
+        if self.dt is None:
+            return duration
         round_off = 1e-13 * duration + 1e-15 * (abs(self.t_start) + abs(self.t_end))
         return (
             self.dt if abs(self.steps * self.dt - duration) < round_off else duration / self.steps
@@ -72,6 +81,8 @@ class Settings:
     @property
     def spacing(self) -> float:
         """Spacing of the finite differences of prescribed functions [s]."""
+        if self.dt is None:
+            return 1e-4 * (self.t_end - self.t_start)
         return max(self.h, 1e-4 * (self.t_end - self.t_start)) if self.steps > 4 else 0.05 * self.h
 
     def time(self, step: Any) -> Any:
@@ -81,7 +92,7 @@ class Settings:
 
     def after(self, memory: Memory | None) -> "Settings":
         """The settings of a run that goes on, with its steps counted from the first one."""
-        if memory is None or memory.h != self.h:
+        if memory is None or memory.h != self.h or self.dt is None:
             return self
         if memory.origin + memory.h * memory.taken != self.t_start:
             return self

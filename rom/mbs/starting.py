@@ -8,30 +8,99 @@ from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import ROLL, Work
 from rom.mbs.motion import evaluate, linearise, moved
-from rom.mbs.record import Record
+from rom.mbs.record import Record, Settings
 from rom.mbs.signals import sample_all
-from rom.mbs.state import State, with_accelerations
+from rom.mbs.state import Memory, State, with_accelerations
 from rom.mbs.user import Law, apply_laws
 from rom.model import Array
 
+# the factorised iteration matrix, with its scaling, its range and the weights of its norm
+FACTOR = ("lu", "pivot", "scaling", "U_lu", "weight")
 
-def begin(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> tuple[Step, State]:
-    """Step memory at the start, accelerations consistent to second order."""
-    packed, settings = record.packed, record.settings
-    n, m = state.v.size, state.lam.size
-    v = state.v
-    if state.algorithmic is None:
-        state, v = _measured(record, W, state, forces)
-    else:
+
+def begin(
+    record: Record, W: Work, state: State, forces: tuple[Law, ...], h: float
+) -> tuple[Step, State]:
+    """Step memory at the start for a first step of length h, consistent to second order.
+
+    Generalised-alpha begins with its acceleration-like variable, BDF with a step before the start
+    as the Taylor series has it.
+    """
+    settings, n = record.settings, state.v.size
+    bdf, jerk = settings.method == "bdf", None
+    method, weights = alpha.coefficients(h, settings.rho_inf), np.zeros(3)
+    if bdf:
+        method, weights = alpha.bdf_coefficients(h, h)
+    if state.base is not None:
         W.base[:] = state.base
-    zeros = [np.zeros(k) for k in (state.q.size, n, n, m, n)]
-    size = np.array([0.0, packed.length, settings.tolerance, packed.mass])
-    copies = (x.copy() for x in (state.q, v, state.algorithmic, state.a, state.lam))
-    method = alpha.coefficients(settings.h, settings.rho_inf)
+    goes_on = fits(state.memory, method, weights)
+    if not goes_on and (bdf or state.algorithmic is None):
+        state, jerk = measured(record, W, state, forces, h)
+    zeros = [np.zeros(k) for k in (state.q.size, n, n, state.lam.size, n)]
+    size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass])
+    v, before, rise = state.v, state.algorithmic, np.zeros(n) if jerk is None else jerk
+    if bdf:
+        before = v - h * state.a + h**2 / 2 * rise
+        zeros[4][:] = h * (v - h / 2 * state.a + h**2 / 6 * rise)
+    elif before is None:
+        before = state.a + (method[3] - method[4]) * h * rise
+        if jerk is not None:
+            v = v + h**2 * across(record, W, state, shift_ahead(record, state, method, jerk))
+        state = replace(state, algorithmic=before)
+    copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
     count, work = np.zeros(9, dtype=np.int64), np.zeros(3)
     count[alpha.ASKS] = bool(forces)
     power = _power(record, W, state, forces)
-    return Step(*copies, *zeros, work, power, count, size, method, np.zeros(3)), state
+    T = Step(*copies, *zeros, work, power, count, size, method, weights)
+    if goes_on:
+        recall(state.memory, W, T)
+    return T, state
+
+
+def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Array:
+    """Velocity that generalised-alpha is ahead, over h^2, before it is taken across constraints."""
+    _, beta, _, alpha_m, alpha_f = method
+    shift = (1 / 6 - beta - 0.5 * (alpha_m - alpha_f)) * jerk
+    for t in record.packed.system.bodies.v_at:
+        shift[t + 3 : t + 6] += np.cross(state.v[t + 3 : t + 6], state.a[t + 3 : t + 6]) / 12
+    return shift
+
+
+def across(record: Record, W: Work, state: State, shift: Array) -> Array:
+    """The part of a velocity, or of each column, that changes the gaps of the constraints."""
+    linearise(record.packed.system, W, state.q, state.v)
+    A = W.G @ np.linalg.solve(W.S, W.G.T)
+    rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
+    y = np.linalg.lstsq(A, np.where(rolling, 0.0, (W.G @ shift).T).T, rcond=1e-10)[0]
+    return np.linalg.solve(W.S, W.G.T @ y)
+
+
+def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
+    """All that the next step depends on and the state does not tell."""
+    arrays = {name: getattr(W, name).copy() for name in FACTOR}
+    arrays["method"], arrays["bdf"] = T.method.copy(), T.bdf.copy()
+    arrays["before"], arrays["psi"] = T.a.copy(), T.psi.copy()
+    arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
+    origin = settings.t_start if settings.origin is None else settings.origin
+    return Memory(settings.method, settings.h, origin, settings.taken + steps, arrays)
+
+
+def recall(memory: Memory, W: Work, T: Step) -> None:
+    """Go on with the factorisation of an earlier run that `fits`."""
+    T.a[:], T.psi[:] = memory.arrays["before"], memory.arrays["psi"]
+    for name in FACTOR:
+        getattr(W, name)[:] = memory.arrays[name]
+    T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
+
+
+def fits(memory: Memory | None, method: Array, weights: Array) -> bool:
+    """Whether what is remembered belongs to the same method and step."""
+    kept = {} if memory is None else memory.arrays
+    same = (
+        np.array_equal(kept.get("method", ()), method),
+        np.array_equal(kept.get("bdf"), weights),
+    )
+    return all(same)
 
 
 def _power(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> Array:
@@ -50,21 +119,20 @@ def signals_at(record: Record, W: Work, t: float) -> None:
     W.signal[:] = sample_all(record.packed.signals, np.array([t]), span, spacing)[0]
 
 
-def _measured(
-    record: Record, W: Work, state: State, forces: tuple[Law, ...]
-) -> tuple[State, Array]:
-    """Accelerations at the start, and the velocity to start the method from.
+def measured(
+    record: Record, W: Work, state: State, forces: tuple[Law, ...], h: float
+) -> tuple[State, Array | None]:
+    """Accelerations at a start and their rate; None if a step does not resolve it.
 
-    The algorithmic acceleration belongs to the time t + (alpha_m - alpha_f) h. Together with a
-    velocity shifted by a multiple of h^2 across the constraints, as the method itself would have
-    it after many steps, the multipliers converge with second order from the first step on.
+    The algorithmic acceleration of generalised-alpha belongs to the time
+    t + (alpha_m - alpha_f) h. Together with a velocity shifted by a multiple of h^2 across the
+    constraints, as the method itself would have it after many steps, the multipliers converge
+    with second order from the first step on.
 
     Source:
         Arnold, Bruels, Cardona, Error analysis of generalized-alpha Lie group time integration
         methods for constrained mechanical systems, Numer. Math. 129 (2015) 149.
     """
-    h = record.settings.h
-    _, beta, _, alpha_m, alpha_f = alpha.coefficients(h, record.settings.rho_inf)
     at_rest = np.zeros_like(state.v)
     state = accelerated(record, W, state, forces, 0.0, at_rest)
     probe = 0.02 * h
@@ -72,17 +140,8 @@ def _measured(
     ahead = accelerated(record, W, state, forces, h, jerk)
     # vibrations that the step does not resolve have no Taylor series over it
     if np.linalg.norm(ahead.a - state.a - h * jerk) > np.linalg.norm(h * jerk):
-        return replace(state, algorithmic=state.a.copy()), state.v
-    lag = alpha_m - alpha_f
-    shift = (1 / 6 - beta - 0.5 * lag) * jerk
-    for t in record.packed.system.bodies.v_at:
-        shift[t + 3 : t + 6] += np.cross(state.v[t + 3 : t + 6], state.a[t + 3 : t + 6]) / 12
-    linearise(record.packed.system, W, state.q, state.v)
-    across = W.G @ np.linalg.solve(W.S, W.G.T)
-    rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
-    y = np.linalg.lstsq(across, np.where(rolling, 0.0, W.G @ shift), rcond=1e-10)[0]
-    v = state.v + h**2 * np.linalg.solve(W.S, W.G.T @ y)
-    return replace(state, algorithmic=state.a + lag * h * jerk), v
+        return state, None
+    return state, jerk
 
 
 def accelerated(

@@ -1,0 +1,212 @@
+"""Steps of chosen length for generalised-alpha and BDF: the errors of all steps add up to rtol.
+
+The error of a step is its difference from the step that follows from the accelerations at both of
+its ends with one order more; lengths are relative to the size of the mechanism, velocities to the
+largest so far, both weighted by mass. What is saved fits the constraints in its velocities and
+accelerations too, which a method of index 3 leaves to its truncation error.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from rom.errors import SolverError
+from rom.mbs import alpha
+from rom.mbs.arrays import Work, workspace
+from rom.mbs.ending import kept_before_the_end
+from rom.mbs.implicit import counts, failed_step, space
+from rom.mbs.record import Record
+from rom.mbs.signals import first_failure, sample_all
+from rom.mbs.starting import accelerated, across, begin, shift_ahead, signals_at
+from rom.mbs.state import State, fitting_velocity
+from rom.mbs.user import apply_laws, laws
+from rom.model import Array
+
+# a step is at most so much longer or shorter than the last, and aims below the tolerance
+LONGER, SHORTER, AIM = 2.0, 0.2, 0.8
+# errors of early steps grow on the way to the end
+MARGIN = 3.0
+# a longer step is worth a new factorisation from here on
+WORTH = 1.3
+# first and smallest step relative to the duration
+FIRST, SMALLEST = 1e-4, 1e-12
+# what a step changes and a rejected one gives back
+CHANGED = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
+
+
+def run_variable(record: Record, W: Work, state: State) -> None:
+    """Fill the record by generalised-alpha or BDF with steps that meet a tolerance."""
+    run = _Run(record, W, replace(state, algorithmic=None, memory=None))
+    while record.t < record.settings.t_end and not record.stopped:
+        run.step()
+        record.show()
+    if not record.stopped and record.blocks[-1][0][-1] < record.t:
+        run.keep()
+
+
+class _Run:
+    """A run with its step memory; ``T`` is prepared for a next step of length ``h``."""
+
+    def __init__(self, record: Record, W: Work, state: State):
+        self.record, self.W, self.forces = record, W, laws(record.mechanism, record.packed)
+        self.duration = record.settings.t_end - record.settings.t_start
+        self.beside = workspace(record.packed.system, len(record.packed.signals))
+        self.state, self.bdf, self.uneven = state, record.settings.method == "bdf", False
+        self.T, start = begin(record, W, state, self.forces, FIRST * self.duration)
+        self.old = self.T._replace(**{name: getattr(self.T, name).copy() for name in CHANGED})
+        self.out, self.base = space(W, self.T, 1), W.base.copy()
+        self.h = self.before = FIRST * self.duration
+        self.fastest, self.rejected, self.steps = record.packed.length / self.duration, 0, []
+        self.jerk, self.next = np.zeros_like(state.v), start
+        record.start(start)
+        if record.watch:
+            record.watch.begin(start.q, start.v)
+        record.clock = perf_counter()
+
+    def step(self) -> None:
+        """Take one step that meets the tolerance: shorten it until it does."""
+        end = self.record.settings.t_end
+        left = end - self.record.t
+        if 2 * self.h > left:  # two equal last steps instead of a tiny one
+            self.prepare(left if 1.001 * self.h > left else 0.5 * left)
+        error = np.inf
+        while error > 1.0:
+            t = end if self.h >= left else self.record.t + self.h
+            answer = self.attempt(t)
+            if answer == alpha.CONVERGED:
+                self.next = self.consistent(t)
+                error = self.error() * self.duration / (self.h * self.record.settings.rtol)
+            if error > 1.0:
+                self.reject(answer, error, t)
+        self.accept(t)
+        factor = min(AIM / np.sqrt(max(error, 1e-6)), LONGER)
+        if self.record.stopped or t >= end:
+            return
+        if factor > WORTH or factor < AIM:
+            self.prepare(factor * self.h)
+        elif self.bdf and self.uneven:
+            self.prepare(self.h)
+
+    def attempt(self, t: float) -> int:
+        """Take the step to a time; says how it went."""
+        T, W, settings, packed = self.T, self.W, self.record.settings, self.record.packed
+        for name in CHANGED:
+            getattr(self.old, name)[:] = getattr(T, name)
+        self.base[:] = W.base
+        times = np.array([t])
+        table = sample_all(packed.signals, times, settings.span, settings.spacing)
+        good, failure = first_failure(packed.signals, times, table)
+        if not good:
+            raise failure
+        T.count[alpha.BEGAN], rank = T.count[alpha.STEPS], self.record.final.rank
+        answer = alpha.ASK
+        while answer == alpha.ASK:
+            clock = perf_counter()
+            answer = alpha.advance(packed.system, W, T, rank, table, 1, self.out)
+            self.record.compiled += perf_counter() - clock
+            if answer == alpha.ASK:
+                apply_laws(self.forces, W, t)
+        return answer
+
+    def error(self) -> float:
+        """Error of the step just taken, relative to length and speed."""
+        T, last, now, h = self.T, self.record.final, self.next, self.h
+        shift = T.psi - h * last.v - h**2 / 6 * (2 * last.a + now.a)
+        for t in self.record.packed.system.bodies.v_at + 3:  # rotation vectors are no sum of steps
+            shift[t : t + 3] -= h**2 / 12 * np.cross(last.v[t : t + 3], now.v[t : t + 3])
+        change = now.v - last.v - h / 2 * (last.a + now.a)
+        self.fastest = max(self.fastest, self.length(now.v))
+        return MARGIN * max(self.length(shift) / T.size[1], self.length(change) / self.fastest)
+
+    def length(self, x: Array) -> float:
+        """Length of a change of velocities or coordinates, weighted by mass."""
+        return float(np.sqrt(self.W.weight @ x**2))
+
+    def reject(self, answer: int, error: float, t: float) -> None:
+        """Go back to where the step began and prepare a shorter one.
+
+        Raises:
+            SolverError: if that would be too short.
+        """
+        spent = self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]]
+        for name in CHANGED:
+            getattr(self.T, name)[:] = getattr(self.old, name)
+        self.W.base[:] = self.base
+        self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]] = spent
+        self.rejected += 1
+        h = self.h * max(SHORTER, AIM / np.sqrt(error))
+        if h < SMALLEST * self.duration:
+            why = f"its error is {error:.3g} times the tolerance"
+            if answer != alpha.CONVERGED:
+                why = failed_step(self.record, self.W, self.T, answer, t).message
+            raise SolverError(
+                f"the step became too small at t = {self.record.t:.9g} s ({self.h:.3g} s): {why}.",
+                hint="A force jumps there, or the mechanism is near a singular position; or ask "
+                f"for less than rtol = {self.record.settings.rtol:.3g}. The motion up to there is "
+                "kept in error.solution.",
+            )
+        self.prepare(h)
+
+    def prepare(self, h: float) -> None:
+        """Let the next step have another length."""
+        T = self.T
+        if T.count[alpha.STEPS] == 0:
+            spent = T.count.copy()
+            fresh, _ = begin(self.record, self.W, self.state, self.forces, h)
+            for name in (*CHANGED, "method", "bdf"):
+                getattr(T, name)[:] = getattr(fresh, name)
+            T.count[:] = spent
+        elif self.bdf:
+            T.method[:], T.bdf[:] = alpha.bdf_coefficients(h, self.before)
+            self.uneven = h != self.before
+        else:
+            T.a[:] += (T.method[3] - T.method[4]) * (h - self.h) * self.jerk
+            T.method[0] = h
+            self.reset_across()
+        T.count[alpha.FRESH], self.h = 0, h
+
+    def reset_across(self) -> None:
+        """Begin anew across the constraints, where another length of steps would excite them."""
+        record, W, T, now = self.record, self.beside, self.T, self.record.final
+        h = T.method[0]
+        lag, shift = T.method[3] - T.method[4], shift_ahead(record, now, T.method, self.jerk)
+        wanted = (now.v + h**2 * shift, now.a + lag * h * self.jerk, now.a)
+        present = (T.v, T.a, T.vd)
+        change = across(record, W, now, (np.array(wanted) - np.array(present)).T)
+        for x, y in zip(present, change.T, strict=True):
+            x += y
+
+    def consistent(self, t: float) -> State:
+        """The present instant with velocities, accelerations and multipliers that fit."""
+        T, rank = self.T, self.record.final.rank
+        self.beside.base[:] = self.base
+        signals_at(self.record, self.beside, t)
+        v = fitting_velocity(self.record.packed, self.beside, T.q, T.v)
+        state = State(t, T.q.copy(), v, T.vd, T.lam, rank, None, self.base)
+        at_rest = np.zeros_like(T.v)
+        return accelerated(self.record, self.beside, state, self.forces, 0.0, at_rest)
+
+    def accept(self, t: float) -> None:
+        """Go on from the new instant."""
+        record, T, state = self.record, self.T, self.next
+        self.jerk, self.before = (state.a - record.final.a) / self.h, self.h
+        self.steps.append(self.h)
+        record.counts = counts(T) | {"rejected": self.rejected}
+        record.counts |= {"shortest": min(self.steps), "longest": max(self.steps)}
+        saved = np.array([T.count[alpha.STEPS] % record.settings.save_every == 0])
+        row = (state.q, state.v, state.a, state.lam, T.work.copy(), state.base)
+        out = tuple(x[None] for x in row)
+        if record.watch and kept_before_the_end(
+            record, self.beside, self.forces, np.array([t]), out, saved
+        ):
+            return
+        record.t, record.final = t, state
+        if saved[0]:
+            self.keep()
+
+    def keep(self) -> None:
+        """Save the present instant."""
+        f = self.record.final
+        arrays = (f.q, f.v, f.a, f.lam, self.T.work, f.base)
+        self.record.keep(np.array([f.t]), *(x[None].copy() for x in arrays))
