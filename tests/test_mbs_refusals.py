@@ -129,7 +129,6 @@ def test_markers_of_another_mechanism_are_refused_when_they_fit_nothing(name, pl
     [
         {"dt": "fast"},
         {"dt": 1e-3j},
-        {"dt": None},
         {"dt": True},
         {"dt": [1e-3]},
         {"t_start": NAN},

@@ -61,11 +61,9 @@ class Settings:
     @property
     def steps(self) -> int:
         """Number of steps of at most dt; 1 if their length is not fixed."""
-        return (
-            1
-            if self.dt is None
-            else max(1, int(np.ceil((self.t_end - self.t_start) / self.dt - 1e-6)))
-        )
+        if self.dt is None:
+            return 1
+        return max(1, int(np.ceil((self.t_end - self.t_start) / self.dt - 1e-6)))
 
     @property
     def h(self) -> float:
