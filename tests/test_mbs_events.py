@@ -160,16 +160,19 @@ def test_rotation_vectors_have_the_rate_of_their_angular_velocity():
     wanted = (vector(ends[0]) - vector(ends[1])) / 2e-4
     assert_allclose(vector_rate(vector(start), omega), wanted, atol=1e-7)
     assert_allclose(vector_rate(1e-4 * omega, omega), omega, atol=1e-12)
+    small = 2e-3 * np.array([0.6, 0.0, 0.8])  # here the formula changes to its series
+    jump = vector_rate(small * (1 + 1e-6), omega) - vector_rate(small * (1 - 1e-6), omega)
+    assert np.abs(jump).max() < 1e-8
 
 
 def test_between_its_instants_a_motion_is_known_to_fourth_order():
     errors = []
-    fine = simulate(heavy_top(), t_end=0.08, dt=0.0005, method="dop853")
+    fine = simulate(heavy_top(), t_end=0.08, dt=1e-3 / 3, method="dop853")
     for h in (4e-3, 2e-3, 1e-3):
         sol = simulate(heavy_top(), t_end=0.08, dt=h, method="dop853").at(fine.t)
-        errors.append([np.abs(getattr(sol, x) - getattr(fine, x)).max() for x in ("q", "v")])
+        errors.append([np.abs(getattr(sol, x) - getattr(fine, x)).max() for x in ("q", "v", "a")])
     order = np.log2(np.array(errors)[:-1] / np.array(errors)[1:])
-    assert_allclose(order[-1], 4.0, atol=0.2)
+    assert (order[-1] > [3.8, 3.8, 2.8]).all()
     assert np.abs(np.linalg.norm(sol.orientation("top"), axis=1) - 1).max() < 1e-14
 
 

@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 from mbs_cases import simulate_quietly, slider_crank
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
 from test_mbs_events import G, falling, pendulum
 from test_mbs_rigid import heavy_top
 
+from rom import rotation
 from rom.errors import ConfigError, SolverError
-from rom.mbs.alpha import bdf_coefficients
+from rom.mbs.alpha import STEPS, bdf_coefficients
 from rom.mbs.integrate import simulate
+from rom.mbs.starting import across, shift_ahead
+from rom.mbs.variable import _Run, increment
 
 IMPLICIT = ["generalized-alpha", "bdf"]
 STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
@@ -52,6 +56,67 @@ def test_dop853_has_its_order_in_the_error_per_tolerance():
     steps = [run.statistics["steps"] for run in runs]
     assert 1e4 ** (1 / 9) < steps[1] / steps[0] < 1e4 ** (1 / 7)
     assert errors(runs[1], exact, "q")[0] < 1e-3 * errors(runs[0], exact, "q")[0]
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_very_first_step_has_the_order_already(method):
+    table = []
+    for h in (4e-4, 2e-4, 1e-4):
+        sol = simulate(heavy_top(), t_end=h, dt=h, method=method, tolerance=1e-12)
+        exact = simulate(heavy_top(), t_end=h, dt=h, method="dop853")
+        table.append(errors(sol, exact, ("a", "lam")))
+    order = np.log2(np.array(table)[:-1] / np.array(table)[1:])
+    assert (order[-1] > 1.8).all()
+
+
+def test_the_increment_of_a_step_is_known_to_fourth_order():
+    """A body that moves as sin t and turns with a given angular velocity, turned exactly."""
+
+    def omega(t):
+        return np.array([np.cos(t), 0.5 * np.sin(2 * t), 0.3])
+
+    def rate(t, p):
+        w = omega(t)
+        return 0.5 * np.concatenate([[-p[1:] @ w], p[0] * w + np.cross(p[1:], w)])
+
+    def ends(t):
+        v = np.concatenate([[np.cos(t), 0, 0], omega(t)])
+        return v, np.array([-np.sin(t), 0, 0, -np.sin(t), np.cos(2 * t), 0])
+
+    gaps, start = [], 0.4
+    for h in (0.2, 0.1):
+        p = solve_ivp(rate, (start, start + h), [1.0, 0, 0, 0], rtol=1e-12, atol=1e-13).y[:, -1]
+        psi = np.concatenate([[np.sin(start + h) - np.sin(start), 0, 0], rotation.log(p)])
+        gaps.append(np.abs(psi - increment([3], h, ends(start), ends(start + h))))
+    ratio = gaps[0][[0, 3, 4, 5]] / gaps[1][[0, 3, 4, 5]]
+    assert (ratio > 13).all()
+
+
+def test_another_length_of_steps_prepares_the_method_for_it(monkeypatch):
+    """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
+    seen = []
+    original = _Run.prepare
+
+    def prepare(self, h):
+        original(self, h)
+        if self.T.count[STEPS] < 5:
+            return
+        now, T = self.record.final, self.T
+        lag = (T.method[3] - T.method[4]) * h * self.jerk
+        ahead = h**2 * shift_ahead(self.record, now, T.method, self.jerk)
+        across_ahead = across(self.record, self.beside, now, ahead)
+        seen.append(
+            [
+                np.linalg.norm(T.a - now.a - lag) / np.linalg.norm(lag),
+                np.linalg.norm(T.v - now.v - across_ahead) / np.linalg.norm(across_ahead),
+            ]
+        )
+
+    monkeypatch.setattr(_Run, "prepare", prepare)
+    simulate(pendulum(), t_end=0.3, rtol=1e-3, rho_inf=0.0)
+    assert len(seen) > 2
+    assert np.max(seen, axis=0)[0] < 0.3
+    assert np.max(seen, axis=0)[1] < 1e-6
 
 
 @pytest.mark.parametrize("before", [0.1, 0.25, 0.4])

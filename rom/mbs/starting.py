@@ -39,9 +39,15 @@ def begin(
     zeros = [np.zeros(k) for k in (state.q.size, n, n, state.lam.size, n)]
     size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass])
     v, before, rise = state.v, state.algorithmic, np.zeros(n) if jerk is None else jerk
-    if bdf:
-        before = v - h * state.a + h**2 / 2 * rise
-        zeros[4][:] = h * (v - h / 2 * state.a + h**2 / 6 * rise)
+    if goes_on:
+        before = v
+    elif bdf:
+        ahead = h**2 * across(record, W, state, shift_ahead(record, state, method, rise))
+        before, v = v - h * state.a + h**2 / 2 * rise + ahead, v + ahead
+        zeros[4][:] = h * (state.v - h / 2 * state.a + h**2 / 6 * rise)
+        for t in record.packed.system.bodies.v_at + 3:  # the term of Magnus
+            w, wd = state.v[t : t + 3], state.a[t : t + 3]
+            zeros[4][t : t + 3] += h**3 / 12 * np.cross(w, wd)
     elif before is None:
         before = state.a + (method[3] - method[4]) * h * rise
         if jerk is not None:
@@ -58,9 +64,10 @@ def begin(
 
 
 def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Array:
-    """Velocity that generalised-alpha is ahead, over h^2, before it is taken across constraints."""
+    """Velocity that a method is ahead, over h^2, before it is taken across constraints."""
     _, beta, _, alpha_m, alpha_f = method
-    shift = (1 / 6 - beta - 0.5 * (alpha_m - alpha_f)) * jerk
+    bdf = record.settings.method == "bdf"
+    shift = (-1 / 3 if bdf else 1 / 6 - beta - 0.5 * (alpha_m - alpha_f)) * jerk
     for t in record.packed.system.bodies.v_at:
         shift[t + 3 : t + 6] += np.cross(state.v[t + 3 : t + 6], state.a[t + 3 : t + 6]) / 12
     return shift

@@ -8,6 +8,7 @@ accelerations too, which a method of index 3 leaves to its truncation error.
 
 from dataclasses import replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,18 @@ WORTH = 1.3
 FIRST, SMALLEST = 1e-4, 1e-12
 # what a step changes and a rejected one gives back
 CHANGED = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
+
+
+def increment(turns: Any, h: float, left: tuple[Array, Array], right: tuple[Array, Array]) -> Array:
+    """Increment of a step from (velocities, accelerations) at its ends, to fourth order.
+
+    Angular velocities begin at ``turns``; their rotation vector has the term of Magnus besides.
+    """
+    (v0, a0), (v1, a1) = left, right
+    out = h * v0 + h**2 / 6 * (2 * a0 + a1)
+    for t in turns:
+        out[t : t + 3] += h**2 / 12 * np.cross(v0[t : t + 3], v1[t : t + 3])
+    return out
 
 
 def run_variable(record: Record, W: Work, state: State) -> None:
@@ -112,9 +125,8 @@ class _Run:
     def error(self) -> float:
         """Error of the step just taken, relative to length and speed."""
         T, last, now, h = self.T, self.record.final, self.next, self.h
-        shift = T.psi - h * last.v - h**2 / 6 * (2 * last.a + now.a)
-        for t in self.record.packed.system.bodies.v_at + 3:  # rotation vectors are no sum of steps
-            shift[t : t + 3] -= h**2 / 12 * np.cross(last.v[t : t + 3], now.v[t : t + 3])
+        turns = self.record.packed.system.bodies.v_at + 3
+        shift = T.psi - increment(turns, h, (last.v, last.a), (now.v, now.a))
         change = now.v - last.v - h / 2 * (last.a + now.a)
         self.fastest = max(self.fastest, self.length(now.v))
         return MARGIN * max(self.length(shift) / T.size[1], self.length(change) / self.fastest)
