@@ -66,9 +66,8 @@ def _turned(s: float, h: float, left: tuple[Array, Array], right: tuple[Array, A
 def vector_rate(psi: Array, omega: Array) -> Array:
     """Rate of the rotation vector psi that belongs to the angular velocity in the body frame.
 
-    Source:
-        Bullo, Murray, Proportional derivative control on the Euclidean group, ECC 1995, eq. 2.7,
-        with the sign of the second term for velocities in the body frame.
+    The inverse of the body tangent of the exponential map, in closed form; its series where the
+    form has no digits left.
     """
     half = 0.5 * np.linalg.norm(psi)
     share = 1 / 12 if half < 1e-3 else (1 - half / np.tan(half)) / (4 * half * half)
