@@ -48,8 +48,8 @@ from rom.workflow import mass_properties, modes, reduce, substructure
 if TYPE_CHECKING:
     from rom.mbs.audit import audit
     from rom.mbs.campbell import campbell
-    from rom.mbs.equilibrium import equilibrium
     from rom.mbs.checkpoint import load_state, save_state
+    from rom.mbs.equilibrium import equilibrium
     from rom.mbs.integrate import simulate
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
@@ -126,11 +126,11 @@ LATER = {  # names whose modules load Numba
     "equilibrium": "equilibrium",
     "frequency_response": "response",
     "linearize": "linearize",
+    "load_state": "checkpoint",
+    "save_state": "checkpoint",
     "simulate": "integrate",
     "transmissibility": "response",
 }
-LATER = {"Mechanism": "mechanism", "audit": "audit", "simulate": "integrate",
-         "load_state": "checkpoint", "save_state": "checkpoint"}  # fmt: skip  # they load Numba
 
 
 def __getattr__(name: str) -> Any:

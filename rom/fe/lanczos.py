@@ -15,7 +15,6 @@ from rom.model import Array
 
 BLOCK = 6  # columns solved together: fewer make solving dearer, more make the space larger
 ROOM = 20  # blocks beside the modes sought before the space is restarted; twenty are seldom used
-SMALL = 1e-13  # change of a block, relative to what came out of the factor, that is none
 RESTARTS = 20  # after which the method has failed
 TOLERANCE = 1e-10  # of an eigenvalue of the inverse: its residual when it counts as converged
 ROUGH = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
@@ -97,12 +96,10 @@ class BlockLanczos:
         V = self.V[:, : self.size]  # M V is not kept: it would take as much memory again
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         for _ in range(2):
-            MW = self.ops.apply_M(W)
-            G = self.ops.gram(V, MW)
+            G = self.ops.gram(V, self.ops.apply_M(W))
             W = W - V @ G
             H += G
-        if np.abs(G).max(initial=0.0) > SMALL * np.abs(H).max(initial=0.0):
-            MW = self.ops.apply_M(W)  # otherwise the second pass moved round-off only
+        MW = self.ops.apply_M(W)
         for _ in range(2):
             g, U = np.linalg.eigh(self.ops.gram(W, MW))
             root = np.sqrt(np.maximum(g, 1e-30 * max(g[-1], np.finfo(float).tiny)))

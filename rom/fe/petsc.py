@@ -203,8 +203,10 @@ class PETScOperators:
         else:
             none = np.zeros((self.n_local, 0))
             lam, Phi = self.lowest(m + SPARE, 0.0, held.factor, none, in_blocks=in_blocks)
+            if finished and not in_blocks:  # SLEPc has taken the factor's matrix for its own
+                held.release()
             self.verify_count(lam, m, 0, held.factor if finished else None)
-            if finished:
+            if finished and in_blocks:
                 held.release()
         return lam[:m], settled(self, lam, Phi)[:, :m]
 

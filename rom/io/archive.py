@@ -144,7 +144,9 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
 
 def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str, Any]:
     if "manifest.npy" not in archive.namelist():
-        raise FileFormatError(f"this archive is not a {kind.what}: it has no manifest.", where=str(path))
+        raise FileFormatError(
+            f"this archive is not a {kind.what}: it has no manifest.", where=str(path)
+        )
     try:
         manifest = json.loads(_read(archive, "manifest", path).tobytes())
         schema, (major, _) = manifest["schema"], manifest["version"]

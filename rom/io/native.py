@@ -71,7 +71,7 @@ def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
 
 
 def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[str, Array]]:
-    """The manifest and the arrays of a file, as they were written; see `load` for what is raised."""
+    """The manifest and the arrays of a file as written; see `load` for what is raised."""
     manifest, arrays = read_archive(path, kind, limit)
     if manifest.get("units") not in SYSTEMS:
         raise FileFormatError(
