@@ -82,7 +82,8 @@ def test_a_missing_library_is_named_with_its_package(monkeypatch):
     import rom.fe
     from rom.errors import ConfigError
 
-    monkeypatch.delitem(sys.modules, "rom.fe.elasticity")
+    for name in ("elasticity", "region"):
+        monkeypatch.delitem(sys.modules, f"rom.fe.{name}")
     monkeypatch.setitem(sys.modules, "ufl", None)
     with pytest.raises(ConfigError, match=r"import of ufl halted.*apt-get install python3-dolfinx"):
         rom.fe.model("rod.geo", material=None)

@@ -100,5 +100,6 @@ def test_frequencies_lie_above_the_full_ones_and_fall_towards_them(name, method)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", COMPONENTS)
 def test_scipy_and_petsc_reduce_alike(name, method):
+    """Blocks of a Krylov sequence are nearly dependent: their span has more of the round-off."""
     ours, theirs = (reduced(name, method, kind, MANY) for kind in ("petsc", "scipy"))
-    assert_allclose(ours, theirs, rtol=1e-9)
+    assert_allclose(ours, theirs, rtol=1e-8 if method == "moments" else 1e-9)

@@ -164,7 +164,7 @@ def test_text_and_record_name_the_same_kind():
         (lambda: rom.Polynomial(True), "order = True"),
         (lambda: rom.FourierLegendre(0, 1), "harmonics = 0"),
         (lambda: rom.FourierLegendre(1, -1), "order = -1"),
-        (lambda: tie(surface("plane"), "polynomial"), "kind 'polynomial'; known kinds"),
+        (lambda: tie(surface("plane"), "polynomial"), "on 'plane' is open"),
         (lambda: tie(surface("plane"), "polynomial:x"), "known kinds"),
         (lambda: tie(surface("plane"), "fourier:2"), "known kinds"),
         (lambda: tie(surface("plane"), "polynomial:0"), "ball joint"),
