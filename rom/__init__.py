@@ -7,45 +7,16 @@ lives in ``rom.fe`` and is imported when it is first used.
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from rom.body.assembly import Assembly
-from rom.body.damping import ModalDamping, Rayleigh
-from rom.body.family import BodyFamily
-from rom.body.flexible import FlexibleBody
-from rom.checks import check
-from rom.errors import RomError
-from rom.io.export import export
-from rom.io.family import load, save
-from rom.io.vtu import write_stress, write_stress_history
-from rom.model import (
-    Attachment,
-    Basis,
-    FEModel,
-    Interface,
-    Layered,
-    Material,
-    Modes,
-    Orthotropic,
-    Region,
-    Report,
-    SurfaceMesh,
-)
-from rom.parameters import Density, Thickness, YoungsModulus
-from rom.parametric.reduce import reduce_parametric
-from rom.reduction.balanced import BalancedTruncation, second_order_balanced_truncation
-from rom.reduction.characteristic import Characteristic
-from rom.reduction.dual import DualAssembly, FreeSubstructure
-from rom.reduction.enhanced import EnhancedCraigBampton
-from rom.reduction.fixed_interface import craig_bampton
-from rom.reduction.free_interface import FreeFree, Herting, Rubin
-from rom.reduction.krylov import MomentMatching
-from rom.reduction.loads import WithLoads
-from rom.reduction.method import CraigBampton, Guyan
-from rom.reduction.polynomial import FourierLegendre, Polynomial
-from rom.reduction.snapshots import Snapshots
-from rom.report import write_report
-from rom.workflow import mass_properties, modes, reduce, substructure
-
 if TYPE_CHECKING:
+    from rom.body.assembly import Assembly
+    from rom.body.damping import ModalDamping, Rayleigh
+    from rom.body.family import BodyFamily
+    from rom.body.flexible import FlexibleBody
+    from rom.checks import check
+    from rom.errors import RomError
+    from rom.io.export import export
+    from rom.io.family import load, save
+    from rom.io.vtu import write_stress, write_stress_history
     from rom.mbs.audit import audit
     from rom.mbs.campbell import campbell
     from rom.mbs.checkpoint import load_state, save_state
@@ -54,6 +25,34 @@ if TYPE_CHECKING:
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.response import frequency_response, transmissibility
+    from rom.model import (
+        Attachment,
+        Basis,
+        FEModel,
+        Interface,
+        Layered,
+        Material,
+        Modes,
+        Orthotropic,
+        Region,
+        Report,
+        SurfaceMesh,
+    )
+    from rom.parameters import Density, Thickness, YoungsModulus
+    from rom.parametric.reduce import reduce_parametric
+    from rom.reduction.balanced import BalancedTruncation, second_order_balanced_truncation
+    from rom.reduction.characteristic import Characteristic
+    from rom.reduction.dual import DualAssembly, FreeSubstructure
+    from rom.reduction.enhanced import EnhancedCraigBampton
+    from rom.reduction.fixed_interface import craig_bampton
+    from rom.reduction.free_interface import FreeFree, Herting, Rubin
+    from rom.reduction.krylov import MomentMatching
+    from rom.reduction.loads import WithLoads
+    from rom.reduction.method import CraigBampton, Guyan
+    from rom.reduction.polynomial import FourierLegendre, Polynomial
+    from rom.reduction.snapshots import Snapshots
+    from rom.report import write_report
+    from rom.workflow import mass_properties, modes, reduce, substructure
 
 __version__ = "0.1.0"
 
@@ -118,25 +117,81 @@ __all__ = [
     "write_stress",
     "write_stress_history",
 ]
-PACKAGES = ("fe", "mbs", "view")
-LATER = {  # names whose modules load Numba
-    "Mechanism": "mechanism",
-    "audit": "audit",
-    "campbell": "campbell",
-    "equilibrium": "equilibrium",
-    "frequency_response": "response",
-    "linearize": "linearize",
-    "load_state": "checkpoint",
-    "save_state": "checkpoint",
-    "simulate": "integrate",
-    "transmissibility": "response",
+PACKAGES = (
+    "body", "components", "eigen", "errors", "fe", "io", "mbs", "model", "reduction", "rotation",
+    "units", "view",
+)  # fmt: skip
+MODULES = {  # imported when a name is first used: asking for help must not load SciPy
+    "Assembly": "body.assembly",
+    "Attachment": "model",
+    "BalancedTruncation": "reduction.balanced",
+    "Basis": "model",
+    "BodyFamily": "body.family",
+    "Characteristic": "reduction.characteristic",
+    "CraigBampton": "reduction.method",
+    "Density": "parameters",
+    "DualAssembly": "reduction.dual",
+    "EnhancedCraigBampton": "reduction.enhanced",
+    "FEModel": "model",
+    "FlexibleBody": "body.flexible",
+    "FourierLegendre": "reduction.polynomial",
+    "FreeFree": "reduction.free_interface",
+    "FreeSubstructure": "reduction.dual",
+    "Guyan": "reduction.method",
+    "Herting": "reduction.free_interface",
+    "Interface": "model",
+    "Layered": "model",
+    "Material": "model",
+    "Mechanism": "mbs.mechanism",
+    "ModalDamping": "body.damping",
+    "Modes": "model",
+    "MomentMatching": "reduction.krylov",
+    "Orthotropic": "model",
+    "Polynomial": "reduction.polynomial",
+    "Rayleigh": "body.damping",
+    "Region": "model",
+    "Report": "model",
+    "RomError": "errors",
+    "Rubin": "reduction.free_interface",
+    "Snapshots": "reduction.snapshots",
+    "SurfaceMesh": "model",
+    "Thickness": "parameters",
+    "WithLoads": "reduction.loads",
+    "YoungsModulus": "parameters",
+    "audit": "mbs.audit",
+    "campbell": "mbs.campbell",
+    "check": "checks",
+    "craig_bampton": "reduction.fixed_interface",
+    "equilibrium": "mbs.equilibrium",
+    "export": "io.export",
+    "frequency_response": "mbs.response",
+    "linearize": "mbs.linearize",
+    "load": "io.family",
+    "load_state": "mbs.checkpoint",
+    "mass_properties": "workflow",
+    "modes": "workflow",
+    "reduce": "workflow",
+    "reduce_parametric": "parametric.reduce",
+    "save": "io.family",
+    "save_state": "mbs.checkpoint",
+    "second_order_balanced_truncation": "reduction.balanced",
+    "simulate": "mbs.integrate",
+    "substructure": "workflow",
+    "transmissibility": "mbs.response",
+    "write_report": "report",
+    "write_stress": "io.vtu",
+    "write_stress_history": "io.vtu",
 }
 
 
 def __getattr__(name: str) -> Any:
-    """Import packages, and names whose modules load slowly, on first use."""
+    """Import packages, and the modules of public names, on first use."""
     if name in PACKAGES:
         return importlib.import_module(f"rom.{name}")
-    if name in LATER:
-        return getattr(importlib.import_module(f"rom.mbs.{LATER[name]}"), name)
+    if name in MODULES:
+        return getattr(importlib.import_module(f"rom.{MODULES[name]}"), name)
     raise AttributeError(f"module 'rom' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *PACKAGES})

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mbs_cases import random_body, simeon_crank, simulate_quietly, slider_crank
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from rom.errors import ConfigError, FileFormatError, QualityGateError
@@ -85,7 +85,8 @@ def test_another_step_or_method_forgets_the_factorisation():
     bare = replace(state, memory=None)
     for options in ({"dt": 5e-3}, {"dt": 1e-2, "rho_inf": 0.5}):
         one, other = (simulate_quietly(mech, t_end=0.2, state=s, **options) for s in (state, bare))
-        assert_array_equal(one.q, other.q)
+        # times are counted from the first step where one is remembered: equal to round-off
+        assert_allclose(one.q, other.q, rtol=0, atol=1e-13)
         assert one.statistics["factorisations"] == other.statistics["factorisations"] >= 1
 
 
