@@ -224,5 +224,27 @@ def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
     return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
 
 
+def residual_errors(
+    ops: Operators, inverse: Held, X: Array, *, seen_in: Operators | None = None
+) -> Array:
+    """(k,) frequency errors r^T K^-1 r / (2 x^T K x) of modes of a basis, r = K x - lambda M x.
+
+    Asymptotically exact, not a bound.
+
+    Args:
+        ops: operators of the model the shapes belong to.
+        inverse: stiffness, factored, of the dofs on which the basis leaves a residual.
+        X: (n_local, k) shapes.
+        seen_in: other coordinates of the same model, in which equilibrium is asked for and those
+            of ``inverse``.
+    """
+    KX, MX = ops.apply_K(X), ops.apply_M(X)
+    energy = np.diag(ops.gram(X, KX))
+    rest = KX - MX * (energy / np.diag(ops.gram(X, MX)))
+    if seen_in is not None:
+        ops, rest = seen_in, seen_in.restrict(rest)
+    return np.diag(ops.gram(rest, inverse(rest))) / (2 * energy)
+
+
 def _squares(ops: Operators, Phi: Array) -> Array:
     return np.diag(ops.gram(Phi, ops.apply_M(Phi)))

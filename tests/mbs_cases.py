@@ -343,3 +343,15 @@ def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
         atol=1e-11,
     ).y
     return y.T.reshape(-1, 2, n, 3)[:, 0]
+
+
+def rotor(speed, *, across=0.3, along=0.5, kx=300.0, ky=500.0):
+    """A disc on a ball joint, turning about z, two springs against its tilt."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    marks = {"c": (0, 0, 0), "tip": (0, 0, 1)}
+    disc = mech.add_rigid("disc", mass=4.0, inertia=(across, across, along), at=(0, 0, 0),
+                          omega=(0, 0, speed), markers=marks)  # fmt: skip
+    mech.spherical("ball", mech.ground.marker((0, 0, 0)), disc.marker("c"))
+    for name, k, far in (("x", kx, (3, 0, 1)), ("y", ky, (0, 3, 1))):
+        mech.spring_damper(name, mech.ground.marker(far), disc.marker("tip"), stiffness=k)
+    return mech

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beam import stiffened_beam
-from mbs_cases import random_body
+from mbs_cases import random_body, rotor
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 from test_mbs_spin import HUB_INERTIA, MASS, REST, SPRING, dumbbell
@@ -194,22 +194,10 @@ def test_a_turning_beam_on_a_hub_as_long_as_itself(eta, exact):
     assert_allclose(flap[:2], exact, rtol=5e-6)
 
 
-def rotor(speed, *, across=0.3, along=0.5, kx=400.0, ky=400.0):
-    """A disc on a ball joint, turning about z, two springs against its tilt."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    marks = {"c": (0, 0, 0), "tip": (0, 0, 1)}
-    disc = mech.add_rigid("disc", mass=4.0, inertia=(across, across, along), at=(0, 0, 0),
-                          omega=(0, 0, speed), markers=marks)  # fmt: skip
-    mech.spherical("ball", mech.ground.marker((0, 0, 0)), disc.marker("c"))
-    for name, k, far in (("x", kx, (3, 0, 1)), ("y", ky, (0, 3, 1))):
-        mech.spring_damper(name, mech.ground.marker(far), disc.marker("tip"), stiffness=k)
-    return mech
-
-
 @pytest.mark.parametrize("speed", [0.0, 20.0, 300.0])
 def test_a_disc_that_spins_splits_its_tilt_into_forward_and_backward_whirl(speed):
     """omega = sqrt(k / A + (C W / 2 A)^2) +- C W / 2 A in the axes of the bearing."""
-    found = linearize(rotor(speed), frame="world")
+    found = linearize(rotor(speed, kx=400.0, ky=400.0), frame="world")
     half, mean = 0.5 * 0.5 * speed / 0.3, np.sqrt(400.0 / 0.3 + (0.5 * 0.5 * speed / 0.3) ** 2)
     exact = [0.0, mean - half, mean + half]
     assert_allclose(2 * np.pi * found.frequencies, exact, rtol=2e-6)
@@ -236,10 +224,10 @@ def test_unequal_bearings():
 def test_coefficients_that_change_with_time_are_noticed():
     """The same disc in its own axes, where the unequal springs go round."""
     with pytest.warns(RomWarning, match="change with time"):
-        linearize(rotor(20.0, kx=300.0, ky=500.0))
+        linearize(rotor(20.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        linearize(rotor(20.0, kx=300.0, ky=500.0), frame="world")
+        linearize(rotor(20.0), frame="world")
         linearize(turning_beam(5, Z, hub=1.0))
 
 
@@ -323,7 +311,7 @@ def test_states_that_do_not_fit_are_named():
 
 def test_a_state_of_a_run_is_good_enough():
     """A free top in the middle of its motion; the spin of a free body has no stiffness."""
-    mech = rotor(20.0)
+    mech = rotor(20.0, kx=400.0, ky=400.0)
     sol = rom.simulate(mech, t_end=0.05, dt=1e-3)
     found = rom.linearize(mech, sol.final, frame="world")
     assert_allclose(found.frequencies, rom.linearize(mech, frame="world").frequencies, rtol=1e-6)

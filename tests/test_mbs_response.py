@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mbs_cases import rotor
 from numpy.testing import assert_allclose
 
 import rom
@@ -103,18 +104,6 @@ def test_infinite_responses_and_wrong_arguments_are_named():
     shaken.fixed("bolt", shaken.ground.marker((0, 0, 0)), table.marker("c"))
     with pytest.warns(RomWarning), pytest.raises(ModelError, match="do not let this drive move"):
         rom.transmissibility(shaken, None, [1.0], drive="shaker", motion=center(shaken, 1))
-
-
-def rotor(speed, *, across=0.3, along=0.5, kx=300.0, ky=500.0):
-    """A disc on a ball joint, turning about z, two springs against its tilt."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    marks = {"c": (0, 0, 0), "tip": (0, 0, 1)}
-    disc = mech.add_rigid("disc", mass=4.0, inertia=(across, across, along), at=(0, 0, 0),
-                          omega=(0, 0, speed), markers=marks)  # fmt: skip
-    mech.spherical("ball", mech.ground.marker((0, 0, 0)), disc.marker("c"))
-    for name, k, far in (("x", kx, (3, 0, 1)), ("y", ky, (0, 3, 1))):
-        mech.spring_damper(name, mech.ground.marker(far), disc.marker("tip"), stiffness=k)
-    return mech
 
 
 def test_campbell_diagram_of_a_rotor_with_its_critical_speeds():

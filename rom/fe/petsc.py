@@ -16,8 +16,10 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
-from rom.eigen import Weighted, count_shift, orthonormal
-from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
+from rom.eigen import Weighted, orthonormal
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.fe.aij import aij, symmetrized, weighted
+from rom.fe.counting import verify_count
 from rom.fe.factor import Factor, dense_rows
 from rom.fe.held import ZERO, HeldPETSc
 from rom.fe.iterative import ConjugateGradients, davidson, multigrid, refined
@@ -117,10 +119,16 @@ class PETScOperators:
         """The body with all dofs held but these: numbers on this rank."""
         dofs = self.first + rows
         some = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=self.comm)
-        if self.n % 3 == 0 and whole_nodes(self, dofs):
+        if self.n % 3 == 0 and self._whole_nodes(dofs):
             some.setBlockSize(3)  # multigrid then aggregates nodes
         K, M = (A.createSubMatrix(some, some) for A in (self.K, self.M))
         return PETScOperators(K, M, fixed=self.fixed[rows], solver=self.solver)
+
+    def _whole_nodes(self, dofs: Index) -> bool:
+        """True when, on every rank, the dofs are all three of their nodes."""
+        mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
+        mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
+        return bool(self.comm.allreduce(mine, op=MPI.LAND))
 
     def transform(self, T: Any, rigid: Array) -> "PETScOperators":
         """The same body in the coordinates a of u = T a."""
@@ -146,9 +154,8 @@ class PETScOperators:
         """The same body with the mass M + dM."""
         sizes = ((self.n_local, self.n), (self.n_local, self.n))
         M = self.M.copy()
-        M.axpy(1.0, _aij(csr_matrix(dM), sizes, self.comm))
-        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": self.solver}
-        return PETScOperators(self.K, M, self.rigid, **fields)
+        M.axpy(1.0, aij(csr_matrix(dM), sizes, self.comm))
+        return self._like(self.K, M, self.rigid)
 
     def product(self, A: PETSc.Mat, X: Array) -> Array:
         """A X."""
@@ -158,14 +165,19 @@ class PETScOperators:
         self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
     ) -> "PETScOperators":
         """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
-        K, M = _weighted(self.K, *stiffness), _weighted(self.M, *mass)
-        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": self.solver}
-        return PETScOperators(K, M, self.rigid if rigid is None else rigid, **fields)
+        K, M = weighted(self.K, *stiffness), weighted(self.M, *mass)
+        return self._like(K, M, self.rigid if rigid is None else rigid)
 
     def solved_by(self, solver: Solver) -> "PETScOperators":
         """The same body, its equations solved another way."""
-        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent, "solver": solver}
-        return PETScOperators(self.K, self.M, self.rigid, **fields)
+        return self._like(self.K, self.M, self.rigid, solver)
+
+    def _like(
+        self, K: PETSc.Mat, M: PETSc.Mat, rigid: Array | None, solver: Solver | None = None
+    ) -> "PETScOperators":
+        """Other matrices in the same coordinates."""
+        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
+        return PETScOperators(K, M, rigid, **fields, solver=solver or self.solver)
 
     def modes(
         self,
@@ -205,7 +217,7 @@ class PETScOperators:
             lam, Phi = self.lowest(m + SPARE, 0.0, held.factor, none, in_blocks=in_blocks)
             if finished and not in_blocks:  # SLEPc has taken the factor's matrix for its own
                 held.release()
-            self.verify_count(lam, m, 0, held.factor if finished else None)
+            verify_count(self, lam, m, 0, held.factor if finished else None)
             if finished and in_blocks:
                 held.release()
         return lam[:m], settled(self, lam, Phi)[:, :m]
@@ -228,11 +240,11 @@ class PETScOperators:
             lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
         else:
             sigma = -SHIFT * self.first_elastic(R) if sigma is None else sigma
-            inverse = self.inverse(self._shifted(sigma), self.rigid)
+            inverse = self.inverse(self.shifted(sigma), self.rigid)
             lam, Phi = self.lowest(m + SPARE, sigma, inverse, R)
             inverse.release()  # counting needs its memory
             self._refuse_mechanisms(lam, n_rigid)
-            self.verify_count(lam, m, n_rigid)
+            verify_count(self, lam, m, n_rigid)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
     def _refuse_mechanisms(self, lam: Array, n_rigid: int) -> None:
@@ -277,16 +289,12 @@ class PETScOperators:
                 "answers at a frequency above zero need a factor.",
                 hint='Use solver="direct" or "out-of-core", or frequencies=(0.0,).',
             )
-        factor = Factor(self._shifted(shift), definite=False, solver=DIRECT)
+        factor = Factor(self.shifted(shift), definite=False, solver=DIRECT)
         if not factor.ok:
             raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
         return factor
 
-    def _factor(self, sigma: float, *, definite: bool) -> Factor:
-        """K - sigma M, factored."""
-        return Factor(self._shifted(sigma), definite=definite, solver=self.solver)
-
-    def _shifted(self, sigma: float) -> PETSc.Mat:
+    def shifted(self, sigma: float) -> PETSc.Mat:
         """K - sigma M."""
         A = self.K.copy()
         A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
@@ -303,47 +311,6 @@ class PETScOperators:
         space = BlockLanczos(self, factor, sigma, deflated, k, min(SPARE, k - 1))
         space.solve()
         return space.pairs()
-
-    def verify_count(self, lam: Array, m: int, n_rigid: int, spent: Inverse | None = None) -> None:
-        """Compare the number of modes found with the inertia of K - sigma M (Sylvester).
-
-        Without a factor there is nothing to count; `davidson` searches for missed ones instead.
-        A factor of K that nobody needs any more gives its place.
-        """
-        if self.solver.iterative:
-            return
-        found, sigma = count_shift(lam, m)
-        count = self._count_below(sigma, spent) - n_rigid
-        if count != found:
-            raise ModesMissedError(
-                f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
-                f"but the inertia of K - sigma M counts {count}.",
-                hint="Ask for more modes, or give another shift sigma.",
-            )
-
-    def _count_below(self, sigma: float, spent: Inverse | None) -> int:
-        """Number of eigenvalues below sigma."""
-        A = self._shifted(sigma)
-        if isinstance(spent, Factor) and spent.A == self.K and _size(A) == _size(self.K):
-            return self._counted_in_place(A, spent)
-        if spent is not None:
-            spent.release()
-        factor = Factor(A, definite=False, solver=self.solver)
-        count = factor.negative_pivots()
-        factor.release()
-        A.destroy()
-        return count
-
-    def _counted_in_place(self, A: PETSc.Mat, factor: Factor) -> int:
-        """The values of A, whose pattern is that of K, go through the analysis of its factor."""
-        same, K = PETSc.Mat.Structure.SAME_NONZERO_PATTERN, self.K.copy()
-        A.copy(self.K, structure=same)
-        A.destroy()
-        factor.compute(definite=False)
-        count = factor.negative_pivots()
-        K.copy(self.K, structure=same)
-        K.destroy()
-        return count
 
     def all_modes(self) -> tuple[Array, Array]:
         """All eigenpairs of a small model, solved densely on every rank."""
@@ -366,7 +333,7 @@ class PETScOperators:
     def _by_inverse_iteration(self) -> float:
         """Smallest eigenvalue that is not zero, estimated without geometry."""
         floor = ZERO * self.largest()
-        factor = self._factor(-1e-6 * self.largest(), definite=True)
+        factor = Factor(self.shifted(-1e-6 * self.largest()), definite=True, solver=self.solver)
         X = self.fixed[:, None] ** np.arange(1.0, 9.0)
         for _ in range(4):
             X = factor.solve(self.apply_M(X))
@@ -391,7 +358,7 @@ class TiedOperators(PETScOperators):
         self.parent, self.rigid, self.comm, self.solver = parent, rigid, parent.comm, parent.solver
         self.affordable = parent.affordable
         sizes = ((parent.n_local, parent.n), (rigid.shape[0], T.shape[1]))
-        self.T = _aij(T, sizes, self.comm)
+        self.T = aij(T, sizes, self.comm)
         self.n = T.shape[1]
         self.first, end = self.T.getOwnershipRangeColumn()
         self.n_local, self.last = end - self.first, parent.last
@@ -444,48 +411,6 @@ class TiedOperators(PETScOperators):
         return self._projected(self.parent.M)
 
     def _projected(self, A: PETSc.Mat) -> PETSc.Mat:
-        projected = _symmetric(A.ptap(self.T))
+        projected = symmetrized(A.ptap(self.T))
         give_back()
         return projected
-
-
-def _size(A: PETSc.Mat) -> float:
-    """Number of entries on all ranks."""
-    return float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
-
-
-def whole_nodes(ops: PETScOperators, dofs: Index) -> bool:
-    """True when, on every rank, the dofs are all three of their nodes."""
-    mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
-    mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
-    return bool(ops.comm.allreduce(mine, op=MPI.LAND))
-
-
-def _symmetric(A: PETSc.Mat) -> PETSc.Mat:
-    """(A + A^T) / 2: sums over thousands of rows differ in their last digits.
-
-    The pattern of T^T K T is symmetric; saying so saves most of the time of the sum.
-    """
-    B = PETSc.Mat()
-    A.transpose(B)
-    A.axpy(1.0, B, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-    A.scale(0.5)
-    B.destroy()
-    return A
-
-
-def _weighted(A: PETSc.Mat, weight: float, parts: list[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
-    """Weight A + sum of the weighted parts; entries that are zero may be missing from A."""
-    B = A.copy()
-    B.scale(weight)
-    for c, part in parts:
-        B.axpy(c, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-    return B
-
-
-def _aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
-    index = PETSc.IntType
-    csr = (A.indptr.astype(index), A.indices.astype(index), A.data)
-    matrix = PETSc.Mat().createAIJ(size=sizes, csr=csr, comm=comm)
-    matrix.assemble()
-    return matrix

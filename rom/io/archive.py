@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib import format as npy
 
-from rom.errors import FileFormatError, UnsafeFileError
+from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import write_whole
 from rom.model import Array
 
@@ -31,13 +31,25 @@ class Kind(NamedTuple):
     needed: tuple[str, ...]
 
 
-def write_archive(path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array]) -> Path:
+def write_archive(
+    path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array], what: str
+) -> Path:
     """Write a file, whole or not at all; the same content gives the same bytes.
+
+    Args:
+        path: file name.
+        manifest: what a reader needs to know about the arrays.
+        arrays: {name: numbers}.
+        what: whose arrays they are, for messages.
 
     Raises:
         ConfigError: if the folder is missing or not writable.
+        QualityGateError: if an array holds a number that is not finite.
         ResourceError: if the disk is full.
     """
+    for name, A in arrays.items():
+        if not np.isfinite(A).all():
+            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
     manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 

@@ -13,7 +13,7 @@ from rom.body.inertia import InertiaIntegrals
 from rom.body.stretch import Stretch
 from rom.errors import FileFormatError
 from rom.io import native
-from rom.io.archive import LIMIT, Kind
+from rom.io.archive import LIMIT, Kind, write_archive
 from rom.model import Array, Report, Row
 from rom.parameters import read, written
 
@@ -57,7 +57,7 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
         "provenance": body.provenance,
         "certificate": None if body.certificate is None else asdict(body.certificate),
     }
-    return native.write_finite(path, manifest, arrays, f"family {body.body.name!r}")
+    return write_archive(path, manifest, arrays, f"family {body.body.name!r}")
 
 
 def load(path: str | Path, *, limit: int = LIMIT) -> Any:

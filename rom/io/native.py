@@ -37,17 +37,7 @@ def save(body: FlexibleBody, path: str | Path) -> Path:
         QualityGateError: if an array holds a number that is not finite.
         ResourceError: if the disk is full.
     """
-    return write_finite(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
-
-
-def write_finite(
-    path: str | Path, manifest: dict[str, Any], arrays: dict[str, Array], what: str
-) -> Path:
-    """Write a manifest and arrays of finite numbers; see `save` for what is raised."""
-    for name, A in arrays.items():
-        if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
-    return write_archive(path, manifest, arrays)
+    return write_archive(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
 
 
 def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:

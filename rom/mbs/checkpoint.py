@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from rom.errors import ConfigError, FileFormatError, QualityGateError
+from rom.errors import ConfigError, FileFormatError
 from rom.io.archive import LIMIT, Kind, read_archive, write_archive
 from rom.mbs.state import Memory, State
 from rom.model import Array
@@ -34,9 +32,6 @@ def save_state(state: State, path: str | Path) -> Path:
     arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED}
     given = {name: getattr(state, name) for name in OPTIONAL}
     arrays |= {name: A for name, A in given.items() if A is not None}
-    for name, A in arrays.items():
-        if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} of the state is not finite; nothing was written.")
     manifest = {"schema": SCHEMA, "version": list(VERSION), "t": float(state.t).hex()}
     manifest["rank"] = int(state.rank)
     if state.memory is not None:
@@ -44,7 +39,7 @@ def save_state(state: State, path: str | Path) -> Path:
         arrays |= {MEMORY + name: A for name, A in m.arrays.items()}
         steps = {"h": float(m.h).hex(), "origin": float(m.origin).hex(), "taken": m.taken}
         manifest["memory"] = {"method": m.method, **steps}
-    return write_archive(path, manifest, dict(sorted(arrays.items())))
+    return write_archive(path, manifest, dict(sorted(arrays.items())), "the state")
 
 
 def load_state(path: str | Path, *, limit: int = LIMIT) -> State:

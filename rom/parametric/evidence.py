@@ -11,12 +11,12 @@ from rom.body.projection import elastic_part
 from rom.certificate import (
     N_COMPARED,
     compared,
-    estimates,
     frequency_rows,
     reduced_shapes,
     rigid_rows,
     row,
 )
+from rom.eigen import residual_errors
 from rom.model import Basis, Report, Row
 from rom.parameters import scattered
 from rom.parametric.affine import AffineModel
@@ -39,7 +39,7 @@ def estimated(connection: Connection, basis: Basis) -> float:
         n = min(N_COMPARED, basis.Psi.shape[1] - held - n_rigid)
         if n > 0:
             shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)[:, n_rigid:]
-            worst = max(worst, float(estimates(ops, inner, shapes).max()))
+            worst = max(worst, float(residual_errors(ops, inner, shapes).max()))
     return worst
 
 

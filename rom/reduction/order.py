@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.eigen import Held, Operators
+from rom.eigen import Held, Operators, residual_errors
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, FEModel
 from rom.reduction.enhanced import projected
@@ -81,23 +81,8 @@ def _error_in_band(ops: Operators, full: Operators) -> Callable[[Array, float], 
         if not inverse:  # one factor serves all orders
             inverse.append(full.hold(np.zeros(0, dtype=np.int64), -SHIFT * lam[0]))
         near = int(np.searchsorted(lam, (REACH * omega_max) ** 2))
-        eta = residual_errors(ops, full, inverse[0], Psi @ V[:, :near])
+        eta = residual_errors(ops, inverse[0], Psi @ V[:, :near], seen_in=full)
         inside = lam[:near] <= (1 + 4 * eta) * omega_max**2  # the exact one may be
         return SAFETY * float(eta[inside].max(initial=0.0))
 
     return error
-
-
-def residual_errors(ops: Operators, full: Operators, inverse: Held, X: Array) -> Array:
-    """(k,) frequency errors r^T K^-1 r / (2 x^T K x), r = K x - lambda M x; asymptotically exact.
-
-    Args:
-        ops: operators in nodal dofs.
-        full: the coordinates in which equilibrium is asked for.
-        inverse: their stiffness, factored.
-        X: (n_local, k) modes of a basis, in nodal dofs.
-    """
-    KX, MX = ops.apply_K(X), ops.apply_M(X)
-    energy = np.diag(ops.gram(X, KX))
-    rest = full.restrict(KX - MX * (energy / np.diag(ops.gram(X, MX))))
-    return np.diag(full.gram(rest, inverse(rest))) / (2 * energy)
