@@ -43,10 +43,11 @@ class BlockLanczos:
         self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
         self.tolerance = np.repeat([TOLERANCE, ROUGH], [k - spare, spare])
         self.n_deflated = deflated.shape[1]
-        self.V = np.empty((ops.n_local, self.n_deflated + capacity(k)), order="F")
+        shape = (ops.n_local, self.n_deflated + capacity(k))
+        self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
         self.size = 0
         self.T = np.zeros((0, 0))
-        self._append(deflated, deflated)
+        self._append(deflated, ops.apply_M(deflated))
         phases = np.arange(1.0, BLOCK + 1.0)
         start = np.cos(np.outer(ops.fixed, phases) + phases)  # depends on the place only
         self._append(*self._orthonormal(start)[:2])
@@ -70,18 +71,17 @@ class BlockLanczos:
     def pairs(self) -> tuple[Array, Array]:
         """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""
         theta, S = self._ritz(self.k)
-        Phi = self.V[:, self.n_deflated : self.size - BLOCK] @ S
-        Phi /= np.sqrt(np.diag(self.ops.gram(Phi, self.ops.apply_M(Phi))))
-        return self.sigma + 1.0 / theta, Phi
+        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - BLOCK] @ S
 
     def _append(self, X: Array, MX: Array) -> None:
-        self.V[:, self.size : self.size + X.shape[1]] = X
-        self.load = MX  # of the next solution
-        self.size += X.shape[1]
+        new = slice(self.size, self.size + X.shape[1])
+        self.V[:, new], self.MV[:, new] = X, MX
+        self.size = new.stop
 
     def _grow(self) -> Array:
         """One more block; returns its (p, p) coupling to the block before."""
-        W, MW, H, R = self._orthonormal(self.factor.solve(self.load))
+        load = self.MV[:, self.size - BLOCK : self.size]
+        W, MW, H, R = self._orthonormal(self.factor.solve(load))
         k, H = self.T.shape[0], H[self.n_deflated :]
         self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
         self._append(W, MW)
@@ -93,10 +93,10 @@ class BlockLanczos:
         When the space holds W already, round-off is left, orthogonal to it after the second pass:
         a random block with which the search goes on.
         """
-        V = self.V[:, : self.size]  # M V is not kept: it would take as much memory again
+        V, MV = self.V[:, : self.size], self.MV[:, : self.size]
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         for _ in range(2):
-            G = self.ops.gram(V, self.ops.apply_M(W))
+            G = self.ops.gram(MV, W)
             W = W - V @ G
             H += G
         MW = self.ops.apply_M(W)
@@ -112,9 +112,10 @@ class BlockLanczos:
         kept = self.k + BLOCK
         theta, S = self._ritz(kept)
         ends = self.n_deflated + np.array([0, kept, kept + BLOCK])
-        last = self.V[:, self.size - BLOCK : self.size].copy()
-        self.V[:, ends[0] : ends[1]] = self.V[:, ends[0] : self.size - BLOCK] @ S
-        self.V[:, ends[1] : ends[2]] = last
+        for V in (self.V, self.MV):
+            last = V[:, self.size - BLOCK : self.size].copy()
+            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - BLOCK] @ S
+            V[:, ends[1] : ends[2]] = last
         self.size, self.T = ends[2], np.diag(theta)
 
     def _converged(self, R: Array) -> bool:
