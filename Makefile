@@ -3,6 +3,8 @@
 # make test    style, types, all tests, then those of the light half without FEniCSx
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
+# test files that run side by side
+WORKERS = 2
 # its own cache: two versions of Numba would compile over each other's code
 LIGHT = NUMBA_CACHE_DIR=$(CURDIR)/.venv-light/numba .venv-light/bin/python
 
@@ -17,8 +19,8 @@ test: setup
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
-	$(PYTHON) -m pytest
-	$(LIGHT) -m pytest -m "not fenicsx" -p no:cacheprovider
+	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
+	$(LIGHT) -m pytest -m "not fenicsx" -p no:cacheprovider -n $(WORKERS) --dist loadfile
 
 clean:
 	rm -rf out .pytest_cache .ruff_cache .mypy_cache .hypothesis
