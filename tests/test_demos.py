@@ -23,6 +23,7 @@ LEFT_BEHIND = {
     "demo_parameters": {"parameters.png"},
     "demo_reference_conditions": {"reference_conditions.png"},
     "demo_rockfall": {"rockfall.png"},
+    "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
     "demo_updating": {"updating.png"},
     "demo_sheet": {"sheet.png", "taylor_bar.gif"},
     "demo_slider_crank": {

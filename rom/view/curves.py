@@ -14,6 +14,7 @@ WIDTH, PANEL = 1400, 330  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 MARKERS = ("o", "s", "^", "D", "v", "x")
 GREY = "#5c636e"
+ACROSS = 5  # names in a row of a wide legend
 FEW = 10  # sizes that have room for a tick each
 EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 
@@ -186,7 +187,10 @@ def campbell(
         for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
             axes.set_ylabel(label, size=page.BODY)
             axes.set_xlim(turns[0], turns[-1])
-            finish(axes, legend=True)
+            finish(axes, legend=False)
+        areas[0].legend(
+            fontsize=page.SMALL, framealpha=0.9, edgecolor="none", loc="upper left", ncol=ACROSS
+        )
         for axes in areas[:-1]:
             axes.set_xticklabels([])
         areas[-1].set_xlabel("speed [1/min]", size=page.BODY)
@@ -195,7 +199,8 @@ def campbell(
 
 def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
     """Rays of the orders, each named where it leaves the picture, and rings where modes meet."""
-    top = 1.12 * diagram.frequencies.max()
+    rows = -(-(diagram.frequencies.shape[1] + 1) // ACROSS)  # of the legend, above all modes
+    top = (1.06 + 0.1 * rows) * diagram.frequencies.max()
     axes.set_ylim(0.0, top)
     for k, order in enumerate(orders):
         end = min(turns[-1], 60 * top / order)
