@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from rom.body.family import BodyFamily
     from rom.body.flexible import FlexibleBody
     from rom.checks import check
+    from rom.cyclic.modes import CyclicModes, cyclic_modes
+    from rom.cyclic.sector import CyclicSector
     from rom.errors import RomError
     from rom.io.export import export
     from rom.io.family import load, save
@@ -64,6 +66,8 @@ __all__ = [
     "BodyFamily",
     "Characteristic",
     "CraigBampton",
+    "CyclicModes",
+    "CyclicSector",
     "Density",
     "DualAssembly",
     "EnhancedCraigBampton",
@@ -97,6 +101,7 @@ __all__ = [
     "campbell",
     "check",
     "craig_bampton",
+    "cyclic_modes",
     "equilibrium",
     "export",
     "frequency_response",
@@ -118,8 +123,8 @@ __all__ = [
     "write_stress_history",
 ]
 PACKAGES = (
-    "body", "components", "eigen", "errors", "fe", "io", "mbs", "model", "reduction", "rotation",
-    "units", "view",
+    "body", "components", "cyclic", "eigen", "errors", "fe", "io", "mbs", "model", "reduction",
+    "rotation", "units", "view",
 )  # fmt: skip
 MODULES = {  # imported when a name is first used: asking for help must not load SciPy
     "Assembly": "body.assembly",
@@ -129,6 +134,8 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "BodyFamily": "body.family",
     "Characteristic": "reduction.characteristic",
     "CraigBampton": "reduction.method",
+    "CyclicModes": "cyclic.modes",
+    "CyclicSector": "cyclic.sector",
     "Density": "parameters",
     "DualAssembly": "reduction.dual",
     "EnhancedCraigBampton": "reduction.enhanced",
@@ -162,6 +169,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "campbell": "mbs.campbell",
     "check": "checks",
     "craig_bampton": "reduction.fixed_interface",
+    "cyclic_modes": "cyclic.modes",
     "equilibrium": "mbs.equilibrium",
     "export": "io.export",
     "frequency_response": "mbs.response",

@@ -11,8 +11,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
-LIGHT = {"attachment", "body", "eigen", "errors", "io", "mbs", "model", "parameters", "reduction",
-         "rotation", "scipy_operators", "units"}  # fmt: skip
+LIGHT = {"attachment", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parameters",
+         "reduction", "rotation", "scipy_operators", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor", "peers"}  # they stand in front
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "errors": set(),
@@ -24,6 +24,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "scipy_operators": {"model", "eigen", "errors"},
     "reduction": {"model", "eigen", "scipy_operators", "errors"},
     "parameters": {"model", "errors"},
+    "cyclic": {"model", "eigen", "scipy_operators", "attachment", "reduction", "errors"},
     "body": {"model", "eigen", "rotation", "attachment", "parameters", "errors"},
     "mbs": {"model", "rotation", "io", "errors"},
     "io": {"model", "units", "body", "parameters", "errors"},

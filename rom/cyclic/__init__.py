@@ -1,0 +1,1 @@
+"""Wheels of equal sectors: bladed disks from the matrices of one sector."""

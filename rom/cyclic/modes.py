@@ -1,0 +1,154 @@
+"""Modes of a wheel by nodal diameters, from a real system of twice the size of a sector."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import bmat, csr_matrix
+
+from rom.cyclic.sector import Complex, CyclicSector
+from rom.errors import ConfigError
+from rom.model import Array
+from rom.scipy_operators import SciPyOperators
+
+SPARE = 2  # modes beyond those asked for, so that no pair is cut
+
+
+@dataclass(frozen=True)
+class CyclicModes:
+    """Modes of a wheel with the same number of nodal diameters.
+
+    Each stands for two modes of the wheel, its real and imaginary part, which one can add up to a
+    wave that travels either way; with 0 and N / 2 diameters for one.
+
+    Attributes:
+        sector: the sector.
+        diameter: number of nodal diameters.
+        omega: (m,) circular frequencies [rad/s]; rigid motions are exactly zero.
+        shapes: (n, m) complex displacements of sector 0, mass-normalised.
+    """
+
+    sector: CyclicSector
+    diameter: int
+    omega: Array
+    shapes: Complex
+
+    @property
+    def frequencies(self) -> Array:
+        """(m,) natural frequencies [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def multiplicity(self) -> int:
+        """How often the wheel has each frequency: 1 or 2."""
+        return 1 if self.sector.standing(self.diameter) else 2
+
+    def on_wheel(self, phase: float = 0.0) -> Array:
+        """(N, n, m) real shapes on all sectors, see `CyclicSector.on_wheel`."""
+        return self.sector.on_wheel(self.shapes, self.diameter, phase)
+
+
+def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 0.0) -> CyclicModes:
+    """Lowest modes of a wheel with a number of nodal diameters.
+
+    The wave u = a + i b of a real sector obeys a real symmetric system of twice its size, whose
+    frequencies come in pairs; none is lost, as the inertia count of that system shows.
+
+    Args:
+        sector: one sector.
+        diameter: number of nodal diameters, 0 to N / 2.
+        n: number of modes.
+        speed: angular speed [rad/s]; stiffens and softens the wheel, Coriolis forces left out, see
+            `travelling_modes`.
+
+    Raises:
+        ConfigError: if the wheel cannot have the diameters or the modes, or has no matrices of
+            rotation.
+        ModelError: if rotation leaves no stiffness.
+        ModesMissedError: if the inertia count says that a mode was skipped.
+
+    Source:
+        Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).
+    """
+    if isinstance(n, bool) or int(n) != n or not 1 <= n <= sector.free.size:
+        raise ConfigError(f"n = {n!r}: one can ask for 1 to {sector.free.size} modes.")
+    T = sector.harmonic(sector.checked(diameter))
+    K = sector.K if speed == 0.0 else spinning(sector, speed)
+    R = sector.rigid(diameter) if speed == 0.0 else np.zeros((sector.n, 0), dtype=complex)
+    R, held = R[sector.free], sector.held.size > 0
+    if sector.standing(diameter):
+        omega, real = _real(T.T @ K @ T, T.T @ sector.M @ T, _span(R), n, held=held)
+        return CyclicModes(sector, diameter, omega, (T @ real).astype(complex))
+    parts = real_form(T)
+    K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
+    rigid = np.hstack([_stacked(R), _stacked(1j * R)])
+    omega, pairs = _real(K_2, M_2, rigid, 2 * (n + SPARE), held=held)
+    omega, shapes = _waves(T, K, sector.M, omega, pairs, n)
+    return CyclicModes(sector, diameter, omega, T @ shapes)
+
+
+def spinning(sector: CyclicSector, speed: float) -> csr_matrix:
+    """(n, n) stiffness at an angular speed [rad/s].
+
+    Raises:
+        ConfigError: if the sector has no matrices of rotation.
+    """
+    if sector.centrifugal is None:
+        raise ConfigError(
+            "the sector has no matrices of rotation.", hint="Make it with rom.rotating_sector."
+        )
+    return sector.K + speed**2 * sector.centrifugal
+
+
+def real_form(T: csr_matrix) -> csr_matrix:
+    """[[A, -B], [B, A]] of A + i B."""
+    return csr_matrix(bmat([[T.real, -T.imag], [T.imag, T.real]]))
+
+
+def _twice(A: csr_matrix) -> csr_matrix:
+    return csr_matrix(bmat([[A, None], [None, A]]))
+
+
+def _stacked(Z: Complex) -> Array:
+    return np.vstack([Z.real, Z.imag])
+
+
+def _span(R: Complex) -> Array:
+    """Real independent columns with the span of the real and imaginary parts."""
+    U, s, _ = np.linalg.svd(np.hstack([R.real, R.imag]), full_matrices=False)
+    return U[:, s > 1e-9 * s.max(initial=0.0)] if s.size else R.real
+
+
+def _real(K: csr_matrix, M: csr_matrix, rigid: Array, m: int, *, held: bool) -> tuple[Array, Array]:
+    """Lowest modes of a real symmetric system, held or with known motions without stiffness."""
+    K, M = (0.5 * (A + A.T) for A in (K, M))
+    m = min(m, K.shape[0])
+    ops = SciPyOperators(K, M, rigid)
+    return ops.modes(ops.hold([]) if held else [], m)
+
+
+def _waves(
+    T: csr_matrix, K: csr_matrix, M: csr_matrix, omega: Array, pairs: Array, n: int
+) -> tuple[Array, Complex]:
+    """The n lowest complex shapes: of a pair, one is i times the other."""
+    half = pairs.shape[0] // 2
+    Z = pairs[:half] + 1j * pairs[half:]
+    n_rigid = np.count_nonzero(omega == 0.0)
+    rigid, elastic = _basis(T, M, Z[:, :n_rigid]), _basis(T, M, Z[:, n_rigid:])
+    KZ, MZ = K @ (T @ elastic), M @ (T @ elastic)
+    H = (T @ elastic).conj().T
+    lam, V = eigh(H @ KZ, H @ MZ)
+    zero = np.zeros(rigid.shape[1])
+    return (
+        np.concatenate([zero, np.sqrt(np.maximum(lam, 0.0))])[:n],
+        np.hstack([rigid, elastic @ V])[:, :n],
+    )
+
+
+def _basis(T: csr_matrix, M: csr_matrix, Z: Complex) -> Complex:
+    """Half as many columns, M-orthonormal, with the complex span of M-orthonormal real pairs."""
+    U = T @ Z
+    weight, V = np.linalg.eigh(U.conj().T @ (M @ U))
+    keep = slice(Z.shape[1] - Z.shape[1] // 2, None)
+    basis: Complex = Z @ (V[:, keep] / np.sqrt(weight[keep]))
+    return basis

@@ -1,0 +1,257 @@
+"""One sector of a wheel, and the coordinates in which one harmonic of the wheel moves.
+
+Displacements of sector j are seen in axes that are turned along with it, so that all sectors have
+the same matrices. In a wave with n nodal diameters each sector repeats its neighbour with a phase::
+
+    u_j = exp(i n j alpha) u_0,    alpha = 2 pi / N
+
+and the faces on which sectors meet make one the function of the other, u_slave =
+exp(i n s alpha) C u_master, with s = +1 or -1 and C the turn by alpha. That is all: the wheel falls
+into problems of the size of a sector, one for each n from 0 to N / 2.
+
+Source:
+    Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979) 81.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import block_diag, csr_matrix, identity, kron
+
+from rom.attachment import added_mass
+from rom.cyclic.faces import paired, turned, unit_axis
+from rom.eigen import rigid_motions
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, FEModel, Index
+
+Complex = npt.NDArray[np.complex128]
+NONE = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class CyclicSector:
+    """Matrices of one sector and how its faces meet.
+
+    Attributes:
+        n_sectors: number N of sectors of the wheel.
+        K: (n, n) stiffness [N/m], sparse.
+        M: (n, n) mass [kg], sparse.
+        slave: (s,) dofs of one face, which follow those of the other.
+        master: (m,) dofs of the other face.
+        coupling: (s, m) sparse map C from master to slave, with the turn by one sector.
+        step: +1 if the slave meets the master of the next sector, -1 of the one before.
+        held: (h,) dofs that do not move.
+        points: (n / 3, 3) nodes [m], or None where dofs are not displacements of nodes.
+        axis: (3,) unit vector of the axis of rotation.
+        at: (3,) a point of it [m].
+        matching: True when each node of a face has a partner on the other.
+        coriolis: (n, n) skew-symmetric Coriolis matrix per rad/s [kg], or None.
+        centrifugal: (n, n) change of the stiffness per (rad/s)^2 [kg]: geometric stiffness of the
+            centrifugal stress less spin softening; None for a wheel at rest.
+        regions: {region: (n, n) stiffness of its elements alone}.
+    """
+
+    n_sectors: int
+    K: Any
+    M: Any
+    slave: Index
+    master: Index
+    coupling: Any
+    step: int = 1
+    held: Index = field(default_factory=lambda: NONE)
+    points: Array | None = None
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    at: Array = field(default_factory=lambda: np.zeros(3))
+    matching: bool = True
+    coriolis: Any = None
+    centrifugal: Any = None
+    regions: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if int(self.n_sectors) != self.n_sectors or self.n_sectors < 2:
+            raise ConfigError(f"n_sectors = {self.n_sectors!r}: a wheel has 2 sectors or more.")
+        if np.intersect1d(self.slave, self.master).size:
+            raise InterfaceError("a dof is on both cyclic faces; sectors would be without width.")
+        if self.coupling.shape != (self.slave.size, self.master.size):
+            raise ConfigError(
+                f"the coupling of {self.slave.size} slave to {self.master.size} master dofs has "
+                f"the shape {self.coupling.shape}."
+            )
+
+    @classmethod
+    def from_model(
+        cls,
+        model: FEModel,
+        *,
+        low: str = "cyclic_low",
+        high: str = "cyclic_high",
+        axis: npt.ArrayLike = (0.0, 0.0, 1.0),
+        at: npt.ArrayLike = (0.0, 0.0, 0.0),
+        fixed: tuple[str, ...] = (),
+    ) -> "CyclicSector":
+        """Sector of a finite element model; the number of sectors follows from its faces.
+
+        Faces with different nodes are tied by interpolation: the finer one follows the coarser.
+
+        Args:
+            model: one sector, on one process, with its two cyclic faces as interfaces.
+            low: name of one cyclic face.
+            high: name of the other.
+            axis: (3,) direction of the axis of rotation.
+            at: (3,) a point of it [m].
+            fixed: names of interfaces that are held.
+
+        Raises:
+            InterfaceError: if an interface is unknown, the angle between the faces does not divide
+                the circle, or they are no images of each other.
+            ConfigError: if the matrices are distributed over several processes.
+        """
+        fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
+        if not hasattr(model.K, "tocsr"):
+            raise ConfigError("cyclic symmetry needs the matrices of the sector on one process.")
+        for name in (low, high, *fixed):
+            if name not in model.interfaces:
+                raise InterfaceError(
+                    f"the sector has no interface {name!r}; it has {sorted(model.interfaces)}."
+                )
+        e, at = unit_axis(axis), np.asarray(at, dtype=float)
+        pair = paired(model.interfaces[low], model.interfaces[high], e, at)
+        dM = added_mass(model, 0, model.n_dofs)
+        held = [model.interfaces[name].dofs for name in fixed]
+        return cls(
+            n_sectors=pair.n_sectors,
+            K=csr_matrix(model.K),
+            M=csr_matrix(model.M if dM is None else model.M + dM),
+            slave=pair.slave.dofs,
+            master=pair.master.dofs,
+            coupling=kron(pair.weights, turned(e, pair.step * 2 * np.pi / pair.n_sectors), "csr"),
+            step=pair.step,
+            held=np.unique(np.concatenate(held)) if held else NONE,
+            points=model.points,
+            axis=e,
+            at=at,
+            matching=pair.matching,
+        )
+
+    @property
+    def n(self) -> int:
+        """Number of dofs of one sector."""
+        return int(self.K.shape[0])
+
+    @property
+    def angle(self) -> float:
+        """Angle of one sector [rad]."""
+        return 2 * np.pi / self.n_sectors
+
+    @property
+    def diameters(self) -> range:
+        """Numbers of nodal diameters the wheel can have, 0 to N / 2."""
+        return range(self.n_sectors // 2 + 1)
+
+    @property
+    def free(self) -> Index:
+        """(f,) independent dofs: neither slaves nor held."""
+        return np.setdiff1d(np.arange(self.n), np.union1d(self.slave, self.held))
+
+    @property
+    def n_wheel(self) -> int:
+        """Number of independent dofs of the whole wheel."""
+        return self.n_sectors * self.free.size
+
+    def standing(self, diameter: int) -> bool:
+        """True for the harmonics whose waves cannot travel: 0 and N / 2."""
+        return 2 * self.checked(diameter) % self.n_sectors == 0
+
+    def checked(self, diameter: int) -> int:
+        """The number of nodal diameters, if the wheel can have it.
+
+        Raises:
+            ConfigError: if not.
+        """
+        if isinstance(diameter, bool) or diameter not in self.diameters:
+            raise ConfigError(
+                f"{diameter!r} nodal diameters: {self.n_sectors} sectors can tell 0 to "
+                f"{self.n_sectors // 2} apart."
+            )
+        return int(diameter)
+
+    def parts(self) -> tuple[csr_matrix, csr_matrix]:
+        """Own and next, (n, f) each: u_j = own a_j + next a_(j + step) of independent dofs a."""
+        one = identity(self.n, format="csr")
+        moves = ~np.isin(self.slave, self.held)
+        leading = one[self.master][:, self.free]
+        following = csr_matrix(self.coupling)[moves] @ leading
+        return one[:, self.free], csr_matrix(one[:, self.slave[moves]] @ following)
+
+    def harmonic(self, diameter: int) -> csr_matrix:
+        """(n, f) complex map from independent dofs to all of a sector, u = T a."""
+        own, following = self.parts()
+        if self.standing(diameter):
+            return own + (1.0 if diameter == 0 else -1.0) * following
+        return csr_matrix(own + np.exp(1j * diameter * self.step * self.angle) * following)
+
+    def rigid(self, diameter: int) -> Complex:
+        """(n, k) rigid motions of the wheel that are waves with these nodal diameters.
+
+        Motion along and about the axis belongs to 0, motion across it to 1.
+        """
+        if self.points is None or self.held.size:
+            return np.zeros((self.n, 0), dtype=complex)
+        e1 = np.eye(3)[np.argmin(np.abs(self.axis))]
+        e1 = np.cross(np.cross(self.axis, e1), self.axis)
+        e1 /= np.linalg.norm(e1)
+        across = e1 + 1j * np.cross(self.axis, e1)
+        R = rigid_motions(self.points - self.at)
+        columns = [
+            R[:, 3 * turning : 3 * turning + 3] @ direction
+            for n, direction in ((0, self.axis), (1, across), (-1, across.conj()))
+            for turning in (0, 1)
+            if (diameter - n) % self.n_sectors == 0
+        ]
+        return np.array(columns, dtype=complex).reshape(-1, self.n).T
+
+    def wheel(self, *others: Any) -> tuple[csr_matrix, ...]:
+        """Matrices of the whole wheel, dofs of sector j in its own turned axes.
+
+        Args:
+            others: further matrices, each (n, n) for all sectors alike or a list of N of them.
+
+        Returns:
+            K, M and the others, (N f, N f) each; block j belongs to sector j.
+        """
+        own, following = self.parts()
+        N = self.n_sectors
+        shift = identity(N, format="csr")[np.roll(np.arange(N), -self.step)]
+        T = csr_matrix(kron(identity(N), own) + kron(shift, following))
+
+        def assembled(A: Any) -> csr_matrix:
+            each = A if isinstance(A, list | tuple) else [A] * N
+            return csr_matrix(T.T @ block_diag(each, format="csr") @ T)
+
+        return tuple(assembled(A) for A in (self.K, self.M, *others))
+
+    def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:
+        """Real displacements of all sectors, in the axes of the wheel where there are points.
+
+        Mass-normalised shapes of a sector become mass-normalised shapes of the wheel.
+
+        Args:
+            shapes: (n, m) complex, of sector 0.
+            diameter: number of nodal diameters.
+            phase: turns the wave [rad]; a quarter of 2 pi gives its partner.
+
+        Returns:
+            (N, n, m).
+        """
+        j = np.arange(self.n_sectors)
+        wave = np.exp(1j * (diameter * self.angle * j - phase))
+        size = np.sqrt((1 if self.standing(diameter) else 2) / self.n_sectors)
+        U = size * (wave[:, None, None] * shapes).real
+        if self.points is None:
+            return U
+        turns = np.array([turned(self.axis, k * self.angle) for k in j])
+        nodal = U.reshape(self.n_sectors, -1, 3, shapes.shape[1])
+        found: Array = np.einsum("jab,jpbm->jpam", turns, nodal).reshape(U.shape)
+        return found

@@ -1,0 +1,143 @@
+"""Wheels for tests: rings of masses, rings of beams, and solid bladed disks of bricks."""
+
+import numpy as np
+from scipy.sparse import csr_matrix, identity, kron
+
+from rom.cyclic.sector import CyclicSector
+
+
+def mass_ring(N, k=3.0e5, coupling=0.7e5, m=0.4):
+    """Masses on springs to the ground, joined by springs: omega^2 = (k + 4 c sin^2(pi n/N)) / m.
+
+    Each mass is cut in two halves, one on either face of its sector.
+    """
+    spring = coupling * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    K = csr_matrix(spring + 0.5 * k * np.eye(2))
+    return CyclicSector(N, K, 0.5 * m * identity(2, format="csr"), np.array([1]), np.array([0]),
+                        identity(1, format="csr"))  # fmt: skip
+
+
+def ring_frequency(n, EI, rho_A, R):
+    """In-plane flexural circular frequency of a thin inextensible ring (Love)."""
+    return np.sqrt(n**2 * (n**2 - 1) ** 2 / (n**2 + 1) * EI / (rho_A * R**4))
+
+
+def beam_ring(N=24, per_sector=8, *, EA=1e9, EI=1.0, rho_A=1.0, R=1.0, rotary=1e-9):
+    """Ring of straight beams in its plane, dofs u, v, theta per node; masses in the nodes."""
+    phi = np.linspace(0.0, 2 * np.pi / N, per_sector + 1)
+    points = R * np.column_stack([np.cos(phi), np.sin(phi), 0 * phi])
+    n = 3 * points.shape[0]
+    K, M = np.zeros((n, n)), np.zeros((n, n))
+    for e in range(per_sector):
+        arm = points[e + 1] - points[e]
+        dofs = np.arange(3 * e, 3 * e + 6)
+        L = np.linalg.norm(arm)
+        K_e = _beam(L, np.arctan2(arm[1], arm[0]), EA, EI)
+        M_e = np.diag([1.0, 1.0, rotary * L**2] * 2) * rho_A * L / 2
+        K[np.ix_(dofs, dofs)] += K_e
+        M[np.ix_(dofs, dofs)] += M_e
+    G = np.zeros((3, 3))
+    G[0, 1], G[1, 0] = -2.0, 2.0  # 2 e_z x v, of u and v
+    alpha = 2 * np.pi / N
+    turn = np.array([[np.cos(alpha), -np.sin(alpha), 0], [np.sin(alpha), np.cos(alpha), 0],
+                     [0, 0, 1]])  # fmt: skip
+    return CyclicSector(
+        N, csr_matrix(K), csr_matrix(M), np.arange(n - 3, n), np.arange(3), csr_matrix(turn),
+        coriolis=csr_matrix(M @ kron(identity(n // 3), G).toarray()),
+        centrifugal=csr_matrix((n, n)),
+    )  # fmt: skip
+
+
+def _beam(L, angle, EA, EI):
+    a, b = EA / L, EI / L**3
+    K = np.array([
+        [a, 0, 0, -a, 0, 0],
+        [0, 12 * b, 6 * b * L, 0, -12 * b, 6 * b * L],
+        [0, 6 * b * L, 4 * b * L**2, 0, -6 * b * L, 2 * b * L**2],
+        [-a, 0, 0, a, 0, 0],
+        [0, -12 * b, -6 * b * L, 0, 12 * b, -6 * b * L],
+        [0, 6 * b * L, 2 * b * L**2, 0, -6 * b * L, 4 * b * L**2],
+    ])  # fmt: skip
+    c, s = np.cos(angle), np.sin(angle)
+    T = np.kron(np.eye(2), [[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return T.T @ K @ T
+
+
+def bladed_mesh(  # noqa: PLR0913  one keyword per size
+    N, sectors=1, *, bore=0.05, rim=0.10, tip=0.16, width=0.02, cells=(4, 3, 3, 2), blade=(1, 3),
+    offset=0.0, twist=0.0,
+):  # fmt: skip
+    """Bricks of some sectors of a disk with straight blades, with the faces of what is cut.
+
+    Args:
+        N: number of sectors of the whole wheel.
+        sectors: number of sectors meshed; N closes the wheel.
+        bore, rim, tip: radii [m]; a ring without blades when the tip is the rim.
+        width: along the axis z [m].
+        cells: around, along the radius of the disk, of the blade, along the axis.
+        blade: first and last line of cells around that a blade stands on.
+        offset: shifts the nodes inside each sector, so that its faces have other nodes.
+        twist: angle of the faces that changes with z [rad].
+    """
+    from rom.fe.mesh import checked
+    from rom.fe.solid import SolidMesh
+
+    around, along, up, across = cells
+    up = up if tip > rim else 0
+    total, closed = around * sectors, sectors == N
+    radii = np.r_[np.linspace(bore, rim, along + 1), np.linspace(rim, tip, up + 1)[1:]]
+    columns = total if closed else total + 1
+    i, j, k = np.meshgrid(
+        np.arange(columns), np.arange(radii.size), np.arange(across + 1), indexing="ij"
+    )
+    z = width * (k / across - 0.5)
+    share = np.arange(columns) / around
+    z = z + offset * width * share[:, None, None] * (1 - (2 * k / across - 1) ** 2)
+    phi = 2 * np.pi / N * i / around + twist * z / width
+    r = radii[j]
+    points = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape(i.shape)
+    lower = [(0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0)]
+    corners = [(*c[:2], s) for s in (0, 1) for c in lower]
+    cubes, regions = [], []
+    for c in np.ndindex(total, radii.size - 1, across):
+        on_blade = c[1] >= along
+        if on_blade and not blade[0] <= c[0] % around < blade[1]:
+            continue
+        cubes.append([number[(c[0] + a) % columns, c[1] + b, c[2] + d] for a, b, d in corners])
+        regions.append(2 if on_blade else 1)
+    facets = {"bore": _quads(number[:, 0], closed)}
+    if not closed:
+        facets |= {"cyclic_low": _quads(number[0, : along + 1]),
+                   "cyclic_high": _quads(number[-1, : along + 1])}  # fmt: skip
+    used, cubes = np.unique(cubes, return_inverse=True)
+    place = np.full(len(points), -1)
+    place[used] = np.arange(used.size)
+    names = {1: "disk", 2: "blade"} if up else {1: "disk"}
+    return checked(SolidMesh(
+        points[used], cubes.reshape(-1, 8), "hex8", np.array(regions), names,
+        {name: place[quads] for name, quads in facets.items()},
+    ))  # fmt: skip
+
+
+def _quads(face, closed=False):
+    face = np.vstack([face, face[:1]]) if closed else face
+    corners = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
+    return np.stack([c.ravel() for c in corners], axis=1)
+
+
+def bladed_model(N, sectors=1, degree=2, material=None, **sizes):
+    """FEModel of `bladed_mesh`; Titanium-like material unless given."""
+    from mpi4py import MPI
+
+    import rom
+    from rom.fe.elasticity import assemble
+    from rom.fe.jit import compiling
+    from rom.fe.mesh import to_dolfinx
+
+    mesh = bladed_mesh(N, sectors, **sizes)
+    with compiling(MPI.COMM_SELF):
+        grid, cell_tags, facet_tags = to_dolfinx(mesh, MPI.COMM_SELF)
+    regions = {name: tag for tag, name in mesh.region_names.items()}
+    return assemble(grid, cell_tags, facet_tags, degree=degree, regions=regions,
+                    material=material or rom.Material(E=114e9, nu=0.33, rho=4430.0))  # fmt: skip
