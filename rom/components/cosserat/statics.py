@@ -1,0 +1,205 @@
+"""Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.cosserat.band import hold, solve
+from rom.components.cosserat.elements import (
+    REACH,
+    Rod,
+    add_turning,
+    internal,
+    rotation_of,
+    turn,
+    work,
+)
+from rom.components.cosserat.shape import Shape, reference
+from rom.errors import ConfigError, SolverError
+from rom.mbs.compiled import drop_stale_cache, inner, kernel
+from rom.model import Array
+
+HERE = Path(__file__).parent
+drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules
+CAP = 0.2  # largest rotation of an iteration [rad]: larger steps jump to other equilibria
+CONVERGED = 1e-8  # last increment, in rad and in lengths of the rod; the next one is its square
+ITERATIONS = 200
+SHORTEST = 1e-4  # part of the load that is tried before giving up
+
+
+@kernel
+def add_loads(p, force, moment, W):
+    """Subtract dead forces at the vertices and dead moments on plates and segments."""
+    for i in range(force.shape[0]):
+        for c in range(3):
+            W.r[6 * i + 3 + c] -= force[i, c]
+    for k in range(moment.shape[0]):
+        rotation_of(p[k], W.R)
+        for c in range(3):
+            W.a[c] = 0.0
+            for d in range(3):
+                W.a[c] += W.R[d, c] * moment[k, d]
+            W.r[6 * k + c] -= W.a[c]
+        add_turning(W.A, 6 * k, -1.0, W.a)
+
+
+@inner
+def largest(d, length):
+    """Largest rotation, and largest displacement per length."""
+    turned = moved = 0.0
+    for k in range(d.shape[0]):
+        if (k // 3) % 2 == 0:
+            turned = max(turned, abs(d[k, 0]))
+        else:
+            moved = max(moved, abs(d[k, 0]) / length)
+    return turned, moved
+
+
+@inner
+def move(x, p, d, factor):
+    """Apply increments to positions and rotations."""
+    for i in range(x.shape[0]):
+        for c in range(3):
+            x[i, c] += factor * d[6 * i + 3 + c, 0]
+    for k in range(p.shape[0]):
+        a, b, c = d[6 * k, 0], d[6 * k + 1, 0], d[6 * k + 2, 0]
+        turn(p[k], factor * a, factor * b, factor * c, p[k])
+
+
+@kernel
+def newton(rod, x, p, force, moment, free, W):
+    """Find equilibrium in place; the number of iterations, -1 if it was not found."""
+    length = rod.h.sum()
+    rest = np.zeros(W.r.size)
+    for iteration in range(ITERATIONS):
+        internal(rod, x, p, rest, 0.0, W)
+        add_loads(p, force, moment, W)
+        for k in range(W.r.size):
+            W.d[k, 0] = -W.r[k]
+        hold(W.A, W.d, free)
+        if solve(W.A, W.d) == 0:
+            return -1
+        turned, moved = largest(W.d, length)
+        if not np.isfinite(turned + moved):
+            return -1
+        move(x, p, W.d, min(1.0, CAP / max(turned, CAP)))
+        if max(turned, moved) < CONVERGED:
+            return iteration + 1
+    return -1
+
+
+def clamped(rod: Rod, *, start: bool = True, end: bool = False) -> Array:
+    """(6 N + 9,) which dofs are free when plates are held; order plate, x_0, segment, x_1, ..."""
+    free = np.ones(6 * rod.h.size + 9, dtype=bool)
+    free[:6], free[-6:] = not start, not end
+    return free
+
+
+def loads(
+    rod: Rod,
+    *,
+    tip: npt.ArrayLike = 0.0,
+    tip_moment: npt.ArrayLike = 0.0,
+    force: npt.ArrayLike = 0.0,
+    weight: npt.ArrayLike = 0.0,
+) -> tuple[Array, Array]:
+    """Dead loads.
+
+    Args:
+        rod: the rod.
+        tip: (3,) force on the last vertex [N].
+        tip_moment: (3,) moment on the plate at the end [N m].
+        force: (N + 1, 3) forces on the vertices [N].
+        weight: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        (N + 1, 3) forces on vertices, (N + 2, 3) moments on plate, segments, plate.
+    """
+    f, m = np.zeros_like(rod.x), np.zeros((rod.h.size + 2, 3))
+    f += np.asarray(force, dtype=float) + np.outer(rod.mass, np.broadcast_to(weight, 3))
+    f[-1] += tip
+    m[-1] += tip_moment
+    return f, m
+
+
+def equilibrium(
+    rod: Rod,
+    load: tuple[Array, Array],
+    *,
+    free: npt.ArrayLike | None = None,
+    start: Shape | None = None,
+    steps: int = 6,
+) -> Shape:
+    """Shape of a rod at rest under dead loads.
+
+    The load grows from zero, or the shape follows from ``start`` in one step. Rotations of an
+    iteration are capped, and a part of the load that fails is halved.
+
+    Args:
+        rod: the rod.
+        load: forces and moments, see `loads`.
+        free: (6 N + 9,) which dofs may move; without it the plate at the start is clamped.
+        start: a shape near the solution, from which no continuation is needed.
+        steps: parts in which the load grows.
+
+    Raises:
+        ConfigError: if shapes of arrays differ from those of the rod.
+        SolverError: if no equilibrium was found; its attribute ``shape`` is the last good one and
+            ``share`` the part of the load it carries.
+    """
+    shape = reference(rod) if start is None else Shape(start.x.copy(), start.p.copy())
+    free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
+    force, moment = (np.array(part, dtype=float) for part in load)
+    if (force.shape, moment.shape, free.size) != (rod.x.shape, (len(rod.p), 3), 3 * rod.p.size // 4
+                                                  + rod.x.size):  # fmt: skip
+        raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
+                          f"for a rod of {rod.h.size} segments.")  # fmt: skip
+    W = work(rod)
+    share, part = (0.0, 1.0 / steps) if start is None else (0.0, 1.0)
+    while share < 1.0:
+        part = min(part, 1.0 - share)
+        x, p = shape.x.copy(), shape.p.copy()
+        now = min(share + part, 1.0)
+        if newton(rod, x, p, now * force, now * moment, free, W) > 0:
+            share, shape = now, Shape(x, p)
+            if 1.0 - share < 1e-12:
+                break
+        elif part > SHORTEST:
+            part /= 2
+        else:
+            raise _stuck(shape, share)
+    return shape
+
+
+def _stuck(shape: Shape, share: float) -> SolverError:
+    error = SolverError(f"no equilibrium beyond {100 * share:.4g} % of the load.",
+                        hint="The rod buckles or a mechanism is left free.")  # fmt: skip
+    error.shape, error.share = shape, share  # type: ignore[attr-defined]
+    return error
+
+
+def linearised(
+    rod: Rod, shape: Shape, load: tuple[Array, Array] | None = None
+) -> tuple[Array, Array]:
+    """Forces out of balance (n,) and their tangent (n, n), unknowns in the order of `clamped`.
+
+    Both count positions in world axes and rotations in section axes; the tangent is the exact
+    derivative, symmetric where moments are in balance.
+    """
+    W = work(rod)
+    n = W.r.size
+    internal(rod, shape.x, shape.p, np.zeros(n), 0.0, W)
+    if load is not None:
+        add_loads(shape.p, *load, W)
+    return W.r, dense(W.A)
+
+
+def dense(A: Array) -> Array:
+    """(n, n) matrix of a band."""
+    n = len(A)
+    K = np.zeros((n, n))
+    for k in range(-REACH, REACH + 1):
+        rows = np.arange(max(0, -k), min(n, n - k))
+        K[rows, rows + k] = A[rows, k + REACH]
+    return K

@@ -1,0 +1,272 @@
+"""Rods at rest: derivatives, objectivity, order, and beams that others have bent before."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+from rom import rotation
+from rom.components.cosserat import (
+    Shape,
+    along,
+    clamped,
+    elastic_energy,
+    equilibrium,
+    linearised,
+    loads,
+    reference,
+    rod,
+    straight,
+    strain,
+)
+from rom.components.cosserat.band import solve
+from rom.components.cosserat.elements import REACH, WIDTH
+from rom.errors import ConfigError, ModelError, SolverError
+
+STIFF = 1e6  # against bending rigidities of one: neither shear nor stretch
+
+
+def crooked(rng, n=4):
+    """A rod with corners and sections of its own everywhere."""
+    x = np.cumsum(rng.normal(size=(n + 1, 3)), axis=0)
+    p = np.array([rotation.exp(0.7 * rng.normal(size=3)) for _ in range(n + 2)])
+    return rod(x, p, stretch=rng.uniform(1, 2, (n, 3)), bend=rng.uniform(1, 2, (n + 1, 3)))
+
+
+def moved(shape, d):
+    """A shape after increments, ordered plate, x_0, segment, x_1, ..."""
+    d = np.append(d, np.zeros(3)).reshape(-1, 6)
+    turned = [rotation.multiply(p, rotation.exp(phi)) for p, phi in zip(shape.p, d[:, :3],
+                                                                      strict=True)]  # fmt: skip
+    return Shape(shape.x + d[:-1, 3:], np.array(turned))
+
+
+def slopes(function, n, step=1e-5):
+    """Central differences along every increment, last axis."""
+    unit = step * np.eye(n)
+    return np.stack([(function(d) - function(-d)) / (2 * step) for d in unit], axis=-1)
+
+
+def test_forces_and_tangent_are_derivatives_of_the_energy():
+    rng = np.random.default_rng(0)
+    one = crooked(rng)
+    n = 6 * one.h.size + 9
+    shape = moved(reference(one), 0.3 * rng.normal(size=n))
+    load = rng.normal(size=one.x.shape), rng.normal(size=(len(one.p), 3))
+    r, _ = linearised(one, shape)
+    assert_allclose(r, slopes(lambda d: elastic_energy(one, moved(shape, d)), n), atol=1e-8)
+    loaded = linearised(one, shape, load)[1]
+    assert_allclose(loaded, slopes(lambda d: linearised(one, moved(shape, d), load)[0], n),
+                    atol=1e-8)  # fmt: skip
+
+
+def test_reference_has_no_stress_whatever_its_corners():
+    one = crooked(np.random.default_rng(1))
+    assert_allclose(linearised(one, reference(one))[0], 0, atol=1e-14)
+    assert elastic_energy(one, reference(one)) < 1e-28
+
+
+def test_a_rigid_motion_changes_nothing():
+    """Energy and forces in section axes are the same, and forces balance as a whole."""
+    rng = np.random.default_rng(2)
+    one = crooked(rng)
+    shape = moved(reference(one), 0.3 * rng.normal(size=6 * one.h.size + 9))
+    turn, away = rotation.exp([1.0, -2.0, 0.5]), [3.0, -1.0, 2.0]
+    A = rotation.matrix(turn)
+    carried = Shape(shape.x @ A.T + away, np.array([rotation.multiply(turn, p) for p in shape.p]))
+    r, _ = linearised(one, shape)
+    there, _ = linearised(one, carried)
+    size = np.append(r, np.zeros(3)).reshape(-1, 6)
+    other = np.append(there, np.zeros(3)).reshape(-1, 6)
+    assert_allclose(other[:, :3], size[:, :3], atol=1e-12)
+    assert_allclose(other[:, 3:], size[:, 3:] @ A.T, atol=1e-12)
+    assert_allclose(size[:, 3:].sum(axis=0), 0, atol=1e-12)
+    moments = [shape.frame(k) @ size[k, :3] for k in range(len(size))]
+    lever = np.cross(shape.x, size[:-1, 3:]).sum(axis=0)
+    assert_allclose(np.sum(moments, axis=0) + lever, 0, atol=1e-12)
+
+
+def test_elimination_along_the_rod_is_a_dense_solution_at_linear_cost():
+    rng = np.random.default_rng(3)
+    n = 57
+    reach = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= REACH
+    K, b = np.where(reach, rng.normal(size=(n, n)), 0.0), rng.normal(size=(n, 2))
+    A = np.zeros((n, WIDTH))
+    for i, j in np.argwhere(reach):
+        A[i, j - i + REACH] = K[i, j]
+    x = b.copy()
+    assert solve(A, x) > 0
+    assert_allclose(x, np.linalg.solve(K, b), rtol=1e-9, atol=1e-9)
+    count = []
+    for size in (2000, 4000, 8000):
+        A = rng.normal(size=(size, WIDTH))
+        A[:, 2 * REACH + 1 :] = 0.0
+        count.append(solve(A, rng.normal(size=(size, 1))))
+    assert count[2] - count[1] == 2 * (count[1] - count[0])
+    assert count[0] < 2000 * (REACH * (2 * REACH + 2) + 2 * REACH + 1)
+    assert solve(np.zeros((5, WIDTH)), np.ones((5, 1))) == 0
+
+
+@pytest.mark.parametrize(
+    ("alpha", "deflection", "shortening", "angle"),
+    [(1, 0.301721, 0.056433, 0.461352), (2, 0.493457, 0.160642, 0.781750),
+     (5, 0.713792, 0.387628, 1.215368), (10, 0.810609, 0.554996, 1.430286)],
+)  # fmt: skip
+def test_elastica(alpha, deflection, shortening, angle):
+    """Elliptic integrals of the cantilever that neither stretches nor shears."""
+    one = straight(1.0, 80, stretch=STIFF, bend=1.0)
+    shape = equilibrium(one, loads(one, tip=(alpha, 0, 0)))
+    assert_allclose([shape.x[-1, 0], 1 - shape.x[-1, 2]], [deflection, shortening], rtol=4e-4)
+    assert_allclose(np.arctan2(shape.frame(-1)[0, 2], shape.frame(-1)[2, 2]), angle, rtol=2e-4)
+
+
+def rolled_up(n):
+    one = straight(10.0, n, stretch=STIFF, bend=100.0)
+    shape = equilibrium(one, loads(one, tip_moment=(0, 20 * np.pi, 0)))
+    a, k = strain(one, shape)
+    assert_allclose(a, 0, atol=1e-9)
+    angle = np.arcsin(2 * np.pi / 10 * one.l)  # where M = B k cos(angle / 2)
+    assert_allclose(k[:, 1], 2 * np.sin(angle / 2) / one.l, rtol=1e-8)
+    return np.linalg.norm(shape.x[-1])
+
+
+def test_moment_rolls_a_beam_up_into_a_circle():
+    """The end meets the start with second order, plates at half segments included."""
+    error = np.array([rolled_up(n) for n in (20, 40, 80)])
+    assert_allclose(error, [0.170, 0.0415, 0.0103], rtol=5e-3)
+    order = np.log2(error[:-1] / error[1:])
+    assert ((order > 1.9) & (order < 2.1)).all()
+
+
+def bend_of_45_degrees(n, J, k):
+    def place(s):
+        c, d = np.cos(s), np.sin(s)
+        return [100 * d, 100 * (1 - c), 0], np.array([[-d, 0, c], [c, 0, d], [0, 1, 0]])
+
+    return along(place, np.linspace(0, np.pi / 4, n + 1), stretch=[k * 5e6, k * 5e6, 1e7],
+                 bend=[1e7 / 12, 1e7 / 12, 5e6 * J])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("J", "k", "P", "tip"),
+    [(1 / 6, 5 / 6, 300, (58.7789, 22.2447, 40.1924)),
+     (1 / 6, 5 / 6, 450, (52.2383, 18.5081, 48.5035)),
+     (1 / 6, 5 / 6, 600, (47.1501, 15.6847, 53.4755)),
+     (0.141, 1.0, 600, (46.8968, 15.5603, 53.6049))],
+)  # fmt: skip
+def test_bend_of_45_degrees_under_a_force_out_of_its_plane(J, k, P, tip):
+    """Bathe and Bolourchi 1979; numbers of a shooting method for both torsion constants in use."""
+    one = bend_of_45_degrees(80, J, k)
+    shape = equilibrium(one, loads(one, tip=(0, 0, P)))
+    assert_allclose(shape.x[-1], tip, rtol=3e-4)
+    if J == 0.141:  # Ibrahimbegovic 1995, eight elements of three nodes
+        assert_allclose(shape.x[-1] - one.x[-1], (-23.814, -13.729, 53.605), rtol=1e-3)
+
+
+def test_bend_converges_with_second_order():
+    tip = []
+    for n in (10, 20, 40):
+        one = bend_of_45_degrees(n, 1 / 6, 5 / 6)
+        tip.append(equilibrium(one, loads(one, tip=(0, 0, 600))).x[-1])
+    error = np.linalg.norm(np.array(tip) - (47.1501, 15.6847, 53.4755), axis=1)
+    order = np.log2(error[:-1] / error[1:])
+    assert ((order > 1.9) & (order < 2.1)).all(), order
+
+
+def test_twisted_beam():
+    """Pretwist of 90 degrees couples the directions; shooting, and published solid elements."""
+
+    def place(s):
+        angle = np.pi / 2 * s / 10
+        return [0, 0, s], rotation.matrix(rotation.exp([0, 0, angle]))
+
+    one = along(place, np.linspace(0, 10, 81), stretch=[8.2604167e9, 8.2604167e9, 25e9],
+                bend=[0.520833e9, 0.130208e9, 0.141872656e9])  # fmt: skip
+    shape = equilibrium(one, loads(one, tip=(0, -4000e3, 0)))
+    u = shape.x[-1] - one.x[-1]
+    assert_allclose(u, (-1.718053, -3.593213, -1.141526), rtol=5e-4)
+    assert_allclose(u[1:], (-3.584232, -1.134192), rtol=0.01)  # solid elements
+
+
+ANGLES = (0, 15, 30, 45, 60, 75, 90)
+PRINCETON = {  # flapwise and edgewise displacement [mm], twist [deg] by a shooting method
+    4.448: [(0, 20.8084, 39.9599, 56.0635, 68.1319, 75.5690, 78.0773),
+            (5.3582, 5.2112, 4.7576, 3.9764, 2.8742, 1.5106, 0),
+            (0, 0.2347, 0.4027, 0.4592, 0.3928, 0.2248, 0)],
+    8.896: [(0, 42.1924, 79.5474, 109.1131, 129.9579, 142.2182, 146.2524),
+            (10.7128, 10.6436, 10.2076, 8.9792, 6.7420, 3.6220, 0),
+            (0, 0.9562, 1.5937, 1.7533, 1.4525, 0.8135, 0)],
+    13.345: [(0, 64.7342, 118.1795, 156.7746, 182.0038, 196.1387, 200.6840),
+             (16.0612, 16.5777, 16.9898, 15.6211, 11.9635, 6.4703, 0),
+             (0, 2.2161, 3.5135, 3.6671, 2.9159, 1.5929, 0)],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("force", PRINCETON)
+def test_princeton_beam(force, angle):
+    """Large displacement in both planes; larger steps end in a wrong state twisted by -156 deg."""
+    b, t, E = 12.3777e-3, 3.2024e-3, 71.7e9
+    G, soft, stiff = E / 2.62, b * t**3 / 12, t * b**3 / 12
+    one = straight(0.508, 80, stretch=[G * b * t, G * b * t, E * b * t],
+                   bend=[E * stiff, E * soft, 0.198 * G * (soft + stiff)])  # fmt: skip
+    beta = np.radians(angle)
+    shape = equilibrium(one, loads(one, tip=force * np.array([np.sin(beta), -np.cos(beta), 0])))
+    A = shape.frame(-1)
+    twist = np.degrees(np.arctan2(A[0, 1], A[1, 1]))
+    flap, edge, turned = np.array(PRINCETON[force])[:, ANGLES.index(angle)]
+    assert_allclose(1e3 * shape.x[-1, :2], (flap, -edge), rtol=2e-3, atol=1e-6)
+    assert_allclose(twist, turned, rtol=2e-3, atol=1e-6)
+
+
+def test_small_loads_bend_as_timoshenko_says():
+    EI, GA, L = 2.0, 50.0, 1.5
+    one = straight(L, 200, stretch=[GA, GA, 80.0], bend=EI)
+    shape = equilibrium(one, loads(one, tip=(1e-4, 0, 1e-4)))
+    assert_allclose(shape.x[-1, 0], 1e-4 * (L**3 / (3 * EI) + L / GA), rtol=5e-5)
+    assert_allclose(shape.x[-1, 2] - L, 1e-4 * L / 80, rtol=1e-3)
+
+
+def test_buckling_load_of_a_column():
+    """Euler with shear and shortening by the modified formula of Engesser and Haringx."""
+    EI, GA, EA, L = 1.0, 400.0, 1e5, 1.0
+    one = straight(L, 80, stretch=[GA, GA, EA], bend=EI)
+
+    def lowest(P):
+        load = loads(one, tip=(0, 0, -P))
+        shape = equilibrium(one, load)
+        free = clamped(one)
+        return eigh(linearised(one, shape, load)[1][np.ix_(free, free)], eigvals_only=True,
+                    subset_by_index=(0, 0))[0]  # fmt: skip
+
+    # P (1 + P / GA - P / EA) = P_E, the length shortens by P / EA
+    P = max(np.roots([1 / GA - 1 / EA, 1.0, -(np.pi**2) / 4]))
+    assert lowest(0.999 * P) > 0 > lowest(1.001 * P)
+
+
+def test_what_is_no_rod_is_named():
+    section = {"stretch": 1.0, "bend": 1.0}
+    turned = np.tile([1.0, 0, 0, 0], (4, 1))
+    with pytest.raises(ModelError, match="segment 1 of the rod has coincident stations"):
+        rod([[0, 0, 0], [0, 0, 1], [0, 0, 1]], turned, **section)
+    with pytest.raises(ModelError, match="segment 0 of the rod has a stretch rigidity"):
+        straight(1.0, 2, stretch=[[1, 1, 0], [1, 1, 1]], bend=1.0)
+    with pytest.raises(ModelError, match="vertex 1 of the rod has a bending rigidity"):
+        straight(1.0, 2, stretch=1.0, bend=[[1, 1, 1], [1, -1, 1], [1, 1, 1]])
+    back = turned.copy()
+    back[2:] = [0, 1, 0, 0]
+    with pytest.raises(ModelError, match="vertex 1 of the rod turns back on itself"):
+        rod([[0, 0, 0], [0, 0, 1], [0, 0, 0]], back, **section)
+    with pytest.raises(ModelError, match="N \\+ 1 vertices and N \\+ 2 quaternions"):
+        rod([[0, 0, 0], [0, 0, 1]], turned, **section)
+    one = straight(1.0, 4, **section)
+    with pytest.raises(ConfigError, match="for a rod of 4 segments"):
+        equilibrium(one, (np.zeros((4, 3)), np.zeros((6, 3))))
+
+
+def test_without_equilibrium_the_last_shape_is_kept():
+    one = straight(1.0, 10, stretch=10.0, bend=1.0)
+    free = np.ones_like(clamped(one))
+    with pytest.raises(SolverError, match="no equilibrium beyond 0 % of the load") as error:
+        equilibrium(one, loads(one, tip=(1.0, 0, 0)), free=free)
+    assert error.value.share == 0.0 and np.isfinite(error.value.shape.x).all()
