@@ -145,8 +145,34 @@ def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:
         yield Figure("blade", case, "times as fast", taken["full"] / taken[kind], "", "above 10")
 
 
+def film(solves: int = 400) -> Iterator[Figure]:
+    """Oil films of 120 x 8 cells under a journal on an orbit, each with all its derivatives.
+
+    Args:
+        solves: films around the orbit, each started from the one before.
+    """
+    from rom.components.journal_bearing import Groove, JournalBearing
+    from rom.components.journal_bearing import film as film_of
+
+    angle = np.linspace(0, 2 * pi, solves)
+    orbit = 1e-5 * np.stack([6 + np.cos(angle), 1.5 * np.sin(angle)], axis=1)
+    for law in ("reynolds", "jfo"):
+        bearing = JournalBearing(0.1, 0.05, 1e-4, [Groove(pi, 0.35)], cavitation=law, aligned=True)
+        now = film_of(bearing, orbit[0], speed=300.0, viscosity=0.03)
+        taken, changes = np.empty(solves), 0
+        for k, x in enumerate(orbit):
+            start = perf_counter()
+            now = film_of(bearing, x, speed=300.0, viscosity=0.03, warm=now.active)
+            taken[k], changes = perf_counter() - start, changes + now.iterations
+        case = f"120 x 8 cells, {law}"
+        each = 1e3 * float(np.median(taken))
+        yield Figure("film", case, "film and derivatives", each, "ms", "below 1")
+        yield Figure("film", case, "systems solved per film", changes / solves)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
+    "film": film,
     "integrator": integrator,
     "reduction": reduction,
     "large-reduction": large_reduction,

@@ -1,0 +1,135 @@
+"""A plain, grooved or two-lobed journal bearing and the cells its film is divided into.
+
+The journal turns from X to Y. Motions of the journal are measured in the bush from its centre:
+ex, ey [m] and the tilt phi_x, phi_y [rad]; the film is
+h = c bore - (ex + z phi_y) cos theta - (ey - z phi_x) sin theta.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.journal_bearing.film_kernel import FULL, JFO, REYNOLDS, Grid
+from rom.errors import ModelError
+from rom.model import Array
+
+Cavitation = Literal["none", "reynolds", "jfo"]
+LAWS = {"none": FULL, "reynolds": REYNOLDS, "jfo": JFO}
+
+
+@dataclass(frozen=True, slots=True)
+class Groove:
+    """An axial groove full of oil.
+
+    Attributes:
+        angle: of its middle from X in the direction of rotation [rad].
+        width: how far it extends around the bush [rad]; at least one column of cells.
+        pressure: of the oil in it [Pa].
+        share: of the width of the bearing, about its middle.
+    """
+
+    angle: float
+    width: float = 0.0
+    pressure: float = 0.0
+    share: float = 1.0
+
+
+@dataclass(frozen=True)
+class JournalBearing:
+    """A bearing and the cells its film is divided into.
+
+    ``cavitation``: "reynolds" lets pressure end without slope, where oil may come from nowhere;
+    "jfo" (Jakobsson, Floberg, Olsson) conserves oil and needs a groove; "none" lets oil pull.
+
+    Attributes:
+        diameter, length: of the journal [m].
+        clearance: radius of the bush less radius of the journal [m]; of a lobe, if preloaded.
+        grooves: inlets of oil.
+        cavitation: what happens where oil would have to pull.
+        preload: of a two-lobed bore; its halves are moved together by so many clearances.
+        lobes: angle of the line along which they are moved [rad].
+        cells: around the bearing, along its width.
+        aligned: the journal never tilts, and the cells cover half the width.
+    """
+
+    diameter: float
+    length: float
+    clearance: float
+    grooves: Sequence[Groove] = ()
+    cavitation: Cavitation = "reynolds"
+    preload: float = 0.0
+    lobes: float = 0.0
+    cells: tuple[int, int] = (120, 8)
+    aligned: bool = False
+    grid: Grid = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        size = (self.diameter, self.length, self.clearance)
+        if not all(np.isfinite(size)) or min(size) <= 0 or self.clearance > 0.05 * self.diameter:
+            raise ModelError(
+                f"no bearing has diameter {self.diameter} m, length {self.length} m and clearance "
+                f"{self.clearance} m: a film is thin against the journal.",
+                hint="Give all three in metres; the clearance is about 0.001 of the diameter.",
+            )
+        if not 0 <= self.preload < 1:
+            raise ModelError(f"preload {self.preload} leaves no room; it is from 0 to below 1.")
+        if self.cavitation not in LAWS:
+            raise ModelError(f"there is no cavitation {self.cavitation!r}; there are {[*LAWS]}.")
+        if self.cavitation == "jfo" and not self.grooves:
+            raise ModelError(
+                "a mass-conserving film without a groove has no oil.", hint="Add a Groove."
+            )
+        if min(self.cells) < 2 or self.cells[0] < 12:
+            raise ModelError(f"{self.cells} cells are too few; at least 12 around and 2 along.")
+        object.__setattr__(self, "grid", _grid(self))
+
+    @property
+    def radius(self) -> float:
+        """Of the journal [m]."""
+        return self.diameter / 2
+
+    @property
+    def scale(self) -> Array:
+        """(4,) motions that change the film by a clearance [m, m, rad, rad]."""
+        c = self.clearance
+        return np.array([c, c, c / self.length, c / self.length])
+
+    def thinnest(self, motion: npt.ArrayLike) -> float:
+        """Smallest film of the cells [m] when the journal is there."""
+        m = four(motion) / self.scale
+        edges = np.array([-0.5, 0.5]) if not self.aligned else np.zeros(1)
+        return self.clearance * float(np.min(thickness(self.grid, m, edges)))
+
+
+def four(values: npt.ArrayLike) -> Array:
+    """A motion or rate of two or four components as one of four."""
+    given = np.asarray(values, dtype=float)
+    return np.concatenate([given, np.zeros(4 - given.size)])
+
+
+def thickness(grid: Grid, m: Array, Z: Array) -> Array:
+    """(2, nt, len(Z)) film in clearances at centres and faces behind them."""
+    c, s = grid.angle[..., :1], grid.angle[..., 1:]
+    return grid.bore[..., None] - (m[0] + Z * m[3]) * c - (m[1] - Z * m[2]) * s
+
+
+def _grid(bearing: JournalBearing) -> Grid:
+    nt, nz = bearing.cells
+    dtheta = 2 * np.pi / nt
+    theta = dtheta * np.arange(nt)
+    both = np.stack([theta, theta + dtheta / 2])
+    Z_face = np.linspace(0.0 if bearing.aligned else -0.5, 0.5, nz + 1)
+    Z = (Z_face[1:] + Z_face[:-1]) / 2
+    fixed, inlet = np.zeros((nt, nz), dtype=np.int64), np.zeros((nt, nz))
+    for groove in bearing.grooves:
+        apart = np.abs((theta - groove.angle + np.pi) % (2 * np.pi) - np.pi)
+        wet = (apart <= max(groove.width / 2, apart.min()) + 1e-9)[:, None]
+        wet = wet & (np.abs(Z) <= max(groove.share / 2, np.abs(Z).min()) + 1e-9)
+        fixed[wet], inlet[wet] = 1, groove.pressure
+    bore = 1 - bearing.preload * np.abs(np.cos(both - bearing.lobes))
+    angle = np.stack([np.cos(both), np.sin(both)], axis=-1)
+    slender = (bearing.radius / bearing.length) ** 2
+    return Grid(angle, bore, Z, Z_face, fixed, inlet, slender, float(bearing.aligned))

@@ -1,0 +1,154 @@
+"""Viscosity of oil over temperature, and the temperature the film makes for itself."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.journal_bearing.bearing import JournalBearing
+from rom.components.journal_bearing.oil_film import Film
+from rom.components.journal_bearing.statics import equilibrium
+from rom.errors import ModelError, SolverError
+from rom.model import Array
+
+KELVIN = 273.15
+AT_100 = {32: 5.4, 46: 6.8, 68: 8.7}  # usual mineral oils of these grades [mm^2/s]
+
+
+@dataclass(frozen=True, slots=True)
+class Oil:
+    """A mineral oil; log log (nu + 0.7) is linear in log T (Walther, ASTM D341).
+
+    Attributes:
+        nu_40, nu_100: kinematic viscosity at 40 and 100 degrees Celsius [mm^2/s].
+        density: [kg/m^3].
+        heat: specific heat [J/(kg K)].
+    """
+
+    nu_40: float
+    nu_100: float
+    density: float = 870.0
+    heat: float = 2000.0
+
+    def __post_init__(self) -> None:
+        if not (self.nu_40 > self.nu_100 > 0.3 and self.density > 0 and self.heat > 0):
+            raise ModelError(
+                f"no oil has {self.nu_40} mm2/s at 40 C and {self.nu_100} mm2/s at 100 C: hot oil "
+                "is thinner."
+            )
+
+    def law(self) -> tuple[float, float]:
+        """A and B of log10 log10 (nu + 0.7) = A - B log10 T."""
+        cold, hot = (np.log10(np.log10(nu + 0.7)) for nu in (self.nu_40, self.nu_100))
+        T = np.log10([KELVIN + 40, KELVIN + 100])
+        B = (cold - hot) / (T[1] - T[0])
+        return float(cold + B * T[0]), float(B)
+
+    def viscosity(self, celsius: npt.ArrayLike) -> Array:
+        """Dynamic viscosity [Pa s] at a temperature [degrees Celsius]."""
+        A, B = self.law()
+        nu = 10 ** (10 ** (A - B * np.log10(np.asarray(celsius, dtype=float) + KELVIN))) - 0.7
+        return 1e-6 * self.density * nu
+
+
+def iso_vg(grade: int) -> Oil:
+    """A usual oil of grade 32, 46 or 68.
+
+    Raises:
+        ModelError: for other grades.
+    """
+    if grade not in AT_100:
+        raise ModelError(
+            f"ISO VG {grade} is not listed; there are {sorted(AT_100)}.", hint="Use Oil."
+        )
+    return Oil(float(grade), AT_100[grade])
+
+
+@dataclass(frozen=True, slots=True)
+class Warm:
+    """A film at the temperature it makes.
+
+    Attributes:
+        film: at rest under the load.
+        temperature: that its viscosity belongs to [degrees Celsius].
+        rise: of the oil from inlet to outlet [K].
+        power: that is lost [W].
+    """
+
+    film: Film
+    temperature: float
+    rise: float
+    power: float
+
+
+def warm_equilibrium(
+    bearing: JournalBearing,
+    load: npt.ArrayLike,
+    oil: Oil,
+    *,
+    speed: float,
+    inlet: float,
+    carried: float = 0.9,
+    felt: float = 0.5,
+) -> Warm:
+    """The loaded film, its viscosity that of oil warmed by the film itself.
+
+    Power lost warms the oil that leaves at the ends; fixed point, half of each change.
+
+    Args:
+        bearing: the bearing.
+        load: (2,) on the journal [N].
+        oil: in it.
+        speed: [rad/s].
+        inlet: temperature of the oil that comes in [degrees Celsius].
+        carried: share of the heat that leaves with the oil.
+        felt: share of the rise that the effective viscosity feels; 0.5 is the mean of inlet and
+            outlet, as Raimondi and Boyd take it.
+
+    Raises:
+        SolverError: if no film carries the load, or the temperature does not settle.
+    """
+    T, start = inlet, None
+    for _ in range(60):
+        mu = float(oil.viscosity(T))
+        film = equilibrium(bearing, load, speed=speed, viscosity=mu, start=start)
+        power, start = film.dissipated, film.motion[:2]
+        rise = carried * power / (oil.density * oil.heat * film.side_flow)
+        change = inlet + felt * rise - T
+        if abs(change) < 1e-6:
+            return Warm(film, T, rise, power)
+        T += 0.5 * change
+    raise SolverError(
+        f"the temperature of the film does not settle; it is {T:.1f} degrees Celsius and still "
+        f"changes by {change:.2g} K.", hint="Check the flow of oil: little flow, great heat.",
+    )  # fmt: skip
+
+
+def warm_bearing(
+    bearing: JournalBearing,
+    *,
+    bush: float,
+    shaft: float,
+    expansion: tuple[float, float] = (11.7e-6, 11.7e-6),
+    free: float = 1.0,
+) -> JournalBearing:
+    """The bearing with the clearance it has when bush and shaft are warm.
+
+    Args:
+        bearing: cold.
+        bush: how much warmer it is [K].
+        shaft: how much warmer it is [K].
+        expansion: coefficients of bush and shaft [1/K].
+        free: share of its expansion that the fit lets the bush have.
+
+    Raises:
+        ModelError: if no clearance is left.
+    """
+    growth = bearing.radius * (expansion[0] * bush * free - expansion[1] * shaft)
+    if bearing.clearance + growth <= 0:
+        raise ModelError(
+            f"the shaft seizes: {shaft} K on the shaft and {bush} K on the bush change the "
+            f"clearance of {bearing.clearance * 1e6:.3g} micrometres by {growth * 1e6:.3g}.",
+            hint="Warm the bush too, or fit with more clearance.",
+        )
+    return replace(bearing, clearance=bearing.clearance + growth)

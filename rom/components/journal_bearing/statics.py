@@ -1,0 +1,140 @@
+"""Where a loaded journal comes to rest, and how long it stays there: stability of whirl."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.journal_bearing.bearing import JournalBearing
+from rom.components.journal_bearing.oil_film import Film, film
+from rom.errors import ModelError, SolverError
+from rom.model import Array
+
+STEP, THINNEST, TIMES, ENOUGH = 0.1, 2e-3, 200, 1e-9  # clearances; Newton steps; of the load
+
+
+def equilibrium(
+    bearing: JournalBearing,
+    load: npt.ArrayLike,
+    *,
+    speed: float,
+    viscosity: float,
+    start: npt.ArrayLike | None = None,
+) -> Film:
+    """The film that carries a load; the journal stays parallel to the bush.
+
+    Newton's method with the derivatives of the film, in steps of at most 0.1 clearances.
+
+    Args:
+        bearing: the bearing.
+        load: (2,) on the journal [N].
+        speed: of rotation [rad/s].
+        viscosity: of the oil [Pa s].
+        start: (2,) first position of the journal [m]; by default 0.3 clearances along the load,
+            turned by 60 degrees in the direction of rotation.
+
+    Raises:
+        ModelError: without a load.
+        SolverError: if the film cannot carry it: at this inlet position, or at all.
+    """
+    W, c = np.asarray(load, dtype=float), bearing.clearance
+    size = float(np.hypot(*W))
+    if not size > 0:
+        raise ModelError(f"a load of {W} N presses the journal nowhere; it needs a size.")
+    turn = np.pi / 3 + np.arctan2(W[1], W[0])
+    given = 0.3 * c * np.array([np.cos(turn), np.sin(turn)]) if start is None else start
+    x, warm = np.array(given, dtype=float), None
+    for _ in range(TIMES):
+        now = film(bearing, x, speed=speed, viscosity=viscosity, warm=warm)
+        missing, warm = now.force[:2] + W, now.active
+        if np.hypot(*missing) <= ENOUGH * size:
+            return now
+        K = now.stiffness[:2, :2]
+        if not np.isfinite(K).all() or np.linalg.cond(K) > 1e12:
+            break
+        step = np.linalg.solve(K, missing)
+        step *= min(1.0, STEP * c / np.hypot(*step))
+        here = bearing.thinnest(x)
+        while bearing.thinnest(x + step) < 0.5 * here:
+            step /= 2
+        x = x + step
+        if bearing.thinnest(x) < THINNEST * c:
+            break
+    raise SolverError(_no_film(bearing, now, size), hint=_cure(bearing))
+
+
+def _no_film(bearing: JournalBearing, film: Film, load: float) -> str:
+    where = ", ".join(f"{np.degrees(g.angle):.0f}" for g in bearing.grooves)
+    there = f" with oil from grooves at {where} degrees" if bearing.grooves else ""
+    carried = float(np.hypot(*film.force[:2]))
+    return (
+        f"no film carries {load:.4g} N{there}: at {film.eccentricity:.3f} clearances, "
+        f"{bearing.thinnest(film.motion) * 1e6:.3g} micrometres thin, it carries {carried:.4g} N."
+    )
+
+
+def _cure(bearing: JournalBearing) -> str:
+    if bearing.cavitation == "jfo":
+        return "Move the inlet out of the loaded arc, upstream of it, or lower the load."
+    return "Lower the load, or raise speed, viscosity or length."
+
+
+@dataclass(frozen=True, slots=True)
+class Stability:
+    """How a rigid rotor on identical bearings leaves its equilibrium.
+
+    Attributes:
+        stiffness: that the whirl feels [N/m].
+        whirl_ratio: frequency of the whirl at the threshold over the speed; 0 if it never whirls.
+        critical_mass: per bearing, from which on the rotor whirls [kg]; inf if it never does.
+    """
+
+    stiffness: float
+    whirl_ratio: float
+    critical_mass: float
+
+
+def stability(stiffness: npt.ArrayLike, damping: npt.ArrayLike, speed: float) -> Stability:
+    """Stability of a rigid rotor from the coefficients of its bearings, by Routh and Hurwitz.
+
+    Args:
+        stiffness: (2, 2) of one bearing [N/m].
+        damping: (2, 2) of it [N s/m].
+        speed: [rad/s].
+
+    Raises:
+        ModelError: if the damping does not damp, so that no threshold exists.
+    """
+    K, C = np.asarray(stiffness, dtype=float), np.asarray(damping, dtype=float)
+    if not (C[0, 0] + C[1, 1] > 0 and np.linalg.det(C) > 0):
+        raise ModelError(f"damping {C.tolist()} N s/m feeds the whirl; it must be damping.")
+    across = K[0, 0] * C[1, 1] + K[1, 1] * C[0, 0] - K[0, 1] * C[1, 0] - K[1, 0] * C[0, 1]
+    k = across / (C[0, 0] + C[1, 1])
+    omega2 = ((k - K[0, 0]) * (k - K[1, 1]) - K[0, 1] * K[1, 0]) / np.linalg.det(C)
+    if omega2 <= 0:
+        return Stability(k, 0.0, np.inf)
+    return Stability(k, float(np.sqrt(omega2)) / speed, max(k, 0.0) / omega2)
+
+
+def threshold_speed(film: Film) -> float:
+    """Speed times sqrt(c/g) at which a rigid rotor with the load of this film starts to whirl.
+
+    The position of the journal, and with it the coefficients, are kept. inf if it never whirls.
+    """
+    found = stability(film.stiffness[:2, :2], film.damping[:2, :2], film.speed)
+    weight = float(np.hypot(*film.force[:2]))
+    return film.speed * float(np.sqrt(found.critical_mass * film.bearing.clearance / weight))
+
+
+def coefficients(film: Film) -> tuple[Array, Array]:
+    """Stiffness times c/W and damping times c speed/W, x along the load, y by 90 degrees from it.
+
+    Returns:
+        (2, 2), (2, 2).
+    """
+    W = -film.force[:2]
+    size = np.hypot(*W)
+    A = np.array([[W[0], -W[1]], [W[1], W[0]]]) / size
+    each = film.bearing.clearance / size
+    K, C = film.stiffness[:2, :2], film.damping[:2, :2]
+    return each * A.T @ K @ A, each * film.speed * A.T @ C @ A

@@ -1,0 +1,430 @@
+"""Journal bearings against tables, closed forms, and the balance of oil and power."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad, solve_ivp
+
+from rom.components.journal_bearing import (
+    Groove,
+    JournalBearing,
+    Oil,
+    coefficients,
+    equilibrium,
+    film,
+    iso_vg,
+    long_force,
+    long_pressure,
+    short_attitude,
+    short_coefficients,
+    short_eccentricity,
+    short_force,
+    short_sommerfeld,
+    stability,
+    threshold_speed,
+    warm_bearing,
+    warm_equilibrium,
+)
+from rom.errors import ModelError, SolverError
+
+RUN = {"speed": 100.0, "viscosity": 0.03}
+SIDES = [Groove(np.radians(a), np.radians(20)) for a in (90, -90)]
+
+
+def bearing(slender=1.0, grooves=(), cells=(180, 10), aligned=True, **more):
+    """100 mm thick, 0.1 mm of clearance, length over diameter as given."""
+    return JournalBearing(0.1, 0.1 * slender, 1e-4, grooves, cells=cells, aligned=aligned, **more)
+
+
+def load(b, sommerfeld):
+    """Load along X at which a bearing has that Sommerfeld number."""
+    unit = RUN["viscosity"] * RUN["speed"] * b.radius * b.length * (b.radius / b.clearance) ** 2
+    return np.array([unit / (np.pi * sommerfeld), 0.0])
+
+
+def numbers(line):
+    return [float(word) for word in line.split()]
+
+
+# Raimondi and Boyd (1958), film from the largest gap: L/D, eccentricity, S, attitude [deg],
+# (R/c) f, Q / (R c N L), share of Q that leaves at the sides. The S printed at 1, 0.4 is 1.4 % off.
+RAIMONDI_BOYD = [numbers(line) for line in """
+1 .1 1.33 79.5 26.4 3.37 .150
+1 .2 .631 74.02 12.8 3.59 .280
+1 .4 .264 63.10 5.79 3.99 .497
+1 .6 .121 50.58 3.22 4.33 .680
+1 .8 .0446 36.24 1.70 4.62 .842
+1 .9 .0188 26.45 1.05 4.74 .919
+1 .97 .00474 15.47 .514 4.82 .973
+.5 .1 4.31 81.62 85.6 3.43 .173
+.5 .2 2.03 74.94 40.9 3.72 .318
+.5 .4 .779 61.45 17.0 4.29 .552
+.5 .6 .319 48.14 8.10 4.85 .730
+.5 .8 .0923 33.31 3.26 5.41 .874
+.5 .9 .0313 23.66 1.60 5.69 .939
+.5 .97 .00609 13.75 .610 5.88 .980
+.25 .1 16.2 82.31 322 3.45 .180
+.25 .2 7.57 75.18 153 3.76 .330
+.25 .4 2.83 60.86 61.1 4.37 .567
+.25 .6 1.07 46.72 26.7 4.99 .746
+.25 .8 .261 31.04 8.80 5.60 .884
+.25 .9 .0736 21.85 3.50 5.91 .945
+.25 .97 .0101 12.22 .922 6.12 .984
+""".strip().splitlines()]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
+def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
+    slender, e, S, attitude, friction, flow, side = row
+    b = bearing(slender, [Groove(np.pi)], (240, 16))
+    f = film(b, [e * b.clearance, 0.0], **RUN)
+    F, nominal = f.force, b.radius * b.clearance * RUN["speed"] / (2 * np.pi) * b.length
+    rough = {0.97: 0.03, 0.4: 0.017}.get(e, 0.012)
+    assert f.sommerfeld == pytest.approx(S, rel=rough)
+    assert np.degrees(np.arctan2(F[1], -F[0])) == pytest.approx(attitude, abs=0.6)
+    assert f.friction() == pytest.approx(friction, rel=rough)
+    into = f.flow_around[len(f.P) // 2]
+    assert into / nominal == pytest.approx(flow, rel=0.008)
+    assert f.side_flow / into == pytest.approx(side, rel=0.008)
+
+
+# Lund and Thomsen (1978), grooves of 20 degrees on both sides of the load: L/D, S, eccentricity,
+# attitude [deg], Kxx Kxy Kyx Kyy, Cxx Cxy Cyy, threshold of a rigid rotor (own computation)
+LUND_THOMSEN = [numbers(line) for line in """
+.5 1.656 .244 65.85 1.69 5.06 -2.20 1.95 9.93 2.15 4.80 2.355
+.5 .917 .372 57.45 2.12 4.01 -1.30 1.85 7.70 2.06 3.23 2.304
+.5 .580 .477 51.01 2.67 3.70 -.78 1.75 6.96 1.94 2.40 2.300
+.5 .379 .570 45.43 3.33 3.64 -.43 1.68 6.76 1.87 1.89 2.377
+.5 .244 .655 40.25 4.21 3.74 -.13 1.64 6.87 1.82 1.54 2.618
+1 .991 .150 70.58 1.56 7.29 -2.16 1.52 14.66 1.58 4.49 2.098
+1 .635 .224 63.54 1.62 5.33 -1.57 1.56 10.80 1.70 3.41 2.107
+1 .235 .460 49.27 2.19 3.57 -.80 1.55 7.36 1.89 2.19 2.105
+1 .159 .559 44.33 2.73 3.36 -.48 1.48 6.94 1.78 1.74 2.162
+1 .108 .650 39.72 3.45 3.34 -.23 1.44 6.89 1.72 1.43 2.321
+""".strip().splitlines()]  # fmt: skip
+
+
+def agree(values, printed):
+    values, printed = np.asarray(values), np.asarray(printed)
+    off = np.abs(values - printed)
+    assert np.all((off < 0.055) | (off < 0.045 * np.abs(printed))), values
+
+
+@pytest.mark.parametrize("row", LUND_THOMSEN, ids=lambda r: f"{r[0]}-{r[1]}")
+def test_two_grooves_have_the_coefficients_of_lund_and_thomsen(row):
+    b = bearing(row[0], SIDES)
+    f = equilibrium(b, load(b, row[1]), **RUN)
+    K, C = coefficients(f)
+    assert f.eccentricity == pytest.approx(row[2], abs=0.006)
+    assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[3], abs=1.0)
+    agree([*K.ravel(), C[0, 0], C[0, 1], C[1, 0], C[1, 1]], [*row[4:10], row[9], row[10]])
+    assert threshold_speed(f) == pytest.approx(row[11], rel=0.02)
+
+
+@pytest.mark.parametrize("row", [
+    (.211, .260, 87.79, 6.65, 4.36, -3.21, .86, 13.09, -2.23, 3.70),
+    (.120, .350, 81.80, 4.99, 3.54, -1.52, 1.14, 9.04, -.01, 2.49),
+])  # fmt: skip
+def test_a_two_lobed_bearing_has_the_coefficients_of_lund_and_thomsen(row):
+    b = bearing(1.0, SIDES, preload=0.5)
+    f = equilibrium(b, load(b, row[0]), **RUN)
+    K, C = coefficients(f)
+    assert f.eccentricity == pytest.approx(row[1], abs=0.006)
+    assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[2], abs=1.0)
+    agree([*K.ravel(), C[0, 0], C[0, 1], C[1, 1]], row[3:])
+
+
+# --- closed forms ---
+
+# eccentricity, S (L/D)^2, attitude [deg], Kxx Kxy Kyx Kyy, Cxx, Cxy, Cyy, whirl ratio, threshold
+SHORT = [numbers(line) for line in """
+.1 .989979 82.708 1.3284 10.3811 -9.7577 2.5308 20.4872 2.5325 19.7905 .5029 2.7413
+.3 .272176 68.178 1.7949 4.4825 -2.6246 2.4126 8.1530 2.4270 6.0612 .5194 2.6058
+.5 .106049 53.680 2.9233 3.9766 -.8577 2.2099 6.6148 2.2450 3.0539 .5146 2.5417
+.7 .032964 38.704 5.6594 4.5347 .1734 1.9695 7.0987 2.0267 1.6240 .3446 3.6278
+""".strip().splitlines()]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", SHORT, ids=lambda r: f"{r[0]}")
+def test_short_bearings_have_their_closed_form_by_quadrature_too(row):
+    e, S, attitude, *rest = row
+    assert_allclose(short_sommerfeld(e), S, rtol=2e-5)
+    assert_allclose(np.degrees(short_attitude(e)), attitude, atol=6e-4)
+    assert short_eccentricity(S) == pytest.approx(e, rel=2e-5)
+    K, C = short_coefficients(e)
+    assert_allclose([*K.ravel(), C[0, 0], C[0, 1], C[1, 1]], rest[:7], atol=6e-5)
+    s = stability(K, C, 1.0)
+    assert_allclose([s.whirl_ratio, np.sqrt(s.critical_mass)], rest[7:], atol=6e-5)
+    x = e * np.array([np.cos(short_attitude(e)), np.sin(short_attitude(e))])
+    W, h, still = -short_force(x, (0, 0)), 1e-5, np.zeros(2)
+    assert_allclose(W, [1 / (4 * np.pi * S), 0.0], atol=2e-5 * W[0])
+    for k, d in enumerate(h * np.eye(2)):
+        by_x = short_force(x - d, still) - short_force(x + d, still)
+        by_v = short_force(x, still - d) - short_force(x, still + d)
+        assert_allclose(K[:, k], by_x / (2 * h * W[0]), rtol=1e-5, atol=1e-5)
+        assert_allclose(C[:, k], by_v / (2 * h * W[0]), rtol=1e-5, atol=1e-5)
+
+
+def test_the_short_bearing_of_friswell():
+    """100 mm, 30 mm long, 0.1 mm of clearance, 525 N at 1500 rpm: numbers of ROSS."""
+    S = 0.1 * 25 * 0.03 * 0.1 / 525 * 500**2 * 0.3**2
+    e = short_eccentricity(S)
+    assert e == pytest.approx(0.266298, abs=1e-6)
+    K, C = (a[::-1, ::-1] * [[1, -1], [-1, 1]] * 525 / 1e-4 for a in short_coefficients(e))
+    assert_allclose(K / 1e6, [[12.80796, 16.393593], [-25.060393, 8.815303]], rtol=1e-6)
+    assert_allclose(C[0] * 1e-3 / (50 * np.pi), [232.89693, -81.924371], rtol=1e-6)
+    assert_allclose(C[1, 1] * 1e-3 / (50 * np.pi), 294.911619, rtol=1e-6)
+
+
+def test_the_film_of_a_short_bearing_is_ocvirks():
+    b = bearing(0.02, cells=(360, 20))
+    f = film(b, [0.5e-4, 0.0], **RUN)
+    assert f.sommerfeld * 0.02**2 == pytest.approx(0.106049, rel=2e-3)
+    K, C = coefficients(f)
+    short = short_coefficients(0.5)
+    assert_allclose(K, short[0], atol=0.02)
+    assert_allclose(C, short[1], atol=0.03)
+
+
+def test_the_film_of_a_long_bearing_is_sommerfelds():
+    b = bearing(40.0, [Groove(np.pi)], (360, 8), cavitation="none")
+    f = film(b, [0.5e-4, 0.0], **RUN)
+    theta = np.linspace(0, 2 * np.pi, 361)[:-1]
+    P, exact = f.P[:, 0], long_pressure(theta - np.pi, 0.5)
+    assert_allclose(P, exact, atol=4e-4 * exact.max())
+    for k, turn in ((0, lambda t: -np.cos(t)), (1, np.sin)):
+        F = quad(lambda t, turn=turn: long_pressure(t, 0.5) * turn(t), 0, np.pi)[0]
+        assert long_force(0.5)[k] == pytest.approx(F, rel=1e-9)
+    assert 1 / (np.pi * np.hypot(*long_force(0.5))) == pytest.approx(0.061770, rel=2e-5)
+
+
+# --- the film itself ---
+
+STATE = np.array([0.4e-4, 0.3e-4, 1e-4, -2e-4])
+RATE = np.array([5e-4, 2e-4, -0.3e-2, 0.4e-2])
+
+
+@pytest.mark.parametrize("law", ["none", "reynolds", "jfo"])
+def test_stiffness_and_damping_are_the_derivatives_of_the_force(law):
+    b = bearing(1.0, [Groove(1.2, 0.3, 1e5, share=0.7)], (60, 8), False, cavitation=law)
+    f = film(b, STATE, RATE, **RUN)
+    for k, d in enumerate(1e-6 * np.diag(b.scale)):
+        K = film(b, STATE - d, RATE, **RUN).force - film(b, STATE + d, RATE, **RUN).force
+        assert_allclose(
+            f.stiffness[:, k], K / (2 * d[k]), atol=1e-6 * np.abs(f.stiffness[:, k]).max()
+        )
+        d = 100 * d
+        C = film(b, STATE, RATE - d, **RUN).force - film(b, STATE, RATE + d, **RUN).force
+        assert_allclose(f.damping[:, k], C / (2 * d[k]), atol=1e-6 * np.abs(f.damping[:, k]).max())
+
+
+def test_pressure_and_void_complement_each_other():
+    """Independent of the cells that a solution starts from."""
+    b = bearing(1.0, [Groove(1.2, 0.3)], (60, 8), False, cavitation="jfo")
+    f = film(b, STATE, RATE, **RUN)
+    assert f.P.min() >= 0 and 0 <= f.fill.min() < 0.8 and f.fill.max() <= 1 + 1e-12
+    assert np.abs(f.P * (1 - f.fill)).max() < 1e-12
+    start = np.random.default_rng(2).integers(0, 2, f.active.shape)
+    assert_allclose(film(b, STATE, RATE, **RUN, warm=start).P, f.P, atol=1e-12)
+
+
+def test_oil_is_conserved_around_the_bearing():
+    b = bearing(1.0, [Groove(np.pi)], cavitation="jfo")
+    f = film(b, [0.5e-4, 0.0], **RUN)
+    into, out = f.flow_around[[90, 89]]
+    assert into - out == pytest.approx(f.side_flow, rel=1e-10)
+    void = ~np.any(f.active, axis=1) & (np.arange(180) != 90)
+    assert void.sum() > 40
+    assert_allclose(f.flow_around[void], out, rtol=1e-10)
+
+
+def test_both_laws_agree_when_oil_comes_in_at_the_largest_gap():
+    both = [
+        film(bearing(1.0, [Groove(np.pi)], cavitation=law), [0.6e-4, 0.0], **RUN)
+        for law in ("reynolds", "jfo")
+    ]
+    assert_allclose(both[0].P, both[1].P, atol=1e-12)
+    assert both[0].fill.min() == 1 and both[1].fill.min() < 0.9
+
+
+def test_power_is_lost_in_shear_and_in_flow():
+    """Friction times speed less work on the journal, cell by cell."""
+    b = bearing(0.8, [Groove(-2.0)], (90, 12), False, cavitation="jfo")
+    f = film(b, STATE, RATE, **RUN)
+    h, p, mu = f.thickness, f.pressure, f.viscosity
+    cell = b.radius * 2 * np.pi / 90 * b.length / 12
+    shear = np.sum(mu * (f.speed * b.radius) ** 2 * f.fill / h) * cell
+    ahead = film(b, STATE, RATE, **RUN).bearing.grid
+    theta, z = 2 * np.pi * (np.arange(90) + 0.5) / 90, ahead.Z * b.length
+    m = STATE
+
+    def gap(theta, z):
+        return b.clearance - (m[0] + z * m[3]) * np.cos(theta) - (m[1] - z * m[2]) * np.sin(theta)
+
+    around = np.diff(np.vstack([p, p[:1]]), axis=0) / (b.radius * 2 * np.pi / 90)
+    flow = np.sum(gap(theta[:, None], z) ** 3 * around**2) / (12 * mu) * cell
+    faces, dz = ahead.Z_face * b.length, b.length / 12
+    along = np.diff(np.hstack([np.zeros((90, 1)), p, np.zeros((90, 1))]), axis=1) / dz
+    share = np.array([2.0, *[1.0] * 11, 2.0])  # the drop to the ends takes half a cell
+    nodes = 2 * np.pi * np.arange(90) / 90
+    flow += np.sum(share * gap(nodes[:, None], faces) ** 3 * along**2) / (12 * mu) * cell
+    assert f.dissipated == pytest.approx(shear + flow, rel=1e-11)
+
+
+def test_a_tilted_journal_is_carried_from_both_ends_alike():
+    b = bearing(1.0, (), (90, 8), False)
+    f = film(b, [0.4e-4, 0.0, 0.0, 3e-4], **RUN).force
+    other = film(b, [0.4e-4, 0.0, 0.0, -3e-4], **RUN).force
+    assert_allclose(f, other * [1, 1, -1, -1], atol=1e-9 * np.abs(f).max())
+    assert f[3] * 3e-4 < 0  # it is turned back
+    half = film(bearing(1.0, (), (90, 4)), [0.4e-4, 0.0], **RUN).force
+    assert_allclose(film(b, [0.4e-4, 0.0], **RUN).force, half, atol=1e-9 * np.abs(half).max())
+
+
+def test_the_force_converges_with_the_square_of_the_cells():
+    cells = [(60, 5), (120, 10), (240, 20)]
+    F = [film(bearing(1.0, [Groove(np.pi)], c), [0.5e-4, 0], **RUN).force[1] for c in cells]
+    assert 1.7 < np.log2((F[0] - F[1]) / (F[1] - F[2])) < 2.3
+
+
+# --- inlets, statics, whirl ---
+
+# one groove of 20 degrees, L/D = 0.5, S = 0.5: its angle from the load; law; eccentricity, attitude
+# [deg], Kxx Kxy Kyx Kyy, threshold. Own computations with another program.
+INLETS = [
+    (180, "reynolds", .504, 55.1, 2.55, 3.65, -.93, 2.14, 2.57),
+    (180, "jfo", .503, 53.5, 2.66, 3.58, -1.11, 2.18, 2.48),
+    (-90, "jfo", .509, 49.1, 2.87, 3.64, -.65, 1.71, 2.32),
+    (90, "reynolds", .504, 55.1, 2.55, 3.65, -.93, 2.14, 2.57),
+    (90, "jfo", .556, 35.9, 5.30, 2.37, -1.13, 2.19, 3.26),
+    (-45, "reynolds", .580, 38.6, 3.78, 4.78, -.30, 1.94, 2.06),
+    (-45, "jfo", .611, 27.4, 4.92, 4.79, -.23, 1.02, 1.19),
+    (135, "jfo", .514, 46.9, 3.52, 3.25, -1.23, 2.16, 2.46),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", INLETS, ids=lambda r: f"{r[0]}-{r[1]}")
+def test_where_oil_comes_in_matters_when_oil_is_conserved(row):
+    b = bearing(0.5, [Groove(np.radians(row[0]), np.radians(20))], cavitation=row[1])
+    f = equilibrium(b, load(b, 0.5), **RUN)
+    assert f.eccentricity == pytest.approx(row[2], abs=0.01)
+    assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[3], abs=1.5)
+    assert_allclose(coefficients(f)[0].ravel(), row[4:8], atol=0.2)
+    assert threshold_speed(f) == pytest.approx(row[8], rel=0.03)
+
+
+# torque on a pinion of 26 teeth, module 4: eccentricity, attitude [deg], travel along the load and
+# across [micrometres], Kxx [N/m]
+PINION = [
+    (50, .4648, 51.82, 14.37, 18.27, 2.64e7), (100, .6129, 42.90, 22.45, 20.86, 7.61e7),
+    (200, .7328, 35.35, 29.88, 21.20, 2.22e8), (500, .8454, 27.24, 37.58, 19.35, 9.37e8),
+    (1000, .9019, 22.24, 41.74, 17.07, 2.83e9),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", PINION, ids=lambda r: f"{r[0]} N m")
+def test_the_bearings_of_a_pinion_let_it_travel(row):
+    b = JournalBearing(0.05, 0.025, 50e-6, SIDES, cells=(180, 12), aligned=True)
+    W = row[0] / (0.052 * np.cos(np.radians(20))) / 2
+    f = equilibrium(b, (W, 0.0), speed=100 * np.pi, viscosity=0.02)
+    assert f.eccentricity == pytest.approx(row[1], abs=1.5e-3)
+    assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[2], abs=0.2)
+    assert_allclose(1e6 * f.motion[:2], row[3:5], atol=0.1)
+    assert f.stiffness[0, 0] == pytest.approx(row[5], rel=0.02)
+
+
+def test_short_bearings_whirl_least_willingly_up_to_a_speed():
+    """The lowest threshold, and the eccentricity beyond which nothing whirls."""
+    e = np.linspace(0.40, 0.52, 121)
+    speed = [np.sqrt(stability(*short_coefficients(x), 1.0).critical_mass) for x in e]
+    assert min(speed) == pytest.approx(2.53171, abs=1e-5)
+    assert e[np.argmin(speed)] == pytest.approx(0.4570, abs=1e-3)
+    masses = [stability(*short_coefficients(x), 1.0).critical_mass for x in (0.756, 0.7561)]
+    assert np.isfinite(masses[0]) and np.isinf(masses[1])
+
+
+@pytest.mark.parametrize(("speed", "grows"), [(2.50, False), (2.55, True)])
+def test_a_rotor_in_short_bearings_whirls_beyond_the_threshold(speed, grows):
+    e = 0.457
+    rest = e * np.array([np.cos(short_attitude(e)), np.sin(short_attitude(e))])
+    W = short_force(rest, (0, 0))
+
+    def motion(_, s):
+        force = short_force(s[:2], s[2:]) / -W[0]
+        return [*s[2:], *((np.array([1.0, 0.0]) + force) / speed**2)]
+
+    s = solve_ivp(motion, (0, 300), [rest[0] + 2e-3, rest[1], 0, 0], rtol=1e-8, atol=1e-10)
+    away = np.hypot(*(s.y[:2] - rest[:, None]))
+    early, late = away[(s.t > 50) & (s.t < 100)].max(), away[s.t > 250].max()
+    assert (late > 1.02 * early) == grows
+    turned = np.unwrap(np.arctan2(*(s.y[:2] - rest[:, None])[::-1]))[s.t > 150]
+    whirl = (turned[-1] - turned[0]) / np.ptp(s.t[s.t > 150])
+    expected = stability(*short_coefficients(e), 1.0).whirl_ratio
+    assert whirl == pytest.approx(expected, abs=0.01) == pytest.approx(0.5, abs=0.03)
+
+
+# --- oil and heat ---
+
+
+@pytest.mark.parametrize(("grade", "A", "B", "nu"), [
+    (32, 9.5308, 3.7466, 15.19), (46, 9.4180, 3.6844, 20.62), (68, 9.3097, 3.6244, 28.66),
+])  # fmt: skip
+def test_oil_thins_by_walthers_law(grade, A, B, nu):
+    oil = iso_vg(grade)
+    assert_allclose(oil.law(), (A, B), atol=6e-5)
+    assert_allclose(oil.viscosity([40, 60]), np.array([grade, nu]) * 870e-6, rtol=4e-4)
+
+
+def test_the_heat_that_leaves_is_the_heat_that_is_made():
+    b, oil = bearing(1.0, [Groove(np.pi)], (120, 8)), iso_vg(46)
+    w = warm_equilibrium(b, (3000.0, 0.0), oil, speed=300.0, inlet=40.0, carried=1.0)
+    assert w.film.viscosity == pytest.approx(float(oil.viscosity(w.temperature)), rel=1e-6)
+    assert 40 < w.temperature == pytest.approx(40 + w.rise / 2, abs=1e-5)
+    assert oil.density * oil.heat * w.film.side_flow * w.rise == pytest.approx(w.power, rel=1e-9)
+    assert w.power == pytest.approx(w.film.friction_torque * 300.0, rel=1e-12)
+
+
+def test_raimondi_and_boyds_rise_of_temperature():
+    f = film(bearing(1.0, [Groove(np.pi)], (240, 16)), [0.6e-4, 0.0], **RUN)
+    flow, side = f.flow_around[120], f.side_flow
+    pressure = np.hypot(*f.force[:2]) / 0.1**2
+    assert f.dissipated / (flow - side / 2) / pressure == pytest.approx(14.2, rel=0.01)
+
+
+def test_heat_closes_and_opens_the_clearance():
+    b = bearing()
+    assert warm_bearing(b, bush=20, shaft=20).clearance == pytest.approx(b.clearance)
+    assert warm_bearing(b, bush=0, shaft=20).clearance == pytest.approx(1e-4 - 0.05 * 11.7e-6 * 20)
+    with pytest.raises(ModelError, match="the shaft seizes"):
+        warm_bearing(b, bush=0, shaft=200)
+
+
+# --- what cannot be ---
+
+
+def test_a_groove_in_the_loaded_arc_leaves_no_film():
+    b = bearing(0.5, [Groove(np.radians(20), np.radians(20))], cavitation="jfo")
+    with pytest.raises(SolverError, match=r"no film carries .* N with oil from grooves at 20 deg"):
+        equilibrium(b, load(b, 0.05), **RUN)
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: JournalBearing(0.1, 0.1, 0.1), "a film is thin"),
+    (lambda: JournalBearing(0.1, np.nan, 1e-4), "no bearing has"),
+    (lambda: bearing(preload=1.0), "preload 1.0 leaves no room"),
+    (lambda: bearing(cavitation="jfo"), "without a groove has no oil"),
+    (lambda: bearing(cavitation="ideal"), "no cavitation 'ideal'"),
+    (lambda: bearing(cells=(8, 8)), "too few"),
+    (lambda: film(bearing(), [1.1e-4, 0], **RUN), "touches the bush"),
+    (lambda: film(bearing(), [0, 0, 1e-4, 0], **RUN), "solved as aligned"),
+    (lambda: film(bearing(), [0, 0], speed=-1.0, viscosity=0.1), "from its other end"),
+    (lambda: equilibrium(bearing(), [0, 0], **RUN), "presses the journal nowhere"),
+    (lambda: short_sommerfeld(1.2), "not between 0 and 1"),
+    (lambda: short_eccentricity(0.0), "no loaded bearing"),
+    (lambda: stability(np.eye(2), -np.eye(2), 1.0), "feeds the whirl"),
+    (lambda: Oil(5.0, 40.0), "hot oil is thinner"),
+    (lambda: iso_vg(10), "ISO VG 10"),
+])  # fmt: skip
+def test_what_cannot_be_is_said(make, said):
+    with pytest.raises(ModelError, match=said):
+        make()
