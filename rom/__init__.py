@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rom.errors import RomError
     from rom.io.export import export
     from rom.io.family import load, save
+    from rom.io.history import write_history
     from rom.io.vtu import write_stress, write_stress_history
     from rom.mbs.audit import audit
     from rom.mbs.campbell import campbell
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from rom.reduction.polynomial import FourierLegendre, Polynomial
     from rom.reduction.snapshots import Snapshots
     from rom.report import write_report
+    from rom.view.motion import write_animation
     from rom.workflow import mass_properties, modes, reduce, substructure
 
 __version__ = "0.1.0"
@@ -118,6 +120,8 @@ __all__ = [
     "simulate",
     "substructure",
     "transmissibility",
+    "write_animation",
+    "write_history",
     "write_report",
     "write_stress",
     "write_stress_history",
@@ -186,6 +190,8 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "simulate": "mbs.integrate",
     "substructure": "workflow",
     "transmissibility": "mbs.response",
+    "write_animation": "view.motion",
+    "write_history": "io.history",
     "write_report": "report",
     "write_stress": "io.vtu",
     "write_stress_history": "io.vtu",

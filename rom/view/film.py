@@ -126,9 +126,9 @@ def _stage(
             u = _deformation(surface, solution.elastic(name)[steps])
             X, triangles, size = surface.points + magnify * u, surface.triangles, u
         else:
-            X, triangles = shapes[name] if name in shapes else _bars(part)
+            X, triangles = shapes[name] if name in shapes else bars(part)
             X, size = np.asarray(X, dtype=float)[None], None
-        points = _placed(X, pose)
+        points = placed(X, pose)
         values = None if size is None else np.linalg.norm(size, axis=2)
         actors.append(Actor(points, triangles, values, METAL[rigid % len(METAL)]))
         edges = sharp_edges(X[0], triangles)
@@ -155,7 +155,7 @@ def _poses(solution: Any, name: str, steps: Any) -> tuple[Array, Array]:
     return solution.position(name)[steps], A
 
 
-def _placed(X: Array, pose: tuple[Array, Array]) -> Array:
+def placed(X: Array, pose: tuple[Array, Array]) -> Array:
     """(f, n, 3) world positions of body points (1 or f, n, 3)."""
     r, A = pose
     return r[:, None] + np.einsum("fab,fnb->fna", A, np.broadcast_to(X, (len(r), *X.shape[1:])))
@@ -166,7 +166,7 @@ def _deformation(surface: Any, q: Array) -> Array:
     return (q @ surface.shape.T).reshape(len(q), -1, 3)
 
 
-def _bars(part: Any) -> Mesh:
+def bars(part: Any) -> Mesh:
     """Round bars from the mass centre to the markers, or a small cube-like knot without any."""
     ends = [np.asarray(p) for p in part.points.values() if np.linalg.norm(p) > 0]
     reach = max((np.linalg.norm(p) for p in ends), default=0.0)

@@ -1,0 +1,188 @@
+"""Moving bodies as glTF 2.0 binary (``.glb``), which browsers, slides and Blender play.
+
+A body is a node that moves; its elastic coordinates are the weights of morph targets, one per
+shape, so that the size of a file hardly depends on the number of instants.
+
+Source:
+    Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022), sections 3.6, 3.7, 3.11 and 4.
+"""
+
+import json
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.io.files import write_whole
+from rom.model import Array, Index
+
+FLOAT, UNSIGNED = 5126, 5125  # componentType
+VERTICES, INDICES = 34962, 34963  # target of a bufferView
+KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+NEGLIGIBLE = 1e-6  # share of the largest displacement below which a shape is left out
+
+
+@dataclass(frozen=True, slots=True)
+class MovingMesh:
+    """A body in a film.
+
+    Attributes:
+        name: name of the body.
+        points: (n, 3) undeformed, body frame [m].
+        triangles: (t, 3) corners, seen from outside counter-clockwise.
+        origin: (f, 3) origin of its frame [m].
+        orientation: (f, 4) quaternion of its frame, scalar first.
+        shapes: (3 n, r) displacement per unit of each elastic coordinate.
+        q: (f, r) elastic coordinates.
+        colour: (3,) red, green, blue from 0 to 1.
+    """
+
+    name: str
+    points: Array
+    triangles: Index
+    origin: Array
+    orientation: Array
+    shapes: Array
+    q: Array
+    colour: tuple[float, float, float] = (0.55, 0.6, 0.66)
+
+
+@dataclass(slots=True)
+class _Document:
+    """A file as it grows: its JSON and its one buffer."""
+
+    json: dict[str, Any]
+    data: bytearray = field(default_factory=bytearray)
+
+    def put(self, kind: str, entry: dict[str, Any]) -> int:
+        self.json.setdefault(kind, []).append(entry)
+        return len(self.json[kind]) - 1
+
+    def accessor(
+        self,
+        values: Any,
+        *,
+        component: int = FLOAT,
+        target: int | None = None,
+        bounds: bool = False,
+    ) -> int:
+        """Add an array (m,) or (m, c)."""
+        A = np.ascontiguousarray(values, dtype="<f4" if component == FLOAT else "<u4")
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": A.nbytes}
+        self.data += A.tobytes()
+        if target is not None:
+            view["target"] = target
+        entry = {
+            "bufferView": self.put("bufferViews", view),
+            "componentType": component,
+            "count": len(A),
+            "type": KINDS[A.shape[1] if A.ndim == 2 else 1],
+        }
+        if bounds:
+            low, high = (np.atleast_1d(x).astype(float).tolist() for x in (A.min(0), A.max(0)))
+            entry |= {"min": low, "max": high}
+        return self.put("accessors", entry)
+
+
+def write_glb(
+    bodies: list[MovingMesh], times: Array, path: str | Path, *, up: Array, title: str
+) -> Path:
+    """Write a film.
+
+    Args:
+        bodies: what is seen.
+        times: (f,) when each instant is shown, ascending from zero [s].
+        path: file to write.
+        up: (3,) upright direction of the world, which the format calls y.
+        title: name of the scene.
+
+    Raises:
+        ConfigError: if the place is not writable.
+    """
+    generator = {"version": "2.0", "generator": "fenicsx-rom"}
+    document = _Document({"asset": generator, "scene": 0})
+    root = document.put("nodes", {"name": "world", "rotation": _scalar_last(upright(up))})
+    clock = document.accessor(times, bounds=True)
+    motion: dict[str, Any] = {"name": title, "samplers": [], "channels": []}
+    for body in bodies:
+        _add(document, body, clock, motion)
+    document.json["nodes"][root]["children"] = list(range(1, 1 + len(bodies)))
+    document.json["scenes"] = [{"name": title, "nodes": [root]}]
+    document.json["animations"] = [motion]
+    content = _packed(document)
+    write_whole(path, lambda file: file.write(content))
+    return Path(path)
+
+
+def upright(up: Array) -> Array:
+    """(4,) quaternion of the shortest rotation that takes a direction to y."""
+    up = np.asarray(up, dtype=float) / np.linalg.norm(up)
+    p = np.r_[1 + up[1], np.cross(up, [0.0, 1.0, 0.0])]
+    if p[0] < 1e-12:  # upside down
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    return p / np.linalg.norm(p)
+
+
+def _add(document: _Document, body: MovingMesh, clock: int, motion: dict[str, Any]) -> None:
+    shapes, weights = _targets(body)
+    points = document.accessor(body.points, target=VERTICES, bounds=True)
+    corners = body.triangles.ravel()
+    indices = document.accessor(corners, component=UNSIGNED, target=INDICES)
+    primitive: dict[str, Any] = {"attributes": {"POSITION": points}, "indices": indices}
+    primitive["material"] = document.put("materials", _material(body.colour))
+    mesh: dict[str, Any] = {"name": body.name, "primitives": [primitive]}
+    if shapes:
+        primitive["targets"] = [
+            {"POSITION": document.accessor(u, target=VERTICES, bounds=True)} for u in shapes
+        ]
+        mesh["weights"] = weights[0].tolist()
+    quaternion = _scalar_last(_continuous(body.orientation))
+    node = {"name": body.name, "mesh": document.put("meshes", mesh)}
+    node |= {"translation": body.origin[0].tolist(), "rotation": quaternion[0]}
+    number = document.put("nodes", node)
+    tracks = {"translation": body.origin, "rotation": np.array(quaternion)}
+    if shapes:
+        tracks["weights"] = weights.ravel()
+    for kind, values in tracks.items():
+        sampler = {"input": clock, "output": document.accessor(values), "interpolation": "LINEAR"}
+        motion["samplers"].append(sampler)
+        target = {"node": number, "path": kind}
+        motion["channels"].append({"sampler": len(motion["samplers"]) - 1, "target": target})
+
+
+def _targets(body: MovingMesh) -> tuple[list[Array], Array]:
+    """Displacements (n, 3) of the shapes that are seen, and weights (f, k) from -1 to 1."""
+    reach = np.abs(body.q).max(axis=0, initial=0.0)
+    moved = body.shapes * reach
+    sizes = np.abs(moved).max(axis=0, initial=0.0)
+    kept = np.flatnonzero(sizes > NEGLIGIBLE * sizes.max(initial=0.0))
+    shapes = [moved[:, k].reshape(-1, 3) for k in kept]
+    return shapes, body.q[:, kept] / np.where(reach[kept] > 0, reach[kept], 1.0)
+
+
+def _material(colour: tuple[float, float, float]) -> dict[str, Any]:
+    surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.2, "roughnessFactor": 0.6}
+    return {"pbrMetallicRoughness": surface, "doubleSided": True}
+
+
+def _continuous(p: Array) -> Array:
+    """Signs of quaternions such that neighbours are near."""
+    flips = np.where(np.einsum("fi,fi->f", p[1:], p[:-1]) < 0, -1.0, 1.0)
+    return p * np.cumprod(np.r_[1.0, flips])[:, None]
+
+
+def _scalar_last(p: Array) -> Any:
+    return np.roll(p, -1, axis=-1).tolist()
+
+
+def _packed(document: _Document) -> bytes:
+    """The header and the two chunks, each filled up to a multiple of four bytes."""
+    document.json["buffers"] = [{"byteLength": len(document.data)}]
+    text = json.dumps(document.json, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    data = bytes(document.data) + b"\0" * (-len(document.data) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(data), b"BIN\0") + data
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks

@@ -1,0 +1,138 @@
+"""Histories of a motion as a table (CSV) or as a tree of arrays (HDF5), units in their names."""
+
+import csv
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, ResourceError
+from rom.io.files import check_writable, write_whole
+from rom.model import Array
+
+XYZ = ("x", "y", "z")
+ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One quantity over time.
+
+    Attributes:
+        path: where it stands, outermost first, e.g. ("bodies", "rod", "position").
+        unit: its unit; a comma separates those of the columns when they differ.
+        columns: name of each column.
+        values: (n_t, c) its history.
+    """
+
+    path: tuple[str, ...]
+    unit: str
+    columns: tuple[str, ...]
+    values: Array
+
+
+def write_history(solution: Any, path: str | Path, *, every: int = 1) -> Path:
+    """Write the motion of every body and marker, the reactions and the energies.
+
+    Positions and velocities are of the world, angular velocities of the body frame; a reaction
+    acts on the second body of its joint, its moment about the second marker.
+
+    Args:
+        solution: a `rom.mbs.solution.Solution` with n_t instants.
+        path: ``.csv`` for one table with a line per instant, or ``.h5`` (``.hdf5``) for a tree of
+            arrays with their units as attributes.
+        every: take every so many instants.
+
+    Raises:
+        ConfigError: for another ending, a wrong ``every``, or a place that is not writable.
+        ResourceError: if h5py is missing for ``.h5``, or the disk is full.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in WRITERS:
+        raise ConfigError(f"{path} has the ending {ending!r}; known: {', '.join(sorted(WRITERS))}.")
+    if isinstance(every, bool) or not isinstance(every, int | np.integer) or every < 1:
+        raise ConfigError(f"every = {every!r} is no number of instants.")
+    path = check_writable(path)
+    rows = slice(None, None, int(every))
+    found = tuple(
+        Channel(c.path, c.unit, c.columns, c.values[rows].reshape(len(solution.t[rows]), -1))
+        for c in channels(solution)
+    )
+    content = WRITERS[ending](solution, solution.t[rows], found)
+    write_whole(path, lambda file: file.write(content))
+    return path
+
+
+def channels(solution: Any) -> Iterator[Channel]:
+    """All quantities of a motion, body by body, then joints, then energies."""
+    for name, part in solution.mechanism.parts.items():
+        yield from _of_body(solution, name, part)
+    for joint in sorted(set(solution.packed.row_owner)):
+        loads = solution.reaction(joint)
+        yield Channel(("joints", joint, "force"), "N", XYZ, loads[:, :3])
+        yield Channel(("joints", joint, "moment"), "N m", XYZ, loads[:, 3:])
+    for name in ENERGIES:
+        values = getattr(solution.energy, name)
+        yield Channel(("energy", name), "J", ("",), values)
+
+
+def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
+    place = ("bodies", name)
+    yield Channel((*place, "position"), "m", XYZ, solution.position(name))
+    quaternion = solution.orientation(name)
+    yield Channel((*place, "orientation"), "1", ("p0", "p1", "p2", "p3"), quaternion)
+    yield Channel((*place, "velocity"), "m/s", XYZ, solution.velocity(name))
+    yield Channel((*place, "omega"), "rad/s", XYZ, solution.omega(name))
+    if part.r:
+        labels = tuple(f"q{k + 1}" for k in range(part.r))
+        normalised = np.allclose(part.flexible.M, np.eye(part.r), rtol=0, atol=1e-6)
+        unit = "m sqrt(kg)" if normalised else "per shape"
+        yield Channel((*place, "elastic"), unit, labels, solution.elastic(name))
+    for marker in part.names:
+        at = (*place, "markers", marker)
+        yield Channel((*at, "position"), "m", XYZ, solution.position(name, marker))
+        yield Channel((*at, "velocity"), "m/s", XYZ, solution.velocity(name, marker))
+
+
+def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
+    """Comma separated, one line of names with units in brackets, then numbers of 17 digits."""
+    head = ["t [s]"]
+    for c in found:
+        head += [f"{' '.join(c.path[1:])} {x}".strip() + f" [{c.unit}]" for x in c.columns]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(head)
+    np.savetxt(text, np.column_stack([t, *(c.values for c in found)]), "%.17g", ",")
+    return text.getvalue().encode()
+
+
+def _tree(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
+    try:
+        import h5py
+    except ModuleNotFoundError as error:
+        raise ResourceError(
+            "h5py is not installed.", hint="rom doctor says what to type; .csv needs nothing."
+        ) from error
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", track_order=True) as file:
+        file.attrs["schema"], file.attrs["version"] = "rom-history", (1, 0)
+        file.attrs["status"] = solution.status
+        file["time"] = t
+        file["time"].attrs["unit"] = "s"
+        for c in found:
+            place = "/".join(quoted(word) for word in c.path)
+            file[place] = c.values[:, 0] if c.columns == ("",) else c.values
+            file[place].attrs["unit"] = c.unit
+            if c.columns != ("",):
+                file[place].attrs["columns"] = c.columns
+    return memory.getvalue()
+
+
+def quoted(name: str) -> str:
+    """A name as a part of an HDF5 path, where a slash separates and a single dot stays."""
+    return name.replace("%", "%25").replace("/", "%2F") if name.strip(".") else "%2E" * len(name)
+
+
+WRITERS = {".csv": _table, ".h5": _tree, ".hdf5": _tree}
