@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rom.mbs.checkpoint import load_state, save_state
     from rom.mbs.equilibrium import equilibrium
     from rom.mbs.integrate import simulate
+    from rom.mbs.inverse import inverse_dynamics
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.response import frequency_response, transmissibility
@@ -107,6 +108,7 @@ __all__ = [
     "equilibrium",
     "export",
     "frequency_response",
+    "inverse_dynamics",
     "linearize",
     "load",
     "load_state",
@@ -177,6 +179,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "equilibrium": "mbs.equilibrium",
     "export": "io.export",
     "frequency_response": "mbs.response",
+    "inverse_dynamics": "mbs.inverse",
     "linearize": "mbs.linearize",
     "load": "io.family",
     "load_state": "mbs.checkpoint",

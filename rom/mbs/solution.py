@@ -10,6 +10,7 @@ from rom.errors import ConfigError
 from rom.mbs.arrays import WORK
 from rom.mbs.dense import Point, between
 from rom.mbs.events import Occurrences
+from rom.mbs.interface_loads import marker_loads, of_body
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
@@ -198,6 +199,39 @@ class Solution:
                 f"no joint or drive {name!r}; there are {sorted(set(self.packed.row_owner))}."
             )
         return self._follow(rows=rows).reaction
+
+    def drive_load(self, name: str) -> Array:
+        """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
+        if name not in self.mechanism.drives:
+            raise ConfigError(f"no drive {name!r}; there are {sorted(self.mechanism.drives)}.")
+        load: Array = -self.lam[:, self.packed.rows_of(name)[0]]
+        return load
+
+    def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
+        """Loads on each marker of a body: joints, drives, springs, contacts, loads together.
+
+        With gravity they are all that moves the body; on an interface of a flexible body they are
+        the load history for a stress or fatigue analysis of the part.
+
+        Args:
+            body: name of a body, or "ground".
+            frame: axes, of the "world" or of the "body".
+
+        Returns:
+            {marker: (n_t, 6) force [N] and moment about the marker [N m]}, without markers that
+            carry nothing.
+
+        Raises:
+            ConfigError: for an unknown body or frame.
+        """
+        self.mechanism.part(body)
+        if frame not in ("world", "body"):
+            raise ConfigError(f"frame is {frame!r}; it is 'world' or 'body'.")
+        return of_body(self, body, self._marker_loads, frame)
+
+    @cached_property
+    def _marker_loads(self) -> tuple[Array, Array]:
+        return marker_loads(self)
 
     @cached_property
     def energy(self) -> Energy:
