@@ -101,6 +101,33 @@ def integrator(turns: int = 40) -> Iterator[Figure]:
     yield Figure("integrator", case, "share outside compiled code", share, "", "below 0.1")
 
 
+def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]:
+    """Hanging chains of flexible links that swing from the horizontal: cost against length.
+
+    Each link has 8 fixed-interface modes and six coordinates of its ends. Needs no FEniCSx.
+
+    Args:
+        lengths: numbers of links.
+    """
+    from rom.mbs.integrate import simulate
+
+    bar = _bar((0.25, 0.02, 0.012), (8, 1, 1))
+    link = reduce(
+        bar, method=CraigBampton(8), interfaces=dict(KINDS), reference="root", certify=False
+    )
+    dt, per_link = 1e-3, []
+    for n in lengths:
+        mechanism, steps = _chain(link, n), max(10, min(200, 6400 // n))
+        warm = simulate(mechanism, t_end=2 * dt, dt=dt)
+        run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
+        case, speed = f"{n} links of {link.n_modes} modes", run.statistics["steps_per_second"]
+        per_link.append(1 / speed / n)
+        yield Figure("chain", case, "steps per second", speed, "1/s")
+    grown = per_link[-1] / per_link[len(per_link) // 2]
+    case = f"{lengths[-1]} against {lengths[len(lengths) // 2]} links"
+    yield Figure("chain", case, "time per step and link", grown, "", "below 2")
+
+
 def peers(meshes: tuple[float, ...] = (0.005, 0.00285)) -> Iterator[Figure]:
     """The same reduction by Exudyn and by SciPy with SuperLU and CHOLMOD; two processes too.
 
@@ -174,6 +201,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
     "integrator": integrator,
+    "chain": chain,
     "reduction": reduction,
     "large-reduction": large_reduction,
     "peers": peers,
@@ -305,6 +333,20 @@ def _slider_crank(rod: Any) -> Any:
     mech.revolute("wrist pin", bar.marker("tip"), slider.marker(origin), axis=z)
     mech.prismatic("guide", mech.ground.marker(end), slider.marker(origin), axis=(1, 0, 0))
     mech.drive("motor", "main", lambda t: SPEED * t)
+    return mech
+
+
+def _chain(link: Any, n: int) -> Any:
+    """So many links in a row along x, hinged about z to each other and to the ground."""
+    from rom.mbs.mechanism import Mechanism
+
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    step = link.marker("tip").point - link.marker("root").point
+    before = mech.ground.marker((0.0, 0.0, 0.0))
+    for k in range(n):
+        part = mech.add_flexible(f"link {k}", link, at=k * step - link.marker("root").point)
+        mech.revolute(f"pin {k}", before, part.marker("root"), axis=(0, 0, 1))
+        before = part.marker("tip")
     return mech
 
 

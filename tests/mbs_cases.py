@@ -109,7 +109,7 @@ def random_state(rng, packed):
 
 def prepared(mechanism):
     """Packed mechanism and memory."""
-    packed = pack(mechanism)
+    packed = pack(mechanism, whole=True)
     return packed, workspace(packed.system, len(packed.signals))
 
 

@@ -93,6 +93,14 @@ def test_the_integrator_is_measured_without_fenicsx():
     assert done.stdout.splitlines() == expected, done.stderr
 
 
+def test_chains_of_all_lengths_are_measured():
+    """One figure for each length, of as many elastic coordinates, and how the cost grew."""
+    figures = list(bench.chain((2, 12, 24)))
+    cases = [f"{n} links of 14 modes" for n in (2, 12, 24)] + ["24 against 12 links"]
+    assert [figure.case for figure in figures] == cases
+    assert all(figure.value > 0.0 for figure in figures)
+
+
 def test_other_programs_reduce_the_same_model(bar, tmp_path):
     """The script that other programs run, here with SciPy: its body has our frequencies."""
     from rom.peers.compare import SCRIPT

@@ -322,7 +322,7 @@ def mechanism_inertia(
         ConfigError: if a drive is unknown.
         ModelError: if the drives do not determine the motion there, or it cannot be assembled.
     """
-    packed = pack(mechanism)
+    packed = pack(mechanism, whole=True)
     rows = [int(k) for name in drives for k in packed.rows_of(name)]
     if len(rows) != 2 or not set(drives) <= set(mechanism.drives):
         raise ConfigError(f"{drives!r} are not two of the drives {sorted(mechanism.drives)}.")

@@ -8,6 +8,7 @@ from numba.extending import intrinsic
 
 from rom.mbs.arrays import ALONG, POINT
 from rom.mbs.compiled import inner
+from rom.mbs.constraints import column_of
 from rom.mbs.coordinates import coordinate_tangent, push_coordinate
 
 
@@ -149,19 +150,20 @@ def load_columns(s, W, lam, rank):
             for r in range(rank):
                 u = W.U_lu[r, row] if rank < lam.size else (1.0 if r == row else 0.0)
                 if u != 0.0:
-                    add_gradient(s, W, at, change * u, W.UG[r])
+                    add_gradient(s, W, at, change * u, r)
 
 
 @inner
-def add_gradient(s, W, at, c, out):
-    """Add c times the gradient of joint coordinate ``at`` in the velocities to a vector."""
+def add_gradient(s, W, at, c, row):
+    """Add c times the gradient of joint coordinate ``at`` in the velocities to a row of W.UG."""
     B, C = s.bodies, s.coordinates
     for side in range(2):
         m = C.i[at] if side == 0 else C.j[at]
         b = s.markers.body[m]
+        first = column_of(s.graph, row, b) if s.graph.compact else B.v_at[b]
         for q in range(6 + B.r[b] if b >= 0 else 0):
             for p in range(6):
-                out[B.v_at[b] + q] += c * W.xg[at, 6 * side + p] * W.H[m, p, q]
+                W.UG[row, first + q] += c * W.xg[at, 6 * side + p] * W.H[m, p, q]
 
 
 @inner

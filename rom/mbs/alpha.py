@@ -12,20 +12,19 @@ from typing import NamedTuple
 import numpy as np
 
 from rom.mbs.actions import load_columns
-from rom.mbs.algebra import factorise, range_basis, row, scale, spatial_tangent, unit, vec
+from rom.mbs.algebra import dot, range_basis, row, scale, spatial_tangent, unit, vec
 from rom.mbs.arrays import ROLL
+from rom.mbs.bordered import border, factorise_bordered, solve_bordered
 from rom.mbs.compiled import inner, kernel
 from rom.mbs.constraints import constraint_gradient
 from rom.mbs.coordinates import follow_coordinates
+from rom.mbs.kinematics import own_block
 from rom.mbs.motion import (
-    border,
     drive_power,
     evaluate,
-    fill,
     least_multipliers,
     moved,
     residual,
-    solve_bordered,
     tangents,
 )
 from rom.model import Array, Index
@@ -117,42 +116,52 @@ def predict(s, T):
 
 @inner
 def turn_columns(s, W, T, rank):
-    """Add Kt to S and fill UGT, rotations counted in increments of the rotation vector psi."""
-    n = T.v.size
-    for b in range(s.bodies.mass.size):
-        t = s.bodies.v_at[b]
-        psi = scale(-1.0, vec(T.psi, t + 3))
-        x = spatial_tangent(psi, unit(0))
-        y = spatial_tangent(psi, unit(1))
-        z = spatial_tangent(psi, unit(2))
-        for i in range(n):
-            k = row(W.Kt, i, t + 3)
-            for j, c in ((0, x), (1, y), (2, z)):
-                W.Kt[i, t + 3 + j] = k[0] * c[0] + k[1] * c[1] + k[2] * c[2]
-        for i in range(rank):
-            k = row(W.UG, i, t + 3)
-            for j, c in ((0, x), (1, y), (2, z)):
-                W.UGT[i, t + 3 + j] = k[0] * c[0] + k[1] * c[1] + k[2] * c[2]
-    for i in range(n):
-        for j in range(n):
+    """Add Kt to S and turn UGT, rotations counted in increments of the rotation vector psi."""
+    B, Y = s.bodies, s.graph
+    for b in range(B.mass.size):
+        for e in range(Y.first[b], Y.first[b + 1]):
+            first = Y.x[e]
+            psi = vec(T.psi, B.v_at[Y.other[e]] + 3)
+            turn_rows(W.Kt, first, first + 6 + B.r[b], Y.y[e] + 3, psi)
+        if not Y.compact:
+            turn_rows(W.UGT, 0, rank, B.v_at[b] + 3, vec(T.psi, B.v_at[b] + 3))
+    for k in range(rank if Y.compact else 0):
+        for p in range(4):
+            if Y.body[k, p] >= 0:
+                psi = vec(T.psi, B.v_at[Y.body[k, p]] + 3)
+                turn_rows(W.UGT, k, k + 1, Y.at[k, p] + 3, psi)
+    for i in range(W.S.shape[0]):
+        for j in range(W.S.shape[1]):
             W.S[i, j] += W.Kt[i, j]
+
+
+@inner
+def turn_rows(A, first, last, at, psi):
+    """Count three columns of some rows of A in increments of the rotation vector psi."""
+    back = scale(-1.0, psi)
+    x = spatial_tangent(back, unit(0))
+    y = spatial_tangent(back, unit(1))
+    z = spatial_tangent(back, unit(2))
+    for i in range(first, last):
+        k = row(A, i, at)
+        A[i, at], A[i, at + 1], A[i, at + 2] = dot(k, x), dot(k, y), dot(k, z)
 
 
 @inner
 def factorise_step(s, W, T, rank):
     """Factorise beta h^2 (M beta' + C gamma' + K), bordered; `tangents` first."""
-    n = T.v.size
-    for i in range(n):
-        W.weight[i] = W.S[i, i] / (mass_factor(T) * T.size[3])
+    for b in range(s.bodies.mass.size):
+        block = own_block(s, b, W.S)
+        for i in range(block.shape[0]):
+            W.weight[s.bodies.v_at[b] + i] = block[i, i] / (mass_factor(T) * T.size[3])
     if rank < T.lam.size:
         range_basis(W.G, rank, W.rest, W.U_lu)
-    border(W, n, rank)
+    border(W, rank)
     turn_columns(s, W, T, rank)
     load_columns(s, W, T.lam1, rank)
-    fill(W, n, rank)
     T.count[FACTORISATIONS] += 1
     T.count[FRESH] = 1
-    return factorise(W.lu, n + rank, W.pivot)
+    return factorise_bordered(s, W, rank)
 
 
 @inner
@@ -192,7 +201,7 @@ def correct(s, W, T, rank):
     for k in range(T.lam.size):
         # a velocity moves gamma / (beta h) as fast as the increment that removes it
         W.part[k] = -W.value[k] * (beta * h / gamma if s.rows.kind[k] == ROLL else 1.0)
-    solve_bordered(W, n, rank, W.delta, W.dlam)
+    solve_bordered(s, W, rank, W.delta, W.dlam)
     for i in range(n):
         T.vd1[i] += mass_factor(T) / bh2 * W.delta[i]
         T.v1[i] += gamma / (beta * h) * W.delta[i]

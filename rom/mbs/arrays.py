@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rom.mbs.layout import Graph
 from rom.model import Array, Index
 
 # kinds of constraint rows
@@ -20,6 +21,9 @@ LENGTHS = (POINT, ALONG, DISTANCE, TOUCH)
 PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
+# velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
+# case that a block of a body or joint is singular for itself
+LARGEST_WHOLE = 2000
 # columns of the work done since the start
 WORK = ("drives", "forces", "damping")
 
@@ -241,6 +245,7 @@ class System(NamedTuple):
     actions: Actions
     bushings: Bushings
     contacts: Contacts
+    graph: Graph | None = None
 
 
 class Work(NamedTuple):
@@ -277,18 +282,21 @@ class Work(NamedTuple):
     value: Array  # (m,) constraint residual
     g: Array  # (m, 24) constraint gradient in the twists of its two or four markers
     gamma: Array  # (m,) convective term of the constraint acceleration
-    G: Array  # (m, n) constraint gradient in the velocities
+    G: Array  # (m, n) constraint gradient in the velocities; blocks in a row if they are stored
     base: Array  # (c,) joint coordinates at the last accepted instant
     power: Array  # (3,) of drives and motors, of forces, lost in dampers and friction
     driven: Array  # (1,) power of motors
     motor: Array  # (k,) forces of motors whose law is in Python
     residual: Array  # (n,) equations of motion
-    S: Array  # (n, n) mass and damping part of the iteration matrix
-    Kt: Array  # (n, n) stiffness part
+    S: Array  # (n, n) mass and damping part of the iteration matrix; or blocks below each other
+    Kt: Array  # as S: stiffness part
     Q: Array  # (12, 12) stiffness of a pair of markers
     QH: Array  # (12, 12 + 2 R)
     lu: Array  # (n + m, n + m)
+    factor: Array  # the factor by blocks, see rom.mbs.layout.Plan
+    by_blocks: Index  # (1,) whether the factor at hand is the one by blocks
     pivot: Index  # (n + m,)
+    spare: Array  # (n + m,)
     rhs: Array  # (n + m,)
     scaling: Array  # (n + m,)
     weight: Array  # (n,) mass weights of the norm of increments
@@ -308,6 +316,13 @@ def workspace(system: System, n_signals: int) -> Work:
     b, k, m, c = bodies.mass.size, markers.body.size, rows.kind.size, system.coordinates.kind.size
     R = bodies.K.shape[1]
     n = int(6 * b + bodies.r.sum())
+    square, wide, whole = (n, n), n, n + m
+    if system.graph.compact:
+        square = (int(np.repeat(6 + bodies.r, np.diff(system.graph.first)).sum()), 6 + R)
+        moved = system.graph.body
+        wide = int((system.graph.at + 6 + bodies.r[moved])[moved >= 0].max(initial=0))
+        whole = n + m if n + m <= LARGEST_WHOLE else 0
+    redundant = (0, 0) if system.graph.compact else (m, m)
     shapes = {
         **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
         **dict.fromkeys(("d", "dd"), (b, 3)),
@@ -327,18 +342,20 @@ def workspace(system: System, n_signals: int) -> Work:
         "g": (m, 24),
         **dict.fromkeys(("x", "xd", "xc", "base"), (c,)),
         "xg": (c, 12),
-        **dict.fromkeys(("G", "UG", "UGT"), (m, n)),
-        "rest": (n, m),
+        **dict.fromkeys(("G", "UG", "UGT"), (m, wide)),
+        "rest": (0, 0) if system.graph.compact else (n, m),
         "power": (3,),
         "driven": (1,),
         "motor": (system.actions.motor_at.size,),
         **dict.fromkeys(("residual", "weight", "delta"), (n,)),
-        **dict.fromkeys(("S", "Kt"), (n, n)),
+        **dict.fromkeys(("S", "Kt"), square),
         "Q": (12, 12),
         "QH": (12, 12 + 2 * R),
-        "lu": (n + m, n + m),
-        **dict.fromkeys(("rhs", "scaling"), (n + m,)),
-        **dict.fromkeys(("U", "U_lu"), (m, m)),
+        "lu": (whole, whole),
+        "factor": tuple(system.graph.plan.memory),
+        **dict.fromkeys(("rhs", "scaling", "spare"), (n + m,)),
+        **dict.fromkeys(("U", "U_lu"), redundant),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    return Work(**arrays, pivot=np.zeros(n + m, dtype=np.int64))
+    whole_numbers = {"pivot": np.zeros(n + m, dtype=np.int64), "by_blocks": np.zeros(1, int)}
+    return Work(**arrays, **whole_numbers)

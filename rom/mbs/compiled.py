@@ -15,7 +15,8 @@ FOLDER = Path(__file__).parent
 STAMP = FOLDER / "__pycache__" / "kernels.sha256"
 
 USER = b"rom.mbs.compiled"  # what kernels import
-BUILT_IN = {"arrays.py", "compiled.py"}  # constants, layouts and options that kernels contain
+# constants, layouts and options that kernels contain
+BUILT_IN = {"arrays.py", "compiled.py", "layout.py"}
 
 
 def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:

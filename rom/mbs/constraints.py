@@ -123,9 +123,37 @@ def coupling_row(R, k, W):
 
 
 @inner
+def column_of(Y, k, b):
+    """First column in G of body b in constraint row k, which moves it."""
+    for p in range(3):
+        if Y.body[k, p] == b:
+            return Y.at[k, p]
+    return Y.at[k, 3]
+
+
+@inner
+def block_of(Y, b, c):
+    """Number of the block of bodies b and c.
+
+    Raises:
+        IndexError: if the graph does not know that something couples them.
+    """
+    low, high = Y.first[b], Y.first[b + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if Y.other[middle] < c:
+            low = middle + 1
+        else:
+            high = middle
+    if low == Y.first[b + 1] or Y.other[low] != c:
+        raise IndexError("a force couples two bodies that share no joint and no pair of markers")
+    return low
+
+
+@inner
 def constraint_gradient(s, W):
     """Assemble G (m, n), the gradient of all rows in the velocities."""
-    B, K, R, G = s.bodies, s.markers, s.rows, W.G
+    B, K, R, G, Y = s.bodies, s.markers, s.rows, W.G, s.graph
     for k in range(R.kind.size):
         for t in range(G.shape[1]):
             G[k, t] = 0.0
@@ -133,7 +161,7 @@ def constraint_gradient(s, W):
             b = K.body[m] if m >= 0 else -1
             if b < 0:
                 continue
-            t, H = B.v_at[b], W.H[m]
+            t, H = column_of(Y, k, b), W.H[m]
             for p in range(6):
                 w = W.g[k, 6 * side + p]
                 if w != 0.0:
@@ -224,12 +252,14 @@ def pair_stiffness(s, W, i, j, S):
         br, bc = K.body[mr], K.body[mc]
         if br < 0 or bc < 0:
             continue
+        e = block_of(s.graph, br, bc)
+        first, left = s.graph.x[e], s.graph.y[e]
         for p in range(6 + B.r[br]):
             for q in range(6 + B.r[bc]):
                 total = 0.0
                 for x in range(6):
                     total += W.H[mr, x, p] * QH[6 * row + x, width * column + q]
-                S[B.v_at[br] + p, B.v_at[bc] + q] += total
+                S[first + p, left + q] += total
 
 
 @inner
@@ -239,8 +269,9 @@ def constraint_stiffness(s, W, lam, c, S):
     for joint in range(R.joint_i.size):
         W.Q[:] = 0.0
         found = False
-        for k in range(R.kind.size):
-            if R.pair[k] == joint and R.kind[k] != POINT and lam[k] != 0.0:
+        for at in range(s.graph.joint_first[joint], s.graph.joint_first[joint + 1]):
+            k = s.graph.joint_rows[at]
+            if R.kind[k] != POINT and lam[k] != 0.0:
                 i, j = R.i[k], R.j[k]
                 a, b = turn(W.E, i, row(R.a, k, 0)), turn(W.E, j, row(R.b, k, 0))
                 gap = sub(row(W.P, j, 0), row(W.P, i, 0))

@@ -112,30 +112,30 @@ def body_residuals(B, W, q, v, a):
 
 @inner
 def body_mass(B, W, b, c, S):
-    """Add c times the mass matrix of body b to its block of S."""
-    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    """Add c times the mass matrix of body b to its block S."""
+    f, r = B.flex[b], B.r[b]
     d, A, J = vec(W.d[b], 0), W.A[b], W.J[b]
     for j in range(3):
-        S[t + j, t + j] += c * B.mass[b]
+        S[j, j] += c * B.mass[b]
         lever = mv(A, cross(unit(j), d))
-        place(S, t, t + 3 + j, c, lever)
-        place_row(S, t + 3 + j, t, c, lever)
+        place(S, 0, 3 + j, c, lever)
+        place_row(S, 3 + j, 0, c, lever)
         for i in range(3):
-            S[t + 3 + i, t + 3 + j] += c * J[i, j]
+            S[3 + i, 3 + j] += c * J[i, j]
     for k in range(r):
-        e = t + 6 + k
+        e = 6 + k
         push, Cr_k = mv(A, col(W.Ct[b], k)), dual(W.SP[b, k], 0)
-        place(S, t, e, c, push)
-        place_row(S, e, t, c, push)
-        place(S, t + 3, e, c, Cr_k)
-        place_row(S, e, t + 3, c, Cr_k)
+        place(S, 0, e, c, push)
+        place_row(S, e, 0, c, push)
+        place(S, 3, e, c, Cr_k)
+        place_row(S, e, 3, c, Cr_k)
         for l in range(r):
-            S[e, t + 6 + l] += c * B.M[f, k, l]
+            S[e, 6 + l] += c * B.M[f, k, l]
 
 
 @inner
 def body_damping(B, W, b, v, c, S):
-    """Add c times the derivative of the residual of body b by its velocities to S."""
+    """Add c times the derivative of the residual of body b by its velocities to its block S."""
     f, r, t = B.flex[b], B.r[b], B.v_at[b]
     w, d, dd, A, J = vec(v, t + 3), vec(W.d[b], 0), vec(W.dd[b], 0), W.A[b], W.J[b]
     SPd = W.SPd[b]
@@ -143,29 +143,29 @@ def body_damping(B, W, b, v, c, S):
     for j in range(3):
         e = unit(j)
         force = sub(add(scale(dot(w, d), e), scale(d[j], w)), scale(2.0 * w[j], d))
-        place(S, t, t + 3 + j, c, mv(A, add(force, scale(2.0, cross(e, dd)))))
+        place(S, 0, 3 + j, c, mv(A, add(force, scale(2.0, cross(e, dd)))))
         moment = add(cross(w, mv(J, e)), cross(e, mv(J, w)))
         moment = add(moment, scale(2.0, sub(scale(spread, e), mtv(SPd, e))))
-        place(S, t + 3, t + 3 + j, c, moment)
+        place(S, 3, 3 + j, c, moment)
     for k in range(r):
-        s, e = W.SP[b, k], t + 6 + k
-        place(S, t, e, c, mv(A, scale(2.0, cross(w, col(W.Ct[b], k)))))
+        s, e = W.SP[b, k], 6 + k
+        place(S, 0, e, c, mv(A, scale(2.0, cross(w, col(W.Ct[b], k)))))
         spin = sub(scale(trace(s, 0), w), transposed_times(s, w))
-        place(S, t + 3, e, c, scale(2.0, spin))
+        place(S, 3, e, c, scale(2.0, spin))
         row = add(times(s, w), transposed_times(s, w))
         row = add(row, scale(2.0, dual(W.Sd[b, k], 0)))
-        place_row(S, e, t + 3, c, sub(row, scale(2.0 * trace(s, 0), w)))
+        place_row(S, e, 3, c, sub(row, scale(2.0 * trace(s, 0), w)))
         for l in range(r):
             coriolis = 2.0 * dot(w, dual(B.S2[f, l], 9 * k))
-            S[e, t + 6 + l] += c * (B.C[f, k, l] + coriolis)
+            S[e, 6 + l] += c * (B.C[f, k, l] + coriolis)
         if B.stiffened[b] == 1:
-            place(S, t, e, c, mv(A, scale(2.0, vec(W.Td[b, k], 0))))
-            place(S, t + 3, e, c, scale(2.0, dual(W.T1d[b, k], 0)))
+            place(S, 0, e, c, mv(A, scale(2.0, vec(W.Td[b, k], 0))))
+            place(S, 3, e, c, scale(2.0, dual(W.T1d[b, k], 0)))
 
 
 @inner
 def body_stiffness(B, W, b, v, a, c, S):
-    """Add c times the derivative of the residual of body b by its coordinates to S.
+    """Add c times the derivative of the residual of body b by its coordinates to its block S.
 
     Rotations are perturbed in the body frame: dA = A skew(dtheta).
     """
@@ -180,10 +180,10 @@ def body_stiffness(B, W, b, v, a, c, S):
     for j in range(3):
         e = unit(j)
         turned_lift = cross(lift, e)
-        place(S, t, t + 3 + j, c, mv(A, cross(e, pull)))
-        place(S, t + 3, t + 3 + j, c, cross(d, turned_lift))
+        place(S, 0, 3 + j, c, mv(A, cross(e, pull)))
+        place(S, 3, 3 + j, c, cross(d, turned_lift))
         for k in range(r):
-            S[t + 6 + k, t + 3 + j] += c * dot(col(W.Ct[b], k), turned_lift)
+            S[6 + k, 3 + j] += c * dot(col(W.Ct[b], k), turned_lift)
     elastic_stiffness(B, W, b, v, a, c, S)
     if B.stiffened[b] == 1:
         bent_stiffness(B, W, b, v, a, c, S)
@@ -200,8 +200,8 @@ def elastic_stiffness(B, W, b, v, a, c, S):
             W.Sa[k, p] = 0.0
     contract(B.S2[f], a, t + 6, r, W.Sa)
     for l in range(r):
-        s, e, S_l = W.SP[b, l], t + 6 + l, col(W.Ct[b], l)
-        place(S, t, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))
+        s, e, S_l = W.SP[b, l], 6 + l, col(W.Ct[b], l)
+        place(S, 0, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))
         tr = 2.0 * trace(s, 0)
         Jdw = sub(scale(tr, dw), add(times(s, dw), transposed_times(s, dw)))
         Jw = sub(scale(tr, w), add(times(s, w), transposed_times(s, w)))
@@ -209,11 +209,11 @@ def elastic_stiffness(B, W, b, v, a, c, S):
         moment = sub(moment, dual(W.Sa[l], 0))
         Sd = W.Sd[b, l]
         spin = sub(scale(trace(Sd, 0), w), times(Sd, w))
-        place(S, t + 3, e, c, add(moment, scale(2.0, spin)))
+        place(S, 3, e, c, add(moment, scale(2.0, spin)))
         for k in range(r):
             s2 = B.S2[f, l, 9 * k : 9 * k + 9]
             softening = dot(w, times(s2, w)) - dot(w, w) * trace(s2, 0)
-            S[t + 6 + k, e] += c * (B.K[f, k, l] + softening + dot(dw, dual(s2, 0)))
+            S[6 + k, e] += c * (B.K[f, k, l] + softening + dot(dw, dual(s2, 0)))
 
 
 @inner

@@ -100,6 +100,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         if state is None:
             state = initial_state(packed, t_start, settings.spacing)
         _check_fit(state, packed)
+        if packed.by_blocks and state.rank < state.lam.size:
+            record.packed = packed = packed.whole()
+            W = workspace(packed.system, len(packed.signals))
         record.watch = watch_of(mechanism, packed, t_start)
         run = run_variable if dt is None else METHODS[method]
         run(record, W, state)

@@ -140,6 +140,14 @@ def spread_wrench(s, W, sign, out):
 
 
 @inner
+def own_block(s, b, S):
+    """The block of body b with itself in S, as a view."""
+    e, w = s.graph.own[b], 6 + s.bodies.r[b]
+    x, y = s.graph.x[e], s.graph.y[e]
+    return S[x : x + w, y : y + w]
+
+
+@inner
 def wrench_stiffness(s, W, c, S):
     """Add c times the derivative of -H^T wrench to S, the wrench kept constant in the world.
 
@@ -150,32 +158,32 @@ def wrench_stiffness(s, W, c, S):
         b = K.body[m]
         if b < 0:
             continue
-        r, t, A = B.r[b], B.v_at[b], W.A[b]
+        r, A, block = B.r[b], W.A[b], own_block(s, b, S)
         f, n = mtv(A, vec(W.wrench[m], 0)), mtv(A, vec(W.wrench[m], 3))
         u, theta = vec(W.u[m], 0), vec(W.theta[m], 0)
         shape, twist = K.shape[m], K.twist[m]
         if B.stiffened[b] == 1:
             shape, twist = W.move[m, :3], W.move[m, 3:]
-            bent_wrench_stiffness(K.bend[m], f, n, theta, t + 6, r, c, S)
+            bent_wrench_stiffness(K.bend[m], f, n, theta, r, c, block)
         for j in range(3):
             e = unit(j)
             df, dn = cross(f, e), cross(n, e)
-            place(S, t + 3, t + 3 + j, -c, add(cross(u, df), dn))
+            place(block, 3, 3 + j, -c, add(cross(u, df), dn))
             for k in range(r):
                 spin = spatial_tangent(theta, col(twist, k))
-                S[t + 6 + k, t + 3 + j] -= c * (dot(col(shape, k), df) + dot(spin, dn))
+                block[6 + k, 3 + j] -= c * (dot(col(shape, k), df) + dot(spin, dn))
         for l in range(r):
-            place(S, t + 3, t + 6 + l, -c, cross(col(shape, l), f))
+            place(block, 3, 6 + l, -c, cross(col(shape, l), f))
             half = scale(0.5, cross(n, col(twist, l)))
             for k in range(r):
-                S[t + 6 + k, t + 6 + l] -= c * dot(col(twist, k), half)
+                block[6 + k, 6 + l] -= c * dot(col(twist, k), half)
 
 
 @inner
-def bent_wrench_stiffness(bend, f, n, theta, at, r, c, S):  # noqa: PLR0913  as above
-    """Stiffness that the force and moment on a marker give to its body."""
+def bent_wrench_stiffness(bend, f, n, theta, r, c, S):
+    """Stiffness that the force and moment on a marker give to its body, in its block S."""
     for k in range(r):
         for l in range(r):
             move = (bend[0, k, l], bend[1, k, l], bend[2, k, l])
             spin = spatial_tangent(theta, (bend[3, k, l], bend[4, k, l], bend[5, k, l]))
-            S[at + k, at + l] -= c * (dot(f, move) + dot(n, spin))
+            S[6 + k, 6 + l] -= c * (dot(f, move) + dot(n, spin))

@@ -1,9 +1,8 @@
 """Equations of motion of the whole mechanism: residual, iteration matrix, accelerations."""
 
-import math
-
 from rom.mbs.actions import action_tangents, action_wrenches, friction_by_load
-from rom.mbs.algebra import back_substitute, factorise, range_basis, scale, turned, vec
+from rom.mbs.algebra import range_basis, scale, turned, vec
+from rom.mbs.bordered import border, factorise_bordered, solve_bordered
 from rom.mbs.bushing import bushing_tangents, bushing_wrenches
 from rom.mbs.compiled import inner, kernel
 from rom.mbs.constraints import (
@@ -22,7 +21,7 @@ from rom.mbs.dynamics import (
     body_stiffness,
 )
 from rom.mbs.forces import applied_wrenches, force_tangents
-from rom.mbs.kinematics import marker_states, spread_wrench, wrench_stiffness
+from rom.mbs.kinematics import marker_states, own_block, spread_wrench, wrench_stiffness
 
 # over the loads of joints with friction; each gains a digit when the friction angle is small
 MAX_PASSES = 60
@@ -42,7 +41,7 @@ def body_masses(s, W):
     """Set W.S to the mass matrix of all bodies; `evaluate` first."""
     W.S[:] = 0.0
     for b in range(s.bodies.mass.size):
-        body_mass(s.bodies, W, b, 1.0, W.S)
+        body_mass(s.bodies, W, b, 1.0, own_block(s, b, W.S))
 
 
 @kernel
@@ -83,9 +82,9 @@ def tangents(s, W, v, a, lam, c):
     W.S[:] = 0.0
     W.Kt[:] = 0.0
     for b in range(s.bodies.mass.size):
-        body_mass(s.bodies, W, b, c[0], W.S)
-        body_damping(s.bodies, W, b, v, c[1], W.S)
-        body_stiffness(s.bodies, W, b, v, a, c[2], W.Kt)
+        body_mass(s.bodies, W, b, c[0], own_block(s, b, W.S))
+        body_damping(s.bodies, W, b, v, c[1], own_block(s, b, W.S))
+        body_stiffness(s.bodies, W, b, v, a, c[2], own_block(s, b, W.Kt))
     wrench_stiffness(s, W, c[2], W.Kt)
     constraint_stiffness(s, W, lam, c[2], W.Kt)
     coupling_stiffness(s, W, lam, c[2], W.Kt)
@@ -93,66 +92,6 @@ def tangents(s, W, v, a, lam, c):
     action_tangents(s, W, lam, c[2], c[1], W.Kt, W.S)
     bushing_tangents(s, W, c[2], c[1], W.Kt, W.S)
     contact_tangents(s, W, c[2], c[1], W.Kt, W.S)
-
-
-@inner
-def border(W, n, rank):
-    """Project the constraint gradient on the range W.U_lu: W.UG, and its copy W.UGT."""
-    m = W.G.shape[0]
-    for k in range(rank):
-        for j in range(n):
-            W.UG[k, j] = W.G[k, j] if rank == m else 0.0
-        if rank < m:
-            for p in range(m):
-                u = W.U_lu[k, p]
-                for j in range(n):
-                    W.UG[k, j] += u * W.G[p, j]
-        for j in range(n):
-            W.UGT[k, j] = W.UG[k, j]
-
-
-@inner
-def fill(W, n, rank):
-    """Write [S, UG^T; UGT, 0] into W.lu, scaled so that masses and gradients have size one."""
-    for i in range(n):
-        W.scaling[i] = 1.0 / math.sqrt(W.S[i, i]) if W.S[i, i] > 0.0 else 1.0
-    for k in range(rank):
-        total = 0.0
-        for j in range(n):
-            total += (W.UG[k, j] * W.scaling[j]) ** 2
-        W.scaling[n + k] = 1.0 / math.sqrt(total) if total > 0.0 else 1.0
-    for i in range(n):
-        for j in range(n):
-            W.lu[i, j] = W.S[i, j] * W.scaling[i] * W.scaling[j]
-    for k in range(rank):
-        for l in range(rank):
-            W.lu[n + k, n + l] = 0.0
-        for j in range(n):
-            W.lu[n + k, j] = W.UGT[k, j] * W.scaling[n + k] * W.scaling[j]
-            W.lu[j, n + k] = W.UG[k, j] * W.scaling[n + k] * W.scaling[j]
-
-
-@inner
-def solve_bordered(W, n, rank, x, lam):
-    """Solve for x (n,) and lam (m,); W.rhs[:n] and W.part (m,) hold the right-hand side."""
-    m = W.G.shape[0]
-    for i in range(n):
-        W.rhs[i] *= W.scaling[i]
-    for k in range(rank):
-        total = W.part[k]
-        if rank < m:
-            total = 0.0
-            for p in range(m):
-                total += W.U_lu[k, p] * W.part[p]
-        W.rhs[n + k] = total * W.scaling[n + k]
-    back_substitute(W.lu, n + rank, W.pivot, W.rhs)
-    for i in range(n):
-        x[i] = W.rhs[i] * W.scaling[i]
-    for p in range(m):
-        lam[p] = W.rhs[n + p] * W.scaling[n + p] if rank == m else 0.0
-        if rank < m:
-            for k in range(rank):
-                lam[p] += W.U_lu[k, p] * W.scaling[n + k] * W.rhs[n + k]
 
 
 @inner
@@ -219,9 +158,8 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     constraint_gradient(s, W)
     if accepted and rank < m:
         range_basis(W.G, rank, W.rest, W.U_lu)
-    border(W, n, rank)
-    fill(W, n, rank)
-    if not factorise(W.lu, n + rank, W.pivot):
+    border(W, rank)
+    if not factorise_bordered(s, W, rank):
         return False
     lam[:] = 0.0
     for _ in range(MAX_PASSES if friction_by_load(s) else 1):
@@ -232,7 +170,7 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
         for k in range(m):
             drive = W.signal[s.rows.signal[k], 2] if s.rows.signal[k] >= 0 else 0.0
             W.part[k] = drive - W.gamma[k]
-        solve_bordered(W, n, rank, a, W.dlam)
+        solve_bordered(s, W, rank, a, W.dlam)
         change, size = 0.0, 0.0
         for k in range(m):
             lam[k] += W.dlam[k]

@@ -1,6 +1,6 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from rom.errors import ConfigError
 from rom.mbs.arrays import ALONG, LENGTHS, Bodies, Coordinates, Forces, Markers, Rows, System
 from rom.mbs.elements_packing import actions, bushings, contacts, integers, table
+from rom.mbs.graph import graph_of
 from rom.mbs.joints import Joint, Row
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import GROUND, Marker, Part
@@ -52,13 +53,27 @@ class Packed:
         lengths = np.isin(rows.kind, LENGTHS) | np.array(way, dtype=bool)
         return np.where(lengths, self.length, 1.0)
 
+    @property
+    def by_blocks(self) -> bool:
+        """Whether the equations are stored and solved body by body, joint by joint."""
+        return bool(self.system.graph.compact)
+
+    def whole(self) -> "Packed":
+        """The same with whole matrices, which constraints that repeat others need."""
+        graph = graph_of(self.system, whole=True)
+        return replace(self, system=self.system._replace(graph=graph))
+
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""
         return self.markers[marker]
 
 
-def pack(mechanism: Mechanism) -> Packed:
+def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     """Write the mechanism into arrays.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        whole: store whole matrices (n, n) in any case, not the blocks of bodies and joints alone.
 
     Raises:
         ConfigError: if there is no body.
@@ -90,7 +105,7 @@ def pack(mechanism: Mechanism) -> Packed:
         contacts(mechanism, index),
     )
     return Packed(
-        system,
+        system._replace(graph=graph_of(system, whole=whole)),
         tuple(mechanism.parts),
         index,
         owners,
@@ -127,7 +142,9 @@ def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
     r = np.array([part.r for part in parts], dtype=np.int64)
     flexible = [part for part in parts if part.r]
     flex = np.zeros(len(parts), dtype=np.int64)
-    flex[r > 0] = np.arange(len(flexible))
+    kinds = {id(part.flexible): part for part in flexible}  # equal links share their tables
+    flex[r > 0] = [list(kinds).index(id(part.flexible)) for part in flexible]
+    flexible = list(kinds.values())
     tables = _flexible_tables(flexible, max(len(flexible), 1), R)
     return Bodies(
         _starts(7 + r),

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from rom.errors import SolverError
 from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import ROLL, Work
+from rom.mbs.bordered import factorised, gradient_times, least_motion
 from rom.mbs.motion import evaluate, linearise, moved
 from rom.mbs.record import Record, Settings
 from rom.mbs.signals import sample_all
@@ -14,8 +16,8 @@ from rom.mbs.state import Memory, State, with_accelerations
 from rom.mbs.user import Law, apply_laws
 from rom.model import Array
 
-# the factorised iteration matrix, with its scaling, its range and the weights of its norm
-FACTOR = ("lu", "pivot", "scaling", "U_lu", "weight")
+# what belongs to the factorised iteration matrix, by blocks or whole
+FACTOR = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
 
 
 def begin(
@@ -76,15 +78,30 @@ def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Arr
 def across(record: Record, W: Work, state: State, shift: Array) -> Array:
     """The part of a velocity, or of each column, that changes the gaps of the constraints."""
     linearise(record.packed.system, W, state.q, state.v)
+    if record.packed.by_blocks:
+        return _across_by_blocks(record, W, shift)
     A = W.G @ np.linalg.solve(W.S, W.G.T)
     rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
     y = np.linalg.lstsq(A, np.where(rolling, 0.0, (W.G @ shift).T).T, rcond=1e-10)[0]
     return np.linalg.solve(W.S, W.G.T @ y)
 
 
+def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
+    """The same from the blocks of masses and gradients at hand."""
+    system, columns = record.packed.system, np.atleast_2d(shift.T)
+    gap, out = np.zeros(W.value.size), np.zeros_like(columns)
+    if not factorised(system, W, 0.0):
+        raise SolverError("the equations of motion are singular where constraints are met.")
+    for column, motion in zip(columns, out, strict=True):
+        gradient_times(system, W, np.ascontiguousarray(column), False, gap)
+        least_motion(system, W, gap, motion)
+    return out.T.reshape(shift.shape)
+
+
 def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
     """All that the next step depends on and the state does not tell."""
-    arrays = {name: getattr(W, name).copy() for name in FACTOR}
+    names = (*FACTOR, "factor" if W.by_blocks[0] else "lu")
+    arrays = {name: getattr(W, name).copy() for name in names}
     arrays["method"], arrays["bdf"] = T.method.copy(), T.bdf.copy()
     arrays["before"], arrays["psi"] = T.a.copy(), T.psi.copy()
     arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
@@ -95,7 +112,7 @@ def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
 def recall(memory: Memory, W: Work, T: Step) -> None:
     """Go on with the factorisation of an earlier run that `fits`."""
     T.a[:], T.psi[:] = memory.arrays["before"], memory.arrays["psi"]
-    for name in FACTOR:
+    for name in (*FACTOR, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
     T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
 

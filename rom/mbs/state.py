@@ -8,6 +8,7 @@ import numpy as np
 
 from rom.errors import ModelError, RomWarning, SolverError
 from rom.mbs.arrays import ROLL, Work, workspace
+from rom.mbs.bordered import factorised, gradient_times, least_motion, mass_diagonal, weigh
 from rom.mbs.motion import evaluate, linearise, moved, rates
 from rom.mbs.packing import Packed
 from rom.mbs.signals import first_failure, sample_all
@@ -84,17 +85,34 @@ def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> Stat
         ModelError: naming the joint that cannot be satisfied.
         SolverError: if a drive or load is not finite at the start.
     """
-    W = workspace(packed.system, len(packed.signals))
     table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
-    W.signal[:] = table[0]
+    state = _start(packed, table[0], t)
+    return _start(packed.whole(), table[0], t) if state is None else state
+
+
+def _start(packed: Packed, signal: Array, t: float) -> State | None:
+    """The state at the start; None if the rank of the constraints needs whole matrices."""
+    W = workspace(packed.system, len(packed.signals))
+    W.signal[:] = signal
+    if packed.by_blocks and not _independent(packed, W, packed.q):
+        return None
     q = assembled(packed, W, packed.q)
-    rank = _rank(packed, W, q)
+    if packed.by_blocks and not _independent(packed, W, q):
+        return None
+    rank = W.value.size if packed.by_blocks else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
     v = fitting_velocity(packed, W, q, packed.v)
     return with_accelerations(packed, W, State(t, q, v, v * 0, np.zeros(W.value.size), rank))
+
+
+def _independent(packed: Packed, W: Work, q: Array) -> bool:
+    """Whether the elimination by blocks meets no joint that could repeat others."""
+    linearise(packed.system, W, q, np.zeros(packed.v.size))
+    weigh(packed.system, W, _weights(packed, W))
+    return bool(factorised(packed.system, W, RANK_TOLERANCE**1.5))
 
 
 def with_accelerations(packed: Packed, W: Work, state: State) -> State:
@@ -119,12 +137,12 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
     q, v = q.copy(), np.zeros(packed.v.size)
     if not W.value.size:
         return q
-    scale, held = packed.row_scale, packed.system.rows.kind != ROLL
+    scale, held = packed.row_scale, np.flatnonzero(packed.system.rows.kind != ROLL)
     weight = None
     for _ in range(MAX_ASSEMBLY):
         linearise(packed.system, W, q, v)
         weight = _weights(packed, W) if weight is None else weight
-        step = -_least_change((W.G / scale[:, None])[held], (W.value / scale)[held], weight)
+        step = -_least_change(packed, W, W.value, weight, held)
         largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
         moved(packed.system, q.copy(), _limited(packed, step), q)
         if largest < 1e-15 or not np.isfinite(largest):
@@ -161,16 +179,24 @@ def _weights(packed: Packed, W: Work) -> Array:
     """(n,) inverse square root of what a unit of each velocity coordinate costs."""
     B = packed.system.bodies
     mass = np.zeros(packed.v.size)
+    mass_diagonal(packed.system, W, mass)
     for b, t in enumerate(B.v_at):
-        mass[t : t + 6] = np.diag(W.S)[t : t + 6]
         mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
-        e = slice(t + 6, t + 6 + B.r[b])
-        mass[e] = ELASTIC_WEIGHT * np.diag(W.S)[e]
+        mass[t + 6 : t + 6 + B.r[b]] *= ELASTIC_WEIGHT
     return 1 / np.sqrt(mass)
 
 
-def _least_change(G: Array, gap: Array, weight: Array) -> Array:
-    """Solution x of G x = gap with the least weighted norm."""
+def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Array) -> Array:
+    """Solution x of G x = gap in some rows, all by blocks, with the least weighted norm."""
+    if packed.by_blocks:
+        x = np.zeros(weight.size)
+        weigh(packed.system, W, weight)
+        if not factorised(packed.system, W, 0.0):
+            raise SolverError("constraints that were independent became dependent.")
+        least_motion(packed.system, W, gap, x)
+        return x
+    scale = packed.row_scale[rows]
+    G, gap = W.G[rows] / scale[:, None], gap[rows] / scale
     rows = np.linalg.norm(G * weight, axis=1)
     rows = np.where(rows > 0, rows, 1.0)
     A = G * weight / rows[:, None]
@@ -187,10 +213,13 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
         return v.copy()
     linearise(packed.system, W, q, v)
     weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
+    now, size, every = np.zeros_like(wanted), np.zeros_like(wanted), np.arange(wanted.size)
     for _ in range(2):  # the second pass removes the round-off of the first
-        v = v + _least_change(W.G, wanted - W.G @ v, weight)
-    miss = np.abs(W.G @ v - wanted)
-    size = np.abs(W.G) @ np.abs(v) + np.abs(wanted)
+        gradient_times(packed.system, W, v, False, now)
+        v = v + _least_change(packed, W, wanted - now, weight, every)
+    gradient_times(packed.system, W, v, False, now)
+    gradient_times(packed.system, W, v, True, size)
+    miss, size = np.abs(now - wanted), size + np.abs(wanted)
     size = np.maximum(size, 1e-3 * size.max())  # rows at rest hold nothing but round-off
     k = int(np.argmax(miss / np.maximum(size, 1e-300)))
     if miss[k] > 1e-8 * size[k]:
@@ -236,7 +265,7 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
             "that only their deformation could divide. The motion is exact, the reactions are "
             "those of least norm.",
             RomWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
     return rank
 

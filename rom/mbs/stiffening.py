@@ -71,12 +71,12 @@ def bent_stiffness(B, W, b, v, a, c, S):
     W.T1a[:] = 0.0
     contract(B.T1[f], a, t + 6, r, W.T1a)
     for l in range(r):
-        e, spread = t + 6 + l, W.T1d[b, l]
+        e, spread = 6 + l, W.T1d[b, l]
         force = add(row(W.Ta, l, 0), scale(2.0, cross(w, row(W.Td[b], l, 0))))
-        place(S, t, e, c, mv(A, force))
+        place(S, 0, e, c, mv(A, force))
         spin = sub(scale(trace(spread, 0), w), transposed_times(spread, w))
-        place(S, t + 3, e, c, add(dual(W.T1a[l], 0), scale(2.0, spin)))
+        place(S, 3, e, c, add(dual(W.T1a[l], 0), scale(2.0, spin)))
         for k in range(r):
             s = B.T1[f, l, 9 * k : 9 * k + 9]
             push = dot(row(B.T[f], l, 3 * k), lift) + dot(dw, dual(s, 0))
-            S[t + 6 + k, e] += c * (push + dot(w, times(s, w)) - dot(w, w) * trace(s, 0))
+            S[6 + k, e] += c * (push + dot(w, times(s, w)) - dot(w, w) * trace(s, 0))

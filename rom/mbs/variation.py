@@ -168,7 +168,7 @@ def instant(mechanism: Any, t: float) -> Instant:
         raise ConfigError(f"{mechanism!r} is no Mechanism.")
     if not np.isfinite(t):
         raise ConfigError(f"t = {t!r} is no time.")
-    packed = pack(mechanism)
+    packed = pack(mechanism, whole=True)
     W = workspace(packed.system, len(packed.signals))
     table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), SPACING)
     good, failure = first_failure(packed.signals, np.array([t]), table)
