@@ -15,7 +15,7 @@ from rom.mbs.actions import load_columns
 from rom.mbs.algebra import dot, range_basis, row, scale, spatial_tangent, unit, vec
 from rom.mbs.arrays import ROLL
 from rom.mbs.bordered import border, factorise_bordered, solve_bordered
-from rom.mbs.compiled import inner, kernel
+from rom.mbs.compiled import copy, inner, kernel
 from rom.mbs.constraints import constraint_gradient
 from rom.mbs.coordinates import follow_coordinates
 from rom.mbs.kinematics import own_block
@@ -107,7 +107,7 @@ def predict(s, T):
             a1 = (T.vd[i] - alpha_m * T.a[i]) / (1 - alpha_m)
             T.v1[i] = T.v[i] + h * ((1 - gamma) * T.a[i] + gamma * a1)
             T.psi[i] = h * T.v[i] + h * h * ((0.5 - beta) * T.a[i] + beta * a1)
-    T.lam1[:] = T.lam
+    copy(T.lam, T.lam1)
     T.size[0] = 0.0
     if T.count[LAST] > 4:
         T.count[FRESH] = 0
@@ -241,10 +241,10 @@ def accept(s, W, T, rank):
     for i in range(T.v.size):
         rate = (1 - alpha_f) * T.vd1[i] + alpha_f * T.vd[i]
         T.a[i] = T.v[i] if T.bdf[0] > 0.0 else (rate - alpha_m * T.a[i]) / (1 - alpha_m)
-    T.q[:] = T.q1
-    T.v[:] = T.v1
-    T.vd[:] = T.vd1
-    T.lam[:] = T.lam1
+    copy(T.q1, T.q)
+    copy(T.v1, T.v)
+    copy(T.vd1, T.vd)
+    copy(T.lam1, T.lam)
     if rank < T.lam.size:
         constraint_gradient(s, W)
         least_multipliers(W, rank, T.lam)
@@ -271,7 +271,7 @@ def advance(s, W, T, rank, signals, every, out):
     while T.count[STEPS] - T.count[BEGAN] < signals.shape[0]:
         if T.count[ASKED] == 0:
             if T.count[PASS] == 0:
-                W.signal[:] = signals[T.count[STEPS] - T.count[BEGAN]]
+                copy(signals[T.count[STEPS] - T.count[BEGAN]], W.signal)
                 predict(s, T)
             evaluate(s, W, T.q1, T.v1)
             if T.count[ASKS] == 1:
@@ -298,9 +298,9 @@ def advance(s, W, T, rank, signals, every, out):
 def save(W, T, out, at):
     """Copy the present state to a row of the output arrays."""
     Q, V, A, L, X, B = out
-    B[at] = W.base
-    Q[at] = T.q
-    V[at] = T.v
-    A[at] = T.vd
-    L[at] = T.lam
-    X[at] = T.work
+    copy(W.base, B[at])
+    copy(T.q, Q[at])
+    copy(T.v, V[at])
+    copy(T.vd, A[at])
+    copy(T.lam, L[at])
+    copy(T.work, X[at])

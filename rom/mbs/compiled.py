@@ -46,9 +46,22 @@ def compiled_before(function: Any) -> bool:
 
 drop_stale_cache()
 
-# reassociation lets sums be vectorised; NaN and infinity keep their meaning
-_OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc"}}
+# reassociation lets sums be vectorised; NaN and infinity keep their meaning. No kernel makes an
+# array, so none counts references to them: a step took four times as long when all did
+_OPTIONS = {
+    "cache": True,
+    "_nrt": False,
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc"},
+}
 # callable from Python
 kernel = njit(**_OPTIONS)
 # callable from other kernels only: the way in from Python costs most of the compile time
 inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+@inner
+def copy(x, out):
+    """Write the array x into out, which has its shape; ``out[:] = x`` would make an array."""
+    for i in range(x.size):
+        out.flat[i] = x.flat[i]

@@ -2,7 +2,7 @@
 
 from rom.mbs.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.arrays import ALONG, COUPLING
-from rom.mbs.compiled import inner
+from rom.mbs.compiled import copy, inner
 from rom.mbs.constraints import angle_state, pair_stiffness, row_stiffness, set_gradient, wrapped
 
 
@@ -33,7 +33,7 @@ def coordinate_states(C, W):
 @inner
 def follow_coordinates(W):
     """Accept the present angles as those the next ones are followed from."""
-    W.base[:] = W.x
+    copy(W.x, W.base)
 
 
 @inner

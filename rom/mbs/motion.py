@@ -4,7 +4,7 @@ from rom.mbs.actions import action_tangents, action_wrenches, friction_by_load
 from rom.mbs.algebra import range_basis, scale, turned, vec
 from rom.mbs.bordered import border, factorise_bordered, solve_bordered
 from rom.mbs.bushing import bushing_tangents, bushing_wrenches
-from rom.mbs.compiled import inner, kernel
+from rom.mbs.compiled import copy, inner, kernel
 from rom.mbs.constraints import (
     constraint_gradient,
     constraint_stiffness,
@@ -181,6 +181,6 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     if accepted:
         follow_coordinates(W)
     coordinate_rates(s, q, v, out[:n_q])
-    out[n_q : n_q + n] = a
-    out[n_q + n :] = W.power
+    copy(a, out[n_q : n_q + n])
+    copy(W.power, out[n_q + n :])
     return True

@@ -8,7 +8,7 @@ from rom.mbs.actions import stop_energy
 from rom.mbs.algebra import add, cross, mtv, mv, put, scale, vec
 from rom.mbs.arrays import workspace
 from rom.mbs.bushing import bushing_energy
-from rom.mbs.compiled import inner, kernel
+from rom.mbs.compiled import copy, inner, kernel
 from rom.mbs.contact import contact_energy
 from rom.mbs.dynamics import body_energy
 from rom.mbs.forces import spring_energy
@@ -53,13 +53,13 @@ def track(s, W, motion, marker, rows, out):
     """Fill the tracks."""
     Q, V, L, base, signals = motion
     for k in range(Q.shape[0]):
-        W.signal[:] = signals[k]
-        W.base[:] = base[k]
+        copy(signals[k], W.signal)
+        copy(base[k], W.base)
         evaluate(s, W, Q[k], V[k])
-        out.position[k] = W.P[marker]
-        out.axes[k] = W.E[marker]
-        out.twist[k] = W.V[marker]
-        out.gap[k] = W.value
+        copy(W.P[marker], out.position[k])
+        copy(W.E[marker], out.axes[k])
+        copy(W.V[marker], out.twist[k])
+        copy(W.value, out.gap[k])
         for row in rows:
             for p in range(6):
                 out.reaction[k, p] -= L[k, row] * W.g[row, 6 + p]
