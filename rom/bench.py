@@ -89,9 +89,9 @@ def integrator(turns: int = 40) -> Iterator[Figure]:
     """
     from rom.mbs.integrate import simulate
 
-    bar = _bar((0.16, 0.02, 0.012), (16, 2, 1))
+    beam = bar((0.16, 0.02, 0.012), (16, 2, 1))
     method, kinds = CraigBampton(20), dict(KINDS)
-    rod = reduce(bar, method=method, interfaces=kinds, reference=tuple(kinds), certify=False)
+    rod = reduce(beam, method=method, interfaces=kinds, reference=tuple(kinds), certify=False)
     mechanism, turn = _slider_crank(rod), 2 * pi / SPEED
     warm = simulate(mechanism, t_end=turn, dt=turn / 1000)
     run = simulate(mechanism, t_end=(turns + 1) * turn, dt=turn / 1000, state=warm.final)
@@ -142,6 +142,23 @@ def peers(meshes: tuple[float, ...] = (0.005, 0.00285)) -> Iterator[Figure]:
     for lc in meshes:
         for case, quantity, value, unit, aim in compared(lc):
             yield Figure("peers", case, quantity, value, unit, aim)
+
+
+def motion(
+    meshes: tuple[int, ...] = (5_000, 31_000, 103_000), links: tuple[int, ...] = (4, 16, 64)
+) -> Iterator[Figure]:
+    """The same mechanisms by Exudyn: steps per second, and how far apart the paths are.
+
+    The same body file of 14 modes, generalised-alpha and step; one thread, processor time.
+
+    Args:
+        meshes: sizes of the mesh behind the pendulum [dofs]; the other mechanisms take the first.
+        links: lengths of the chains.
+    """
+    from rom.peers.motion import measured
+
+    for case, quantity, value, unit, aim in measured(meshes, links):
+        yield Figure("motion", case, quantity, value, unit, aim)
 
 
 def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:
@@ -205,6 +222,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "reduction": reduction,
     "large-reduction": large_reduction,
     "peers": peers,
+    "motion": motion,
 }
 
 
@@ -256,8 +274,8 @@ def _on_a_bed(body: Any, model: FEModel) -> Any:
     return np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * pi)
 
 
-def _bar(size: tuple[float, ...], cells: tuple[int, ...]) -> FEModel:
-    """A straight steel bar of bricks with 27 nodes; its ends are the interfaces "root" and "tip".
+def bar(size: tuple[float, ...], cells: tuple[int, ...], material: Material = STEEL) -> FEModel:
+    """A straight bar of bricks with 27 nodes; its ends are the interfaces "root" and "tip".
 
     On a grid, integrals over the bar are Kronecker products of integrals along its edges.
     """
@@ -270,7 +288,7 @@ def _bar(size: tuple[float, ...], cells: tuple[int, ...]) -> FEModel:
         mx, my, mz = (line[int(a == c), int(a == d)] for a, line in enumerate(along))
         return kron(kron(mx, my), mz)
 
-    lam, mu = STEEL.stiffness[0, 1], STEEL.stiffness[3, 3]
+    lam, mu = material.stiffness[0, 1], material.stiffness[3, 3]
     shear = mu * sum(integral(c, c) for c in range(3))
     blocks = [
         [lam * integral(c, d) + mu * integral(d, c) + (c == d) * shear for d in range(3)]
@@ -278,7 +296,7 @@ def _bar(size: tuple[float, ...], cells: tuple[int, ...]) -> FEModel:
     ]
     node_by_node = np.arange(points.size).reshape(3, -1).T.ravel()
     K = csr_matrix(bmat(blocks))[node_by_node][:, node_by_node]
-    M = STEEL.rho * kron(integral(), identity(3))
+    M = material.rho * kron(integral(), identity(3))
     face = kron(along[1][0, 0], along[2][0, 0])
     numbers = np.arange(len(points)).reshape(-1, face.shape[0])
     ends = {

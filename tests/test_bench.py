@@ -21,7 +21,7 @@ SIZE = np.array([0.16, 0.02, 0.012])
 
 @pytest.fixture(scope="module")
 def bar():
-    return bench._bar(tuple(SIZE), (16, 2, 1))
+    return bench.bar(tuple(SIZE), (16, 2, 1))
 
 
 def test_the_bar_has_the_mass_centre_and_inertia_of_a_bar(bar):

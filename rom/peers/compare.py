@@ -35,19 +35,19 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
     with tempfile.TemporaryDirectory() as folder:
         file = str(Path(folder) / "matrices.npz")
         rod = [sys.executable, "-m", "rom.peers.ours", str(lc)]
-        ours = _run([*rod, "rbe2", str(N_MODES), file])
+        ours = answer_of([*rod, "rbe2", str(N_MODES), file])
         case = f"{ours['dofs']} dofs, rbe2"
         yield case, "rom, one process", ours["processor"], "s of the processor", ""
-        two = _run(["mpirun", "--oversubscribe", "-n", "2", *rod, "rbe2", str(N_MODES)])
+        two = answer_of(["mpirun", "--oversubscribe", "-n", "2", *rod, "rbe2", str(N_MODES)])
         yield case, "one process over two", ours["seconds"] / two["seconds"], "", "above 1"
         for program, aim in (("superlu", ""), ("cholmod", "above 1"), ("exudyn", "above 10")):
-            theirs = _run([python, str(SCRIPT), file, program, "rbe2", str(N_MODES)])
+            theirs = answer_of([python, str(SCRIPT), file, program, "rbe2", str(N_MODES)])
             yield case, f"{program} over rom", theirs["seconds"] / ours["processor"], "", aim
             gap = np.abs(np.array(theirs["frequencies"]) / ours["frequencies"] - 1).max()
             yield case, f"{program}: difference of ten frequencies", gap, "", f"below {SAME:g}"
         if ours["dofs"] <= RBE3_DOFS:
-            mean = _run([*rod, "rbe3", str(N_MODES)])
-            theirs = _run([python, str(SCRIPT), file, "exudyn", "rbe3", str(N_MODES)])
+            mean = answer_of([*rod, "rbe3", str(N_MODES)])
+            theirs = answer_of([python, str(SCRIPT), file, "exudyn", "rbe3", str(N_MODES)])
             ratio = theirs["seconds"] / mean["processor"]
             yield f"{ours['dofs']} dofs, rbe3", "exudyn over rom", ratio, "", "above 10"
 
@@ -77,7 +77,7 @@ def interpreter() -> str:
     return str(python)
 
 
-def _run(command: list[str]) -> dict[str, Any]:
+def answer_of(command: list[str]) -> dict[str, Any]:
     """The answer of a process with one thread.
 
     Raises:

@@ -1,0 +1,154 @@
+"""Motion of mechanisms by Exudyn's ``ObjectFFRFreducedOrder``; a script without rom.
+
+``python ffrf.py body.rom.npz matrices.npz runs.json`` prints a list with {"seconds", "positions",
+"version"} for each run: processor time of the time integration alone, and the (k + 1, 3) path of
+the point watched at the start and after each k-th of the duration.
+
+The body file has all nodes of the mesh as its surface, so that the modes are known everywhere;
+``matrices.npz`` is that of ``craig_bampton.py`` with the weights of the interface nodes as
+``weights_0``, ... and their names as ``names``. ``runs.json`` is a list of {"mechanism", "t_end",
+"steps", "samples", "rho_inf"}; for the mechanisms see ``mechanisms.py``.
+"""
+
+import json
+import sys
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from craig_bampton import read
+from exudyn import itemInterface as item
+from exudyn.FEM import FEMinterface, ObjectFFRFreducedOrderInterface
+
+FREE = {"revolute": [1, 1, 1, 1, 1, 0], "point_on_line": [1, 1, 0, 0, 0, 0]}  # about or along z
+PRISMATIC = [0, 1, 1, 1, 1, 1]  # along x
+DENSE = 60  # unknowns below which a dense factor is the faster one
+
+
+class Body:
+    """The flexible body, and the nodes and weights of its interfaces by name."""
+
+    def __init__(self, body_file: str, matrices: str):
+        K, M, points, interfaces = read(matrices)
+        data, body = np.load(matrices), np.load(body_file)
+        fem = FEMinterface()
+        fem.nodes = {"Position": points}
+        fem.massMatrix, fem.stiffnessMatrix = M, K
+        fem.modeBasis = {"matrix": body["surface/shape"], "type": "NormalModes"}
+        self.ffrf = ObjectFFRFreducedOrderInterface(fem)
+        self.n = self.ffrf.nModes
+        self.faces = {
+            str(name): (nodes.tolist(), data[f"weights_{k}"].tolist())
+            for k, (name, nodes) in enumerate(zip(data["names"], interfaces, strict=True))
+        }
+
+
+class Model:
+    """A mechanism in Exudyn."""
+
+    def __init__(self, described: dict[str, Any], body: Body):
+        self.container = exu.SystemContainer()
+        self.mbs, self.body, self.described = self.container.AddSystem(), body, described
+        self.ground = self.mbs.AddObject(item.ObjectGround())
+        self.objects = {name: self.add(name) for name in described["bodies"]}
+        for joint in described["joints"]:
+            self.join(*joint)
+        self.watched = self.mbs.AddSensor(
+            item.SensorMarker(
+                markerNumber=self.marker(*described["watch"], turns=False),
+                outputVariableType=exu.OutputVariableType.Position,
+                storeInternal=True,
+            )
+        )
+        self.mbs.Assemble()
+
+    def add(self, name: str) -> Any:
+        """The object number of a body."""
+        data, gravity = self.described["bodies"][name], self.described["gravity"]
+        if "mass" not in data:
+            return self.body.ffrf.AddObjectFFRFreducedOrder(
+                self.mbs,
+                positionRef=data["at"],
+                initialVelocity=data["velocity"],
+                initialAngularVelocity=data["omega"],
+                rotationMatrixRef=np.eye(3),
+                gravity=gravity,
+            )["oFFRFreducedOrder"]
+        inertia = exu.rigidBodyUtilities.RigidBodyInertia(data["mass"], np.diag(data["inertia"]))
+        return self.mbs.CreateRigidBody(
+            inertia=inertia,
+            referencePosition=data["at"],
+            initialVelocity=data["velocity"],
+            initialAngularVelocity=data["omega"],
+            gravity=gravity,
+        )
+
+    def marker(self, name: str, place: Any, *, turns: bool) -> Any:
+        """The marker of a joint; one that does not turn costs less."""
+        if name == "ground":
+            return self.mbs.AddMarker(
+                item.MarkerBodyRigid(bodyNumber=self.ground, localPosition=place)
+            )
+        data = self.described["bodies"][name]
+        if "mass" in data:
+            point = data["markers"][place]
+            return self.mbs.AddMarker(
+                item.MarkerBodyRigid(bodyNumber=self.objects[name], localPosition=point)
+            )
+        nodes, weights = self.body.faces[place]
+        kind = item.MarkerSuperElementRigid if turns else item.MarkerSuperElementPosition
+        number = self.objects[name]
+        return self.mbs.AddMarker(
+            kind(bodyNumber=number, meshNodeNumbers=nodes, weightingFactors=weights)
+        )
+
+    def join(self, _name: str, kind: str, i: Any, j: Any, axis: Any) -> None:
+        """Add a joint."""
+        if kind == "spherical":
+            markers = [self.marker(*end, turns=False) for end in (i, j)]
+            self.mbs.AddObject(item.SphericalJoint(markerNumbers=markers))
+            return
+        markers = [self.marker(*end, turns=True) for end in (i, j)]
+        along = PRISMATIC if kind == "prismatic" else FREE[kind]
+        assert axis == ([1, 0, 0] if kind == "prismatic" else [0, 0, 1]), axis
+        self.mbs.AddObject(item.GenericJoint(markerNumbers=markers, constrainedAxes=along))
+
+    def move(self, run: dict[str, Any]) -> dict[str, Any]:
+        """Integrate and say how long it took."""
+        settings = exu.SimulationSettings()
+        time = settings.timeIntegration
+        time.numberOfSteps, time.endTime = run["steps"], run["t_end"]
+        time.verboseMode = 0
+        time.generalizedAlpha.spectralRadius = run["rho_inf"]
+        time.generalizedAlpha.computeInitialAccelerations = True
+        time.newton.useModifiedNewton = True
+        time.newton.relativeTolerance = 1e-9
+        settings.solutionSettings.writeSolutionToFile = False
+        settings.solutionSettings.sensorsWritePeriod = run["t_end"] / run["samples"]
+        settings.displayStatistics = settings.displayComputationTime = False
+        n = self.mbs.systemData.ODE2Size() + self.mbs.systemData.AEsize()
+        dense = n < DENSE
+        kind = exu.LinearSolverType
+        settings.linearSolver.solverType = kind.EXUdense if dense else kind.EigenSparse
+        start = process_time()
+        self.mbs.SolveDynamic(settings)
+        seconds = process_time() - start
+        positions = self.mbs.GetSensorStoredData(self.watched)[:, 1:]
+        return {
+            "seconds": seconds,
+            "positions": positions.tolist(),
+            "version": exu.__version__,
+        }
+
+
+def main(body_file: str, matrices: str, runs: str) -> None:
+    """All runs of a body."""
+    body = Body(body_file, matrices)
+    found = [Model(run["mechanism"], body).move(run) for run in json.loads(Path(runs).read_text())]
+    sys.stdout.write(json.dumps(found) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], sys.argv[3])

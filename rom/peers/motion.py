@@ -1,0 +1,165 @@
+"""The same body file, mechanism, integrator and step in rom and in Exudyn.
+
+Both use generalised-alpha with the same spectral radius and constraints on position level.
+Processor time, one thread, the set-up of the bodies excluded. The body frame is that of the mean
+axis: Exudyn lets gravity turn a body about its undeformed mass centre, which only there is right.
+"""
+
+import json
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from rom.bench import KINDS, bar
+from rom.body.flexible import FlexibleBody
+from rom.errors import ConfigError
+from rom.io.native import save
+from rom.mbs.integrate import simulate
+from rom.model import Array, FEModel, SurfaceMesh
+from rom.peers.compare import answer_of, interpreter
+from rom.peers.mechanisms import Described, built, chain, pendulum, slider_crank
+from rom.peers.ours import save_matrices
+from rom.reduction.method import CraigBampton
+from rom.workflow import reduce
+
+SCRIPT = Path(__file__).with_name("ffrf.py")
+ENDS = ("root", "tip")
+SIZE = (0.3, 0.02, 0.012)  # of the bar in the benchmark [m]
+CELLS = {5_000: (33, 2, 2), 31_000: (64, 4, 4), 103_000: (101, 6, 6)}  # dofs: bricks
+H = 2.5e-4  # step [s]
+LONGER = 10  # times as many steps are timed here as there
+SAME = 1e-5  # difference of paths relative to the size of the mechanism
+
+
+@dataclass(frozen=True)
+class Run:
+    """One mechanism with one step.
+
+    Attributes:
+        mechanism: see `rom.peers.mechanisms`.
+        t_end: duration [s].
+        steps: number of steps.
+        samples: how many instants are compared; divides the number of steps.
+        rho_inf: spectral radius of generalised-alpha at infinite frequency.
+    """
+
+    mechanism: Described
+    t_end: float
+    steps: int
+    samples: int = 20
+    rho_inf: float = 0.9
+
+    def __post_init__(self):
+        if self.steps % self.samples:
+            raise ConfigError(f"{self.samples} samples do not divide {self.steps} steps.")
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """What the other program reads."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What came out.
+
+    Attributes:
+        rate: steps per second of processor time.
+        positions: (samples + 1, 3) path of the point watched [m].
+        version: of the program.
+    """
+
+    rate: float
+    positions: Array
+    version: str = ""
+
+
+def with_all_nodes(model: FEModel) -> FEModel:
+    """The model with every node on its surface, so that its body file holds the whole modes."""
+    n = len(model.points)
+    return replace(model, surface=SurfaceMesh(np.arange(n), np.zeros((0, 3), dtype=np.int64)))
+
+
+def by_exudyn(model: FEModel, body: FlexibleBody, runs: list[Run]) -> list[Moved]:
+    """Runs in Exudyn; the body made of ``with_all_nodes(model)``."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = [str(Path(folder) / name) for name in ("body.rom.npz", "M.npz", "runs.json")]
+        save(body, files[0])
+        save_for_exudyn(model, files[1])
+        Path(files[2]).write_text(json.dumps([run.described for run in runs]))
+        answers = answer_of([interpreter(), str(SCRIPT), *files])
+    return [
+        Moved(run.steps / found["seconds"], np.array(found["positions"]), found["version"])
+        for run, found in zip(runs, answers, strict=True)
+    ]
+
+
+def save_for_exudyn(model: FEModel, path: str) -> None:
+    """Matrices, interfaces, and weights with which nodes average to the point of a marker."""
+    save_matrices(model, path, ENDS)
+    with np.load(path) as data:
+        arrays = dict(data)
+    for k, name in enumerate(ENDS):
+        area = np.asarray(model.interfaces[name].surface_mass.sum(axis=1)).ravel()
+        arrays[f"weights_{k}"] = area / area.sum()
+    np.savez(path, names=np.array(ENDS), **arrays)
+
+
+def by_rom(body: FlexibleBody, run: Run, *, longer: int = 1) -> Moved:
+    """The same run here; ``longer`` times as many steps are timed, for set-up weighs less then."""
+    mech, dt = built(run.mechanism, body), run.t_end / run.steps
+    options = {"dt": dt, "rho_inf": run.rho_inf, "save_every": run.steps // run.samples}
+    simulate(mech, t_end=20 * dt, **options)  # compiled code is loaded
+    start = process_time()
+    sol = simulate(mech, t_end=longer * run.t_end, **options)
+    seconds = process_time() - start
+    path = sol.position(*run.mechanism["watch"])[: run.samples + 1]
+    return Moved(longer * run.steps / seconds, path)
+
+
+def measured(
+    meshes: tuple[int, ...], links: tuple[int, ...]
+) -> Iterator[tuple[str, str, float, str, str]]:
+    """Case, quantity, value, unit and aim of each figure; see `rom.bench.motion`."""
+    for dofs in meshes:
+        model = with_all_nodes(bar(SIZE, CELLS[dofs]))
+        body = reduced(model)
+        runs = {"pendulum": Run(pendulum(body, spin=2.0), 400 * H, 400)}
+        if dofs == meshes[0]:
+            runs["slider-crank"] = Run(slider_crank(body, 0.1, 30.0), 400 * H, 400)
+            runs |= {f"chain of {k}": Run(chain(body, k), 40 * H, 40) for k in links}
+        yield from _compared(model, body, runs)
+
+
+def reduced(model: FEModel, n_modes: int = 8) -> FlexibleBody:
+    """A bar with rigid ends and so many fixed-interface modes, six more in all."""
+    return reduce(model, method=CraigBampton(n_modes), interfaces=dict(KINDS), certify=False)
+
+
+def _compared(
+    model: FEModel, body: FlexibleBody, runs: dict[str, Run]
+) -> Iterator[tuple[str, str, float, str, str]]:
+    for (name, run), theirs in zip(
+        runs.items(), by_exudyn(model, body, list(runs.values())), strict=True
+    ):
+        ours = by_rom(body, run, longer=1 if "chain" in name else LONGER)
+        case, aim = f"{name}, {body.n_modes} modes, {model.n_dofs} dofs", "above 10"
+        if name == "chain of 64":
+            aim = "above 20"
+        elif model.n_dofs > 1e5:
+            aim = "above 50"
+        yield case, f"Exudyn {theirs.version}", theirs.rate, "steps/s", ""
+        yield case, "rom", ours.rate, "steps/s", ""
+        yield case, "rom over Exudyn", ours.rate / theirs.rate, "", aim
+        apart = np.abs(ours.positions - theirs.positions).max() / reach(run.mechanism)
+        yield case, "difference of paths", apart, "of the size", f"below {SAME:g}"
+
+
+def reach(mechanism: Described) -> float:
+    """Farthest body from the origin at the start, or the length of the bar [m]."""
+    return max(SIZE[0], *(float(np.linalg.norm(b["at"])) for b in mechanism["bodies"].values()))
