@@ -111,9 +111,9 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     """
     from rom.mbs.integrate import simulate
 
-    bar = _bar((0.25, 0.02, 0.012), (8, 1, 1))
+    straight = bar((0.25, 0.02, 0.012), (8, 1, 1))
     link = reduce(
-        bar, method=CraigBampton(8), interfaces=dict(KINDS), reference="root", certify=False
+        straight, method=CraigBampton(8), interfaces=dict(KINDS), reference="root", certify=False
     )
     dt, per_link = 1e-3, []
     for n in lengths:

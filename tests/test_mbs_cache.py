@@ -25,7 +25,7 @@ def test_only_sources_of_kernels_drop_them(tmp_path):
 
 def test_kernels_copy_arrays_and_count_no_references():
     """Counting takes longer than the mechanics: every part of every argument, in every call."""
-    options = compiled._OPTIONS | {"cache": False}
+    options = compiled.OPTIONS | {"cache": False}
 
     @njit(**options)
     def spread(x, out, k):

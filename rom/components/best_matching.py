@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from rom.components.compiled import kernel
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.compiled import kernel
 from rom.model import Array
 
 UNSEEN = 1e-12  # share of inertia below which a rotation is left out: points on a line

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rom.mbs.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import drop_stale_cache, inner, kernel
 from rom.model import Array, Index
 
 HERE = Path(__file__).parent

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rom.components.block_contact import OPEN, SLIDES, STICKS, Blocks, find_contacts
-from rom.mbs.compiled import inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.model import Array, Index
 
 STATE_CHANGES = 12  # open-close iterations before the step is cut

@@ -28,8 +28,8 @@ from scipy.integrate import quad
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
+from rom.components.compiled import inner, kernel
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.compiled import inner, kernel
 from rom.model import Array
 from rom.rotation import skew
 

@@ -14,14 +14,14 @@ from numba import njit
 FOLDER = Path(__file__).parent
 STAMP = FOLDER / "__pycache__" / "kernels.sha256"
 
-USER = b"rom.mbs.compiled"  # what kernels import
+USER = b".compiled import"  # in sources of kernels
 # constants, layouts and options that kernels contain
 BUILT_IN = {"arrays.py", "compiled.py", "layout.py"}
 
 
 def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:
     """Remove compiled kernels that were made from other sources; True when some were."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(Path(__file__).read_bytes())
     for source in sorted(folder.glob("*.py")):
         text = source.read_bytes()
         if source.name in BUILT_IN or USER in text:
@@ -48,16 +48,16 @@ drop_stale_cache()
 
 # reassociation lets sums be vectorised; NaN and infinity keep their meaning. No kernel makes an
 # array, so none counts references to them: a step took four times as long when all did
-_OPTIONS = {
+OPTIONS = {
     "cache": True,
     "_nrt": False,
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc"},
 }
 # callable from Python
-kernel = njit(**_OPTIONS)
+kernel = njit(**OPTIONS)
 # callable from other kernels only: the way in from Python costs most of the compile time
-inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inner = njit(**OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 @inner

@@ -7,7 +7,7 @@ Everything that is compiled together stands in this file, so that its cache is n
 
 import numpy as np
 
-from rom.mbs.compiled import inner, kernel
+from rom.components.compiled import inner, kernel
 
 FLOOR = 0.15  # share of its first area below which a triangle does not shorten the time step
 COURANT = 0.6  # share of the critical step

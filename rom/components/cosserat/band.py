@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from rom.components.compiled import drop_stale_cache, inner, kernel
 from rom.components.cosserat.elements import REACH
-from rom.mbs.compiled import drop_stale_cache, inner, kernel
 
 HERE = Path(__file__).parent
 drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rom.mbs.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import drop_stale_cache, inner, kernel
 from rom.model import Array
 
 HERE = Path(__file__).parent

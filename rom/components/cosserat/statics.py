@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from rom.components.compiled import drop_stale_cache, inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.elements import (
     REACH,
@@ -17,7 +18,6 @@ from rom.components.cosserat.elements import (
 )
 from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ConfigError, SolverError
-from rom.mbs.compiled import drop_stale_cache, inner, kernel
 from rom.model import Array
 
 HERE = Path(__file__).parent

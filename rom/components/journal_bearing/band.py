@@ -1,6 +1,6 @@
 """Linear systems whose matrix is a band with dominant diagonals: no pivoting."""
 
-from rom.mbs.compiled import inner
+from rom.components.compiled import inner
 
 
 @inner

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rom.components.compiled import drop_stale_cache, inner, kernel
 from rom.components.journal_bearing.band import back_substitute, factor
-from rom.mbs.compiled import drop_stale_cache, inner, kernel
 from rom.model import Array, Index
 
 HERE = Path(__file__).parent
