@@ -173,6 +173,35 @@ def test_friction_by_load_takes_few_newton_passes():
     assert sol.statistics["iterations"] < 3.2 * sol.statistics["steps"]
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_motor_pushes_the_second_body_and_holds_back_the_first(way):
+    """Two blocks on one rail: equal and opposite momentum, and the work is force times way."""
+    mech, force = block(mass=2.0, gravity=0.0), 3.0 * way
+    other = mech.add_rigid("other", mass=5.0, inertia=(1, 1, 1), at=(1, 0, 0))
+    mech.prismatic("rail", mech.parts["block"].marker((0, 0, 0)), other.marker((0, 0, 0)), axis=X)
+    mech.motor("jack", "rail", lambda t, x, rate: force)
+    sol = simulate(mech, t_end=1.0, dt=1e-2)
+    assert_allclose(sol.velocity("other")[:, 0], force / 5.0 * sol.t, atol=1e-9)
+    assert_allclose(sol.velocity("block")[:, 0], -force / 2.0 * sol.t, atol=1e-9)
+    apart = sol.position("other")[:, 0] - sol.position("block")[:, 0] - 1.0
+    assert_allclose(sol.energy.drives, force * apart, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_block_with_coulomb_friction_slides_down_a_slope(method):
+    """A = g (sin - mu cos) with the level by the load, and with that level given."""
+    mu, angle, s = 0.2, 0.5, 1e-3
+    for level in ({"mu": mu}, {"coulomb": 2.0 * mu * g * np.cos(angle)}):
+        mech = block(speed=1.0)
+        mech.gravity = g * np.array([np.sin(angle), 0, -np.cos(angle)])
+        mech.friction("shoes", "guide", transition_speed=s, **level)
+        sol = simulate(mech, t_end=0.5, dt=1e-2, method=method)
+        a = g * (np.sin(angle) - mu * np.cos(angle))
+        assert_allclose(sol.velocity("block")[:, 0], 1.0 + a * sol.t, atol=1e-8)
+        lost = 2.0 * mu * g * np.cos(angle) * sol.position("block")[:, 0]
+        assert_allclose(sol.energy.damping, lost, atol=1e-3)
+
+
 def test_an_oscillator_with_dry_friction_loses_four_f_over_k_per_cycle():
     k, F, x0 = 200.0, 2.0, 0.3
     mech = block(mass=2.0, gravity=0.0)
@@ -282,6 +311,10 @@ def test_a_mass_between_stops_bounces_with_the_speed_and_time_of_the_closed_form
                     atol=1e-4)  # fmt: skip
     assert_allclose(sol.velocity("block")[-1, 0], v0, atol=1e-4)
     assert_allclose(x[-1], 0.0, atol=1e-4)
+    stored = 0.5 * k * np.maximum(np.maximum(x - 0.1, -0.05 - x), 0.0) ** 2
+    assert_allclose(sol.energy.strain, stored, atol=1e-12)
+    assert np.abs(sol.energy.balance).max() < 1e-5 * m * v0**2
+    assert np.abs(sol.energy.damping).max() < 1e-9
 
 
 def test_a_stop_on_an_angle_acts_after_whole_turns():
@@ -291,6 +324,8 @@ def test_a_stop_on_an_angle_acts_after_whole_turns():
     sol = simulate(mech, t_end=2.0, dt=1e-4)
     assert 15.0 < sol.base[:, 0].max() < 15.2
     assert_allclose(sol.omega("wheel")[-1, 2], -5.0, rtol=1e-3)
+    assert_allclose(sol.energy.damping[-1], 0.25 * (10.0**2 - 5.0**2), rtol=2e-3)
+    assert np.abs(sol.energy.balance).max() < 1e-3 * sol.energy.kinetic.max()
 
 
 WRONG = {
