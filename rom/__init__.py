@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.response import frequency_response, transmissibility
+    from rom.mbs.sensitivity import (
+        equilibrium_sensitivity,
+        frequency_sensitivity,
+        motion_sensitivity,
+    )
     from rom.model import (
         Attachment,
         Basis,
@@ -106,14 +111,17 @@ __all__ = [
     "craig_bampton",
     "cyclic_modes",
     "equilibrium",
+    "equilibrium_sensitivity",
     "export",
     "frequency_response",
+    "frequency_sensitivity",
     "inverse_dynamics",
     "linearize",
     "load",
     "load_state",
     "mass_properties",
     "modes",
+    "motion_sensitivity",
     "reduce",
     "reduce_parametric",
     "save",
@@ -177,14 +185,17 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "craig_bampton": "reduction.fixed_interface",
     "cyclic_modes": "cyclic.modes",
     "equilibrium": "mbs.equilibrium",
+    "equilibrium_sensitivity": "mbs.sensitivity",
     "export": "io.export",
     "frequency_response": "mbs.response",
+    "frequency_sensitivity": "mbs.sensitivity",
     "inverse_dynamics": "mbs.inverse",
     "linearize": "mbs.linearize",
     "load": "io.family",
     "load_state": "mbs.checkpoint",
     "mass_properties": "workflow",
     "modes": "workflow",
+    "motion_sensitivity": "mbs.sensitivity",
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
     "save": "io.family",
