@@ -1,5 +1,7 @@
 """Generalised-alpha on R^3 x SO(3) x R^r, constraints on position level (index 3).
 
+BDF shares its steps. Stabilised, both keep the constraints of the velocities too (index 2).
+
 Source:
     Bruels, Cardona, Arnold, Lie group generalized-alpha time integration of constrained flexible
     multibody systems, Mech. Mach. Theory 48 (2012) 121. Scaling of the multipliers: Bottasso,
@@ -27,12 +29,14 @@ from rom.mbs.motion import (
     residual,
     tangents,
 )
+from rom.mbs.multistep import follow_increment, is_multistep, keep_past, predict_multistep
+from rom.mbs.stabilised import close_gaps, fit_velocities, velocity_gaps
 from rom.model import Array, Index
 
 # what a corrector pass says
 GOES_ON, CONVERGED, FAILED, NOT_FINITE, SINGULAR, ASK = 0, 1, 2, 3, 4, 5
 # entries of Step.count
-STEPS, ITERATIONS, FACTORISATIONS, LAST, FRESH, PASS, BEGAN, ASKS, ASKED = range(9)
+STEPS, ITERATIONS, FACTORISATIONS, LAST, FRESH, PASS, BEGAN, ASKS, ASKED, BOTH = range(10)
 MAX_PASSES = 25
 ROUND_OFF = 4e-16
 
@@ -46,14 +50,18 @@ class Step(NamedTuple):
         q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
         work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
         lost: (3,) the powers at the last accepted instant.
-        count: (9,) steps, iterations, factorisations, iterations of the last step, whether a
+        count: (10,) steps, iterations, factorisations, iterations of the last step, whether a
             factorisation is at hand, pass of the present step, steps when the present chunk
-            began, whether Python forces are to be asked for, whether they have been.
+            began, whether Python forces are to be asked for, whether they have been, whether
+            constraints hold for positions and velocities both.
         size: (4,) norm of the last increment, length of the mechanism, tolerance, total mass.
         method: (5,) h, beta, gamma, alpha_m, alpha_f.
-        bdf: (3,) weights of the present, last and last but one value in the derivative of BDF,
-            zero for generalised-alpha. There ``a`` is the last but one velocity, and ``psi`` the
-            last increment until the next step begins.
+        bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
+            BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one
+            velocity, and ``psi`` the last increment until the next step begins.
+        past: (2, order - 1, n) for BDF of other orders: earlier positions as seen from the last
+            accepted instant, see `rom.mbs.multistep`, and velocities.
+        drift: (n,) part of the increment of such a step that closes gaps.
     """
 
     q: Array
@@ -72,6 +80,8 @@ class Step(NamedTuple):
     size: Array
     method: Array
     bdf: Array
+    past: Array
+    drift: Array
 
 
 def coefficients(h: float, rho_inf: float) -> Array:
@@ -97,8 +107,8 @@ def bdf_coefficients(h: float, before: float) -> tuple[Array, Array]:
 def predict(s, T):
     """Trial state with the accelerations and multipliers of the last step."""
     h, beta, gamma, alpha_m, _ = T.method
-    c0, c1, c2 = T.bdf
-    for i in range(T.v.size):
+    c0, c1, c2 = T.bdf[0], T.bdf[1], T.bdf[-1]
+    for i in range(0 if is_multistep(T) else T.v.size):
         T.vd1[i] = T.vd[i]
         if c0 > 0.0:
             T.v1[i] = (T.vd[i] - c1 * T.v[i] - c2 * T.a[i]) / c0
@@ -107,6 +117,9 @@ def predict(s, T):
             a1 = (T.vd[i] - alpha_m * T.a[i]) / (1 - alpha_m)
             T.v1[i] = T.v[i] + h * ((1 - gamma) * T.a[i] + gamma * a1)
             T.psi[i] = h * T.v[i] + h * h * ((0.5 - beta) * T.a[i] + beta * a1)
+    T.drift[:] = 0.0
+    if is_multistep(T):
+        predict_multistep(s, T)
     copy(T.lam, T.lam1)
     T.size[0] = 0.0
     if T.count[LAST] > 4:
@@ -195,12 +208,17 @@ def increment_goal(W, T):
 def correct(s, W, T, rank):
     """One Newton correction for the residual at hand; says how it went."""
     h, beta, gamma, _, _ = T.method
-    n, bh2 = T.v.size, beta * h * h
+    n, bh2, lead = T.v.size, beta * h * h, beta * h / gamma
     for i in range(n):
         W.rhs[i] = -bh2 * W.residual[i]
+    if T.count[BOTH] == 1:
+        velocity_gaps(s, W, W.part)
     for k in range(T.lam.size):
         # a velocity moves gamma / (beta h) as fast as the increment that removes it
-        W.part[k] = -W.value[k] * (beta * h / gamma if s.rows.kind[k] == ROLL else 1.0)
+        if T.count[BOTH] == 1:
+            W.part[k] *= -lead
+        else:
+            W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
     for i in range(n):
         T.vd1[i] += mass_factor(T) / bh2 * W.delta[i]
@@ -208,16 +226,25 @@ def correct(s, W, T, rank):
         T.psi[i] += W.delta[i]
     for k in range(T.lam.size):
         T.lam1[k] += W.dlam[k] / bh2
+    size = increment_norm(W, T)
+    if T.count[BOTH] == 1:
+        close_gaps(s, W, n, rank, lead)
+        size += increment_norm(W, T)
+        for i in range(n):
+            T.psi[i] += W.delta[i]
+            T.drift[i] += W.delta[i]
+    if is_multistep(T):
+        follow_increment(s, T)
     moved(s, T.q, T.psi, T.q1)
     T.count[PASS] += 1
     T.count[ITERATIONS] += 1
-    return verdict(W, T)
+    return verdict(W, T, size)
 
 
 @inner
-def verdict(W, T):
+def verdict(W, T, size):
     """Judge the increment just applied by its size and by how fast increments shrink."""
-    last, size = T.size[0], increment_norm(W, T)
+    last = T.size[0]
     T.size[0] = size
     if not math.isfinite(size):
         return NOT_FINITE
@@ -238,6 +265,10 @@ def verdict(W, T):
 def accept(s, W, T, rank):
     """Make the trial state the present one, multipliers of least norm, and add up the work."""
     h, _, _, alpha_m, alpha_f = T.method
+    if T.count[BOTH] == 1:
+        fit_velocities(s, W, T, rank)
+    if is_multistep(T):
+        keep_past(s, T)
     for i in range(T.v.size):
         rate = (1 - alpha_f) * T.vd1[i] + alpha_f * T.vd[i]
         T.a[i] = T.v[i] if T.bdf[0] > 0.0 else (rate - alpha_m * T.a[i]) / (1 - alpha_m)

@@ -58,6 +58,8 @@ OPTIONS = {
 kernel = njit(**OPTIONS)
 # callable from other kernels only: the way in from Python costs most of the compile time
 inner = njit(**OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# for functions that return a part of an array, which compiled functions without counting cannot
+spliced = njit(**OPTIONS, inline="always")
 
 
 @inner

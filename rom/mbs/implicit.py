@@ -9,6 +9,7 @@ from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import Work
 from rom.mbs.ending import kept_before_the_end
+from rom.mbs.first_steps import first_steps
 from rom.mbs.record import Record
 from rom.mbs.signals import first_failure, sample_all
 from rom.mbs.starting import begin, remember
@@ -32,6 +33,8 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
         record.watch.begin(state.q, state.v)
     record.clock = perf_counter()
     done, chunk, n = 0, 16, record.settings.steps
+    if T.bdf.size != 3 and not T.count[alpha.FRESH]:
+        done = _first(record, W, T, forces)
     while done < n and not record.stopped:
         clock = perf_counter()
         taken = _chunk(record, W, T, forces, done, min(chunk, n - done))
@@ -41,6 +44,17 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
         record.show()
     if n % record.settings.save_every and not record.stopped:
         record.keep(record.t, *(x[None].copy() for x in (T.q, T.v, T.vd, T.lam, T.work, W.base)))
+
+
+def _first(record: Record, W: Work, T: Step, forces: tuple[Law, ...]) -> int:
+    """Take the steps before a multistep method can begin; returns how many there were."""
+    t, rows = first_steps(record, W, T)
+    T.count[alpha.BEGAN] = 0
+    if not record.watch:
+        every = record.settings.save_every
+        rows = tuple(x[every - 1 :: every] for x in rows)
+    _note(record, W, T, forces, t, rows)
+    return t.size
 
 
 def space(W: Work, T: Step, rows: int) -> tuple[Array, ...]:

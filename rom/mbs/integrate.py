@@ -40,6 +40,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     save_every: int = 1,
     t_start: float | None = None,
     state: State | None = None,
+    order: int = 2,
+    stabilised: bool = False,
 ) -> Solution:
     """Move the mechanism from the start to ``t_end``.
 
@@ -50,8 +52,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             the duration is not a multiple of it. None lets an implicit method choose its steps by
             ``rtol``; ask the solution for times in between by ``solution.at``.
         method: "generalized-alpha" (implicit, second order, for everything), "bdf" (implicit,
-            second order, damps all that the step does not resolve), or "dop853" (explicit,
-            eighth order, variable step: references for smooth, not too stiff motion).
+            second order or as ``order`` says, damps all that the step does not resolve), or
+            "dop853" (explicit, eighth order, variable step: references for smooth, not too stiff
+            motion).
         rho_inf: spectral radius of generalised-alpha at infinite frequency: 1 keeps energy, but
             reactions then collect round-off over many steps; 0 removes what the time step does
             not resolve in one step.
@@ -65,6 +68,12 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         t_start: start time [s]; None for 0, or for the time of ``state``.
         state: state of an earlier run of the same mechanism to go on from, e.g. ``sol.final``.
             Generalised-alpha with the same dt then gives the same bits as a run without a stop.
+        order: of bdf, 1 to 5, with steps dt. Above two, vibrations of little damping that the
+            step resolves poorly can grow. Its first ``order - 1`` steps are Radau's.
+        stabilised: let an implicit method keep the constraints of the velocities to round-off,
+            which it else leaves to its truncation error: multipliers of their own close the gaps
+            of the positions (index 2, after Gear, Gupta and Leimkuhler). BDF of an order other
+            than two always does.
 
     Returns:
         The motion, start and end included.
@@ -88,7 +97,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         t_start = 0.0 if state is None else state.t
     rtol = RTOL[method] if rtol is None else rtol
     numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
-    settings = Settings(*numbers, progress, method)
+    settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
     settings = settings.after(None if state is None else state.memory)
     packed = pack(mechanism)
     if progress and not compiled_before(advance):

@@ -15,7 +15,7 @@ from rom.mbs.algebra import (
     unit,
     vec,
 )
-from rom.mbs.compiled import inner
+from rom.mbs.compiled import inner, spliced
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -139,7 +139,7 @@ def spread_wrench(s, W, sign, out):
             out[t + j] += sign * total
 
 
-@inner
+@spliced
 def own_block(s, b, S):
     """The block of body b with itself in S, as a view."""
     e, w = s.graph.own[b], 6 + s.bodies.r[b]

@@ -11,6 +11,7 @@ import numpy as np
 from rom.errors import ConfigError
 from rom.mbs.events import Watch
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.multistep import LARGEST_ORDER
 from rom.mbs.packing import Packed
 from rom.mbs.signals import Span, sample_all
 from rom.mbs.solution import Solution
@@ -34,6 +35,8 @@ class Settings:
     method: str = "generalized-alpha"
     origin: float | None = None
     taken: int = 0
+    order: int = 2
+    stabilised: bool = False
 
     def __post_init__(self):
         numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
@@ -52,6 +55,34 @@ class Settings:
             raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
         if int(self.save_every) != self.save_every or self.save_every < 1:
             raise ConfigError(f"save_every = {self.save_every!r} is not a positive whole number.")
+        self._check_kind()
+
+    def _check_kind(self) -> None:
+        """Order and stabilisation must be offered by the method."""
+        if isinstance(self.order, bool) or self.order not in range(1, LARGEST_ORDER + 1):
+            raise ConfigError(f"order = {self.order!r} is not 1, 2, 3, 4 or 5.")
+        if self.order != 2 and self.method != "bdf":
+            raise ConfigError(
+                f"{self.method} has one order; order = {self.order} is for bdf only.",
+                hint='Leave it out, or take method="bdf".',
+            )
+        if self.order != 2 and self.dt is None:
+            raise ConfigError(
+                f"bdf of order {self.order} needs steps of one length dt; steps of chosen length "
+                "have order two."
+            )
+        if not isinstance(self.stabilised, bool):
+            raise ConfigError(f"stabilised = {self.stabilised!r} is neither True nor False.")
+        if self.stabilised and self.method == "dop853":
+            raise ConfigError(
+                "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
+                "to the tolerance of its steps."
+            )
+
+    @property
+    def both(self) -> bool:
+        """Whether constraints hold for positions and velocities both."""
+        return self.stabilised or self.order != 2
 
     @property
     def span(self) -> Span:

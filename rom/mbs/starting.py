@@ -10,6 +10,7 @@ from rom.mbs.alpha import Step
 from rom.mbs.arrays import ROLL, Work
 from rom.mbs.bordered import factorised, gradient_times, least_motion
 from rom.mbs.motion import evaluate, linearise, moved
+from rom.mbs.multistep import multistep_coefficients
 from rom.mbs.record import Record, Settings
 from rom.mbs.signals import sample_all
 from rom.mbs.state import Memory, State, with_accelerations
@@ -29,14 +30,15 @@ def begin(
     as the Taylor series has it.
     """
     settings, n = record.settings, state.v.size
-    bdf, jerk = settings.method == "bdf", None
-    method, weights = alpha.coefficients(h, settings.rho_inf), np.zeros(3)
-    if bdf:
-        method, weights = alpha.bdf_coefficients(h, h)
+    bdf, jerk = settings.method == "bdf" and settings.order == 2, None
+    method, weights = _method(settings, h)
     if state.base is not None:
         W.base[:] = state.base
     goes_on = fits(state.memory, method, weights)
-    if not goes_on and (bdf or state.algorithmic is None):
+    if weights.size != 3 and not goes_on:  # further instants of the start follow
+        state = accelerated(record, W, state, forces, 0.0, 0 * state.v)
+        state = replace(state, algorithmic=0 * state.v)
+    elif not goes_on and (bdf or state.algorithmic is None):
         state, jerk = measured(record, W, state, forces, h)
     zeros = [np.zeros(k) for k in (state.q.size, n, n, state.lam.size, n)]
     size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass])
@@ -56,17 +58,32 @@ def begin(
             v = v + h**2 * across(record, W, state, shift_ahead(record, state, method, jerk))
         state = replace(state, algorithmic=before)
     copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
-    count, work = np.zeros(9, dtype=np.int64), np.zeros(3)
-    count[alpha.ASKS] = bool(forces)
+    count, work = np.zeros(10, dtype=np.int64), np.zeros(3)
+    count[alpha.ASKS], count[alpha.BOTH] = bool(forces), settings.both
     power = _power(record, W, state, forces)
-    T = Step(*copies, *zeros, work, power, count, size, method, weights)
+    past = np.zeros((2, weights.size - 2, n))
+    T = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
     if goes_on:
         recall(state.memory, W, T)
     return T, state
 
 
+def _method(settings: Settings, h: float) -> tuple[Array, Array]:
+    """The five numbers of the method, and its weights if it is BDF."""
+    if settings.method != "bdf":
+        return alpha.coefficients(h, settings.rho_inf), np.zeros(3)
+    if settings.order == 2:
+        return alpha.bdf_coefficients(h, h)
+    return multistep_coefficients(h, settings.order)
+
+
 def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Array:
-    """Velocity that a method is ahead, over h^2, before it is taken across constraints."""
+    """Velocity that a method is ahead, over h^2, before it is taken across constraints.
+
+    None if the constraints hold for the velocities too.
+    """
+    if record.settings.both:
+        return 0 * jerk
     _, beta, _, alpha_m, alpha_f = method
     bdf = record.settings.method == "bdf"
     shift = (-1 / 3 if bdf else 1 / 6 - beta - 0.5 * (alpha_m - alpha_f)) * jerk
@@ -103,7 +120,7 @@ def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
     names = (*FACTOR, "factor" if W.by_blocks[0] else "lu")
     arrays = {name: getattr(W, name).copy() for name in names}
     arrays["method"], arrays["bdf"] = T.method.copy(), T.bdf.copy()
-    arrays["before"], arrays["psi"] = T.a.copy(), T.psi.copy()
+    arrays["before"], arrays["psi"], arrays["past"] = T.a.copy(), T.psi.copy(), T.past.copy()
     arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
     origin = settings.t_start if settings.origin is None else settings.origin
     return Memory(settings.method, settings.h, origin, settings.taken + steps, arrays)
@@ -112,6 +129,7 @@ def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
 def recall(memory: Memory, W: Work, T: Step) -> None:
     """Go on with the factorisation of an earlier run that `fits`."""
     T.a[:], T.psi[:] = memory.arrays["before"], memory.arrays["psi"]
+    T.past[:] = memory.arrays.get("past", T.past)
     for name in (*FACTOR, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
     T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
