@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         frequency_sensitivity,
         motion_sensitivity,
     )
+    from rom.mbs.steady import SteadyMotion, steady_motion
     from rom.model import (
         Attachment,
         Basis,
@@ -101,6 +102,7 @@ __all__ = [
     "RomError",
     "Rubin",
     "Snapshots",
+    "SteadyMotion",
     "SurfaceMesh",
     "Thickness",
     "WithLoads",
@@ -128,6 +130,7 @@ __all__ = [
     "save_state",
     "second_order_balanced_truncation",
     "simulate",
+    "steady_motion",
     "substructure",
     "transmissibility",
     "write_animation",
@@ -175,6 +178,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "RomError": "errors",
     "Rubin": "reduction.free_interface",
     "Snapshots": "reduction.snapshots",
+    "SteadyMotion": "mbs.steady",
     "SurfaceMesh": "model",
     "Thickness": "parameters",
     "WithLoads": "reduction.loads",
@@ -202,6 +206,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "save_state": "mbs.checkpoint",
     "second_order_balanced_truncation": "reduction.balanced",
     "simulate": "mbs.integrate",
+    "steady_motion": "mbs.steady",
     "substructure": "workflow",
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 
 import rom
 from rom.errors import ConfigError, ModelError
@@ -60,6 +61,29 @@ def test_a_bar_on_a_coil_turns_as_the_implicit_function_says():
     }
     for name, slope in wanted.items():
         assert_allclose(found[name], slope, rtol=1e-6, err_msg=name)
+
+
+def guyed(place):
+    """A box on a vertical slide at a place along x, held by a spring to (0.5, 0, 0.8)."""
+    mech = rom.Mechanism(gravity=(0, 0, -G))
+    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    centre = box.marker((0, 0, 0))
+    mech.prismatic("slide", mech.ground.marker((place, 0, 0)), centre, axis=(0, 0, 1))
+    guy = mech.ground.marker((0.5, 0, 0.8))
+    mech.spring_damper("guy", guy, centre, stiffness=60.0, free_length=0.4)
+    return mech
+
+
+def test_a_joint_that_moves_takes_the_forces_with_it():
+    """k (1 - 0.4 / L) (0.8 - z) = m g with L^2 = (0.5 - x)^2 + (0.8 - z)^2."""
+
+    def miss(z, x):
+        return 60 * (1 - 0.4 / np.hypot(0.5 - x, 0.8 - z)) * (0.8 - z) - G
+
+    found = rom.equilibrium_sensitivity(guyed, {"place": 0.1}, lambda mech, state: state.q[2])
+    heights = [brentq(miss, -2.0, 0.5, args=(0.1 + step,), xtol=1e-14) for step in (-1e-4, 1e-4)]
+    assert_allclose(found["place"], (heights[1] - heights[0]) / 2e-4, rtol=1e-6)
+    assert abs(found["place"]) > 0.05
 
 
 def test_reactions_have_derivatives_too():

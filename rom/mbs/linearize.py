@@ -266,4 +266,5 @@ def _refuse_rolling(packed: Packed, state: State) -> None:
         raise ModelError(
             "a rolling joint binds velocities, not positions: it can be linearised at rest only.",
             where=name,
+            hint="rom.steady_motion has the eigenvalues of steady rolling.",
         )
