@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.family import BodyFamily
     from rom.body.flexible import FlexibleBody
+    from rom.body.spread import SpreadLoad, mass_load, surface_load
     from rom.checks import check
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.sector import CyclicSector
@@ -102,6 +103,7 @@ __all__ = [
     "RomError",
     "Rubin",
     "Snapshots",
+    "SpreadLoad",
     "SteadyMotion",
     "SurfaceMesh",
     "Thickness",
@@ -121,6 +123,7 @@ __all__ = [
     "linearize",
     "load",
     "load_state",
+    "mass_load",
     "mass_properties",
     "modes",
     "motion_sensitivity",
@@ -132,6 +135,7 @@ __all__ = [
     "simulate",
     "steady_motion",
     "substructure",
+    "surface_load",
     "transmissibility",
     "write_animation",
     "write_history",
@@ -178,6 +182,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "RomError": "errors",
     "Rubin": "reduction.free_interface",
     "Snapshots": "reduction.snapshots",
+    "SpreadLoad": "body.spread",
     "SteadyMotion": "mbs.steady",
     "SurfaceMesh": "model",
     "Thickness": "parameters",
@@ -197,6 +202,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "linearize": "mbs.linearize",
     "load": "io.family",
     "load_state": "mbs.checkpoint",
+    "mass_load": "body.spread",
     "mass_properties": "workflow",
     "modes": "workflow",
     "motion_sensitivity": "mbs.sensitivity",
@@ -208,6 +214,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "simulate": "mbs.integrate",
     "steady_motion": "mbs.steady",
     "substructure": "workflow",
+    "surface_load": "body.spread",
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",
     "write_history": "io.history",

@@ -10,6 +10,7 @@ from scipy.linalg import eigh, null_space
 from rom.body.recovery import StressRecovery
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
+from rom.body.spread import point_areas
 from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
@@ -162,6 +163,18 @@ class FlexibleBody:
         body = replace(body, K_geo=stiffening, stress=stress)
         omega, V = _normal_modes(body.K, body.M)
         return _recombined(body, V, omega, reference_label(reference))
+
+    def surface_areas(self, where: Any = None) -> Array:
+        """(s,) area that belongs to each point of the surface, undeformed [m^2].
+
+        Args:
+            where: part of the surface, as in `rom.surface_load`; the rest has no area.
+
+        Raises:
+            ConfigError: for a place without area.
+            ModelError: if the body carries no surface.
+        """
+        return point_areas(self, where)
 
     def frequencies(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Array:
         """Natural frequencies of the reduced body with some interfaces held [Hz].

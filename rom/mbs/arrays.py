@@ -234,6 +234,26 @@ class Contacts(NamedTuple):
     law: Array
 
 
+class Spread(NamedTuple):
+    """Loads spread over bodies.
+
+    Attributes:
+        body: (l,) body; world: (l,) 1 if the forces keep their direction in the world, else 0.
+        force: (l, 3) sum of the forces f [N].
+        first: (l, 9) entry 3 a + b: sum of X_a f_b [N m].
+        shapes: (l, R, 9) entry 3 a + b: sum of phi_k,a f_b.
+        amplitude: (l,) factor; signal: (l,) function of time added to it, -1 for none.
+    """
+
+    body: Index
+    world: Index
+    force: Array
+    first: Array
+    shapes: Array
+    amplitude: Array
+    signal: Index
+
+
 class System(NamedTuple):
     """Everything that stays constant during a run."""
 
@@ -245,6 +265,7 @@ class System(NamedTuple):
     actions: Actions
     bushings: Bushings
     contacts: Contacts
+    spread: Spread
     graph: Graph | None = None
 
 
@@ -274,6 +295,7 @@ class Work(NamedTuple):
     theta: Array  # (k, 3) marker rotation vectors
     wrench: Array  # (k, 6) force and moment on each marker
     user: Array  # (k, 6) force and moment from Python functions
+    arm: Array  # (l, 9) sum of positions and forces of spread loads, body frame
     signal: Array  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
     x: Array  # (c,) joint coordinates, angles followed over whole turns
     xd: Array  # (c,) their rates
@@ -337,6 +359,7 @@ def workspace(system: System, n_signals: int) -> Work:
         "E": (k, 3, 3),
         **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),
         "H": (k, 6, 6 + R),
+        "arm": (system.spread.body.size, 9),
         "signal": (n_signals, 3),
         **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
         "g": (m, 24),

@@ -59,7 +59,7 @@ def _energy(solution: Solution) -> list[Row]:
 def _momentum(solution: Solution) -> list[Row]:
     mechanism = solution.mechanism
     grounded = any(m.body == "ground" for j in mechanism.joints.values() for m in j.markers)
-    pushed = mechanism.loads or np.any(mechanism.gravity)
+    pushed = mechanism.loads or mechanism.spread_loads or np.any(mechanism.gravity)
     pushed = pushed or any(u.j is None for u in mechanism.user_forces.values())
     between = (mechanism.springs, mechanism.user_forces, mechanism.bushings, mechanism.contacts)
     for law in (law for laws in between for law in laws.values()):

@@ -1,4 +1,4 @@
-"""Force elements between bodies: bushings and contacts of surfaces."""
+"""Force elements: bushings, contacts of surfaces, loads spread over a body."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from scipy.interpolate import PchipInterpolator
 
 from rom import rotation
 from rom.errors import ConfigError
-from rom.mbs.arguments import finite, positive, unit_quaternion, unit_vector
+from rom.mbs.arguments import finite, number, positive, unit_quaternion, unit_vector
 from rom.mbs.arrays import BORE, CYLINDER, DISC, PLANE, SPHERE
 from rom.mbs.impact import Impact, checked_law
 from rom.mbs.parts import Marker, Part
@@ -46,11 +46,25 @@ class Contact:
     law: Impact
 
 
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """A load on all points of a body; arrays as in `rom.body.spread.SpreadLoad`."""
+
+    body: str
+    force: Array
+    first: Array
+    shapes: Array
+    amplitude: float
+    function: Callable[[float], Any] | None
+    world: int
+
+
 class Elements:
-    """The bushings and contacts of a `rom.mbs.mechanism.Mechanism`."""
+    """The bushings, contacts and spread loads of a `rom.mbs.mechanism.Mechanism`."""
 
     bushings: dict[str, Bushing]
     contacts: dict[str, Contact]
+    spread_loads: dict[str, Spread]
     part: Callable[[str], Part]
     design_point: Callable[[Marker], Array]
     _check_new: Callable[[str], None]
@@ -165,6 +179,42 @@ class Elements:
                 f"{radii[1]:g} m."
             )
         self._touch(name, BORE if inside else CYLINDER, (m1, m2), law, (axis, None), radii)
+
+    def spread_load(
+        self, name: str, part: Part, load: Any, amplitude: Any = 1.0, *, frame: str = "body"
+    ) -> None:
+        """Load on all points of a flexible body: pressure, traction, force per mass.
+
+        In the frame "body" the forces turn with it, as a pressure does; in the "world" they keep
+        their direction, given in the axes of the world. Either way they act on the points as they
+        deform, which changes moments; the area they were reduced for stays the undeformed one.
+
+        Args:
+            name: name of the load.
+            part: what `add_flexible` returned.
+            load: from `rom.surface_load` or `rom.mass_load` of the same reduced body.
+            amplitude: a number, or a function of time.
+            frame: "body" or "world".
+
+        Raises:
+            ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
+        """
+        self._check_new(name)
+        part = self.part(getattr(part, "name", part))
+        if frame not in ("world", "body"):
+            raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
+        shapes = getattr(load, "shapes", None)
+        if shapes is None or shapes.shape != (part.r, 3, 3) or part.flexible is None:
+            raise ConfigError(
+                f"load {name!r} is not one of body {part.name!r} with {part.r} coordinates.",
+                hint="Make it with rom.surface_load or rom.mass_load from that body.",
+            )
+        function = amplitude if callable(amplitude) else None
+        constant = 0.0 if function else number("amplitude", amplitude)
+        arrays = (load.force, load.first, shapes)
+        self.spread_loads[name] = Spread(
+            part.name, *arrays, constant, function, int(frame == "world")
+        )
 
     def _touch(
         self, name: str, kind: int, markers: Any, law: Impact, axes: Any, radius: Any

@@ -1,12 +1,13 @@
-"""Motors, friction, stops, bushings and contacts as flat arrays."""
+"""Motors, friction, stops, bushings, contacts and spread loads as flat arrays."""
 
 from typing import Any
 
 import numpy as np
 
-from rom.mbs.arrays import Actions, Bushings, Contacts
+from rom.mbs.arrays import Actions, Bushings, Contacts, Spread
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import Marker
+from rom.mbs.signals import Signal, load_signal
 from rom.model import Array, Index
 
 
@@ -91,3 +92,30 @@ def contacts(mechanism: Mechanism, index: dict[Marker, int]) -> Contacts:
         table((c.radius for c in found), 2),
         table(numbers, 5),
     )
+
+
+def spread_loads(mechanism: Mechanism, first: int, R: int) -> tuple[Spread, list[Signal]]:
+    """Spread loads and their functions of time, counted from the signal ``first``."""
+    found = mechanism.spread_loads
+    names = list(mechanism.parts)
+    shapes, signals, at = np.zeros((len(found), R, 9)), [], []
+    for k, (name, load) in enumerate(found.items()):
+        shapes[k, : len(load.shapes)] = load.shapes.reshape(-1, 9)
+        at.append(first + len(signals) if load.function else -1)
+        if load.function:
+            signals.append(load_signal(name, _as_vector(load.function)))
+    spread = Spread(
+        integers(names.index(load.body) for load in found.values()),
+        integers(load.world for load in found.values()),
+        table((load.force for load in found.values()), 3),
+        table((load.first.ravel() for load in found.values()), 9),
+        shapes,
+        np.array([load.amplitude for load in found.values()], dtype=float),
+        integers(at),
+    )
+    return spread, signals
+
+
+def _as_vector(function: Any) -> Any:
+    """The function of time as the first of three components."""
+    return lambda t: (function(t), 0.0, 0.0)

@@ -11,10 +11,11 @@ from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion
 from rom.mbs.connections import Connections, Drive, TimeFunction
-from rom.mbs.elements import Bushing, Contact, Elements
+from rom.mbs.elements import Bushing, Contact, Elements, Spread
 from rom.mbs.joint_forces import Friction, JointForces, Motor, Stop
 from rom.mbs.joints import Joint
 from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
+from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
 
 
@@ -68,7 +69,7 @@ class Event:
 
 
 @dataclass
-class Mechanism(Connections, JointForces, Elements):
+class Mechanism(Connections, JointForces, Elements, SurfaceContacts):
     """Rigid and flexible bodies, connected and loaded.
 
     Joints are defined in the position in which the bodies are added, flexible bodies
@@ -92,6 +93,7 @@ class Mechanism(Connections, JointForces, Elements):
     stops: dict[str, Stop] = field(default_factory=dict, init=False)
     bushings: dict[str, Bushing] = field(default_factory=dict, init=False)
     contacts: dict[str, Contact] = field(default_factory=dict, init=False)
+    spread_loads: dict[str, Spread] = field(default_factory=dict, init=False)
 
     def __post_init__(self):
         self.gravity = finite("gravity", self.gravity, (3,))
@@ -300,7 +302,7 @@ class Mechanism(Connections, JointForces, Elements):
         taken = [
             *(GROUND, *self.parts, *self.joints, *self.drives, *self.springs),
             *(*self.turns, *self.loads, *self.user_forces, *self.motors, *self.frictions),
-            *(*self.stops, *self.bushings, *self.contacts, *self.events),
+            *(*self.stops, *self.bushings, *self.contacts, *self.spread_loads, *self.events),
         ]
         if name in taken:
             raise ConfigError(f"the name {name!r} is used twice; in use are {sorted(taken)}.")

@@ -7,7 +7,14 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.mbs.arrays import ALONG, LENGTHS, Bodies, Coordinates, Forces, Markers, Rows, System
-from rom.mbs.elements_packing import actions, bushings, contacts, integers, table
+from rom.mbs.elements_packing import (
+    actions,
+    bushings,
+    contacts,
+    integers,
+    spread_loads,
+    table,
+)
 from rom.mbs.graph import graph_of
 from rom.mbs.joints import Joint, Row
 from rom.mbs.mechanism import Mechanism
@@ -86,6 +93,8 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     coordinates = _Coordinates()
     rows, owners, signals = _rows(mechanism, index, coordinates)
     forces, loads = _forces(mechanism, index, len(signals), coordinates)
+    spread, more = spread_loads(mechanism, len(signals) + len(loads), max(p.r for p in parts))
+    loads += more
     clock = (clock_signal(),) if mechanism.motors else ()
     moved_by = actions(
         mechanism,
@@ -103,6 +112,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         moved_by,
         bushings(mechanism, index),
         contacts(mechanism, index),
+        spread,
     )
     return Packed(
         system._replace(graph=graph_of(system, whole=whole)),
@@ -200,7 +210,7 @@ def _bends(mechanism: Mechanism, handles: list[Marker], R: int) -> Array:
     motions = {name: part.flexible.second_order().markers for name, part in bodies.items()}
     bend = np.zeros((len(handles), 6, *2 * (R if bodies else 0,)))
     for k, marker in enumerate(handles):
-        if marker.body in bodies and isinstance(marker.place, str):
+        if marker.body in bodies and marker.place in motions[marker.body]:
             r = bodies[marker.body].r
             bend[k, :, :r, :r] = motions[marker.body][marker.place]
     return bend

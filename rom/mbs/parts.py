@@ -14,6 +14,14 @@ GROUND = "ground"
 SINGULAR_MASS = 1e-11
 
 
+SURFACE = "surface point "  # markers that a contact puts on the surface of a flexible body
+
+
+def surface_place(k: int) -> str:
+    """Place of the marker on point k of the surface of a flexible body; it does not turn."""
+    return f"{SURFACE}{k}"
+
+
 @dataclass(frozen=True, slots=True)
 class Marker:
     """A point on a body: a name, or three coordinates in the body frame."""
@@ -83,6 +91,9 @@ class Part:
 
     def point(self, marker: Marker) -> Array:
         """(3,) undeformed position of a marker in the body frame [m]."""
+        row = self._surface_row(marker.place)
+        if row is not None:
+            return np.asarray(self.flexible.surface.points[row], dtype=float)
         self.marker(marker.place)
         if not isinstance(marker.place, str):
             return np.array(marker.place)
@@ -94,8 +105,18 @@ class Part:
         """(3, r) displacement and (3, r) rotation of a marker per elastic coordinate."""
         if self.flexible is None:
             return np.zeros((3, 0)), np.zeros((3, 0))
+        row = self._surface_row(marker.place)
+        if row is not None:
+            shape = np.asarray(self.flexible.surface.shape, dtype=float)
+            return shape[3 * row : 3 * row + 3], np.zeros((3, self.r))
         m = self.flexible.markers[marker.place]
         return np.asarray(m.translation, dtype=float), np.asarray(m.rotation, dtype=float)
+
+    def _surface_row(self, place: Any) -> int | None:
+        """Point of the surface that a contact has put a marker on, or None."""
+        if self.flexible is None or not isinstance(place, str) or place in self.names:
+            return None
+        return int(place.removeprefix(SURFACE)) if place.startswith(SURFACE) else None
 
 
 def ground_part() -> Part:

@@ -68,7 +68,8 @@ class Instant:
         s = self.packed.system
         forces = s.forces._replace(load=self.load * s.forces.load)
         bodies = s.bodies._replace(gravity=self.load * s.bodies.gravity)
-        return s._replace(bodies=bodies, forces=forces)
+        spread = s.spread._replace(amplitude=self.load * s.spread.amplitude)
+        return s._replace(bodies=bodies, forces=forces, spread=spread)
 
     def evaluate(self, q: Array, v: Array) -> None:
         """Everything that depends on coordinates and velocities, Python forces included."""

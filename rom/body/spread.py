@@ -1,0 +1,185 @@
+"""Loads spread over a body, reduced once to what a floating frame feels of them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError, ModelError
+from rom.model import Array, Index
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+
+Where = Callable[[Array], Any] | str | None
+NEAR = 1e-9  # distance of two points that are the same, relative to the size of the body
+
+
+@dataclass(frozen=True, slots=True)
+class SpreadLoad:
+    """Forces f on points X + sum_k phi_k q_k of a body, for a unit of their amplitude.
+
+    Attributes:
+        force: (3,) sum of f [N].
+        first: (3, 3) entry [a, b] is the sum of X_a f_b [N m].
+        shapes: (r, 3, 3) entry [k, a, b] is the sum of phi_k,a f_b.
+    """
+
+    force: Array
+    first: Array
+    shapes: Array
+
+    def __add__(self, other: "SpreadLoad") -> "SpreadLoad":
+        """Both loads at once."""
+        pairs = ((getattr(self, x), getattr(other, x)) for x in ("force", "first", "shapes"))
+        return SpreadLoad(*(a + b for a, b in pairs))
+
+    def __rmul__(self, factor: float) -> "SpreadLoad":
+        """The load so many times."""
+        return SpreadLoad(factor * self.force, factor * self.first, factor * self.shapes)
+
+
+def surface_load(
+    body: "FlexibleBody",
+    *,
+    pressure: float | None = None,
+    traction: npt.ArrayLike | None = None,
+    forces: npt.ArrayLike | None = None,
+    where: Where = None,
+) -> SpreadLoad:
+    """A load on the outer surface of a body, from the surface it carries.
+
+    Every triangle gives a third of its load to each of its corners, in the undeformed geometry.
+
+    Args:
+        body: with a surface.
+        pressure: [Pa], pushing inwards; or
+        traction: (3,) force per area in the axes of the body [Pa]; or
+        forces: (s, 3) forces on the points of ``body.surface`` [N].
+        where: which part of the surface: a function of the (t, 3) centres of the triangles that
+            returns (t,) booleans, the name of a deformable interface, or None for all of it.
+
+    Raises:
+        ConfigError: for not exactly one load, a wrong shape, or a place without area.
+        ModelError: if the body has no surface, or one whose triangles do not tell inside from
+            outside, which a pressure needs.
+    """
+    if sum(x is not None for x in (pressure, traction, forces)) != 1:
+        raise ConfigError("give either a pressure, a traction or forces.")
+    surface = _surface(body)
+    shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
+    if forces is not None:
+        f = np.asarray(forces, dtype=float)
+        if where is not None or f.shape != surface.points.shape:
+            raise ConfigError(
+                f"forces have the shape {f.shape}; needed is {surface.points.shape}, zero where "
+                "there is none, and no `where`."
+            )
+        return _reduced(surface.points, shapes, f)
+    if pressure is not None:
+        _refuse_inside_out(body.name, surface.triangles)
+    chosen, areas = _triangles(body, where)
+    if pressure is not None:
+        each = -float(pressure) * areas
+    else:
+        t = np.asarray(traction, dtype=float)
+        if t.shape != (3,):
+            raise ConfigError(f"traction has the shape {t.shape}; needed is (3,).")
+        each = np.linalg.norm(areas, axis=1)[:, None] * t
+    f = np.zeros(surface.points.shape)
+    np.add.at(f, chosen.ravel(), np.repeat(each / 3, 3, axis=0))
+    return _reduced(surface.points, shapes, f)
+
+
+def point_areas(body: "FlexibleBody", where: Where = None) -> Array:
+    """(s,) a third of the area of the chosen triangles around each point of the surface [m^2]."""
+    chosen, areas = _triangles(body, where)
+    out = np.zeros(_surface(body).points.shape[0])
+    np.add.at(out, chosen.ravel(), np.repeat(np.linalg.norm(areas, axis=1) / 3, 3))
+    return out
+
+
+def _surface(body: "FlexibleBody") -> Any:
+    if body.surface is None:
+        raise ModelError(
+            f"body {body.name!r} carries no surface: nothing to spread a load on.",
+            hint="Reduce a model that has one; imported matrices have none.",
+        )
+    return body.surface
+
+
+def _triangles(body: "FlexibleBody", where: Where) -> tuple[Index, Array]:
+    """(t, 3) corners of the chosen triangles and their areas times the normal (t, 3)."""
+    surface = _surface(body)
+    chosen = surface.triangles[_chosen(body, where)]
+    a, b, c = np.moveaxis(surface.points[chosen], 1, 0)
+    return chosen, 0.5 * np.cross(b - a, c - a)
+
+
+def mass_load(body: "FlexibleBody", acceleration: npt.ArrayLike) -> SpreadLoad:
+    """Force per mass on every particle of a body, such as gravity or a magnetic pull.
+
+    Args:
+        body: flexible.
+        acceleration: (3,) force per mass [m/s^2].
+
+    Raises:
+        ConfigError: for another shape.
+    """
+    g = np.asarray(acceleration, dtype=float)
+    if g.shape != (3,):
+        raise ConfigError(f"acceleration has the shape {g.shape}; needed is (3,).")
+    shapes = np.einsum("ak,b->kab", body.S, g)
+    return SpreadLoad(body.mass * g, np.outer(body.first_moment, g), shapes)
+
+
+def _reduced(points: Array, shapes: Array, f: Array) -> SpreadLoad:
+    both = np.einsum("nak,nb->kab", shapes, f, optimize=True)
+    return SpreadLoad(f.sum(axis=0), points.T @ f, both)
+
+
+def _chosen(body: "FlexibleBody", where: Where) -> Any:
+    """(t,) which triangles are meant."""
+    surface: Any = body.surface
+    corners = surface.points[surface.triangles]
+    if where is None:
+        chosen = np.ones(len(corners), dtype=bool)
+    elif isinstance(where, str):
+        chosen = _on_interface(body, where)[surface.triangles].all(axis=1)
+    else:
+        chosen = np.asarray(where(corners.mean(axis=1)))
+    if chosen.shape != (len(corners),) or chosen.dtype != bool or not chosen.any():
+        raise ConfigError(
+            f"`where` chooses no triangle of the {len(corners)} on body {body.name!r}.",
+            hint="It takes (t, 3) points and returns (t,) booleans.",
+        )
+    return chosen
+
+
+def _on_interface(body: "FlexibleBody", name: str) -> Any:
+    """(s,) whether the points of the surface belong to a deformable interface."""
+    patch = body.markers[name].patch if name in body.markers else None
+    if patch is None:
+        raise ConfigError(
+            f"body {body.name!r} has no deformable interface {name!r}.",
+            hint="Choose the place by a function of points.",
+        )
+    surface: Any = body.surface
+    grid = NEAR * max(float(np.ptp(surface.points, axis=0).max()), 1e-300)
+    known = {tuple(x) for x in np.round(patch.points / grid / 100).astype(int)}
+    return np.array([tuple(x) in known for x in np.round(surface.points / grid / 100).astype(int)])
+
+
+def _refuse_inside_out(name: str, triangles: Index) -> None:
+    """Every edge of a closed surface is passed once in each direction."""
+    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    once = np.unique(ends, axis=0)
+    back = np.unique(ends[:, ::-1], axis=0)
+    if len(once) != len(ends) or not np.array_equal(once, back):
+        raise ModelError(
+            f"the triangles on body {name!r} do not tell its inside from its outside: a pressure "
+            "has no direction.",
+            hint="Give a traction or forces.",
+        )
