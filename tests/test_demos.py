@@ -22,6 +22,7 @@ LEFT_BEHIND = {
     "demo_masonry": {"masonry.png"},
     "demo_parameters": {"parameters.png"},
     "demo_reference_conditions": {"reference_conditions.png"},
+    "demo_pendulum_chain": {"pendulum_chain.png"},
     "demo_rockfall": {"rockfall.png"},
     "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
     "demo_updating": {"updating.png"},

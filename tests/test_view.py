@@ -295,6 +295,20 @@ def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
         view.convergence(tmp_path / "d.png", [("error", {"x": ([1, 2], [1.0])})], **look)
 
 
+def test_a_panel_may_have_logarithmic_scales():
+    from rom.view import page
+    from rom.view.panels import _draw
+
+    line = view.Panel(
+        "Cost", "links", "time [ms]", curves={"one": ([1, 1000], [0.1, 100])}, log=True
+    )
+    with page.styled():
+        axes = page.area(page.sheet(400, 300), 50, 50, 300, 200)
+        _draw(axes, line, (300, 200))
+        assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+        assert axes.get_xlim()[0] < 1 and axes.get_xlim()[1] > 1000
+
+
 def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
     x = np.linspace(0, 1, 9)
     path = view.Panel("Path", "x [m]", "y [m]", {"one": (x, x)}, {"seen": (x, 1 - x)}, equal=True)

@@ -29,6 +29,7 @@ class Panel:
         points: {name: (x (n,), y (n,))} drawn as small circles over them.
         bars: {name: (low, high)} horizontal bars from low to high, from top to bottom.
         equal: the same scale along both axes.
+        log: logarithmic scales along both axes.
     """
 
     title: str
@@ -38,6 +39,7 @@ class Panel:
     points: Mapping[str, Line] = field(default_factory=dict)
     bars: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     equal: bool = False
+    log: bool = False
 
 
 def panels(path: str | Path, rows: Sequence[Sequence[Panel]], *, title: str, caption: str) -> Path:
@@ -85,8 +87,12 @@ def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
     axes.set_ylabel(panel.ylabel, size=page.SMALL)
     named = sum(not name.startswith("_") for name in (*panel.curves, *panel.points))
     low, high = axes.get_ylim()
-    if named and not panel.bars:  # room for the legend above all lines
-        axes.set_ylim(low, high + 0.11 * (named + 0.5) * (high - low))
+    room = 0.11 * (named + 0.5)  # for the legend above all lines
+    if panel.log:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+    elif named and not panel.bars:
+        axes.set_ylim(low, high + room * (high - low))
     if not (panel.xlabel or panel.ylabel):
         axes.set_axis_off()
     if panel.equal:
