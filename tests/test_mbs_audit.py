@@ -59,6 +59,19 @@ def test_momentum_that_changes_is_seen(free):
     assert "change of linear momentum" in failures(replace(free, v=v, _tracks={}))
 
 
+def test_forces_inside_what_starts_at_rest_change_no_momentum():
+    """Nothing but round-off: a share of itself would be one."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    ball = {"mass": 1.0, "inertia": (1, 2, 3), "at": (0, 0, 0)}
+    hub, wheel = (mech.add_rigid(name, **ball) for name in ("hub", "wheel"))
+    axle = (part.marker((0.3, 0.1, 0.2)) for part in (hub, wheel))
+    mech.revolute("axle", *axle, axis=(1, 2, 2))
+    mech.motor("motor", "axle", lambda t, angle, rate: 3.0)
+    sol = simulate(mech, t_end=0.2, dt=1e-3)
+    assert sol.energy.kinetic[-1] > 0.01
+    assert audit(sol).ok, audit(sol)
+
+
 def test_a_stretched_quaternion_is_seen(free):
     q = free.q.copy()
     q[10, 3:7] *= 1 + 1e-9

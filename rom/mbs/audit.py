@@ -66,9 +66,13 @@ def _momentum(solution: Solution) -> list[Row]:
         pushed = pushed or "ground" in (law.i.body, law.j.body if law.j else "")
     if grounded or pushed:
         return []
-    rows = []
-    for name, p in zip(("linear", "angular"), solution.momentum, strict=True):
-        size = max(np.abs(p).max(), 1e-300)
+    # what starts at rest has no momentum as a whole: its parts have, as much as their energy allows
+    packed, rows = solution.packed, []
+    moving = max(np.sqrt(2 * packed.mass * solution.energy.kinetic.max()), 1e-300)
+    for name, p, arm in zip(
+        ("linear", "angular"), solution.momentum, (1.0, packed.length), strict=True
+    ):
+        size = max(np.abs(p).max(), moving * arm)
         rows.append(_row(f"change of {name} momentum", np.abs(p - p[0]).max() / size, MOMENTUM))
     return rows
 
