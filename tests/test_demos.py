@@ -25,6 +25,7 @@ LEFT_BEHIND = {
     "demo_pendulum_chain": {"pendulum_chain.png"},
     "demo_rockfall": {"rockfall.png"},
     "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
+    "demo_satellite": {"satellite.png", "satellite.gif"},
     "demo_updating": {"updating.png"},
     "demo_sheet": {"sheet.png", "taylor_bar.gif"},
     "demo_slider_crank": {
