@@ -285,6 +285,7 @@ class Work(NamedTuple):
     T1d: Array  # (b, R, 9) integral of rho X psi_kl dq_l/dt
     Ta: Array  # (R, 3) integral of rho psi_kl d2q_l/dt2
     T1a: Array  # (R, 9) integral of rho X psi_kl d2q_l/dt2
+    line: Array  # (9 R,) the rows of a contraction, one after the other
     P: Array  # (k, 3) marker positions
     E: Array  # (k, 3, 3) marker axes
     V: Array  # (k, 6) marker twists
@@ -354,6 +355,7 @@ def workspace(system: System, n_signals: int) -> Work:
         "T1d": (b, R, 9),
         "Ta": (R, 3),
         **dict.fromkeys(("Sa", "T1a"), (R, 9)),
+        "line": (9 * R,),
         "move": (k, 6, R),
         **dict.fromkeys(("P", "u", "theta"), (k, 3)),
         "E": (k, 3, 3),

@@ -37,14 +37,16 @@ def body_states(B, W, q, v):
         if B.stiffened[b] == 1:
             bent_integrals(B, W, b, q, v)
         for i in range(3):
-            W.d[b, i], W.dd[b, i] = B.first[b, i], 0.0
+            moment, rate = B.first[b, i], 0.0
             for k in range(r):
-                W.d[b, i] += 0.5 * (B.S[f, i, k] + Ct[i, k]) * q[at + 7 + k]
-                W.dd[b, i] += Ct[i, k] * v[vt + 6 + k]
+                moment += 0.5 * (B.S[f, i, k] + Ct[i, k]) * q[at + 7 + k]
+                rate += Ct[i, k] * v[vt + 6 + k]
+            W.d[b, i], W.dd[b, i] = moment, rate
             for j in range(3):
-                SPd[i, j] = 0.0
+                total = 0.0
                 for k in range(r):
-                    SPd[i, j] += v[vt + 6 + k] * SP[k, 3 * i + j]
+                    total += v[vt + 6 + k] * SP[k, 3 * i + j]
+                SPd[i, j] = total
         spur = -(J[0, 0] + J[1, 1] + J[2, 2])
         for i in range(3):
             J[i, i] += spur
@@ -61,13 +63,14 @@ def shape_integrals(B, W, b, q, v):
             Sd[k, p] = 0.0
         for i in range(3):
             Ct[i, k] = B.S[f, i, k]
-    contract(B.S2[f], q, at + 7, r, SP)
-    contract(B.S2[f], v, vt + 6, r, Sd)
+    contract(B.S2[f], q, at + 7, r, W.line, SP)
+    contract(B.S2[f], v, vt + 6, r, W.line, Sd)
     for i in range(3):
         for j in range(3):
-            J[i, j] = -B.second[b, i, j]
+            total = B.second[b, i, j]
             for k in range(r):
-                J[i, j] -= q[at + 7 + k] * (B.S1[f, k, 3 * j + i] + SP[k, 3 * i + j])
+                total += q[at + 7 + k] * (B.S1[f, k, 3 * j + i] + SP[k, 3 * i + j])
+            J[i, j] = -total
 
 
 @inner
@@ -198,7 +201,7 @@ def elastic_stiffness(B, W, b, v, a, c, S):
     for k in range(r):
         for p in range(9):
             W.Sa[k, p] = 0.0
-    contract(B.S2[f], a, t + 6, r, W.Sa)
+    contract(B.S2[f], a, t + 6, r, W.line, W.Sa)
     for l in range(r):
         s, e, S_l = W.SP[b, l], 6 + l, col(W.Ct[b], l)
         place(S, 0, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))

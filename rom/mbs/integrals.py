@@ -36,10 +36,20 @@ def transposed_times(s, x):
 
 
 @inner
-def contract(S2, x, at, r, out):
-    """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out."""
+def add_multiple(factor, x, n, out):
+    """Add a multiple of the first n numbers of x to those of out: one loop, for vector units."""
+    for j in range(n):
+        out[j] += factor * x[j]
+
+
+@inner
+def contract(S2, x, at, r, line, out):
+    """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out; ``line`` is working memory."""
+    n = 9 * r
+    for j in range(n):
+        line[j] = 0.0
     for l in range(r):
-        factor = x[at + l]
-        for k in range(r):
-            for p in range(9):
-                out[k, p] += factor * S2[l, 9 * k + p]
+        add_multiple(x[at + l], S2[l], n, line)
+    for k in range(r):
+        for p in range(9):
+            out[k, p] += line[9 * k + p]

@@ -31,8 +31,8 @@ def bent_integrals(B, W, b, q, v):
     contract_moment(B.T[f], v, vt + 6, r, W.Td[b])
     spread[:] = 0.0
     W.T1d[b] = 0.0
-    contract(B.T1[f], q, at + 7, r, spread)
-    contract(B.T1[f], v, vt + 6, r, W.T1d[b])
+    contract(B.T1[f], q, at + 7, r, W.line, spread)
+    contract(B.T1[f], v, vt + 6, r, W.line, W.T1d[b])
     for k in range(r):
         for i in range(3):
             W.Ct[b, i, k] += moment[k, i]
@@ -69,7 +69,7 @@ def bent_stiffness(B, W, b, v, a, c, S):
     lift = mtv(A, sub(vec(a, t), vec(B.gravity, 0)))
     contract_moment(B.T[f], a, t + 6, r, W.Ta)
     W.T1a[:] = 0.0
-    contract(B.T1[f], a, t + 6, r, W.T1a)
+    contract(B.T1[f], a, t + 6, r, W.line, W.T1a)
     for l in range(r):
         e, spread = 6 + l, W.T1d[b, l]
         force = add(row(W.Ta, l, 0), scale(2.0, cross(w, row(W.Td[b], l, 0))))
