@@ -145,14 +145,17 @@ def peers(meshes: tuple[float, ...] = (0.005, 0.00285)) -> Iterator[Figure]:
 
 
 def motion(
-    meshes: tuple[int, ...] = (5_000, 31_000, 103_000), links: tuple[int, ...] = (4, 16, 64)
+    meshes: tuple[float, ...] = (0.024, 0.0045, 0.00255), links: tuple[int, ...] = (4, 16, 64)
 ) -> Iterator[Figure]:
-    """The same mechanisms by Exudyn: steps per second, and how far apart the paths are.
+    """The same motion by Exudyn: steps per second, and how far apart the paths are.
 
-    The same body file of 14 modes, generalised-alpha and step; one thread, processor time.
+    The same connecting rod of 14 modes, mechanism, generalised-alpha and step; one thread,
+    processor time.
 
     Args:
-        meshes: sizes of the mesh behind the pendulum [dofs]; the other mechanisms take the first.
+        meshes: element sizes [m] of the rod of a pendulum; about 5000, 31 000 and 103 000
+            dofs.
+            Slider-crank and chains have the first.
         links: lengths of the chains.
     """
     from rom.peers.motion import measured

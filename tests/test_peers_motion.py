@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.bench import motion
+from rom.bench import bar, motion
 from rom.errors import ConfigError
 from rom.mbs.integrate import simulate
 from rom.peers import motion as peer
@@ -67,11 +67,11 @@ def test_the_file_for_other_programs_averages_nodes_to_the_markers(mesh, tmp_pat
 def test_figures_say_rates_ratio_and_difference(monkeypatch):
     """With our own runs in the place of Exudyn's: no difference, and an aim for each ratio."""
     monkeypatch.setattr(peer, "TIMED", 1)
-    monkeypatch.setattr(peer, "CELLS", {600: (7, 1, 1)})
+    monkeypatch.setattr(peer, "rod", lambda lc: bar((0.3, 0.02, 0.012), (7, 1, 1)))
     monkeypatch.setattr(
         peer, "by_exudyn", lambda model, body, runs: [peer.by_rom(body, run) for run in runs]
     )
-    figures = list(motion((600,), (2,)))
+    figures = list(motion((0.02,), (2,)))
     cases = [f"{name}, 14 modes, 405 dofs" for name in ("pendulum", "slider-crank", "chain of 2")]
     assert [f.case for f in figures[::4]] == cases
     for theirs, ours, ratio, apart in zip(*(figures[k::4] for k in range(4)), strict=True):

@@ -15,6 +15,8 @@ No joint is redundant: other programs do not solve such equations.
 
 from typing import Any
 
+import numpy as np
+
 from rom.body.flexible import FlexibleBody
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
@@ -67,13 +69,14 @@ def slider_crank(
     reach, (heavy, light) = _span(body), masses
     rod, pin, spin = _link(body, [radius, 0.0, 0.0]), [0.0, speed * radius, 0.0], -speed * radius
     root = body.markers["root"].point
-    turn = spin / reach[0]  # the small end stands still
+    turn = spin / float(reach[0])  # the small end does not go sideways
     rod["velocity"] = [turn * root[1], pin[1] - turn * root[0], 0.0]
     rod["omega"] = [0.0, 0.0, turn]
     crank = _rigid(heavy, radius, NONE, {"o": NONE, "pin": [radius, 0.0, 0.0]})
     crank["omega"] = [0.0, 0.0, speed]
-    end = [radius + float(reach[0]), 0.0, 0.0]
+    end = (np.array([radius, 0.0, 0.0]) + reach).tolist()
     slider = _rigid(light, radius, end, {"o": NONE})
+    slider["velocity"] = [-turn * float(reach[1]), 0.0, 0.0]
     return {
         "gravity": [0.0, -9.81, 0.0],
         "bodies": {"crank": crank, "rod": rod, "slider": slider},

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench import KINDS, bar
+from rom.bench import KINDS, STEEL, geometry
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.native import save
@@ -23,16 +23,14 @@ from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, FEModel, SurfaceMesh
 from rom.peers.compare import answer_of, interpreter
-from rom.peers.mechanisms import Described, built, chain, pendulum, slider_crank
+from rom.peers.mechanisms import Described, built, chain, slider_crank
 from rom.peers.ours import save_matrices
 from rom.reduction.method import CraigBampton
 from rom.workflow import reduce
 
 SCRIPT = Path(__file__).with_name("ffrf.py")
 ENDS = ("root", "tip")
-SIZE = (0.3, 0.02, 0.012)  # of the bar in the benchmark [m]
-CELLS = {5_000: (33, 2, 2), 31_000: (64, 4, 4), 103_000: (101, 6, 6)}  # dofs: bricks
-H = 2.5e-4  # step [s]
+H = 2.5e-4  # step of the pendulum and the slider-crank [s]; of chains four times that
 TIMED = 4000  # steps timed here, over the number of bodies
 SAME = 1e-5  # difference of paths relative to the size of the mechanism
 
@@ -132,17 +130,28 @@ def _seconds(mech: Mechanism, t_end: float, options: dict[str, Any]) -> float:
 
 
 def measured(
-    meshes: tuple[int, ...], links: tuple[int, ...]
+    meshes: tuple[float, ...], links: tuple[int, ...]
 ) -> Iterator[tuple[str, str, float, str, str]]:
     """Case, quantity, value, unit and aim of each figure; see `rom.bench.motion`."""
-    for dofs in meshes:
-        model = with_all_nodes(bar(SIZE, CELLS[dofs]))
+    for lc in meshes:
+        model = with_all_nodes(rod(lc))
         body = reduced(model)
-        runs = {"pendulum": Run(pendulum(body, spin=2.0), 400 * H, 400, times=3)}
-        if dofs == meshes[0]:
-            runs["slider-crank"] = Run(slider_crank(body, 0.1, 30.0), 400 * H, 400, times=3)
-            runs |= {f"chain of {k}": Run(chain(body, k), 200 * H, 200) for k in links}
+        runs = {"pendulum": Run(chain(body, 1), 400 * H, 400, times=3)}
+        if lc == meshes[0]:
+            crank = slider_crank(body, 0.04, 60.0)
+            runs["slider-crank"] = Run(crank, 400 * H, 400, times=3)
+            runs |= {f"chain of {k}": Run(chain(body, k), 800 * H, 200) for k in links}
         yield from _compared(model, body, runs)
+
+
+def rod(lc: float) -> FEModel:
+    """A connecting rod of steel with the element size lc [m], its bores called root and tip."""
+    from rom.fe import model as read_model
+
+    model = read_model(geometry("connecting_rod"), material=STEEL, parameters={"lc": lc})
+    bores = dict(zip(ENDS, ("pin_a", "pin_b"), strict=True))
+    faces = {end: replace(model.interfaces[bore], name=end) for end, bore in bores.items()}
+    return replace(model, interfaces=faces)
 
 
 def reduced(model: FEModel, n_modes: int = 8) -> FlexibleBody:
@@ -165,10 +174,10 @@ def _compared(
         yield case, f"Exudyn {theirs.version}", theirs.rate, "steps/s", ""
         yield case, "rom", ours.rate, "steps/s", ""
         yield case, "rom over Exudyn", ours.rate / theirs.rate, "", aim
-        apart = np.abs(ours.positions - theirs.positions).max() / reach(run.mechanism)
+        apart = np.abs(ours.positions - theirs.positions).max() / _reach(run.mechanism, body)
         yield case, "difference of paths", apart, "of the size", f"below {SAME:g}"
 
 
-def reach(mechanism: Described) -> float:
-    """Farthest body from the origin at the start, or the length of the bar [m]."""
-    return max(SIZE[0], *(float(np.linalg.norm(b["at"])) for b in mechanism["bodies"].values()))
+def _reach(mechanism: Described, body: FlexibleBody) -> float:
+    """Length of the mechanism as it starts, stretched along x [m]."""
+    return body.size + max(float(np.linalg.norm(b["at"])) for b in mechanism["bodies"].values())
