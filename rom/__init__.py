@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rom.body.spread import SpreadLoad, mass_load, surface_load
     from rom.checks import check
     from rom.cyclic.modes import CyclicModes, cyclic_modes
+    from rom.cyclic.reduced import reduce_sector
     from rom.cyclic.sector import CyclicSector
     from rom.errors import RomError
     from rom.io.export import export
@@ -129,6 +130,7 @@ __all__ = [
     "motion_sensitivity",
     "reduce",
     "reduce_parametric",
+    "reduce_sector",
     "save",
     "save_state",
     "second_order_balanced_truncation",
@@ -208,6 +210,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "motion_sensitivity": "mbs.sensitivity",
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
+    "reduce_sector": "cyclic.reduced",
     "save": "io.family",
     "save_state": "mbs.checkpoint",
     "second_order_balanced_truncation": "reduction.balanced",

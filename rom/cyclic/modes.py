@@ -75,7 +75,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     T = sector.harmonic(sector.checked(diameter))
     K = sector.K if speed == 0.0 else spinning(sector, speed)
     R = sector.rigid(diameter) if speed == 0.0 else np.zeros((sector.n, 0), dtype=complex)
-    R, held = R[sector.free], sector.held.size > 0
+    R, held = R[sector.free], sector.supported
     if sector.standing(diameter):
         omega, real = _real(T.T @ K @ T, T.T @ sector.M @ T, _span(R), n, held=held)
         return CyclicModes(sector, diameter, omega, (T @ real).astype(complex))

@@ -24,7 +24,7 @@ from rom.attachment import added_mass
 from rom.cyclic.faces import paired, turned, unit_axis
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, FEModel, Index
+from rom.model import Array, FEModel, Index, Interface
 
 Complex = npt.NDArray[np.complex128]
 NONE = np.zeros(0, dtype=np.int64)
@@ -44,6 +44,9 @@ class CyclicSector:
         step: +1 if the slave meets the master of the next sector, -1 of the one before.
         held: (h,) dofs that do not move.
         points: (n / 3, 3) nodes [m], or None where dofs are not displacements of nodes.
+        motions: (n, 6) motions without stiffness: translations, then rotations about ``at``; None
+            when they are not known, or held.
+        face: the leading face with its nodes and area, or None.
         axis: (3,) unit vector of the axis of rotation.
         at: (3,) a point of it [m].
         matching: True when each node of a face has a partner on the other.
@@ -62,6 +65,8 @@ class CyclicSector:
     step: int = 1
     held: Index = field(default_factory=lambda: NONE)
     points: Array | None = None
+    motions: Array | None = None
+    face: Interface | None = None
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     at: Array = field(default_factory=lambda: np.zeros(3))
     matching: bool = True
@@ -130,6 +135,8 @@ class CyclicSector:
             step=pair.step,
             held=np.unique(np.concatenate(held)) if held else NONE,
             points=model.points,
+            motions=None if held else rigid_motions(model.points - at),
+            face=pair.master,
             axis=e,
             at=at,
             matching=pair.matching,
@@ -139,6 +146,11 @@ class CyclicSector:
     def n(self) -> int:
         """Number of dofs of one sector."""
         return int(self.K.shape[0])
+
+    @property
+    def supported(self) -> bool:
+        """True when something is held."""
+        return self.held.size > 0
 
     @property
     def angle(self) -> float:
@@ -197,15 +209,14 @@ class CyclicSector:
 
         Motion along and about the axis belongs to 0, motion across it to 1.
         """
-        if self.points is None or self.held.size:
+        if self.motions is None:
             return np.zeros((self.n, 0), dtype=complex)
         e1 = np.eye(3)[np.argmin(np.abs(self.axis))]
         e1 = np.cross(np.cross(self.axis, e1), self.axis)
         e1 /= np.linalg.norm(e1)
         across = e1 + 1j * np.cross(self.axis, e1)
-        R = rigid_motions(self.points - self.at)
         columns = [
-            R[:, 3 * turning : 3 * turning + 3] @ direction
+            self.motions[:, 3 * turning : 3 * turning + 3] @ direction
             for n, direction in ((0, self.axis), (1, across), (-1, across.conj()))
             for turning in (0, 1)
             if (diameter - n) % self.n_sectors == 0

@@ -1,0 +1,142 @@
+"""Component mode synthesis of one sector, good for all nodal diameters at once."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix, identity
+from scipy.spatial import cKDTree
+
+from rom.cyclic.sector import Complex, CyclicSector
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, Interface
+from rom.reduction.polynomial import DEPENDENT, FourierLegendre, Polynomial, orthonormal_in
+from rom.scipy_operators import SciPyOperators
+
+
+@dataclass(frozen=True)
+class ReducedSector(CyclicSector):
+    """A sector in a few coordinates: those of its two faces, then fixed-interface modes.
+
+    Attributes:
+        Psi: (n_full, r) displacement shapes of the full sector.
+        full: the full sector.
+        omega: (m,) circular frequencies of the fixed-interface modes [rad/s].
+    """
+
+    Psi: Array | None = None
+    full: CyclicSector | None = None
+    omega: Array | None = None
+
+    @property
+    def supported(self) -> bool:
+        """True when something of the full sector is held."""
+        return self.full.supported
+
+    def expand(self, shapes: Complex) -> Complex:
+        """(n_full, m) displacements of the full sector."""
+        found: Complex = self.Psi @ shapes
+        return found
+
+    def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:
+        """(N, n_full, m) real displacements of the full sectors, see `CyclicSector.on_wheel`."""
+        return self.full.on_wheel(self.expand(shapes), diameter, phase)
+
+
+def reduce_sector(
+    sector: CyclicSector,
+    *,
+    n_modes: int,
+    functions: Polynomial | FourierLegendre | None = None,
+) -> ReducedSector:
+    """Craig-Bampton reduction of a sector with a-priori functions on its cyclic faces.
+
+    The faces follow u_master = (Q (x) I) a and u_slave = C (Q (x) I) b with functions Q that are
+    chosen before anything is solved; both faces take the same, so that sectors stay joined exactly
+    and a and b are again dofs of a sector whose faces match. Frequencies are never below those of
+    the full sector.
+
+    Args:
+        sector: the full sector, made by `CyclicSector.from_model`.
+        n_modes: number of fixed-interface modes.
+        functions: on the cyclic faces; `Polynomial` of order 4 unless given. Where the face is
+            held they fall to zero.
+
+    Returns:
+        ReducedSector; `cyclic_modes` and the other functions take it like any sector.
+
+    Raises:
+        ConfigError: if the sector has no geometry of its faces, or cannot have so many modes.
+        InterfaceError: if the functions cannot move the face.
+
+    Source:
+        Carassale and Maurici, Interface reduction in Craig-Bampton component mode synthesis by
+        orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
+    """
+    if sector.face is None:
+        raise ConfigError(
+            "interface functions need the geometry of the cyclic faces.",
+            hint="Make the sector with rom.CyclicSector.from_model.",
+        )
+    Q = face_functions(sector, functions or Polynomial(4))
+    W = np.kron(Q, np.eye(3))
+    q = W.shape[1]
+    E = np.zeros((sector.n, 2 * q))
+    E[sector.master, :q] = W
+    E[sector.slave, q:] = sector.coupling @ W
+    E[sector.held] = 0.0
+    ops = SciPyOperators(sector.K, sector.M)
+    inner = ops.hold(np.union1d(np.union1d(sector.slave, sector.master), sector.held))
+    omega, Phi = ops.modes(inner, n_modes)
+    Psi = np.hstack([E - inner(ops.apply_K(E)), Phi])
+    return projected(sector, Psi, q, omega)
+
+
+def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> ReducedSector:
+    """The sector in the coordinates of Psi, the first q of them one face, the next q the other."""
+
+    def small(A: Any) -> csr_matrix:
+        return None if A is None else csr_matrix(Psi.T @ (A @ Psi))
+
+    K, M = (0.5 * (A + A.T) for A in (small(sector.K), small(sector.M)))
+    kept = {f.name: getattr(sector, f.name) for f in fields(CyclicSector)}
+    motions = None
+    if sector.motions is not None:
+        motions = np.linalg.solve(M.toarray(), Psi.T @ (sector.M @ sector.motions))
+    return ReducedSector(
+        **kept
+        | {
+            "K": K,
+            "M": M,
+            "slave": np.arange(q, 2 * q),
+            "master": np.arange(q),
+            "coupling": identity(q, format="csr"),
+            "held": np.zeros(0, dtype=np.int64),
+            "points": None,
+            "motions": motions,
+            "coriolis": small(sector.coriolis),
+            "centrifugal": small(sector.centrifugal),
+            "regions": {name: small(A) for name, A in sector.regions.items()},
+            "face": None,
+        },
+        Psi=Psi,
+        full=sector,
+        omega=omega,
+    )
+
+
+def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre) -> Array:
+    """(k, m) functions on the leading face, orthonormal over its area, zero where it is held.
+
+    Raises:
+        InterfaceError: if all of the face is held.
+    """
+    face: Interface = sector.face
+    V, S = functions.functions(face), face.surface_mass
+    at_rest = np.isin(face.dofs[::3], sector.held)
+    if at_rest.all():
+        raise InterfaceError(f"all nodes of the cyclic face {face.name!r} are held.")
+    if at_rest.any():  # the distance to what is held fades them out
+        V = V * cKDTree(face.points[at_rest]).query(face.points)[0][:, None]
+    norms = np.sqrt(np.einsum("km,km->m", V, S @ V))
+    return orthonormal_in(S, V[:, norms > DEPENDENT * norms.max()])
