@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from rom.checks import check
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
+    from rom.cyclic.rotation import rotating_sector
     from rom.cyclic.sector import CyclicSector
+    from rom.cyclic.travelling import TravellingModes, travelling_modes
     from rom.errors import RomError
     from rom.io.export import export
     from rom.io.family import load, save
@@ -108,6 +110,7 @@ __all__ = [
     "SteadyMotion",
     "SurfaceMesh",
     "Thickness",
+    "TravellingModes",
     "WithLoads",
     "YoungsModulus",
     "audit",
@@ -131,6 +134,7 @@ __all__ = [
     "reduce",
     "reduce_parametric",
     "reduce_sector",
+    "rotating_sector",
     "save",
     "save_state",
     "second_order_balanced_truncation",
@@ -141,6 +145,7 @@ __all__ = [
     "transmissibility",
     "write_animation",
     "write_history",
+    "travelling_modes",
     "write_report",
     "write_stress",
     "write_stress_history",
@@ -188,6 +193,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "SteadyMotion": "mbs.steady",
     "SurfaceMesh": "model",
     "Thickness": "parameters",
+    "TravellingModes": "cyclic.travelling",
     "WithLoads": "reduction.loads",
     "YoungsModulus": "parameters",
     "audit": "mbs.audit",
@@ -211,6 +217,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
     "reduce_sector": "cyclic.reduced",
+    "rotating_sector": "cyclic.rotation",
     "save": "io.family",
     "save_state": "mbs.checkpoint",
     "second_order_balanced_truncation": "reduction.balanced",
@@ -221,6 +228,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",
     "write_history": "io.history",
+    "travelling_modes": "cyclic.travelling",
     "write_report": "report",
     "write_stress": "io.vtu",
     "write_stress_history": "io.vtu",

@@ -6,8 +6,9 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import bmat, csr_matrix
 
+from rom.cyclic.rotation import divergence_speed
 from rom.cyclic.sector import Complex, CyclicSector
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.scipy_operators import SciPyOperators
 
@@ -73,6 +74,8 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     if isinstance(n, bool) or int(n) != n or not 1 <= n <= sector.free.size:
         raise ConfigError(f"n = {n!r}: one can ask for 1 to {sector.free.size} modes.")
     T = sector.harmonic(sector.checked(diameter))
+    if speed:
+        _refuse_divergence(sector, diameter, speed)
     K = sector.K if speed == 0.0 else spinning(sector, speed)
     R = sector.rigid(diameter) if speed == 0.0 else np.zeros((sector.n, 0), dtype=complex)
     R, held = R[sector.free], sector.supported
@@ -85,6 +88,22 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     omega, pairs = _real(K_2, M_2, rigid, 2 * (n + SPARE), held=held)
     omega, shapes = _waves(T, K, sector.M, omega, pairs, n)
     return CyclicModes(sector, diameter, omega, T @ shapes)
+
+
+def _refuse_divergence(sector: CyclicSector, diameter: int, speed: float) -> None:
+    spinning(sector, speed)
+    if sector.motions is not None:
+        raise ConfigError(
+            "a free wheel at speed has no modes without Coriolis forces: its floating motion has "
+            "no other stiffness.",
+            hint="Use rom.travelling_modes.",
+        )
+    limit = divergence_speed(sector, diameter)
+    if abs(speed) >= limit:
+        raise ModelError(
+            f"at {speed:g} rad/s the wheel is above its instability: spin softening has used up "
+            f"the stiffness against {diameter} nodal diameters at {limit:.6g} rad/s."
+        )
 
 
 def spinning(sector: CyclicSector, speed: float) -> csr_matrix:

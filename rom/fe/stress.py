@@ -7,7 +7,9 @@ from mpi4py import MPI
 import numpy as np
 import ufl
 from dolfinx import fem
+from scipy.sparse import csr_matrix
 
+from rom.errors import ParallelError
 from rom.fe.compat import (
     assemble_matrix,
     cell_dofs,
@@ -106,6 +108,23 @@ class Stresses:
         give_back()
         self.mesh.comm.Allreduce(MPI.IN_PLACE, out)
         return 0.5 * (out + out.transpose(0, 2, 1))
+
+    def prestress(self, u: Array) -> csr_matrix:
+        """(n, n) geometric stiffness of the stress of one displacement; on one process.
+
+        Args:
+            u: (n,) displacement [m].
+        """
+        if self.mesh.comm.size > 1:
+            raise ParallelError("the matrix of a prestress is made on one process only.")
+        load = fem.Function(self.V)
+        load.x.array[: u.size] = u
+        with compiling(self.mesh.comm):
+            A = assemble_matrix(self._second_variation(load))
+        starts, columns, values = A.getValuesCSR()
+        half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
+        A.destroy()
+        return (half + half.T).tocsr()
 
     def _second_variation(self, load: Any) -> ufl.Form:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""

@@ -1,0 +1,111 @@
+"""What rotation does to a sector: stress that stiffens, spin that softens, Coriolis forces.
+
+In axes that turn with the wheel, small vibrations about its steady state obey::
+
+    M u'' + Omega G u' + (K + Omega^2 C) u = f,    G = 2 M (I (x) S),    C = K_geo - M (I (x) P)
+
+with S = skew(e) of the axis e, P = I - e e^T, and K_geo the geometric stiffness of the stress that
+centrifugal force leaves at one rad/s. Coriolis and softening matrices follow from the mass matrix
+alone, because equal functions interpolate all three directions.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, eigh, qr
+from scipy.sparse import csr_matrix, identity, kron
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+from rom.cyclic.sector import CyclicSector
+from rom.errors import ConfigError, ModelError
+from rom.model import Array, FEModel
+from rom.rotation import skew
+from rom.scipy_operators import DENSE, SciPyOperators
+
+
+def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
+    """The sector with the matrices of its rotation, for all speeds.
+
+    The wheel turns about the axis of the sector; its centrifugal stress is that of the linear
+    solid, and grows with the square of the speed.
+
+    Args:
+        sector: made from the model by `CyclicSector.from_model`.
+        model: the finite elements.
+
+    Raises:
+        ConfigError: if the model has no finite elements, or carries attachments.
+    """
+    if model.stresses is None:
+        raise ConfigError(
+            "the model has no finite elements, from which alone geometric stiffness follows.",
+            hint="Make it with rom.fe.model.",
+        )
+    if model.attachments:
+        raise ConfigError(
+            f"the model carries {len(model.attachments)} attachments, whose rotation is not known.",
+            hint="Mesh them as a region of their own density.",
+        )
+    K_geo = model.stresses.prestress(centrifugal_displacement(sector))
+    coriolis, softening = rotation_matrices(sector.M, sector.axis)
+    return replace(sector, coriolis=coriolis, centrifugal=csr_matrix(K_geo - softening))
+
+
+def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
+    """Coriolis matrix per rad/s and softening M (I (x) P) per (rad/s)^2, (n, n) each [kg].
+
+    Args:
+        M: (n, n) mass of a solid, the same for all directions [kg].
+        axis: (3,) unit vector.
+    """
+    nodes = identity(M.shape[0] // 3)
+    turn, across = skew(axis), np.eye(3) - np.outer(axis, axis)
+    G, P = (csr_matrix(M @ kron(nodes, A, format="csr")) for A in (turn, across))
+    return csr_matrix(G - G.T), 0.5 * (P + P.T)
+
+
+def centrifugal_displacement(sector: CyclicSector) -> Array:
+    """(n,) displacement of the sector in a wheel that turns at 1 rad/s [m]."""
+    T = sector.harmonic(0)
+    x = sector.points - sector.at
+    load = sector.M @ (x - np.outer(x @ sector.axis, sector.axis)).ravel()
+    ops = SciPyOperators(T.T @ sector.K @ T, T.T @ sector.M @ T)
+    rigid = sector.rigid(0)[sector.free].real
+    loose = np.zeros(0, dtype=np.int64)
+    if rigid.shape[1]:  # the load neither pushes along the axis nor turns about it
+        scaled = rigid / np.linalg.norm(rigid, axis=0)
+        loose = np.sort(qr(scaled.T, mode="r", pivoting=True)[1][: rigid.shape[1]])
+    found: Array = T @ ops.hold(loose)((T.T @ load)[:, None])[:, 0]
+    return found
+
+
+def divergence_speed(sector: CyclicSector, diameter: int) -> float:
+    """Speed [rad/s] at which rotation has used up the stiffness; infinite if it never does.
+
+    The smallest Omega with a singular K + Omega^2 C, Coriolis forces left out.
+
+    Args:
+        sector: a supported sector with matrices of rotation.
+        diameter: number of nodal diameters.
+
+    Raises:
+        ModelError: if nothing holds the wheel even at rest.
+    """
+    T = sector.harmonic(sector.checked(diameter))
+    H = T.conj().T
+    K, C = csr_matrix(H @ sector.K @ T), csr_matrix(-(H @ sector.centrifugal @ T))
+    if K.shape[0] <= DENSE:
+        most = _largest(C.toarray(), K.toarray())
+    else:
+        inverse = LinearOperator(K.shape, matvec=splu(K.tocsc()).solve, dtype=K.dtype)
+        start = np.sin(1.0 + np.arange(K.shape[0])).astype(K.dtype)
+        most = eigsh(C, 1, K, Minv=inverse, which="LA", v0=start, return_eigenvectors=False)[0]
+    return float(1 / np.sqrt(most)) if most > 0 else np.inf
+
+
+def _largest(C: Array, K: Array) -> float:
+    try:
+        return float(eigh(C, K, eigvals_only=True)[-1])
+    except LinAlgError as error:
+        raise ModelError("nothing holds the wheel, even at rest.") from error
