@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.body.spread import SpreadLoad, mass_load, surface_load
     from rom.checks import check
+    from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
     from rom.cyclic.rotation import rotating_sector
@@ -95,6 +96,7 @@ __all__ = [
     "Layered",
     "Material",
     "Mechanism",
+    "MistunedWheel",
     "ModalDamping",
     "Modes",
     "MomentMatching",
@@ -129,6 +131,7 @@ __all__ = [
     "load_state",
     "mass_load",
     "mass_properties",
+    "mistuned_wheel",
     "modes",
     "motion_sensitivity",
     "reduce",
@@ -178,6 +181,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "Layered": "model",
     "Material": "model",
     "Mechanism": "mbs.mechanism",
+    "MistunedWheel": "cyclic.mistuning",
     "ModalDamping": "body.damping",
     "Modes": "model",
     "MomentMatching": "reduction.krylov",
@@ -212,6 +216,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "load_state": "mbs.checkpoint",
     "mass_load": "body.spread",
     "mass_properties": "workflow",
+    "mistuned_wheel": "cyclic.mistuning",
     "modes": "workflow",
     "motion_sensitivity": "mbs.sensitivity",
     "reduce": "workflow",

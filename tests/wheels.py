@@ -17,6 +17,21 @@ def mass_ring(N, k=3.0e5, coupling=0.7e5, m=0.4):
                         identity(1, format="csr"))  # fmt: skip
 
 
+def bladed_ring(N, *, k_blade=4.3e5, m_blade=0.0114, k_disk=2.2e6, m_disk=0.43, coupling=3.0e6):
+    """Blades on disk masses that are grounded and joined by springs; dofs disk, blade, disk.
+
+    The disk mass is cut in two halves, dofs 0 and 2; the region "blade" is the blade's spring.
+    """
+    join = coupling * np.array([[1.0, 0, -1], [0, 0, 0], [-1, 0, 1]])
+    blade = k_blade * np.array([[1.0, -1, 0], [-1, 1, 0], [0, 0, 0]])
+    K = join + blade + 0.5 * k_disk * np.diag([1.0, 0, 1])
+    M = np.diag([0.5 * m_disk, m_blade, 0.5 * m_disk])
+    return CyclicSector(
+        N, csr_matrix(K), csr_matrix(M), np.array([2]), np.array([0]), identity(1, format="csr"),
+        regions={"blade": csr_matrix(blade)},
+    )  # fmt: skip
+
+
 def ring_frequency(n, EI, rho_A, R):
     """In-plane flexural circular frequency of a thin inextensible ring (Love)."""
     return np.sqrt(n**2 * (n**2 - 1) ** 2 / (n**2 + 1) * EI / (rho_A * R**4))

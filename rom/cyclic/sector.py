@@ -95,6 +95,7 @@ class CyclicSector:
         axis: npt.ArrayLike = (0.0, 0.0, 1.0),
         at: npt.ArrayLike = (0.0, 0.0, 0.0),
         fixed: tuple[str, ...] = (),
+        regions: tuple[str, ...] = (),
     ) -> "CyclicSector":
         """Sector of a finite element model; the number of sectors follows from its faces.
 
@@ -107,11 +108,12 @@ class CyclicSector:
             axis: (3,) direction of the axis of rotation.
             at: (3,) a point of it [m].
             fixed: names of interfaces that are held.
+            regions: names of regions whose stiffness is kept apart, for blades that differ.
 
         Raises:
+            ConfigError: if a region is unknown, or the matrices are distributed.
             InterfaceError: if an interface is unknown, the angle between the faces does not divide
                 the circle, or they are no images of each other.
-            ConfigError: if the matrices are distributed over several processes.
         """
         fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
         if not hasattr(model.K, "tocsr"):
@@ -140,6 +142,7 @@ class CyclicSector:
             axis=e,
             at=at,
             matching=pair.matching,
+            regions={name: _region(model, name) for name in regions},
         )
 
     @property
@@ -266,3 +269,14 @@ class CyclicSector:
         nodal = U.reshape(self.n_sectors, -1, 3, shapes.shape[1])
         found: Array = np.einsum("jab,jpbm->jpam", turns, nodal).reshape(U.shape)
         return found
+
+
+def _region(model: FEModel, name: str) -> csr_matrix:
+    """Stiffness of one region, whichever library holds it."""
+    if name not in model.regions:
+        raise ConfigError(f"the sector has no region {name!r}; it has {sorted(model.regions)}.")
+    K = model.regions[name].K
+    if hasattr(K, "tocsr"):
+        return csr_matrix(K)
+    starts, columns, values = K.getValuesCSR()
+    return csr_matrix((values, columns, starts), shape=K.getSize())
