@@ -20,6 +20,7 @@ LEFT_BEHIND = {
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_masonry": {"masonry.png"},
+    "demo_mistuning": {"mistuning.png"},
     "demo_parameters": {"parameters.png"},
     "demo_reference_conditions": {"reference_conditions.png"},
     "demo_pendulum_chain": {"pendulum_chain.png"},

@@ -32,7 +32,7 @@ from rom.model import Array, Index
 
 STIFFER = 0.1  # relative change of the stiffness of all blades that enriches the basis
 NEW = 1e-12  # squared share of a mode that is new, below which it is round-off
-AT_ONCE = 16_000_000  # complex numbers held by one batch of wheels
+AT_ONCE = 1_000_000  # complex numbers held by one batch of wheels
 
 
 @dataclass(frozen=True)
@@ -238,10 +238,7 @@ def mistuned_wheel(
 def _tuned(
     sector: CyclicSector, K_blade: Any, diameter: int, n: int, speed: float
 ) -> tuple[Array, Complex]:
-    """Squared frequencies and shapes of the tuned wheel, from its modes and those of stiffer blades.
-
-    All have the same number of nodal diameters.
-    """
+    """Squared frequencies and shapes in the space of tuned modes and those with stiffer blades."""
     stiffer = replace(sector, K=sector.K + STIFFER * K_blade)
     Phi, more = (cyclic_modes(s, diameter, n, speed=speed).shapes for s in (sector, stiffer))
     for _ in range(2):
