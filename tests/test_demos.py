@@ -16,6 +16,7 @@ LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
     "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
     "demo_best_matching": {"best_matching.png"},
+    "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},

@@ -9,6 +9,7 @@ from rom.view.planes import Drawing, plane
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
+from rom.view.wheels import wheel_modes
 
 __all__ = [
     "Drawing",
@@ -29,4 +30,5 @@ __all__ = [
     "panels",
     "plane",
     "updating",
+    "wheel_modes",
 ]

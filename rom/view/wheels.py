@@ -1,0 +1,101 @@
+"""Pictures of a whole wheel from the surface of one sector."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.errors import ConfigError
+from rom.model import Array, FEModel, Index
+from rom.view import page
+from rom.view.shapes import AMPLITUDE, PANEL, _drawn
+
+SAME = 1e-6  # of the size of the wheel: nodes of neighbours that close are one
+
+
+def wheel_modes(  # noqa: PLR0913  keywords of one picture
+    path: str | Path,
+    model: FEModel,
+    shapes: Mapping[str, npt.ArrayLike],
+    *,
+    title: str,
+    caption: str,
+    hidden: tuple[str, ...] = ("cyclic_low", "cyclic_high"),
+    axis: npt.ArrayLike = (0.0, 0.0, 1.0),
+    view: npt.ArrayLike | None = None,
+) -> Path:
+    """Draw modes of a wheel on its deformed surface.
+
+    Args:
+        path: picture to write, .png.
+        model: one sector, with its surface.
+        shapes: {name: (N, 3 k) displacements of the k nodes of each sector, axes of the wheel}.
+        title: heading.
+        caption: what a stranger has to know.
+        hidden: interfaces inside the wheel, not drawn.
+        axis: (3,) axis of the wheel, through the origin of coordinates.
+        view: (3,) direction from the wheel to the eye.
+
+    Raises:
+        ConfigError: if there is nothing to draw, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    if model.surface is None or not shapes:
+        raise ConfigError("there is no surface, or no mode of the wheel, to draw.")
+    U = [np.asarray(u, dtype=float) for u in shapes.values()]
+    N = U[0].shape[0]
+    if any(u.shape != (N, 3 * model.points.shape[0]) for u in U):
+        raise ConfigError(f"each shape needs {3 * model.points.shape[0]} numbers per sector.")
+    nodes, triangles = _outside(model, hidden)
+    e = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    turns = [rotation.matrix(rotation.exp(2 * np.pi * j / N * e)) for j in range(N)]
+    points = np.vstack([model.points[nodes] @ R.T for R in turns])
+    first, whole = _joined(points, np.vstack([triangles + j * nodes.size for j in range(N)]))
+    moved: list[Array] = [u.reshape(N, -1, 3)[:, nodes].reshape(-1, 3)[first] for u in U]
+    surface = SimpleNamespace(points=points[first], triangles=whole)
+    images = _drawn(surface, moved, view, None)
+    with page.styled():
+        return page.save(_sheet(images, list(shapes), title, caption), path)
+
+
+def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
+    """Nodes of the model on the outer surface of the wheel, and triangles between them."""
+    surface = model.surface
+    inside = np.zeros(len(surface.triangles), dtype=bool)
+    for name in hidden:
+        inside |= np.isin(surface.nodes[surface.triangles], model.interfaces[name].nodes).all(1)
+    used, triangles = np.unique(surface.triangles[~inside], return_inverse=True)
+    return surface.nodes[used], triangles.reshape(-1, 3)
+
+
+def _joined(points: Array, triangles: Index) -> tuple[Index, Index]:
+    """One of each group of points in the same place, and the triangles between these."""
+    grid = np.round(points / (SAME * np.ptp(points)) + 0.381966)  # away from round coordinates
+    _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    return first, place.ravel()[triangles]
+
+
+def _sheet(images: Any, names: list[str], title: str, caption: str) -> Any:
+    columns = min(2, len(images))
+    width = columns * (PANEL + 20) + 20
+    rows, height = -(-len(images) // columns), images[0].shape[0] + 50
+    text, below = page.caption(
+        f"{caption} The largest displacement is drawn as {AMPLITUDE:.0%} of the size of the wheel; "
+        "grey lines show the undeformed edges.",
+        width - 60,
+    )
+    figure = page.sheet(width, 80 + rows * height + 110 + below + 20)
+    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+    for k, (image, name) in enumerate(zip(images, names, strict=True)):
+        left, top = 20 + (k % columns) * (PANEL + 20), 80 + (k // columns) * height
+        page.words(figure, name, left + 10, top + 10)
+        page.place(figure, image, left, top + 40)
+    top = 80 + rows * height
+    label = "displacement / largest displacement of the mode"
+    page.colour_bar(figure, (0.0, 1.0), label, (width / 2 - 250, top + 35, 500, 18))
+    page.words(figure, text, 30, top + 110, size=page.SMALL)
+    return figure
