@@ -85,8 +85,8 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     parts = real_form(T)
     K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
     rigid = np.hstack([_stacked(R), _stacked(1j * R)])
-    omega, pairs = _real(K_2, M_2, rigid, 2 * (n + SPARE), held=held)
-    omega, shapes = _waves(T, K, sector.M, omega, pairs, n)
+    _, pairs = _real(K_2, M_2, rigid, 2 * (n + SPARE), held=held)
+    omega, shapes = _waves(T, K, sector.M, pairs, rigid.shape[1], n)
     return CyclicModes(sector, diameter, omega, T @ shapes)
 
 
@@ -147,12 +147,11 @@ def _real(K: csr_matrix, M: csr_matrix, rigid: Array, m: int, *, held: bool) -> 
 
 
 def _waves(
-    T: csr_matrix, K: csr_matrix, M: csr_matrix, omega: Array, pairs: Array, n: int
+    T: csr_matrix, K: csr_matrix, M: csr_matrix, pairs: Array, n_rigid: int, n: int
 ) -> tuple[Array, Complex]:
     """The n lowest complex shapes: of a pair, one is i times the other."""
     half = pairs.shape[0] // 2
     Z = pairs[:half] + 1j * pairs[half:]
-    n_rigid = np.count_nonzero(omega == 0.0)
     rigid, elastic = _basis(T, M, Z[:, :n_rigid]), _basis(T, M, Z[:, n_rigid:])
     KZ, MZ = K @ (T @ elastic), M @ (T @ elastic)
     H = (T @ elastic).conj().T
