@@ -44,6 +44,32 @@ def add_loads(p, force, moment, W):
         add_turning(W.A, 6 * k, -1.0, W.a)
 
 
+@kernel
+def add_spin(rod, x, p, spin, W):
+    """Add centrifugal forces and moments of steady rotation about an axis through the origin."""
+    for i in range(rod.mass.size):
+        for c in range(3):
+            d, e, at = (c + 1) % 3, (c + 2) % 3, 6 * i + 3
+            along = spin[0] * x[i, 0] + spin[1] * x[i, 1] + spin[2] * x[i, 2]
+            square = spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]
+            W.r[at + c] += rod.mass[i] * (spin[c] * along - square * x[i, c])
+            W.A[at + c, REACH] += rod.mass[i] * (spin[c] * spin[c] - square)
+            W.A[at + c, d - c + REACH] += rod.mass[i] * spin[c] * spin[d]
+            W.A[at + c, e - c + REACH] += rod.mass[i] * spin[c] * spin[e]
+    for k in range(rod.inertia.shape[0]):
+        rotation_of(p[k], W.R)
+        w, J, at = W.a, rod.inertia[k], 6 * k
+        for c in range(3):
+            w[c] = W.R[0, c] * spin[0] + W.R[1, c] * spin[1] + W.R[2, c] * spin[2]
+        for c in range(3):  # J' w_d w_e, where a turn phi changes w by w x phi
+            d, e = (c + 1) % 3, (c + 2) % 3
+            more = J[e] - J[d]
+            W.r[at + c] += more * w[d] * w[e]
+            W.A[at + c, REACH] += more * (w[e] * w[e] - w[d] * w[d])
+            W.A[at + c, d - c + REACH] += more * w[d] * w[c]
+            W.A[at + c, e - c + REACH] -= more * w[e] * w[c]
+
+
 @inner
 def largest(d, length):
     """Largest rotation, and largest displacement per length."""
@@ -68,13 +94,14 @@ def move(x, p, d, factor):
 
 
 @kernel
-def newton(rod, x, p, force, moment, free, W):
+def newton(rod, x, p, load, spin, free, W):
     """Find equilibrium in place; the number of iterations, -1 if it was not found."""
     length = rod.h.sum()
     rest = np.zeros(W.r.size)
     for iteration in range(ITERATIONS):
         internal(rod, x, p, rest, 0.0, W)
-        add_loads(p, force, moment, W)
+        add_loads(p, load[0], load[1], W)
+        add_spin(rod, x, p, spin, W)
         for k in range(W.r.size):
             W.d[k, 0] = -W.r[k]
         hold(W.A, W.d, free)
@@ -130,8 +157,9 @@ def equilibrium(
     free: npt.ArrayLike | None = None,
     start: Shape | None = None,
     steps: int = 6,
+    spin: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Shape:
-    """Shape of a rod at rest under dead loads.
+    """Shape of a rod at rest under dead loads, or in steady rotation.
 
     The load grows from zero, or the shape follows from ``start`` in one step. Rotations of an
     iteration are capped, and a part of the load that fails is halved.
@@ -141,7 +169,9 @@ def equilibrium(
         load: forces and moments, see `loads`.
         free: (6 N + 9,) which dofs may move; without it the plate at the start is clamped.
         start: a shape near the solution, from which no continuation is needed.
-        steps: parts in which the load grows.
+        steps: parts in which the load grows, and the square of the speed.
+        spin: (3,) angular velocity of the axes about their origin [rad/s], in which the rod rests
+            and the loads keep their direction.
 
     Raises:
         ConfigError: if shapes of arrays differ from those of the rod.
@@ -155,13 +185,13 @@ def equilibrium(
                                                   + rod.x.size):  # fmt: skip
         raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
                           f"for a rod of {rod.h.size} segments.")  # fmt: skip
-    W = work(rod)
+    W, speed = work(rod), np.array(spin, dtype=float)
     share, part = (0.0, 1.0 / steps) if start is None else (0.0, 1.0)
     while share < 1.0:
         part = min(part, 1.0 - share)
         x, p = shape.x.copy(), shape.p.copy()
         now = min(share + part, 1.0)
-        if newton(rod, x, p, now * force, now * moment, free, W) > 0:
+        if newton(rod, x, p, (now * force, now * moment), np.sqrt(now) * speed, free, W) > 0:
             share, shape = now, Shape(x, p)
             if 1.0 - share < 1e-12:
                 break
@@ -180,7 +210,10 @@ def _stuck(shape: Shape, share: float) -> SolverError:
 
 
 def linearised(
-    rod: Rod, shape: Shape, load: tuple[Array, Array] | None = None
+    rod: Rod,
+    shape: Shape,
+    load: tuple[Array, Array] | None = None,
+    spin: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array]:
     """Forces out of balance (n,) and their tangent (n, n), unknowns in the order of `clamped`.
 
@@ -192,6 +225,7 @@ def linearised(
     internal(rod, shape.x, shape.p, np.zeros(n), 0.0, W)
     if load is not None:
         add_loads(shape.p, *load, W)
+    add_spin(rod, shape.x, shape.p, np.array(spin, dtype=float), W)
     return W.r, dense(W.A)
 
 

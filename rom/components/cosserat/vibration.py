@@ -1,0 +1,122 @@
+"""Small vibrations of a rod about a shape at rest or in steady rotation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eigh
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import LinearOperator, eigs, splu
+
+from rom import rotation
+from rom.components.cosserat.elements import Rod
+from rom.components.cosserat.shape import Shape
+from rom.components.cosserat.statics import clamped, linearised
+from rom.errors import SolverError
+from rom.model import Array
+
+
+@dataclass(frozen=True)
+class Vibrations:
+    """Modes, lowest first.
+
+    Attributes:
+        frequencies: (m,) [Hz].
+        shapes: (6 N + 9, m) increments, complex in rotation; order of `statics.clamped`.
+    """
+
+    frequencies: Array
+    shapes: Array
+
+    def translations(self) -> Array:
+        """(N + 1, 3, m) displacements of the vertices in world axes."""
+        padded = np.concatenate([self.shapes, np.zeros_like(self.shapes[:3])])
+        return padded.reshape(-1, 6, padded.shape[1])[:-1, 3:]
+
+
+def lumped_mass(rod: Rod) -> Array:
+    """(6 N + 9,) diagonal of the mass matrix, section axes for rotations [kg], [kg m^2]."""
+    M = np.zeros((len(rod.p), 6))
+    M[:, :3], M[:-1, 3:] = rod.inertia, rod.mass[:, None]
+    return M.ravel()[:-3]
+
+
+def gyroscopic(rod: Rod, shape: Shape, spin: npt.ArrayLike) -> csc_matrix:
+    """(n, n) matrix of the forces that velocities meet in a rotating frame; it is skew."""
+    spin = np.asarray(spin, dtype=float)
+    G = np.zeros((len(rod.p), 6, 6))
+    for k, (J, p) in enumerate(zip(rod.inertia, shape.p, strict=True)):
+        w = rotation.matrix(p).T @ spin
+        W = rotation.skew(w)
+        G[k, :3, :3] = J[:, None] * W + W * J - rotation.skew(J * w)
+    G[:-1, 3:, 3:] = 2 * rod.mass[:, None, None] * rotation.skew(spin)
+    rows = np.arange(6 * len(rod.p)).reshape(-1, 6)
+    i, j = np.repeat(rows, 6, axis=1).ravel(), np.tile(rows, 6).ravel()
+    n = 6 * rod.h.size + 9
+    return csc_matrix((G.ravel(), (i, j)))[:n, :n]
+
+
+def modes(
+    rod: Rod,
+    shape: Shape,
+    m: int,
+    *,
+    load: tuple[Array, Array] | None = None,
+    free: npt.ArrayLike | None = None,
+    spin: npt.ArrayLike = (0.0, 0.0, 0.0),
+) -> Vibrations:
+    """The m lowest modes of vibration, without damping.
+
+    Args:
+        rod: the rod.
+        shape: an equilibrium, see `statics.equilibrium`.
+        m: number of modes.
+        load: the dead loads of that equilibrium.
+        free: (6 N + 9,) which dofs may move; without it the plate at the start is held.
+        spin: (3,) angular velocity of the axes in which the shape rests [rad/s].
+
+    Raises:
+        SolverError: if the shape is not stable, or the modes of a rotating rod were not found.
+    """
+    free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
+    K = linearised(rod, shape, load, spin)[1][np.ix_(free, free)]
+    K, M = (K + K.T) / 2, lumped_mass(rod)[free]
+    if np.any(spin):
+        G = gyroscopic(rod, shape, spin)[free][:, free]
+        omega, part = _rotating(csc_matrix(K), M, G, m)
+    else:
+        omega, part = _resting(K, M, m)
+    Phi = np.zeros((free.size, m), dtype=part.dtype)
+    Phi[free] = part
+    return Vibrations(omega / (2 * np.pi), Phi)
+
+
+def _resting(K: Array, M: Array, m: int) -> tuple[Array, Array]:
+    """Modes without spin, from M q = K q / omega^2: dofs without mass do no harm there."""
+    n = len(K)
+    try:
+        flexible, Phi = eigh(np.diag(M), K, subset_by_index=(n - m, n - 1))
+    except np.linalg.LinAlgError:
+        raise SolverError("the shape is not stable: it leaves a way that needs no force.",
+                          hint="Hold it, or find an equilibrium that lasts.") from None  # fmt: skip
+    omega = 1 / np.sqrt(flexible[::-1])
+    return omega, Phi[:, ::-1] * omega
+
+
+def _rotating(K: csc_matrix, M: Array, G: csc_matrix, m: int) -> tuple[Array, Array]:
+    """Modes from M a + G v + K q = 0, by Arnoldi's method on the inverse."""
+    n, lu = len(M), splu(K)
+
+    def inverse(y: Array) -> Array:
+        """Velocities and positions (v, q) of which (M v + G q, ...) is y: 1 / lambda."""
+        v, q = y[:n], y[n:]
+        return np.concatenate([q, -lu.solve(M * v + G @ q)])
+
+    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=float)
+    start = np.sin(1.0 + np.arange(2 * n))
+    values, vectors = eigs(operator, k=2 * m + 4, which="LM", v0=start, tol=1e-10)
+    omega = np.imag(1 / values)
+    chosen = np.argsort(np.where(omega > 0, omega, np.inf))[:m]
+    if (omega[chosen] <= 0).any() or np.abs(np.real(1 / values[chosen])).max() > 1e-3 * omega.max():
+        raise SolverError("the rotating shape has modes that grow.", hint="Lower the speed.")
+    return omega[chosen], vectors[n:, chosen]

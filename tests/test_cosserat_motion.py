@@ -1,0 +1,233 @@
+"""Rods in motion: published swings, spin-up, invariants, decay, frequencies, cost."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+from rom import rotation
+from rom.components.cosserat import (
+    clamped,
+    equilibrium,
+    linearised,
+    loads,
+    modes,
+    reference,
+    rod,
+    simulate,
+    straight,
+)
+from rom.components.cosserat.vibration import gyroscopic
+from rom.errors import ConfigError, SolverError
+
+ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
+
+
+def elbow(n):
+    """Two legs at a right angle, after Simo and Vu-Quoc 1988."""
+    s = np.linspace(0, 10, n + 1)[:, None]
+    x = np.concatenate([s * [1, 0, 0], [10, 0, 0] + s[1:] * [0, 1, 0]])
+    legs = [rotation.quaternion(A) for A in (ALONG_X, np.roll(ALONG_X, 1, axis=0))]
+    return rod(x, np.repeat(legs, n + 1, axis=0), stretch=1e6, bend=1e3, mass=1.0,
+               inertia=(10, 10, 20))  # fmt: skip
+
+
+def hit(one, n):
+    def load(t):
+        force = np.zeros_like(one.x)
+        force[n, 2] = 50 * max(0.0, 1 - abs(t - 1))
+        return loads(one, force=force)
+
+    return load
+
+
+def test_right_angle_cantilever_swings_as_published():
+    """Finite elements with 40 elements and 0.005 s: 8.25 at 7.44, -9.73 at 15.87, elbow -4.06."""
+    one = elbow(10)
+    motion = simulate(one, 17.0, 0.05, load=hit(one, 10))
+    tip, corner = motion.x[:, -1, 2], motion.x[:, 10, 2]
+    assert_allclose([tip.max(), tip.min(), corner.min()], [8.260, -9.687, -4.058], rtol=1e-3)
+    assert_allclose([tip.max(), tip.min(), corner.min()], [8.25, -9.73, -4.06], rtol=0.01)
+    assert_allclose(motion.t[[tip.argmax(), tip.argmin(), corner.argmin()]], [7.44, 15.87, 10.87],
+                    atol=0.1)  # fmt: skip
+
+
+def test_energy_is_kept_without_damping_of_the_scheme():
+    one = elbow(10)
+    motion = simulate(one, 20.0, 0.02, load=hit(one, 10), rho_inf=1.0)
+    after = motion.energies().sum(axis=1)[motion.t >= 2.0]
+    assert_allclose(after[0], 114.86, rtol=3e-3)
+    assert np.abs(after / after[0] - 1).max() < 1e-4
+
+
+def test_a_free_rod_keeps_the_momentum_it_was_given():
+    """Force and couple on one end; impulse in, and the angular momentum about the origin stays."""
+    n = 10
+    one = straight(10.0, n, stretch=1e4, bend=500.0, mass=1.0, inertia=10.0)
+
+    def pushed(t):
+        share = 8 * max(0.0, 1 - abs(t - 2.5) / 2.5)
+        return loads(one, tip=(share, 0, share / 10), tip_moment=(0, 10 * share, 10 * share))
+
+    drift = []
+    for dt in (0.1, 0.05):
+        motion = simulate(one, 10.0, dt, load=pushed, free=clamped(one, start=False), rho_inf=1.0)
+        v = np.append(motion.v, np.zeros((len(motion.t), 3)), axis=1).reshape(-1, n + 2, 6)
+        u = v[:, :-1, 3:]
+        momentum = np.einsum("i,tic->tc", one.mass, u)[motion.t > 5.01]
+        assert_allclose(momentum, np.tile([20.0, 0, 2.0], (len(momentum), 1)), atol=0.05 * dt)
+        turn = [sum(rotation.matrix(q) @ (J * w) for q, J, w in zip(p, one.inertia, ww[:, :3],
+                strict=True)) for p, ww in zip(motion.p, v, strict=True)]  # fmt: skip
+        L = np.array(turn) + np.einsum("i,tic->tc", one.mass, np.cross(motion.x, u))
+        later = L[motion.t > 5.01]
+        drift.append(np.abs(later - later[0]).max() / np.linalg.norm(later[0]))
+        energy = motion.energies().sum(axis=1)[motion.t > 5.01]
+        assert np.abs(energy / energy[0] - 1).max() < 40 * dt**2
+    assert drift[0] < 5e-3 and drift[1] < 0.35 * drift[0]
+
+
+SPEED, RISE = 6.0, 15.0
+
+
+def spin_angle(t):
+    turn = 2 * np.pi / RISE
+    rising = SPEED * (t * t / (2 * RISE) + (np.cos(turn * t) - 1) / (turn * turn * RISE))
+    return np.where(t < RISE, rising, SPEED * (t - RISE / 2))
+
+
+def spin_up(n, dt):
+    one = straight(10.0, n, frame=ALONG_X, stretch=(1e7, 1e7, 2.8e7), bend=1.4e4, mass=1.2,
+                   inertia=6e-4)  # fmt: skip
+
+    def root(t):
+        turn = 2 * np.pi / RISE
+        speed = SPEED * (t / RISE - np.sin(turn * t) / (2 * np.pi)) if t < RISE else SPEED
+        p = rotation.multiply(rotation.exp([0, 0, spin_angle(t)]), rotation.quaternion(ALONG_X))
+        return np.zeros(3), p, np.zeros(3), [0, speed, 0]
+
+    motion = simulate(one, 20.0, dt, root=root)
+    angle, tip = spin_angle(motion.t), motion.x[:, -1]
+    along = np.cos(angle) * tip[:, 0] + np.sin(angle) * tip[:, 1] - 10
+    across = np.cos(angle) * tip[:, 1] - np.sin(angle) * tip[:, 0]
+    return SimpleNamespace(motion=motion, t=motion.t, along=along, across=across)
+
+
+def test_spin_up_lags_and_stretches():
+    """Kane's beam: a linear body without centrifugal stiffness would fly away here."""
+    run = {n: spin_up(n, 0.01) for n in (10, 20)}
+    lag = {n: r.across.min() for n, r in run.items()}
+    assert_allclose(lag[20], -0.5766, rtol=2e-3)
+    assert_allclose(lag[20] + (lag[20] - lag[10]) / 3, -0.5740, rtol=3e-3)
+    one = run[20]
+    at = [round(s / 0.01) for s in (2.5, 5.0, 7.5, 10.0, 12.5)]
+    assert_allclose(one.across[at], (-0.1514, -0.4690, -0.5602, -0.3644, -0.1133), rtol=8e-3)
+    assert_allclose(one.along[one.t > RISE].mean(), 1.2 * 36 * 1000 / (3 * 2.8e7), rtol=3e-3)
+
+
+def test_work_of_the_root_is_the_energy_of_the_rod():
+    """Power of the moment that holds the plate, integrated, while the rod is spun up."""
+    motion = spin_up(10, 0.01).motion
+    power = np.einsum("tc,tc->t", motion.root[:, 3:], motion.v[:, :3])
+    work = np.concatenate([[0], np.cumsum((power[1:] + power[:-1]) / 2 * 0.01)])
+    total = motion.energies().sum(axis=1)
+    assert_allclose(work, total, atol=2e-3 * total.max())
+
+
+def test_cost_of_a_step_grows_with_the_number_of_segments():
+    """Counted products of the elimination, 16 times the segments."""
+    count = []
+    for n in (50, 100, 200, 800):
+        one = straight(1.0, n, stretch=1e4, bend=1.0, mass=1.0, inertia=1e-3)
+        motion = simulate(one, 1e-3, 1e-3, load=loads(one, tip=(1e-3, 0, 0)))
+        count.append(motion.products / motion.iterations)
+    assert count[1] - count[0] == 50 * (count[3] - count[2]) / 600
+    assert count[3] < 16.01 * count[0]
+
+
+def test_viscosity_damps_a_mode_at_its_rate():
+    """Stiffness-proportional damping: half the ratio times omega^2."""
+    ratio = 2e-3
+    one = straight(1.0, 10, stretch=1e5, bend=1.0, mass=1.0, inertia=1e-6, viscosity=ratio)
+    omega = 2 * np.pi * modes(one, reference(one), 1).frequencies[0]
+    bent = equilibrium(one, loads(one, tip=(1e-3, 0, 0)))
+    motion = simulate(one, 20 * np.pi / omega, np.pi / (50 * omega), start=bent, rho_inf=1.0)
+    energy = motion.energies().sum(axis=1)[200:]  # after two periods, when higher modes are gone
+    assert_allclose(np.log(energy[-1] / energy[0]) / (motion.t[-1] - motion.t[200]),
+                    -ratio * omega**2, rtol=0.01)  # fmt: skip
+
+
+def test_frequencies_of_a_slender_cantilever():
+    """Euler and Bernoulli, second order in the segments; torsion and stretch by closed forms."""
+    exact = np.array([1.875104069, 4.694091133, 7.854757438]) ** 2 / (2 * np.pi)
+    error = []
+    for n in (20, 40):
+        one = straight(1.0, n, stretch=1e7, bend=(1.0, 1e4, 1e4), mass=1.0, inertia=1e-9)
+        f = modes(one, reference(one), 3).frequencies
+        error.append(np.abs(f / exact - 1))
+    assert (error[1] < 6e-3).all()
+    assert_allclose(error[0] / error[1], 4.0, rtol=0.05)
+    one = straight(1.0, 80, stretch=(1e9, 1e9, 9.0), bend=(1e6, 1e6, 16.0), mass=1.0, inertia=4.0)
+    f = modes(one, reference(one), 2).frequencies
+    assert_allclose(f, [0.5, 0.75], rtol=1e-3)  # sqrt(GJ / rho I) / 4 L, sqrt(EA / rho A) / 4 L
+
+
+def rotating_beam(speed, degree=12):
+    """Galerkin's method with polynomials: EI = rho A = L = 1, flapping in a centrifugal field."""
+    w = [Polynomial([0, 0, *np.zeros(k), 1.0]) for k in range(degree)]
+    tension = Polynomial([speed**2 / 2, 0, -(speed**2) / 2])
+
+    def over(f):
+        return f.integ()(1.0)
+
+    K = [[over(a.deriv(2) * b.deriv(2) + tension * a.deriv() * b.deriv()) for b in w] for a in w]
+    return np.sqrt(eigh(K, [[over(a * b) for b in w] for a in w], eigvals_only=True)[:2])
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0])
+def test_rotation_stiffens_flapping_and_less_so_lagging(speed):
+    """Out of the plane as Galerkin's method says; in the plane omega^2 is less by that of spin."""
+    flap = rotating_beam(speed)
+    one = straight(1.0, 60, frame=ALONG_X, stretch=1e8, bend=(1e4, 1.0, 1e4), mass=1.0,
+                   inertia=1e-9)  # fmt: skip
+    for axis, squares in ((0, flap**2), (1, flap**2 - speed**2)):  # the soft direction is y
+        spin = speed * np.roll([0, 1.0, 0], 0 if axis == 0 else 1)
+        shape = equilibrium(one, loads(one), spin=spin)
+        f = 2 * np.pi * modes(one, shape, 2, spin=spin).frequencies
+        assert_allclose(f**2, squares, rtol=5e-3)
+
+
+def test_forces_of_steady_rotation_have_their_tangent():
+    rng = np.random.default_rng(4)
+    one = straight(1.0, 3, stretch=3.0, bend=2.0, mass=1.3, inertia=(0.3, 0.5, 0.9))
+    spin = np.array([0.4, -1.1, 0.7])
+    shape = equilibrium(one, loads(one, tip=(0.3, 0.1, 0), tip_moment=(0, 0, 0.3)))
+    K = linearised(one, shape, spin=spin)[1] - linearised(one, shape)[1]
+    n = len(K)
+
+    def forces(d):
+        rows = np.append(d, np.zeros(3)).reshape(-1, 6)
+        p = [rotation.multiply(q, rotation.exp(e)) for q, e in zip(shape.p, rows[:, :3],
+                                                                  strict=True)]  # fmt: skip
+        there = type(shape)(shape.x + rows[:-1, 3:], np.array(p))
+        return linearised(one, there, spin=spin)[0] - linearised(one, there)[0]
+
+    d = rng.normal(size=n)
+    assert_allclose(K @ d, (forces(1e-5 * d) - forces(-1e-5 * d)) / 2e-5, atol=1e-8)
+    G = gyroscopic(one, shape, spin).toarray()
+    assert_allclose(G, -G.T, atol=1e-14)
+
+
+def test_bad_runs_are_refused_and_lost_ones_kept():
+    one = straight(1.0, 4, stretch=1e3, bend=1.0, mass=1.0, inertia=1e-3)
+    with pytest.raises(ConfigError, match=r"rho_inf=1\.5 is no run"):
+        simulate(one, 1.0, 0.1, rho_inf=1.5)
+    with pytest.raises(SolverError, match="step 1 at 10 s did not converge") as error:
+        simulate(one, 100.0, 10.0, load=loads(one, tip=(1e4, 0, 0)))
+    assert len(error.value.motion.t) == 1
+    unstable = straight(1.0, 20, stretch=1e4, bend=1.0, mass=1.0, inertia=1e-3)
+    load = loads(unstable, tip=(0, 0, -3.0))
+    with pytest.raises(SolverError, match="the shape is not stable"):
+        modes(unstable, equilibrium(unstable, load), 1, load=load)
