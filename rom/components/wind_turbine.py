@@ -1,0 +1,189 @@
+"""Blade and tower of the NREL 5 MW reference turbine as rods, and the run-up of its rotor.
+
+The rotor turns about the first axis of the world, which points downwind; blades start along the
+third one, up. A point of a blade then moves against the second axis. Section axes of a blade are
+flapwise (downwind where it has no twist), edgewise (towards the trailing edge), along.
+
+Source:
+    Jonkman, Butterfield, Musial, Scott, Definition of a 5-MW reference wind turbine for offshore
+    system development, NREL/TP-500-38060, 2009.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.components.cosserat import Motion, Rod, along, loads, simulate
+from rom.model import Array
+
+STATIONS = Path(__file__).parent / "nrel5mw_blade.csv"
+COLUMNS = (
+    "eta", "twist_deg", "mass", "EI_flap", "EI_edge", "GJ", "EA", "kGA", "inertia_edge",
+    "inertia_flap",
+)  # fmt: skip
+BLADE, HUB_RADIUS = 61.5, 1.5  # m
+MASS_FACTOR = 1.04536  # brings the mass to that of the definition; inertias stay as they are
+VISCOSITY = (1e-3, 1e-3, 1e-3, 1.4e-3, 2.2e-3, 2.2e-3)  # s, as in the files of BeamDyn
+RATED = 12.1 * np.pi / 30  # rad/s
+TOWER, HUB_HEIGHT = 87.6, 90.0  # m
+TUBE = {"diameter": (6.0, 3.87), "wall": (0.0351, 0.0247)}  # m, at foot and top
+STEEL = {"E": 210e9, "G": 80.8e9, "rho": 8500.0}  # with paint, bolts and flanges
+
+
+def stations() -> dict[str, Array]:
+    """{name: (49,)} properties of the blade along its length; SI units, twist in degrees."""
+    return dict(zip(COLUMNS, np.loadtxt(STATIONS, delimiter=",").T, strict=True))
+
+
+def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: float = 1.0) -> Rod:
+    """One blade on a rigid hub whose centre is the origin.
+
+    Args:
+        n: number of segments, of equal length.
+        azimuth: turned about the rotor axis from upright [rad].
+        damped: with viscosity in proportion to the rigidities.
+        shear: factor of the shear rigidity; a thousand makes an Euler-Bernoulli beam.
+    """
+    table = stations()
+    eta = np.linspace(0, 1, n + 1)
+    middles = (eta[1:] + eta[:-1]) / 2
+    cells = np.concatenate(([eta[1] / 4], eta[1:-1], [1 - eta[1] / 4]))  # what bends at a vertex
+    turn = rotation.matrix(rotation.exp([azimuth, 0, 0]))
+
+    def at(name: str, where: npt.ArrayLike) -> Array:
+        return np.interp(where, table["eta"], table[name])
+
+    def place(s: float) -> tuple[Array, Array]:
+        twist = np.radians(at("twist_deg", s))  # leading edge into the wind
+        return turn @ [0, 0, HUB_RADIUS + BLADE * s], turn @ rotation.matrix(
+            rotation.exp([0, 0, -twist])
+        )
+
+    edge, flap = at("inertia_edge", middles), at("inertia_flap", middles)
+    return along(
+        place,
+        eta,
+        stretch=np.column_stack([shear * at("kGA", middles)] * 2 + [at("EA", middles)]),
+        bend=np.column_stack([at("EI_edge", cells), at("EI_flap", cells), at("GJ", cells)]),
+        mass=MASS_FACTOR * at("mass", middles),
+        inertia=np.column_stack([edge, flap, edge + flap]),
+        viscosity=VISCOSITY if damped else 0.0,
+    )
+
+
+def tower(n: int = 40, *, top: float = 0.0) -> Rod:
+    """The tower, a conical tube along the third axis, with a mass on its top [kg]."""
+    s = np.linspace(0, 1, n + 1)
+    middles, cells = (s[1:] + s[:-1]) / 2, np.concatenate(([s[1] / 4], s[1:-1], [1 - s[1] / 4]))
+
+    def tube(where: Array) -> tuple[Array, Array]:
+        """Area, and second moment of area about a diameter."""
+        D, t = (end[0] + where * (end[1] - end[0]) for end in TUBE.values())
+        d = D - 2 * t
+        return np.pi / 4 * (D**2 - d**2), np.pi / 64 * (D**4 - d**4)
+
+    (A, I), (_, bent) = tube(middles), tube(cells)
+    GA, EI = STEEL["G"] * A / 2, STEEL["E"] * bent
+    rod = along(
+        lambda at: (np.array([0, 0, TOWER * at]), np.eye(3)),
+        s,
+        stretch=np.column_stack([GA, GA, STEEL["E"] * A]),
+        bend=np.column_stack([EI, EI, 2 * STEEL["G"] * bent]),
+        mass=STEEL["rho"] * A,
+        inertia=STEEL["rho"] * np.column_stack([I, I, 2 * I]),
+    )
+    mass = rod.mass.copy()
+    mass[-1] += top
+    return rod._replace(mass=mass)
+
+
+def ramp(final: float, rise: float) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    """Speed and angle over time, from rest to a final speed [rad/s] without a jerk.
+
+    The speed is final (t / rise - sin(2 pi t / rise) / 2 pi) until ``rise`` [s].
+    """
+    k = 2 * np.pi / rise
+
+    def speed(t: float) -> float:
+        return final * (t / rise - np.sin(k * t) / (2 * np.pi)) if t < rise else final
+
+    def angle(t: float) -> float:
+        if t >= rise:
+            return final * (t - rise / 2)
+        return final * (t * t / (2 * rise) + (np.cos(k * t) - 1) / (2 * np.pi * k))
+
+    return speed, angle
+
+
+@dataclass(frozen=True)
+class RunUp:
+    """A blade while the rotor is driven to its speed.
+
+    Attributes:
+        motion: of the blade in the world.
+        angle: (k,) of the rotor [rad].
+        speed: (k,) of the rotor [rad/s].
+        tip: (k, 3) deflection of the tip in axes that turn with the rotor: downwind, against the
+            motion, outward [m].
+        torque: (k,) about the rotor axis that drives this blade [N m].
+    """
+
+    motion: Motion
+    angle: Array
+    speed: Array
+    tip: Array
+    torque: Array
+
+    @property
+    def t(self) -> Array:
+        """Instants [s]."""
+        return self.motion.t
+
+
+def run_up(
+    rod: Rod,
+    *,
+    t_end: float = 30.0,
+    dt: float = 0.02,
+    final: float = RATED,
+    rise: float = 20.0,
+    gravity: float = 0.0,
+    **options: Any,
+) -> RunUp:
+    """Drive the root of a blade about the rotor axis from rest to a speed.
+
+    Args:
+        rod: a `blade`.
+        t_end: end of the run [s].
+        dt: step [s].
+        final: speed that is reached [rad/s].
+        rise: when it is reached [s], see `ramp`.
+        gravity: acceleration of gravity, down [m/s^2].
+        options: more for `cosserat.simulate`.
+    """
+    speed, angle = ramp(final, rise)
+    home = rod.x[0].copy(), rod.p[0].copy()
+    axis = rotation.matrix(home[1]).T @ [1.0, 0, 0]  # rotor axis in the axes of the root
+
+    def root(t: float) -> tuple[Array, Array, Array, Array]:
+        turn = rotation.exp([angle(t), 0, 0])
+        x = rotation.matrix(turn) @ home[0]
+        return x, rotation.multiply(turn, home[1]), np.cross([speed(t), 0, 0], x), speed(t) * axis
+
+    options = {"root": root, "load": loads(rod, weight=(0, 0, -gravity)), "start": None} | options
+    motion = simulate(rod, t_end, dt, **options)
+    angles = np.array([angle(t) for t in motion.t])
+    outward = rod.x[-1] / np.linalg.norm(rod.x[-1])
+    behind = np.cross(outward, [1.0, 0, 0])
+    basis = np.array([[1.0, 0, 0], behind, outward])
+    back = [rotation.matrix(rotation.exp([-a, 0, 0])) for a in angles]
+    ends = [A @ x - rod.x[-1] for A, x in zip(back, motion.x[:, -1], strict=True)]
+    about = [np.cross(x[0], r[:3]) + rotation.matrix(p[0]) @ r[3:]
+             for x, p, r in zip(motion.x, motion.p, motion.root, strict=True)]  # fmt: skip
+    speeds = np.array([speed(t) for t in motion.t])
+    return RunUp(motion, angles, speeds, np.array(ends) @ basis.T, np.array(about)[:, 0])
