@@ -35,6 +35,9 @@ LEFT_BEHIND = {
         "rod_frequencies.png", "rod_mesh.png", "rod_modes.png", "slider_crank.gif",
     },
     "demo_spin_up": {"spin_up.png"},
+    "demo_wind_turbine": {
+        "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
+    },
 }  # fmt: skip
 
 

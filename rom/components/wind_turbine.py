@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.components.cosserat import Motion, Rod, along, loads, simulate
+from rom.components.cosserat import Motion, Rod, along, equilibrium, loads, simulate
 from rom.model import Array
 
 STATIONS = Path(__file__).parent / "nrel5mw_blade.csv"
@@ -163,7 +163,7 @@ def run_up(
         dt: step [s].
         final: speed that is reached [rad/s].
         rise: when it is reached [s], see `ramp`.
-        gravity: acceleration of gravity, down [m/s^2].
+        gravity: acceleration of gravity, down [m/s^2]; the blade starts at rest under its weight.
         options: more for `cosserat.simulate`.
     """
     speed, angle = ramp(final, rise)
@@ -175,8 +175,9 @@ def run_up(
         x = rotation.matrix(turn) @ home[0]
         return x, rotation.multiply(turn, home[1]), np.cross([speed(t), 0, 0], x), speed(t) * axis
 
-    options = {"root": root, "load": loads(rod, weight=(0, 0, -gravity)), "start": None} | options
-    motion = simulate(rod, t_end, dt, **options)
+    weight = loads(rod, weight=(0, 0, -gravity))
+    options = {"load": weight, "start": equilibrium(rod, weight) if gravity else None} | options
+    motion = simulate(rod, t_end, dt, root=root, **options)
     angles = np.array([angle(t) for t in motion.t])
     outward = rod.x[-1] / np.linalg.norm(rod.x[-1])
     behind = np.cross(outward, [1.0, 0, 0])

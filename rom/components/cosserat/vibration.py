@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
+from scipy.linalg import cholesky, eigh, solve_triangular
 from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import LinearOperator, eigs, splu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from rom import rotation
 from rom.components.cosserat.elements import Rod
@@ -83,7 +83,7 @@ def modes(
     K, M = (K + K.T) / 2, lumped_mass(rod)[free]
     if np.any(spin):
         G = gyroscopic(rod, shape, spin)[free][:, free]
-        omega, part = _rotating(csc_matrix(K), M, G, m)
+        omega, part = _rotating(K, M, G, m)
     else:
         omega, part = _resting(K, M, m)
     Phi = np.zeros((free.size, m), dtype=part.dtype)
@@ -103,20 +103,29 @@ def _resting(K: Array, M: Array, m: int) -> tuple[Array, Array]:
     return omega, Phi[:, ::-1] * omega
 
 
-def _rotating(K: csc_matrix, M: Array, G: csc_matrix, m: int) -> tuple[Array, Array]:
-    """Modes from M a + G v + K q = 0, by Arnoldi's method on the inverse."""
-    n, lu = len(M), splu(K)
+def _rotating(K: Array, M: Array, G: csc_matrix, m: int) -> tuple[Array, Array]:
+    """Modes from M a + G v + K q = 0 by Lanczos' method on the inverse, which is Hermitian.
+
+    With K = L L^T and y = (sqrt(M) v, L^T q) the inverse is skew; i times it has 1 / omega.
+    """
+    try:
+        L = cholesky(K, lower=True)
+    except np.linalg.LinAlgError:
+        raise SolverError("the rotating shape is not stable.", hint="Lower the speed.") from None
+    n, root = len(M), np.sqrt(M)
+    X = root[:, None] * solve_triangular(L, np.eye(n), lower=True).T
+    Y = solve_triangular(L, solve_triangular(L, G.toarray(), lower=True).T, lower=True).T
 
     def inverse(y: Array) -> Array:
-        """Velocities and positions (v, q) of which (M v + G q, ...) is y: 1 / lambda."""
-        v, q = y[:n], y[n:]
-        return np.concatenate([q, -lu.solve(M * v + G @ q)])
+        first, second = y[:n], y[n:]
+        return 1j * np.concatenate([X @ second, -X.T @ first - Y @ second])
 
-    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=float)
-    start = np.sin(1.0 + np.arange(2 * n))
-    values, vectors = eigs(operator, k=2 * m + 4, which="LM", v0=start, tol=1e-10)
-    omega = np.imag(1 / values)
-    chosen = np.argsort(np.where(omega > 0, omega, np.inf))[:m]
-    if (omega[chosen] <= 0).any() or np.abs(np.real(1 / values[chosen])).max() > 1e-3 * omega.max():
-        raise SolverError("the rotating shape has modes that grow.", hint="Lower the speed.")
-    return omega[chosen], vectors[n:, chosen]
+    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=complex)
+    start = np.sin(1.0 + np.arange(2 * n)).astype(complex)
+    try:
+        values, vectors = eigsh(operator, k=m, which="LA", v0=start, ncv=4 * m + 20)
+    except ArpackError as error:
+        raise SolverError(f"the modes of a rotating rod were not found: {error}.") from error
+    order = np.argsort(-values)
+    q = solve_triangular(L.T, vectors[n:, order])
+    return 1 / values[order], q
