@@ -52,9 +52,10 @@ def test_noise_on_a_border_does_not_chatter():
 
 
 def test_a_group_is_left_only_after_a_while():
-    first, short, long = ray(9, 0.5, 50), ray(60, 0.5, 14), ray(60, 0.5, 30)
+    first, short, long = ray(9, 0.5, 50), ray(60, 0.7, 14), ray(60, 0.7, 30)
     brief = Chart().follow(*(np.concatenate(p) for p in zip(first, short, first, strict=True)), DT)
     assert (brief.groups == 0).all()
+    assert_allclose(brief.pulls[63], brief.pulls[49])  # nobody moves in doubt
     lasting = Chart().follow(*(np.concatenate(p) for p in zip(first, long, strict=True)), DT)
     assert lasting.groups[-1] == 3
     assert_allclose(lasting.pulls[-1, 0], lasting.pulls[49, 0])  # the first group holds

@@ -18,6 +18,7 @@ LEFT_BEHIND = {
     "demo_best_matching": {"best_matching.png"},
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
+    "demo_hand": {"hand.png", "hand_control.png"},
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_masonry": {"masonry.png"},

@@ -87,7 +87,7 @@ class Chart:
             armed = armed or not strong
             if armed and both > self.together[1]:
                 opens, armed = not opens, False
-            if now != REST and not strong:
+            if now != REST and not strong and waited == 0.0:
                 goal = 0.0 if opens else float(self.command(max(a, b)))
                 change = np.clip(goal - pull[group], -self.rate * dt, self.rate * dt)
                 if opens or change > 0:  # closing never gives way

@@ -1,0 +1,153 @@
+# # A light hand: joints of springs, closed by cables
+#
+# Every joint of this hand is a compression spring; a cable on the palm side bends three of them at
+# once. A spring under a cable is pressed together and bent far, which no small-deflection formula
+# covers, but a short rod with the four rigidities of the spring does. The hand is ours, after an
+# idea of Potratz, Yang, Abdel-Malek, Pena Pitarch and Grosland.
+#
+# Run: `python demos/demo_hand.py`
+# Writes: `hand.png` and `hand_control.png` into `out/`; another folder with `--out`
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rom import view
+from rom.components.compliant_hand import Finger, close, hand, rest
+from rom.components.control_chart import Chart, envelope, muscle
+from rom.components.grasp import Bar, grasp
+from rom.components.helical_spring import HelicalSpring
+from rom.view import Panel
+
+options = argparse.ArgumentParser(description="fingers of springs, their stiffness and command")
+options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
+options.add_argument("-q", "--quiet", action="store_true", help="no tables")
+options = options.parse_args()
+options.out.mkdir(parents=True, exist_ok=True)
+say = (lambda *_: None) if options.quiet else print
+MM, MN = 1e-3, 1e-3
+
+# ## A finger closes
+
+finger = Finger(n=12)
+postures = [rest(finger)]
+for tension in (0.5, 1.0, 1.5, 2.0, 2.5, 3.5):
+    postures.append(close(finger, tension=tension, start=postures[-1]))
+closing = {f"{p.tension:g} N": (p.shape.x[:, 0] / MM, p.shape.x[:, 2] / MM)
+           for p in postures[::2]}  # fmt: skip
+
+
+def loop(friction):
+    """Tension over pull, drawn in and let out."""
+    one, posture, path = Finger(n=8, friction=friction), rest(Finger(n=8)), []
+    posture = replace(posture, finger=one)
+    for way, pulls in ((1.0, np.linspace(0.5, 12, 24)), (-1.0, np.linspace(11.9, 1, 23))):
+        for pull in pulls:
+            posture = close(one, pull=pull * MM, start=posture, way=way)
+            path.append((pull, posture.tension))
+    return tuple(np.array(path).T)
+
+
+# ## How stiff is the fingertip, and what does compression do to a spring?
+
+forces = np.linspace(-100, 100, 11)
+
+
+def deflection(one, tension, axis):
+    start = close(one, tension=tension)
+    moved = [
+        close(one, tension=tension, load=f * MN * np.eye(3)[axis], start=start).tip for f in forces
+    ]
+    return (np.array(moved) - start.tip)[:, axis] / MM
+
+
+bending = {f"cable {T:g} N": (forces, deflection(finger, T, 0)) for T in (0.0, 1.0)}
+sideways = {f"cable {T:g} N": (forces, deflection(finger, T, 1)) for T in (0.0, 1.0)}
+sideways["cable 1 N, stiffeners"] = forces, deflection(replace(finger, stiffener=10.0), 1.0, 1)
+C = rest(finger).tip_compliance()
+
+column = HelicalSpring(MM, 10 * MM, 8, 40 * MM)
+sturdy = replace(column, length=24 * MM)
+share = np.linspace(0.0, 0.4, 81)
+within = share < column.critical_compression(1.0)
+columns = {"40 mm long": (100 * share[within], column.lateral_stiffness(share[within])),
+           "24 mm long": (100 * share, sturdy.lateral_stiffness(share))}  # fmt: skip
+
+# ## A grasp of a bar of 40 mm from both sides
+
+fingers = hand(n=8)
+bar = Bar((26 * MM, 20 * MM), 20 * MM)
+held = {name: grasp(f, bar, np.linspace(0.25, 2.5, 10))[-1] for name, f in fingers.items()}
+grip = {name: bar.pressure(p)[0].sum() for name, p in held.items()}
+say("pressed on the bar:", *(f"{name} {f:.2f} N" for name, f in grip.items()))
+circle = np.linspace(0, 2 * np.pi, 100)
+seen = {"_bar": (26 + 20 * np.cos(circle), 20 + 20 * np.sin(circle))}
+for name, p in held.items():
+    x, z = p.shape.x[:, 0] / MM, p.shape.x[:, 2] / MM
+    seen[name] = (52 - x, z) if name == "thumb" else (x, z)
+
+drawn = {f"friction {mu:g}": loop(mu) for mu in (0.2, 0.0)}
+view.panels(
+    options.out / "hand.png",
+    [
+        [Panel("Index finger, tension of the cable", "towards the palm [mm]", "along [mm]",
+               curves=closing, equal=True),
+         Panel("Cable drawn in and let out", "pull [mm]", "tension [N]", curves=drawn)],
+        [Panel("Fingertip in the plane of flexion", "force [mN]", "deflection [mm]",
+               curves=bending),
+         Panel("Fingertip sideways", "force [mN]", "deflection [mm]", curves=sideways)],
+        [Panel("Sideways stiffness of a spring", "compression [%]", "stiffness [N/m]",
+               curves=columns),
+         Panel("Five fingers around a bar of 40 mm", "across the hand [mm]", "along [mm]",
+               curves=seen, equal=True)],
+    ],
+    title="Fingers whose joints are springs",
+    caption="Centre lines; fingers are 10 mm thick. Top: beyond 2.65 N coils touch on the palm "
+    "side; friction of the cable opens a loop. Middle: the slack finger is as soft sideways as in "
+    "flexion, stiffeners in the joints cure that. Bottom: a long spring loses its sideways "
+    "stiffness under compression and buckles at 20 %; fingers and thumb close with 2.5 N each.",
+)  # fmt: skip
+
+# ## Commands from two muscles
+
+dt, n = 1e-3, 9000
+t = dt * np.arange(n)
+plan = [(0.0, 0.0), (0.5, 0.08), (0.0, 0.0), (0.35, 0.25), (0.0, 0.0), (0.1, 0.6)]
+steps = np.repeat(np.array(plan), n // len(plan), axis=0)
+rng = np.random.default_rng(1)
+effort = [envelope(muscle(steps[:, k], dt, rng), dt) for k in (0, 1)]
+commands = Chart().follow(effort[0][::10], effort[1][::10], 10 * dt)
+pulls = np.repeat(commands.fingers(), 10, axis=0) / MM
+view.history(
+    options.out / "hand_control.png", t,
+    [
+        ("effort", {"flexor": effort[0], "extensor": effort[1]}),
+        ("selected group,\n0 thumb to 4 all", {"": np.repeat(commands.groups, 10)}),
+        ("pull [mm]", dict(zip(("thumb", "index", "middle", "ring", "little"), pulls.T,
+                               strict=True))),
+    ],
+    title="From two muscles to five fingers",
+    caption="Top: envelopes of two synthetic muscle signals. Their ratio selects a group, in "
+    "sectors of 18 degrees, their strength how far it closes. Middle: a group is kept through rest "
+    "and noise; -1 before the first. Bottom: fingers hold what they reached.",
+)  # fmt: skip
+
+# ## What to remember
+#
+# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+
+at = postures[4]
+results = {
+    "angle of a joint at 2 N [deg]": (np.degrees(at.angles[0]), 28.6334, 1e-3),
+    "pull at 2 N [mm]": (at.pull / MM, 11.331, 1e-3),
+    "tip at 2 N, towards the palm [mm]": (at.tip[0] / MM, 40.801, 1e-3),
+    "sideways compliance of the slack tip [mm/N]": (C[0, 0] / MM, 267.362, 1e-3),
+    "flexion at which coils touch [deg]": (np.degrees(postures[-1].angles.sum()), 113, 0.07),
+    "buckling at a compression of": (column.critical_compression(1.0), 0.1986, 1e-3),
+    "fingers that press the bar": (float(sum(f > 0.1 for f in grip.values())), 5.0, 0.0),
+    "last selected group": (float(commands.groups[-1]), 4.0, 0.0),
+}  # fmt: skip
+for name, (value, expected, tolerance) in results.items():
+    print(f"{name}: {value:.6g}, expected {expected:.6g} within {tolerance:g}")
