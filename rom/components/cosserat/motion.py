@@ -119,7 +119,7 @@ def place(old, D, free, new):
             if free[6 * i + 3 + c] != HELD:
                 new.x[i, c] = old.x[i, c] + D[6 * i + 3 + c]
     for k in range(old.p.shape[0]):
-        if free[6 * k] != HELD:
+        if free[6 * k] != HELD or free[6 * k + 1] != HELD or free[6 * k + 2] != HELD:
             turn(old.p[k], D[6 * k], D[6 * k + 1], D[6 * k + 2], new.p[k])
 
 
@@ -228,7 +228,8 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
             axes and angular velocity (3,) in section axes of the plate at the start; without it
             that plate stays where it is. The rod starts with the angular velocity of its root.
         start: shape at time zero; without it the one without stress.
-        free: (6 N + 9,) which dofs may move; without it the plate at the start is held.
+        free: (6 N + 9,) which dofs may move, rotations in section axes; without it the plate at the
+            start is held.
         rho_inf: damping of the highest frequencies in a step, 1 for none.
         save_every: steps between instants that are kept.
 
