@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
+from scipy.optimize import fsolve
 
 from rom import rotation
 from rom.components.cosserat import (
@@ -163,6 +165,42 @@ def test_bend_of_45_degrees_under_a_force_out_of_its_plane(J, k, P, tip):
         assert_allclose(shape.x[-1] - one.x[-1], (-23.814, -13.729, 53.605), rtol=1e-3)
 
 
+def shooting(turn, curvature, length, rigidities, force):
+    """End of a rod from its differential equations, by the moment at the root that leaves none.
+
+    Nothing of this is discrete: x' = R (C^-1 R^T n + e3), R' = R [B^-1 R^T m + k0]x, m' = -x' x n.
+    """
+    C, B = np.array(rigidities[:3]), np.array(rigidities[3:])
+
+    def rates(_, y, n):
+        R = rotation.matrix(y[3:7])
+        along = R @ (R.T @ n / C + [0, 0, 1])
+        bend = R.T @ y[7:] / B + curvature
+        return np.concatenate([along, rotation.multiply(y[3:7], np.append(0, bend)) / 2,
+                               -np.cross(along, n)])  # fmt: skip
+
+    def end(moment, n):
+        start = np.concatenate([np.zeros(3), turn, moment])
+        return solve_ivp(rates, (0, length), start, "DOP853", args=(n,), rtol=1e-9, atol=1e-9).y[
+            :, -1
+        ]
+
+    moment = np.zeros(3)
+    for share in np.linspace(0.5, 1, 2):
+        n = share * np.asarray(force, dtype=float)
+        moment = fsolve(lambda m, n=n: end(m, n)[7:], moment, xtol=1e-9)
+    return end(moment, n)[:3]
+
+
+def test_bend_is_the_solution_of_the_differential_equations():
+    """A boundary value problem solved by shooting has no segments to be wrong about."""
+    one = bend_of_45_degrees(80, 1 / 6, 5 / 6)
+    stiff = (*one.stretch[0], *one.bend[0])
+    tip = shooting(one.p[0], [0, 0.01, 0], 25 * np.pi, stiff, (0, 0, 600))
+    assert_allclose(tip, (47.1501, 15.6847, 53.4755), rtol=2e-6)
+    assert_allclose(equilibrium(one, loads(one, tip=(0, 0, 600))).x[-1], tip, rtol=3e-4)
+
+
 def test_bend_converges_with_second_order():
     tip = []
     for n in (10, 20, 40):
@@ -202,21 +240,33 @@ PRINCETON = {  # flapwise and edgewise displacement [mm], twist [deg] by a shoot
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("angle", ANGLES)
-@pytest.mark.parametrize("force", PRINCETON)
-def test_princeton_beam(force, angle):
-    """Large displacement in both planes; larger steps end in a wrong state twisted by -156 deg."""
+def princeton(force, angle, **options):
     b, t, E = 12.3777e-3, 3.2024e-3, 71.7e9
     G, soft, stiff = E / 2.62, b * t**3 / 12, t * b**3 / 12
     one = straight(0.508, 80, stretch=[G * b * t, G * b * t, E * b * t],
                    bend=[E * stiff, E * soft, 0.198 * G * (soft + stiff)])  # fmt: skip
     beta = np.radians(angle)
-    shape = equilibrium(one, loads(one, tip=force * np.array([np.sin(beta), -np.cos(beta), 0])))
+    load = loads(one, tip=force * np.array([np.sin(beta), -np.cos(beta), 0]))
+    return equilibrium(one, load, **options)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("force", PRINCETON)
+def test_princeton_beam(force, angle):
+    """Large displacement in both planes; a wrong state twisted by -156 degrees is near."""
+    shape = princeton(force, angle)
     A = shape.frame(-1)
     twist = np.degrees(np.arctan2(A[0, 1], A[1, 1]))
     flap, edge, turned = np.array(PRINCETON[force])[:, ANGLES.index(angle)]
     assert_allclose(1e3 * shape.x[-1, :2], (flap, -edge), rtol=2e-3, atol=1e-6)
     assert_allclose(twist, turned, rtol=2e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("angle", [45, 60, 75])
+def test_one_large_step_finds_the_same_equilibrium(angle):
+    """Rotations of an iteration are capped: without that, this load ends in a wrong state."""
+    once, slowly = princeton(13.345, angle, steps=1), princeton(13.345, angle, steps=12)
+    assert_allclose(once.x, slowly.x, atol=1e-9)
 
 
 def test_small_loads_bend_as_timoshenko_says():
