@@ -1,0 +1,204 @@
+"""Involute spur and helical gear pairs: base circles, path of contact, lengths of contact lines.
+
+The pinion drives and turns about +Z, the gear lies in the direction of +X. Distances s along the
+path of contact count from the pinion's point of tangency T1 on the base plane.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from rom.errors import ModelError
+from rom.model import Array
+
+
+def involute(angle: npt.ArrayLike) -> Array:
+    """Tan a - a of a pressure angle [rad]."""
+    return np.tan(angle) - np.asarray(angle, dtype=float)
+
+
+@dataclass(frozen=True)
+class GearPair:
+    """A pair of cylindrical gears.
+
+    Attributes:
+        teeth: of pinion and gear.
+        module: normal module [m].
+        width: common face width [m].
+        helix: angle at the reference circle [rad]; positive for a right-handed pinion.
+        pressure_angle: normal [rad].
+        shift: profile shifts in modules.
+        centre_distance: [m]; None leaves no backlash.
+        thinning: transverse backlash from thinner teeth, along the line of action [m].
+        addendum, dedendum, fillet: height of the teeth above and below the reference circle, and
+            radius at their roots, in modules.
+    """
+
+    teeth: tuple[int, int]
+    module: float
+    width: float
+    helix: float = 0.0
+    pressure_angle: float = float(np.radians(20.0))
+    shift: tuple[float, float] = (0.0, 0.0)
+    centre_distance: float | None = None
+    thinning: float = 0.0
+    addendum: float = 1.0
+    dedendum: float = 1.25
+    fillet: float = 0.4
+
+    def __post_init__(self) -> None:
+        if min(self.teeth) < 4 or not (self.module > 0 and self.width > 0):
+            raise ModelError(
+                f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."
+            )
+        if not abs(self.helix) < 0.9 or not 0.1 < self.pressure_angle < 0.7:
+            raise ModelError(
+                f"helix {self.helix} and pressure angle {self.pressure_angle} are in radians; "
+                "usual are up to 0.6 and 0.35."
+            )
+        for z, x, name in zip(self.teeth, self.shift, ("pinion", "gear"), strict=True):
+            least = self.addendum - z * np.sin(self.alpha_t) ** 2 / (2 * np.cos(self.helix))
+            if x < least - 1e-9:
+                raise ModelError(
+                    f"the teeth of the {name} are undercut: {z} teeth with profile shift {x} lose "
+                    "part of their involute to the tool.",
+                    hint=f"Shift the profile by at least {least:.3f} modules, or take more teeth.",
+                )
+        if self.cos_working >= 1 or self.backlash < -1e-12:
+            raise ModelError(
+                f"the backlash is closed: at a centre distance of {self.distance * 1e3:.4f} mm the "
+                f"teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
+                hint=f"From {self.tight_distance * 1e3:.4f} mm on there is backlash.",
+            )
+        if self.path[0] < 0 or self.path[1] > self.tangents or self.contact_ratio < 1:
+            raise ModelError(
+                f"contact is lost: a transverse contact ratio of {self.contact_ratio:.3f}, from "
+                f"{self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm on a base tangent of "
+                f"{self.tangents * 1e3:.3f} mm.",
+                hint="Lower the centre distance or the profile shift, or take more teeth.",
+            )
+
+    @property
+    def alpha_t(self) -> float:
+        """Transverse pressure angle at the reference circles [rad]."""
+        return float(np.arctan(np.tan(self.pressure_angle) / np.cos(self.helix)))
+
+    @property
+    def r(self) -> Array:
+        """(2,) reference radii [m]."""
+        return self.module / np.cos(self.helix) * np.array(self.teeth) / 2
+
+    @property
+    def rb(self) -> Array:
+        """(2,) base radii [m]."""
+        return self.r * np.cos(self.alpha_t)
+
+    @property
+    def ra(self) -> Array:
+        """(2,) tip radii [m]."""
+        return self.r + self.module * (self.addendum + np.array(self.shift))
+
+    @property
+    def rf(self) -> Array:
+        """(2,) root radii [m]."""
+        return self.r - self.module * (self.dedendum - np.array(self.shift))
+
+    @property
+    def base_helix(self) -> float:
+        """Angle of the contact lines on the base plane [rad]."""
+        return float(np.arctan(np.tan(self.helix) * np.cos(self.alpha_t)))
+
+    @property
+    def base_pitch(self) -> float:
+        """Distance of contact lines along the line of action [m]."""
+        return float(2 * np.pi * self.rb[0] / self.teeth[0])
+
+    @property
+    def tight_angle(self) -> float:
+        """Working pressure angle without backlash [rad]."""
+        x = 2 * sum(self.shift) / sum(self.teeth) * np.tan(self.pressure_angle)
+        wanted = float(involute(self.alpha_t) + x)
+        return float(brentq(lambda a: involute(a) - wanted, 1e-6, 1.2, xtol=1e-15))
+
+    @property
+    def tight_distance(self) -> float:
+        """Centre distance at which teeth that are not thinned have no backlash [m]."""
+        return float(self.rb.sum() / np.cos(self.tight_angle))
+
+    @property
+    def distance(self) -> float:
+        """Centre distance [m]."""
+        return self.tight_distance if self.centre_distance is None else self.centre_distance
+
+    @property
+    def cos_working(self) -> float:
+        """Cosine of the working pressure angle."""
+        return float(self.rb.sum() / self.distance)
+
+    @property
+    def alpha(self) -> float:
+        """Working transverse pressure angle [rad]."""
+        return float(np.arccos(self.cos_working))
+
+    @property
+    def backlash(self) -> float:
+        """Gap of the back flanks along their line of action when the working flanks touch [m]."""
+        opened = involute(self.alpha) - involute(self.tight_angle)
+        return self.thinning + 2 * float(self.rb.sum() * opened)
+
+    @property
+    def tangents(self) -> float:
+        """Distance of the points of tangency [m]."""
+        return self.distance * float(np.sin(self.alpha))
+
+    @property
+    def path(self) -> tuple[float, float]:
+        """First and last point of contact, from T1 [m]."""
+        return path_of_contact(self, self.alpha)
+
+    @property
+    def pitch_point(self) -> float:
+        """Where the teeth roll on each other, from T1 [m]."""
+        return float(self.rb[0] * np.tan(self.alpha))
+
+    @property
+    def contact_ratio(self) -> float:
+        """Transverse, epsilon_alpha."""
+        return (self.path[1] - self.path[0]) / self.base_pitch
+
+    @property
+    def overlap(self) -> float:
+        """Of the helix, epsilon_beta."""
+        return self.width * abs(float(np.tan(self.base_helix))) / self.base_pitch
+
+    @property
+    def base_thickness(self) -> Array:
+        """(2,) transverse thickness of the teeth on the base circle [m]."""
+        x, m = np.array(self.shift), self.module / np.cos(self.helix)
+        at_r = m * (np.pi / 2 + 2 * x * np.tan(self.pressure_angle) * np.cos(self.helix))
+        at_r = at_r - np.array([0.0, self.thinning / np.cos(self.alpha_t)])
+        return self.rb * (at_r / self.r + 2 * involute(self.alpha_t))
+
+
+def path_of_contact(pair: GearPair, alpha: float) -> tuple[float, float]:
+    """First and last point of contact at a working pressure angle [m]."""
+    first = pair.rb.sum() * np.tan(alpha) - np.sqrt(pair.ra[1] ** 2 - pair.rb[1] ** 2)
+    return float(first), float(np.sqrt(pair.ra[0] ** 2 - pair.rb[0] ** 2))
+
+
+def line_length(pair: GearPair, tau: npt.ArrayLike, terms: int = 4000) -> Array:
+    """Total length of the contact lines over width / cos(base helix), as a Fourier series.
+
+    Maatar and Velex, J. Mech. Des. 118 (1996).
+
+    Args:
+        pair: the gears.
+        tau: (n,) time in mesh periods since a pair began to touch on the first end of the face.
+        terms: of the series.
+    """
+    a, b, t = pair.contact_ratio, pair.overlap, np.asarray(tau, dtype=float)
+    k = np.arange(1, terms + 1)
+    each = np.sinc(k * a) * np.sinc(k * b)
+    return a * (1 + 2 * np.cos(np.pi * np.multiply.outer(a + b - 2 * t, k)) @ each)

@@ -1,0 +1,276 @@
+"""Gear meshes against series, tables, exact transmission errors and rigid motions."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rom.components.gear_mesh import (
+    Correction,
+    GearPair,
+    Mesh,
+    contact_compliance,
+    iso_stiffness,
+    line_length,
+    pair_stiffness,
+    stiffness_table,
+    tooth_compliance,
+    transmission_error,
+)
+from rom.components.gear_mesh.contact import Line, contact_lines, structural_vectors
+from rom.errors import ModelError
+
+TEETH = (26, 157)
+HELIX = float(np.radians(12.5))
+K = 15e9
+
+
+def pair(helix=0.0, **more):
+    return GearPair(TEETH, 4e-3, 0.04, helix, **more)
+
+
+def lines(p, theta, cells=40):
+    return contact_lines(p, Line(p.alpha, 0.0, p.alpha), theta, cells, p.path)
+
+
+# --- geometry ---
+
+
+def test_centre_distance_opens_the_working_angle_and_the_backlash():
+    p, wide = pair(), pair(centre_distance=0.3663)
+    assert p.distance == pytest.approx(0.366) and p.alpha == pytest.approx(np.radians(20))
+    assert p.backlash == pytest.approx(0.0, abs=1e-15)
+    slope = 3e-4 / (0.366 * np.tan(np.radians(20)))
+    assert wide.alpha - p.alpha == pytest.approx(slope, rel=5e-3)
+    assert wide.backlash == pytest.approx(2 * np.sin(wide.alpha) * 3e-4, rel=5e-3)
+    thick = pair(shift=(0.3, 0.0))
+    assert thick.tight_distance == pytest.approx(0.366 + 4e-3 * 0.3, rel=1e-3)
+
+
+@pytest.mark.parametrize(("a", "b"), [(1.6, 0.7), (1.6, 1.0), (1.43, 1.25), (2.0, 0.4)])
+def test_contact_lines_are_as_long_as_their_series(a, b):
+    """Both ratios are reached with the addendum and the width."""
+    p = GearPair((40, 60), 3e-3, 0.03, HELIX, addendum=0.9)
+    low, high = 0.5, 1.3
+    for _ in range(60):
+        middle = (low + high) / 2
+        p = GearPair((40, 60), 3e-3, 0.03, HELIX, addendum=middle)
+        low, high = (middle, high) if p.contact_ratio < a else (low, middle)
+    width = b * p.base_pitch / np.tan(p.base_helix)
+    p = GearPair((40, 60), 3e-3, width, HELIX, addendum=low)
+    assert (p.contact_ratio, p.overlap) == (pytest.approx(a), pytest.approx(b))
+    tau = np.linspace(0.03, 0.97, 12)
+    # a pair begins at A on the end that leads
+    theta = (p.path[0] + (tau * p.base_pitch - b * p.base_pitch / 2)) / p.rb[0]
+    at = [lines(p, t) for t in theta]
+    length = [x.length[~x.back].sum() * np.cos(p.base_helix) / width for x in at]
+    assert_allclose(length, line_length(p, tau), atol=2e-3)
+    if b == 1.0 or a == 2.0:
+        assert_allclose(length, a, rtol=1e-5)
+
+
+@pytest.mark.parametrize("helix", [0.0, HELIX, -HELIX])
+def test_teeth_do_not_feel_that_all_moves_together(helix):
+    """Also wheels that roll on each other, and a pinion screwed along its teeth."""
+    m = Mesh(pair(helix, centre_distance=pair(helix).distance + 3e-4), K)
+    rng = np.random.default_rng(1)
+    u, phi = rng.normal(size=3), rng.normal(size=3)
+    a = np.array([m.pair.distance, 0, 0])
+    together = np.concatenate([u, phi, u + np.cross(phi, a), phi])
+    rolled, screwed = np.zeros(12), np.zeros(12)
+    rolled[[5, 11]] = m.pair.rb[1], -m.pair.rb[0]
+    screwed[[2, 5]] = 1.0, np.tan(m.pair.base_helix) / m.pair.rb[0]
+    line = Line(m.pair.alpha, 0.0, m.pair.alpha)
+    V = structural_vectors(m.pair, line, lines(m.pair, 0.3))
+    assert {*lines(m.pair, 0.3).back} == {True, False}
+    for motion in (together, rolled, screwed):
+        assert np.abs(V @ motion).max() < 1e-12 * np.abs(motion).max()
+
+
+def test_forces_are_the_derivatives_of_the_energy():
+    m = Mesh(pair(HELIX), K, Correction(crowning=5e-6, slope=8e-6))
+    q = 1e-5 * np.random.default_rng(4).normal(size=12)
+    q[5] += 6e-4
+    f, h = m.forces(q, 0.3), 1e-9
+    still = [m.forces(q + h * e, 0.3 - h * e[5]) for e in np.eye(12)]  # the lines stay
+    back = [m.forces(q - h * e, 0.3 + h * e[5]) for e in np.eye(12)]
+    slope = [(b.energy - a.energy) / (2 * h) for a, b in zip(still, back, strict=True)]
+    # but for the path of contact, which moves with the wheels
+    assert_allclose(f.force, slope, atol=6e-4 * np.abs(f.force).max())
+    K_fd = np.transpose([(b.force - a.force) / (2 * h) for a, b in zip(still, back, strict=True)])
+    assert_allclose(f.stiffness, K_fd, atol=2e-3 * np.abs(f.stiffness).max())
+
+
+def test_torques_are_as_the_base_radii():
+    m = Mesh(pair(HELIX), K)
+    q = np.zeros(12)
+    q[5] = 2e-4
+    F = m.forces(q, 0.1).force
+    assert F[5] < 0 and F[11] / F[5] == pytest.approx(157 / 26, rel=1e-12)
+    assert_allclose(F[:3] + F[6:9], 0, atol=1e-9 * np.abs(F).max())
+    assert F[7] > 0  # the gear is pushed along +Y
+    moment = F[3:6] + F[9:12] + np.cross([m.pair.distance, 0, 0], F[6:9])
+    assert_allclose(moment, 0, atol=1e-9 * np.abs(F).max())
+
+
+def test_stiffness_is_constant_when_a_contact_ratio_is_whole():
+    p = pair(HELIX)
+    p = GearPair(TEETH, 4e-3, p.base_pitch / np.tan(p.base_helix), HELIX)
+    q = np.zeros(12)
+    q[5] = 1e-4
+    k = [Mesh(p, K).forces(q, t).stiffness[5, 5] for t in np.linspace(0, 0.24, 11)]
+    assert_allclose(k, k[0], rtol=1e-9)
+    b = np.cos(p.base_helix) * p.width * p.contact_ratio  # lines are longer, normals inclined
+    assert k[0] == pytest.approx(K * b * p.rb[0] ** 2, rel=1e-9)
+
+
+def test_back_flanks_touch_when_the_backlash_is_used_up():
+    m = Mesh(pair(thinning=40e-6), K)
+    q = np.zeros(12)
+    for turned, force in ((-39e-6, False), (-41e-6, True)):
+        q[5] = turned / m.pair.rb[0]
+        F = m.forces(q, 0.3).force
+        assert bool(F[5] > 0) == force and F[7] <= 0
+    q[6] = 1e-4  # wheels apart: the gap grows on this side, too
+    for apart, force in ((0.9e-4, False), (1.1e-4, True)):
+        q[5] = -(40e-6 + np.sin(m.pair.alpha) * apart) / m.pair.rb[0]
+        assert bool(m.forces(q, 0.3).load.any()) == force
+
+
+def test_flanks_open_along_the_exact_involutes():
+    """Wheels moved apart by 1 mm: the pinion turns by the difference of the involutes."""
+    m = Mesh(pair(), K)
+    q = np.zeros(12)
+    q[6] = 1e-3
+    alpha = np.arccos(m.pair.rb.sum() / (m.pair.distance + 1e-3))
+    angle = [np.tan(a) - a for a in (alpha, m.pair.alpha)]
+    touch = m.pair.rb.sum() * (angle[0] - angle[1]) / m.pair.rb[0]
+    for more, closed in ((-1e-9, False), (1e-9, True)):
+        q[5] = touch + more
+        assert bool(m.forces(q, 0.2).load.any()) == closed
+
+
+# --- compliance ---
+
+# at the pitch point, and mean, least and largest value of the mesh [N/mm/um]: own computations with
+# another program and slightly other fillets; ISO 6336: ideal, of a pair, of the mesh
+TABLE = [
+    (26, 157, 4e-3, 16.91, 26.13, 16.34, 29.71, 11.45, 18.23, 14.22, 22.30),
+    (50, 50, 3e-3, 16.39, 25.24, 16.25, 28.63, 11.22, 18.02, 14.05, 22.01),
+    (25, 25, 4e-3, 15.77, 22.68, 15.46, 27.46, 11.81, 15.68, 12.23, 17.84),
+]
+
+
+@pytest.mark.parametrize("row", TABLE, ids=lambda r: f"{r[0]}-{r[1]}")
+def test_teeth_are_as_stiff_as_listed(row):
+    p = GearPair(row[:2], row[2], 0.04)
+    at = pair_stiffness(p, p.pitch_point, force=3e5) / 1e9
+    assert at == pytest.approx(row[3], rel=0.015)
+    m, q = Mesh(p, stiffness_table(p, force=3e5)), np.zeros(12)
+    q[5] = 1e-4
+    theta = np.linspace(0, 2 * np.pi / p.teeth[0], 100, endpoint=False)
+    k = np.array([m.forces(q, t).stiffness[5, 5] for t in theta]) / (p.rb[0] ** 2 * 0.04e9)
+    assert_allclose((k.mean(), k.min(), k.max()), row[4:7], rtol=0.02)
+    soft = pair_stiffness(p, p.pitch_point, force=3e5, body="sainsot") / 1e9
+    assert soft == pytest.approx(row[7], rel=0.015)
+    assert_allclose(np.array(iso_stiffness(p)) / 1e9, row[8:], rtol=4e-4)
+
+
+@pytest.mark.parametrize(("z", "bending", "whole"), [(26, 2.09, 4.52), (50, 1.85, 4.60)])
+def test_a_tooth_bends_as_listed(z, bending, whole):
+    p = GearPair((z, 100), 4e-3, 0.04)
+    got = tooth_compliance(p, 0, 2e-3 * z)
+    assert (got[0], got[0] + got[1]) == (pytest.approx(bending, rel=0.015),
+                                         pytest.approx(whole, rel=0.015))  # fmt: skip
+
+
+def test_contact_is_between_a_logarithm_and_hertz():
+    """Half width and pressure of Hertz give the approach of points deep in two cylinders."""
+    F, E, R, h = 3e5, 206e9, 0.02, 2e-3
+    a = np.sqrt(8 * F * (1 - 0.09) * (R / 2) / (np.pi * E))
+    one = 2 * (1 - 0.09) / np.pi * (np.log(2 * h / a) - 0.3 / 0.7 / 2)
+    assert contact_compliance([R, R], [h, h], F, E) == pytest.approx(2 * one, rel=1e-12)
+
+
+# --- quasi-static transmission error ---
+
+
+def error(correction, load, addendum=1.0, cells=1, n=200):
+    """In deflections F / k of one pair; `load` over the load the relief is made for."""
+    p = pair(addendum=addendum)
+    m = Mesh(p, K, correction(p), cells=cells)
+    theta = np.linspace(0, 2 * np.pi / 26, n, endpoint=False) + 1e-5
+    te = transmission_error(m, load * p.width * K * 1e-5 * p.rb[0], theta)
+    return te / (load * 1e-5)
+
+
+def test_two_pairs_bend_half_as_much():
+    te = error(lambda p: Correction(), 1.0)
+    assert {*np.round(te, 12)} == {0.5, 1.0}
+    assert_allclose((te.mean(), te.std()), (0.6200, 0.2135), atol=3e-3)
+
+
+def test_relief_as_deep_as_the_deflection_keeps_the_error_constant():
+    def over(share):
+        def correction(p):
+            extent = share * (p.contact_ratio - 1) * p.base_pitch
+            return Correction((1e-5, 1e-5), (extent, extent))
+
+        return correction
+
+    assert np.ptp(error(over(1.0), 1.0)) < 1e-12
+    assert np.ptp(error(over(1.0), 0.5)) == pytest.approx(0.5, abs=0.01)  # of F/k, half of F0/k
+    assert np.ptp(error(over(0.5), 1.0)) == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_tooth_out_of_place_takes_less_load():
+    late = np.zeros(26)
+    late[3] = 4e-6
+    p = pair()
+    m = Mesh(p, K, Correction(pitch=(late, ())))
+    q = np.zeros(12)
+    q[5] = 1e-5 / p.rb[0]
+    seen = set()
+    for theta in np.linspace(0, 2 * np.pi, 120):
+        f = m.forces(q, theta)
+        seen |= {*np.round(f.load[f.load > 0] / (K * 0.04 / 21), 9)}
+    assert sorted(seen) == pytest.approx([6e-6, 1e-5])
+
+
+def test_a_slope_of_the_lead_loads_one_end():
+    m = Mesh(pair(), K, Correction(slope=20e-6))
+    q = np.zeros(12)
+    q[5] = 12e-6 / m.pair.rb[0]
+    f = m.forces(q, 0.3)
+    z = f.slices.z[f.load > 0]
+    assert z.min() < -0.018 and z.max() == pytest.approx((12 / 20 - 0.5) * 0.04, abs=0.0015)
+    q[4] = 20e-6 / 0.04 / np.sin(m.pair.alpha)  # a pinion tilted by as much carries evenly
+    even = m.forces(q, 0.3)
+    one = even.load[~even.slices.back]
+    assert_allclose(one, K * 0.04 / 21 * 2e-6, rtol=1e-2)
+
+
+def test_damping_takes_power_from_teeth_in_contact():
+    m = Mesh(pair(), K, damping=1e-6)
+    q, v = np.zeros(12), np.zeros(12)
+    q[5], v[5] = 1e-4, 0.01
+    f, still = m.forces(q, 0.1, v), m.forces(q, 0.1)
+    assert (still.force - f.force) @ v == pytest.approx(f.lost, rel=1e-12)
+    assert_allclose(f.damping, 1e-6 * f.stiffness)
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: GearPair((12, 40), 4e-3, 0.04), "teeth of the pinion are undercut.*|at least 0.298"),
+    (lambda: GearPair(TEETH, 4e-3, 0.04, 12.5), "in radians"),
+    (lambda: GearPair((2, 40), 4e-3, 0.04), "no gears have"),
+    (lambda: pair(centre_distance=0.3659), "backlash is closed"),
+    (lambda: pair(centre_distance=0.3725), "contact is lost"),
+    (lambda: pair(addendum=0.4), "contact is lost"),
+    (lambda: Mesh(pair(), -1.0), "must be positive"),
+    (lambda: Mesh(pair(), K, Correction(pitch=([0.0], ()))), "1 pitch errors for 26 teeth"),
+    (lambda: Mesh(pair(), K).forces([0, 0, 0, 0, 0, 0, -0.1, 0, 0, 0, 0, 0], 0.0), "overlap"),
+    (lambda: transmission_error(Mesh(pair(), K), -1.0, 0.0), "does not press"),
+    (lambda: tooth_compliance(pair(), 0, 0.04), "not on the involute"),
+])  # fmt: skip
+def test_what_cannot_be_is_said(make, said):
+    with pytest.raises(ModelError, match=said):
+        make()
