@@ -136,6 +136,26 @@ def test_back_flanks_touch_when_the_backlash_is_used_up():
         assert bool(m.forces(q, 0.3).load.any()) == force
 
 
+def test_back_flanks_follow_by_the_thickness_of_a_tooth():
+    """Half a tooth pitch on the reference circle after the working flank, at the pitch point."""
+    p = pair()
+    s = p.rb[0] * np.tan(p.alpha)
+    theta = s / p.rb[0]  # line 0 runs through the pitch point
+    now, later = lines(p, theta, 1), lines(p, theta + np.pi / 26, 1)
+    assert np.abs(now.s[~now.back] - s).min() < 1e-12 > np.abs(later.s[later.back] - s).min()
+
+
+def test_teeth_do_not_care_where_the_line_of_centres_points():
+    m, turn = Mesh(pair(HELIX), K), 0.4
+    A = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    q, moved = np.zeros(12), np.zeros(12)
+    q[5] = 1e-4
+    moved[[5, 11]] = turn + 1e-4, turn
+    moved[6:9] = (A - np.eye(3)) @ [m.pair.distance, 0, 0]
+    F, turned = (m.forces(x, 0.3).force.reshape(4, 3) for x in (q, moved))
+    assert_allclose(turned, F @ A.T, atol=1e-8 * np.abs(F).max())
+
+
 def test_flanks_open_along_the_exact_involutes():
     """Wheels moved apart by 1 mm: the pinion turns by the difference of the involutes."""
     m = Mesh(pair(), K)

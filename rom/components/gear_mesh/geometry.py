@@ -5,6 +5,7 @@ path of contact count from the pinion's point of tangency T1 on the base plane.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -80,100 +81,100 @@ class GearPair:
                 hint="Lower the centre distance or the profile shift, or take more teeth.",
             )
 
-    @property
+    @cached_property
     def alpha_t(self) -> float:
         """Transverse pressure angle at the reference circles [rad]."""
         return float(np.arctan(np.tan(self.pressure_angle) / np.cos(self.helix)))
 
-    @property
+    @cached_property
     def r(self) -> Array:
         """(2,) reference radii [m]."""
         return self.module / np.cos(self.helix) * np.array(self.teeth) / 2
 
-    @property
+    @cached_property
     def rb(self) -> Array:
         """(2,) base radii [m]."""
         return self.r * np.cos(self.alpha_t)
 
-    @property
+    @cached_property
     def ra(self) -> Array:
         """(2,) tip radii [m]."""
         return self.r + self.module * (self.addendum + np.array(self.shift))
 
-    @property
+    @cached_property
     def rf(self) -> Array:
         """(2,) root radii [m]."""
         return self.r - self.module * (self.dedendum - np.array(self.shift))
 
-    @property
+    @cached_property
     def base_helix(self) -> float:
         """Angle of the contact lines on the base plane [rad]."""
         return float(np.arctan(np.tan(self.helix) * np.cos(self.alpha_t)))
 
-    @property
+    @cached_property
     def base_pitch(self) -> float:
         """Distance of contact lines along the line of action [m]."""
         return float(2 * np.pi * self.rb[0] / self.teeth[0])
 
-    @property
+    @cached_property
     def tight_angle(self) -> float:
         """Working pressure angle without backlash [rad]."""
         x = 2 * sum(self.shift) / sum(self.teeth) * np.tan(self.pressure_angle)
         wanted = float(involute(self.alpha_t) + x)
         return float(brentq(lambda a: involute(a) - wanted, 1e-6, 1.2, xtol=1e-15))
 
-    @property
+    @cached_property
     def tight_distance(self) -> float:
         """Centre distance at which teeth that are not thinned have no backlash [m]."""
         return float(self.rb.sum() / np.cos(self.tight_angle))
 
-    @property
+    @cached_property
     def distance(self) -> float:
         """Centre distance [m]."""
         return self.tight_distance if self.centre_distance is None else self.centre_distance
 
-    @property
+    @cached_property
     def cos_working(self) -> float:
         """Cosine of the working pressure angle."""
         return float(self.rb.sum() / self.distance)
 
-    @property
+    @cached_property
     def alpha(self) -> float:
         """Working transverse pressure angle [rad]."""
         return float(np.arccos(self.cos_working))
 
-    @property
+    @cached_property
     def backlash(self) -> float:
         """Gap of the back flanks along their line of action when the working flanks touch [m]."""
         opened = involute(self.alpha) - involute(self.tight_angle)
         return self.thinning + 2 * float(self.rb.sum() * opened)
 
-    @property
+    @cached_property
     def tangents(self) -> float:
         """Distance of the points of tangency [m]."""
         return self.distance * float(np.sin(self.alpha))
 
-    @property
+    @cached_property
     def path(self) -> tuple[float, float]:
         """First and last point of contact, from T1 [m]."""
         return path_of_contact(self, self.alpha)
 
-    @property
+    @cached_property
     def pitch_point(self) -> float:
         """Where the teeth roll on each other, from T1 [m]."""
         return float(self.rb[0] * np.tan(self.alpha))
 
-    @property
+    @cached_property
     def contact_ratio(self) -> float:
         """Transverse, epsilon_alpha."""
         return (self.path[1] - self.path[0]) / self.base_pitch
 
-    @property
+    @cached_property
     def overlap(self) -> float:
         """Of the helix, epsilon_beta."""
         return self.width * abs(float(np.tan(self.base_helix))) / self.base_pitch
 
-    @property
+    @cached_property
     def base_thickness(self) -> Array:
         """(2,) transverse thickness of the teeth on the base circle [m]."""
         x, m = np.array(self.shift), self.module / np.cos(self.helix)

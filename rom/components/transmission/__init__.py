@@ -1,0 +1,21 @@
+"""Geared shafts on journal bearings: where they rest, whether they whirl, how they vibrate."""
+
+from rom.components.transmission.motion import Run, Whirl, linearised, simulate, threshold, whirl
+from rom.components.transmission.shaft import Disc, Shaft
+from rom.components.transmission.unit import Forces, Rest, Rotor, Transmission, rest
+
+__all__ = [
+    "Disc",
+    "Forces",
+    "Rest",
+    "Rotor",
+    "Run",
+    "Shaft",
+    "Transmission",
+    "Whirl",
+    "linearised",
+    "rest",
+    "simulate",
+    "threshold",
+    "whirl",
+]

@@ -1,0 +1,154 @@
+"""Spinning shafts as Timoshenko beams with discs.
+
+Six coordinates per node, u_x, u_y, u_z, phi_x, phi_y, phi_z, in axes that do not spin; the shaft
+lies along Z. Shape functions satisfy the static equations of the element (Przemieniecki, 1968).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ModelError
+from rom.model import Array
+
+GAUSS, WEIGHT = np.polynomial.legendre.leggauss(4)
+STEEL = (206e9, 0.3, 7850.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A rigid disc on a shaft.
+
+    Attributes:
+        node: where.
+        mass: [kg].
+        diametral, polar: moments of inertia [kg m^2].
+    """
+
+    node: int
+    mass: float
+    diametral: float
+    polar: float
+
+    @classmethod
+    def of_ring(
+        cls, node: int, *, outer: float, inner: float, width: float, rho: float = 7850.0
+    ) -> "Disc":
+        """A ring of that outer and inner diameter and width [m]."""
+        m = rho * np.pi / 4 * (outer**2 - inner**2) * width
+        squares = outer**2 + inner**2
+        return cls(node, m, m * (squares / 16 + width**2 / 12), m * squares / 8)
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A straight shaft.
+
+    Attributes:
+        z: (n,) nodes along the axis [m].
+        diameter: (n - 1,) of the pieces between them [m], or one number.
+        discs: on the shaft.
+        material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3].
+    """
+
+    z: npt.ArrayLike
+    diameter: npt.ArrayLike
+    discs: Sequence[Disc] = ()
+    material: tuple[float, float, float] = STEEL
+
+    def __post_init__(self) -> None:
+        z = np.asarray(self.z, dtype=float)
+        d = np.asarray(self.diameter, dtype=float)
+        if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
+            raise ModelError(f"no shaft has nodes at {z.tolist()} m and diameters {d.tolist()} m.")
+        if any(not 0 <= disc.node < z.size for disc in self.discs):
+            raise ModelError(f"a disc sits beyond the last of {z.size} nodes.")
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return 6 * np.asarray(self.z).size
+
+    def matrices(self) -> tuple[Array, Array, Array]:
+        """(n, n) mass, stiffness, and gyroscopic matrix per speed of rotation."""
+        z = np.asarray(self.z, dtype=float)
+        d = np.broadcast_to(np.asarray(self.diameter, dtype=float), z.size - 1)
+        M, K, G = (np.zeros((self.n, self.n)) for _ in range(3))
+        for k, (length, across) in enumerate(zip(np.diff(z), d, strict=True)):
+            at = slice(6 * k, 6 * k + 12)
+            for whole, part in zip((M, K, G), _beam(length, across, *self.material), strict=True):
+                whole[at, at] += part
+        for disc in self.discs:
+            i = 6 * disc.node
+            M[range(i, i + 6), range(i, i + 6)] += (
+                *[disc.mass] * 3, *[disc.diametral] * 2, disc.polar,
+            )  # fmt: skip
+            G[i + 3, i + 4] += disc.polar
+            G[i + 4, i + 3] -= disc.polar
+        return M, K, G
+
+
+def _beam(l: float, d: float, E: float, nu: float, rho: float) -> tuple[Array, Array, Array]:
+    """(12, 12) mass, stiffness and gyroscopic matrix of a round piece."""
+    area, I, shear = np.pi * d**2 / 4, np.pi * d**4 / 64, E / (2 * (1 + nu))
+    kappa = 6 * (1 + nu) / (7 + 6 * nu)
+    stiff = kappa * shear * area
+    phi = 12 * E * I / (stiff * l**2)
+    M, K, G = (np.zeros((12, 12)) for _ in range(3))
+    for x, w in zip((1 + GAUSS) / 2, WEIGHT * l / 2, strict=True):
+        N, T, dN, dT = _shapes(x, l, phi)
+        ux, py, uy, px = (_row(c, v) for c, v in ((0, N), (4, T), (1, N), (3, -T)))
+        M += w * rho * (area * (np.outer(ux, ux) + np.outer(uy, uy)))
+        M += w * rho * I * (np.outer(px, px) + np.outer(py, py))
+        G += w * 2 * rho * I * (np.outer(px, py) - np.outer(py, px))
+        for c, sign in ((0, 1), (1, -1)):
+            bend = _row(4 if c == 0 else 3, sign * dT)
+            slide = _row(c, dN - T)
+            K += w * (E * I * np.outer(bend, bend) + stiff * np.outer(slide, slide))
+        line, slope = np.array([1 - x, x]), np.array([-1, 1]) / l
+        for c, inertia, spring in ((2, area, E * area), (5, 2 * I, shear * 2 * I)):
+            at = np.ix_([c, 6 + c], [c, 6 + c])
+            M[at] += w * rho * inertia * np.outer(line, line)
+            K[at] += w * spring * np.outer(slope, slope)
+    return M, K, G
+
+
+def _shapes(x: float, l: float, phi: float) -> tuple[Array, Array, Array, Array]:
+    """Deflection and turn of the section per (u, turn) of both ends, and their slopes."""
+    m = 1 / (1 + phi)
+    N = m * np.array([
+        1 - 3 * x**2 + 2 * x**3 + phi * (1 - x),
+        l * (x - 2 * x**2 + x**3 + phi / 2 * (x - x**2)),
+        3 * x**2 - 2 * x**3 + phi * x,
+        l * (-(x**2) + x**3 + phi / 2 * (x**2 - x)),
+    ])  # fmt: skip
+    dN = m / l * np.array([
+        -6 * x + 6 * x**2 - phi,
+        l * (1 - 4 * x + 3 * x**2 + phi / 2 * (1 - 2 * x)),
+        6 * x - 6 * x**2 + phi,
+        l * (-2 * x + 3 * x**2 + phi / 2 * (2 * x - 1)),
+    ])  # fmt: skip
+    T = m * np.array([
+        6 / l * (x**2 - x), 1 - 4 * x + 3 * x**2 + phi * (1 - x),
+        6 / l * (x - x**2), -2 * x + 3 * x**2 + phi * x,
+    ])  # fmt: skip
+    dT = m / l * np.array([
+        6 / l * (2 * x - 1), -4 + 6 * x - phi, 6 / l * (1 - 2 * x), -2 + 6 * x + phi,
+    ])  # fmt: skip
+    return N, T, dN, dT
+
+
+def _row(component: int, values: Array) -> Array:
+    """Shape functions in the columns of a displacement and of the turn that belongs to it.
+
+    `component` is what the row yields: 0 or 4 in the plane X-Z, 1 or 3 in the plane Y-Z, where the
+    slope of u_y is -phi_x.
+    """
+    row = np.zeros(12)
+    if component in (0, 4):
+        row[[0, 4, 6, 10]] = values
+    else:
+        row[[1, 3, 7, 9]] = values * [1, -1, 1, -1]
+    return row
