@@ -9,11 +9,13 @@ from rom.components.gear_mesh import (
     GearPair,
     Mesh,
     contact_compliance,
+    element_table,
     iso_stiffness,
     line_length,
     pair_stiffness,
     stiffness_table,
     tooth_compliance,
+    tooth_model,
     transmission_error,
 )
 from rom.components.gear_mesh.contact import Line, contact_lines, structural_vectors
@@ -203,6 +205,29 @@ def test_a_tooth_bends_as_listed(z, bending, whole):
                                          pytest.approx(whole, rel=0.015))  # fmt: skip
 
 
+# teeth, bore, E times compliance: own computations with dolfinx and slightly other fillets
+@pytest.mark.parametrize(("z", "bore", "dolfinx", "rel"), [
+    (26, .35, 6.24, .06), (26, .6, 4.64, .06), (26, .8, 3.38, .07),
+    (50, .35, 6.58, .01), (50, .6, 5.09, .01), (50, .85, 3.75, .01),
+])  # fmt: skip
+def test_a_tooth_of_finite_elements_gives_way_as_another_program_says(z, bore, dolfinx, rel):
+    p = GearPair((z, 100), 4e-3, 0.04)
+    coarse, fine = (tooth_model(p, 0, bore=bore, fine=f).compliance(p.r[0]) for f in (2, 3))
+    assert fine == pytest.approx(dolfinx, rel=rel)
+    assert coarse == pytest.approx(fine, rel=0.012)
+    if bore == 0.6:  # where Weber is meant for
+        bending, foundation, _ = tooth_compliance(p, 0, p.r[0])
+        assert bending + foundation == pytest.approx(fine, rel=0.15)
+
+
+def test_a_pair_of_finite_elements_is_as_stiff_as_webers():
+    p = GearPair((50, 50), 3e-3, 0.04)
+    table = element_table(p, force=3e5, bore=0.6, n=9)
+    assert_allclose(table, table[::-1], rtol=1e-6)  # equal wheels
+    assert table[4] == pytest.approx(pair_stiffness(p, p.pitch_point, force=3e5), rel=0.1)
+    assert table[4] > 1.05 * table[0]  # a tooth is softest at its tip
+
+
 def test_contact_is_between_a_logarithm_and_hertz():
     """Half width and pressure of Hertz give the approach of points deep in two cylinders."""
     F, E, R, h = 3e5, 206e9, 0.02, 2e-3
@@ -289,6 +314,8 @@ def test_damping_takes_power_from_teeth_in_contact():
     (lambda: Mesh(pair(), K, Correction(pitch=([0.0], ()))), "1 pitch errors for 26 teeth"),
     (lambda: Mesh(pair(), K).forces([0, 0, 0, 0, 0, 0, -0.1, 0, 0, 0, 0, 0], 0.0), "overlap"),
     (lambda: transmission_error(Mesh(pair(), K), -1.0, 0.0), "does not press"),
+    (lambda: tooth_model(pair(), 0, bore=0.95), "leaves no body"),
+    (lambda: tooth_model(pair(), 0, fine=1).compliance(0.06), "not on the flank"),
     (lambda: tooth_compliance(pair(), 0, 0.04), "not on the involute"),
 ])  # fmt: skip
 def test_what_cannot_be_is_said(make, said):

@@ -16,6 +16,7 @@ from rom.components.transmission import (
     Shaft,
     Transmission,
     linearised,
+    mesh_response,
     rest,
     simulate,
     threshold,
@@ -98,6 +99,15 @@ def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias():
         < M[0::6, 0::6].sum()
         == pytest.approx(RHO * np.pi / 4 * (0.05**2 * 0.2 + (0.3**2 - 0.05**2) * 0.04))
     )
+
+
+def test_a_ring_has_the_inertias_of_a_ring():
+    solid = Disc.of_ring(0, outer=0.2, inner=0.0, width=1e-9)
+    assert solid.polar == pytest.approx(2 * solid.diametral) == pytest.approx(solid.mass * 0.005)
+    hole, ring = (Disc.of_ring(0, outer=d, inner=i, width=0.05) for d, i in ((0.1, 0), (0.2, 0.1)))
+    whole = Disc.of_ring(0, outer=0.2, inner=0.0, width=0.05)
+    for name in ("mass", "polar", "diametral"):
+        assert getattr(hole, name) + getattr(ring, name) == pytest.approx(getattr(whole, name))
 
 
 # --- statics ---
@@ -219,6 +229,30 @@ def test_steps_converge_to_a_reference_of_a_tenth_of_the_step(loaded):
     assert spent == pytest.approx(heat, rel=0.01)  # but for spin that films do not know
     names = {"drive", "load", "films", "teeth", "shafts", "kinetic"}
     assert names == set(fine.work)
+
+
+def test_the_response_to_the_mesh_is_where_a_motion_settles():
+    """To first order; the motion also feels that the stiffness changes while it vibrates."""
+    u = unit(torque=300.0, speed=150.0, loss=4e-5)
+    state = rest(u)
+    linear = mesh_response(state, harmonics=12)
+    run = simulate(state, periods=6, steps=50)
+    last = run.t > run.t[-1] - 2 * u.mesh_period
+    assert linear.frequency == pytest.approx(150 / (2 * np.pi) * 26)
+    assert linear.mean == pytest.approx(run.teeth[last].mean(), rel=0.01)
+    assert linear.error_rms == pytest.approx(np.std(run.error[last]), rel=0.2)
+    assert linear.load_factor - 1 == pytest.approx(np.std(run.teeth[last]) / linear.mean, rel=0.3)
+
+
+def test_slow_units_have_the_error_of_their_teeth():
+    """Everything follows: the error is that of rest in each position."""
+    u = unit(speed=20.0, torque=50.0)
+    u = replace(u, viscosity=0.2)
+    linear = mesh_response(rest(u), harmonics=30, positions=128)
+    still = [rest(u, t) for t in 2 * np.pi / 26 * np.arange(24) / 24]
+    rb, w = u.mesh.pair.rb, u.wheels
+    error = np.array([rb[0] * s.q[w[5]] + rb[1] * s.q[w[11]] for s in still])
+    assert linear.error_rms == pytest.approx(np.std(error), rel=0.15)
 
 
 # --- what cannot be ---

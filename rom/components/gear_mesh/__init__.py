@@ -15,6 +15,7 @@ from rom.components.gear_mesh.contact import (
     transmission_error,
 )
 from rom.components.gear_mesh.geometry import GearPair, line_length
+from rom.components.gear_mesh.tooth_elements import ToothModel, element_table, tooth_model
 
 __all__ = [
     "Correction",
@@ -22,11 +23,14 @@ __all__ = [
     "Mesh",
     "MeshForce",
     "Slices",
+    "ToothModel",
     "contact_compliance",
+    "element_table",
     "iso_stiffness",
     "line_length",
     "pair_stiffness",
     "stiffness_table",
     "tooth_compliance",
+    "tooth_model",
     "transmission_error",
 ]

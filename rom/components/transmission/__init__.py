@@ -1,12 +1,14 @@
 """Geared shafts on journal bearings: where they rest, whether they whirl, how they vibrate."""
 
 from rom.components.transmission.motion import Run, Whirl, linearised, simulate, threshold, whirl
+from rom.components.transmission.response import Response, mesh_response
 from rom.components.transmission.shaft import Disc, Shaft
 from rom.components.transmission.unit import Forces, Rest, Rotor, Transmission, rest
 
 __all__ = [
     "Disc",
     "Forces",
+    "Response",
     "Rest",
     "Rotor",
     "Run",
@@ -14,6 +16,7 @@ __all__ = [
     "Transmission",
     "Whirl",
     "linearised",
+    "mesh_response",
     "rest",
     "simulate",
     "threshold",
