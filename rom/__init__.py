@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rom.io.export import export
     from rom.io.family import load, save
     from rom.io.history import write_history
+    from rom.io.sid_dialect import read_sid
     from rom.io.vtu import write_stress, write_stress_history
     from rom.mbs.audit import audit
     from rom.mbs.campbell import campbell
@@ -134,6 +135,7 @@ __all__ = [
     "mistuned_wheel",
     "modes",
     "motion_sensitivity",
+    "read_sid",
     "reduce",
     "reduce_parametric",
     "reduce_sector",
@@ -219,6 +221,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "mistuned_wheel": "cyclic.mistuning",
     "modes": "workflow",
     "motion_sensitivity": "mbs.sensitivity",
+    "read_sid": "io.sid_dialect",
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
     "reduce_sector": "cyclic.reduced",

@@ -8,22 +8,27 @@ from rom.cli.answer import Answer
 SUMMARY = "write a body for another program"
 EXAMPLES = """\
   rom export rod.rom.npz rod.vtu        # mode shapes for ParaView
+  rom export rod.rom.npz rod.SID_FEM    # Standard Input Data for Simpack
+  rom export rod.rom.npz rod.sid --to sid-geisler
+  rom export rod.SID_FEM rod.rom.npz    # and back, without geometric stiffness
 """
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz")
+    parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz, or .SID_FEM")
     parser.add_argument("output", type=Path, help="file to write")
+    parser.add_argument("--to", metavar="FORMAT", help="format, if the ending does not tell")
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Load; the file is written at the end."""
-    from rom.io.export import export
+    from rom.io.export import export, format_of, read_body
     from rom.io.files import check_writable
-    from rom.io.native import load
 
     check_writable(args.output)
-    body = load(args.file)
-    data = {"file": str(args.file), "output": str(args.output)}
-    return Answer(data, f"{args.output}: body {body.name}", lambda: export(body, args.output))
+    kind = format_of(args.output, args.to)
+    body = read_body(args.file)
+    data = {"file": str(args.file), "output": str(args.output), "format": kind}
+    text = f"{args.output}: body {body.name} as {kind}"
+    return Answer(data, text, lambda: export(body, args.output, to=kind))

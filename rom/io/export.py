@@ -1,27 +1,76 @@
-"""Files for other programs, by the ending of their name."""
+"""Files for other programs, by name or by the ending of the file name."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
-from rom.io.native import save
+from rom.io.native import load, save
+from rom.io.sid import write_sid
+from rom.io.sid_body import sid_body, standard_input
+from rom.io.sid_dialect import read_sid
 from rom.io.vtu import write_vtu
 
-WRITERS: dict[str, Any] = {".npz": save, ".vtu": write_vtu}
+SID = ".sid_fem"
 
 
-def export(body: FlexibleBody, path: str | Path) -> Path:
-    """Write a body in the format its file name asks for.
+def _write_sid(body: FlexibleBody, path: str | Path, dialect: str) -> Path:
+    return write_sid(standard_input(body), path, dialect=dialect)
+
+
+FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
+    "npz": (".npz", save),
+    "vtu": (".vtu", write_vtu),
+    "sid": (SID, partial(_write_sid, dialect="fembs")),
+    "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
+    "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
+}
+
+
+def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Path:
+    """Write a body in the format of another program.
 
     Args:
         body: the body.
-        path: ``.vtu`` for ParaView, ``.npz`` for the native body file.
+        path: file to write.
+        to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
+            Simpack, "sid-pysid" and "sid-geisler" for its dialects; None for the ending of the
+            path: ``.vtu``, ``.npz``, ``.SID_FEM``.
 
     Raises:
-        ConfigError: if the ending is not known or the place is not writable.
+        ConfigError: if the format or the ending is not known, or the place is not writable.
     """
+    return FORMATS[format_of(path, to)][1](body, path)
+
+
+def format_of(path: str | Path, to: str | None = None) -> str:
+    """The name of the format that a file will have.
+
+    Raises:
+        ConfigError: listing what is known.
+    """
+    if to is not None:
+        if to not in FORMATS:
+            raise ConfigError(f"the format {to!r} is unknown; known: {', '.join(FORMATS)}.")
+        return to
     ending = Path(path).suffix.lower()
-    if ending not in WRITERS:
-        raise ConfigError(f"{path} has the ending {ending!r}; known: {', '.join(sorted(WRITERS))}.")
-    return WRITERS[ending](body, path)
+    endings = {known: name for name, (known, _) in FORMATS.items() if known}
+    if ending not in endings:
+        raise ConfigError(
+            f"{path} has the ending {ending!r}; known: {', '.join(sorted(endings))}.",
+            hint=f"Or name a format: {', '.join(FORMATS)}.",
+        )
+    return endings[ending]
+
+
+def read_body(path: str | Path) -> FlexibleBody:
+    """A body from the native file, or from Standard Input Data without geometric stiffness.
+
+    Raises:
+        ConfigError: if Standard Input Data contain geometric stiffness.
+        FileFormatError: if the file is missing, cut, or not what its ending promises.
+    """
+    if Path(path).suffix.lower() == SID:
+        return sid_body(read_sid(path))
+    return load(path)
