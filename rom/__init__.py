@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rom.errors import RomError
     from rom.io.export import export
     from rom.io.family import load, save
+    from rom.io.foreign_model import read_model
     from rom.io.history import write_history
     from rom.io.sid_dialect import read_sid
     from rom.io.vtu import write_stress, write_stress_history
@@ -135,6 +136,7 @@ __all__ = [
     "mistuned_wheel",
     "modes",
     "motion_sensitivity",
+    "read_model",
     "read_sid",
     "reduce",
     "reduce_parametric",
@@ -221,6 +223,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "mistuned_wheel": "cyclic.mistuning",
     "modes": "workflow",
     "motion_sensitivity": "mbs.sensitivity",
+    "read_model": "io.foreign_model",
     "read_sid": "io.sid_dialect",
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",

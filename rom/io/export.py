@@ -6,7 +6,10 @@ from typing import Any
 
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
+from rom.io.dmig import write_dmig
+from rom.io.interface_form import InterfaceForm, interface_form
 from rom.io.native import load, save
+from rom.io.op4 import write_op4
 from rom.io.sid import write_sid
 from rom.io.sid_body import sid_body, standard_input
 from rom.io.sid_dialect import read_sid
@@ -19,10 +22,25 @@ def _write_sid(body: FlexibleBody, path: str | Path, dialect: str) -> Path:
     return write_sid(standard_input(body), path, dialect=dialect)
 
 
+def _nastran(form: InterfaceForm) -> dict[str, Any]:
+    return {"KAAX": form.K, "MAAX": form.M, "BAAX": form.D}
+
+
+def _write_op4(body: FlexibleBody, path: str | Path) -> Path:
+    return write_op4(_nastran(interface_form(body)), path)
+
+
+def _write_dmig(body: FlexibleBody, path: str | Path) -> Path:
+    form = interface_form(body)
+    return write_dmig(_nastran(form), form.dofs, path, nodes=form.points)
+
+
 FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
     "npz": (".npz", save),
     "vtu": (".vtu", write_vtu),
     "sid": (SID, partial(_write_sid, dialect="fembs")),
+    "dmig": (".dmig", _write_dmig),
+    "op4": (".op4", _write_op4),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
 }
@@ -35,8 +53,9 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
         body: the body.
         path: file to write.
         to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
-            Simpack, "sid-pysid" and "sid-geisler" for its dialects; None for the ending of the
-            path: ``.vtu``, ``.npz``, ``.SID_FEM``.
+            Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
+            (KAAX, MAAX, BAAX, see `rom.io.interface_form`); None for the ending of the path:
+            ``.vtu``, ``.npz``, ``.SID_FEM``, ``.dmig``, ``.op4``.
 
     Raises:
         ConfigError: if the format or the ending is not known, or the place is not writable.

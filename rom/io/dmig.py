@@ -1,0 +1,186 @@
+"""Matrices in Nastran bulk data and punch files: DMIG cards, with nodes as GRID cards.
+
+Source:
+    MSC Nastran Quick Reference Guide, entries DMIG, GRID and SPOINT, formats of bulk data.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix
+
+from rom.errors import FileFormatError, UnsafeFileError
+from rom.io.files import write_whole
+from rom.model import Array, Index
+
+LARGEST = 2**32  # bytes of a file that is still read
+BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
+SYMMETRIC, SQUARE = 6, 1
+Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
+
+
+def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
+    """All real square matrices of a file: {name: (sparse (n, n), (n, 2) label and component)}.
+
+    Of symmetric ones only the triangle that is written.
+
+    Raises:
+        FileFormatError: naming the line, if the file is missing, cut, or a matrix is complex.
+        UnsafeFileError: if it is larger than 4 GiB.
+    """
+    entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
+    for number, fields in cards(path, "DMIG"):
+        try:
+            _enter(entries, fields)
+        except (ValueError, IndexError) as error:
+            where = f"{path}, line {number}"
+            raise FileFormatError(f"this is no DMIG card: {error}.", where=where) from error
+    if not entries:
+        raise FileFormatError("the file holds no DMIG matrix.", where=str(path))
+    return {name: _matrix(rows) for name, rows in entries.items()}
+
+
+def read_grids(path: str | Path) -> tuple[Index, Array]:
+    """Labels (k,) and positions (k, 3) of the GRID cards, which must be in the basic system.
+
+    Raises:
+        FileFormatError: naming the line, for a card that is damaged or in another system.
+    """
+    labels, points = [], []
+    for number, fields in cards(path, "GRID"):
+        try:
+            if fields[1].strip("0") or (len(fields) > 5 and fields[5].strip("0")):
+                raise ValueError("its coordinate system is not the basic one")
+            labels.append(int(fields[0]))
+            points.append([real(fields[k]) for k in (2, 3, 4)])
+        except (ValueError, IndexError) as error:
+            where = f"{path}, line {number}"
+            raise FileFormatError(f"this GRID is not read: {error}.", where=where) from error
+    return np.array(labels, dtype=np.int64), np.array(points).reshape(-1, 3)
+
+
+def write_dmig(
+    matrices: dict[str, Any], dofs: Dofs, path: str | Path, *, nodes: dict[int, Array] | None = None
+) -> Path:
+    """Write symmetric matrices, ten digits each.
+
+    Args:
+        matrices: {name of at most 8 characters: (n, n)}.
+        dofs: (n, 2) label and component of each row; component 0 for a scalar point.
+        path: file to write.
+        nodes: {label: (3,) position}, written as GRID cards, with the scalar points as SPOINT.
+
+    Raises:
+        ConfigError: if the place is not writable.
+    """
+    lines = list(_points(dofs, nodes)) if nodes else []
+    for name, A in matrices.items():
+        lines += _written(name.upper(), csc_matrix(A), dofs)
+    text = "\n".join(lines) + "\n"
+    write_whole(path, lambda file: file.write(text.encode("ascii")))
+    return Path(path)
+
+
+def cards(path: str | Path, wanted: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and fields, without the name, of all cards of a kind.
+
+    Raises:
+        FileFormatError: if the file is missing.
+        UnsafeFileError: if it is larger than 4 GiB.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError("there is no such file.", where=str(path))
+    if path.stat().st_size > LARGEST:
+        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    start, fields = 0, list[str]()
+    with path.open(encoding="ascii", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            line = line.partition("$")[0].rstrip()
+            if not line:
+                continue
+            continued = line[0] in "*+, " and bool(fields)
+            if not continued:
+                if fields:
+                    yield start, fields
+                name = line.split(",")[0][:8].strip().rstrip("*").upper()
+                start, fields = number, []
+                if name != wanted:
+                    continue
+            fields += _fields(line)
+    if fields:
+        yield start, fields
+
+
+def real(text: str) -> float:
+    """A number of bulk data, e.g. 1.5D+3, 1.5+3 or .5.
+
+    Raises:
+        ValueError: if it is none, or not finite.
+    """
+    word = text.strip().upper().replace("D", "E")
+    value = float(word if "E" in word else BARE_EXPONENT.sub(r"E\1", word))
+    if not np.isfinite(value):
+        raise ValueError(f"{text!r} is not finite")
+    return value
+
+
+def _fields(line: str) -> list[str]:
+    """Fields after the first: free, of 16 characters, or of 8; filled up to four or eight."""
+    if "," in line:
+        words = [word.strip() for word in line.split(",")[1:9]]
+        return words + [""] * (8 - len(words))
+    width = 16 if "*" in line[:8] else 8
+    return [line[k : k + width].strip() for k in range(8, 72, width)]
+
+
+def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: list[str]) -> None:
+    name = fields[0].upper()
+    if fields[1] == "0":  # the header card: form, type
+        if int(fields[2]) not in (SYMMETRIC, SQUARE) or int(fields[3]) not in (1, 2):
+            raise ValueError(f"{name} is not square and real (form {fields[2]}, type {fields[3]})")
+        entries.setdefault(name, [])
+        return
+    if name not in entries:
+        raise ValueError(f"{name} has no header")
+    column = int(fields[1]), int(fields[2] or 0)
+    for k in range(4, len(fields), 4):
+        node, component, value = fields[k : k + 3]
+        if node:
+            entries[name].append((int(node), int(component or 0), *column, real(value)))
+
+
+def _matrix(rows: list[tuple[int, int, int, int, float]]) -> tuple[Any, Dofs]:
+    table = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 2, 2)
+    dofs, place = np.unique(table.reshape(-1, 2), axis=0, return_inverse=True)
+    i, j = place.reshape(-1, 2).T
+    values = np.array([row[4] for row in rows])
+    return coo_matrix((values, (i, j)), shape=(len(dofs),) * 2).tocsr(), dofs
+
+
+def _points(dofs: Dofs, nodes: dict[int, Array]) -> Iterator[str]:
+    for label, point in nodes.items():
+        x, y, z = (_real16(v) for v in point)
+        yield f"{'GRID*':<8}{label:16d}{'':16}{x}{y}"
+        yield f"{'*':<8}{z}"
+    for label in dofs[dofs[:, 1] == 0, 0]:
+        yield f"SPOINT  {label:8d}"
+
+
+def _written(name: str, A: csc_matrix, dofs: Dofs) -> Iterator[str]:
+    n = A.shape[0]
+    yield f"{'DMIG':<8}{name:<8.8}{0:8d}{SYMMETRIC:8d}{2:8d}{0:8d}{0:8d}{'':8}{n:8d}"
+    for c in range(n):
+        column = A[:, c].toarray().ravel()
+        rows = c + np.flatnonzero(column[c:])  # the lower triangle
+        if rows.size:
+            yield f"{'DMIG*':<8}{name:<16.16}{dofs[c, 0]:16d}{dofs[c, 1]:16d}"
+            for r in rows:
+                yield f"{'*':<8}{dofs[r, 0]:16d}{dofs[r, 1]:16d}{_real16(column[r])}"
+
+
+def _real16(value: float) -> str:
+    return f"{value:16.9E}".replace("E", "D")

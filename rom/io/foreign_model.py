@@ -1,0 +1,200 @@
+"""A finite element model from matrices and nodes of another program."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix, identity, kron
+
+from rom.errors import ConfigError, FileFormatError, InterfaceError, ModelError, QualityGateError
+from rom.io.dmig import Dofs, read_grids
+from rom.io.matrix_files import NamedMatrix, read_matrix
+from rom.model import Array, FEModel, Index, Interface
+from rom.units import unit_system
+
+ASYMMETRY, MIXED_MASS, RIGID = 1e-6, 1e-6, 1e-6
+MORE_NODES = 5
+
+
+def read_model(
+    K: Any,
+    M: Any,
+    *,
+    nodes: Any,
+    interfaces: Mapping[str, npt.ArrayLike],
+    units: str = "SI",
+) -> FEModel:
+    """A free solid body from the matrices of another program, to be reduced here.
+
+    Args:
+        K: stiffness of the body without supports: file, or (file, name), see
+            `rom.io.matrix_files.read_matrix`.
+        M: mass, likewise; the same along x, y and z, as that of solid elements.
+        nodes: (k,) labels and (k, 3) positions; or a file: ``.inp`` with ``*NODE``, ``.bdf`` or
+            ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``. Rows of matrices
+            without labels are those of the nodes in ascending order, 3 or 6 for each.
+        interfaces: {name: labels of its nodes}; all nodes of an interface weigh the same.
+        units: unit system of the files; the model is in SI.
+
+    Raises:
+        ConfigError: for unknown endings, names or units.
+        FileFormatError: if a file is missing, damaged, or does not fit the others.
+        InterfaceError: if an interface has no nodes, or unknown ones.
+        ModelError: if the nodes turn, as those of beams and shells do, or the mass is not that of
+            a solid.
+        QualityGateError: if a matrix is not symmetric, or the body is not free.
+        UnsafeFileError: if a file asks for more memory than its size can mean.
+    """
+    unit = unit_system(units)
+    labels, points = _nodes(nodes)
+    stiffness, mass = (_placed(read_matrix(source), labels) for source in (K, M))
+    model = FEModel(
+        stiffness * (unit.force / unit.length),
+        mass * unit.mass,
+        points * unit.length,
+        {name: _interface(name, wanted, labels, points * unit.length)
+         for name, wanted in interfaces.items()},
+        provenance={"K": _name(K), "M": _name(M), "units": units},
+    )  # fmt: skip
+    _check_mass(model)
+    _check_free(model)
+    return model
+
+
+def _nodes(nodes: Any) -> tuple[Index, Array]:
+    if isinstance(nodes, str | Path):
+        where, (labels, points) = str(nodes), _node_file(Path(nodes))
+    else:
+        where, (labels, points) = "nodes", (np.asarray(part) for part in nodes)
+    if points.shape != (labels.size, 3) or not labels.size or not np.isfinite(points).all():
+        raise FileFormatError(f"{labels.size} labels and positions {points.shape}.", where=where)
+    order = np.argsort(labels)
+    labels = labels[order].astype(np.int64)
+    if (np.diff(labels) == 0).any():
+        raise FileFormatError("a label of a node occurs twice.", where=where)
+    return labels, points[order].astype(float)
+
+
+def _node_file(path: Path) -> tuple[Index, Array]:
+    if not path.is_file():
+        raise FileFormatError("there is no such file.", where=str(path))
+    if path.suffix.lower() in (".bdf", ".dat"):
+        return read_grids(path)
+    if path.suffix.lower() not in (".inp", ".csv"):
+        raise ConfigError(f"nodes are read from .inp, .bdf, .dat or .csv, not from {path}.")
+    rows, inside = [], path.suffix.lower() == ".csv"
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if line.startswith("*"):
+                inside = inside if line.startswith("**") else _opens_nodes(line)
+            elif inside and line.strip() and not line.startswith("#"):
+                words = line.strip().rstrip(",").split(",")
+                try:
+                    label, x, y, z = int(words[0]), *(float(word) for word in words[1:4])
+                except ValueError as error:
+                    where = f"{path}, line {number}"
+                    raise FileFormatError("a node is label, x, y, z.", where=where) from error
+                rows.append((label, x, y, z))
+    table = np.array(rows).reshape(-1, 4)
+    return np.array([row[0] for row in rows], dtype=np.int64), table[:, 1:]
+
+
+def _opens_nodes(line: str) -> bool:
+    return line.split(",")[0].strip().upper() == "*NODE"
+
+
+def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:
+    """(3 k, 3 k) symmetric matrix in the order of the nodes."""
+    A, dofs = _completed(found), found.dofs
+    if dofs is None:
+        per_node, rest = divmod(A.shape[0], labels.size)
+        if rest or per_node not in (3, 6):
+            raise FileFormatError(
+                f"{A.shape[0]} rows are neither 3 nor 6 for each of {labels.size} nodes.",
+                where=found.where,
+            )
+        nodes = np.repeat(labels, per_node)
+        dofs = np.column_stack([nodes, np.tile(np.arange(1, per_node + 1), labels.size)])
+    place = _rows(found, A, dofs, labels)
+    moving = place >= 0
+    pick = csr_matrix(
+        (np.ones(moving.sum()), (place[moving], np.flatnonzero(moving))),
+        shape=(3 * labels.size, A.shape[0]),
+    )
+    return (pick @ A @ pick.T).tocsr()
+
+
+def _rows(found: NamedMatrix, A: csr_matrix, dofs: Dofs, labels: Index) -> Index:
+    """Row in the model of each row of a matrix; -1 for rotations, which must be empty."""
+    node = np.searchsorted(labels, dofs[:, 0])
+    known = labels[np.minimum(node, labels.size - 1)] == dofs[:, 0]
+    if not known.all():
+        strange = np.unique(dofs[~known, 0])[:MORE_NODES].tolist()
+        raise FileFormatError(f"rows belong to nodes that are not given: {strange}.",
+                              where=found.where)  # fmt: skip
+    turning = (dofs[:, 1] < 1) | (dofs[:, 1] > 3)
+    if np.abs(A[turning]).sum() > 0:
+        label, component = dofs[np.flatnonzero(turning)[0]]
+        raise ModelError(
+            f"node {label} has the component {component}: nodes that turn are those of beams and "
+            "shells; this body has to be a solid.",
+            where=found.where,
+        )
+    return np.where(turning, -1, 3 * node + dofs[:, 1] - 1)
+
+
+def _completed(found: NamedMatrix) -> csr_matrix:
+    """The whole matrix; entries without their mirror image get it."""
+    A = found.A
+    there = csr_matrix((np.ones(A.nnz), A.indices, A.indptr), shape=A.shape)
+    both = there.multiply(there.T)
+    A = csr_matrix(A + A.T - A.T.multiply(both))
+    if not A.nnz:
+        raise FileFormatError("the matrix is empty.", where=found.where)
+    if abs(A - A.T).max() > ASYMMETRY * abs(A).max():
+        raise QualityGateError("the matrix is not symmetric.", where=found.where)
+    return csr_matrix(0.5 * (A + A.T))
+
+
+def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -> Interface:
+    own = np.unique(np.asarray(wanted, dtype=np.int64))
+    node = np.searchsorted(labels, own)
+    known = labels[np.minimum(node, labels.size - 1)] == own
+    if not own.size or not known.all():
+        strange = own[~known][:MORE_NODES].tolist()
+        raise InterfaceError(f"interface {name!r} has no nodes, or unknown ones: {strange}.")
+    node = node[np.lexsort(points[node].T[::-1])]
+    weights = identity(node.size, format="csr") / node.size
+    return Interface(name, node, points[node], weights, points[node].mean(axis=0))
+
+
+def _check_mass(model: FEModel) -> None:
+    scalar = model.M[::3][:, ::3]
+    if abs(model.M - kron(scalar, identity(3))).max() > MIXED_MASS * abs(model.M).max():
+        raise ModelError(
+            "the mass is not the same along x, y and z, or couples them: it is not that of solid "
+            "elements.",
+            hint="Leave concentrated inertias out; rom.Attachment adds them.",
+        )
+
+
+def _check_free(model: FEModel) -> None:
+    """Rigid motions must be free of force; supports and rows left out are seen here."""
+    X = model.points - model.points.mean(axis=0)
+    size = max(np.abs(X).max(), 1e-300)
+    turns = [np.cross(axis, X / size) for axis in np.eye(3)]
+    R = np.column_stack([*(np.tile(axis, len(X)) for axis in np.eye(3)), *map(np.ravel, turns)])
+    residual = np.abs(model.K @ R).max() / abs(model.K).max()
+    if not residual < RIGID:
+        raise QualityGateError(
+            f"a rigid motion meets the stiffness {residual:.2g} of its largest entry: the body is "
+            "supported, or its nodes are not those of the matrix.",
+            where=str(model.provenance["K"]),
+            hint="Write K without boundary conditions, and check nodes and units.",
+        )
+
+
+def _name(source: Any) -> str:
+    return " ".join(map(str, source)) if isinstance(source, tuple) else str(source)

@@ -1,0 +1,160 @@
+"""Square matrices of other finite element programs, each in its own kind of file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import mmread
+from scipy.sparse import coo_matrix, csr_matrix
+
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.io.dmig import Dofs, read_dmig
+from rom.io.files import write_whole
+from rom.io.op4 import read_op4
+
+LARGEST = 2**32  # bytes of a file that is still read
+BANNER = b"%%MatrixMarket"
+MOST_ROWS = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class NamedMatrix:
+    """A matrix of another program.
+
+    Attributes:
+        where: file and name, for messages.
+        A: (n, n) sparse, as written: of a symmetric one there may be one triangle only.
+        dofs: (n, 2) label and component 1 to 6 of each row; None for rows in the order of nodes.
+    """
+
+    where: str
+    A: csr_matrix
+    dofs: Dofs | None = None
+
+
+def read_matrix(source: Any) -> NamedMatrix:
+    """A square matrix: Matrix Market, Abaqus, OUTPUT4, or DMIG.
+
+    Args:
+        source: file, or (file, name) where it holds several: ``.mtx`` and ``.mm`` for Matrix Market
+            (told by its first line) or Abaqus text, ``.op4`` for OUTPUT4, ``.bdf``, ``.dat``,
+            ``.pch``, ``.dmig`` for DMIG cards.
+
+    Raises:
+        ConfigError: for another ending, or if a name is needed or unknown.
+        FileFormatError: if the file is missing, cut, or holds no real square matrix.
+        UnsafeFileError: if it asks for more memory than its size can mean.
+    """
+    path, name = source if isinstance(source, tuple) else (source, None)
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError("there is no such file.", where=str(path))
+    if path.stat().st_size > LARGEST:
+        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    found = _all(path)
+    if name is None and len(found) > 1:
+        raise ConfigError(f"{path} holds {sorted(found)}; which? Give (file, name).")
+    key = next(iter(found)) if name is None else name.upper()
+    if key not in found:
+        raise ConfigError(f"{path} has no matrix {name!r}; it holds {sorted(found)}.")
+    A, dofs = found[key]
+    if A.shape[0] != A.shape[1]:
+        raise FileFormatError(f"the matrix {key} is {A.shape[0]} x {A.shape[1]}.", where=str(path))
+    return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs)
+
+
+def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
+    """Write the lower triangle of a symmetric matrix as text that ``*MATRIX INPUT`` reads.
+
+    Args:
+        A: (n, n) dense or sparse.
+        dofs: (n, 2) node and component of each row.
+        path: file to write.
+
+    Raises:
+        ConfigError: if the place is not writable.
+    """
+    found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
+    lines = [
+        f"{dofs[i, 0]},{dofs[i, 1]}, {dofs[j, 0]},{dofs[j, 1]}, {v:.16e}"
+        for i, j, v in zip(found.row, found.col, found.data, strict=True)
+        if i >= j and v
+    ]
+    text = "\n".join(lines) + "\n"
+    write_whole(path, lambda file: file.write(text.encode("ascii")))
+    return Path(path)
+
+
+def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
+    ending = path.suffix.lower()
+    if ending == ".op4":
+        return {name: (A, None) for name, A in read_op4(path).items()}
+    if ending in (".bdf", ".dat", ".pch", ".dmig"):
+        return dict(read_dmig(path))
+    if ending not in (".mtx", ".mm"):
+        raise ConfigError(
+            f"{path} has the ending {ending!r}; known: .mtx, .mm, .op4, .bdf, .dat, .pch, .dmig."
+        )
+    with path.open("rb") as file:
+        market = file.read(len(BANNER)) == BANNER
+    return {"": (_market(path), None) if market else _abaqus(path)}
+
+
+def _market(path: Path) -> Any:
+    """A file of Matrix Market; its sizes are compared with its length before it is read."""
+    with path.open("rb") as file:
+        words = file.readline(200).lower().split()
+        line = file.readline(2000)
+        while line.startswith(b"%"):
+            line = file.readline(2000)
+    if words[1:2] != [b"matrix"] or not {b"real", b"integer"} & set(words):
+        raise FileFormatError("the matrix is not real.", where=str(path))
+    try:
+        sizes = [int(word) for word in line.split()]
+        entries = sizes[2] if b"coordinate" in words else sizes[0]
+        if max(sizes[:2]) > MOST_ROWS or 2 * entries > path.stat().st_size:
+            raise UnsafeFileError(f"sizes {sizes} do not fit the file.", where=str(path))
+        A = mmread(str(path))
+    except (ValueError, IndexError, TypeError, OverflowError, StopIteration) as error:
+        raise FileFormatError(
+            f"this is no Matrix Market file: {error}.", where=str(path)
+        ) from error
+    return _finite(csr_matrix(A), path)
+
+
+def _abaqus(path: Path) -> tuple[Any, Dofs]:
+    """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE`` output."""
+    rows = []
+    with path.open(encoding="ascii", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if line.upper().startswith("*USER"):
+                raise FileFormatError(
+                    "the form of a linear user element is not read.",
+                    where=f"{path}, line {number}",
+                    hint="Ask Abaqus for MATRIX INPUT form.",
+                )
+            if not line.strip() or line.startswith("*"):
+                continue
+            words = line.replace(",", " ").split()
+            try:
+                if len(words) != 5:
+                    raise ValueError(f"{len(words)} numbers instead of 5")
+                rows.append([*(int(word) for word in words[:4]), float(words[4])])
+            except ValueError as error:
+                where = f"{path}, line {number}"
+                raise FileFormatError(f"this is no entry: {error}.", where=where) from error
+    if not rows:
+        raise FileFormatError("the file holds no entry.", where=str(path))
+    table = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 2)
+    dofs, place = np.unique(table, axis=0, return_inverse=True)
+    i, j = place.reshape(-1, 2).T
+    values = np.array([row[4] for row in rows])
+    A = coo_matrix((values, (i, j)), shape=(len(dofs),) * 2).tocsr()
+    return _finite(A, path), dofs
+
+
+def _finite(A: Any, path: Path) -> Any:
+    if not np.isfinite(A.data).all():
+        raise FileFormatError("a number is not finite.", where=str(path))
+    return A
