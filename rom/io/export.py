@@ -7,6 +7,7 @@ from typing import Any
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.dmig import write_dmig
+from rom.io.exudyn import write_exudyn
 from rom.io.interface_form import InterfaceForm, interface_form
 from rom.io.native import load, save
 from rom.io.op4 import write_op4
@@ -41,6 +42,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "sid": (SID, partial(_write_sid, dialect="fembs")),
     "dmig": (".dmig", _write_dmig),
     "op4": (".op4", _write_op4),
+    "exudyn": (".py", write_exudyn),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
 }
@@ -54,8 +56,9 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
         path: file to write.
         to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
             Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
-            (KAAX, MAAX, BAAX, see `rom.io.interface_form`); None for the ending of the path:
-            ``.vtu``, ``.npz``, ``.SID_FEM``, ``.dmig``, ``.op4``.
+            (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "exudyn" for a Python module that adds
+            the body to an Exudyn system; None for the ending of the path: ``.vtu``, ``.npz``,
+            ``.SID_FEM``, ``.dmig``, ``.op4``, ``.py``.
 
     Raises:
         ConfigError: if the format or the ending is not known, or the place is not writable.

@@ -1,0 +1,188 @@
+"""A body as a Python module for Exudyn: ``ObjectFFRFreducedOrder`` with all its arrays inside.
+
+The module needs NumPy and Exudyn, not rom. Its arrays are the integrals that Exudyn computes from
+finite elements, here from those of the body; x~ is the matrix of the cross product::
+
+    mPhitTPsi           int phi_k                mPhitTPsiTilde      int phi~_k
+    mXRefTildePsi       int x~^T phi_k           mXRefTildePsiTilde  int x~^T phi~_k
+    mPsiTildePsi        int phi~_j^T phi_k       mPsiTildePsiTilde   int phi~_j^T phi~_k
+
+Its nodes are those of the surface, behind six around each interface, whose mean motion and mean
+rotation are those of the interface.
+
+Source:
+    Zwoelfer and Gerstmayr, The nodal-based floating frame of reference formulation with modal
+    reduction, Acta Mech. 232 (2021) 835.
+"""
+
+import base64
+import io
+import json
+import textwrap
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.body.flexible import FlexibleBody
+from rom.body.reference import skew_tensor
+from rom.errors import RomWarning
+from rom.io.files import write_whole
+from rom.model import Array
+
+STAR = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
+MOVED = 1e-9  # share of what the momentum of a shape could be
+RADIUS = 1e-3  # of the star, of the size of the body
+
+MODULE = '''\
+"""A flexible body for Exudyn, written by rom.
+
+    import exudyn as exu
+    import {stem}
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    body = {stem}.add(mbs, gravity=[0, 0, -9.81])
+    marker = {stem}.marker(mbs, body, {stem}.INTERFACES[0])  # for joints and loads
+"""
+
+import base64
+import io
+import json
+
+import numpy as np
+
+
+def add(mbs, position=(0, 0, 0), rotation=None, velocity=(0, 0, 0), omega=(0, 0, 0), gravity=None):
+    """Add the body: numbers of its "object", "frame" node and "modal" node.
+
+    Frame and modal coordinates are those of the body as reduced; rotation (3, 3) takes its axes to
+    the world, velocity and omega are of the world.
+    """
+    import exudyn as exu
+    from exudyn import itemInterface as item
+    from exudyn import rigidBodyUtilities as rigid
+
+    def container(A):
+        found = exu.MatrixContainer()
+        found.SetWithDenseMatrix(A, useDenseMatrix=False)
+        return found
+
+    p = np.array(rigid.RotationMatrix2EulerParameters(np.eye(3) if rotation is None else rotation))
+    rates = rigid.AngularVelocity2EulerParameters_t(omega, p)
+    frame = mbs.AddNode(item.NodeRigidBodyEP(
+        referenceCoordinates=[*position, *p], initialVelocities=[*velocity, *rates]))
+    r, still = len(ARRAYS["K"]), [0.0] * len(ARRAYS["K"])
+    modal = mbs.AddNode(item.NodeGenericODE2(
+        numberOfODE2Coordinates=r, referenceCoordinates=still, initialCoordinates=still,
+        initialCoordinates_t=still))
+    known = {{name: A for name, A in ARRAYS.items() if name not in ("K", "M", "D", "triangles")}}
+    known["mass"] = float(known["mass"])
+    number = mbs.AddObject(item.ObjectFFRFreducedOrder(
+        nodeNumbers=[frame, modal], massMatrixReduced=container(ARRAYS["M"]),
+        stiffnessMatrixReduced=container(ARRAYS["K"]), dampingMatrixReduced=container(ARRAYS["D"]),
+        visualization=item.VObjectFFRFreducedOrder(triangleMesh=ARRAYS["triangles"]), **known))
+    if gravity is not None:
+        mass = mbs.AddMarker(item.MarkerBodyMass(bodyNumber=number))
+        mbs.AddLoad(item.LoadMassProportional(markerNumber=mass, loadVector=list(gravity)))
+    return {{"object": number, "frame": frame, "modal": modal}}
+
+
+def marker(mbs, body, interface):
+    """Add a rigid marker that follows an interface: its number."""
+    from exudyn import itemInterface as item
+
+    first = 6 * INTERFACES.index(interface)
+    return mbs.AddMarker(item.MarkerSuperElementRigid(
+        bodyNumber=body["object"], meshNodeNumbers=list(range(first, first + 6)),
+        weightingFactors=[1 / 6] * 6))
+
+
+def _decoded(text):
+    return base64.b64decode("".join(text.split()))
+
+
+INTERFACES = json.loads(_decoded("""
+{names}
+"""))
+ARRAYS = dict(np.load(io.BytesIO(_decoded("""
+{arrays}
+""")), allow_pickle=False))
+'''
+
+
+def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
+    """Write a module that adds the body to an Exudyn system.
+
+    Args:
+        body: any body; geometric stiffness has no place in Exudyn and is left out.
+        path: file ending in ``.py``, a name that Python can import.
+
+    Raises:
+        ConfigError: if the place is not writable.
+
+    Warns:
+        RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.
+    """
+    path = Path(path)
+    if np.abs(body.S).max(initial=0.0) > MOVED * np.sqrt(body.mass * np.abs(body.M).max(initial=0)):
+        warnings.warn(
+            f"the shapes of body {body.name!r} move its mass centre; the gravity of Exudyn 1.13 "
+            "turns the body as if they did not. body.with_reference('mean-axis') avoids that.",
+            RomWarning,
+            stacklevel=2,
+        )
+    memory = io.BytesIO()
+    np.savez_compressed(memory, **arrays(body))
+    names = json.dumps(list(body.markers)).encode()
+    stem = path.stem if path.stem.isidentifier() else "body"
+    text = MODULE.format(stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue()))
+    write_whole(path, lambda file: file.write(text.encode()))
+    return path
+
+
+def arrays(body: FlexibleBody) -> dict[str, Array]:
+    """Arrays by the names of Exudyn's arguments, and K, M, D, triangles."""
+    r, eye, eps = body.n_modes, np.eye(3), skew_tensor()
+    dot = np.einsum("aak->k", body.Ibar_kl)
+    both = np.einsum("aajk->jk", body.S_kl)
+    x_phi = dot[:, None, None] * eye - body.Ibar_kl.transpose(2, 1, 0)  # (k, a, b)
+    phi_phi = np.einsum("jk,ab->jakb", both, eye) - body.S_kl.transpose(2, 1, 3, 0)
+    return {
+        "K": body.K,
+        "M": body.M,
+        "D": body.D,
+        "mass": np.array(body.mass),
+        "inertia": body.inertia,
+        "centerOfMass": body.first_moment / body.mass,
+        "mPhitTPsi": body.S,
+        "mPhitTPsiTilde": np.einsum("abc,ck->akb", eps, body.S).reshape(3, 3 * r),
+        "mXRefTildePsi": np.einsum("cab,abk->ck", eps, body.Ibar_kl),
+        "mXRefTildePsiTilde": x_phi.transpose(1, 0, 2).reshape(3, 3 * r),
+        "mPsiTildePsi": np.einsum("cab,abjk->jck", eps, body.S_kl).reshape(3 * r, r),
+        "mPsiTildePsiTilde": phi_phi.reshape(3 * r, 3 * r),
+        **_nodes(body),
+    }
+
+
+def _nodes(body: FlexibleBody) -> dict[str, Array]:
+    points, modes = [np.zeros((0, 3))], [np.zeros((0, body.n_modes))]
+    arms = RADIUS * body.size * STAR
+    for m in body.markers.values():
+        points.append(m.point + arms)
+        turned = np.einsum("abc,ck,nb->nak", skew_tensor(), m.rotation, arms)
+        modes.append((m.translation + turned).reshape(18, -1))
+    triangles: Any = np.zeros((0, 3), dtype=np.int64)
+    if body.surface is not None:
+        points.append(body.surface.points)
+        modes.append(body.surface.shape)
+        triangles = body.surface.triangles + 6 * len(body.markers)
+    return {
+        "referencePositions": np.vstack(points).ravel(),
+        "modeBasis": np.vstack(modes),
+        "triangles": triangles,
+    }
+
+
+def _encoded(data: bytes) -> str:
+    return "\n".join(textwrap.wrap(base64.b64encode(data).decode(), 96))
