@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.io import mmwrite
+from scipy.io import loadmat, mmwrite
 from scipy.sparse import csr_matrix
 from solid import block
 
@@ -310,3 +310,23 @@ def test_a_reduced_body_is_exported_for_nastran(body, ending, tmp_path):
         got = found[name].toarray()
         expected = A if ending == "op4" else np.tril(A)
         assert_allclose(got, expected, rtol=1e-9, atol=0 if ending == "op4" else 1e-30)
+
+
+def test_a_reduced_body_is_exported_for_simscape(body, tmp_path):
+    """Read back by SciPy; every motion of the frames with what the block expects of it."""
+    found = loadmat(rom.export(body, tmp_path / "rod.mat"))
+    K, M, form = found["K"], found["M"], interface_form(body)
+    assert_array_equal(K, form.K)
+    assert_array_equal(found["C"], form.D)
+    assert [str(name[0][0]) for name in found["interfaces"]] == list(body.interface_names)
+    points = [body.markers[name].point for name in body.interface_names]
+    assert_allclose(found["origins"], points)
+    still = np.arange(12, len(K))
+    lam = np.linalg.eigvals(np.linalg.solve(M[np.ix_(still, still)], K[np.ix_(still, still)]))
+    assert_allclose(np.sqrt(np.sort(lam.real)) / (2 * np.pi), found["frequencies"][:, 0])
+    along = np.zeros(len(K))
+    along[[0, 6]] = 1.0  # both frames along x
+    assert along @ M @ along == pytest.approx(body.mass, rel=1e-9)
+    assert_array_equal(found["quaternions"], [[1, 0, 0, 0]] * 2)
+    again = rom.export(body, tmp_path / "again.mat")
+    assert again.read_bytes() == (tmp_path / "rod.mat").read_bytes()

@@ -14,6 +14,7 @@ from rom.io.op4 import write_op4
 from rom.io.sid import write_sid
 from rom.io.sid_body import sid_body, standard_input
 from rom.io.sid_dialect import read_sid
+from rom.io.simscape import write_simscape
 from rom.io.vtu import write_vtu
 
 SID = ".sid_fem"
@@ -43,6 +44,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "dmig": (".dmig", _write_dmig),
     "op4": (".op4", _write_op4),
     "exudyn": (".py", write_exudyn),
+    "simscape": (".mat", write_simscape),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
 }
@@ -57,8 +59,9 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
         to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
             Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
             (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "exudyn" for a Python module that adds
-            the body to an Exudyn system; None for the ending of the path: ``.vtu``, ``.npz``,
-            ``.SID_FEM``, ``.dmig``, ``.op4``, ``.py``.
+            the body to an Exudyn system, "simscape" for its Reduced Order Flexible Solid; None for
+            the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``, ``.dmig``, ``.op4``, ``.py``,
+            ``.mat``.
 
     Raises:
         ConfigError: if the format or the ending is not known, or the place is not writable.
