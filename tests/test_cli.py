@@ -2,6 +2,7 @@
 
 import json
 import resource
+import shutil
 import subprocess
 import sys
 import warnings
@@ -52,8 +53,24 @@ def answer(capsys, *arguments):
 
 
 def test_verbs_are_those_of_the_design():
-    design = "doctor mesh modes reduce check export simulate view bench"
+    design = "doctor mesh modes reduce check export simulate view bench completion"
     assert design.split() == NAMES
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("rom ex", ["export"]), ("rom -q reduce --ref", ["--reference"]), ("rom check rod", [])],
+)
+def test_bash_completes_verbs_and_options_and_leaves_files_alone(words, expected, capsys, tmp_path):
+    assert main(["completion", "bash"]) == 0
+    (tmp_path / "rom.bash").write_text(capsys.readouterr().out)
+    ask = f"source rom.bash; COMP_WORDS=({words}); COMP_CWORD={len(words.split()) - 1}; _rom"
+    done = subprocess.run(
+        ["bash", "-c", f'{ask}; echo "${{COMPREPLY[@]}}"'],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == expected
 
 
 def test_help_answers_within_half_a_second():

@@ -1,0 +1,47 @@
+"""Print what lets a shell complete verbs and options at the tabulator key."""
+
+import argparse
+
+from rom.cli.answer import Answer
+
+SUMMARY = "print completion for a shell"
+EXAMPLES = """\
+  rom completion bash   # in ~/.bashrc: source <(rom completion bash)
+  rom completion zsh    # in ~/.zshrc: source <(rom completion zsh)
+"""
+BASH = """\
+_rom() {{
+    local word="${{COMP_WORDS[COMP_CWORD]}}" verb="" k
+    for ((k = 1; k < COMP_CWORD; k++)); do
+        case "${{COMP_WORDS[k]}}" in -*) ;; *) verb="${{COMP_WORDS[k]}}"; break ;; esac
+    done
+    case "$verb" in
+        "") COMPREPLY=($(compgen -W "{verbs}" -- "$word")) ;;
+{cases}
+        *) COMPREPLY=() ;;
+    esac
+}}
+complete -o default -F _rom rom
+"""
+ZSH = "autoload -U +X bashcompinit && bashcompinit\n"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    parser.add_argument("shell", choices=("bash", "zsh"), help="bash or zsh")
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Build the text from the grammar, so that it never lags behind."""
+    from rom.cli.parser import VERBS, build_parser, options_of
+
+    parser = build_parser()
+    names = [module.__name__.rpartition(".")[2] for module in VERBS]
+    cases = "\n".join(
+        f'        {name}) [[ "$word" == -* ]] && COMPREPLY=($(compgen -W '
+        f'"{" ".join(options_of(parser, name))}" -- "$word")) || COMPREPLY=() ;;'
+        for name in names
+    )
+    text = BASH.format(verbs=" ".join([*names, *options_of(parser, None)]), cases=cases)
+    text = (ZSH if args.shell == "zsh" else "") + text.rstrip("\n")
+    return Answer({"shell": args.shell, "text": text}, text)
