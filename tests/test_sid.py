@@ -9,6 +9,7 @@ import pytest
 from command import rom as command
 from mbs_cases import nodal_body, random_body, random_nodes
 from numpy.testing import assert_allclose, assert_array_equal
+from particles import motion, particles
 
 import rom
 from rom.errors import ConfigError, FileFormatError, RomError, RomWarning, UnsafeFileError
@@ -49,22 +50,6 @@ def rows(record, q, qd, qdd, a, omega, domega):
     moment = cross(md, a) + J @ domega + Cr.T @ qdd + Gr + cross(omega, J @ omega)
     elastic = Ct @ a + Cr @ domega + at("Me") @ qdd + Ge + at("Oe") @ W + at("ksigma")[:, 0]
     return force, moment, elastic + at("Ke") @ q + at("De") @ qd
-
-
-def particles(nodes, q, qd, qdd, a, omega, domega):
-    """The same rows by Newton's law for masses that are coupled, nothing precomputed."""
-    x, Ms, phi, K, D = nodes
-    rho, u, v = x + np.tensordot(q, phi, 1), np.tensordot(qd, phi, 1), np.tensordot(qdd, phi, 1)
-    acceleration = a + np.cross(domega, rho) + np.cross(omega, np.cross(omega, rho))
-    inertia = Ms @ (acceleration + 2 * np.cross(omega, u) + v)
-    elastic = np.einsum("kia,ia->k", phi, inertia) + K @ q + D @ qd
-    return inertia.sum(axis=0), np.cross(rho, inertia).sum(axis=0), elastic
-
-
-def motion(scale=1.0):
-    draws = np.random.default_rng(3).normal(size=(7, 4))
-    q, qd, qdd = scale * draws[:3]
-    return q, qd, qdd, draws[3, :3], draws[4, :3], draws[5, :3]
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)

@@ -9,6 +9,7 @@ from rom.errors import ConfigError
 from rom.io.dmig import write_dmig
 from rom.io.exudyn import write_exudyn
 from rom.io.interface_form import InterfaceForm, interface_form
+from rom.io.mbdyn import write_mbdyn
 from rom.io.native import load, save
 from rom.io.op4 import write_op4
 from rom.io.sid import write_sid
@@ -44,6 +45,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "dmig": (".dmig", _write_dmig),
     "op4": (".op4", _write_op4),
     "exudyn": (".py", write_exudyn),
+    "mbdyn": (".fem", write_mbdyn),
     "simscape": (".mat", write_simscape),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
@@ -59,9 +61,9 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
         to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
             Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
             (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "exudyn" for a Python module that adds
-            the body to an Exudyn system, "simscape" for its Reduced Order Flexible Solid; None for
-            the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``, ``.dmig``, ``.op4``, ``.py``,
-            ``.mat``.
+            the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
+            Order Flexible Solid; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
+            ``.dmig``, ``.op4``, ``.py``, ``.fem``, ``.mat``.
 
     Raises:
         ConfigError: if the format or the ending is not known, or the place is not writable.

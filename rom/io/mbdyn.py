@@ -1,0 +1,122 @@
+"""A body as data for the joint "modal" of MBDyn (``.fem``).
+
+Record groups: 1 header, 2 labels of the nodes, 3 and 4 start, 5 to 7 positions, 8 shapes (six
+numbers for each node), 9 mass, 10 stiffness, 12 rigid inertia about the mass centre, 13 damping;
+14 to 18 inertia invariants, row by row, with x~ the matrix of the cross product::
+
+    Inv3 int phi_k    Inv4 int x x phi_k    Inv8 -int x~ phi~_j    Inv5 int phi_j x phi_k
+    Inv9 int phi~_j phi~_k
+
+and 19 stress stiffening per unit of xx, yy, zz, xy, yz, zx of angular velocities (1 to 6), angular
+acceleration (7 to 9), acceleration (10 to 12), then force and moment on each node.
+
+Source:
+    MBDyn input manual, joint "modal", and what its reader of these groups stores where.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from rom.body.flexible import FlexibleBody
+from rom.body.reference import skew_tensor
+from rom.body.stiffening import known_loads
+from rom.errors import ConfigError
+from rom.io.files import write_whole
+from rom.model import Array
+
+
+def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
+    """Write the interfaces of a body as nodes, its inertia to second order, and its stiffening.
+
+    The modal joint has to list the nodes in their order here, as stiffening counts them so; give
+    it "use invariant 9" where it asks.
+
+    Args:
+        body: with at least one shape and one interface.
+        path: file, usually ending in ``.fem``.
+
+    Raises:
+        ConfigError: if there is no shape or no interface, names become equal without their
+            blanks, or the place is not writable.
+    """
+    if not body.n_modes or not body.markers:
+        raise ConfigError(
+            f"body {body.name!r} has {body.n_modes} shapes and {len(body.markers)} interfaces; "
+            "MBDyn needs one of each."
+        )
+    labels = ["_".join(name.split()) for name in body.markers]
+    if len(set(labels)) < len(labels):
+        raise ConfigError(f"labels of nodes have no blanks, and {labels} are not distinct.")
+    text = "\n".join(_document(body, labels)) + "\n"
+    write_whole(path, lambda file: file.write(text.encode()))
+    return Path(path)
+
+
+def invariants(body: FlexibleBody) -> dict[str, Array]:
+    """Inv3, Inv4 (3, r), Inv8 (3, r, 3), Inv5 (3, r, r), Inv9 (3, r, r, 3)."""
+    eye, eps = np.eye(3), -skew_tensor()
+    dot = np.einsum("aak->k", body.Ibar_kl)
+    both = np.einsum("aajk->jk", body.S_kl)
+    return {
+        "Inv3": body.S,
+        "Inv4": np.einsum("cab,abk->ck", eps, body.Ibar_kl),
+        "Inv8": np.einsum("j,ac->ajc", dot, eye) - body.Ibar_kl.transpose(1, 2, 0),
+        "Inv5": np.einsum("cab,abjk->cjk", eps, body.S_kl),
+        # phi~_j phi~_k = phi_k phi_j^T - (phi_j . phi_k) 1
+        "Inv9": body.S_kl.transpose(1, 2, 3, 0) - np.einsum("jk,ac->ajkc", both, eye),
+    }
+
+
+def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:
+    r, points = body.n_modes, np.array([m.point for m in body.markers.values()])
+    yield "** MBDyn MODAL DATA FILE"
+    yield from _group(1, "HEADER")
+    yield "**   REVISION, NODES, NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES"
+    yield f"      REV0 {len(labels)} {r} 0 0 0"
+    yield from _group(2, "FINITE ELEMENT NODE LIST")
+    yield " ".join(labels)
+    for number, what in ((3, "DISPLACEMENTS"), (4, "VELOCITIES")):
+        yield from _group(number, f"INITIAL MODAL {what}")
+        yield _row(np.zeros(r))
+    for axis, letter in enumerate("XYZ"):
+        yield from _group(5 + axis, f"NODAL {letter} COORDINATES")
+        yield from map(_row, points[:, axis, None])
+    yield from _group(8, "MODE SHAPES")
+    for k in range(r):
+        yield f"**    NORMAL MODE SHAPE #  {k + 1}"
+        for m in body.markers.values():
+            yield _row(np.r_[m.translation[:, k], m.rotation[:, k]])
+    yield from _group(9, "MODAL MASS MATRIX", body.M)
+    yield from _group(10, "MODAL STIFFNESS MATRIX", body.K)
+    centre = body.first_moment / body.mass
+    about = body.inertia - body.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    yield from _group(12, "RIGID BODY INERTIA MATRIX")
+    yield _row(np.array([body.mass]))
+    yield from map(_row, [centre, *about])
+    yield from _group(13, "MODAL DAMPING MATRIX", body.D)
+    for number, (name, A) in enumerate(invariants(body).items(), 14):
+        yield from _group(number, f"INVARIANT {name[3:]}", A.reshape(3, -1))
+    if body.K_geo:
+        yield from _stiffening(body)
+
+
+def _stiffening(body: FlexibleBody) -> Iterator[str]:
+    numbers = {load: k for k, load in enumerate(known_loads(body), 1)}
+    yield from _group(19, "MODAL STRESS STIFFENING MATRIX")
+    yield f"{len(body.K_geo)}"
+    for load, A in body.K_geo.items():
+        yield f"{numbers[load]}"
+        yield from map(_row, A)
+
+
+def _group(number: int, title: str, rows: Array | None = None) -> Iterator[str]:
+    yield "**"
+    yield f"** RECORD GROUP {number}, {title}"
+    if rows is not None:
+        yield from map(_row, rows)
+
+
+def _row(values: Array) -> str:
+    return " ".join(f"{v:.16e}" for v in values)
