@@ -140,6 +140,19 @@ def test_export_writes_what_the_ending_asks_for(file, tmp_path, capsys):
     assert (tmp_path / "rod.vtu").read_text().startswith("<VTKFile")
 
 
+def test_simulate_writes_a_film_and_a_history_when_asked(file, tmp_path, capsys):
+    found = answer(
+        capsys, "simulate", file, "--hinge", "root", "--t-end", 0.004, "--dt", 4e-4, "-q",
+        "--film", "glb", "--history", "csv", "-o", tmp_path,
+    )  # fmt: skip
+    assert found["also"] == [str(tmp_path / "body.glb"), str(tmp_path / "body.history.csv")]
+    assert (tmp_path / "body.glb").read_bytes()[:4] == b"glTF"
+    assert "hinge force x [N]" in (tmp_path / "body.history.csv").read_text().splitlines()[0]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "body.csv", "body.glb", "body.history.csv",
+    }  # fmt: skip
+
+
 def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
     """Tip of a stiff pendulum released at rest: y = -alpha L t^2 / 2, alpha = m g c / I.
 

@@ -16,6 +16,7 @@ SUMMARY = "let a body swing as a pendulum"
 EXAMPLES = """\
   rom simulate rod.rom.npz --hinge pin_a --gravity 0,-9.81,0 --t-end 1 --dt 1e-3 -o out/
   rom simulate rod.rom.npz --hinge pin_a --axis=-1,0,0 --t-end 0.2 --dt 1e-4 -o out/
+  rom simulate rod.rom.npz --hinge pin_a --t-end 1 --dt 1e-3 --film glb --history h5 -o out/
 Mechanisms of several bodies are built in Python, see demos/.
 """
 
@@ -30,6 +31,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--t-end", type=positive, required=True, help="duration [s]")
     parser.add_argument("--dt", type=positive, required=True, help="time step [s]")
+    parser.add_argument(
+        "--film", choices=("glb", "vtkhdf"), help="film in space: for browsers, or for ParaView"
+    )
+    parser.add_argument(
+        "--history", choices=("csv", "h5"), help="every marker, reaction and energy, too"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
 
 
@@ -48,6 +55,7 @@ def run(args: argparse.Namespace) -> Answer:
     path = args.output / f"{body.name}.csv"
     data = {
         "output": str(path),
+        "also": [str(also) for also in _more(path, args)],
         "steps": len(solution.t) - 1,
         "status": solution.status,
         "audit": report_data(audit),
@@ -55,7 +63,7 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(
         data,
         f"{path}: {data['steps']} steps. {solution.status}\n\n{audit}",
-        lambda: _write(path, body, solution),
+        lambda: _write_all(path, body, solution, args),
         failures(audit),
     )
 
@@ -80,6 +88,25 @@ def _check_folder(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"{folder} is a file; a folder is needed.")
     check_writable(folder / "motion.csv" if folder.is_dir() else folder)
+
+
+def _more(path: Path, args: argparse.Namespace) -> list[Path]:
+    """The film and the history asked for."""
+    found = [path.with_suffix(f".{args.film}")] if args.film else []
+    return found + ([path.with_suffix(f".history.{args.history}")] if args.history else [])
+
+
+def _write_all(path: Path, body: "FlexibleBody", solution: Any, args: argparse.Namespace) -> None:
+    _write(path, body, solution)
+    for also in _more(path, args):
+        if also.suffix in (".glb", ".vtkhdf"):
+            from rom.view.motion import write_animation
+
+            write_animation(solution, also)
+        else:
+            from rom.io.history import write_history
+
+            write_history(solution, also)
 
 
 def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:
