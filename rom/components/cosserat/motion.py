@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.components.compiled import drop_stale_cache, inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.elements import (
     REACH,
@@ -32,7 +33,6 @@ from rom.components.cosserat.shape import Shape, reference
 from rom.components.cosserat.statics import add_loads, clamped, largest
 from rom.components.cosserat.vibration import lumped_mass
 from rom.errors import ConfigError, SolverError
-from rom.mbs.compiled import drop_stale_cache, inner, kernel
 from rom.model import Array
 
 HERE = Path(__file__).parent
