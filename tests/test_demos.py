@@ -29,6 +29,7 @@ LEFT_BEHIND = {
     "demo_rockfall": {"rockfall.png"},
     "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
     "demo_satellite": {"satellite.png", "satellite.gif"},
+    "demo_rolling_wheel": {"rolling_wheel.png"},
     "demo_updating": {"updating.png"},
     "demo_sheet": {"sheet.png", "taylor_bar.gif"},
     "demo_slider_crank": {

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from solid import block
 
 import rom
+from rom import rotation
 from rom.errors import ConfigError, ModelError
 from rom.mbs.impact import Impact
 from rom.mbs.parts import Marker, surface_place
@@ -47,6 +48,18 @@ def test_the_areas_of_the_points_are_those_of_the_face(brick):
     assert_allclose(areas.sum(), 0.4 * 0.3)
     assert (brick.surface.points[areas > 0, 2] < 1e-9).all()
     assert_allclose(brick.surface_areas().sum(), 2 * (0.12 + 0.08 + 0.06))
+
+
+def test_points_of_the_surface_move_with_its_shapes(brick):
+    rng = np.random.default_rng(4)
+    q = 1e-3 * rng.normal(size=brick.n_modes)
+    mech, _ = on_floor(brick, at=(0.1, 0, 1.0), orientation=(0.6, 0, 0.8, 0), q=q)
+    sol = rom.simulate(mech, t_end=1e-6, dt=1e-6)
+    bent = brick.surface.points + (brick.surface.shape @ q).reshape(-1, 3)
+    wanted = [0.1, 0, 1.0] + bent @ rotation.matrix([0.6, 0, 0.8, 0]).T
+    for k in np.flatnonzero(brick.surface_areas(below)):
+        at = sol.position("brick", Marker("brick", surface_place(int(k))))[0]
+        assert_allclose(at, wanted[k], atol=1e-12)
 
 
 def test_a_brick_sinks_into_its_foundation_by_its_weight(brick):
