@@ -144,8 +144,20 @@ def geared():
     return mech
 
 
+def bridge():
+    """Two bodies on universal joints of their own, and a ball joint between them."""
+    mech = Mechanism(gravity=(0, 0, -GRAVITY))
+    one = add_link(mech, "one", (0, 0, 0), flexible=False)
+    two = add_link(mech, "two", (0.3, 0, 0), flexible=False)
+    mech.universal("left", mech.ground.marker((0, 0, 0)), one.marker("a"), axis1=Z, axis2=(0, 1, 0))
+    ends = mech.ground.marker((0.5, 0.1, 0)), two.marker((0.05, 0.1, 0))
+    mech.universal("right", *ends, axis1=(1, 0, 0), axis2=Z)
+    mech.spherical("ball", one.marker("b"), two.marker("a"))
+    return mech
+
+
 CASES = {"chain": chain, "tied": tied_chain, "tree": tree, "loops": loops, "pinned": pinned,
-         "driven": driven, "geared": geared}  # fmt: skip
+         "driven": driven, "geared": geared, "bridge": bridge}  # fmt: skip
 
 
 def made(case):
@@ -167,7 +179,7 @@ def solved(monkeypatch):
 def assert_same_motion(one, other, limits):
     """Each array to its limit, relative to the largest entry; everything accelerates."""
     assert one.packed.by_blocks and not other.packed.by_blocks
-    assert np.abs(other.a[:, other.packed.system.bodies.v_at + 1]).max() > 1.0
+    assert np.abs(other.a).max() > 1.0
     for name, limit in limits.items():
         expected = getattr(other, name)
         size = np.abs(expected).max()
@@ -180,6 +192,14 @@ def test_the_motion_is_that_of_whole_matrices(case, solved):
     options = {"t_end": 0.03, "dt": 1e-3, "tolerance": 1e-12}
     one, other = (solved(made(case), blocks=blocks, **options) for blocks in (True, False))
     assert_same_motion(one, other, {"q": 1e-10, "v": 1e-9, "a": 1e-6, "lam": 1e-6})
+    counted = [sol.statistics["iterations"] for sol in (one, other)]
+    assert abs(counted[0] - counted[1]) <= 2, "the iteration matrix is another one"
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "bdf"])
+def test_steps_of_chosen_length_end_where_whole_matrices_do(method, solved):
+    one, other = (solved(driven(), blocks=blocks, t_end=4e-3, method=method) for blocks in (1, 0))
+    assert_same_motion(one.at(4e-3), other.at(4e-3), {"q": 1e-7, "v": 1e-5})
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -337,38 +357,61 @@ def test_gaps_are_closed_by_the_least_motion_of_whole_matrices(monkeypatch):
 
 @njit
 def solution_of(s, W, rank, x, lam):
-    W.UG[:], W.UGT[:] = W.G, W.G
     done = factorise_bordered(s, W, rank)
     solve_bordered(s, W, rank, x, lam)
     return done
 
 
-def test_a_body_without_stiffness_of_its_own_falls_back_to_the_whole_matrix(solved):
-    """Its block is singular, though not the equations: joints hold it from both sides."""
-    sol = solved(pinned(), blocks=True, t_end=1e-3, dt=1e-3)
-    s = sol.packed.system
-    W = workspace(s, 0)
-    width, n, m = 6 + int(s.bodies.r[0]), sol.v.shape[1], sol.lam.shape[1]
-    W.S[:], W.G[:] = 0.0, np.random.default_rng(1).normal(size=W.G.shape)
-    for b, e in enumerate(s.graph.own):
-        kept = width if b != 3 else width - 3
-        W.S[s.graph.x[e] : s.graph.x[e] + kept, :kept] = 2 * np.eye(kept)
-    rhs, gap = np.random.default_rng(3).normal(size=(2, max(n, m)))
-    W.rhs[:n], W.part[:] = rhs[:n], gap[:m]
-    x, lam = np.zeros(n), np.zeros(m)
-    assert solution_of(s, W, m, x, lam)
-    assert W.by_blocks[0] == 0
-    S, G = np.zeros((n, n)), np.zeros((m, n))
+def random_blocks(case, monkeypatch, weak=()):
+    """Graph and memory with random blocks, not symmetric, and the whole matrix they stand for.
+
+    Bodies in ``weak`` have three motions without any mass or stiffness.
+    """
+    monkeypatch.setattr(graph, "WORTH", 1e-12)
+    packed, rng = pack(made(case)), np.random.default_rng(1)
+    s, n, m = packed.system, packed.v.size, packed.system.rows.kind.size
+    W, Y, size = workspace(s, len(packed.signals)), s.graph, 6 + s.bodies.r
+    A = np.zeros((n + m, n + m))
     for b, t in enumerate(s.bodies.v_at):
-        at = s.graph.x[s.graph.own[b]]
-        S[t : t + width, t : t + width] = W.S[at : at + width, :width]
+        for e in range(Y.first[b], Y.first[b + 1]):
+            c, u = Y.other[e], s.bodies.v_at[Y.other[e]]
+            block = 0.03 * rng.normal(size=(size[b], size[c])) + (b == c) * np.eye(size[b], size[c])
+            if b in weak or c in weak:
+                part = rng.normal(size=(size[b], size[c] - 3))
+                block = float(b == c) * part @ part.T
+            W.S[Y.x[e] : Y.x[e] + size[b], : size[c]] = block
+            A[t : t + size[b], u : u + size[c]] = block
     for k in range(m):
-        for b, at in zip(s.graph.body[k], s.graph.at[k], strict=True):
-            if b >= 0:
+        for b, at in zip(Y.body[k], Y.at[k], strict=True):
+            for row, out in ((W.UG[k], A.T), (W.UGT[k], A)) if b >= 0 else ():
+                row[at : at + size[b]] = rng.normal(size=size[b])
                 t = s.bodies.v_at[b]
-                G[k, t : t + width] = W.G[k, at : at + width]
-    A = np.block([[S, G.T], [G, np.zeros((m, m))]])
-    assert_allclose(A @ np.r_[x, lam], np.r_[rhs[:n], gap[:m]], atol=1e-9)
+                out[n + k, t : t + size[b]] = row[at : at + size[b]]
+        W.UGT[k] = W.UG[k] + 0.03 * W.UGT[k]
+    A[n:, :n] = A[:n, n:].T + 0.03 * A[n:, :n]
+    return s, W, A
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_random_blocks_are_solved_like_their_whole_matrix(case, monkeypatch):
+    s, W, A = random_blocks(case, monkeypatch)
+    b = np.random.default_rng(2).normal(size=len(A))
+    n, m = W.residual.size, W.value.size
+    W.rhs[:n], W.part[:] = b[:n], b[n:]
+    x, lam = np.zeros(n), np.zeros(m)
+    assert solution_of(s, W, m, x, lam) and W.by_blocks[0] == 1
+    assert_allclose(np.r_[x, lam], np.linalg.solve(A, b), atol=1e-10 * np.abs(lam).max())
+
+
+def test_a_body_without_stiffness_of_its_own_falls_back_to_the_whole_matrix(monkeypatch):
+    """Its block is singular, though not the equations: joints hold it from both sides."""
+    s, W, A = random_blocks("pinned", monkeypatch, weak=(3,))
+    b = np.random.default_rng(2).normal(size=len(A))
+    n, m = W.residual.size, W.value.size
+    W.rhs[:n], W.part[:] = b[:n], b[n:]
+    x, lam = np.zeros(n), np.zeros(m)
+    assert solution_of(s, W, m, x, lam) and W.by_blocks[0] == 0
+    assert_allclose(np.r_[x, lam], np.linalg.solve(A, b), atol=1e-10 * np.abs(lam).max())
 
 
 def test_a_run_goes_on_bit_for_bit(solved, tmp_path):
