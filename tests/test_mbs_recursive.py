@@ -1,6 +1,7 @@
 """Chains, trees and loops eliminated body by body: the whole solution, at linear cost."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from rom.mbs.bordered import factorise_bordered, solve_bordered
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import pack
+from rom.mbs.starting import across
 from rom.mbs.state import initial_state
 
 Z, GRAVITY = (0, 0, 1), 9.81
@@ -303,6 +305,21 @@ def test_work_and_memory_grow_with_the_number_of_bodies_only(made):
         one, two, three = (lengths(made(n)) for n in (20, 40, 60))
     assert_allclose(three - two, two - one, rtol=0.02)
     assert np.all(three < 3.3 * one)
+
+
+@pytest.mark.parametrize("case", ["chain", "loops", "geared"])
+def test_motions_across_the_constraints_are_those_of_whole_matrices(case, monkeypatch):
+    """The part of a velocity, or of three, that opens the joints, with the least kinetic energy."""
+    found = []
+    for worth in (1e-12, np.inf):
+        monkeypatch.setattr(graph, "WORTH", worth)
+        packed = pack(made(case))
+        shift = np.random.default_rng(4).normal(size=(packed.v.size, 3))
+        run = SimpleNamespace(packed=packed), workspace(packed.system, 0), initial_state(packed)
+        found.append([across(*run, shift), across(*run, shift[:, 1])])
+    assert_allclose(found[0][0], found[1][0], atol=1e-10 * np.abs(found[1][0]).max())
+    assert_allclose(found[0][1], found[0][0][:, 1], atol=1e-14)
+    assert np.abs(found[0][0]).max() > 0.1
 
 
 def test_a_few_bodies_keep_whole_matrices():
