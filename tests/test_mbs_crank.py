@@ -1,12 +1,16 @@
 """Slider-cranks: the published flexible one, and the rigid one in closed form."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mbs_cases import CRANK, simeon_crank, simulate_quietly, slider_crank
 from numpy.testing import assert_allclose
+from solid import block
+
+import rom
 
 REFERENCE = json.loads((Path(__file__).parent / "reference" / "simeon_crank.json").read_text())
 
@@ -126,3 +130,50 @@ def test_work_of_the_motor_balances_the_energy():
 def test_speed_of_the_published_crank_is_that_of_the_drive():
     sol = simulate_quietly(simeon_crank(), t_end=0.002, dt=1e-5)
     assert_allclose(sol.omega("crank")[:, 2], CRANK["speed"], rtol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def steel_rod():
+    """A slender steel block between the pins "a" and "b"."""
+    rod = rom.reduce(
+        block(size=(0.3, 0.01, 0.01), cells=(10, 1, 1)), method=rom.CraigBampton(2),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+    ends = {new: replace(rod.marker(old), name=new) for old, new in (("root", "a"), ("tip", "b"))}
+    return replace(rod, markers=ends)
+
+
+def one_turn(rod):
+    """The crank turns once within 60 ms, from rest to rest."""
+
+    def course(t):
+        x = t / 0.06
+        return 2 * np.pi * x**3 * (10 - 15 * x + 6 * x * x)
+
+    mech = slider_crank(speed=0.0, rod=rod)
+    mech.drives.clear()
+    mech.drive("motor", "main", course)
+    sol = simulate_quietly(mech, t_end=0.06, dt=3e-5, rho_inf=0.8)
+    bending = np.abs(sol.elastic("rod") @ rod.marker("b").translation.T).max()
+    return bending, sol.position("slider", "b")[:, 0]
+
+
+def test_a_rod_moves_the_same_in_every_frame_but_for_the_square_of_its_deformation(steel_rod):
+    """A third of the stiffness: three times the bending, nine times the differences of frames.
+
+    Beside each other stand the frame on the chord and the mean axis.
+    """
+    frames, apart, bending = ("a", "b", ("a", "b"), "mean-axis"), [], []
+    for softer in (1.0, 3.0):
+        rod = replace(steel_rod, K=steel_rod.K / softer, omega=steel_rod.omega / np.sqrt(softer))
+        bent, ways = zip(*(one_turn(rod.with_reference(frame)) for frame in frames), strict=True)
+        bending.append(bent[0])
+        apart.append([[np.abs(x - y).max() for x in ways] for y in ways])
+    one, three = np.array(apart)
+    assert bending[0] > 4e-4
+    assert_allclose(bending[1] / bending[0], 3.0, rtol=0.05)
+    i, j = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3)]).T
+    assert 1e-8 < one[i, j].min() and one[i, j].max() < 1e-6
+    slope = np.log(three[i, j] / one[i, j]) / np.log(bending[1] / bending[0])
+    assert_allclose(slope, 2.0, atol=0.1)
+    assert one[2, 3] < 1e-3 * one[0, 2]
