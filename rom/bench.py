@@ -153,8 +153,7 @@ def motion(
     processor time.
 
     Args:
-        meshes: element sizes [m] of the rod of a pendulum; about 5000, 31 000 and 103 000
-            dofs.
+        meshes: element sizes [m] of the rod of a pendulum; about 5000, 31 000 and 103 000 dofs.
             Slider-crank and chains have the first.
         links: lengths of the chains.
     """
