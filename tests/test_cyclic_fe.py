@@ -110,6 +110,19 @@ def test_the_geometry_is_a_sector_with_a_blade(bladed_disk):
     assert_allclose(bladed_disk.mass(), 4430.0 * (disk + blade), rtol=3e-3)
 
 
+@pytest.mark.parametrize(
+    ("parameters", "culprit"),
+    [({"N": 7.5}, "whole number of sectors"), ({"r_rim": 0.3}, "r_rim = 0.3"),
+     ({"chord": 0.05}, "foot of the blade")],
+)  # fmt: skip
+def test_impossible_wheels_are_named(parameters, culprit):
+    from rom.errors import ConfigError
+    from rom.fe.mesh import read_mesh
+
+    with pytest.raises(ConfigError, match=culprit):
+        read_mesh("meshes/bladed_disk.geo", parameters=parameters)
+
+
 def test_a_reduced_sector_of_few_dofs_has_ten_families(bladed_disk):
     """Polynomials on the cyclic face, under 5 % of the dofs: 0.1 % for all nodal diameters."""
     sector = rom.CyclicSector.from_model(bladed_disk)
