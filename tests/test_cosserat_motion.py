@@ -199,6 +199,14 @@ def test_rotation_stiffens_flapping_and_less_so_lagging(speed):
         assert_allclose(f**2, squares, rtol=5e-3)
 
 
+def test_a_shaft_that_spins_whirls_slower_and_faster():
+    """Seen in axes that turn with it, a round shaft has its frequency less and plus the speed."""
+    one = straight(1.0, 20, stretch=1e5, bend=(1.0, 1.0, 1e3), mass=1.0, inertia=1e-7)
+    still = modes(one, reference(one), 1).frequencies[0]
+    turning = modes(one, reference(one), 2, spin=(0, 0, 1.0)).frequencies
+    assert_allclose(2 * np.pi * (turning - still), [-1.0, 1.0], rtol=1e-4)
+
+
 def test_forces_of_steady_rotation_have_their_tangent():
     rng = np.random.default_rng(4)
     one = straight(1.0, 3, stretch=3.0, bend=2.0, mass=1.3, inertia=(0.3, 0.5, 0.9))

@@ -1,0 +1,81 @@
+"""A rod cut into linear bodies in series: how many does a large deflection need?
+
+Each piece deforms linearly in a frame that moves with its root, as reduced bodies do; poses of the
+frames are exact. With one piece this is linear theory; with many the rod itself comes back.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from rom import rotation
+from rom.components.cosserat import Rod, Shape, clamped, linearised, reference, rod
+from rom.errors import ConfigError, SolverError
+from rom.model import Array
+
+CONVERGED, ITERATIONS = 1e-12, 500
+
+
+def cut(whole: Rod, k: int) -> list[Rod]:
+    """K pieces of nearly as many segments each, with plates where they meet.
+
+    Raises:
+        ConfigError: if there are more pieces than segments.
+    """
+    n = whole.h.size
+    if not 1 <= k <= n:
+        raise ConfigError(f"{k} pieces of a rod of {n} segments.", hint="Take 1 to as many.")
+    ends = np.linspace(0, n, k + 1).round().astype(int)
+    middle = [rotation.multiply(p, s) for p, s in zip(whole.p, whole.s, strict=False)]
+    plates = {0: whole.p[0], n: whole.p[-1]}
+    pieces = []
+    for a, b in pairwise(ends):
+        p = [plates.get(a, middle[a]), *whole.p[a + 1 : b + 1], plates.get(b, middle[b])]
+        pieces.append(rod(whole.x[a : b + 1], p, stretch=whole.stretch[a:b],
+                          bend=whole.bend[a : b + 1]))  # fmt: skip
+    return pieces
+
+
+def bend_in_pieces(whole: Rod, k: int, force: Array) -> Array:
+    """Shape of a clamped rod of k linear pieces under dead forces.
+
+    Args:
+        whole: the rod.
+        k: number of pieces.
+        force: (N + 1, 3) on the vertices [N].
+
+    Returns:
+        (N + 1, 3) positions of the vertices [m].
+
+    Raises:
+        ConfigError: if there are more pieces than segments.
+        SolverError: if linear pieces find no equilibrium, because they turn too far.
+    """
+    pieces = cut(whole, k)
+    flexibility = [np.linalg.inv(linearised(one, reference(one))[1][np.ix_(free, free)])
+                   for one in pieces for free in [clamped(one)]]  # fmt: skip
+    ends = np.cumsum([0, *(one.h.size for one in pieces)])
+    x, turns = whole.x.copy(), [np.eye(3)] * (k + 1)  # of the pieces, from where they started
+    for _ in range(ITERATIONS):
+        new, turn, at = [whole.x[:1]], [np.eye(3)], whole.x[0]
+        for j, (one, C) in enumerate(zip(pieces, flexibility, strict=True)):
+            a, b = ends[j], ends[j + 1]
+            load = np.zeros((b - a + 2, 6))
+            load[1 : b - a, 3:] = force[a + 1 : b]
+            load[b - a, 3:] = force[b:].sum(axis=0)
+            load[:, 3:] = load[:, 3:] @ turns[j]
+            moment = turns[j].T @ np.cross(x[b:] - x[b], force[b:]).sum(axis=0)
+            load[-1, :3] = rotation.matrix(one.p[-1]).T @ moment
+            u = np.zeros((b - a + 2, 6))
+            u.ravel()[6:-3] = C @ load.ravel()[6:-3]
+            shape = Shape(one.x + u[:-1, 3:], one.p)
+            new.append(at + (shape.x[1:] - one.x[0]) @ turn[-1].T)
+            bent = rotation.matrix(rotation.exp(rotation.matrix(one.p[-1]) @ u[-1, :3]))
+            at, turn = new[-1][-1], [*turn, turn[-1] @ bent]
+        step = np.abs(np.concatenate(new) - x).max()
+        x, turns = np.concatenate(new), turn
+        if step < CONVERGED * whole.h.sum():
+            return x
+        if not step < 10 * whole.h.sum():
+            break
+    raise SolverError(f"{k} linear pieces found no equilibrium.", hint="Take more pieces.")
