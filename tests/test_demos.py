@@ -41,6 +41,7 @@ LEFT_BEHIND = {
     "demo_wind_turbine": {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
     },
+    "demo_transmission": {"transmission.png", "transmission_fields.png"},
 }  # fmt: skip
 
 

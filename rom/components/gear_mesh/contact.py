@@ -121,6 +121,14 @@ class Mesh:
         back = self.pair.backlash * np.cos(self.pair.base_helix)
         return np.where(slices.back, back, e)
 
+    def least_gap(self, theta: float) -> float:
+        """How far the working flanks are apart at the datum, along the line of action [m]."""
+        slices = contact_lines(
+            self.pair, Line.of(self.pair, np.zeros(12)), theta, self.cells, self.pair.path
+        )
+        gap = self.gap(slices, self.pair.path)[~slices.back]
+        return float(gap.min() / np.cos(self.pair.base_helix))
+
     def pair_stiffness(self, s: Array, path: tuple[float, float]) -> Array:
         """(n,) stiffness per length of contact line of pairs in contact at s [N/m^2]."""
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))

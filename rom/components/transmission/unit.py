@@ -252,7 +252,8 @@ def rest(
     K, f = unit.matrices[1], unit.load
     q = np.zeros(f.size) if start is None else np.array(start, dtype=float)
     if start is None:
-        q[unit.pinion.shaft.n + 5 :: 6] = 1e-7 / unit.mesh.pair.rb[1]  # teeth touch
+        closed = 1e-7 + unit.mesh.least_gap(theta)  # teeth touch
+        q[unit.pinion.shaft.n + 5 :: 6] = closed / unit.mesh.pair.rb[1]
     for share in loads if start is None else (1.0,):
         q, forces, residual = _newton(unit, K, share * f, q, theta)
     return Rest(unit, q, theta, forces, residual)
