@@ -19,6 +19,10 @@ LEFT_BEHIND = {
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
     "demo_hand": {"hand.png", "hand_control.png"},
+    "demo_exchange": {
+        "beam.SID_FEM", "beam.csv", "beam.dmig", "beam.fem", "beam.glb", "beam.mat", "beam.op4",
+        "beam.py", "beam.vtu",
+    },
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_masonry": {"masonry.png"},
