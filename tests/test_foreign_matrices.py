@@ -128,6 +128,63 @@ def test_market_and_abaqus_text_with_nodes_of_an_input_deck(brick, whole, tmp_pa
     assert_array_equal(same.points, model.points)
 
 
+DECK = """*HEADING
+*NODE, NSET=Left
+3, 0., 0., 0.1
+7, 0., 0., 0.
+*NODE
+20, 0., 0.2, 0.1
+12, 0., 0.2, 0.
+55, 0.3, 0., 0.1
+101, 0.3, 0., 0.
+60, 0.3, 0.2, 0.1
+41, 0.3, 0.2, 0.
+*NSET, NSET=upper, GENERATE
+12, 20, 8
+*NSET, nset=root
+left, upper,
+*NSET, NSET=tip
+41, 55, 60
+101
+*ELSET, ELSET=tip
+1, 2
+"""
+
+
+def test_sets_of_nodes_in_the_deck_are_interfaces(brick, tmp_path):
+    (tmp_path / "b.inp").write_text(DECK)
+    K, M = SOURCES["op4"]
+    model = read_model(K, M, nodes=tmp_path / "b.inp", interfaces=("root", "tip"))
+    for name, labels in SIDES.items():
+        found = np.sort(LABELS)[model.interfaces[name].nodes]
+        assert_array_equal(np.sort(found), np.sort(labels))
+        assert model.interfaces[name].area == pytest.approx(1.0)
+    assert_allclose(model.points, brick.points[np.argsort(LABELS)])
+    for wanted, error, message in (
+        (
+            ("root", "pin"),
+            InterfaceError,
+            r"no set 'pin'; it has \['LEFT', 'ROOT', 'TIP', 'UPPER'\]",
+        ),
+        ("other", FileFormatError, "the set 'LOST' is unknown"),
+        ("self", FileFormatError, "the set 'SELF' is in itself"),
+        ("huge", UnsafeFileError, "has 2000000000 nodes"),
+        ("odd", FileFormatError, r"b\.inp, line \d+: a label is a whole number"),
+    ):
+        more = "*NSET, NSET=self\nself\n*NSET, NSET=other\nlost\n"
+        more += "*NSET, NSET=huge, GENERATE\n1, 2000000000, 1\n"
+        more += "*NSET, NSET=odd, GENERATE\n1, x\n" if wanted == "odd" else ""
+        (tmp_path / "b.inp").write_text(DECK + more.replace("self\nself", "self\nSelf"))
+        if wanted == ("root", "pin"):
+            (tmp_path / "b.inp").write_text(DECK)
+        with pytest.raises(error, match=message):
+            read_model(K, M, nodes=tmp_path / "b.inp", interfaces=wanted)
+    with pytest.raises(ConfigError, match=r"read from \.inp, not from"):
+        read_model(K, M, nodes=HERE / "brick.bdf", interfaces=["root"])
+    with pytest.raises(ConfigError, match=r"looked up in the \.inp file"):
+        read_model(K, M, nodes=read_grids(HERE / "brick.bdf"), interfaces=["root"])
+
+
 def test_units_are_converted_at_the_border(brick, tmp_path):
     """Newton, millimetre, tonne: 1 N/mm is 1000 N/m."""
     write_op4({"K": by_label(brick.K) / 1e3, "M": by_label(brick.M) / 1e3}, tmp_path / "b.op4")

@@ -1,6 +1,6 @@
 """A finite element model from matrices and nodes of another program."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +9,9 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import ConfigError, FileFormatError, InterfaceError, ModelError, QualityGateError
-from rom.io.dmig import Dofs, read_grids
+from rom.io.dmig import Dofs
 from rom.io.matrix_files import NamedMatrix, read_matrix
+from rom.io.node_files import read_node_sets, read_nodes
 from rom.model import Array, FEModel, Index, Interface
 from rom.units import unit_system
 
@@ -23,7 +24,7 @@ def read_model(
     M: Any,
     *,
     nodes: Any,
-    interfaces: Mapping[str, npt.ArrayLike],
+    interfaces: Mapping[str, npt.ArrayLike] | Sequence[str],
     units: str = "SI",
 ) -> FEModel:
     """A free solid body from the matrices of another program, to be reduced here.
@@ -35,7 +36,8 @@ def read_model(
         nodes: (k,) labels and (k, 3) positions; or a file: ``.inp`` with ``*NODE``, ``.bdf`` or
             ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``. Rows of matrices
             without labels are those of the nodes in ascending order, 3 or 6 for each.
-        interfaces: {name: labels of its nodes}; all nodes of an interface weigh the same.
+        interfaces: {name: labels of its nodes}, or names of ``*NSET`` in the ``.inp`` of the nodes;
+            all nodes of an interface weigh the same.
         units: unit system of the files; the model is in SI.
 
     Raises:
@@ -48,7 +50,10 @@ def read_model(
         UnsafeFileError: if a file asks for more memory than its size can mean.
     """
     unit = unit_system(units)
-    labels, points = _nodes(nodes)
+    labels, points = read_nodes(nodes)
+    if not isinstance(interfaces, Mapping):
+        names = (interfaces,) if isinstance(interfaces, str) else tuple(interfaces)
+        interfaces = read_node_sets(_deck(nodes), names)
     stiffness, mass = (_placed(read_matrix(source), labels) for source in (K, M))
     model = FEModel(
         stiffness * (unit.force / unit.length),
@@ -63,46 +68,10 @@ def read_model(
     return model
 
 
-def _nodes(nodes: Any) -> tuple[Index, Array]:
-    if isinstance(nodes, str | Path):
-        where, (labels, points) = str(nodes), _node_file(Path(nodes))
-    else:
-        where, (labels, points) = "nodes", (np.asarray(part) for part in nodes)
-    if points.shape != (labels.size, 3) or not labels.size or not np.isfinite(points).all():
-        raise FileFormatError(f"{labels.size} labels and positions {points.shape}.", where=where)
-    order = np.argsort(labels)
-    labels = labels[order].astype(np.int64)
-    if (np.diff(labels) == 0).any():
-        raise FileFormatError("a label of a node occurs twice.", where=where)
-    return labels, points[order].astype(float)
-
-
-def _node_file(path: Path) -> tuple[Index, Array]:
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    if path.suffix.lower() in (".bdf", ".dat"):
-        return read_grids(path)
-    if path.suffix.lower() not in (".inp", ".csv"):
-        raise ConfigError(f"nodes are read from .inp, .bdf, .dat or .csv, not from {path}.")
-    rows, inside = [], path.suffix.lower() == ".csv"
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            if line.startswith("*"):
-                inside = inside if line.startswith("**") else _opens_nodes(line)
-            elif inside and line.strip() and not line.startswith("#"):
-                words = line.strip().rstrip(",").split(",")
-                try:
-                    label, x, y, z = int(words[0]), *(float(word) for word in words[1:4])
-                except ValueError as error:
-                    where = f"{path}, line {number}"
-                    raise FileFormatError("a node is label, x, y, z.", where=where) from error
-                rows.append((label, x, y, z))
-    table = np.array(rows).reshape(-1, 4)
-    return np.array([row[0] for row in rows], dtype=np.int64), table[:, 1:]
-
-
-def _opens_nodes(line: str) -> bool:
-    return line.split(",")[0].strip().upper() == "*NODE"
+def _deck(nodes: Any) -> Path:
+    if not isinstance(nodes, str | Path):
+        raise ConfigError("names of interfaces are looked up in the .inp file of the nodes.")
+    return Path(nodes)
 
 
 def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:
