@@ -61,8 +61,6 @@ share = eta * np.append(np.ones(48), 0.5)
 force = np.outer(267e3 * share / share.sum(), [1.0, 0, 0])
 bent = {"rod": equilibrium(rod, loads(rod, force=force)).x}
 bent |= {f"linear bodies: {k}": bend_in_pieces(rod, k, force) for k in (1, 2, 8)}
-for name, x in bent.items():
-    say(f"tip of {name}:", *(f"{u:.3f}" for u in x[-1] - rod.x[-1]), "m")
 tip = bent["rod"][-1] - rod.x[-1]
 
 # ## The run-up of three blades in the field of gravity
@@ -112,12 +110,14 @@ for instant in (6.0, 10.0, 14.0, 30.0):
     curves |= {f"_{i}": line[2:] for i, line in enumerate(drawn)}
     rows.append(Panel(f"{instant:g} s, {runs[0].speed[k] * 30 / np.pi:.1f} 1/min",
                       "across [m]", "up [m]", curves=curves, equal=True))  # fmt: skip
-side = {name: (x[:, 2] - HUB_RADIUS, x[:, 0]) for name, x in bent.items()}
+side = {name: (x[-4:, 2] - HUB_RADIUS, x[-4:, 0]) for name, x in bent.items()}
+whole = {"rod": (bent["rod"][:, 2] - HUB_RADIUS, bent["rod"][:, 0]),
+         "_straight": (rod.x[:, 2] - HUB_RADIUS, rod.x[:, 0])}  # fmt: skip
 view.panels(
     options.out / "wind_turbine_shapes.png",
     [rows[:2], rows[2:],
-     [Panel("Blade under 267 kN, growing from root to tip", "along the blade [m]",
-            "downwind [m]", curves=side, equal=True)]],
+     [Panel("Blade under 267 kN", "along it [m]", "downwind [m]", curves=whole, equal=True),
+      Panel("Its last four metres", "along it [m]", "downwind [m]", curves=side, equal=True)]],
     title="Shapes of the blades",
     caption=f"Above: the rotor seen from upwind at four instants of the run-up, deflections drawn "
     f"{LARGER} times larger; grey lines are blades that do not bend. Below: a blade under a static "
