@@ -194,7 +194,7 @@ view.history(
     "although its joints stand almost still.",
 )  # fmt: skip
 view.animate(
-    robot(True), sol, options.out / "robot_arm.gif", frames=60,
+    robot(True), sol, options.out / "robot_arm.gif", frames=40,
     view=(0.3, 0.3, 1.0), up=(0, 1, 0),
     shapes={"motor": view.box((0.1, 0.1, 0.1)), "tool": view.box((0.12, 0.12, 0.12))},
 )  # fmt: skip

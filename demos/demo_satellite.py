@@ -177,7 +177,7 @@ view.history(
     "on a wall, because the hub turns the other way.",
 )  # fmt: skip
 view.animate(
-    satellite(True), sol, options.out / "satellite.gif", frames=50, view=(0.3, -1.0, 0.8),
+    satellite(True), sol, options.out / "satellite.gif", frames=36, view=(0.3, -1.0, 0.8),
     up=(0, 0, 1), shapes={"hub": view.box((1, 1, 1)), "wheel": view.cylinder(
         np.array([0, -0.55, 0]), np.array([0, 0.55, 0]), 0.3)},
 )  # fmt: skip
