@@ -45,10 +45,16 @@ def mode_shapes(
     omega, V = body.modes(fixed=fixed)
     elastic = np.flatnonzero(omega > 0)[:n]
     shapes = [displacement(body, V[:, k]) for k in elastic]
-    images = _drawn(body.surface, shapes, view, up)
+    images = drawn(body.surface, shapes, view, up)
+    support = f"{' and '.join(fixed)} held" if fixed else "free, its six rigid motions left out"
+    words = (
+        f"Lowest elastic modes of the reduced body {body.name} ({body.n_modes} elastic "
+        f"coordinates), {support}."
+    )
     with page.styled():
         names = [f"mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz" for i, k in enumerate(elastic)]
-        return page.save(_sheet(body, images, names, fixed), path)
+        title = f"Mode shapes of {body.name}"
+        return page.save(sheet(images, names, title, words, "body"), path)
 
 
 def displacement(body: Any, motion: Array) -> Array:
@@ -58,7 +64,7 @@ def displacement(body: Any, motion: Array) -> Array:
     return rigid + (body.surface.shape @ motion[6:]).reshape(-1, 3)
 
 
-def _drawn(surface: Any, shapes: list[Array], view: Any, up: Any) -> Image:
+def drawn(surface: Any, shapes: list[Array], view: Any, up: Any) -> Image:
     """One picture per shape, all from the same place."""
     X, size = surface.points, np.ptp(surface.points, axis=0).max()
     lengths = [np.linalg.norm(u, axis=1) for u in shapes]
@@ -71,19 +77,26 @@ def _drawn(surface: Any, shapes: list[Array], view: Any, up: Any) -> Image:
     return render([still, Actor(np.stack(moved), surface.triangles, np.stack(values))], camera)
 
 
-def _sheet(body: Any, images: Image, names: list[str], fixed: tuple[str, ...]) -> Any:
-    support = f"{' and '.join(fixed)} held" if fixed else "free, its six rigid motions left out"
-    words = (
-        f"Lowest elastic modes of the reduced body {body.name} ({body.n_modes} elastic "
-        f"coordinates), {support}. The largest displacement is drawn as {AMPLITUDE:.0%} of the "
-        "size of the body; grey lines show the undeformed edges."
-    )
+def sheet(images: Any, names: list[str], title: str, words: str, what: str) -> Any:
+    """A page of modes, two beside each other.
+
+    Args:
+        images: of `drawn`.
+        names: of the modes.
+        title: heading.
+        words: caption, to which the meaning of displacements and grey lines is added.
+        what: that whose size displacements are compared with.
+    """
     columns = min(2, len(images))
     width = columns * (PANEL + 20) + 20
     rows, height = -(-len(images) // columns), images[0].shape[0] + 50
-    text, below = page.caption(words, width - 60)
+    text, below = page.caption(
+        f"{words} The largest displacement is drawn as {AMPLITUDE:.0%} of the size of the {what}; "
+        "grey lines show the undeformed edges.",
+        width - 60,
+    )
     figure = page.sheet(width, 80 + rows * height + 110 + below + 20)
-    page.words(figure, f"Mode shapes of {body.name}", 30, 25, size=page.TITLE, weight="bold")
+    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
     for k, (image, name) in enumerate(zip(images, names, strict=True)):
         left, top = 20 + (k % columns) * (PANEL + 20), 80 + (k // columns) * height
         page.words(figure, name, left + 10, top + 10)

@@ -12,7 +12,7 @@ from rom import rotation
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index
 from rom.view import page
-from rom.view.shapes import AMPLITUDE, PANEL, _drawn
+from rom.view.shapes import drawn, sheet
 
 SAME = 1e-6  # of the size of the wheel: nodes of neighbours that close are one
 
@@ -57,9 +57,9 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     first, whole = _joined(points, np.vstack([triangles + j * nodes.size for j in range(N)]))
     moved: list[Array] = [u.reshape(N, -1, 3)[:, nodes].reshape(-1, 3)[first] for u in U]
     surface = SimpleNamespace(points=points[first], triangles=whole)
-    images = _drawn(surface, moved, view, None)
+    images = drawn(surface, moved, view, None)
     with page.styled():
-        return page.save(_sheet(images, list(shapes), title, caption), path)
+        return page.save(sheet(images, list(shapes), title, caption, "wheel"), path)
 
 
 def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
@@ -77,25 +77,3 @@ def _joined(points: Array, triangles: Index) -> tuple[Index, Index]:
     grid = np.round(points / (SAME * np.ptp(points)) + 0.381966)  # away from round coordinates
     _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     return first, place.ravel()[triangles]
-
-
-def _sheet(images: Any, names: list[str], title: str, caption: str) -> Any:
-    columns = min(2, len(images))
-    width = columns * (PANEL + 20) + 20
-    rows, height = -(-len(images) // columns), images[0].shape[0] + 50
-    text, below = page.caption(
-        f"{caption} The largest displacement is drawn as {AMPLITUDE:.0%} of the size of the wheel; "
-        "grey lines show the undeformed edges.",
-        width - 60,
-    )
-    figure = page.sheet(width, 80 + rows * height + 110 + below + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
-    for k, (image, name) in enumerate(zip(images, names, strict=True)):
-        left, top = 20 + (k % columns) * (PANEL + 20), 80 + (k // columns) * height
-        page.words(figure, name, left + 10, top + 10)
-        page.place(figure, image, left, top + 40)
-    top = 80 + rows * height
-    label = "displacement / largest displacement of the mode"
-    page.colour_bar(figure, (0.0, 1.0), label, (width / 2 - 250, top + 35, 500, 18))
-    page.words(figure, text, 30, top + 110, size=page.SMALL)
-    return figure
