@@ -7,7 +7,7 @@ also where a block is singular for itself.
 import math
 
 from rom.mbs.algebra import back_substitute, factorise
-from rom.mbs.compiled import inner, kernel
+from rom.mbs.compiled import copy, inner, kernel
 from rom.mbs.elimination import eliminate, fill_blocks, substitute
 from rom.mbs.kinematics import own_block
 
@@ -184,5 +184,5 @@ def factorised(s, W, least):
 def least_motion(s, W, gap, out):
     """Set out (n,) to the motion x with G x = gap and the least x^T S x, factorised before."""
     W.rhs[:] = 0.0
-    W.part[:] = gap
+    copy(gap, W.part)
     solve_bordered(s, W, gap.size, out, W.dlam)
