@@ -40,7 +40,7 @@ panel = rom.reduce(
     model, method=rom.CraigBampton(n_modes=6), interfaces={"root": "rbe2", "tip": "rbe2"},
     reference="root", name="panel", certify=False,
 )  # fmt: skip
-clamped = panel.frequencies(1, fixed=("root",))[0]
+clamped, m = panel.frequencies(1, fixed=("root",))[0], model.mass()
 if not first:
     raise SystemExit  # a reduced mechanism is work for one process
 
@@ -52,7 +52,6 @@ if not first:
 HUB, EDGE = 150.0, 0.5  # mass of the cube [kg], half its size [m]
 ROTOR, WHEEL = 20.0, 1.0  # mass [kg] and inertia [kg m^2] of the wheel
 TORQUE, SLEW, END = 40.0, 6.0, 12.0
-m = model.mass()
 J_HUB = HUB * (2 * EDGE) ** 2 / 6
 J = J_HUB + 2 * (m * (L**2 + THICK**2) / 12 + m * (EDGE + L / 2) ** 2)  # all but the wheel
 
