@@ -257,15 +257,17 @@ def test_the_response_to_the_mesh_is_where_a_motion_settles():
     assert linear.load_factor - 1 == pytest.approx(np.std(run.teeth[last]) / linear.mean, rel=0.3)
 
 
-def test_slow_units_have_the_error_of_their_teeth():
-    """Everything follows: the error is that of rest in each position."""
-    u = unit(speed=20.0, torque=50.0)
-    u = replace(u, viscosity=0.2)
+@pytest.mark.parametrize(("helix", "rel"), [(0.0, 0.15), (HELIX, 0.25)])
+def test_slow_units_have_the_error_of_their_teeth(helix, rel):
+    """The error is that of rest; but films resist the tilt of helical gears more when squeezed."""
+    p = GearPair((26, 157), 4e-3, 0.04, helix)
+    width = p.base_pitch / np.tan(p.base_helix) if helix else 0.04
+    u = replace(unit(speed=20.0, torque=50.0, helix=helix, width=width), viscosity=0.2)
     linear = mesh_response(rest(u), harmonics=30, positions=128)
-    still = [rest(u, t) for t in 2 * np.pi / 26 * np.arange(24) / 24]
+    still = [rest(u, t) for t in 2 * np.pi / 26 * np.arange(16) / 16]
     rb, w = u.mesh.pair.rb, u.wheels
     error = np.array([rb[0] * s.q[w[5]] + rb[1] * s.q[w[11]] for s in still])
-    assert linear.error_rms == pytest.approx(np.std(error), rel=0.15)
+    assert linear.error_rms == pytest.approx(np.std(error), rel=rel)
 
 
 # --- what cannot be ---

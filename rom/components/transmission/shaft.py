@@ -103,8 +103,8 @@ def _beam(l: float, d: float, E: float, nu: float, rho: float) -> tuple[Array, A
         M += w * rho * (area * (np.outer(ux, ux) + np.outer(uy, uy)))
         M += w * rho * I * (np.outer(px, px) + np.outer(py, py))
         G += w * 2 * rho * I * (np.outer(px, py) - np.outer(py, px))
-        for c, sign in ((0, 1), (1, -1)):
-            bend = _row(4 if c == 0 else 3, sign * dT)
+        for c in (0, 1):
+            bend = _row(4 if c == 0 else 3, dT)
             slide = _row(c, dN - T)
             K += w * (E * I * np.outer(bend, bend) + stiff * np.outer(slide, slide))
         line, slope = np.array([1 - x, x]), np.array([-1, 1]) / l
