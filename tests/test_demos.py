@@ -38,8 +38,9 @@ LEFT_BEHIND = {
     "demo_updating": {"updating.png"},
     "demo_sheet": {"sheet.png", "taylor_bar.gif"},
     "demo_slider_crank": {
-        "crank_mesh.png", "instants.png", "motion.png", "report.html", "rod.rom.npz", "rod.vtu",
-        "rod_frequencies.png", "rod_mesh.png", "rod_modes.png", "slider_crank.gif",
+        "crank_mesh.png", "frames.png", "instants.png", "motion.png", "report.html",
+        "rod.rom.npz", "rod.vtu", "rod_frequencies.png", "rod_mesh.png", "rod_modes.png",
+        "slider_crank.gif",
     },
     "demo_spin_up": {"spin_up.png"},
     "demo_wind_turbine": {
