@@ -14,18 +14,21 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import bmat, csr_matrix, identity, kron
+from scipy.sparse import identity, kron
 
+from rom.bench_models import SPEED, STEEL, bar, chain_of, slider_crank
 from rom.errors import ConfigError
-from rom.model import FEModel, Interface, Material
+from rom.model import FEModel, Material
 from rom.reduction.interface import connect
 from rom.reduction.method import CraigBampton
 from rom.workflow import operators, reduce
 
-STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 TITANIUM = Material(E=114e9, nu=0.33, rho=4430.0)
 BED = TITANIUM.E / 0.010  # as soft as 10 mm of the same metal [N/m^3]
-SPEED = 300.0  # of the crank [rad/s]
+WHEEL = {
+    "width": 0.016, "chord": 0.015, "chord_tip": 0.012, "t": 0.003, "t_tip": 0.002,
+    "stagger": 20, "lc": 0.010, "lc_blade": 0.0065,
+}  # fmt: skip
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
@@ -92,7 +95,7 @@ def integrator(turns: int = 40) -> Iterator[Figure]:
     beam = bar((0.16, 0.02, 0.012), (16, 2, 1))
     method, kinds = CraigBampton(20), dict(KINDS)
     rod = reduce(beam, method=method, interfaces=kinds, reference=tuple(kinds), certify=False)
-    mechanism, turn = _slider_crank(rod), 2 * pi / SPEED
+    mechanism, turn = slider_crank(rod), 2 * pi / SPEED
     warm = simulate(mechanism, t_end=turn, dt=turn / 1000)
     run = simulate(mechanism, t_end=(turns + 1) * turn, dt=turn / 1000, state=warm.final)
     case = f"{rod.n_modes} elastic coordinates, {run.statistics['steps']} steps"
@@ -117,7 +120,7 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     )
     dt, per_link = 1e-3, []
     for n in lengths:
-        mechanism, steps = _chain(link, n), max(10, min(200, 6400 // n))
+        mechanism, steps = chain_of(link, n), max(10, min(200, 6400 // n))
         warm = simulate(mechanism, t_end=2 * dt, dt=dt)
         run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
         case, speed = f"{n} links of {link.n_modes} modes", run.statistics["steps_per_second"]
@@ -216,6 +219,56 @@ def film(solves: int = 400) -> Iterator[Figure]:
         yield Figure("film", case, "systems solved per film", changes / solves)
 
 
+def wheel(families: int = 4, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
+    """Modes of a bladed disk: one reduced sector, one full sector, the whole wheel.
+
+    Both kinds of sectors give all nodal diameters; the whole wheel is asked for as many modes. The
+    peak of the memory is that of the process so far.
+
+    Args:
+        families: modes for each number of nodal diameters.
+        parameters: of the geometry.
+    """
+    from rom.cyclic.modes import cyclic_modes
+    from rom.cyclic.reduced import reduce_sector
+    from rom.cyclic.sector import CyclicSector
+    from rom.fe import model as read_model
+    from rom.reduction.polynomial import Polynomial
+    from rom.scipy_operators import SciPyOperators
+
+    def frequencies(part: Any) -> Any:
+        """All below the first that belongs to a family left out."""
+        found = [cyclic_modes(part, n, families) for n in part.diameters]
+        f = np.concatenate([np.repeat(modes.frequencies, modes.multiplicity) for modes in found])
+        return np.sort(f[f < min(modes.frequencies[-1] for modes in found)])
+
+    model = read_model(geometry("bladed_disk"), material=TITANIUM, parameters=parameters or WHEEL)
+    sector = CyclicSector.from_model(model, fixed=("bore",))
+
+    def by_reduction() -> Any:
+        return frequencies(reduce_sector(sector, n_modes=30, functions=Polynomial(7)))
+
+    def whole() -> Any:
+        ops, m = SciPyOperators(*sector.wheel()), families * sector.n_sectors
+        return ops.modes(np.zeros(0, dtype=np.int64), m)[0] / (2 * pi)
+
+    case, answers, taken = f"{sector.n_wheel} dofs, {sector.n_sectors} sectors", {}, {}
+    ways = {"reduced sector": by_reduction, "sector": lambda: frequencies(sector), "wheel": whole}
+    for name, way in ways.items():
+        start = perf_counter()
+        answers[name] = way()
+        taken[name] = perf_counter() - start
+        yield Figure("wheel", case, name, taken[name], "s")
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+        yield Figure("wheel", case, f"{name}: peak memory so far", peak, "GiB")
+    for name in ("reduced sector", "sector"):
+        yield Figure("wheel", case, f"{name}, times as fast", taken["wheel"] / taken[name])
+    for name, aim in (("sector", "below 1e-8"), ("reduced sector", "below 0.001")):
+        f = answers[name]
+        error = np.abs(f / answers["wheel"][: f.size] - 1).max()
+        yield Figure("wheel", case, f"{name}: difference of {f.size} frequencies", error, "", aim)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
@@ -223,6 +276,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "chain": chain,
     "reduction": reduction,
     "large-reduction": large_reduction,
+    "wheel": wheel,
     "peers": peers,
     "motion": motion,
 }
@@ -274,100 +328,6 @@ def _on_a_bed(body: Any, model: FEModel) -> Any:
         felt = kron(S, identity(3)) @ H if marker.kind == "full" else H
         K = K + BED * H.T @ felt
     return np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * pi)
-
-
-def bar(size: tuple[float, ...], cells: tuple[int, ...], material: Material = STEEL) -> FEModel:
-    """A straight bar of bricks with 27 nodes; its ends are the interfaces "root" and "tip".
-
-    On a grid, integrals over the bar are Kronecker products of integrals along its edges.
-    """
-    along = [_line(length, n) for length, n in zip(size, cells, strict=True)]
-    lines = [np.linspace(0.0, length, 2 * n + 1) for length, n in zip(size, cells, strict=True)]
-    points = np.array(np.meshgrid(*lines, indexing="ij")).reshape(3, -1).T
-
-    def integral(c: int | None = None, d: int | None = None) -> Any:
-        """Of N_i N_j, the first derived along axis c and the second along d."""
-        mx, my, mz = (line[int(a == c), int(a == d)] for a, line in enumerate(along))
-        return kron(kron(mx, my), mz)
-
-    lam, mu = material.stiffness[0, 1], material.stiffness[3, 3]
-    shear = mu * sum(integral(c, c) for c in range(3))
-    blocks = [
-        [lam * integral(c, d) + mu * integral(d, c) + (c == d) * shear for d in range(3)]
-        for c in range(3)
-    ]
-    node_by_node = np.arange(points.size).reshape(3, -1).T.ravel()
-    K = csr_matrix(bmat(blocks))[node_by_node][:, node_by_node]
-    M = material.rho * kron(integral(), identity(3))
-    face = kron(along[1][0, 0], along[2][0, 0])
-    numbers = np.arange(len(points)).reshape(-1, face.shape[0])
-    ends = {
-        name: Interface(name, nodes, points[nodes], csr_matrix(face), points[nodes].mean(axis=0))
-        for name, nodes in (("root", numbers[0]), ("tip", numbers[-1]))
-    }
-    return FEModel(0.5 * (K + K.T), csr_matrix(M), points, ends)
-
-
-def _line(length: float, cells: int) -> dict[tuple[int, int], Any]:
-    """Integrals of the products of quadratic shape functions and their derivatives on a line.
-
-    Returns:
-        {(p, q): (2 cells + 1,) * 2 sparse matrix of the integrals of N_i^(p) N_j^(q)}.
-    """
-    h = length / cells
-    slope = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
-    elements = {
-        (0, 0): np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) * h / 30,
-        (1, 0): slope,
-        (0, 1): slope.T,
-        (1, 1): np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / (3 * h),
-    }
-    whole = {key: np.zeros((2 * cells + 1,) * 2) for key in elements}
-    for key, element in elements.items():
-        for first in range(0, 2 * cells, 2):
-            whole[key][first : first + 3, first : first + 3] += element
-    return {key: csr_matrix(matrix) for key, matrix in whole.items()}
-
-
-def _slider_crank(rod: Any) -> Any:
-    """Crank of 40 mm at full speed, the rod, and a slider of 0.3 kg."""
-    from rom.mbs.mechanism import Mechanism
-
-    mech, radius = Mechanism(gravity=(0, -9.81, 0)), 0.04
-    a, b = rod.marker("root").point, rod.marker("tip").point
-    moving = {"velocity": (0, SPEED * radius, 0)}
-    crank = mech.add_rigid(
-        "crank",
-        mass=1.0,
-        inertia=(6e-4, 9e-4, 6e-4),
-        at=(0, 0, 0),
-        omega=(0, 0, SPEED),
-        markers={"pin": (radius, 0, 0)},
-    )
-    bar = mech.add_flexible("rod", rod, at=np.array([radius, 0, 0]) - a, **moving)
-    end = np.array([radius, 0, 0]) + b - a
-    slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=end)
-    z, origin = (0, 0, 1), (0.0, 0.0, 0.0)
-    mech.revolute("main", mech.ground.marker(origin), crank.marker(origin), axis=z)
-    mech.revolute("crank pin", crank.marker("pin"), bar.marker("root"), axis=z)
-    mech.revolute("wrist pin", bar.marker("tip"), slider.marker(origin), axis=z)
-    mech.prismatic("guide", mech.ground.marker(end), slider.marker(origin), axis=(1, 0, 0))
-    mech.drive("motor", "main", lambda t: SPEED * t)
-    return mech
-
-
-def _chain(link: Any, n: int) -> Any:
-    """So many links in a row along x, hinged about z to each other and to the ground."""
-    from rom.mbs.mechanism import Mechanism
-
-    mech = Mechanism(gravity=(0, -9.81, 0))
-    step = link.marker("tip").point - link.marker("root").point
-    before = mech.ground.marker((0.0, 0.0, 0.0))
-    for k in range(n):
-        part = mech.add_flexible(f"link {k}", link, at=k * step - link.marker("root").point)
-        mech.revolute(f"pin {k}", before, part.marker("root"), axis=(0, 0, 1))
-        before = part.marker("tip")
-    return mech
 
 
 def _seconds(work: Callable[..., Any], *arguments: Any, **named: Any) -> float:

@@ -139,3 +139,12 @@ def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
     n_edges = len(np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0))
     n_dofs = 3 * (len(np.unique(solid.cells[:, :4])) + n_edges)  # one node more on each edge
     assert_allclose(n_dofs, size, rtol=0.1)
+
+
+@pytest.mark.fenicsx
+def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
+    pytest.importorskip("dolfinx", reason="the sector is meshed")
+    figures = list(bench.wheel(2, bench.WHEEL | {"lc": 0.02, "lc_blade": 0.02}))
+    errors = [figure.value for figure in figures if "difference" in figure.quantity]
+    assert errors[0] < 1e-8 and 1e-8 < errors[1] < 1e-3
+    assert all(figure.value > 0.0 for figure in figures)

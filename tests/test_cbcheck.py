@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import rom
-from rom.bench import KINDS, _bar
+from rom.bench import KINDS
+from rom.bench_models import bar as bar_of
 from rom.eigen import rigid_motions
 from rom.reduction.interface import connect
 from rom.workflow import operators
@@ -20,7 +21,7 @@ N_MODES = 12
 
 
 def bar():
-    return _bar((0.5, 0.06, 0.04), (10, 2, 2))
+    return bar_of((0.5, 0.06, 0.04), (10, 2, 2))
 
 
 def matrices(model):
@@ -84,7 +85,7 @@ def test_cbcheck_sees_no_grounding(pyyeti):
 
 def test_effective_masses_of_all_modes_add_up_to_what_the_interior_can_carry():
     """Kammer and Triller: the sum over all modes is (M R)_i^T M_ii^-1 (M R)_i, without modes."""
-    model = _bar((0.5, 0.06, 0.04), (3, 1, 1))
+    model = bar_of((0.5, 0.06, 0.04), (3, 1, 1))
     inner = np.setdiff1d(
         np.arange(model.n_dofs), np.concatenate([i.dofs for i in model.interfaces.values()])
     )

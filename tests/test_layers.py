@@ -13,7 +13,15 @@ HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "g
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
 LIGHT = {"attachment", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parameters",
          "reduction", "rotation", "scipy_operators", "units"}  # fmt: skip
-ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor", "peers"}  # they stand in front
+ANYTHING = {
+    "__init__",
+    "__main__",
+    "bench",
+    "bench_models",
+    "cli",
+    "doctor",
+    "peers",
+}  # they stand in front
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "errors": set(),
     "model": {"errors"},
