@@ -6,3 +6,5 @@ os.environ["OMP_NUM_THREADS"] = "1"
 os.environ.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
 os.environ.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
 os.environ.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
+# processes that wait for others leave the core to them
+os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
