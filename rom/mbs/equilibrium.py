@@ -183,6 +183,10 @@ def _described(packed: Packed, motion: Array) -> str:
         sizes.append((shift @ shift + packed.length**2 * turn @ turn) * B.mass[b])
     b = int(np.argmax(sizes))
     at = B.v_at[b]
+    if not sizes[b] > 0.0:  # frames on interfaces that are held stay where they are
+        bent = [np.abs(motion[at + 6 : at + 6 + r]).max(initial=0.0)
+                for at, r in zip(B.v_at, B.r, strict=True)]  # fmt: skip
+        return f"body {packed.names[int(np.argmax(bent))]!r} deforms"
     shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
     turns = np.linalg.norm(turn) * packed.length > 1e-6 * np.linalg.norm(shift)
     way = turn if turns else shift
