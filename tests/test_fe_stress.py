@@ -128,11 +128,11 @@ def test_messages(model):
         rom.write_stress(replace(body, stress=None), np.zeros(8), "x.vtu")
     with pytest.raises(ConfigError, match=r"q has the shape \(3,\)"):
         body.stress.field(np.zeros(3))
-    from rom.bench import _bar
+    from rom.bench_models import bar
 
     with pytest.raises(ConfigError, match="has no finite elements"):
         rom.reduce(
-            _bar((0.4, 0.05, 0.03), (4, 1, 1)), method=rom.Guyan(), interfaces=kinds, stress=True
+            bar((0.4, 0.05, 0.03), (4, 1, 1)), method=rom.Guyan(), interfaces=kinds, stress=True
         )
 
 

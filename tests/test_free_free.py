@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import rom
-from rom.bench import KINDS, _bar
+from rom.bench import KINDS
+from rom.bench_models import bar as bar_of
 from rom.errors import ModelError
 
 SIZE = (1.0, 0.02, 0.01)
@@ -12,7 +13,7 @@ SIZE = (1.0, 0.02, 0.01)
 
 @pytest.fixture(scope="module")
 def model():
-    return _bar(SIZE, (20, 1, 1))
+    return bar_of(SIZE, (20, 1, 1))
 
 
 @pytest.fixture(scope="module")

@@ -7,14 +7,15 @@ import pytest
 from scipy.sparse import csr_matrix
 
 import rom
-from rom.bench import KINDS, _bar
+from rom.bench import KINDS
+from rom.bench_models import bar as bar_of
 from rom.errors import QualityGateError, RomWarning
 
 
 @pytest.fixture(scope="module")
 def square():
     """A bar of square section: its bending modes come in pairs."""
-    return _bar((0.5, 0.05, 0.05), (12, 1, 1))
+    return bar_of((0.5, 0.05, 0.05), (12, 1, 1))
 
 
 def reduced(model, n_modes=4):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.bench import bar, motion
+from rom.bench import motion
+from rom.bench_models import bar
 from rom.errors import ConfigError
 from rom.mbs.integrate import simulate
 from rom.peers import motion as peer

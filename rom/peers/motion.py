@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench import KINDS, STEEL, geometry
+from rom.bench import KINDS, geometry
+from rom.bench_models import STEEL
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.native import save

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench import STEEL, geometry
+from rom.bench import geometry
+from rom.bench_models import STEEL
 from rom.model import FEModel
 from rom.reduction.method import CraigBampton
 from rom.workflow import reduce

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from rom.bench import bar
+from rom.bench_models import bar
 from rom.body.flexible import FlexibleBody
 from rom.model import FEModel, Material
 from rom.peers.mechanisms import chain, pendulum, slider_crank
