@@ -131,14 +131,14 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     yield Figure("chain", case, "time per step and link", grown, "", "below 2")
 
 
-def peers(meshes: tuple[float, ...] = (0.005, 0.00285)) -> Iterator[Figure]:
+def peers(meshes: tuple[float, ...] = (0.0047, 0.00257)) -> Iterator[Figure]:
     """The same reduction by Exudyn and by SciPy with SuperLU and CHOLMOD; two processes too.
 
     A connecting rod, two bores, 20 modes, one thread per process. The programs are installed from
     the package index into an environment of their own, ``.venv-peers``.
 
     Args:
-        meshes: element sizes [m]; about 31 000 and 103 000 dofs.
+        meshes: element sizes [m]; about 29 000 and 105 000 dofs.
     """
     from rom.peers.compare import compared
 
