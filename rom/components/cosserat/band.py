@@ -1,12 +1,7 @@
 """Elimination along the rod: a banded system solved from one end to the other and back."""
 
-from pathlib import Path
-
-from rom.components.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.components.cosserat.elements import REACH
-
-HERE = Path(__file__).parent
-drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules
 
 
 @kernel

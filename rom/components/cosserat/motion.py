@@ -12,14 +12,13 @@ Source:
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.components.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.elements import (
     REACH,
@@ -33,10 +32,9 @@ from rom.components.cosserat.shape import Shape, reference
 from rom.components.cosserat.statics import add_loads, clamped, largest
 from rom.components.cosserat.vibration import lumped_mass
 from rom.errors import ConfigError, SolverError
+from rom.mbs.alpha import coefficients
 from rom.model import Array
 
-HERE = Path(__file__).parent
-drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules
 HELD, HEAVY, LIGHT = 0, 1, 2  # dofs; light ones have no mass and follow the rest
 CONVERGED, ITERATIONS = 1e-9, 25  # last increment, in rad and lengths of the rod
 
@@ -56,9 +54,8 @@ class Scheme(NamedTuple):
 
 def scheme(h: float, rho: float) -> Scheme:
     """The scheme that damps the highest frequencies by rho a step."""
-    alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
-    gamma = 0.5 + alpha_f - alpha_m
-    return Scheme(h, alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma)
+    _, beta, gamma, alpha_m, alpha_f = coefficients(h, rho).tolist()
+    return Scheme(h, alpha_m, alpha_f, beta, gamma)
 
 
 class Point(NamedTuple):

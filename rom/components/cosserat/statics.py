@@ -1,11 +1,9 @@
 """Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation."""
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 
-from rom.components.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.elements import (
     REACH,
@@ -20,8 +18,6 @@ from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
 
-HERE = Path(__file__).parent
-drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules
 CAP = 0.2  # largest rotation of an iteration [rad]: larger steps jump to other equilibria
 CONVERGED = 1e-8  # last increment, in rad and in lengths of the rod; the next one is its square
 ITERATIONS = 200
