@@ -21,6 +21,7 @@ from rom.model import Array, FEModel, Modes
 from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
+from rom.reduction.kinds import by_name
 from rom.reduction.method import Method
 from rom.reduction.order import with_orders
 from rom.scipy_operators import SciPyOperators
@@ -98,7 +99,7 @@ def modes(
     if isinstance(m, bool) or int(m) != m or m < 1:
         raise ConfigError(f"m = {m!r} is not a number of modes (1, 2, …).")
     fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
-    kinds = dict(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
+    kinds = by_name(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)
     omega, Phi = connection.ops.modes(held, int(m))
@@ -156,7 +157,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     """
     clock = perf_counter()
     bare, ops = mesh_operators(model), operators(model)
-    interfaces, method = with_orders(ops, model, interfaces, method)
+    interfaces, method = with_orders(ops, model, by_name(interfaces), method)
     connection = connect(ops, model, interfaces)
     say = log.info if ops.first == 0 else log.debug
     say("reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)
@@ -208,7 +209,7 @@ def substructure(model: FEModel, *, n_modes: int, interfaces: dict[str, Any]) ->
     Raises:
         InterfaceError, ConfigError: for a wrong interface, kind or number of modes.
     """
-    connection = connect(operators(model), model, interfaces)
+    connection = connect(operators(model), model, by_name(interfaces))
     origins = {name: model.interfaces[name].origin for name in connection.parts}
     return free_substructure(connection, origins, n_modes)
 

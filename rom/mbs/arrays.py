@@ -21,6 +21,8 @@ LENGTHS = (POINT, ALONG, DISTANCE, TOUCH)
 PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
+# numbers that the law of a non-linear element may use as memory
+SPACE = 256
 # velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
 # case that a block of a body or joint is singular for itself
 LARGEST_WHOLE = 2000
@@ -254,6 +256,22 @@ class Spread(NamedTuple):
     signal: Index
 
 
+class Nonlinear(NamedTuple):
+    """Elements of non-linear bodies between up to K frames, each with a compiled law.
+
+    Attributes:
+        address: (e,) of the laws, see `rom.mbs.nonlinear`.
+        count: (e,) number of frames.
+        body: (e, K) their bodies, -1 beyond.
+        numbers: (e, c) what the law knows of the element.
+    """
+
+    address: Index
+    count: Index
+    body: Index
+    numbers: Array
+
+
 class System(NamedTuple):
     """Everything that stays constant during a run."""
 
@@ -266,6 +284,7 @@ class System(NamedTuple):
     bushings: Bushings
     contacts: Contacts
     spread: Spread
+    nonlinear: Nonlinear
     graph: Graph | None = None
 
 
@@ -297,6 +316,9 @@ class Work(NamedTuple):
     wrench: Array  # (k, 6) force and moment on each marker
     user: Array  # (k, 6) force and moment from Python functions
     arm: Array  # (l, 9) sum of positions and forces of spread loads, body frame
+    pose: Array  # (e, 13 K) frames of non-linear elements: position, quaternion, velocities
+    answer: Array  # (2 + 6 K + 72 K^2,) what the law of an element says
+    space: Array  # (SPACE,) for the laws to use as they like
     signal: Array  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
     x: Array  # (c,) joint coordinates, angles followed over whole turns
     xd: Array  # (c,) their rates
@@ -346,6 +368,7 @@ def workspace(system: System, n_signals: int) -> Work:
         wide = int((system.graph.at + 6 + bodies.r[moved])[moved >= 0].max(initial=0))
         whole = n + m if n + m <= LARGEST_WHOLE else 0
     redundant = (0, 0) if system.graph.compact else (m, m)
+    e, K = system.nonlinear.body.shape
     shapes = {
         **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
         **dict.fromkeys(("d", "dd"), (b, 3)),
@@ -361,6 +384,9 @@ def workspace(system: System, n_signals: int) -> Work:
         "E": (k, 3, 3),
         **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),
         "H": (k, 6, 6 + R),
+        "pose": (e, 13 * K),
+        "answer": (2 + 6 * K + 72 * K * K,),
+        "space": (SPACE,),
         "arm": (system.spread.body.size, 9),
         "signal": (n_signals, 3),
         **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),

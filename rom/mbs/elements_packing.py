@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.mbs.arrays import Actions, Bushings, Contacts, Spread
+from rom.mbs.arrays import Actions, Bushings, Contacts, Nonlinear, Spread
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import Marker
 from rom.mbs.signals import Signal, load_signal
@@ -114,6 +114,28 @@ def spread_loads(mechanism: Mechanism, first: int, R: int) -> tuple[Spread, list
         integers(at),
     )
     return spread, signals
+
+
+def nonlinear(mechanism: Mechanism) -> Nonlinear:
+    """Elements of non-linear bodies."""
+    number = {name: b for b, name in enumerate(mechanism.parts)}
+    groups = [
+        (group, np.array([number[part.name] for part in whole.parts])[group.frames])
+        for whole in mechanism.nonlinear.values()
+        for group in whole.body.elements
+    ]
+    e = sum(len(bodies) for _, bodies in groups)
+    K = max((bodies.shape[1] for _, bodies in groups), default=1)
+    c = max((group.numbers.shape[1] for group, _ in groups), default=1)
+    body, numbers = np.full((e, K), -1, dtype=np.int64), np.zeros((e, c))
+    address, count, at = integers([0] * e), integers([0] * e), 0
+    for group, bodies in groups:
+        mine = slice(at, at + len(bodies))
+        address[mine], count[mine] = group.address, bodies.shape[1]
+        body[mine, : bodies.shape[1]] = bodies
+        numbers[mine, : group.numbers.shape[1]] = group.numbers
+        at += len(bodies)
+    return Nonlinear(address, count, body, numbers)
 
 
 def _as_vector(function: Any) -> Any:

@@ -57,6 +57,9 @@ def _neighbours(system: Any) -> list[list[int]]:
                 if a >= 0 and b >= 0:
                     found[a].add(int(b))
                     found[b].add(int(a))
+    for count, bodies in zip(system.nonlinear.count, system.nonlinear.body, strict=True):
+        for b in bodies[:count]:
+            found[b].update(map(int, bodies[:count]))
     return [sorted(others) for others in found]
 
 

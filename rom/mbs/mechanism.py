@@ -14,6 +14,7 @@ from rom.mbs.connections import Connections, Drive, TimeFunction
 from rom.mbs.elements import Bushing, Contact, Elements, Spread
 from rom.mbs.joint_forces import Friction, JointForces, Motor, Stop
 from rom.mbs.joints import Joint
+from rom.mbs.nonlinear import Assembly, NonlinearBodies
 from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
@@ -69,7 +70,7 @@ class Event:
 
 
 @dataclass
-class Mechanism(Connections, JointForces, Elements, SurfaceContacts):
+class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBodies):
     """Rigid and flexible bodies, connected and loaded.
 
     Joints are defined in the position in which the bodies are added, flexible bodies
@@ -81,6 +82,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts):
 
     gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
     parts: dict[str, Part] = field(default_factory=dict, init=False)
+    nonlinear: dict[str, Assembly] = field(default_factory=dict, init=False)
     joints: dict[str, Joint] = field(default_factory=dict, init=False)
     drives: dict[str, Drive] = field(default_factory=dict, init=False)
     springs: dict[str, Spring] = field(default_factory=dict, init=False)
@@ -300,7 +302,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts):
         if not isinstance(name, str) or not name:
             raise ConfigError(f"a name must be a text that is not empty, got {name!r}.")
         taken = [
-            *(GROUND, *self.parts, *self.joints, *self.drives, *self.springs),
+            *(GROUND, *self.parts, *self.nonlinear, *self.joints, *self.drives, *self.springs),
             *(*self.turns, *self.loads, *self.user_forces, *self.motors, *self.frictions),
             *(*self.stops, *self.bushings, *self.contacts, *self.spread_loads, *self.events),
         ]

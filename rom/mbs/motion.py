@@ -22,6 +22,7 @@ from rom.mbs.dynamics import (
 )
 from rom.mbs.forces import applied_wrenches, force_tangents
 from rom.mbs.kinematics import marker_states, own_block, spread_wrench, wrench_stiffness
+from rom.mbs.nonlinear_forces import nonlinear_residuals, nonlinear_tangents
 from rom.mbs.spread import spread_residuals, spread_tangents
 
 # over the loads of joints with friction; each gains a digit when the friction angle is small
@@ -60,6 +61,7 @@ def residual(s, W, q, v, a, lam):
     W.power[:] = 0.0
     body_residuals(s.bodies, W, q, v, a)
     spread_residuals(s, W, q, v)
+    nonlinear_residuals(s, W, q, v)
     applied_wrenches(s, W)
     action_wrenches(s, W, lam)
     bushing_wrenches(s, W)
@@ -88,6 +90,7 @@ def tangents(s, W, v, a, lam, c):
         body_damping(s.bodies, W, b, v, c[1], own_block(s, b, W.S))
         body_stiffness(s.bodies, W, b, v, a, c[2], own_block(s, b, W.Kt))
     spread_tangents(s, W, c[2], W.Kt)
+    nonlinear_tangents(s, W, c[2], c[1], W.Kt, W.S)
     wrench_stiffness(s, W, c[2], W.Kt)
     constraint_stiffness(s, W, lam, c[2], W.Kt)
     coupling_stiffness(s, W, lam, c[2], W.Kt)

@@ -12,6 +12,7 @@ from rom.mbs.elements_packing import (
     bushings,
     contacts,
     integers,
+    nonlinear,
     spread_loads,
     table,
 )
@@ -113,6 +114,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         bushings(mechanism, index),
         contacts(mechanism, index),
         spread,
+        nonlinear(mechanism),
     )
     return Packed(
         system._replace(graph=graph_of(system, whole=whole)),
@@ -122,7 +124,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         (*signals, *loads, *clock),
         np.concatenate([np.r_[part.at, part.p, part.q] for part in parts]),
         np.concatenate([np.r_[part.velocity, part.omega, part.qd] for part in parts]),
-        _length(parts),
+        max([_length(parts), *(whole.reach for whole in mechanism.nonlinear.values())]),
         sum(part.mass for part in parts),
     )
 

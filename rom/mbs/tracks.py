@@ -14,6 +14,7 @@ from rom.mbs.dynamics import body_energy
 from rom.mbs.forces import spring_energy
 from rom.mbs.integrals import dual
 from rom.mbs.motion import evaluate
+from rom.mbs.nonlinear_forces import nonlinear_energy
 from rom.model import Array
 
 
@@ -65,6 +66,7 @@ def track(s, W, motion, marker, rows, out):
                 out.reaction[k, p] -= L[k, row] * W.g[row, 6 + p]
         out.energy[k, 1] = spring_energy(s, W) + stop_energy(s, W)
         out.energy[k, 1] += bushing_energy(s, W) + contact_energy(s, W)
+        out.energy[k, 1] += nonlinear_energy(s, W, Q[k], V[k])
         for b in range(s.bodies.mass.size):
             kinetic, strain, height = body_energy(s.bodies, W, b, Q[k], V[k])
             out.energy[k, 0] += kinetic

@@ -120,6 +120,7 @@ class Instant:
         by_rate = s.forces.spring[:, 1].any() or s.forces.turn[:, 1].any() or s.bushings.i.size
         by_rate = by_rate or s.contacts.i.size or s.actions.motor_at.size
         by_rate = by_rate or s.actions.friction_at.size or s.actions.stop_at.size
+        by_rate = by_rate or s.nonlinear.address.size
         rests = not state.v.any() or not by_rate
         return bool(not self.laws and rests and np.abs(stiff).max(initial=0.0) < ELASTIC_TURN)
 

@@ -1,5 +1,6 @@
 """Kinds of interfaces: how a few coordinates c = L u govern the dofs u of a surface."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -132,6 +133,20 @@ def _label(kind: Polynomial | FourierLegendre) -> str:
     if isinstance(kind, Polynomial):
         return f"polynomial:{kind.order}"
     return f"fourier:{kind.harmonics},{kind.order}"
+
+
+def by_name(interfaces: Any) -> dict[str, Any]:
+    """The kinds of interfaces as a dictionary.
+
+    Raises:
+        ConfigError: if they are no mapping from names to kinds.
+    """
+    if not isinstance(interfaces, Mapping):
+        raise ConfigError(
+            f"interfaces = {interfaces!r} tells no interface its kind.",
+            hint='Give a dictionary, for example {"bore": "rbe2"}.',
+        )
+    return dict(interfaces)
 
 
 def parsed(name: str, kind: Any) -> Any:

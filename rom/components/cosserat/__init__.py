@@ -1,12 +1,14 @@
 """Geometrically exact rods: discrete Cosserat rods of positions and quaternions.
 
 `shape` makes rods, `statics` brings them to rest under loads or in steady rotation, `vibration`
-finds their modes, `motion` moves them; `elements` and `band` are the compiled kernels. Axes of a
-section: third along the rod. Loads are dead: they keep their direction.
+finds their modes, `motion` moves them, `multibody` puts them into mechanisms; `elements` and `band`
+are the compiled kernels. Axes of a section: third along the rod. Loads are dead: they keep their
+direction.
 """
 
 from rom.components.cosserat.elements import Rod
 from rom.components.cosserat.motion import Motion, simulate
+from rom.components.cosserat.multibody import RodBody, body, shape_of
 from rom.components.cosserat.shape import (
     Shape,
     along,
@@ -22,9 +24,11 @@ from rom.components.cosserat.vibration import Vibrations, modes
 __all__ = [
     "Motion",
     "Rod",
+    "RodBody",
     "Shape",
     "Vibrations",
     "along",
+    "body",
     "clamped",
     "elastic_energy",
     "equilibrium",
@@ -33,6 +37,7 @@ __all__ = [
     "modes",
     "reference",
     "rod",
+    "shape_of",
     "simulate",
     "straight",
     "strain",

@@ -147,17 +147,23 @@ def add_turning(A, row, factor, a):
 
 
 @inner
-def stretch_of(rod, x, p, n, W):
-    """Set a, the force C (a - a0) and the gradient D of a for x_n, the segment and x_n+1."""
-    rotation_of(p[n + 1], W.R)
+def stretched(h, C, a0, start, end, p, W):
+    """Set a, the force C (a - a0) and the gradient D of a by start, rotation and end."""
+    rotation_of(p, W.R)
     W.D[:] = 0.0
     for i in range(3):
         W.a[i] = 0.0
         for j in range(3):
-            W.a[i] += W.R[j, i] * (x[n + 1, j] - x[n, j]) / rod.h[n]
-            W.D[i, j], W.D[i, 6 + j] = -W.R[j, i] / rod.h[n], W.R[j, i] / rod.h[n]
-        W.f[i] = rod.stretch[n, i] * (W.a[i] - rod.a0[n, i])
+            W.a[i] += W.R[j, i] * (end[j] - start[j]) / h
+            W.D[i, j], W.D[i, 6 + j] = -W.R[j, i] / h, W.R[j, i] / h
+        W.f[i] = C[i] * (W.a[i] - a0[i])
     add_cross(W.D, 0, 3, 1.0, W.a)
+
+
+@inner
+def stretch_of(rod, x, p, n, W):
+    """The quantities of `stretched` for segment n."""
+    stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
 
 
 @inner
@@ -179,18 +185,17 @@ def stretch_geometry(h, W):
 
 
 @inner
-def curvature_of(rod, p, i, W):
-    """Set a = k, the moment B k and the gradient D of k for the neighbours of vertex i."""
-    s = rod.s[i]
+def curved(l, B, s, S, p, q, W):
+    """Set a = k, the moment B k and the gradient D of k by the rotations p and q beside it."""
     conjugate = (s[0], -s[1], -s[2], -s[3])
-    before, after = product(p[i], s), product(p[i + 1], conjugate)
+    before, after = product(p, s), product(q, conjugate)
     r = product((before[0], -before[1], -before[2], -before[3]), after)
     sign = 1.0 if r[0] >= 0.0 else -1.0  # both quaternions mean the same rotation
     for k in range(4):
         W.e[k] = sign * r[k]
     for k in range(3):
-        W.a[k] = 2 * W.e[1 + k] / rod.l[i]
-        W.f[k] = rod.bend[i, k] * W.a[k]
+        W.a[k] = 2 * W.e[1 + k] / l
+        W.f[k] = B[k] * W.a[k]
     W.R[:] = 0.0
     add_cross(W.R, 0, 0, 1.0, W.e[1:])
     W.D[:] = 0.0
@@ -198,14 +203,20 @@ def curvature_of(rod, p, i, W):
         for j in range(3):
             for m in range(3):
                 unit = W.e[0] if k == m else 0.0
-                W.D[k, j] -= (unit - W.R[k, m]) * rod.S[i, j, m] / rod.l[i]
-                W.D[k, 6 + j] += (unit + W.R[k, m]) * rod.S[i, m, j] / rod.l[i]
+                W.D[k, j] -= (unit - W.R[k, m]) * S[j, m] / l
+                W.D[k, 6 + j] += (unit + W.R[k, m]) * S[m, j] / l
 
 
 @inner
-def curvature_geometry(rod, i, W):
+def curvature_of(rod, p, i, W):
+    """The quantities of `curved` for vertex i."""
+    curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
+
+
+@inner
+def curvature_geometry(S, W):
     """Set H to the second derivatives of k, times the moment, times l."""
-    m, r, S = W.f, W.e, rod.S[i]
+    m, r = W.f, W.e
     dot = m[0] * r[1] + m[1] * r[2] + m[2] * r[3]
     W.R[:] = 0.0
     add_cross(W.R, 0, 0, 0.5 * r[0], m)
@@ -256,7 +267,7 @@ def internal(rod, x, p, v, rate, W):
         add_element(W, rod.stretch[n], rod.viscous_stretch[n], rod.h[n], rate, at, v)
     for i in range(rod.l.size):
         curvature_of(rod, p, i, W)
-        curvature_geometry(rod, i, W)
+        curvature_geometry(rod.S[i], W)
         add_element(W, rod.bend[i], rod.viscous_bend[i], rod.l[i], rate, 6 * i, v)
     for k in range(rod.h.size + 2):  # the gradient turns with the section
         add_turning(W.A, 6 * k, 0.5, W.r[6 * k : 6 * k + 3])
