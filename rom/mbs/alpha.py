@@ -15,7 +15,7 @@ import numpy as np
 
 from rom.mbs.actions import load_columns
 from rom.mbs.algebra import dot, range_basis, row, scale, spatial_tangent, unit, vec
-from rom.mbs.arrays import ROLL
+from rom.mbs.arrays import ALONG, DISTANCE, POINT, ROLL, TOUCH
 from rom.mbs.bordered import border, factorise_bordered, solve_bordered
 from rom.mbs.compiled import copy, inner, kernel
 from rom.mbs.constraints import constraint_gradient
@@ -39,6 +39,9 @@ GOES_ON, CONVERGED, FAILED, NOT_FINITE, SINGULAR, ASK = 0, 1, 2, 3, 4, 5
 STEPS, ITERATIONS, FACTORISATIONS, LAST, FRESH, PASS, BEGAN, ASKS, ASKED, BOTH = range(10)
 MAX_PASSES = 25
 ROUND_OFF = 4e-16
+# gap in a joint, in rad or lengths of the mechanism, that may remain: the norm of increments hardly
+# sees a light body that spins fast
+GAP = 1e-11
 
 
 class Step(NamedTuple):
@@ -54,7 +57,8 @@ class Step(NamedTuple):
             factorisation is at hand, pass of the present step, steps when the present chunk
             began, whether Python forces are to be asked for, whether they have been, whether
             constraints hold for positions and velocities both.
-        size: (4,) norm of the last increment, length of the mechanism, tolerance, total mass.
+        size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
+            largest gap in a joint before the last increment.
         method: (5,) h, beta, gamma, alpha_m, alpha_f.
         bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
             BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one
@@ -121,7 +125,7 @@ def predict(s, T):
     if is_multistep(T):
         predict_multistep(s, T)
     copy(T.lam, T.lam1)
-    T.size[0] = 0.0
+    T.size[0] = T.size[4] = 0.0
     if T.count[LAST] > 4:
         T.count[FRESH] = 0
     moved(s, T.q, T.psi, T.q1)
@@ -213,7 +217,9 @@ def correct(s, W, T, rank):
         W.rhs[i] = -bh2 * W.residual[i]
     if T.count[BOTH] == 1:
         velocity_gaps(s, W, W.part)
+    gap = 0.0
     for k in range(T.lam.size):
+        gap = max(gap, row_gap(s, W, T, k))
         # a velocity moves gamma / (beta h) as fast as the increment that removes it
         if T.count[BOTH] == 1:
             W.part[k] *= -lead
@@ -238,19 +244,31 @@ def correct(s, W, T, rank):
     moved(s, T.q, T.psi, T.q1)
     T.count[PASS] += 1
     T.count[ITERATIONS] += 1
-    return verdict(W, T, size)
+    return verdict(W, T, size, gap)
 
 
 @inner
-def verdict(W, T, size):
-    """Judge the increment just applied by its size and by how fast increments shrink."""
-    last = T.size[0]
-    T.size[0] = size
+def row_gap(s, W, T, k):
+    """Gap of constraint k as far as increments close it, in rad or lengths of the mechanism."""
+    kind = s.rows.kind[k]
+    if T.count[BOTH] == 1 or kind == ROLL:
+        return 0.0
+    is_length = kind in (POINT, ALONG, DISTANCE, TOUCH)
+    return abs(W.value[k]) / (T.size[1] if is_length else 1.0)
+
+
+@inner
+def verdict(W, T, size, gap):
+    """Judge the increment just applied by its size and by how fast increments and gaps shrink."""
+    last, wider = T.size[0], T.size[4]
+    T.size[0], T.size[4] = size, gap
     if not math.isfinite(size):
         return NOT_FINITE
     goal, floor = increment_goal(W, T)
     shrink = size / last if last > 0.0 else 1.0
-    if size <= floor or (shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal):
+    closed = gap * min(1.0, gap / wider if wider > 0.0 else 1.0) <= GAP
+    closing = shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal
+    if size <= floor or (closing and closed):
         return CONVERGED
     if shrink > 0.5 and size < 100 * floor and T.count[PASS] > 3:
         return CONVERGED

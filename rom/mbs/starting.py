@@ -41,7 +41,7 @@ def begin(
     elif not goes_on and (bdf or state.algorithmic is None):
         state, jerk = measured(record, W, state, forces, h)
     zeros = [np.zeros(k) for k in (state.q.size, n, n, state.lam.size, n)]
-    size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass])
+    size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass, 0.0])
     v, before, rise = state.v, state.algorithmic, np.zeros(n) if jerk is None else jerk
     if goes_on:
         before = v
