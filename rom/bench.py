@@ -166,6 +166,35 @@ def motion(
         yield Figure("motion", case, quantity, value, unit, aim)
 
 
+def rods(lengths: tuple[int, ...] = (100, 1000, 10_000)) -> Iterator[Figure]:
+    """A swinging rod: cost against the number of segments; then a rotor, here and by Exudyn.
+
+    Args:
+        lengths: numbers of segments of the one rod, which hangs on a ball joint.
+    """
+    from rom.components.cosserat import body, straight
+    from rom.mbs.integrate import simulate
+    from rom.mbs.mechanism import Mechanism
+    from rom.peers.rods import measured
+
+    dt, origin, per_segment = 1e-3, (0.0, 0.0, 0.0), []
+    for n in lengths:
+        mechanism, steps = Mechanism(), max(10, 40_000 // n)
+        section = {"stretch": 1e6, "bend": 100.0, "mass": 1.0, "inertia": 1e-3}
+        rod = mechanism.add_nonlinear("rod", body(straight(10.0, n, **section)))
+        mechanism.spherical("hook", mechanism.ground.marker(origin), rod.marker("start"))
+        warm = simulate(mechanism, t_end=2 * dt, dt=dt)
+        run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
+        speed, passes = run.statistics["steps_per_second"], run.statistics["iterations"] / steps
+        per_segment.append(1 / speed / n / passes)
+        yield Figure("rods", f"{n} segments", "steps per second", speed, "1/s")
+    case = f"{lengths[-1]} against {lengths[0]} segments"
+    grown = per_segment[-1] / per_segment[0]
+    yield Figure("rods", case, "time per segment and iteration", grown, "", "below 2")
+    for case, quantity, value, unit, aim in measured():
+        yield Figure("rods", case, quantity, value, unit, aim)
+
+
 def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:
     """All dofs of the dovetail flanks of a compressor blade against polynomials on them.
 
@@ -279,6 +308,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "wheel": wheel,
     "peers": peers,
     "motion": motion,
+    "rods": rods,
 }
 
 

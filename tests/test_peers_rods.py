@@ -1,0 +1,52 @@
+"""What the comparison of rods with other programs hands over, and its figures."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+from rom import rotation
+from rom.components.wind_turbine import RATED, blade, ramp, run_up
+from rom.peers import rods
+
+
+def test_beams_have_the_sections_of_the_blade():
+    one = blade(12, azimuth=2.0)
+    described = {name: np.array(value) for name, value in rods.beams(one).items()}
+    assert_allclose(described["mass"] @ described["length"], one.mass.sum(), rtol=1e-12)
+    lumped = np.zeros(13)
+    lumped[:-1] += described["mass"] * one.h / 2
+    lumped[1:] += described["mass"] * one.h / 2
+    assert_allclose(lumped, one.mass, rtol=1e-12)
+    # along: EA, two shear rigidities, GJ, bending about first and second axis of a section
+    assert_allclose(described["stiffness"][:, :3], one.stretch[:, [2, 0, 1]])
+    assert_allclose(described["stiffness"][1:, 3:5], one.bend[1:-1][:, [2, 0]], rtol=0.3)
+    assert_allclose(described["inertia"][:, 0], described["inertia"][:, 1:].sum(axis=1))
+    for k, node in enumerate(described["nodes"]):
+        A = rotation.matrix(node[3:])
+        assert_allclose(A[:, 0], one.x[-1] / np.linalg.norm(one.x[-1]), atol=1e-12)
+        assert_allclose(node[:3], one.x[k])
+        before, after = (rotation.matrix(one.p[j])[:, 0] for j in (k, k + 1))
+        between = before + after
+        assert_allclose(A[:, 1], between / np.linalg.norm(between), atol=2e-2)
+
+
+def test_the_rotor_here_is_the_run_up_of_its_blades(monkeypatch):
+    monkeypatch.setattr(rods, "RISE", 4.0)
+    seconds, tip = rods.by_rom(8)
+    alone = run_up(blade(8, damped=True), t_end=4.0, dt=rods.DT, rise=4.0, save_every=1)
+    assert seconds > 0
+    every = round(4.0 / rods.DT) // rods.SAMPLES
+    assert_allclose(tip[:, 0], alone.tip[::every, 0], atol=1e-8)
+    assert_allclose(tip[:, 1], -alone.tip[::every, 1], atol=1e-8)
+
+
+def test_both_programs_turn_the_hub_alike():
+    """The script knows nothing of rom; its law of the angle is read from its text."""
+    source = Path(rods.SCRIPT).read_text()
+    law = next(f for f in ast.parse(source).body if getattr(f, "name", "") == "angle")
+    scope = {"cos": np.cos, "pi": np.pi}
+    exec(compile(ast.Module([law], []), "beams", "exec"), scope)
+    for t in (0.3, 7.0, 19.9, 25.0):
+        assert_allclose(scope["angle"](t, RATED, 20.0), ramp(RATED, 20.0)[1](t), rtol=1e-14)
