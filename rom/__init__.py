@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rom.mbs.inverse import inverse_dynamics
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
+    from rom.mbs.release import release
     from rom.mbs.response import frequency_response, transmissibility
     from rom.mbs.sensitivity import (
         equilibrium_sensitivity,
@@ -141,6 +142,7 @@ __all__ = [
     "reduce",
     "reduce_parametric",
     "reduce_sector",
+    "release",
     "rotating_sector",
     "save",
     "save_state",
@@ -228,6 +230,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
     "reduce_sector": "cyclic.reduced",
+    "release": "mbs.release",
     "rotating_sector": "cyclic.rotation",
     "save": "io.family",
     "save_state": "mbs.checkpoint",

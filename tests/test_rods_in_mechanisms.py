@@ -9,7 +9,7 @@ from numba import carray, cfunc
 from numpy.testing import assert_allclose
 
 import rom
-from rom import rotation
+from rom import rotation, view
 from rom.bench_models import bar
 from rom.components import cosserat
 from rom.components.cosserat import body, shape_of
@@ -18,6 +18,7 @@ from rom.mbs.arrays import workspace
 from rom.mbs.motion import moved
 from rom.mbs.nonlinear import Elements, Frames
 from rom.mbs.packing import pack
+from rom.view.film import shades_of
 
 ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
 ORIGIN = (0.0, 0.0, 0.0)
@@ -197,6 +198,41 @@ def test_restart_gives_the_same_bits():
     half = rom.simulate(mech, t_end=0.2, dt=0.01)
     rest = rom.simulate(mech, state=half.final, t_end=0.4, dt=0.01)
     assert np.array_equal(one.q[-1], rest.q[-1])
+
+
+def test_a_released_rod_starts_from_the_shape_in_which_it_was_held():
+    """A tip that is pulled and let go: its first acceleration is the pull over what it moves."""
+    rod = a_rod()
+    held, part = clamped(rod)
+    held.spherical("hand", held.ground.marker((9.5, 0.0, 2.0)), part.marker("end"))
+    rest = rom.equilibrium(held)
+    loose, _ = clamped(rod)
+    start = rom.release(loose, rest)
+    assert_allclose(start.q, rest.q, atol=1e-12)
+    assert start.lam.size == rest.lam.size - 3
+    sol = rom.simulate(loose, state=start, t_end=1.0, dt=0.002, rho_inf=0.9)
+    assert sol.energy.strain[0] > 1.0
+    assert np.abs(sol.energy.balance).max() < 0.02 * sol.energy.strain[0]
+    assert sol.position("rod.12")[-1, 2] < 1.5
+    with pytest.raises(ConfigError, match="no State"):
+        rom.release(loose, rest.q)
+    other, _ = clamped(a_rod(4))
+    with pytest.raises(ConfigError, match="their bodies differ"):
+        rom.release(other, rest)
+
+
+def test_pictures_of_a_rod_are_its_segments():
+    mech, part = clamped(a_rod(4))
+    boxes = view.sleeves(part, (0.2, 0.4))
+    assert list(boxes) == [f"rod.{k}" for k in range(6)]
+    points, _ = boxes["rod.2"]
+    assert_allclose(np.ptp(points, axis=0), [0.2, 0.4, 2.5])
+    assert_allclose(points.max(axis=0), [0.1, 0.2, 0.0], atol=1e-12)
+    assert len(set(shades_of(mech).values())) == 1
+    with pytest.raises(ConfigError, match=r"\(4, 2\) and positive"):
+        view.sleeves(part, np.ones((3, 2)))
+    with pytest.raises(ConfigError, match="positive"):
+        view.sleeves(part, (1.0, 0.0))
 
 
 @pytest.mark.parametrize("n", [50, 400])

@@ -6,6 +6,7 @@ from rom.view.panels import Panel, panels
 from rom.view.part import mesh
 from rom.view.plane import Shape, deformed, flow
 from rom.view.planes import Drawing, plane
+from rom.view.rods import sleeves
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
@@ -29,6 +30,7 @@ __all__ = [
     "mode_shapes",
     "panels",
     "plane",
+    "sleeves",
     "updating",
     "wheel_modes",
 ]

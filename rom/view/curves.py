@@ -58,6 +58,8 @@ def history(
                 axes.plot(factor * x, y, label=name, **look)
             axes.set_ylabel(label, size=page.BODY)
             axes.set_xlim(factor * t[0], factor * t[-1])
+            if len(curves) > 2:
+                axes.margins(y=0.3)  # room for the legend
             finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
         for axes in areas[:-1]:
             axes.set_xticklabels([])

@@ -58,7 +58,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     images = render(stage.actors, stage.camera(WIDTH, view, up), limits=stage.limits)
     with page.styled():
         blank = _film_sheet(stage, images.shape[1], magnify)
-        clocks = np.stack([_clock(t) for t in solution.t[steps]])
+        clocks = np.stack([_clock(text) for text in clock_texts(solution.t[steps])])
     pages = np.repeat(blank[None], len(images), axis=0)
     pages[:, CLOCK : CLOCK + images.shape[1]] = images
     pages[:, :CLOCK] = clocks
@@ -117,7 +117,7 @@ def _stage(
         raise ConfigError(
             f"shapes: no body {sorted(unknown)[0]!r}; there are {sorted(mechanism.parts)}."
         )
-    actors, flexible, rigid = [], {}, 0
+    actors, flexible, shades = [], {}, shades_of(mechanism)
     for name, part in mechanism.parts.items():
         pose = _poses(solution, name, steps)
         surface = getattr(part.flexible, "surface", None)
@@ -130,23 +130,51 @@ def _stage(
             X, size = np.asarray(X, dtype=float)[None], None
         points = placed(X, pose)
         values = None if size is None else np.linalg.norm(size, axis=2)
-        actors.append(Actor(points, triangles, values, METAL[rigid % len(METAL)]))
+        actors.append(Actor(points, triangles, values, shades[name]))
         edges = sharp_edges(X[0], triangles)
         actors.append(Actor(points, edges, colour="#3a414b", width=1.0))
-        rigid += size is None
     return _scaled(actors, flexible)
+
+
+def shades_of(mechanism: Any) -> dict[str, str]:
+    """A grey for each body; all frames of a non-linear body have one."""
+    whole = {part.name: name for name, all_ in mechanism.nonlinear.items() for part in all_.parts}
+    things = dict.fromkeys(
+        whole.get(name, name) for name, part in mechanism.parts.items() if part.flexible is None
+    )
+    number = {name: k for k, name in enumerate(things)}
+    return {
+        name: METAL[number.get(whole.get(name, name), 0) % len(METAL)] for name in mechanism.parts
+    }
 
 
 def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:
     """Colours in a unit in which the largest deformation is between 1 and 1000."""
     if not flexible:
-        return Stage(actors, (0.0, 1.0), "m", "")
+        return Stage(together(actors), (0.0, 1.0), "m", "")
     largest = max(float(actors[k].values.max()) for k in flexible.values())
     factor, unit = next((s for s in SCALES if largest * s[0] >= 1.0), SCALES[-1])
     for k in flexible.values():
         a = actors[k]
         actors[k] = Actor(a.points, a.cells, a.values * factor, a.colour)
-    return Stage(actors, (0.0, max(largest * factor, 1e-12)), unit, " and ".join(flexible))
+    limits = 0.0, max(largest * factor, 1e-12)
+    return Stage(together(actors), limits, unit, " and ".join(flexible))
+
+
+def together(actors: list[Actor]) -> list[Actor]:
+    """The same picture with one actor for all things of one plain colour: far fewer to draw."""
+    kept = [actor for actor in actors if actor.values is not None]
+    plain: dict[Any, list[Actor]] = {}
+    for actor in actors:
+        if actor.values is None:
+            look = actor.colour, actor.width, actor.opacity, actor.cells.shape[1]
+            plain.setdefault(look, []).append(actor)
+    for (colour, width, opacity, _), alike in plain.items():
+        first = np.cumsum([0, *(actor.points.shape[1] for actor in alike)])
+        cells = np.vstack([a.cells + n for a, n in zip(alike, first[:-1], strict=True)])
+        points = np.concatenate([actor.points for actor in alike], axis=1)
+        kept.append(Actor(points, cells, None, colour, width, opacity))
+    return kept
 
 
 def _poses(solution: Any, name: str, steps: Any) -> tuple[Array, Array]:
@@ -184,7 +212,7 @@ def bars(part: Any) -> Mesh:
 
 def _words(stage: Stage, magnify: float) -> str:
     if not stage.name:
-        return "Motion of the mechanism; all bodies are rigid."
+        return "Motion of the mechanism in true size."
     how = "true size" if magnify == 1.0 else f"{magnify:g} times larger"
     return (
         f"Motion of the mechanism, deformation of {stage.name} drawn {how}. Colours: "
@@ -192,10 +220,17 @@ def _words(stage: Stage, magnify: float) -> str:
     )
 
 
-def _clock(t: float) -> Image:
+def clock_texts(times: Array) -> list[str]:
+    """The time in words, in milliseconds if the motion lasts less than ten seconds."""
+    if np.ptp(times) >= 10.0:
+        return [f"t = {t:.2f} s" for t in times]
+    return [f"t = {t * 1e3:.3f} ms" for t in times]
+
+
+def _clock(text: str) -> Image:
     """The strip above a picture of the film, with the time."""
     strip = page.sheet(WIDTH, CLOCK)
-    page.words(strip, f"t = {t * 1e3:.3f} ms", 20, 8)
+    page.words(strip, text, 20, 8)
     return page.pixels(strip)
 
 

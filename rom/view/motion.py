@@ -11,7 +11,7 @@ from rom.errors import ConfigError
 from rom.io.gltf import MovingMesh, write_glb
 from rom.io.vtkhdf import write_vtkhdf
 from rom.model import Array
-from rom.view.film import bars, placed
+from rom.view.film import bars, placed, shades_of
 from rom.view.page import checked
 from rom.view.solids import Mesh
 
@@ -68,16 +68,17 @@ def write_animation(
 
 
 def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) -> list[MovingMesh]:
-    bodies, rigid = [], 0
+    bodies, elastic, shades = [], 0, shades_of(solution.mechanism)
     for name, part in solution.mechanism.parts.items():
         surface = getattr(part.flexible, "surface", None)
         if surface is not None:
             points, triangles, modes = surface.points, surface.triangles, magnify * surface.shape
-            q, colour = solution.elastic(name)[steps], ELASTIC[(len(bodies) - rigid) % len(ELASTIC)]
+            q, colour = solution.elastic(name)[steps], ELASTIC[elastic % len(ELASTIC)]
+            elastic += 1
         else:
             points, triangles = shapes[name] if name in shapes else bars(part)
             modes, q = np.zeros((3 * len(points), 0)), np.zeros((len(steps), 0))
-            colour, rigid = METAL[rigid % len(METAL)], rigid + 1
+            colour = shades[name]
         pose = solution.position(name)[steps], solution.orientation(name)[steps]
         mesh = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
         bodies.append(MovingMesh(name, *mesh, *pose, modes, q, colour))
