@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rom.cyclic.sector import CyclicSector
     from rom.cyclic.travelling import TravellingModes, travelling_modes
     from rom.errors import RomError
+    from rom.fmu.export import write_fmu
     from rom.io.export import export
     from rom.io.family import load, save
     from rom.io.foreign_model import read_model
@@ -154,6 +155,7 @@ __all__ = [
     "transmissibility",
     "travelling_modes",
     "write_animation",
+    "write_fmu",
     "write_history",
     "write_report",
     "write_stress",
@@ -241,6 +243,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "surface_load": "body.spread",
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",
+    "write_fmu": "fmu.export",
     "write_history": "io.history",
     "travelling_modes": "cyclic.travelling",
     "write_report": "report",

@@ -51,6 +51,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "fe": {"model", "eigen", "units", "scipy_operators", "errors"},
     "components": LIGHT,
     "view": {"model", "mbs", "rotation", "io", "errors"},
+    "fmu": {"model", "mbs", "rotation", "body", "io", "errors"},
     "report": {"model", "mbs", "view", "io", "errors"},
 }
 MODULES = sorted((ROOT / "rom").rglob("*.py"))

@@ -1,0 +1,103 @@
+"""Compile the library of an FMU and pack the archive."""
+
+import hashlib
+import platform
+import re
+import shutil
+import subprocess
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+from rom.errors import ConfigError, ResourceError
+from rom.io.files import write_whole
+
+SOURCES = Path(__file__).with_name("c")
+OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
+
+
+@dataclass(frozen=True)
+class Content:
+    """What goes into an FMU.
+
+    Attributes:
+        name: of the model.
+        core: C file of the model behind the interface.
+        resources: files by their names below ``resources/``.
+        data: C text of tables that the core includes as ``tables.h``.
+        describe: (guid, identifier, names of C files) -> text of ``modelDescription.xml``.
+    """
+
+    name: str
+    core: str
+    describe: Callable[[str, str, tuple[str, ...]], bytes]
+    resources: dict[str, bytes] = field(default_factory=dict)
+    data: str = ""
+
+
+def write_archive(path: Path, content: Content) -> Path:
+    """Compile and pack, whole or not at all.
+
+    Raises:
+        ConfigError: if there is no C compiler, or the place is not writable.
+        ResourceError: if the compiler fails.
+    """
+    identifier = re.sub(r"\W", "_", content.name, flags=re.ASCII)
+    identifier = identifier if identifier[:1].isalpha() else f"m{identifier}"
+    names = ("fmi2.c", content.core)
+    sources = {name: (SOURCES / name).read_bytes() for name in (*names, "model.h")}
+    guid = _guid(sources, content)
+    sources["config.h"] = f'#define GUID "{guid}"\n'.encode()
+    if content.data:
+        sources["tables.h"] = content.data.encode()
+    files = {f"sources/{name}": data for name, data in sources.items()}
+    files |= {f"resources/{name}": data for name, data in content.resources.items()}
+    files[f"binaries/{_platform()}/{identifier}.so"] = _library(sources, names)
+    files["modelDescription.xml"] = content.describe(guid, identifier, names)
+    write_whole(path, lambda file: _pack(file, files))
+    return path
+
+
+def _guid(sources: dict[str, bytes], content: Content) -> str:
+    """The same for the same content, another one for any other."""
+    digest = hashlib.sha256()
+    parts = {**sources, **content.resources, "tables": content.data.encode()}
+    for name, data in sorted(parts.items()):
+        digest.update(f"{name} {len(data)}\n".encode() + data)
+    digest.update(content.describe("", "", ()))
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
+
+
+def _platform() -> str:
+    bits = "64" if platform.architecture()[0] == "64bit" else "32"
+    return f"{platform.system().lower()}{bits}"
+
+
+def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        raise ConfigError("an FMU needs a C compiler.", hint="Install gcc.")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, data in sources.items():
+            (Path(folder) / name).write_bytes(data)
+        done = subprocess.run(
+            [compiler, *OPTIONS, *names, "-lm", "-o", "out.so"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode:
+            raise ResourceError(f"{compiler} cannot compile the FMU: {done.stderr.strip()}")
+        return (Path(folder) / "out.so").read_bytes()
+
+
+def _pack(file: IO[bytes], files: dict[str, bytes]) -> None:
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(files):
+            archive.writestr(zipfile.ZipInfo(name, EPOCH), files[name], zipfile.ZIP_DEFLATED)

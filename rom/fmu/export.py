@@ -1,0 +1,116 @@
+"""Write the FMU of a mechanism."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rom.errors import ConfigError
+from rom.fmu.archive import Content, write_archive
+from rom.fmu.description import Model, model_description
+from rom.fmu.server import SETTINGS
+from rom.fmu.variables import Variable
+from rom.io.files import check_writable
+
+FOLDER = "model"  # of the Python file, below the resources
+LONGEST = 600  # seconds to build the mechanism, its compilation included
+
+
+def write_fmu(
+    path: str | Path,
+    script: str | Path,
+    *,
+    inputs: tuple[str, ...] | list[str] = (),
+    outputs: tuple[str, ...] | list[str] = (),
+    dt: float,
+    rho_inf: float = 0.9,
+    files: tuple[str | Path, ...] | list[str | Path] = (),
+) -> Path:
+    """Write a mechanism as an FMU for co-simulation (FMI 2.0), see `rom.fmu`.
+
+    The mechanism is built by a Python file, for its functions of time cannot be written down
+    otherwise: a function ``mechanism()`` returns a `rom.Mechanism`. What it reads it must find in
+    its own folder, as in ``rom.load(Path(__file__).with_name("rod.rom.npz"))``; it is tried in an
+    empty folder before it is packed. The FMU runs where rom is installed, on POSIX systems.
+
+    Inputs replace functions of time and are held over a communication step: three components of a
+    force or torque [N, N m]; the amplitude of a spread load; the force or torque of a motor; for a
+    drive ``name.acceleration`` [rad/s^2 or m/s^2], from which its rate and coordinate follow
+    without jumps. Outputs are: of ``"body.marker"`` position, velocity, quaternion (marker to
+    world, scalar first) and angular velocity, all in the world; of a joint its angle, counted over
+    whole turns, or its way, with their rates; of a drive the load it supplies. Parameters are
+    ``dt`` and ``rho_inf``.
+
+    Args:
+        path: file ending in ``.fmu``.
+        script: Python file with the function ``mechanism``.
+        inputs: names of loads, spread loads, motors or drives.
+        outputs: "body.marker", names of joints or drives.
+        dt: longest time step [s]; a communication step is divided into equal ones.
+        rho_inf: spectral radius of generalised-alpha at infinite frequency.
+        files: what the Python file reads or imports; put beside it.
+
+    Raises:
+        ConfigError: for an unknown input or output, a file that is missing, a mechanism that
+            cannot be built from these files alone, no C compiler, or a place not writable.
+        ResourceError: if the compiler fails or the disk is full.
+    """
+    path, script = check_writable(path), Path(script)
+    if path.suffix != ".fmu":
+        raise ConfigError(f"{path} does not end in .fmu.")
+    if not (dt > 0.0 and 0.0 <= rho_inf <= 1.0):
+        raise ConfigError(f"dt = {dt} s must be positive, rho_inf = {rho_inf} within [0, 1].")
+    resources = {f"{FOLDER}/{p.name}": _read(p) for p in (script, *map(Path, files))}
+    settings: dict[str, Any] = {"script": f"{FOLDER}/{script.name}"}
+    settings |= {"inputs": list(inputs), "outputs": list(outputs)}
+    settings |= {"dt": float(dt), "rho_inf": float(rho_inf)}
+    resources[SETTINGS] = json.dumps(settings, indent=1).encode()
+    describe = partial(_description, script.stem, _variables(resources, script), float(dt))
+    return write_archive(path, Content(script.stem, "process.c", describe, resources))
+
+
+def _read(path: Path) -> bytes:
+    if not path.is_file():
+        raise ConfigError(f"there is no file {path}.")
+    return path.read_bytes()
+
+
+def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
+    """The variables as the FMU itself will find them, in a process and folder of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        place, empty, out = Path(folder, "resources"), Path(folder, "empty"), Path(folder, "out")
+        for name, data in resources.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_bytes(data)
+        empty.mkdir()
+        known = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", "rom.fmu", str(place), str(out)],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, known))},
+            cwd=empty,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=LONGEST,
+        )
+        if not out.exists():
+            last = (done.stderr.strip().splitlines() or ["no message"])[-1].replace(folder, "")
+            raise ConfigError(
+                f"{script.name} fails in a folder that holds only it and the files named: {last}",
+                hint="Name all files it needs, and let it look for them beside itself.",
+            )
+        found = json.loads(out.read_text())
+    if isinstance(found, dict):
+        raise ConfigError(found["error"], where=script.name)
+    return [Variable(**one) for one in found]
+
+
+def _description(
+    name: str, variables: list[Variable], dt: float, guid: str, identifier: str, names: Any
+) -> bytes:
+    about = f"Mechanism {name}, moved by rom, which must be installed where the FMU runs."
+    return model_description(Model(name, identifier, guid, True, names, dt, about), variables)

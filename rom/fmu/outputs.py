@@ -1,0 +1,103 @@
+"""Outputs: motion of markers, joint coordinates, loads of drives."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError
+from rom.fmu.variables import Variable, structured
+from rom.mbs.arrays import Work
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.packing import Packed
+from rom.mbs.parts import Marker
+from rom.model import Array
+from rom.rotation import quaternion
+
+# reads (W, lam, packed) at an instant
+Reading = Callable[[Work, Array, Packed], Any]
+MARKER = (
+    ("position", 3, "m", "world"),
+    ("velocity", 3, "m/s", "world"),
+    ("quaternion", 4, "1", "marker to world, scalar first"),
+    ("angular_velocity", 3, "rad/s", "world"),
+)
+
+
+class Outputs:
+    """What an FMU tells of its mechanism.
+
+    Args:
+        mechanism: joints asked for get a friction of zero, which lets the integrator count their
+            angles over whole turns.
+        names: "body.marker", names of joints with a coordinate, or names of drives.
+
+    Raises:
+        ConfigError: for a name that nothing has, or twice the same.
+    """
+
+    def __init__(self, mechanism: Mechanism, names: tuple[str, ...]):
+        self.variables: list[Variable] = []
+        self.readings: list[Reading] = []
+        places = {
+            f"{part.name}.{place}": part.marker(place)
+            for part in mechanism.parts.values()
+            for place in part.names
+        }
+        joints = {n: j for n, j in mechanism.joints.items() if j.coordinate is not None}
+        for name in names:
+            if list(names).count(name) > 1:
+                raise ConfigError(f"the output {name!r} is named twice.")
+            if name in places:
+                self._marker(places[name])
+            elif name in joints:
+                self._joint(mechanism, name)
+            elif name in mechanism.drives:
+                self._drive(mechanism, name)
+            else:
+                known = sorted([*places, *joints, *mechanism.drives])
+                raise ConfigError(f"no output {name!r}; there are {known}.")
+
+    def values(self, W: Work, lam: Array, packed: Packed) -> Array:
+        """(n,) all outputs after an evaluation of the mechanism."""
+        found = [np.ravel(read(W, lam, packed)) for read in self.readings]
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def _marker(self, marker: Marker) -> None:
+        for what, count, unit, axes in MARKER:
+            name = structured(marker.body, str(marker.place), what)
+            self.variables += [
+                Variable(f"{name}[{k}]", "output", unit, description=axes)
+                for k in range(1, count + 1)
+            ]
+        self.readings += [
+            lambda W, lam, packed: W.P[packed.row(marker)],
+            lambda W, lam, packed: W.V[packed.row(marker), :3],
+            lambda W, lam, packed: quaternion(W.E[packed.row(marker)]),
+            lambda W, lam, packed: W.V[packed.row(marker), 3:],
+        ]
+
+    def _joint(self, mechanism: Mechanism, name: str) -> None:
+        joint = mechanism.joints[name]
+        for what, row, unit in (("angle", joint.turn, "rad"), ("way", joint.way, "m")):
+            if row is None:
+                continue
+            k = len(mechanism.frictions)
+            mechanism.friction(f"{what} of {name}", name, transition_speed=1.0, coordinate=what)
+            self.variables += [
+                Variable(structured(name, what), "output", unit, description="from the start"),
+                Variable(structured(name, f"{what}_rate"), "output", f"{unit}/s"),
+            ]
+            self.readings += [_coordinate("x", k), _coordinate("xd", k)]
+
+    def _drive(self, mechanism: Mechanism, name: str) -> None:
+        joint = mechanism.joints[mechanism.drives[name].joint]
+        unit = "N.m" if joint.coordinate is joint.turn else "N"
+        about = "that the drive supplies along its joint coordinate"
+        self.variables.append(Variable(structured(name, "load"), "output", unit, None, about))
+        self.readings.append(lambda W, lam, packed: -lam[packed.rows_of(name)[0]])
+
+
+def _coordinate(what: str, k: int) -> Reading:
+    """Coordinate or rate that friction k follows."""
+    return lambda W, lam, packed: getattr(W, what)[packed.system.actions.friction_at[k]]

@@ -1,0 +1,149 @@
+"""The other end of the socket: the mechanism of one FMU instance, asked by its library.
+
+A request is three int32 (verb, number of references, number of values), then the references as
+uint32 and the values as doubles. An answer is three int32 (status, number of values, length of the
+text), then values and text. The verbs are those of ``c/process.c``.
+"""
+
+import importlib.util
+import json
+import socket
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, RomError
+from rom.fmu.driven import Driven
+from rom.mbs.mechanism import Mechanism
+from rom.model import Array, Index
+
+SETTINGS, FUNCTION = "fmu.json", "mechanism"
+OK, ERROR = 0, 3
+HEAD = struct.Struct("=iii")
+NONE = np.zeros(0)
+
+
+def driven(resources: Path) -> Driven:
+    """The mechanism that the resources of an FMU describe.
+
+    Raises:
+        ConfigError: if the Python file has no function ``mechanism``, or that gives no Mechanism,
+            or an input or output is unknown.
+    """
+    settings = json.loads((resources / SETTINGS).read_text())
+    script = resources / settings["script"]
+    sys.path.insert(0, str(script.parent))
+    spec: Any = importlib.util.spec_from_file_location(script.stem, script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    build = getattr(module, FUNCTION, None)
+    if not callable(build):
+        raise ConfigError(f"{script.name} has no function {FUNCTION}() that builds the mechanism.")
+    mechanism = build()
+    if not isinstance(mechanism, Mechanism):
+        raise ConfigError(f"{FUNCTION}() of {script.name} gave {mechanism!r}, not a Mechanism.")
+    names = {key: tuple(settings[key]) for key in ("inputs", "outputs")}
+    return Driven(mechanism, **names, dt=settings["dt"], rho_inf=settings["rho_inf"])
+
+
+class Server:
+    """Answers requests about one mechanism.
+
+    Args:
+        build: makes the mechanism as it is before the start.
+    """
+
+    def __init__(self, build: Callable[[], Driven]):
+        self.build, self.model = build, build()
+        self.states: dict[int, Any] = {}
+        self.count = 0
+        self.verbs: dict[int, Callable[[Index, Array], Array]] = {
+            1: self._set,
+            2: lambda refs, values: self.model.get(refs),
+            3: self._start,
+            4: self._step,
+            5: self._keep,
+            6: self._recall,
+            7: self._drop,
+            8: self._reset,
+        }
+
+    def answer(self, verb: int, refs: Index, values: Array) -> tuple[int, Array, str]:
+        """Status, values and message; never an exception, for the caller is another program."""
+        try:
+            return OK, self.verbs[verb](refs, values), ""
+        except RomError as error:
+            return ERROR, NONE, str(error)
+        except Exception as error:  # whatever the user's own functions raise
+            return ERROR, NONE, f"{type(error).__name__}: {error}"
+
+    def _set(self, refs: Index, values: Array) -> Array:
+        self.model.set(refs, values)
+        return NONE
+
+    def _start(self, refs: Index, values: Array) -> Array:
+        self.model.start(float(values[0]))
+        return NONE
+
+    def _step(self, refs: Index, values: Array) -> Array:
+        self.model.step(float(values[0]), float(values[1]))
+        return NONE
+
+    def _keep(self, refs: Index, values: Array) -> Array:
+        self.count += 1
+        self.states[self.count] = self.model.keep()
+        return np.array([float(self.count)])
+
+    def _recall(self, refs: Index, values: Array) -> Array:
+        if int(values[0]) not in self.states:
+            raise ConfigError("this state has been freed, or is of another instance.")
+        self.model.recall(self.states[int(values[0])])
+        return NONE
+
+    def _drop(self, refs: Index, values: Array) -> Array:
+        self.states.pop(int(values[0]), None)
+        return NONE
+
+    def _reset(self, refs: Index, values: Array) -> Array:
+        self.model = self.build()
+        return NONE
+
+
+def serve(connection: socket.socket, build: Callable[[], Driven]) -> None:
+    """Answer until the other end closes; the first answer says whether the mechanism is there."""
+    try:
+        server = Server(build)
+    except Exception as error:  # the Python file is the user's
+        kind = "" if isinstance(error, RomError) else f"{type(error).__name__}: "
+        _send(connection, ERROR, NONE, f"{kind}{error}")
+        return
+    _send(connection, OK, NONE, "")
+    while (head := _receive(connection, HEAD.size)) is not None:
+        verb, n_refs, n_values = HEAD.unpack(head)
+        data = _receive(connection, 4 * n_refs + 8 * n_values)
+        if data is None:
+            return
+        refs = np.frombuffer(data, np.uint32, n_refs).astype(np.int64)
+        values = np.frombuffer(data, float, n_values, 4 * n_refs)
+        _send(connection, *server.answer(verb, refs, values))
+
+
+def _send(connection: socket.socket, status: int, values: Array, text: str) -> None:
+    words = text.encode()
+    head = HEAD.pack(status, values.size, len(words))
+    connection.sendall(head + np.ascontiguousarray(values, dtype=float).tobytes() + words)
+
+
+def _receive(connection: socket.socket, size: int) -> bytes | None:
+    """So many bytes, or None at the end."""
+    data = b""
+    while len(data) < size:
+        more = connection.recv(size - len(data))
+        if not more:
+            return None
+        data += more
+    return data
