@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rom.fmu.export import write_fmu
     from rom.io.export import export
     from rom.io.family import load, save
+    from rom.io.fmu.body import write_body_fmu
     from rom.io.foreign_model import read_model
     from rom.io.history import write_history
     from rom.io.sid_dialect import read_sid
@@ -155,6 +156,7 @@ __all__ = [
     "transmissibility",
     "travelling_modes",
     "write_animation",
+    "write_body_fmu",
     "write_fmu",
     "write_history",
     "write_report",
@@ -243,6 +245,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "surface_load": "body.spread",
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",
+    "write_body_fmu": "io.fmu.body",
     "write_fmu": "fmu.export",
     "write_history": "io.history",
     "travelling_modes": "cyclic.travelling",

@@ -1,6 +1,5 @@
 """Mechanisms as FMUs, run by fmpy as another program would run them."""
 
-import importlib
 import os
 import signal
 import sys
@@ -11,18 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmu_instance import Instance, fmpy
 from mbs_cases import random_body, simulate_quietly, slider_crank
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from rom.errors import ConfigError, RomWarning
 from rom.fmu.driven import Driven
-from rom.fmu.variables import structured
+from rom.io.fmu.variables import structured
 from rom.mbs.mechanism import Mechanism
 
-fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
-for part in ("fmi1", "fmi2", "validation"):
-    importlib.import_module(f"fmpy.{part}")
 ROOT = Path(__file__).parents[1]
 CRANK = """
 from mbs_cases import slider_crank
@@ -68,46 +65,6 @@ def crank(tmp_path_factory):
             folder / "crank.fmu", script, inputs=["gas"], outputs=["slider.b", "main"],
             dt=1e-3,
         )  # fmt: skip
-
-
-class Instance:
-    """An FMU as another program holds it, by the names of its variables."""
-
-    def __init__(self, path, tmp_path, guid=None, log=None):
-        self.description = fmpy.read_model_description(str(path))
-        self.refs = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.folder = fmpy.extract(str(path), str(tmp_path / "a folder"))
-        self.log = [] if log is None else log
-        self.fmu = fmpy.fmi2.FMU2Slave(
-            guid=guid or self.description.guid, unzipDirectory=self.folder, instanceName="one",
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-        self.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
-            lambda environment, name, status, category, text: self.log.append(text.decode())
-        )
-        callbacks.logger = self.logger
-        self.fmu.instantiate(callbacks=callbacks)
-
-    def begin(self, **start):
-        for name, value in start.items():
-            self.set(name, value)
-        self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-        return self
-
-    def set(self, name, value):
-        self.fmu.setReal([self.refs[name]], [value])
-
-    def get(self, *names):
-        return np.array(self.fmu.getReal([self.refs[name] for name in names]))
-
-    def fails(self, call, *arguments):
-        """The message of a call that answers with fmi2Error."""
-        with pytest.raises(fmpy.fmi1.FMICallException, match=r"status 3 \(error\)"):
-            call(*arguments)
-        return self.log[-1]
 
 
 def crank_by_hand(function=None):

@@ -11,6 +11,9 @@ The archive holds the Python file that builds the mechanism and the files it rea
 compiled at export by gcc for POSIX systems, and the C source of the library. The interpreter is the
 one that the environment variable ROM_PYTHON names, else python3.
 
+A body alone, in small motions, needs none of this: `rom.io.fmu.body` writes its linear equations
+as C code.
+
 Inputs are held over a communication step H, so that an input that follows a smooth function costs
 an error of order H; the time steps themselves have order two.
 """

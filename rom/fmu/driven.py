@@ -8,7 +8,7 @@ import numpy as np
 from rom.errors import ConfigError, SolverError
 from rom.fmu.inputs import Inputs
 from rom.fmu.outputs import Outputs
-from rom.fmu.variables import Variable
+from rom.io.fmu.variables import Variable
 from rom.mbs.arrays import Work, workspace
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rom.errors import ConfigError
-from rom.fmu.archive import Content, write_archive
-from rom.fmu.description import Model, model_description
 from rom.fmu.server import SETTINGS
-from rom.fmu.variables import Variable
 from rom.io.files import check_writable
+from rom.io.fmu.archive import Content, write_archive
+from rom.io.fmu.description import Model, model_description
+from rom.io.fmu.variables import Variable
 
 FOLDER = "model"  # of the Python file, below the resources
 LONGEST = 600  # seconds to build the mechanism, its compilation included

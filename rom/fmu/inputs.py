@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.fmu.variables import Variable, structured
+from rom.io.fmu.variables import Variable, structured
 from rom.mbs.connections import Drive
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.signals import drive_signal

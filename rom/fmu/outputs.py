@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.fmu.variables import Variable, structured
+from rom.io.fmu.variables import Variable, structured
 from rom.mbs.arrays import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed

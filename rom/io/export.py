@@ -8,6 +8,7 @@ from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.dmig import write_dmig
 from rom.io.exudyn import write_exudyn
+from rom.io.fmu.body import write_body_fmu
 from rom.io.interface_form import InterfaceForm, interface_form
 from rom.io.mbdyn import write_mbdyn
 from rom.io.native import load, save
@@ -47,6 +48,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "exudyn": (".py", write_exudyn),
     "mbdyn": (".fem", write_mbdyn),
     "simscape": (".mat", write_simscape),
+    "fmu": (".fmu", write_body_fmu),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
 }
@@ -62,8 +64,9 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
             Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
             (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "exudyn" for a Python module that adds
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
-            Order Flexible Solid; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
-            ``.dmig``, ``.op4``, ``.py``, ``.fem``, ``.mat``.
+            Order Flexible Solid, "fmu" for a Functional Mock-up Unit of its small motions, see
+            `rom.write_body_fmu`; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
+            ``.dmig``, ``.op4``, ``.py``, ``.fem``, ``.mat``, ``.fmu``.
 
     Raises:
         ConfigError: if the format or the ending is not known, or the place is not writable.

@@ -1,6 +1,5 @@
 /* FMI 2.0 for co-simulation around a model, see model.h. Only real variables; inputs are held
    over a step. Source: Functional Mock-up Interface for Model Exchange and Co-Simulation 2.0. */
-#define _POSIX_C_SOURCE 200809L
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +27,11 @@ typedef struct {
     double start, reached;
 } Instance;
 
+#ifdef _WIN32
+#define API __declspec(dllexport)
+#else
 #define API __attribute__((visibility("default")))
+#endif
 
 /* The logger formats its text like printf. */
 static void tell(const Callbacks *callbacks, String name, int status, String message)
@@ -123,7 +126,9 @@ API void *fmi2Instantiate(String name, int type, String guid, String resources,
     (void)visible, (void)logging;
     if (x) {
         x->callbacks = *callbacks;
-        x->name = strdup(name ? name : "");
+        x->name = malloc(strlen(name ? name : "") + 1);
+        if (x->name)
+            strcpy(x->name, name ? name : "");
         if (type != 1)
             strcpy(message, "this FMU is for co-simulation, not for model exchange.");
         else if (!guid || strcmp(guid, GUID))

@@ -7,7 +7,7 @@ Source:
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 
-from rom.fmu.variables import Variable
+from rom.io.fmu.variables import Variable
 
 # exponents of kg, m, s, rad
 UNITS = {

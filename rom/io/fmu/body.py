@@ -1,0 +1,125 @@
+"""The FMU of a body: forces on its interfaces in, their motion out, without Python.
+
+The FMU is the C code of the linear equations, with their matrices inside. It is for small motions
+about the place in which the body was meshed: of a body that is held, of one on soft springs that
+the other program knows, or of a free one as long as its rotation stays small. Bodies that turn
+belong into a mechanism, see `rom.fmu`.
+"""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from rom.body.flexible import FlexibleBody
+from rom.errors import ConfigError
+from rom.io.files import check_writable
+from rom.io.fmu.archive import Content, write_archive
+from rom.io.fmu.description import Model, model_description
+from rom.io.fmu.variables import Variable, structured
+from rom.model import Array
+
+INPUTS = (("force", "N"), ("torque", "N.m"))
+OUTPUTS = (
+    ("displacement", "m"),
+    ("rotation", "rad"),
+    ("velocity", "m/s"),
+    ("angular_velocity", "rad/s"),
+)
+STEPS = 20  # communication steps that are proposed for the period of the first vibration
+
+
+def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ...] = ()) -> Path:
+    """Write a body as an FMU for co-simulation (FMI 2.0) that needs nothing where it runs.
+
+    Inputs are ``interface.force[1..3]`` [N] and ``interface.torque[1..3]`` [N m] of each interface,
+    and ``gravity[1..3]`` [m/s^2], minus the acceleration of the ground for a body that is held;
+    outputs are small ``displacement`` [m], ``rotation`` [rad], ``velocity`` and
+    ``angular_velocity`` of each interface, all in the axes of the geometry. The body starts at rest
+    and undeformed. Inputs are held over a communication step, which then is exact, whatever its
+    length; a smooth input costs an error of the order of the step.
+
+    The archive holds a library for this kind of machine, compiled by gcc, and its C source.
+
+    Args:
+        body: with at least one interface, in SI units.
+        path: file ending in ``.fmu``.
+        fixed: interfaces that are held; they take loads too, which do not move them.
+
+    Raises:
+        ConfigError: if the body has no interface or other units, there is no C compiler, or the
+            place is not writable.
+        InterfaceError: if a fixed interface is unknown.
+        ModelError: if an interface of a basis of free-free modes alone is held.
+        ResourceError: if the compiler fails or the disk is full.
+    """
+    path = check_writable(path)
+    if not body.markers or body.units != "SI":
+        what = f"has the units {body.units}" if body.markers else "has no interface"
+        raise ConfigError(f"body {body.name!r} {what}; an FMU needs interfaces and SI units.")
+    omega, V = body.modes(fixed=fixed)
+    if not omega.size:
+        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
+    first = omega[omega > 0.0][:1] / (2 * np.pi)
+    step = 1.0 / (STEPS * float(first[0])) if first.size else 1e-3
+    describe = partial(_description, body.name, _variables(body), step)
+    content = Content(body.name, "linear.c", describe, data=_tables(body, omega, V))
+    return write_archive(path, content)
+
+
+def interface_motion(body: FlexibleBody) -> Array:
+    """(6 i, 6 + r) displacement and rotation of all i interfaces per rigid and elastic motion."""
+    blocks = []
+    for marker in body.markers.values():
+        x, y, z = marker.point
+        across = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # a x p = across a
+        blocks.append(np.hstack([np.eye(3), across, marker.translation]))
+        blocks.append(np.hstack([np.zeros((3, 3)), np.eye(3), marker.rotation]))
+    return np.vstack(blocks)
+
+
+def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:
+    """The numbers of the equations as C text."""
+    D = np.zeros((6 + body.n_modes,) * 2)
+    D[6:, 6:] = body.D
+    motion = interface_motion(body) @ V
+    fall = body.full_matrices()[0][:, :3]
+    tables = {
+        "OMEGA": omega,
+        "XI": V.T @ D @ V,
+        "LOADS": np.hstack([motion.T, V.T @ fall]),
+        "MOTION": motion,
+    }
+    sizes = f"enum {{ MODES = {omega.size}, INTERFACES = {len(body.markers)} }};\n"
+    return sizes + "".join(_table(name, A) for name, A in tables.items())
+
+
+def _table(name: str, A: Array) -> str:
+    numbers = ",\n".join(float(x).hex() for x in np.ravel(A))
+    return f"static const double {name}[{A.size}] = {{\n{numbers}}};\n"
+
+
+def _variables(body: FlexibleBody) -> list[Variable]:
+    names = body.interface_names
+    inputs = [_three((name, what), "input", unit) for name in names for what, unit in INPUTS]
+    inputs.append(_three(("gravity",), "input", "m/s2"))
+    outputs = [_three((name, what), "output", unit) for name in names for what, unit in OUTPUTS]
+    return [variable for several in inputs + outputs for variable in several]
+
+
+def _three(parts: tuple[str, ...], causality: str, unit: str) -> list[Variable]:
+    start = 0.0 if causality == "input" else None
+    name = structured(*parts)
+    return [Variable(f"{name}[{k}]", causality, unit, start) for k in (1, 2, 3)]
+
+
+def _description(
+    name: str,
+    variables: list[Variable],
+    step: float,
+    guid: str,
+    identifier: str,
+    sources: tuple[str, ...],
+) -> bytes:
+    about = f"Small motions of the flexible body {name}, inputs held over a step."
+    return model_description(Model(name, identifier, guid, False, sources, step, about), variables)
