@@ -298,6 +298,18 @@ def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     one.fmu.freeInstance()
 
 
+def test_a_warning_is_logged_once(crank, tmp_path):
+    """That constraints repeat each other does not stop a run."""
+    one = Instance(crank, tmp_path).begin()
+    (text,) = one.log
+    assert "3 of 20 constraints repeat others" in text
+    one.fmu.reset()
+    one.begin()
+    one.fmu.doStep(0.0, 1e-3)
+    assert len(one.log) == 1
+    one.fmu.freeInstance()
+
+
 def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
     one, other = (Instance(hanging, tmp_path / name).begin() for name in ("one", "other"))
     commands = {int(p.parent.name): p.read_bytes() for p in Path("/proc").glob("[0-9]*/cmdline")}

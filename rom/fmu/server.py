@@ -2,7 +2,8 @@
 
 A request is three int32 (verb, number of references, number of values), then the references as
 uint32 and the values as doubles. An answer is three int32 (status, number of values, length of the
-text), then values and text. The verbs are those of ``c/process.c``.
+text), then values and text, which is an error or, with the status OK, a warning. The verbs are
+those of ``rom/io/fmu/c/process.c``.
 """
 
 import importlib.util
@@ -10,13 +11,14 @@ import json
 import socket
 import struct
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, RomError
+from rom.errors import ConfigError, RomError, RomWarning
 from rom.fmu.driven import Driven
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Index
@@ -61,6 +63,7 @@ class Server:
         self.build, self.model = build, build()
         self.states: dict[int, Any] = {}
         self.count = 0
+        self.told: set[str] = set()
         self.verbs: dict[int, Callable[[Index, Array], Array]] = {
             1: self._set,
             2: lambda refs, values: self.model.get(refs),
@@ -73,13 +76,21 @@ class Server:
         }
 
     def answer(self, verb: int, refs: Index, values: Array) -> tuple[int, Array, str]:
-        """Status, values and message; never an exception, for the caller is another program."""
-        try:
-            return OK, self.verbs[verb](refs, values), ""
-        except RomError as error:
-            return ERROR, NONE, str(error)
-        except Exception as error:  # whatever the user's own functions raise
-            return ERROR, NONE, f"{type(error).__name__}: {error}"
+        """Status, values and message; never an exception, for the caller is another program.
+
+        A warning comes once for each instance, as the message of an answer that is OK.
+        """
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                found = self.verbs[verb](refs, values)
+            except RomError as error:
+                return ERROR, NONE, str(error)
+            except Exception as error:  # whatever the user's own functions raise
+                return ERROR, NONE, f"{type(error).__name__}: {error}"
+        new = {str(w.message) for w in caught if issubclass(w.category, RomWarning)} - self.told
+        self.told |= new
+        return OK, found, " ".join(sorted(new))
 
     def _set(self, refs: Index, values: Array) -> Array:
         self.model.set(refs, values)

@@ -69,7 +69,8 @@ def model_description(model: Model, variables: list[Variable]) -> bytes:
         powers = {key: str(value) for key, value in UNITS[name].items()}
         ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", powers)
     categories = ET.SubElement(root, "LogCategories")
-    ET.SubElement(categories, "Category", name="logStatusError")
+    for name in ("logStatusError", "logStatusWarning"):
+        ET.SubElement(categories, "Category", name=name)
     ET.SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(model.step))
     listed = ET.SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):

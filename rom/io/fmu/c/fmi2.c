@@ -46,13 +46,14 @@ static void tell(const Callbacks *callbacks, String name, int status, String mes
         text[k++] = *message;
     }
     text[k] = 0;
-    callbacks->logger(callbacks->environment, name, status, "logStatusError", text);
+    callbacks->logger(callbacks->environment, name, status,
+                      status == WARNING ? "logStatusWarning" : "logStatusError", text);
 }
 
 static int answer(Instance *x, int status, String message)
 {
-    if (status != OK)
-        tell(&x->callbacks, x->name, status, message);
+    if (*message)
+        tell(&x->callbacks, x->name, status == OK ? WARNING : status, message);
     return status;
 }
 

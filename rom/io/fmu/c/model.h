@@ -1,11 +1,11 @@
-/* What an FMU needs of the model behind it. All functions answer OK, DISCARD or ERROR, and put a
-   sentence into message when they do not answer OK. */
+/* What an FMU needs of the model behind it. All functions answer OK or ERROR; ERROR comes with a
+   sentence in message, OK with one if the user is to be warned. */
 #ifndef MODEL_H
 #define MODEL_H
 
 #include <stddef.h>
 
-enum { OK = 0, DISCARD = 2, ERROR = 3 }; /* numbers of fmi2Status */
+enum { OK = 0, WARNING = 1, ERROR = 3 }; /* numbers of fmi2Status */
 enum { MESSAGE = 2048 };
 
 typedef struct Model Model;
