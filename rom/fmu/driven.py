@@ -187,12 +187,9 @@ class Driven:
 
     def _jumped(self, state: State) -> State:
         """The state with what the change of inputs since the last step does to accelerations."""
-        if np.array_equal(self.held, self.inputs.values):
+        if state.memory is None or np.array_equal(self.held, self.inputs.values):
             return state
-        after = self._accelerated(state)
-        if state.memory is None or state.algorithmic is None:
-            return after
-        now = self.inputs.values.copy()
+        after, now = self._accelerated(state), self.inputs.values.copy()
         self.inputs.values[:] = self.held
         before = self._accelerated(state)
         self.inputs.values[:] = now
