@@ -57,12 +57,12 @@ def python_with_rom(monkeypatch):
 @pytest.fixture(scope="module")
 def crank(tmp_path_factory):
     folder = tmp_path_factory.mktemp("crank")
-    script = folder / "slider crank.py"
+    script = folder / "crank.py"
     script.write_text(CRANK)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT / "tests"))
         return rom.write_fmu(
-            folder / "crank.fmu", script, inputs=["gas"], outputs=["slider.b", "main"],
+            folder / "slider crank.fmu", script, inputs=["gas"], outputs=["slider.b", "main"],
             dt=1e-3,
         )  # fmt: skip
 

@@ -69,8 +69,8 @@ def write_fmu(
     settings |= {"inputs": list(inputs), "outputs": list(outputs)}
     settings |= {"dt": float(dt), "rho_inf": float(rho_inf)}
     resources[SETTINGS] = json.dumps(settings, indent=1).encode()
-    describe = partial(_description, script.stem, _variables(resources, script), float(dt))
-    return write_archive(path, Content(script.stem, "process.c", describe, resources))
+    describe = partial(_description, path.stem, _variables(resources, script), float(dt))
+    return write_archive(path, Content(path.stem, "process.c", describe, resources))
 
 
 def _read(path: Path) -> bytes:

@@ -26,6 +26,7 @@ OUTPUTS = (
     ("velocity", "m/s"),
     ("angular_velocity", "rad/s"),
 )
+ROUND_OFF = 1e-12  # share of the damping of two modes below which they count as not coupled
 STEPS = 20  # communication steps that are proposed for the period of the first vibration
 
 
@@ -62,8 +63,8 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
         raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
     first = omega[omega > 0.0][:1] / (2 * np.pi)
     step = 1.0 / (STEPS * float(first[0])) if first.size else 1e-3
-    describe = partial(_description, body.name, _variables(body), step)
-    content = Content(body.name, "linear.c", describe, data=_tables(body, omega, V))
+    describe = partial(_description, path.stem, _variables(body), step)
+    content = Content(path.stem, "linear.c", describe, data=_tables(body, omega, V))
     return write_archive(path, content)
 
 
@@ -80,18 +81,24 @@ def interface_motion(body: FlexibleBody) -> Array:
 
 def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:
     """The numbers of the equations as C text."""
-    D = np.zeros((6 + body.n_modes,) * 2)
-    D[6:, 6:] = body.D
     motion = interface_motion(body) @ V
     fall = body.full_matrices()[0][:, :3]
     tables = {
         "OMEGA": omega,
-        "XI": V.T @ D @ V,
+        "XI": _modal_damping(body, omega, V),
         "LOADS": np.hstack([motion.T, V.T @ fall]),
         "MOTION": motion,
     }
     sizes = f"enum {{ MODES = {omega.size}, INTERFACES = {len(body.markers)} }};\n"
     return sizes + "".join(_table(name, A) for name, A in tables.items())
+
+
+def _modal_damping(body: FlexibleBody, omega: Array, V: Array) -> Array:
+    """(m, m) damping of the modes, without the round-off that would fill the propagator."""
+    XI: Array = V[6:].T @ body.D @ V[6:]
+    size = np.where(omega > 0.0, np.sqrt(np.abs(np.diag(XI))), 0.0)  # rigid motion is not damped
+    pairs = np.outer(size, size)
+    return np.where((pairs > 0.0) & (np.abs(XI) > ROUND_OFF * pairs), XI, 0.0)
 
 
 def _table(name: str, A: Array) -> str:
