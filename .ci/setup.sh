@@ -8,6 +8,8 @@ cd "$(dirname "$0")/.."
 packages="python3-dolfinx python3-petsc4py python3-slepc4py python3-gmsh python3-meshio
   python3-scipy python3-numba python3-h5py python3-venv python3-dev libopenblas0-pthread
   gcc g++ pkg-config libgl1 libegl1 libxrender1"
+# programs that tests compare with, a few MB; where they cannot be had, those tests are skipped
+optional="calculix-ccx"
 
 fail() {
   echo "setup: $1" >&2
@@ -39,6 +41,22 @@ fi
 # A stamp holds the checksum of everything an environment depends on; where it fits, nothing is done.
 wanted=$({ pwd; /usr/bin/python3 -V; cat Makefile pyproject.toml constraints.txt .ci/setup.sh \
   .ci/light.txt; } | sha256sum)
+
+try_optional() {
+  missing=""
+  for package in $optional; do
+    installed "$package" || missing="$missing $package"
+  done
+  [ -n "$missing" ] || return 0
+  as_root=""
+  [ "$(id -u)" -eq 0 ] || as_root="sudo -n"
+  # shellcheck disable=SC2086
+  { $as_root apt-get update -qq &&
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+      $missing; } >/dev/null 2>&1 || echo "setup: not installed:$missing; some tests are skipped" >&2
+}
+
+[ "$(cat .venv/.stamp 2>/dev/null)" = "$wanted" ] || try_optional
 
 environment() { # folder, options of venv, what pip installs
   [ -x "$1/bin/python" ] && [ "$(cat "$1/.stamp" 2>/dev/null)" = "$wanted" ] && return

@@ -56,6 +56,17 @@ def test_a_system_without_debian_packages_is_told_so(tmp_path):
     assert "no Debian" in done.stderr and "README" in done.stderr
 
 
+def test_programs_to_compare_with_are_not_needed(tmp_path):
+    """The function of the script, where nothing is installed and nothing can be."""
+    function = re.search(r"^try_optional\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
+    script = f"set -eu\noptional=calculix-ccx\ninstalled() {{ false; }}\n{function}\ntry_optional\n"
+    done = subprocess.run(["sh", "-c", script], env=deny_network(tmp_path), capture_output=True,
+                          text=True, timeout=20, check=False)  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "")
+    assert "not installed: calculix-ccx; some tests are skipped" in done.stderr
+    assert 'optional="calculix-ccx"' in SETUP.read_text()
+
+
 def test_scripts_are_valid_shell():
     for script in (SETUP, ROOT / ".ci" / "run", ROOT / ".ci" / "newer_dolfinx.sh"):
         assert os.access(script, os.X_OK), f"{script} is not executable"

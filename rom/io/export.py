@@ -17,6 +17,7 @@ from rom.io.sid import write_sid
 from rom.io.sid_body import sid_body, standard_input
 from rom.io.sid_dialect import read_sid
 from rom.io.simscape import write_simscape
+from rom.io.user_element import write_user_element
 from rom.io.vtu import write_vtu
 
 SID = ".sid_fem"
@@ -39,12 +40,19 @@ def _write_dmig(body: FlexibleBody, path: str | Path) -> Path:
     return write_dmig(_nastran(form), form.dofs, path, nodes=form.points)
 
 
+def _write_abaqus(body: FlexibleBody, path: str | Path) -> Path:
+    form = interface_form(body)
+    matrices = {"STIFFNESS": form.K, "MASS": form.M}
+    return write_user_element(matrices, form.dofs, path, nodes=form.points)
+
+
 FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
     "npz": (".npz", save),
     "vtu": (".vtu", write_vtu),
     "sid": (SID, partial(_write_sid, dialect="fembs")),
     "dmig": (".dmig", _write_dmig),
     "op4": (".op4", _write_op4),
+    "abaqus": (".inp", _write_abaqus),
     "exudyn": (".py", write_exudyn),
     "mbdyn": (".fem", write_mbdyn),
     "simscape": (".mat", write_simscape),
@@ -62,11 +70,12 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
         path: file to write.
         to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
             Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
-            (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "exudyn" for a Python module that adds
+            (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "abaqus" for a linear user element with
+            stiffness and mass but no damping, "exudyn" for a Python module that adds
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
             Order Flexible Solid, "fmu" for a Functional Mock-up Unit of its small motions, see
             `rom.write_body_fmu`; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
-            ``.dmig``, ``.op4``, ``.py``, ``.fem``, ``.mat``, ``.fmu``.
+            ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.fmu``.
 
     Raises:
         ConfigError: if the format or the ending is not known, or the place is not writable.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-from rom.errors import ConfigError, ResourceError
+from rom.errors import ConfigError, FileFormatError, ResourceError
 
 
 def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -54,6 +54,25 @@ def check_writable(path: str | Path) -> Path:
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise ConfigError(f"the folder {path.parent} is not writable.")
     return path
+
+
+def check_last_line(path: Path) -> None:
+    """For programs that end every line: a number that is cut would still be a number.
+
+    Raises:
+        FileFormatError: if the file is missing or empty, or its last line is not ended.
+    """
+    if not path.is_file():
+        raise FileFormatError("there is no such file.", where=str(path))
+    with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - 1, 0))
+        if file.read(1) != b"\n":
+            raise FileFormatError(
+                "the last line is cut." if size else "the file is empty.",
+                where=str(path),
+                hint="Let the program that made it write it again.",
+            )
 
 
 def _fill(handle: int, write: Callable[[IO[bytes]], object]) -> None:

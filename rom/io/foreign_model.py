@@ -35,7 +35,8 @@ def read_model(
         M: mass, likewise; the same along x, y and z, as that of solid elements.
         nodes: (k,) labels and (k, 3) positions; or a file: ``.inp`` with ``*NODE``, ``.bdf`` or
             ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``. Rows of matrices
-            without labels are those of the nodes in ascending order, 3 or 6 for each.
+            without labels are those of the nodes in ascending order, 3 or 6 for each; where all
+            rows have labels, nodes without a row are left out.
         interfaces: {name: labels of its nodes}, or names of ``*NSET`` in the ``.inp`` of the nodes;
             all nodes of an interface weigh the same.
         units: unit system of the files; the model is in SI.
@@ -54,7 +55,9 @@ def read_model(
     if not isinstance(interfaces, Mapping):
         names = (interfaces,) if isinstance(interfaces, str) else tuple(interfaces)
         interfaces = read_node_sets(_deck(nodes), names)
-    stiffness, mass = (_placed(read_matrix(source), labels) for source in (K, M))
+    found = [read_matrix(source) for source in (K, M)]
+    labels, points = _used(labels, points, found)
+    stiffness, mass = (_placed(A, labels) for A in found)
     model = FEModel(
         stiffness * (unit.force / unit.length),
         mass * unit.mass,
@@ -72,6 +75,15 @@ def _deck(nodes: Any) -> Path:
     if not isinstance(nodes, str | Path):
         raise ConfigError("names of interfaces are looked up in the .inp file of the nodes.")
     return Path(nodes)
+
+
+def _used(labels: Index, points: Array, found: list[NamedMatrix]) -> tuple[Index, Array]:
+    """Nodes without those in no row, as decks carry them for loads and pictures."""
+    rows = [A.dofs[:, 0] for A in found if A.dofs is not None]
+    if len(rows) < len(found):
+        return labels, points
+    used = np.isin(labels, np.concatenate(rows))
+    return labels[used], points[used]
 
 
 def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:

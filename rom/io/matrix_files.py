@@ -9,12 +9,15 @@ from scipy.io import mmread
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.io.calculix import STORED, read_stored_matrix
 from rom.io.dmig import Dofs, read_dmig
 from rom.io.files import write_whole
 from rom.io.op4 import read_op4
+from rom.io.user_element import read_user_element
 
 LARGEST = 2**32  # bytes of a file that is still read
 BANNER = b"%%MatrixMarket"
+HEAD = 10_000  # bytes among which a user element is announced
 MOST_ROWS = 10_000_000
 
 
@@ -34,12 +37,14 @@ class NamedMatrix:
 
 
 def read_matrix(source: Any) -> NamedMatrix:
-    """A square matrix: Matrix Market, Abaqus, OUTPUT4, or DMIG.
+    """A square matrix: Matrix Market, Abaqus, CalculiX, OUTPUT4, or DMIG.
 
     Args:
         source: file, or (file, name) where it holds several: ``.mtx`` and ``.mm`` for Matrix Market
-            (told by its first line) or Abaqus text, ``.op4`` for OUTPUT4, ``.bdf``, ``.dat``,
-            ``.pch``, ``.dmig`` for DMIG cards.
+            (told by its first line) or Abaqus text, matrices or a linear user element, the latter
+            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with
+            ``.dof`` beside, ``.op4`` for OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG
+            cards.
 
     Raises:
         ConfigError: for another ending, or if a name is needed or unknown.
@@ -92,13 +97,19 @@ def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
         return {name: (A, None) for name, A in read_op4(path).items()}
     if ending in (".bdf", ".dat", ".pch", ".dmig"):
         return dict(read_dmig(path))
-    if ending not in (".mtx", ".mm"):
+    if ending in STORED:
+        A, dofs = read_stored_matrix(path)
+        return {"": (_finite(A, path), dofs)}
+    if ending not in (".mtx", ".mm", ".inp"):
         raise ConfigError(
-            f"{path} has the ending {ending!r}; known: .mtx, .mm, .op4, .bdf, .dat, .pch, .dmig."
+            f"{path} has the ending {ending!r}; known: .mtx, .mm, .inp, .sti, .mas, "
+            ".op4, .bdf, .dat, .pch, .dmig."
         )
     with path.open("rb") as file:
-        market = file.read(len(BANNER)) == BANNER
-    return {"": (_market(path), None) if market else _abaqus(path)}
+        start = file.read(HEAD)
+    if ending == ".inp" or b"*USER ELEMENT" in start.upper():
+        return dict(read_user_element(path))
+    return {"": (_market(path), None) if start.startswith(BANNER) else _abaqus(path)}
 
 
 def _market(path: Path) -> Any:
@@ -128,12 +139,6 @@ def _abaqus(path: Path) -> tuple[Any, Dofs]:
     rows = []
     with path.open(encoding="ascii", errors="replace") as file:
         for number, line in enumerate(file, 1):
-            if line.upper().startswith("*USER"):
-                raise FileFormatError(
-                    "the form of a linear user element is not read.",
-                    where=f"{path}, line {number}",
-                    hint="Ask Abaqus for MATRIX INPUT form.",
-                )
             if not line.strip() or line.startswith("*"):
                 continue
             words = line.replace(",", " ").split()
