@@ -3,6 +3,7 @@
 import argparse
 
 from rom.cli.answer import Answer, table
+from rom.cli.matrices import add_matrices
 from rom.cli.options import (
     add_geometry,
     add_interfaces,
@@ -18,6 +19,7 @@ EXAMPLES = """\
   rom modes meshes/beam.geo --E 210e9 --nu 0.3 --rho 7850 -n 12
   rom modes meshes/beam.geo --E 210e9 --nu 0.3 --rho 7850 -n 6 --fixed root
   mpirun -n 2 rom modes part.msh --E 70e9 --nu 0.33 --rho 2700 --json
+  rom modes rod.sti --mass rod.mas --nodes rod.inp --fixed pin_a
 """
 
 
@@ -26,6 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_geometry(parser)
     add_material(parser)
     add_interfaces(parser)
+    add_matrices(parser)
     parser.add_argument(
         "-n", "--number", type=count, default=12, help="number of modes; rigid ones count too"
     )

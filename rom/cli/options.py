@@ -102,9 +102,9 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
 
 def add_material(parser: argparse.ArgumentParser) -> None:
     """Elastic solid and element degree."""
-    parser.add_argument("--E", type=number, required=True, help="Young's modulus [Pa]")
-    parser.add_argument("--nu", type=number, required=True, help="Poisson's ratio")
-    parser.add_argument("--rho", type=number, required=True, help="density [kg/m^3]")
+    parser.add_argument("--E", type=number, help="Young's modulus [Pa]")
+    parser.add_argument("--nu", type=number, help="Poisson's ratio")
+    parser.add_argument("--rho", type=number, help="density [kg/m^3]")
     parser.add_argument(
         "--degree", type=count, default=2, help="degree of the displacement, 1 to 3 (default 2)"
     )
@@ -138,6 +138,11 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
 
 def read_model(args: argparse.Namespace) -> "FEModel":
     """The finite element model the options ask for."""
+    from rom.cli.matrices import check_geometry, read_matrices
+
+    if args.mass is not None:
+        return read_matrices(args)
+    check_geometry(args)
     from rom.fe.elasticity import model
 
     numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}

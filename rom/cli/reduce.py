@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
+from rom.cli.matrices import add_matrices
 from rom.cli.method import add_method, method
 from rom.cli.options import (
     add_geometry,
@@ -32,6 +33,8 @@ EXAMPLES = """\
       -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz
   rom reduce meshes/beam.geo --E 70e9 --nu 0.33 --rho 2700 -i root=rbe2 -i tip=rbe3 \\
       --f-max 3e3 --reference root,tip --damping-ratio 0.01 -o beam.rom.npz
+  rom reduce rod.op4:KAA --mass rod.op4:MAA --nodes rod.bdf --units mm-t-s \\
+      --set pin_a=11-14 --set pin_b=81-84 -i pin_a=rbe2 -i pin_b=rbe2 -o rod.rom.npz
 """
 
 
@@ -40,6 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_geometry(parser)
     add_material(parser)
     add_interfaces(parser)
+    add_matrices(parser)
     add_method(parser)
     parser.add_argument(
         "--reference",

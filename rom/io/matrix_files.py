@@ -59,7 +59,10 @@ def read_matrix(source: Any) -> NamedMatrix:
         raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
     found = _all(path)
     if name is None and len(found) > 1:
-        raise ConfigError(f"{path} holds {sorted(found)}; which? Give (file, name).")
+        raise ConfigError(
+            f"{path} holds {sorted(found)}; which?",
+            hint="Give (file, name), on the command line FILE:NAME.",
+        )
     key = next(iter(found)) if name is None else name.upper()
     if key not in found:
         raise ConfigError(f"{path} has no matrix {name!r}; it holds {sorted(found)}.")

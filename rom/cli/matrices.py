@@ -1,0 +1,122 @@
+"""Options for the matrices of another program in place of a geometry."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.options import assignment, unique
+from rom.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rom.model import FEModel
+
+GEOMETRY = {  # options of a geometry, and what they are when not given
+    "E": None,
+    "nu": None,
+    "rho": None,
+    "degree": 2,
+    "solver": "direct",
+    "parameter": [],
+    "scale": 1.0,
+}
+MOST_NODES = 10_000_000  # in a range
+
+
+def add_matrices(parser: argparse.ArgumentParser) -> None:
+    """Mass, nodes and units; the file of the verb is then the stiffness."""
+    group = parser.add_argument_group(
+        "matrices of another program",
+        "FILE is then the stiffness: .mtx, .mm, .sti, .op4, .bdf, .dat, .pch or .dmig, with :NAME "
+        "behind where it holds several; interfaces are node sets of the .inp, or --set",
+    )
+    group.add_argument("--mass", metavar="FILE[:NAME]", help="mass matrix")
+    group.add_argument("--nodes", metavar="FILE", type=Path, help=".inp, .bdf, .dat or .csv")
+    group.add_argument(
+        "--set",
+        metavar="NAME=LABELS",
+        type=assignment,
+        action="append",
+        default=[],
+        help="nodes of an interface, e.g. pin=11-14,20; may be repeated",
+    )
+    group.add_argument("--units", help="SI (default), mm-t-s or mm-kg-ms")
+
+
+def check_geometry(args: argparse.Namespace) -> None:
+    """A geometry needs a material, and options of matrices need a mass.
+
+    Raises:
+        ConfigError: naming what is missing or superfluous.
+    """
+    given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
+    if given:
+        raise ConfigError(f"{given[0]} goes with --mass, which is not given.")
+    if missing := [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is None]:
+        raise ConfigError(
+            f"the following arguments are required: {', '.join(missing)}.",
+            hint="For matrices of another program give --mass and --nodes instead.",
+        )
+
+
+def read_matrices(args: argparse.Namespace) -> "FEModel":
+    """The model of the matrices the options name.
+
+    Raises:
+        ConfigError: for an option of geometries, missing nodes, or an interface without a set.
+        RomError: of `rom.read_model`.
+    """
+    from rom.io.foreign_model import read_model
+
+    odd = [f"--{name}" for name, default in GEOMETRY.items() if getattr(args, name) != default]
+    if odd:
+        raise ConfigError(f"{odd[0]} is for geometries, and --mass for matrices: give one of them.")
+    if args.nodes is None:
+        raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
+    names = [*unique(args.interface, "-i"), *getattr(args, "fixed", ())]
+    return read_model(
+        source(str(args.file)),
+        source(args.mass),
+        nodes=args.nodes,
+        interfaces=_sets(args, list(dict.fromkeys(names))),
+        units=args.units or "SI",
+    )
+
+
+def source(text: str) -> Any:
+    """A file, or (file, name) from FILE:NAME."""
+    path, colon, name = text.rpartition(":")
+    return (path, name) if colon and path and not Path(text).exists() else text
+
+
+def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
+    """Labels of the nodes of each interface."""
+    from rom.io.node_files import read_node_sets
+
+    found = unique([(name, labels(text)) for name, text in args.set], "--set")
+    if unused := sorted(set(found) - set(names)):
+        raise ConfigError(f"--set {unused[0]} is no interface: neither -i nor --fixed names it.")
+    rest = tuple(name for name in names if name not in found)
+    if rest and args.nodes.suffix.lower() != ".inp":
+        raise ConfigError(
+            f"which nodes are the interface {rest[0]!r}? {args.nodes} has no node sets.",
+            hint=f"For example --set {rest[0]}=11-14,20.",
+        )
+    return found | (read_node_sets(args.nodes, rest) if rest else {})
+
+
+def labels(text: str) -> list[int]:
+    """Labels of nodes from 11-14,20.
+
+    Raises:
+        ConfigError: if it is no such list.
+    """
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        last = last if dash else first
+        if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last)):
+            raise ConfigError(f"--set: {part!r} is no label and no range of labels as in 11-14.")
+        if int(last) - int(first) > MOST_NODES:
+            raise ConfigError(f"--set: {part} has more than {MOST_NODES} nodes.")
+        found += range(int(first), int(last) + 1)
+    return found
