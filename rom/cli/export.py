@@ -4,12 +4,14 @@ import argparse
 from pathlib import Path
 
 from rom.cli.answer import Answer
+from rom.cli.options import names
 
 SUMMARY = "write a body for another program"
 EXAMPLES = """\
   rom export rod.rom.npz rod.vtu        # mode shapes for ParaView
   rom export rod.rom.npz rod.SID_FEM    # Standard Input Data for Simpack
   rom export rod.rom.npz rod.sid --to sid-geisler
+  rom export jacket.rom.npz jacket.dat --to openfast --held foot
   rom export rod.SID_FEM rod.rom.npz    # and back, without geometric stiffness
 """
 
@@ -19,6 +21,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz, or .SID_FEM")
     parser.add_argument("output", type=Path, help="file to write")
     parser.add_argument("--to", metavar="FORMAT", help="format, if the ending does not tell")
+    parser.add_argument(
+        "--held", metavar="NAME,...", type=names, default=(), help="interfaces held, for openfast"
+    )
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -31,4 +36,4 @@ def run(args: argparse.Namespace) -> Answer:
     body = read_body(args.file)
     data = {"file": str(args.file), "output": str(args.output), "format": kind}
     text = f"{args.output}: body {body.name} as {kind}"
-    return Answer(data, text, lambda: export(body, args.output, to=kind))
+    return Answer(data, text, lambda: export(body, args.output, to=kind, held=args.held))

@@ -1,5 +1,6 @@
 """Files for other programs, by name or by the ending of the file name."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from rom.io.interface_form import InterfaceForm, interface_form
 from rom.io.mbdyn import write_mbdyn
 from rom.io.native import load, save
 from rom.io.op4 import write_op4
+from rom.io.openfast import write_openfast
 from rom.io.sid import write_sid
 from rom.io.sid_body import sid_body, standard_input
 from rom.io.sid_dialect import read_sid
@@ -21,6 +23,7 @@ from rom.io.user_element import write_user_element
 from rom.io.vtu import write_vtu
 
 SID = ".sid_fem"
+HOLDING = "openfast"
 
 
 def _write_sid(body: FlexibleBody, path: str | Path, dialect: str) -> Path:
@@ -57,12 +60,15 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "mbdyn": (".fem", write_mbdyn),
     "simscape": (".mat", write_simscape),
     "fmu": (".fmu", write_body_fmu),
+    "openfast": ("", write_openfast),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
 }
 
 
-def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Path:
+def export(
+    body: FlexibleBody, path: str | Path, *, to: str | None = None, held: Sequence[str] = ()
+) -> Path:
     """Write a body in the format of another program.
 
     Args:
@@ -73,14 +79,20 @@ def export(body: FlexibleBody, path: str | Path, *, to: str | None = None) -> Pa
             (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "abaqus" for a linear user element with
             stiffness and mass but no damping, "exudyn" for a Python module that adds
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
-            Order Flexible Solid, "fmu" for a Functional Mock-up Unit of its small motions, see
-            `rom.write_body_fmu`; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
-            ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.fmu``.
+            Order Flexible Solid, "openfast" for a superelement of its module ExtPtfm with the
+            weight of the body; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
+            ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``.
+        held: interfaces that stand still; for "openfast", which takes one free interface.
 
     Raises:
-        ConfigError: if the format or the ending is not known, or the place is not writable.
+        ConfigError: if the format or the ending is not known, another one is given interfaces to
+            hold, or the place is not writable.
     """
-    return FORMATS[format_of(path, to)][1](body, path)
+    kind = format_of(path, to)
+    if held and kind != HOLDING:
+        raise ConfigError(f"interfaces are held for {HOLDING} alone, not for {kind}.")
+    options = {"held": tuple(held)} if held else {}
+    return FORMATS[kind][1](body, path, **options)
 
 
 def format_of(path: str | Path, to: str | None = None) -> str:
