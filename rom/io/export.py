@@ -23,7 +23,7 @@ from rom.io.user_element import write_user_element
 from rom.io.vtu import write_vtu
 
 SID = ".sid_fem"
-HOLDING = "openfast"
+HOLDING = ("openfast", "openfast-4")  # formats with one free interface
 
 
 def _write_sid(body: FlexibleBody, path: str | Path, dialect: str) -> Path:
@@ -61,6 +61,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "simscape": (".mat", write_simscape),
     "fmu": (".fmu", write_body_fmu),
     "openfast": ("", write_openfast),
+    "openfast-4": ("", partial(write_openfast, version=4)),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
     "sid-geisler": ("", partial(_write_sid, dialect="geisler")),
 }
@@ -80,8 +81,9 @@ def export(
             stiffness and mass but no damping, "exudyn" for a Python module that adds
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
             Order Flexible Solid, "openfast" for a superelement of its module ExtPtfm with the
-            weight of the body; None for the ending of the path: ``.vtu``, ``.npz``, ``.SID_FEM``,
-            ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``.
+            weight of the body, "openfast-4" for those up to version 4; None for the ending of the
+            path: ``.vtu``, ``.npz``, ``.SID_FEM``, ``.dmig``, ``.op4``, ``.inp``, ``.py``,
+            ``.fem``, ``.mat``.
         held: interfaces that stand still; for "openfast", which takes one free interface.
 
     Raises:
@@ -89,8 +91,8 @@ def export(
             hold, or the place is not writable.
     """
     kind = format_of(path, to)
-    if held and kind != HOLDING:
-        raise ConfigError(f"interfaces are held for {HOLDING} alone, not for {kind}.")
+    if held and kind not in HOLDING:
+        raise ConfigError(f"interfaces are held for {HOLDING[0]} alone, not for {kind}.")
     options = {"held": tuple(held)} if held else {}
     return FORMATS[kind][1](body, path, **options)
 

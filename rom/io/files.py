@@ -71,7 +71,7 @@ def check_last_line(path: Path) -> None:
             raise FileFormatError(
                 "the last line is cut." if size else "the file is empty.",
                 where=str(path),
-                hint="Let the program that made it write it again.",
+                hint="Let the program that made it write it again, or end the line if it is whole.",
             )
 
 
