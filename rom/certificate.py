@@ -211,7 +211,7 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
     scale = 1 / np.sqrt(np.diag(M))
     lam = np.linalg.eigvalsh(scale[:, None] * (0.5 * (M + M.T)) * scale)
     return [
-        *_coupling_row(connection, basis, K),
+        *_coupling_row(connection, basis, K, stiff),
         row("asymmetry of projected K and M", asymmetry, ASYMMETRY),
         row("smallest eigenvalue of the scaled mass", lam[0], 1e-13, above=True),
         row("condition of the scaled mass", lam[-1] / max(lam[0], 1e-300), 1e13),
@@ -220,14 +220,17 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
     ]
 
 
-def _coupling_row(connection: Connection, basis: Basis, K: Array) -> list[Row]:
-    """Constraint modes and fixed-interface modes do not couple in K; other modes do."""
+def _coupling_row(connection: Connection, basis: Basis, K: Array, stiff: Any) -> list[Row]:
+    """Constraint modes and fixed-interface modes do not couple in K; other modes do.
+
+    Constraint modes of a single interface are rigid motions, whose stiffness is round-off.
+    """
     normal = [label.startswith("fixed-interface") for label in basis.labels]
     n_b = normal.index(True) if any(normal) else 0
     if not any(normal) or not all(normal[n_b:]) or n_b > connection.boundary.size:
         return []
-    off, size = K[:n_b, n_b:], np.sqrt(np.diag(K))
-    coupling = np.abs(off / np.outer(size[:n_b], size[n_b:])).max(initial=0.0)
+    b, size = np.flatnonzero(stiff[:n_b]), np.sqrt(np.abs(np.diag(K)))
+    coupling = np.abs(K[b, n_b:] / np.outer(size[b], size[n_b:])).max(initial=0.0)
     return [row("constraint against normal modes in K", coupling, 1e-8)]
 
 

@@ -416,3 +416,11 @@ def test_frequencies_survive_a_mirror_and_another_numbering(model, body, change)
         n_rigid = 0 if fixed else 6
         expected = body.frequencies(fixed=fixed)[n_rigid:]
         assert_allclose(seen.frequencies(fixed=fixed)[n_rigid:], expected, rtol=1e-8)
+
+
+def test_a_single_interface_has_a_certificate(model):
+    """Its constraint modes are rigid: their stiffness is round-off, of either sign."""
+    body = rom.reduce(model, method=rom.CraigBampton(40), interfaces={"root": "rbe2"})
+    assert body.certificate.ok, body.certificate
+    (row,) = [r for r in body.certificate.rows if r.quantity.startswith("constraint against")]
+    assert row.value == 0.0
