@@ -5,9 +5,11 @@ for C3D4, four for C3D10), which are exact for polynomials of degree 1 and 2 ins
 with that quadrature the mass agrees to round-off too, and with ours frequencies differ.
 """
 
+import json
 import shutil
 import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,13 +18,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 import rom
+from rom.cli.main import main
 from rom.errors import ConfigError, InterfaceError, MeshError, TagError
 from rom.fe.input_deck import input_deck
 from rom.fe.mesh import read_mesh
 from rom.io.interface_form import interface_form
 from rom.io.matrix_files import read_matrix
 
-BEAM = {"path": "meshes/beam.geo", "parameters": {"L": 0.3, "lc": 0.04}}
+BEAM = {
+    "path": str(Path(__file__).parents[1] / "meshes" / "beam.geo"),
+    "parameters": {"L": 0.3, "lc": 0.04},
+}
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 WOOD = rom.Orthotropic(
     E=(12e9, 0.9e9, 0.5e9), nu=(0.35, 0.4, 0.3), G=(0.8e9, 0.7e9, 0.1e9), rho=500.0,
@@ -178,6 +184,24 @@ def test_a_substructure_is_not_condensed(beam, tmp_path):
     rows = 3 * node + found.dofs[:, 1] - 1
     K_bb = ours.K[rows][:, rows].toarray()
     assert_allclose(found.A.toarray(), np.tril(K_bb), atol=1e-11 * np.abs(K_bb).max())
+
+
+@needs_ccx
+@pytest.mark.fenicsx
+def test_the_command_line_goes_to_calculix_and_back(tmp_path, capsys, same_quadrature):
+    """Mesh here, matrices there, frequencies here."""
+    steel = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
+    mesh = (BEAM["path"], "-p", "L=0.3", "-p", "lc=0.04", *steel)
+    assert main(["mesh", *mesh, "--save", str(tmp_path / "job.inp")]) == 0
+    run(tmp_path, (tmp_path / "job.inp").read_text())
+    files = [str(tmp_path / f"job{ending}") for ending in (".sti", ".mas", ".inp")]
+    theirs = [files[0], "--mass", files[1], "--nodes", files[2]]
+    capsys.readouterr()
+    found = []
+    for words in (theirs, mesh):
+        assert main(["modes", *words, "--fixed", "root", "-n", "5", "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out)["frequencies"])
+    assert_allclose(*found, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["tet4", "tet10"])

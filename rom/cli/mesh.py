@@ -5,17 +5,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, table
-from rom.cli.options import add_geometry, assignment, reading, unique, vector
+from rom.cli.options import (
+    add_geometry,
+    add_solid,
+    assignment,
+    material,
+    reading,
+    unique,
+    vector,
+)
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.fe.solid import SolidMesh
+    from rom.model import Material
 
+DECK = ".inp"
 SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
   rom mesh part.msh --scale 1e-3 --save part.vtu
   rom mesh part.step -p lc=0.002 --face pin=0,0,0.01
+  rom mesh meshes/beam.geo --save beam.inp --E 210e9 --nu 0.3 --rho 7850   # then: ccx beam
 """
 
 
@@ -30,7 +41,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="name the surface of a .step file next to a point [m]; may be repeated",
     )
-    parser.add_argument("--save", metavar="FILE.vtu", type=Path, help="write it for ParaView")
+    parser.add_argument(
+        "--save",
+        metavar="FILE",
+        type=Path,
+        help=".vtu for ParaView; .inp for CalculiX and Abaqus, and with --E, --nu, --rho CalculiX "
+        "runs it and leaves matrices for rom modes and rom reduce",
+    )
+    add_solid(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -38,6 +56,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.fe.mesh import read_mesh
     from rom.fe.summary import summary
 
+    solid = _solid(args)
     if args.save:
         _check_save(args.save)
     faces = unique([(name, _point(at)) for name, at in args.face], "--face")
@@ -46,7 +65,7 @@ def run(args: argparse.Namespace) -> Answer:
     if not args.save:
         return Answer(data, _text(data))
     data["saved"] = str(args.save)
-    return Answer(data, _text(data), write=lambda: _save(mesh, args.save))
+    return Answer(data, _text(data), write=lambda: _save(mesh, args.save, solid))
 
 
 def _point(text: str) -> tuple[float, float, float]:
@@ -59,17 +78,33 @@ def _point(text: str) -> tuple[float, float, float]:
 def _check_save(path: Path) -> None:
     from rom.io.files import check_writable
 
-    if path.suffix.lower() != ".vtu":
-        raise ConfigError(f"--save {path}: a mesh is written as .vtu only.")
+    if path.suffix.lower() not in (".vtu", DECK):
+        raise ConfigError(f"--save {path}: a mesh is written as .vtu or .inp only.")
     check_writable(path)
 
 
-def _save(mesh: "SolidMesh", path: Path) -> None:
+def _solid(args: argparse.Namespace) -> "Material | None":
+    """The material of a deck; None for the mesh alone."""
+    given = [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is not None]
+    if not given:
+        return None
+    if args.save is None or args.save.suffix.lower() != DECK:
+        raise ConfigError(f"{given[0]} goes with --save FILE.inp.")
+    if len(given) < 3:
+        raise ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
+    return material(args)
+
+
+def _save(mesh: "SolidMesh", path: Path, solid: "Material | None") -> None:
+    from rom.fe.input_deck import input_deck
     from rom.fe.summary import vtk_cells
     from rom.io.files import write_whole
     from rom.io.vtu import grid
 
-    text = grid(mesh.points, *vtk_cells(mesh), at_cells={"region": mesh.regions})
+    if path.suffix.lower() == DECK:
+        text = input_deck(mesh, material=solid, step="matrices")
+    else:
+        text = grid(mesh.points, *vtk_cells(mesh), at_cells={"region": mesh.regions})
     write_whole(path, lambda file: file.write(text.encode()))
 
 

@@ -100,11 +100,16 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_material(parser: argparse.ArgumentParser) -> None:
-    """Elastic solid and element degree."""
+def add_solid(parser: argparse.ArgumentParser) -> None:
+    """Numbers of an elastic solid."""
     parser.add_argument("--E", type=number, help="Young's modulus [Pa]")
     parser.add_argument("--nu", type=number, help="Poisson's ratio")
     parser.add_argument("--rho", type=number, help="density [kg/m^3]")
+
+
+def add_material(parser: argparse.ArgumentParser) -> None:
+    """Elastic solid and element degree."""
+    add_solid(parser)
     parser.add_argument(
         "--degree", type=count, default=2, help="degree of the displacement, 1 to 3 (default 2)"
     )
