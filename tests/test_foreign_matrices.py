@@ -185,6 +185,29 @@ def test_sets_of_nodes_in_the_deck_are_interfaces(brick, tmp_path):
         read_model(K, M, nodes=read_grids(HERE / "brick.bdf"), interfaces=["root"])
 
 
+def test_decks_in_several_files(brick, tmp_path):
+    """Nodes as data of *NODE in a file of their own, sets included, both beside the deck."""
+    nodes, sets = DECK.partition("*NSET")[::2]
+    rows = [line for line in nodes.splitlines() if line[0] != "*"]
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "nodes.txt").write_text("** label, x, y, z\n" + "\n".join(rows))
+    (tmp_path / "parts" / "sets.inp").write_text(f"*NSET{sets}".replace("left", "3, 7"))
+    deck = tmp_path / "b.inp"
+    deck.write_text('*Node, input=parts/nodes.txt\n*INCLUDE, INPUT="parts/sets.inp"\n')
+    model = read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))
+    assert_allclose(model.points, brick.points[np.argsort(LABELS)])
+    for name, labels in SIDES.items():
+        found = np.sort(LABELS)[model.interfaces[name].nodes]
+        assert_array_equal(np.sort(found), np.sort(labels))
+    for name in ("gone.inp", "x" * 300, "nul\0"):
+        deck.write_text(f"*INCLUDE, INPUT={name}\n")
+        with pytest.raises(FileFormatError, match=f"{name}: there is no such file"):
+            read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))
+    deck.write_text("*INCLUDE, INPUT=b.inp\n")
+    with pytest.raises(FileFormatError, match="include each other too deep"):
+        read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))
+
+
 def test_units_are_converted_at_the_border(brick, tmp_path):
     """Newton, millimetre, tonne: 1 N/mm is 1000 N/m."""
     write_op4({"K": by_label(brick.K) / 1e3, "M": by_label(brick.M) / 1e3}, tmp_path / "b.op4")

@@ -13,6 +13,7 @@ from rom.model import Array, Index
 
 LARGEST = 2**32  # bytes of a file that is still read
 CARDS = (".bdf", ".dat")
+WITH_FILES, MOST_INCLUDED, LONGEST_NAME = ("*INCLUDE", "*NODE", "*NSET"), 20, 255
 MOST_NESTED, MOST_NODES = 200, 100_000_000  # sets in sets, nodes in a set
 
 
@@ -136,20 +137,29 @@ class _Line:
             raise FileFormatError("a label is a whole number.", where=self.where) from error
 
 
-def _lines(path: Path) -> Iterator[_Line]:
-    if not path.is_file():
+def _lines(
+    path: Path, keyword: str = "", options: dict[str, str] | None = None, depth: int = 0
+) -> Iterator[_Line]:
+    """Lines of data of a deck and of the files it includes, whole or as data of a keyword."""
+    if len(path.name) > LONGEST_NAME or not path.is_file():
         raise FileFormatError("there is no such file.", where=str(path))
     if path.stat().st_size > LARGEST:
         raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
-    keyword, options = "", dict[str, str]()
+    if depth > MOST_INCLUDED:
+        raise FileFormatError("files include each other too deep.", where=str(path))
+    options = options or {}
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, 1):
             if line.startswith(("**", "#")) or not line.strip():
                 continue
             words = [word.strip() for word in line.strip().rstrip(",").split(",")]
-            if line.startswith("*"):
-                keyword = words[0].upper()
-                pairs = (word.partition("=") for word in words[1:])
-                options = {key.strip().upper(): value.strip() for key, _, value in pairs}
-            else:
+            if not line.startswith("*"):
                 yield _Line(keyword, options, words, f"{path}, line {number}")
+                continue
+            pairs = (word.partition("=") for word in words[1:])
+            found = {key.strip().upper(): value.strip() for key, _, value in pairs}
+            if words[0].upper() != "*INCLUDE":
+                keyword, options = words[0].upper(), found
+            if "INPUT" in found and words[0].upper() in WITH_FILES:
+                other = path.parent / found["INPUT"].strip("\"'")
+                yield from _lines(other, keyword, options, depth + 1)
