@@ -1,11 +1,11 @@
 # # One body, many programs
 #
 # A reduced body is worth as much as the places it can go. One beam is written for Simpack, Nastran,
-# MBDyn, Exudyn and Simscape; what comes back from the files has the same mass and frequencies. Then
-# it swings, and the motion leaves as a table and as a film to turn around.
+# Abaqus, OpenFAST, MBDyn, Exudyn and Simscape; what comes back from the files has the same mass and
+# frequencies. Then it swings, and the motion leaves as a table and as a film to turn around.
 #
 # Run: `python demos/demo_exchange.py`, or under `mpirun -n 2`
-# Writes: nine files named `beam` into `out/`; another folder with `--out`
+# Writes: eleven files named `beam` into `out/`; another folder with `--out`
 
 import argparse
 from pathlib import Path
@@ -17,6 +17,7 @@ from scipy.linalg import eigh
 
 import rom
 from rom.io.dmig import read_dmig
+from rom.io.openfast_reading import read_openfast
 from rom.io.sid import write_sid
 from rom.io.sid_body import sid_body, standard_input
 from rom.io.sid_dialect import check_sid
@@ -54,7 +55,7 @@ if first:
 
     for ending, program in {
         "vtu": "ParaView", "dmig": "Nastran", "op4": "Nastran, all digits", "fem": "MBDyn",
-        "py": "Exudyn", "mat": "Simscape Multibody",
+        "inp": "Abaqus", "py": "Exudyn", "mat": "Simscape Multibody",
     }.items():  # fmt: skip
         path = rom.export(body, out / f"beam.{ending}")
         say(f"{path.name:16s} {path.stat().st_size / 1e3:8.1f} kB  {program}")
@@ -67,6 +68,17 @@ if first:
     K, M = (A + np.tril(A, -1).T for A in (K, M))
     cantilever = np.sqrt(eigh(K[6:, 6:], M[6:, 6:], eigvals_only=True)[:4]) / (2 * np.pi)
     say("cantilever from DMIG:", *(f"{f:8.2f}" for f in cantilever), "Hz")
+
+    # ## And back: a superelement of OpenFAST
+    #
+    # The root is held, the six coordinates of the tip come first. Their stiffness alone is that of
+    # a cantilever under a load at its end; the weight stands beside.
+
+    rom.export(body, out / "beam.dat", to="openfast", held=["root"])
+    element = read_openfast(out / "beam.dat")
+    tower = np.sqrt(eigh(element.K, element.M, eigvals_only=True)[:4]) / (2 * np.pi)
+    sag = np.linalg.solve(element.K[:6, :6], element.weight[:6])[2]
+    say("cantilever from OpenFAST:", *(f"{f:8.2f}" for f in tower), f"Hz, sag {1e3 * sag:.4f} mm")
 
     # ## Standard Input Data, in three dialects
     #
@@ -109,9 +121,12 @@ if first:
     speed = np.sqrt(rho * b * h * L * 9.81 * drop / inertia)
     turning = np.linalg.norm(sol.velocity("beam", "tip")[-1]) / L
     held = body.frequencies(4, fixed=("root",))
+    sagging = -rho * b * h * 9.81 * L**4 / (8 * E * b * h**3 / 12)
     results |= {
         "cantilever from DMIG, Euler and Bernoulli [Hz]": (cantilever[0], 1.875104**2 * EI, 0.01),
         "worst frequency ratio, DMIG": (1 + np.abs(cantilever / held - 1).max(), 1.0, 1e-7),
+        "worst frequency ratio, OpenFAST": (1 + np.abs(tower / held - 1).max(), 1.0, 1e-7),
+        "sag of the tip under its weight, Euler and Bernoulli [m]": (sag, sagging, 0.01),
         "worst frequency ratio, SID": (1 + np.abs(returned / held - 1).max(), 1.0, 1e-8),
         "worst relation of the SID blocks": (1 + worst, 1.0, 1e-9),
         "turning after the fall [rad/s]": (turning, speed, 0.01),

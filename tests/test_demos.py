@@ -17,8 +17,8 @@ LEFT_BEHIND = {
     "demo_compressor_blade": {"compressor_blade.png"},
     "demo_hand": {"hand.png", "hand_control.png"},
     "demo_exchange": {
-        "beam.SID_FEM", "beam.csv", "beam.dmig", "beam.fem", "beam.glb", "beam.mat", "beam.op4",
-        "beam.py", "beam.vtu",
+        "beam.SID_FEM", "beam.csv", "beam.dat", "beam.dmig", "beam.fem", "beam.glb", "beam.inp",
+        "beam.mat", "beam.op4", "beam.py", "beam.vtu",
     },
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},

@@ -199,7 +199,7 @@ def test_decks_in_several_files(brick, tmp_path):
     for name, labels in SIDES.items():
         found = np.sort(LABELS)[model.interfaces[name].nodes]
         assert_array_equal(np.sort(found), np.sort(labels))
-    for name in ("gone.inp", "x" * 300, "nul\0"):
+    for name in ("gone.inp", "x" * 300, "x" * 300 + "/y", "nul\0"):
         deck.write_text(f"*INCLUDE, INPUT={name}\n")
         with pytest.raises(FileFormatError, match=f"{name}: there is no such file"):
             read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))

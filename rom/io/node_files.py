@@ -13,7 +13,7 @@ from rom.model import Array, Index
 
 LARGEST = 2**32  # bytes of a file that is still read
 CARDS = (".bdf", ".dat")
-WITH_FILES, MOST_INCLUDED, LONGEST_NAME = ("*INCLUDE", "*NODE", "*NSET"), 20, 255
+WITH_FILES, MOST_INCLUDED = ("*INCLUDE", "*NODE", "*NSET"), 20
 MOST_NESTED, MOST_NODES = 200, 100_000_000  # sets in sets, nodes in a set
 
 
@@ -141,7 +141,7 @@ def _lines(
     path: Path, keyword: str = "", options: dict[str, str] | None = None, depth: int = 0
 ) -> Iterator[_Line]:
     """Lines of data of a deck and of the files it includes, whole or as data of a keyword."""
-    if len(path.name) > LONGEST_NAME or not path.is_file():
+    if not _is_file(path):
         raise FileFormatError("there is no such file.", where=str(path))
     if path.stat().st_size > LARGEST:
         raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
@@ -163,3 +163,10 @@ def _lines(
             if "INPUT" in found and words[0].upper() in WITH_FILES:
                 other = path.parent / found["INPUT"].strip("\"'")
                 yield from _lines(other, keyword, options, depth + 1)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name longer than names can be
+        return False
