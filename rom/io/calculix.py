@@ -53,7 +53,7 @@ def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
         )
     i, j = place.T - 1
     missing = np.setdiff1d(np.arange(len(dofs)), i[i == j])
-    twice = len(place) - len(np.unique(place, axis=0))
+    twice = len(place) - len(np.unique(i * len(dofs) + j))
     if missing.size or twice:
         raise FileFormatError(
             f"{missing.size} of {len(dofs)} diagonal entries are missing and {twice} entries "
