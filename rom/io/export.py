@@ -15,6 +15,7 @@ from rom.io.mbdyn import write_mbdyn
 from rom.io.native import load, save
 from rom.io.op4 import write_op4
 from rom.io.openfast import write_openfast
+from rom.io.radioss import write_radioss
 from rom.io.sid import write_sid
 from rom.io.sid_body import sid_body, standard_input
 from rom.io.sid_dialect import read_sid
@@ -60,6 +61,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
     "mbdyn": (".fem", write_mbdyn),
     "simscape": (".mat", write_simscape),
     "fmu": (".fmu", write_body_fmu),
+    "radioss": (".pch", write_radioss),
     "openfast": ("", write_openfast),
     "openfast-4": ("", partial(write_openfast, version=4)),
     "sid-pysid": ("", partial(_write_sid, dialect="pysid")),
@@ -80,10 +82,10 @@ def export(
             (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "abaqus" for a linear user element with
             stiffness and mass but no damping, "exudyn" for a Python module that adds
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
-            Order Flexible Solid, "openfast" for a superelement of its module ExtPtfm with the
-            weight of the body, "openfast-4" for those up to version 4; None for the ending of the
-            path: ``.vtu``, ``.npz``, ``.SID_FEM``, ``.dmig``, ``.op4``, ``.inp``, ``.py``,
-            ``.fem``, ``.mat``.
+            Order Flexible Solid, "radioss" for a flexible body of OpenRadioss, "openfast" for a
+            superelement of OpenFAST's module ExtPtfm with the weight of the body, "openfast-4" for
+            those up to version 4; None for the ending of the path: ``.vtu``, ``.npz``,
+            ``.SID_FEM``, ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.pch``.
         held: interfaces that stand still; for "openfast", which takes one free interface.
 
     Raises:
