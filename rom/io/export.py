@@ -84,8 +84,10 @@ def export(
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
             Order Flexible Solid, "radioss" for a flexible body of OpenRadioss, "openfast" for a
             superelement of OpenFAST's module ExtPtfm with the weight of the body, "openfast-4" for
-            those up to version 4; None for the ending of the path: ``.vtu``, ``.npz``,
-            ``.SID_FEM``, ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.pch``.
+            those up to version 4, "fmu" for a Functional Mock-up Unit of its small motions, see
+            `rom.write_body_fmu`; None for the ending of the path: ``.vtu``, ``.npz``,
+            ``.SID_FEM``, ``.dmig``, ``.op4``, ``.inp``, ``.py``, ``.fem``, ``.mat``, ``.pch``,
+            ``.fmu``.
         held: interfaces that stand still; for "openfast", which takes one free interface.
 
     Raises:
