@@ -1,6 +1,8 @@
 # make setup   Debian packages, .venv over them, .venv-light without FEniCSx; seconds when done
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
 # make test    style, types, all tests, then those of the light half without FEniCSx
+# make docs    the site, in build/site/; pictures of demos that have run stand in it
+# make pictures  run every demo, for the site; takes minutes
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
 # test files that run side by side
@@ -8,7 +10,7 @@ WORKERS = 2
 # its own cache: two versions of Numba would compile over each other's code
 LIGHT = NUMBA_CACHE_DIR=$(CURDIR)/.venv-light/numba .venv-light/bin/python
 
-.PHONY: setup demo test clean
+.PHONY: setup demo test docs pictures clean
 setup:
 	@.ci/setup.sh
 
@@ -22,6 +24,13 @@ test: setup
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
 	$(LIGHT) -m pytest -m "not fenicsx" -p no:cacheprovider -n $(WORKERS) --dist loadfile
 
+docs: setup
+	$(PYTHON) -m sphinx -W -n -q docs build/site
+	@echo "open build/site/index.html"
+
+pictures: setup
+	set -e; for demo in demos/demo_*.py; do $(PYTHON) $$demo -q; done
+
 clean:
-	rm -rf out .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf out build/site docs/generated .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find rom tests demos meshes -name __pycache__ -prune -exec rm -rf {} +

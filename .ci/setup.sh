@@ -69,7 +69,7 @@ environment() { # folder, options of venv, what pip installs
   echo "$wanted" >"$folder/.stamp"
 }
 
-environment .venv --system-site-packages -c constraints.txt -e '.[view,dev]'
+environment .venv --system-site-packages -c constraints.txt -e '.[view,dev,docs]'
 environment .venv-light "" -r .ci/light.txt
 
 # Python runs lines of .pth files when it starts, before OpenBLAS is loaded.

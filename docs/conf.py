@@ -1,0 +1,48 @@
+"""Configuration of the site: ``make docs``; no network is needed once Sphinx is installed."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import rom  # noqa: E402
+
+project = "rom"
+author = "the fenicsx-rom authors"
+copyright = author
+version = release = rom.__version__
+
+extensions = [
+    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser", "site_pages", "site_text",
+]  # fmt: skip
+exclude_patterns = ["build"]
+nitpicky = True  # a name that is linked must exist
+suppress_warnings = ["config.cache"]
+
+autodoc_typehints = "none"  # docstrings give shapes and units, which types cannot
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+add_module_names = False
+python_maximum_signature_line_length = 88
+napoleon_use_param = False  # several names may share a line
+napoleon_attr_annotations = False
+napoleon_custom_sections = [
+    "Source", "Sources", "Returns", ("Attributes", "params_style"),
+]  # fmt: skip
+
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+myst_heading_anchors = 3
+
+html_theme = "alabaster"
+html_title = f"rom {release}"
+html_theme_options = {
+    "description": "From a gmsh geometry to a flexible body that moves",
+    "fixed_sidebar": True,
+    "page_width": "1080px",
+    "font_family": "sans-serif",
+    "show_powered_by": False,
+}
+html_math_renderer = "mathml"
+html_show_sourcelink = False
+html_copy_source = False

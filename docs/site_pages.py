@@ -1,0 +1,224 @@
+"""Pages made from the project itself: demos, pictures, errors, commands, the public interface.
+
+They are written below ``generated/`` beside this file whenever the site is built, so that none of
+them can be out of date.
+"""
+
+import importlib
+import inspect
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+import rom
+from rom import errors
+from rom.cli.parser import EXIT_CODES, VERBS, build_parser
+
+ROOT = Path(rom.__file__).parents[1]
+DEMOS = ROOT / "demos"
+PICTURES = (ROOT / "out", DEMOS)  # what `make pictures` leaves, then those of the README
+PICTURE = re.compile(r"\b(\w+\.(?:png|gif))\b")
+ALSO = {  # what public functions give back or raise
+    "errors": ("errors",),
+    "mbs": (
+        "mbs.solution",
+        "mbs.linearize",
+        "mbs.response",
+        "mbs.campbell",
+        "mbs.state",
+        "mbs.signals",
+    ),
+}
+CURES = {  # what to do about it, where no single message can tell
+    "ConfigError": "Compare with `rom VERB --help` or the arguments of the function.",
+    "ParameterError": "Keep to the range the family was reduced for, or reduce it for a wider one.",
+    "FileFormatError": "Write the file again; bodies are checked whole by `rom check`.",
+    "UnsafeFileError": "Do not open it: a body file holds plain arrays only.",
+    "MeshError": "Look at it with `rom mesh FILE --save mesh.vtu`, repair it where it is named.",
+    "TagError": "Name each interface once, by a physical surface, a node set or `--face`.",
+    "MaterialError": "Give E and rho above zero and nu between -1 and 0.5, in units of the mesh.",
+    "InterfaceError": "Check the name with `rom mesh FILE`; take another kind or more nodes.",
+    "ModelError": "Draw the mechanism as it starts; release the joint that is named.",
+    "SolverError": "Take shorter steps or looser tolerances; see whether the model is held.",
+    "ModesMissedError": "Ask for a few modes more, or solve directly instead of by iteration.",
+    "QualityGateError": "Keep more modes or finer interfaces; the certificate says which row.",
+    "ResourceError": "Use a coarser mesh, another `--solver`, or install what `rom doctor` names.",
+    "ParallelError": "Read the message of the first process that failed.",
+    "InterruptedRun": "Start again; a motion goes on from its checkpoint.",
+}
+
+
+def demo_page(script: Path, pictures: dict[str, Path]) -> str:
+    """A demo as a page: comments at the left margin between blank lines are its text.
+
+    Args:
+        script: a demo, of prose in comments and code.
+        pictures: files by their names, of those that are there.
+    """
+    parts = [_pictures(script, pictures)]
+    for block in _blocks(script.read_text()):
+        prose = all(line.startswith("#") for line in block)
+        body = "\n".join(re.sub("^# ?", "", line) if prose else line for line in block)
+        parts.append(body if prose else f"```python\n{body}\n```")
+    title, _, rest = parts[1].partition("\n")
+    return "\n\n".join([title, rest.strip(), parts[0], *parts[2:]]) + "\n"
+
+
+def _blocks(text: str) -> list[list[str]]:
+    """Blocks of comments and of code, code with the blank lines inside it."""
+    found: list[list[str]] = []
+    for part in re.split(r"\n{2,}", text.strip()):
+        lines = part.split("\n")
+        comment = all(line.startswith("#") for line in lines)
+        if found and not comment and not found[-1][0].startswith("#"):
+            found[-1] += ["", *lines]
+        else:
+            found.append(lines)
+    return found
+
+
+def _pictures(script: Path, pictures: dict[str, Path]) -> str:
+    names = list(dict.fromkeys(PICTURE.findall(script.read_text())))
+    shown = [f"![{_spoken(name)}]({name})" for name in names if name in pictures]
+    absent = [f"`{name}`" for name in names if name not in pictures]
+    if absent:
+        shown.append(f"Not drawn yet, run the demo to see them: {', '.join(absent)}.")
+    return "\n\n".join(shown)
+
+
+def _spoken(name: str) -> str:
+    return Path(name).stem.replace("_", " ").capitalize()
+
+
+def gallery_page(scripts: list[Path], pictures: dict[str, Path]) -> str:
+    """All demos: the picture where there is one, the title, the first paragraph."""
+    parts = ["# Demos", "Each demo is one script; it ends in numbers that a test checks.\n"]
+    for script in scripts:
+        text = "\n".join(_blocks(script.read_text())[0])
+        title, about = (re.sub("^# ?", "", t, flags=re.M) for t in re.split(r"\n#\n", text)[:2])
+        names = [n for n in PICTURE.findall(script.read_text()) if n in pictures]
+        parts += [f"## [{title.lstrip('# ')}]({script.stem}.md)", about]
+        parts += [f"![{_spoken(names[0])}]({names[0]})"] if names else []
+    listed = "\n".join(script.stem for script in scripts)
+    return "\n\n".join(parts) + f"\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+
+
+def error_page() -> str:
+    """Every error with its exit code, its meaning and what to do, from `rom.errors`."""
+    rows = ["| error | exit code | what it is | what to do |", "|---|---|---|---|"]
+    kinds = [e for e in vars(errors).values() if inspect.isclass(e) and hasattr(e, "exit_code")]
+    for kind in sorted(kinds, key=lambda e: e.exit_code):
+        if kind is not errors.RomError:
+            meaning = " ".join((kind.__doc__ or "").split())
+            rows.append(
+                f"| `{kind.__name__}` | {kind.exit_code} | {meaning} | {CURES[kind.__name__]} |"
+            )
+    return "\n\n".join([
+        "# Errors",
+        "Everything raised on purpose is a `rom.RomError`. Its message says what happened, with the"
+        " number and the name of the culprit, and what to do; `error.where` names the file, body,"
+        " joint or interface and `error.hint` the cure. The command line turns it into one line and"
+        " an exit code; `--debug` adds the traceback, `--json` gives the error as an object.",
+        "\n".join(rows),
+        "`RomWarning` announces something legal that a careful user wants to know; `--strict` makes"
+        " it an error.",
+        f"```text\n{EXIT_CODES.strip()}\n```",
+    ]) + "\n"  # fmt: skip
+
+
+def command_page() -> str:
+    """The help of every verb."""
+    parser = build_parser()
+    verbs: Any = next(a for a in parser._actions if a.dest == "verb").choices
+    parts = ["# Commands", f"```text\n{parser.format_help().strip()}\n```"]
+    for module in VERBS:
+        name = module.__name__.rpartition(".")[2]
+        text = verbs[name].format_help().partition("\nexit codes:")[0].strip()
+        parts += [f"## rom {name}", f"```text\n{text}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def interface_pages() -> dict[str, str]:
+    """One page per part of the package, with its public names; and the list of these pages."""
+    parts: dict[str, list[str]] = {}
+    for name in rom.__all__:
+        parts.setdefault(rom.MODULES[name].partition(".")[0], []).append(name)
+    pages = {f"rom_{part}.rst": _names(part, names) for part, names in sorted(parts.items())}
+    pages["rom_fe.rst"] = _modules("rom.fe", ["rom.fe"])
+    pages["rom_view.rst"] += ".. automodule:: rom.view\n"
+    for name, modules in _components().items():
+        pages[f"{name.replace('.', '_')}.rst"] = _modules(name, modules)
+    listed = "\n".join(f"   {name.removesuffix('.rst')}" for name in pages)
+    head = "Interface\n=========\n\nEvery public name, from its docstring.\n\n"
+    return pages | {"interface.rst": f"{head}.. toctree::\n   :maxdepth: 1\n\n{listed}\n"}
+
+
+def _components() -> dict[str, list[str]]:
+    """Modules of every component; those of a package stand on one page."""
+    found = {}
+    for path in sorted((ROOT / "rom" / "components").iterdir()):
+        name = f"rom.components.{path.stem}"
+        if path.suffix == ".py" and path.stem not in ("__init__", "compiled"):
+            found[name] = [name]
+        elif (path / "__init__.py").exists():
+            found[name] = [f"{name}.{inside.stem}" for inside in sorted(path.glob("[a-z]*.py"))]
+    return found
+
+
+def _head(name: str) -> str:
+    about = (importlib.import_module(name).__doc__ or "").partition("\n\n")[0]
+    about = " ".join(about.split()).replace("`", "``").replace("````", "``").replace("*", r"\*")
+    return f"{name}\n{'=' * len(name)}\n\n{about}\n"
+
+
+def _names(part: str, names: list[str]) -> str:
+    lines = [_head(f"rom.{part}")]
+    for name in names:
+        kind = "class" if inspect.isclass(getattr(rom, name)) else "function"
+        lines.append(f".. auto{kind}:: rom.{name}\n")
+    for module in ALSO.get(part, ()):
+        listed = [name for name in names if rom.MODULES[name] == module]
+        skip = f"   :exclude-members: {', '.join(listed)}\n" if listed else ""
+        lines.append(f".. automodule:: rom.{module}\n{skip}")
+    return "\n".join(lines)
+
+
+def _modules(title: str, modules: list[str]) -> str:
+    lines = [_head(title)]
+    for name in modules:
+        short = name.rpartition(".")[2]
+        lines += [f"{short}\n{'-' * len(short)}\n"] if len(modules) > 1 else []
+        lines.append(f".. automodule:: {name}\n")
+    return "\n".join(lines)
+
+
+def write_all(out: Path) -> None:
+    """Write every page, and beside them the pictures they show.
+
+    Args:
+        out: folder, emptied first.
+    """
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    scripts = sorted(DEMOS.glob("demo_*.py"))
+    pictures = {p.name: p for folder in reversed(PICTURES) for p in sorted(folder.glob("*.*"))}
+    pictures = {name: path for name, path in pictures.items() if PICTURE.fullmatch(name)}
+    pages = {f"{s.stem}.md": demo_page(s, pictures) for s in scripts}
+    pages |= interface_pages()
+    pages["demos.md"] = gallery_page(scripts, pictures)
+    pages["errors.md"], pages["commands.md"] = error_page(), command_page()
+    pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text()
+    for name, text in pages.items():
+        (out / name).write_text(text)
+    for name, path in pictures.items():
+        if any(f"({name})" in text for text in pages.values()):
+            shutil.copy(path, out / name)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register with Sphinx."""
+    app.connect("builder-inited", lambda app: write_all(Path(app.srcdir) / "generated"))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
