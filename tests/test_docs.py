@@ -1,10 +1,13 @@
 """The site builds without a warning, and its generated pages say what the project is."""
 
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from solid import block
 
 import rom
 from rom import errors
@@ -12,6 +15,9 @@ from rom.cli.parser import VERBS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+WRITTEN = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
+CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
+TRIED = [path for path in WRITTEN if CODE.search(path.read_text())]
 PARTS = """# # A title
 #
 # Some `code` in prose.
@@ -78,11 +84,8 @@ def test_every_verb_is_shown_with_its_help(pages):
 def test_the_site_builds_without_warnings(tmp_path):
     pytest.importorskip("dolfinx", reason="docstrings of rom.fe need it")
     pytest.importorskip("sphinx", reason="the site is built in the environment of the developers")
-    source = tmp_path / "docs"
-    source.mkdir()
-    for path in DOCS.iterdir():  # `make docs` may be writing into the folder itself
-        if path.name not in ("generated", "__pycache__"):
-            (source / path.name).symlink_to(path)
+    source = tmp_path / "docs"  # `make docs` may be writing into the folder itself
+    shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("generated", "__pycache__"))
     command = [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "--keep-going", source]
     done = subprocess.run([*command, tmp_path / "site"], capture_output=True, text=True,
                           timeout=240, check=False)  # fmt: skip
@@ -91,3 +94,49 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert {"index.html", "generated/errors.html", "generated/demo_beam.html"} <= set(site)
     for path in site.values():  # nothing is fetched when the site is read
         assert 'src="http' not in path.read_text() and '<link href="http' not in path.read_text()
+
+
+@pytest.fixture(scope="module")
+def beam(tmp_path_factory):
+    """What the first page makes of a mesh, here from bricks, so that FEniCSx is not needed."""
+    path = tmp_path_factory.mktemp("beam") / "beam.rom.npz"
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    model = block(size=(1.0, 0.05, 0.03), cells=(20, 2, 2))
+    rom.save(rom.reduce(model, method=rom.CraigBampton(12), interfaces=kinds), path)
+    return path
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.parametrize("page", TRIED, ids=lambda path: path.stem)
+def test_code_on_a_page_runs(page, beam, tmp_path, monkeypatch):
+    """Blocks of a page run one after the other, as a reader types them."""
+    text = page.read_text()
+    if "rom.fe" in text or "rom.view" in text:
+        pytest.importorskip("dolfinx", reason="the page starts from finite elements")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "beam.rom.npz").symlink_to(beam)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    names = {"__name__": "__main__"}
+    for found in CODE.finditer(text):
+        line = text.count("\n", 0, found.start(1))
+        exec(compile("\n" * line + found.group(1), str(page), "exec"), names)
+
+
+def test_pages_of_theory_are_short_and_name_their_sources():
+    for path in (DOCS / "theory").glob("*.md"):
+        text = path.read_text()
+        assert len(text.splitlines()) < 120
+        assert path.stem == "index" or ("\n## Sources\n" in text and CODE.search(text)), path
+
+
+def test_what_pages_name_exists():
+    """Modules, functions, files and options written in backquotes."""
+    for path in WRITTEN:
+        for name in re.findall(r"`(rom(?:\.\w+)+)(?:\(.*?\))?`", path.read_text()):
+            thing = rom
+            for part in name.split(".")[1:]:
+                thing = getattr(thing, part, None) or __import__(
+                    f"{thing.__name__}.{part}", fromlist=["_"]
+                )
+        for name in re.findall(r"`((?:meshes|demos|tests|rom)/[\w./-]+)`", path.read_text()):
+            assert (ROOT / name).exists(), f"{path.name} names {name}"
