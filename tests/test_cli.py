@@ -53,7 +53,7 @@ def answer(capsys, *arguments):
 
 
 def test_verbs_are_those_of_the_design():
-    design = "doctor mesh modes reduce check export simulate view bench completion"
+    design = "doctor mesh modes reduce check export simulate view swing bench completion"
     assert design.split() == NAMES
 
 
@@ -294,18 +294,33 @@ def test_mesh_says_what_is_inside(geometry, tmp_path, capsys):
     assert set(grid.cell_data["region"]) == {1}
 
 
-@pytest.mark.fenicsx
-def test_a_step_file_in_millimetres_with_a_picked_face(tmp_path, capsys):
-    """A box of 20 x 10 x 10 mm; STEP files carry their unit, so that no scale is needed."""
+def step_box(path, *edges):
+    """Write a box with edges in mm."""
     gmsh = pytest.importorskip("gmsh", reason="gmsh is not installed")
     gmsh.initialize([], False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.occ.addBox(0, 0, 0, 20, 10, 10)
+        gmsh.model.occ.addBox(0, 0, 0, *edges)
         gmsh.model.occ.synchronize()
-        gmsh.write(str(tmp_path / "box.step"))
+        gmsh.write(str(path))
     finally:
         gmsh.finalize()
+
+
+@pytest.mark.fenicsx
+def test_mesh_lists_the_faces_of_a_step_file(tmp_path, capsys):
+    step_box(tmp_path / "box.step", 20, 10, 10)
+    found = answer(capsys, "mesh", tmp_path / "box.step", "-p", "lc=0.01", "--faces")["interfaces"]
+    assert sorted(found) == [f"face {k}" for k in range(1, 7)]
+    middles = sorted(tuple(round(x, 9) for x in face["middle"]) for face in found.values())
+    assert middles == [(0.0, 0.005, 0.005), (0.01, 0.0, 0.005), (0.01, 0.005, 0.0),
+                       (0.01, 0.005, 0.01), (0.01, 0.01, 0.005), (0.02, 0.005, 0.005)]  # fmt: skip
+
+
+@pytest.mark.fenicsx
+def test_a_step_file_in_millimetres_with_a_picked_face(tmp_path, capsys):
+    """A box of 20 x 10 x 10 mm; STEP files carry their unit, so that no scale is needed."""
+    step_box(tmp_path / "box.step", 20, 10, 10)
     command = ("mesh", tmp_path / "box.step", "-p", "lc=0.005", "--face", "end=0.02,0.005,0.005")
     found = answer(capsys, *command)
     assert_allclose(found["volume"], 2e-6, rtol=1e-9)

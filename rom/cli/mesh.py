@@ -25,6 +25,7 @@ SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
   rom mesh part.msh --scale 1e-3 --save part.vtu
+  rom mesh part.step --faces
   rom mesh part.step -p lc=0.002 --face pin=0,0,0.01
   rom mesh meshes/beam.geo --save beam.inp --E 210e9 --nu 0.3 --rho 7850   # then: ccx beam
 """
@@ -40,6 +41,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="name the surface of a .step file next to a point [m]; may be repeated",
+    )
+    parser.add_argument(
+        "--faces", action="store_true", help="list every face of a .step file, by its number"
     )
     parser.add_argument(
         "--save",
@@ -59,7 +63,9 @@ def run(args: argparse.Namespace) -> Answer:
     solid = _solid(args)
     if args.save:
         _check_save(args.save)
-    faces = unique([(name, _point(at)) for name, at in args.face], "--face")
+    faces: dict[str, Any] = unique([(name, _point(at)) for name, at in args.face], "--face")
+    if args.faces:
+        faces["face"] = "every"
     mesh = read_mesh(args.file, faces=faces, **reading(args))
     data = summary(mesh)
     if not args.save:
@@ -111,7 +117,10 @@ def _save(mesh: "SolidMesh", path: Path, solid: "Material | None") -> None:
 def _text(data: dict[str, Any]) -> str:
     quality = ", ".join(f"{name} {value:.3g}" for name, value in data["quality"].items())
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
-    faces = [(name, str(f["facets"]), str(f["nodes"])) for name, f in data["interfaces"].items()]
+    faces = [
+        (name, str(f["facets"]), str(f["nodes"]), ", ".join(f"{x:.4g}" for x in f["middle"]))
+        for name, f in data["interfaces"].items()
+    ]
     box = " x ".join(f"{high - low:.4g}" for low, high in data["box"])
     parts = [
         f"{data['file']}: {data['cells']} cells {data['cell_type']}, {data['nodes']} nodes",
@@ -120,5 +129,6 @@ def _text(data: dict[str, Any]) -> str:
     ]
     if regions:
         parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
-    parts += ["", table(("interface", "facets", "nodes"), faces) if faces else "no interface"]
+    header = ("interface", "facets", "nodes", "middle [m]")
+    parts += ["", table(header, faces) if faces else "no interface"]
     return "\n".join(parts)

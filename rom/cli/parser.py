@@ -4,10 +4,22 @@ import argparse
 from difflib import get_close_matches
 from typing import NoReturn
 
-from rom.cli import bench, check, completion, doctor, export, mesh, modes, reduce, simulate, view
+from rom.cli import (
+    bench,
+    check,
+    completion,
+    doctor,
+    export,
+    mesh,
+    modes,
+    reduce,
+    simulate,
+    swing,
+    view,
+)
 from rom.errors import ConfigError
 
-VERBS = (doctor, mesh, modes, reduce, check, export, simulate, view, bench, completion)
+VERBS = (doctor, mesh, modes, reduce, check, export, simulate, view, swing, bench, completion)
 EXIT_CODES = """\
 exit codes:
   0  done

@@ -51,7 +51,8 @@ def read_mesh(
         parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
             ``build``, or ``lc`` (element size [m]) for ``.step``.
         faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
-            around it, or a list of these; lengths in metres.
+            around it, or a list of these; lengths in metres. {"face": "every"} names all faces
+            without a name "face 1", "face 2", ...
         scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
         order: degree of the geometry, 1 or 2, when the mesh is made here; None for the default.
 

@@ -18,6 +18,7 @@ ELEMENTS_ACROSS = 20  # default element size: this part of the diagonal
 CELLS_PER_CUBE = 8.0  # tetrahedra in a cube of the element size
 MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 NEAR = 0.05  # of the diagonal: a point further from every face is a mistake
+EVERY = "every"  # names all faces without a name by their numbers
 TIE = 1e-6  # of the diagonal: two faces nearer than this to the point are equally near
 
 
@@ -92,11 +93,20 @@ def pick(gmsh: Any, faces: dict[str, Any]) -> None:
         TagError: nothing, or two faces, at the place given.
     """
     for name, wanted in faces.items():
+        if wanted == EVERY:
+            _number(gmsh, name)
+            continue
         _group(
             gmsh,
             name,
             sorted({s for one in _wishes(name, wanted) for s in _surfaces(gmsh, name, one)}),
         )
+
+
+def _number(gmsh: Any, name: str) -> None:
+    for _, tag in gmsh.model.getEntities(2):
+        if not gmsh.model.getPhysicalGroupsForEntity(2, tag).size:
+            _group(gmsh, f"{name} {tag}", [tag])
 
 
 def _wishes(name: str, wanted: Any) -> list[Any]:

@@ -36,7 +36,11 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
             for tag, name in mesh.region_names.items()
         },
         "interfaces": {
-            name: {"facets": len(facets), "nodes": len(np.unique(facets))}
+            name: {
+                "facets": len(facets),
+                "nodes": len(np.unique(facets)),
+                "middle": _middle(mesh.points[facets.ravel()]),
+            }
             for name, facets in mesh.facets.items()
         },
         "quality": {
@@ -44,6 +48,12 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
             "largest aspect ratio": float(aspect_ratio(mesh).max()),
         },
     }
+
+
+def _middle(points: Array) -> list[float]:
+    """Middle of the box around the points."""
+    middle: list[float] = (0.5 * (points.min(axis=0) + points.max(axis=0))).tolist()
+    return middle
 
 
 def cell_volumes(mesh: SolidMesh) -> Array:
