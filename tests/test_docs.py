@@ -1,5 +1,6 @@
 """The site builds without a warning, and its generated pages say what the project is."""
 
+import importlib
 import re
 import shutil
 import subprocess
@@ -7,11 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from solid import block
+from solid import block, composite
 
 import rom
 from rom import errors
 from rom.cli.parser import VERBS
+from rom.io.op4 import write_op4
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -122,6 +124,47 @@ def test_code_on_a_page_runs(page, beam, tmp_path, monkeypatch):
         exec(compile("\n" * line + found.group(1), str(page), "exec"), names)
 
 
+def bar_deck(folder):
+    """Matrices and nodes of a bar in mm, t and s, as another program leaves them: rod.op4, .bdf."""
+    steel = rom.Material(E=210e3, nu=0.3, rho=7.85e-9)
+    model = block(size=(200.0, 20.0, 10.0), cells=(7, 1, 1), material=steel)
+    write_op4({"KAA": model.K.toarray(), "MAA": model.M.toarray()}, folder / "rod.op4")
+    sections = [10 * (k // 4 + 1) + k % 4 + 1 for k in range(len(model.points))]
+    lines = [
+        f"GRID,{number},," + ",".join(f"{x:.6f}" for x in point)
+        for number, point in zip(sections, model.points, strict=True)
+    ]
+    (folder / "rod.bdf").write_text("BEGIN BULK\n" + "\n".join(lines) + "\nENDDATA\n")
+
+
+def panel():
+    """A bar of two materials, the inner part a core."""
+    core = rom.Material(E=1e9, nu=0.3, rho=200.0)
+    materials = {"skin": rom.Material(E=70e9, nu=0.3, rho=2700.0), "core": core}
+    return composite(materials, lambda cell: "core" if cell[2] == 1 else "skin", cells=(8, 2, 3))
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+def test_code_in_the_readme_runs(tmp_path, monkeypatch):
+    """All blocks but the first, which has a test of its own; the film is not drawn."""
+    monkeypatch.chdir(tmp_path)
+    bar_deck(tmp_path)
+    drawn = []
+    monkeypatch.setattr(rom.view, "animate", lambda *a, **k: drawn.append(a[2]))
+    _, *blocks = CODE.findall((ROOT / "README.md").read_text())
+    names = {"__name__": "__main__", "model": panel(), "rom": rom}
+    for text in blocks:
+        if "read_model" in text:  # its model is not that of the next block
+            own = dict(names)
+            exec(compile(text, "README.md", "exec"), own)
+            rom.save(own["body"], "rod.rom.npz")
+            assert own["body"].mass == pytest.approx(7850 * 4e-5, rel=1e-9)
+        else:
+            exec(compile(text, "README.md", "exec"), names)
+    assert drawn == ["pendulum.gif"] and len(blocks) == 3
+    assert {"pendulum.csv", "pendulum.glb", "panel.rom.npz"} <= {p.name for p in tmp_path.iterdir()}
+
+
 def test_pages_of_theory_are_short_and_name_their_sources():
     for path in (DOCS / "theory").glob("*.md"):
         text = path.read_text()
@@ -129,14 +172,24 @@ def test_pages_of_theory_are_short_and_name_their_sources():
         assert path.stem == "index" or ("\n## Sources\n" in text and CODE.search(text)), path
 
 
+def named(name):
+    """The module, function or class that a dotted name stands for; of rom.fe only the file."""
+    thing = rom
+    for part in name.split(".")[1:]:
+        if thing is rom.fe:
+            return part in rom.fe.__all__ or (ROOT / "rom" / "fe" / f"{part}.py").exists()
+        try:
+            thing = getattr(thing, part)
+        except AttributeError:
+            thing = importlib.import_module(f"{thing.__name__}.{part}")
+    return thing
+
+
 def test_what_pages_name_exists():
-    """Modules, functions, files and options written in backquotes."""
+    """Modules, functions and files written in backquotes."""
     for path in WRITTEN:
-        for name in re.findall(r"`(rom(?:\.\w+)+)(?:\(.*?\))?`", path.read_text()):
-            thing = rom
-            for part in name.split(".")[1:]:
-                thing = getattr(thing, part, None) or __import__(
-                    f"{thing.__name__}.{part}", fromlist=["_"]
-                )
-        for name in re.findall(r"`((?:meshes|demos|tests|rom)/[\w./-]+)`", path.read_text()):
+        text = path.read_text()
+        for name in re.findall(r"`(rom(?:\.\w+)+)(?:\(.*?\))?`", text):
+            assert named(name), f"{path.name} names {name}"
+        for name in re.findall(r"`((?:meshes|demos|tests|rom)/[\w./-]+)`", text):
             assert (ROOT / name).exists(), f"{path.name} names {name}"
