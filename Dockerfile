@@ -17,6 +17,7 @@ RUN cd /opt/rom \
     && /usr/bin/python3 -m venv --system-site-packages .venv \
     && .venv/bin/pip install -q --no-cache-dir -c constraints.txt '.[view]'
 
+# on another machine than this one, `doctor` says whether OPENBLAS_CORETYPE makes it faster;
 # compiled forms and kernels are kept in the home of the user who runs the container
 RUN useradd --create-home --uid 1000 rom && mkdir /work && chown rom /work
 USER rom
