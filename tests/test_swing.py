@@ -46,8 +46,7 @@ def test_gravity_may_be_given_and_must_not_pass_through_the_hinge(bar):
 def test_a_single_stiff_interface_has_a_certificate_without_gaps(bar):
     """Its constraint modes are rigid motions, whose stiffness is round-off of either sign."""
     assert all(np.isfinite(row.value) for row in bar.certificate.rows)
-    quantities = {row.quantity for row in bar.certificate.rows}
-    assert "constraint against normal modes in K" not in quantities
+    assert not any("in K" in row.quantity for row in bar.certificate.failures)
 
 
 def test_deformations_are_magnified_until_they_are_seen(bar):
