@@ -1,0 +1,99 @@
+"""Rods in floating frames: the motion in space is that of the absolute form, whatever the frame."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from rom import rotation
+from rom.components import cosserat
+from rom.components.cosserat import floating
+from rom.errors import ConfigError, ModelError
+
+LOAD = {"tip": (30.0, -20.0, 10.0), "tip_moment": (10.0, 20.0, -15.0), "weight": (0, 0, -9.81)}
+VELOCITY, OMEGA = (1.0, 2.0, 0.0), (1.0, -2.0, 3.0)
+T = (0.1, 0.2)
+
+
+@pytest.fixture(scope="module")
+def rod():
+    one = cosserat.straight(2.0, 2, stretch=(400, 500, 600), bend=(20, 30, 25), mass=1.0,
+                            inertia=(0.2, 0.3, 0.4), viscosity=1e-3)  # fmt: skip
+    return one._replace(inertia=cosserat.body(one).frames.inertia)
+
+
+@pytest.fixture(scope="module")
+def absolute(rod):
+    """The same rod in a mechanism, by the explicit method with its tolerance of 1e-12."""
+    mech = rom.Mechanism(gravity=LOAD["weight"])
+    part = mech.add_nonlinear("rod", cosserat.body(rod), velocity=VELOCITY, omega=OMEGA)
+    mech.force("force", part.marker("end"), LOAD["tip"])
+    mech.torque("moment", part.marker("end"), LOAD["tip_moment"])
+    sol = rom.simulate(mech, t_end=T[-1], dt=1e-2, method="dop853", save_every=10)
+    return [cosserat.shape_of(sol, "rod", k) for k in (1, 2)]
+
+
+@pytest.fixture(scope="module", params=list(floating.REFERENCES))
+def motion(rod, request):
+    load = cosserat.loads(rod, **LOAD)
+    return request.param, floating.simulate(
+        rod, T, reference_condition=request.param, load=load, velocity=VELOCITY, omega=OMEGA
+    )
+
+
+def test_the_motion_in_space_is_that_of_the_absolute_form(rod, absolute, motion):
+    _, instants = motion
+    for now, shape in zip(instants, absolute, strict=True):
+        assert_allclose(now.shape.x, shape.x, atol=1e-9)
+        assert_allclose(np.abs(np.sum(now.shape.p * shape.p, axis=1)), 1.0, atol=1e-12)
+    assert np.abs(instants[-1].xi - rod.x).max() > 5e-3  # it bends
+
+
+def test_the_frames_are_what_they_are_called(rod, motion):
+    name, instants = motion
+    now = instants[-1]
+    if name == "start":
+        assert_allclose(now.xi[0], rod.x[0], atol=1e-9)
+        assert_allclose(now.theta[0], rod.p[0], atol=1e-9)
+    elif name == "chord":
+        assert_allclose(now.xi[[0, -1]][:, :2], 0.0, atol=1e-9)
+    else:
+        assert_allclose(rod.mass @ now.xi, rod.mass @ rod.x, atol=1e-9)
+        _, _, speeds, turning = now.parts
+        spin = np.cross(now.xi, rod.mass[:, None] * speeds).sum(axis=0)
+        for q, J, w in zip(now.theta, rod.inertia, turning, strict=True):
+            spin = spin + rotation.matrix(q) @ (J * w)
+        assert_allclose(spin, 0.0, atol=1e-9)
+
+
+def test_reference_conditions_hold_nothing(rod, motion):
+    """Their reactions are zero for a free rod: they choose a frame."""
+    name, instants = motion
+    load = cosserat.loads(rod, **LOAD)
+    dz, reaction = floating.accelerations(rod, instants[-1], load, floating.REFERENCES[name])
+    assert np.abs(dz).max() > 1.0
+    assert_allclose(reaction, 0.0, atol=1e-10)
+
+
+def test_forces_of_the_rod_do_not_notice_the_frame(rod, motion):
+    """Objectivity: without force and moment as a whole, the same in every frame."""
+    now = motion[1][-1]
+    W = cosserat.elements.work(rod)
+    still = np.zeros(W.r.size)
+    cosserat.elements.internal(rod, now.xi, now.theta, still, 0.0, W)
+    seen = np.append(W.r, np.zeros(3)).reshape(-1, 6)
+    force = seen[:-1, 3:]
+    turned = [rotation.matrix(q) @ m for q, m in zip(now.theta, seen[:, :3], strict=True)]
+    assert_allclose(force.sum(axis=0), 0.0, atol=1e-11)
+    assert_allclose(np.cross(now.xi, force).sum(axis=0) + np.sum(turned, axis=0), 0.0, atol=1e-11)
+    cosserat.elements.internal(rod, now.shape.x, now.shape.p, still, 0.0, W)
+    world = np.append(W.r, np.zeros(3)).reshape(-1, 6)
+    assert_allclose(world[:-1, 3:], force @ rotation.matrix(now.P).T, atol=1e-11)
+    assert_allclose(world[:, :3], seen[:, :3], atol=1e-11)
+
+
+def test_wrong_arguments_are_named(rod):
+    with pytest.raises(ConfigError, match="'tip' is none of"):
+        floating.simulate(rod, 1.0, reference_condition="tip")
+    with pytest.raises(ModelError, match="has no inertia"):
+        floating.simulate(cosserat.straight(1.0, 2, stretch=1.0, bend=1.0, mass=1.0), 1.0)
