@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
+from rom.components.blade_element import in_wind
 from rom.components.cosserat import body
 from rom.components.wind_turbine import TOWER, blade, tower
 from rom.errors import ConfigError
@@ -82,7 +83,7 @@ class Turbine:
         return seen @ basis.T
 
 
-def turbine(
+def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     segments: int = 48,
     *,
     tower_segments: int = 16,
@@ -90,6 +91,8 @@ def turbine(
     tilt: float = TILT,
     cone: float = CONE,
     damped: bool = True,
+    wind: float | None = None,
+    speed: float = 0.0,
     shaft: tuple[float, float] = (STIFFNESS, DAMPING),
 ) -> Turbine:
     """The turbine, its first blade up.
@@ -101,6 +104,8 @@ def turbine(
         tilt: of the shaft, nose up [rad].
         cone: of the blades, upwind [rad].
         damped: whether blades have the viscosity of the definition.
+        wind: its speed along the first axis [m/s], see `rom.components.blade_element`; None: still.
+        speed: with which the rotor starts to turn [rad/s].
         shaft: torsional stiffness [N m/rad] and damping [N m s/rad].
 
     Raises:
@@ -115,9 +120,10 @@ def turbine(
     axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER + RISE])
     hub = hub - OVERHANG * axis
     nacelle = _nacelle(mech, top)
-    turning = _train(mech, nacelle, (lean, hub, axis), shaft)
+    turning = _train(mech, nacelle, (lean, hub, axis), shaft, speed)
     one = body(blade(segments, damped=damped))
-    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone)) for k in range(BLADES))
+    one = one if wind is None else in_wind(one, (wind, 0.0, 0.0))
+    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(BLADES))
     return Turbine(mech, blades, standing, axis, hub)
 
 
@@ -144,20 +150,30 @@ def _nacelle(mech: Mechanism, top: Marker) -> Part:
 
 
 def _train(
-    mech: Mechanism, nacelle: Part, place: tuple[Array, Array, Array], shaft: tuple[float, float]
+    mech: Mechanism,
+    nacelle: Part,
+    place: tuple[Array, Array, Array],
+    shaft: tuple[float, float],
+    speed: float,
 ) -> Part:
     """Gear wheel, generator and hub; the hub, which carries the blades."""
     lean, hub, axis = place
     behind = nacelle.at
     bearing = nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
     at = mech.design_point(bearing)
-    wheel = mech.add_rigid("wheel", mass=WHEEL_MASS, inertia=(WHEEL_INERTIA,) * 3, at=at)
-    fast = mech.add_rigid("generator", mass=GENERATOR_MASS, inertia=(GENERATOR_INERTIA,) * 3, at=at)
-    turning = mech.add_rigid(
-        "hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, at=hub, orientation=lean
+    slow, fast = speed * axis, GEAR * speed * axis
+    wheel = mech.add_rigid(
+        "wheel", mass=WHEEL_MASS, inertia=(WHEEL_INERTIA,) * 3, at=at, omega=slow
     )
+    generator = mech.add_rigid(
+        "generator", mass=GENERATOR_MASS, inertia=(GENERATOR_INERTIA,) * 3, at=at, omega=fast
+    )
+    turning = mech.add_rigid(
+        "hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, at=hub, orientation=lean,
+        omega=(speed, 0.0, 0.0),
+    )  # fmt: skip
     mech.revolute("slow", bearing, wheel.marker(STILL), axis=axis)
-    mech.revolute("fast", bearing, fast.marker(STILL), axis=axis)
+    mech.revolute("fast", bearing, generator.marker(STILL), axis=axis)
     mech.gear("gear", "slow", "fast", ratio=GEAR)
     mech.revolute("shaft", wheel.marker(hub - at), turning.marker(STILL), axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
@@ -166,10 +182,11 @@ def _train(
 
 def _blade(mech: Mechanism, k: int, one: Any, hub: Part, place: Any) -> Assembly:
     """Blade k on the hub."""
-    lean, centre, cone = place
+    lean, centre, cone, speed = place
     round_ = rotation.matrix(rotation.exp([2 * np.pi / BLADES * k, 0.0, 0.0]))
     A = lean @ round_ @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
-    added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A)
+    turning = A.T @ lean @ [speed, 0.0, 0.0]
+    added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
     root = rotation.matrix(hub.p).T @ (mech.design_point(added.marker("start")) - centre)
     mech.fixed(f"root {k + 1}", hub.marker(root), added.marker("start"))
     return added

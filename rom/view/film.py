@@ -130,22 +130,20 @@ def _stage(
             X, size = np.asarray(X, dtype=float)[None], None
         points = placed(X, pose)
         values = None if size is None else np.linalg.norm(size, axis=2)
-        actors.append(Actor(points, triangles, values, shades[name]))
+        actors.append(Actor(points, triangles, values, METAL[shades[name]]))
         edges = sharp_edges(X[0], triangles)
         actors.append(Actor(points, edges, colour="#3a414b", width=1.0))
     return _scaled(actors, flexible)
 
 
-def shades_of(mechanism: Any) -> dict[str, str]:
-    """A grey for each body; all frames of a non-linear body have one."""
+def shades_of(mechanism: Any) -> dict[str, int]:
+    """Number of the grey of each body; all frames of a non-linear body have one."""
     whole = {part.name: name for name, all_ in mechanism.nonlinear.items() for part in all_.parts}
     things = dict.fromkeys(
         whole.get(name, name) for name, part in mechanism.parts.items() if part.flexible is None
     )
     number = {name: k for k, name in enumerate(things)}
-    return {
-        name: METAL[number.get(whole.get(name, name), 0) % len(METAL)] for name in mechanism.parts
-    }
+    return {name: number.get(whole.get(name, name), 0) % len(METAL) for name in mechanism.parts}
 
 
 def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:

@@ -78,7 +78,7 @@ def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) 
         else:
             points, triangles = shapes[name] if name in shapes else bars(part)
             modes, q = np.zeros((3 * len(points), 0)), np.zeros((len(steps), 0))
-            colour = shades[name]
+            colour = METAL[shades[name]]
         pose = solution.position(name)[steps], solution.orientation(name)[steps]
         mesh = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
         bodies.append(MovingMesh(name, *mesh, *pose, modes, q, colour))
