@@ -1,6 +1,7 @@
 """Rigid bodies, springs, drives and loads against closed forms."""
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +126,23 @@ def test_a_coil_wound_by_several_turns_unwinds_as_a_harmonic_motion(method):
     phi = np.unwrap(2 * np.arctan2(p[:, 3], p[:, 0]), period=4 * np.pi)
     assert_allclose(phi, 20.0 * (1 - np.cos(2 * sol.t)), atol=1e-9 if method == "dop853" else 1e-3)
     assert np.abs(sol.energy.balance).max() < 1e-5 * sol.energy.strain.max()
+
+
+@pytest.mark.parametrize(("dt", "lost"), [(0.01, False), (0.02, True)])
+def test_turns_that_a_step_cannot_count_are_told(dt, lost):
+    """Two hundred rad/s are two or four rad a step; half a turn is the limit."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    body = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 0.5), at=(0, 0, 0), omega=(0, 0, 200))
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), body.marker((0, 0, 0)), axis=(0, 0, 1))
+    mech.motor("drag", "axle", lambda t, x, v: -1e-6 * x)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulate(mech, t_end=0.2, dt=dt)
+    told = [str(w.message) for w in caught if "rad a step" in str(w.message)]
+    assert bool(told) == lost
+    if lost:
+        assert "body 'wheel' turned by 4 rad a step against 'ground'" in told[0]
+        assert "below 0.0157 s" in told[0]
 
 
 @pytest.mark.parametrize("kind", ["world", "body", "function"])

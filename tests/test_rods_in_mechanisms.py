@@ -200,6 +200,16 @@ def test_restart_gives_the_same_bits():
     assert np.array_equal(one.q[-1], rest.q[-1])
 
 
+def test_plates_take_their_inertia_from_the_segments_beside_them():
+    rod = cosserat.straight(10.0, 5, **SECTION)
+    frames = body(rod).frames
+    assert_allclose(frames.inertia.sum(axis=0), rod.inertia.sum(axis=0), rtol=1e-14)
+    assert_allclose(frames.inertia[[0, 1]], np.outer([0.5, 1.5], SECTION["inertia"]), rtol=1e-12)
+    assert_allclose(frames.mass.sum(), 10.0, rtol=1e-14)
+    own = rod._replace(inertia=rod.inertia + 1.0)
+    assert_allclose(body(own).frames.inertia, own.inertia)
+
+
 def test_a_released_rod_starts_from_the_shape_in_which_it_was_held():
     """A tip that is pulled and let go: its first acceleration is the pull over what it moves."""
     rod = a_rod()

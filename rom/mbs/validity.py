@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from rom import rotation
 from rom.errors import RomWarning
+from rom.mbs.arrays import ANGLE
 from rom.mbs.solution import Solution
 from rom.model import Array
 
@@ -15,7 +17,8 @@ DEFORMATION = 0.1
 
 
 def warn_of_limits(solution: Solution) -> None:
-    """Warn of bodies that left small deformations, or turned too fast without stiffening."""
+    """Warn of bodies that left small deformations, or turned too fast for stiffness or step."""
+    _warn_of_lost_turns(solution)
     for name, part in solution.mechanism.parts.items():
         if not part.r:
             continue
@@ -33,6 +36,45 @@ def warn_of_limits(solution: Solution) -> None:
                 "elastic deformation; its motion is no longer to be trusted. Divide it into "
                 "several bodies, or look for a load or drive that is too large."
             )
+
+
+def _warn_of_lost_turns(solution: Solution) -> None:
+    """Angles of joints are followed from step to step, which cannot tell more than half a turn."""
+    steps = solution.statistics.get("steps", 0)
+    if not steps:
+        return
+    h = (solution.t[-1] - solution.t[0]) / steps
+    C, body = solution.packed.system.coordinates, solution.packed.system.markers.body
+    for k in np.flatnonzero(C.kind == ANGLE):
+        i, j = int(body[C.i[k]]), int(body[C.j[k]])
+        if h * (_top(solution, i) + _top(solution, j)) < np.pi:
+            continue
+        rate = np.linalg.norm(_spin(solution, j) - _spin(solution, i), axis=1)
+        rate = rate[np.isfinite(rate)].max(initial=0.0)
+        if rate * h >= np.pi:
+            names = [solution.packed.names[b] if b >= 0 else "ground" for b in (i, j)]
+            _warn(
+                f"body {names[1]!r} turned by {rate * h:.3g} rad a step against {names[0]!r}: the "
+                "angle of their joint loses whole turns beyond pi, and with it the spring, motor, "
+                f"gear or stop that acts on it is wrong. Take steps below {np.pi / rate:.3g} s."
+            )
+
+
+def _top(solution: Solution, body: int) -> float:
+    """Largest angular speed of a body, -1 for the ground."""
+    if body < 0:
+        return 0.0
+    omega = solution.omega(solution.packed.names[body])
+    return float(np.nanmax(np.linalg.norm(omega, axis=1), initial=0.0))
+
+
+def _spin(solution: Solution, body: int) -> Array:
+    """(n_t, 3) angular velocity of a body in the world, -1 for the ground."""
+    if body < 0:
+        return np.zeros((solution.t.size, 3))
+    name = solution.packed.names[body]
+    axes = (rotation.matrix(p) for p in solution.orientation(name))
+    return np.array([A @ w for A, w in zip(axes, solution.omega(name), strict=True)])
 
 
 def _warn(message: str) -> None:
