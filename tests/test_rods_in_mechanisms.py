@@ -1,5 +1,6 @@
 """Non-linear bodies in a mechanism: rods against their own solvers, and a law of a stranger."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +19,7 @@ from rom.mbs.arrays import workspace
 from rom.mbs.motion import moved
 from rom.mbs.nonlinear import Elements, Frames
 from rom.mbs.packing import pack
+from rom.mbs.state import initial_state
 from rom.view.film import shades_of
 
 ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
@@ -251,6 +253,28 @@ def test_memory_of_the_elimination_grows_with_the_rod(n):
     packed = pack(mech)
     assert packed.by_blocks
     assert packed.system.graph.plan.memory[0] < 130 * (n + 4)
+
+
+def test_elimination_along_the_rod_is_the_dense_solution():
+    """Accelerations and reactions of a bent rod in motion, both ways."""
+    mech, _ = clamped(a_rod(9, viscosity=1e-3), gravity=(1, 2, 3))
+    by_blocks, whole = pack(mech), pack(mech, whole=True)
+    assert by_blocks.by_blocks
+    assert not whole.by_blocks
+    rng = np.random.default_rng(11)
+    n = whole.v.size
+    free = np.ones(n)
+    free[:6] = free[-6:-3] = 0.0  # the clamp, and the place of the plate at the end
+    q = whole.q.copy()
+    d = 0.2 * rng.normal(size=n) * free
+    d[-6:-3] = d[-12:-9]
+    moved(whole.system, whole.q, d, q)
+    v = rng.normal(size=n) * free
+    v[-6:-3] = v[-12:-9]
+    one, two = (initial_state(replace(p, q=q.copy(), v=v.copy())) for p in (by_blocks, whole))
+    assert_allclose(one.q, q, atol=1e-12)
+    assert_allclose(one.a, two.a, atol=1e-9 * np.abs(two.a).max())
+    assert_allclose(one.lam, two.lam, atol=1e-9 * np.abs(two.lam).max())
 
 
 # ## A law from outside: a spring and a damper between two origins
