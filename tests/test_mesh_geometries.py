@@ -216,6 +216,29 @@ def test_the_blade_meshes_over_its_range(seed):
     assert_allclose((top, -bottom), (p["span"], foot), rtol=1e-9)
 
 
+@pytest.mark.parametrize("L", [0.018, 0.010])
+def test_the_phalanx_is_a_round_edged_cylinder_with_a_bore(L):
+    """Edges after Pappus, plates without the bore, pad on the side of the palm."""
+    D, R, d, e, l_pad, w_pad = 0.014, 0.00125, 0.0015, 0.0045, 0.005, 0.006
+    mesh = read_mesh(MESHES / "phalanx.geo", parameters={"L": L}, order=2)
+    a = D / 2 - R
+    rim = np.pi * (a**2 * R + a * np.pi * R**2 / 2 + 2 * R**3 / 3)
+    exact = np.pi * D**2 / 4 * (L - 2 * R) + 2 * rim - np.pi * d**2 / 4 * L
+    assert volume(mesh) == pytest.approx(exact, rel=1.5e-3)
+    ends = [mesh.points[np.unique(mesh.facets[name])] for name in ("proximal", "distal")]
+    for points, z in zip(ends, (0.0, L), strict=True):
+        assert_allclose(points[:, 2], z, atol=1e-12)
+        assert np.hypot(*points[:, :2].T).max() == pytest.approx(a)
+        assert np.hypot(points[:, 0] - e, points[:, 1]).min() == pytest.approx(d / 2)
+    pad = mesh.points[np.unique(mesh.facets["pad"])]
+    assert_allclose(np.hypot(pad[:, 0], pad[:, 1]), D / 2)
+    assert_allclose((pad[:, 2].min(), pad[:, 2].max()), (L - 0.00725, L - 0.00225))
+    assert_allclose(np.abs(pad[:, 1]).max(), w_pad / 2)
+    assert pad[:, 0].min() > 0
+    assert areas(mesh)["pad"] == pytest.approx(D * np.arcsin(w_pad / D) * l_pad, rel=0.01)
+    assert 3 * len(mesh.points) < 12_000
+
+
 @pytest.mark.parametrize(
     ("name", "parameters", "culprit"),
     [
@@ -234,6 +257,9 @@ def test_the_blade_meshes_over_its_range(seed):
         ("compressor_blade", {"crown": 0.005}, "crown = 0.005"),
         ("crank", {"d_pin": 0.05}, "d_pin = 0.05"),
         ("crank", {"r": 0.005}, "r = 0.005"),
+        ("phalanx", {"D": 0.012}, "radius D / 2 - R = 0.00475"),
+        ("phalanx", {"w_pad": 0.02}, "w_pad = 0.02"),
+        ("phalanx", {"L": 0.008}, "L = 0.008"),
     ],
 )
 def test_impossible_dimensions_are_named(name, parameters, culprit):
