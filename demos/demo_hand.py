@@ -14,11 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+import rom
 from rom import view
-from rom.components.compliant_hand import Finger, close, hand, rest
+from rom.bench_models import bar
+from rom.components.compliant_hand import INDEX, SPRING, Finger, close, hand, rest
 from rom.components.control_chart import Chart, envelope, muscle
 from rom.components.grasp import Bar, grasp
 from rom.components.helical_spring import HelicalSpring
+from rom.components.solid_finger import parts_of_compliance
 from rom.view import Panel
 
 options = argparse.ArgumentParser(description="fingers of springs, their stiffness and command")
@@ -74,6 +77,21 @@ share = np.linspace(0.0, 0.4, 81)
 within = share < column.critical_compression(1.0)
 columns = {"40 mm long": (100 * share[within], column.lateral_stiffness(share[within])),
            "24 mm long": (100 * share, sturdy.lateral_stiffness(share))}  # fmt: skip
+
+# ## May phalanges be rigid?
+#
+# Square bars of polyamide, 12 mm thick, reduced: what they add to the compliance of the tip. With
+# `solid_finger` they move in a mechanism; `meshes/phalanx.geo` is a bone with a bore for the cable.
+
+polyamide = rom.Material(E=1.7e9, nu=0.4, rho=1010.0)
+ends = {"root": "rbe3", "tip": "rbe3"}  # plates that leave the bars free to widen, as in beams
+solids = [bar((link, 12 * MM, 12 * MM), (3, 2, 2), polyamide) for link in INDEX]
+bones = [rom.reduce(solid, interfaces=ends, method=rom.CraigBampton(n_modes=3), certify=False)
+         for solid in solids]  # fmt: skip
+upward = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])  # these bars lie along x
+joints, links = parts_of_compliance(bones, (SPRING,) * 3, ends=tuple(ends), orientation=upward)
+bone_share = 100 * links[0, 0] / (joints + links)[0, 0]
+say(f"sideways compliance of the tip that is in the bones: {bone_share:.4f} %")
 
 # ## A grasp of a bar of 40 mm from both sides
 
@@ -144,6 +162,7 @@ results = {
     "pull at 2 N [mm]": (at.pull / MM, 11.331, 1e-3),
     "tip at 2 N, towards the palm [mm]": (at.tip[0] / MM, 40.801, 1e-3),
     "sideways compliance of the slack tip [mm/N]": (C[0, 0] / MM, 267.362, 1e-3),
+    "share of the bones in it, as beams [%]": (bone_share, 0.00627, 3e-3),
     "flexion at which coils touch [deg]": (np.degrees(postures[-1].angles.sum()), 113, 0.07),
     "buckling at a compression of": (column.critical_compression(1.0), 0.1986, 1e-3),
     "fingers that press the bar": (float(sum(f > 0.1 for f in grip.values())), 5.0, 0.0),

@@ -27,10 +27,10 @@ SIDE = 6e-3
 SPRINGS = (SPRING, HelicalSpring(0.8e-3, 8e-3, 4, 9e-3), SPRING)
 
 
-def bars(material, lengths=INDEX):
-    kinds = dict.fromkeys(ENDS, "rbe2")
+def bars(material, lengths=INDEX, kind="rbe2", cells=(2, 1, 1)):
+    kinds = dict.fromkeys(ENDS, kind)
     return [
-        rom.reduce(bar((length, SIDE, 0.8 * SIDE), (2, 1, 1), material),
+        rom.reduce(bar((length, SIDE, 0.8 * SIDE), cells, material),
                    method=rom.CraigBampton(2), interfaces=kinds, certify=False)
         for length in lengths
     ]  # fmt: skip
@@ -58,15 +58,15 @@ def test_compliance_is_the_sum_of_springs_and_phalanges():
 
 
 def test_compliance_of_one_link_is_that_of_a_beam():
-    """Bending, shear and tension in closed form; plates that do not widen are a little stiffer."""
+    """Bending, shear and tension in closed form, for plates that leave the bar free to widen."""
     L, b, h = INDEX[0], SIDE, 0.8 * SIDE
     E, G = 2e6, 2e6 / 2.6
-    C = link_compliance(bars(SOFT)[0], ENDS)
+    C = link_compliance(bars(SOFT, INDEX[:1], "rbe3", (6, 2, 2))[0], ENDS)
     bends = np.array([h * b**3, b * h**3]) / 12
     exact = [L / (E * b * h), *(L**3 / (3 * E * bends) + L / (5 / 6 * G * b * h))]
-    assert_allclose(np.diag(C)[:3], exact, rtol=0.08)
-    assert_allclose(np.diag(C)[4:], L / (E * bends[::-1]), rtol=0.05)
-    assert_allclose([C[1, 5], C[2, 4]], L**2 / (2 * E * bends) * [1, -1], rtol=0.06)
+    assert_allclose(np.diag(C)[:3], exact, rtol=5e-3)
+    assert_allclose(np.diag(C)[4:], L / (E * bends[::-1]), rtol=5e-3)
+    assert_allclose([C[1, 5], C[2, 4]], L**2 / (2 * E * bends) * [1, -1], rtol=5e-3)
 
 
 def test_stiff_phalanges_make_the_rigid_finger():
