@@ -226,6 +226,10 @@ def test_a_released_rod_starts_from_the_shape_in_which_it_was_held():
     assert sol.energy.strain[0] > 1.0
     assert np.abs(sol.energy.balance).max() < 0.02 * sol.energy.strain[0]
     assert sol.position("rod.12")[-1, 2] < 1.5
+    again = rom.release(loose, sol.final)
+    assert_allclose(again.v, sol.final.v, atol=1e-8)
+    assert np.abs(again.v).max() > 0.1
+    assert again.t == sol.final.t
     with pytest.raises(ConfigError, match="no State"):
         rom.release(loose, rest.q)
     other, _ = clamped(a_rod(4))
