@@ -24,6 +24,11 @@ def test_beams_have_the_sections_of_the_blade():
     assert_allclose(described["stiffness"][:, :3], one.stretch[:, [2, 0, 1]])
     around = (described["stiffness"][24:40, 3:] + described["stiffness"][25:41, 3:]) / 2
     assert_allclose(around, one.bend[25:41][:, [2, 0, 1]], rtol=0.06)
+    damped = blade(48, damped=True)
+    ratio = described["damping"] / described["stiffness"]
+    seen = damped.viscous_stretch / damped.stretch, damped.viscous_bend[1:] / damped.bend[1:]
+    assert_allclose(ratio[:, :3], seen[0][:, [2, 0, 1]])
+    assert_allclose(ratio[:, 3:], seen[1][:, [2, 0, 1]])
     assert_allclose(described["inertia"][:, 0], described["inertia"][:, 1:].sum(axis=1))
     for k, node in enumerate(described["nodes"]):
         A = rotation.matrix(node[3:])

@@ -33,6 +33,23 @@ def test_masses_are_those_of_the_definition():
     assert_allclose(whole.axis, [np.cos(np.radians(5)), 0, -np.sin(np.radians(5))])
 
 
+def test_geometry_and_yaw_are_those_of_the_definition():
+    """Blades lean upwind by 2.5 degrees; the nacelle has 2 607 890 kg m^2 about the tower."""
+    whole = turbine(4)
+    for blade_ in whole.blades:
+        arm = whole.mechanism.design_point(blade_.marker("end")) - whole.hub
+        assert_allclose(arm @ whole.axis / np.linalg.norm(arm), -np.sin(np.radians(2.5)))
+    parts = whole.mechanism.parts
+    nacelle = parts["nacelle"]
+    own = nacelle.second[0, 0] + nacelle.second[1, 1]  # about the third axis
+    extra = 2000.0 * 1.9**2  # of wheel and generator, which are drawn elsewhere on the shaft
+    assert_allclose(own + nacelle.mass * nacelle.at[0] ** 2 + extra, 2_607_890, rtol=1e-9)
+    fast = turbine(4, speed=RATED).mechanism.parts
+    assert_allclose(fast["generator"].omega, GEAR * RATED * whole.axis)
+    assert_allclose(fast["blade 2.3"].velocity, RATED * np.cross(
+        whole.axis, fast["blade 2.3"].at - whole.hub), atol=1e-12)  # fmt: skip
+
+
 def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
     """Largest lag 0.25181 m at 10.07 s, flapping -0.0492 m, stretch 14.02 mm at speed."""
     whole = turbine(48, tower_segments=0, gravity=0.0, tilt=0.0, cone=0.0, damped=False,
