@@ -153,6 +153,23 @@ def test_momentum_of_a_free_flexible_body_is_conserved():
     assert np.ptp(sol.energy.total) < 1e-9 * sol.energy.kinetic[0]
 
 
+def test_momentum_gets_better_with_the_step_down_to_the_smallest():
+    """Second order, 1e-8 at last; increments that stop at the round-off of positions leave 1e-6."""
+    drift = []
+    for dt in (1e-3, 1e-4, 1e-5):
+        mech = Mechanism(gravity=(0, 0, 0))
+        rng = np.random.default_rng(11)
+        mech.add_flexible(
+            "one", random_body(rng, damped=False), at=(0.1, 0.2, 0.3), velocity=(1, 2, -1),
+            omega=(1.0, -0.5, 0.3), q=0.01 * rng.normal(size=4), qd=0.1 * rng.normal(size=4),
+        )  # fmt: skip
+        sol = simulate(mech, t_end=0.2, dt=dt, rho_inf=1.0, save_every=20)
+        drift.append([np.abs(p - p[0]).max() / np.abs(p).max() for p in sol.momentum])
+    drift = np.array(drift)
+    assert (drift[1] < drift[0] / 50).all()
+    assert (drift[1:] < 1e-8).all()
+
+
 @pytest.fixture(scope="module")
 def beam():
     """A slender block on the hinge side "root", reduced to rigid ends and ten modes."""

@@ -39,6 +39,9 @@ GOES_ON, CONVERGED, FAILED, NOT_FINITE, SINGULAR, ASK = 0, 1, 2, 3, 4, 5
 STEPS, ITERATIONS, FACTORISATIONS, LAST, FRESH, PASS, BEGAN, ASKS, ASKED, BOTH = range(10)
 MAX_PASSES = 25
 ROUND_OFF = 4e-16
+# share of the round-off of positions that increments are brought to: velocities and accelerations
+# feel an increment over the step and over its square, and their errors add up to momentum
+FINER = 1e-3
 # gap in a joint, in rad or lengths of the mechanism, that may remain: the norm of increments hardly
 # sees a light body that spins fast
 GAP = 1e-11
@@ -198,14 +201,17 @@ def increment_norm(W, T):
 
 @inner
 def increment_goal(W, T):
-    """Increment that no longer matters: a fraction of what the acceleration moves in a step."""
+    """Increment that no longer matters: a fraction of what the acceleration moves in a step.
+
+    And the round-off of the positions.
+    """
     total, reach, h = 0.0, 0.0, T.method[0]
     for i in range(T.vd1.size):
         total += W.weight[i] * T.vd1[i] ** 2
     for i in range(T.q1.size):
         reach = max(reach, abs(T.q1[i]))
     floor = ROUND_OFF * (1.0 + reach / T.size[1])
-    return max(T.size[2] * h * h * math.sqrt(total) / T.size[1], floor), floor
+    return max(T.size[2] * h * h * math.sqrt(total) / T.size[1], FINER * floor), floor
 
 
 @inner
@@ -268,7 +274,7 @@ def verdict(W, T, size, gap):
     shrink = size / last if last > 0.0 else 1.0
     closed = gap * min(1.0, gap / wider if wider > 0.0 else 1.0) <= GAP
     closing = shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal
-    if size <= floor or (closing and closed):
+    if size <= FINER * floor or (closing and closed):
         return CONVERGED
     if shrink > 0.5 and size < 100 * floor and T.count[PASS] > 3:
         return CONVERGED
