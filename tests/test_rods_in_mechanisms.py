@@ -192,6 +192,21 @@ def test_a_rod_goes_on_where_a_reduced_solid_ends():
     assert_allclose(found, expected, rtol=4e-3)
 
 
+def test_a_rod_that_hardly_bends_has_the_frequencies_of_the_reduced_solid():
+    """Cantilever of one metre, 30 x 20 mm: bricks in Craig-Bampton form against 192 segments."""
+    size, E, rho = (1.0, 0.03, 0.02), 210e9, 7850.0
+    solid = rom.reduce(bar(size, (40, 2, 2)), method=rom.CraigBampton(8), certify=False,
+                       interfaces={"root": "rbe3"})  # fmt: skip
+    A, I = size[1] * size[2], np.array([size[1] * size[2] ** 3, size[2] * size[1] ** 3]) / 12
+    rod = cosserat.straight(
+        1.0, 192, frame=ALONG_X, stretch=E / 2.6 * A * np.array([5 / 6, 5 / 6, 2.6]),
+        bend=(E * I[0], E * I[1], E / 2.6 * 0.196 * size[1] * size[2] ** 3), mass=rho * A,
+        inertia=rho * np.array([I[0], I[1], I.sum()]),
+    )  # fmt: skip
+    found = cosserat.modes(rod, cosserat.reference(rod), 5).frequencies
+    assert_allclose(found, solid.frequencies(fixed="root")[:5], rtol=3e-3)
+
+
 def test_restart_gives_the_same_bits():
     rod = a_rod(5)
     mech, part = clamped(rod)
