@@ -18,6 +18,7 @@ class RomError(Exception):
     """
 
     exit_code = 1
+    solution: Any = None  # of a motion that failed: what came before
 
     def __init__(self, message: str, *, where: str = "", hint: str = ""):
         self.message, self.where, self.hint = message, where, hint

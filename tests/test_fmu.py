@@ -21,6 +21,9 @@ from rom.io.fmu.variables import structured
 from rom.mbs.mechanism import Mechanism
 
 ROOT = Path(__file__).parents[1]
+# two processes of which one has just compiled the kernels and the other read them from the cache
+# differ in the last bit; of two that read them none does
+SAME_CODE = 1e-12
 CRANK = """
 from mbs_cases import slider_crank
 
@@ -105,7 +108,8 @@ def test_the_slider_crank_is_the_native_run(crank):
         output=[*POSITION, *VELOCITY, "main.angle"],
     )  # fmt: skip
     slider = np.column_stack([found[name] for name in (*POSITION, *VELOCITY)])
-    assert_array_equal(slider, native(motion)[::2])
+    here = native(motion)[::2]
+    assert_allclose(slider, here, rtol=0, atol=SAME_CODE * np.abs(here).max())
     # the last corrections of Newton have not reached the angle that the integrator remembers
     assert_allclose(found["main.angle"], motion.base[::2, 0], rtol=0, atol=1e-9)
 
@@ -260,7 +264,7 @@ def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tm
     mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
     mech.force("pull", body.marker("b"), (1.0, 2.0, 3.0), frame="body")
     half = simulate_quietly(mech, t_end=0.05, dt=1e-2, rho_inf=0.8)
-    assert_array_equal(begun, half.position("one", "b")[-1])
+    assert_allclose(begun, half.position("one", "b")[-1], atol=SAME_CODE)
     mech.loads["pull"] = replace(mech.loads["pull"], vector=np.array([-4.0, 2.0, 3.0]))
     end = simulate_quietly(mech, t_end=0.1, dt=2e-4, rho_inf=0.8, state=replace(
         half.final, algorithmic=None, memory=None))  # fmt: skip

@@ -92,7 +92,8 @@ def campbell(
         raise ConfigError(f"speeds = {speeds.tolist()} must be at least two growing numbers.")
     axis = unit_vector("axis", axis)
     found = [_at(mechanism, speed, axis, about, frame) for speed in speeds]
-    orders, likeness = [np.arange(found[0].eigenvalues.size)], []
+    orders: list[Any] = [np.arange(found[0].eigenvalues.size)]
+    likeness = []
     for one, two in pairwise(found):
         follow, mac = _follow(one, two, orders[-1])
         orders.append(follow)

@@ -32,7 +32,8 @@ def save_state(state: State, path: str | Path) -> Path:
     arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED}
     given = {name: getattr(state, name) for name in OPTIONAL}
     arrays |= {name: A for name, A in given.items() if A is not None}
-    manifest = {"schema": SCHEMA, "version": list(VERSION), "t": float(state.t).hex()}
+    manifest: dict[str, Any] = {"schema": SCHEMA, "version": list(VERSION)}
+    manifest["t"] = float(state.t).hex()
     manifest["rank"] = int(state.rank)
     if state.memory is not None:
         m = state.memory

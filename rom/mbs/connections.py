@@ -11,7 +11,7 @@ from rom import rotation
 from rom.errors import ConfigError, ModelError
 from rom.mbs import joints
 from rom.mbs.arguments import number, positive, unit_vector
-from rom.mbs.joints import Joint
+from rom.mbs.joints import Joint, Row
 from rom.mbs.parts import Marker, Part
 from rom.model import Array
 
@@ -195,7 +195,9 @@ class Connections:
                 raise ConfigError(f"{what} of drive {name!r} is {f!r}, not a function of time.")
         self.drives[name] = Drive(joint, function, rate, acceleration)
 
-    def _join(self, name: str, m1: Marker, m2: Marker, kind: Callable[..., Joint], *axes: Any):
+    def _join(
+        self, name: str, m1: Marker, m2: Marker, kind: Callable[..., Joint], *axes: Any
+    ) -> None:
         self._check_new(name)
         self._check_markers(name, m1, m2)
         if m1.body == m2.body:
@@ -229,7 +231,7 @@ class Connections:
             )
         return self.joints[joint]
 
-    def _coordinate(self, joint: str, which: str | None, what: str) -> joints.Row:
+    def _coordinate(self, joint: str, which: str | None, what: str) -> Row:
         """The row that measures the coordinate "angle" or "way" of a joint; None for the first."""
         found = self._joint_with_axis(joint, what)
         rows = {None: found.coordinate, "angle": found.turn, "way": found.way}

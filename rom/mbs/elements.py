@@ -200,7 +200,7 @@ class Elements:
             ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
         """
         self._check_new(name)
-        part = self.part(getattr(part, "name", part))
+        part = self.part(str(getattr(part, "name", part)))
         if frame not in ("world", "body"):
             raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
         shapes = getattr(load, "shapes", None)
@@ -230,7 +230,9 @@ class Elements:
             else rotation.matrix(self.part(marker.body).p).T @ unit_vector(f"axis of {name}", axis)
             for marker, axis in zip(markers, axes, strict=True)
         ]
-        self.contacts[name] = Contact(kind, *markers, *directions, radius, checked_law(name, law))
+        i, j = markers
+        e, s = directions
+        self.contacts[name] = Contact(kind, i, j, e, s, radius, checked_law(name, law))
 
 
 def _matrix66(name: str, value: Any) -> Array:

@@ -150,8 +150,8 @@ class _Search:
         """Refuse free motions, and warn of unstable ones."""
         tangent = Tangent.of(self.now.scaled(1.0), state)
         squares, V = np.linalg.eigh(tangent.curvature)
-        free = np.flatnonzero(np.abs(squares) <= tangent.none(squares))
-        free = [k for k in free if not self.along_spin(tangent, state, V[:, k])]
+        still = np.flatnonzero(np.abs(squares) <= tangent.none(squares))
+        free = [k for k in still if not self.along_spin(tangent, state, V[:, k])]
         if free:
             motion = tangent.Z @ V[:, free[0]]
             raise ModelError(
@@ -171,7 +171,7 @@ class _Search:
     def along_spin(self, tangent: "Tangent", state: State, y: Array) -> bool:
         """Whether a free motion is the steady rotation itself."""
         motion, v = tangent.T @ tangent.Z @ y / self.now.probe(), state.v / self.now.probe()
-        return abs(motion @ v) > (1 - 1e-6) * np.linalg.norm(motion) * np.linalg.norm(v) > 0.0
+        return bool(abs(motion @ v) > (1 - 1e-6) * np.linalg.norm(motion) * np.linalg.norm(v) > 0)
 
 
 def _described(packed: Packed, motion: Array) -> str:

@@ -43,7 +43,7 @@ class Impact:
     mu: float = 0.0
     transition_speed: float = 1e-3
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("stiffness", "exponent", "transition_speed"):
             positive(name, getattr(self, name))
         for name in ("damping", "mu"):

@@ -121,12 +121,12 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             warn_of_limits(error.solution)
         raise
     except KeyboardInterrupt:
-        error = InterruptedRun(
+        interrupted = InterruptedRun(
             f"interrupted at t = {record.t:.6g} s of {t_end:g} s.",
             hint="The motion up to there is kept in error.solution.",
         )
-        error.solution = record.solution(str(error)) if record.blocks else None
-        raise error from None
+        interrupted.solution = record.solution(str(interrupted)) if record.blocks else None
+        raise interrupted from None
     stopped = "" if record.watch is None else record.watch.sentence
     solution = record.solution(stopped or status)
     warn_of_limits(solution)

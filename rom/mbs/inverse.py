@@ -102,10 +102,8 @@ def _solution(
 
     t, work = rows("t"), np.zeros_like(powers)
     work[1:] = np.cumsum(0.5 * np.diff(t)[:, None] * (powers[1:] + powers[:-1]), axis=0)
-    motion = (rows(name) for name in ("q", "v", "a", "lam"))
     statistics = {"steps": t.size - 1, "rank": states[0].rank}
     status = f"Prescribed from t = {t[0]:g} s to {t[-1]:g} s."
-    return Solution(
-        *(mechanism, packed, t, *motion, work, rows("base"), signals, statistics, status),
-        states[-1],
-    )
+    q, v, a, lam = (rows(name) for name in ("q", "v", "a", "lam"))
+    moved = mechanism, packed, t, q, v, a, lam
+    return Solution(*moved, work, rows("base"), signals, statistics, status, states[-1])

@@ -37,7 +37,7 @@ class Joint:
     Attributes:
         name: name of the joint.
         kind: "revolute", "spherical", ...
-        markers: the two markers.
+        markers: the two markers; of a coupling those of its second and its first joint.
         rows: the constraints.
         coordinate: the row that measures the joint coordinate, or None.
         turn: the row that measures the angle, or None.
@@ -46,7 +46,7 @@ class Joint:
 
     name: str
     kind: str
-    markers: tuple[Marker, Marker]
+    markers: tuple[Marker, ...]
     rows: tuple[Row, ...]
     coordinate: Row | None = None
     turn: Row | None = None

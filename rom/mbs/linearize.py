@@ -170,13 +170,13 @@ def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearizati
     if state.v.any():
         later = path.later()
         moved_on = _matrices(now, later.state, world, later)
-        scale = max(np.abs(found.K).max(initial=0.0), rate * np.abs(found.C).max(initial=0.0))
+        size = max(np.abs(found.K).max(initial=0.0), rate * np.abs(found.C).max(initial=0.0))
         change = max(np.abs(found.K - moved_on.K).max(initial=0.0),
                      rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
-        scale = max(scale, rate**2)
-        if change > DRIFT * TURN * scale:
+        size = max(float(size), rate**2)
+        if change > DRIFT * TURN * size:
             warnings.warn(
-                f"the linear equations change with time, by {change / TURN / scale:.2g} of their "
+                f"the linear equations change with time, by {change / TURN / size:.2g} of their "
                 "size per radian: these frequencies are those of one instant.",
                 RomWarning,
                 stacklevel=4,

@@ -97,7 +97,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
     contacts: dict[str, Contact] = field(default_factory=dict, init=False)
     spread_loads: dict[str, Spread] = field(default_factory=dict, init=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.gravity = finite("gravity", self.gravity, (3,))
         self.ground = ground_part()
 

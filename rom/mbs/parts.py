@@ -125,9 +125,7 @@ def ground_part() -> Part:
     return Part(GROUND, 0.0, zero, np.zeros((3, 3)), zero, still, zero, zero)
 
 
-def rigid_part(
-    name: str, mass: float, inertia: Array, pose: tuple[Array, ...], points: dict[str, Array]
-) -> Part:
+def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[str, Array]) -> Part:
     """A rigid body.
 
     Raises:
@@ -148,10 +146,11 @@ def rigid_part(
             where=name,
         )
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    return Part(name, mass, np.zeros(3), second, *pose, points)
+    at, p, velocity, omega = pose
+    return Part(name, mass, np.zeros(3), second, at, p, velocity, omega, points)
 
 
-def flexible_part(name: str, body: Any, pose: tuple[Array, ...], elastic: tuple) -> Part:
+def flexible_part(name: str, body: Any, pose: Any, elastic: Any) -> Part:
     """A flexible body.
 
     Raises:
@@ -160,7 +159,9 @@ def flexible_part(name: str, body: Any, pose: tuple[Array, ...], elastic: tuple)
     inertia = np.asarray(body.inertia, dtype=float)
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     first = np.asarray(body.first_moment, dtype=float)
-    part = Part(name, float(body.mass), first, second, *pose, {}, body, *elastic)
+    at, p, velocity, omega = pose
+    still = name, float(body.mass), first, second, at, p
+    part = Part(*still, velocity, omega, {}, body, *elastic)
     _check_mass(part)
     return part
 

@@ -28,15 +28,15 @@ class FrequencyResponse:
     """
 
     frequencies: Array
-    receptance: Array
+    receptance: Any
 
     @property
-    def mobility(self) -> Array:
+    def mobility(self) -> Any:
         """(f, 6, 6) velocities per force."""
         return 2j * np.pi * self.frequencies[:, None, None] * self.receptance
 
     @property
-    def accelerance(self) -> Array:
+    def accelerance(self) -> Any:
         """(f, 6, 6) accelerations per force."""
         return 2j * np.pi * self.frequencies[:, None, None] * self.mobility
 

@@ -86,7 +86,7 @@ class SurfaceContacts:
         law, axis, radius, where = given
         self._check_new(name)
         self._check_markers(name, m1)
-        part = self.part(getattr(part, "name", part))
+        part = self.part(str(getattr(part, "name", part)))
         if part.flexible is None:
             raise ConfigError(f"contact {name!r}: body {part.name!r} is rigid, it has no surface.")
         if part.name == m1.body:

@@ -41,12 +41,12 @@ class Law:
     def apply(self, W: Work, t: float) -> None:
         """Add force and reaction to the wrenches of the user."""
         a = motion_of(W, self.i)
-        motions = (a,) if self.j < 0 else (a, motion_of(W, self.j))
-        force, moment = _checked(self, t, self.function(t, *motions))
+        others = () if self.j < 0 else (motion_of(W, self.j),)
+        force, moment = _checked(self, t, self.function(t, a, *others))
         W.user[self.i, :3] += force
         W.user[self.i, 3:] += moment
-        if self.j >= 0:
-            lever = a.position - motions[1].position
+        for other in others:
+            lever = a.position - other.position
             W.user[self.j, :3] -= force
             W.user[self.j, 3:] -= moment + np.cross(lever, force)
 
