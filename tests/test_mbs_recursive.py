@@ -194,8 +194,10 @@ def test_the_motion_is_that_of_whole_matrices(case, solved):
     options = {"t_end": 0.03, "dt": 1e-3, "tolerance": 1e-12}
     one, other = (solved(made(case), blocks=blocks, **options) for blocks in (True, False))
     assert_same_motion(one, other, {"q": 1e-10, "v": 1e-9, "a": 1e-6, "lam": 1e-6})
-    counted = [sol.statistics["iterations"] for sol in (one, other)]
-    assert abs(counted[0] - counted[1]) <= 2, "the iteration matrix is another one"
+    options["tolerance"] = 1e-8  # where no correction is a matter of round-off
+    pair = (solved(made(case), blocks=blocks, **options) for blocks in (True, False))
+    counted = [sol.statistics["iterations"] for sol in pair]
+    assert abs(counted[0] - counted[1]) <= 1, "the iteration matrix is another one"
 
 
 @pytest.mark.parametrize("method", ["generalized-alpha", "bdf"])
