@@ -18,14 +18,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import carray, cfunc
+from numba import carray
 
+from rom.components.compiled import elements, law
 from rom.components.cosserat import RodBody
-from rom.components.cosserat.multibody import SIGNATURE
+from rom.components.cosserat.elements import rotation_of
 from rom.components.wind_turbine import BLADE, HUB_RADIUS
 from rom.errors import ConfigError
-from rom.mbs.compiled import OPTIONS
-from rom.mbs.nonlinear import Elements
 from rom.model import Array
 
 RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 40.45, 44.55, 48.65,
@@ -45,12 +44,7 @@ def strip(numbers, pose, wanted, answer, space):
     out, room = carray(answer, (2 + 6 + 72,)), carray(space, (64,))
     out[:] = 0.0
     R, J, L = room[0:9].reshape((3, 3)), room[9:18].reshape((3, 3)), room[18:27].reshape((3, 3))
-    e0, e1, e2, e3 = s[3], s[4], s[5], s[6]
-    R[0, 0], R[0, 1] = 1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3)
-    R[0, 2], R[1, 0] = 2 * (e1 * e3 + e0 * e2), 2 * (e1 * e2 + e0 * e3)
-    R[1, 1], R[1, 2] = 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)
-    R[2, 0], R[2, 1] = 2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1)
-    R[2, 2] = 1 - 2 * (e1 * e1 + e2 * e2)
+    rotation_of(s[3:7], R)
     wx, wy, wz = given[1] - s[7], given[2] - s[8], given[3] - s[9]
     # across the section: from the pressure side, and from the leading edge
     a = R[0, 0] * wx + R[1, 0] * wy + R[2, 0] * wz
@@ -88,9 +82,9 @@ def strip(numbers, pose, wanted, answer, space):
 
 
 @cache
-def law() -> Any:
+def compiled_strip() -> Any:
     """The compiled law of a strip."""
-    return cfunc(SIGNATURE, **OPTIONS | {"_nrt": True})(strip)
+    return law(strip)
 
 
 def in_wind(
@@ -126,7 +120,7 @@ def in_wind(
     drag = np.where(lifting, DRAG, DRAG_OF_CIRCLES)
     slowed = np.tile((1.0 - induction) * wind, (n, 1))
     numbers = np.column_stack([0.5 * density * area, slowed, lift, drag])
-    blown = Elements(law().address, np.arange(n)[:, None], numbers, law())
+    blown = elements(compiled_strip(), np.arange(n)[:, None], numbers)
     return replace(blade, elements=(*blade.elements, blown))
 
 

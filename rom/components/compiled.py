@@ -1,13 +1,24 @@
 """The compiler of components' kernels, which may make arrays; those of `rom.mbs` may not."""
 
-from numba import njit
+from typing import Any
+
+from numba import cfunc, njit
 
 from rom.mbs.compiled import OPTIONS, drop_stale_cache
+from rom.mbs.nonlinear import SIGNATURE, Elements
+from rom.model import Array, Index
 
-__all__ = ["drop_stale_cache", "inner", "kernel"]
+__all__ = ["drop_stale_cache", "elements", "inner", "kernel", "law"]
 
 _OPTIONS = OPTIONS | {"_nrt": True}
 # callable from Python
 kernel = njit(**_OPTIONS)
 # callable from other kernels only
 inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# of the elements of non-linear bodies, see `rom.mbs.nonlinear`
+law = cfunc(SIGNATURE, **_OPTIONS)
+
+
+def elements(compiled: Any, frames: Index, numbers: Array) -> Elements:
+    """Elements with a compiled law."""
+    return Elements(compiled.address, frames, numbers, compiled)

@@ -12,14 +12,20 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.components.cosserat import Motion, Rod, rod
-from rom.components.wind_turbine import blade
+from rom.components.wind_turbine import (
+    BLADES,
+    DAMPING,
+    GEAR,
+    GENERATOR_INERTIA,
+    HUB_INERTIA,
+    OVERHANG,
+    STIFFNESS,
+    blade,
+)
 from rom.model import Array
 
-BLADES = 3
-OVERHANG = 5.0191  # m, generator to hub here
-HUB = 115_926.0  # kg m^2, about the rotor axis
-GENERATOR = 534.116 * 97**2  # kg m^2, on the slow side of the gear
-STIFFNESS, DAMPING = 8.67637e8, 6.215e6  # N m/rad and N m s/rad, of the shaft
+HUB = HUB_INERTIA
+GENERATOR = GENERATOR_INERTIA * GEAR**2  # kg m^2, on the slow side of the gear
 RIGID = 1e12  # N and N m^2, of what does not bend; the root of a blade has 2e10
 
 

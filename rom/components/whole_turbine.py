@@ -18,7 +18,18 @@ import numpy as np
 from rom import rotation
 from rom.components.blade_element import in_wind
 from rom.components.cosserat import body
-from rom.components.wind_turbine import TOWER, blade, tower
+from rom.components.wind_turbine import (
+    BLADES,
+    DAMPING,
+    GEAR,
+    GENERATOR_INERTIA,
+    HUB_INERTIA,
+    OVERHANG,
+    STIFFNESS,
+    TOWER,
+    blade,
+    tower,
+)
 from rom.errors import ConfigError
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.nonlinear import Assembly
@@ -26,14 +37,11 @@ from rom.mbs.parts import Marker, Part
 from rom.mbs.solution import Solution
 from rom.model import Array
 
-BLADES = 3
-OVERHANG, RISE = 5.0191, 1.96256  # m, from the axis of the tower to the hub, tower top to shaft
+RISE = 1.96256  # m, from the top of the tower to the shaft
 TILT, CONE = np.radians(5.0), np.radians(2.5)  # noses up and blades upwind, away from the tower
-HUB_MASS, HUB_INERTIA = 56_780.0, 115_926.0  # kg, kg m^2 about the shaft
+HUB_MASS = 56_780.0  # kg
 NACELLE_MASS, NACELLE_CENTRE = 240_000.0, (1.9, 0.0, 1.75)  # kg, m from the top of the tower
 NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
-GEAR, GENERATOR_INERTIA = 97.0, 534.116  # kg m^2 about the fast shaft
-STIFFNESS, DAMPING = 8.67637e8, 6.215e6  # N m/rad and N m s/rad, of the slow shaft
 # kg; gear wheel and generator are part of the nacelle, which is lighter by as much
 WHEEL_MASS, GENERATOR_MASS = 1000.0, 1000.0
 WHEEL_INERTIA = 500.0  # kg m^2: of no weight beside the generator's 5e6 on the slow side

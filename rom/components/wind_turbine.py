@@ -32,6 +32,11 @@ VISCOSITY = (1e-3, 1e-3, 1e-3, 1.4e-3, 2.2e-3, 2.2e-3)  # s, as in the files of 
 RATED = 12.1 * np.pi / 30  # rad/s
 TOWER, HUB_HEIGHT = 87.6, 90.0  # m
 TUBE = {"diameter": (6.0, 3.87), "wall": (0.0351, 0.0247)}  # m, at foot and top
+BLADES = 3
+OVERHANG = 5.0191  # m, from the axis of the tower to the hub
+HUB_INERTIA = 115_926.0  # kg m^2, about the rotor axis
+GEAR, GENERATOR_INERTIA = 97.0, 534.116  # kg m^2 about the fast shaft
+STIFFNESS, DAMPING = 8.67637e8, 6.215e6  # N m/rad and N m s/rad, of the slow shaft
 STEEL = {"E": 210e9, "G": 80.8e9, "rho": 8500.0}  # with paint, bolts and flanges
 
 

@@ -79,3 +79,14 @@ def unit_quaternion(value: Any) -> Array:
         )
     U, _, V = np.linalg.svd(A)
     return rotation.quaternion(U @ V)
+
+
+def start_pose(at: Any, orientation: Any, velocity: Any, omega: Any) -> tuple[Array, ...]:
+    """(3,) place, (4,) quaternion, (3,) velocity and (3,) angular velocity; None for no motion."""
+    zero = np.zeros(3)
+    return (
+        finite("at", at, (3,)),
+        unit_quaternion(orientation),
+        finite("velocity", zero if velocity is None else velocity, (3,)),
+        finite("omega", zero if omega is None else omega, (3,)),
+    )

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.errors import ConfigError
-from rom.mbs.arguments import finite, matrix33, number, positive, unit_quaternion
+from rom.mbs.arguments import finite, matrix33, number, positive, start_pose
 from rom.mbs.connections import Connections, Drive, TimeFunction
 from rom.mbs.elements import Bushing, Contact, Elements, Spread
 from rom.mbs.joint_forces import Friction, JointForces, Motor, Stop
@@ -129,7 +129,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             ConfigError: for a name in use, a wrong shape or a number that is not finite.
             ModelError: if mass or inertia are not those of a real body.
         """
-        pose = _pose(at, orientation, velocity, omega)
+        pose = start_pose(at, orientation, velocity, omega)
         points = {key: finite(f"marker {key}", x, (3,)) for key, x in (markers or {}).items()}
         part = rigid_part(name, positive("mass", mass), matrix33("inertia", inertia), pose, points)
         return self._enter(part)
@@ -173,7 +173,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             finite("qd", np.zeros(r) if qd is None else qd, (r,)),
         )
         return self._enter(
-            flexible_part(name, body, _pose(at, orientation, velocity, omega), elastic)
+            flexible_part(name, body, start_pose(at, orientation, velocity, omega), elastic)
         )
 
     def spring_damper(
@@ -316,13 +316,3 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
                     f"{name!r} needs markers, got {marker!r}.", hint="Use part.marker(...)."
                 )
             self.part(marker.body).point(marker)
-
-
-def _pose(at: Any, orientation: Any, velocity: Any, omega: Any) -> tuple[Array, ...]:
-    zero = np.zeros(3)
-    return (
-        finite("at", at, (3,)),
-        unit_quaternion(orientation),
-        finite("velocity", zero if velocity is None else velocity, (3,)),
-        finite("omega", zero if omega is None else omega, (3,)),
-    )

@@ -28,11 +28,13 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.errors import ConfigError, ModelError
-from rom.mbs.arguments import finite, unit_quaternion
+from rom.mbs.arguments import finite, start_pose
 from rom.mbs.joints import Joint
 from rom.mbs.parts import Marker, Part
 from rom.model import Array, Index
 
+# of a law, as numba.cfunc takes it
+SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
 UNIT = 1e-9  # by which a quaternion may miss the unit length
 
 
@@ -161,13 +163,7 @@ class NonlinearBodies:
         """
         self._check_new(name)
         _check(name, body)
-        zero = np.zeros(3)
-        pose = (
-            finite("at", at, (3,)),
-            unit_quaternion(orientation),
-            finite("velocity", zero if velocity is None else velocity, (3,)),
-            finite("omega", zero if omega is None else omega, (3,)),
-        )
+        pose = start_pose(at, orientation, velocity, omega)
         parts = tuple(_frame_part(f"{name}.{k}", body.frames, k, pose)
                       for k in range(len(body.frames.x)))  # fmt: skip
         for part in parts:

@@ -15,7 +15,7 @@ import numpy as np
 
 from rom import rotation
 from rom.components.cosserat import Rod, body
-from rom.components.wind_turbine import RATED, VISCOSITY, blade, ramp, run_up, stations
+from rom.components.wind_turbine import BLADES, RATED, VISCOSITY, blade, ramp, run_up, stations
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
@@ -23,7 +23,6 @@ from rom.peers.compare import answer_of, interpreter
 
 SCRIPT = Path(__file__).with_name("beams.py")
 RISE, DT, RHO, SAMPLES = 20.0, 0.02, 0.9, 200
-BLADES = 3
 FINE = 192  # segments of the blade whose lag is the reference
 FROM_SECTION = [2, 0, 1]  # first axis along the beam there, third along the rod here
 ORIGIN = (0.0, 0.0, 0.0)

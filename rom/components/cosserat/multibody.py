@@ -13,9 +13,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import carray, cfunc
+from numba import carray
 
-from rom.components.compiled import inner
+from rom.components.compiled import elements, inner, law
 from rom.components.cosserat.elements import (
     Rod,
     Work,
@@ -27,11 +27,9 @@ from rom.components.cosserat.elements import (
 from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ModelError
 from rom.mbs.arrays import SPACE
-from rom.mbs.compiled import OPTIONS
 from rom.mbs.nonlinear import Elements, Frames
 from rom.model import Array
 
-SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
 POSE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity
 # where the nine dofs of an element are among the twelve of its two frames
 SEGMENT, VERTEX = (0, 1, 2, 9, 10, 11, 6, 7, 8), (3, 4, 5, 0, 1, 2, 9, 10, 11)
@@ -112,8 +110,7 @@ def vertex(numbers, pose, wanted, answer, space):
 @cache
 def laws() -> tuple[Any, Any]:
     """Compiled laws of segments and vertices."""
-    options = OPTIONS | {"_nrt": True}
-    return cfunc(SIGNATURE, **options)(segment), cfunc(SIGNATURE, **options)(vertex)
+    return law(segment), law(vertex)
 
 
 @dataclass(frozen=True)
@@ -166,11 +163,8 @@ def body(rod: Rod, start: Shape | None = None) -> RodBody:
     stretch = np.column_stack([rod.h, rod.stretch, rod.viscous_stretch, rod.a0])
     bend = np.column_stack([rod.l, rod.bend, rod.viscous_bend, rod.s, rod.S.reshape(n + 1, 9)])
     by_segment, by_vertex = laws()
-    elements = (
-        Elements(by_segment.address, pairs[:-1], stretch, by_segment),
-        Elements(by_vertex.address, pairs, bend, by_vertex),
-    )
-    return RodBody(rod, frames, elements)
+    along = elements(by_segment, pairs[:-1], stretch), elements(by_vertex, pairs, bend)
+    return RodBody(rod, frames, along)
 
 
 def _inertia(rod: Rod) -> Array:
