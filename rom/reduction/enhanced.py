@@ -83,7 +83,7 @@ def estimated_errors(
         (k,) eigenvalues [rad^2/s^2] and (k,) relative errors; zero for rigid motions.
 
     Source:
-        Kim, Lee and Lee, Comput. Struct. 145 (2014); Boo, Kim and Lee (2016).
+        Kim, Lee and Lee, Comput. Struct. 139 (2014) 54; Boo, Kim and Lee (2016).
     """
     keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), drop)
     T = basis.Psi[:, keep]
