@@ -1,7 +1,7 @@
 # # A bladed disk: one sector in the computer, the whole wheel in the diagrams
 #
 # 24 titanium blades on a disk. Only one sector is meshed; the wheel falls apart into waves with n
-# nodal diameters, each a problem of the size of a sector, and after reduction of two hundred dofs.
+# nodal diameters, each a problem of the size of a sector, and after reduction of 168 dofs.
 # Rotation adds stress, spin softening and Coriolis forces. The Campbell diagram then says which
 # speeds to avoid, and the interference (SAFE) diagram which resonances really answer: a disturbance
 # with E lobes around the circumference meets only waves with E nodal diameters.
@@ -25,7 +25,8 @@ options = argparse.ArgumentParser(description="waves, Campbell and SAFE diagram 
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
-first = MPI.COMM_WORLD.rank == 0
+comm = MPI.COMM_WORLD
+first = comm.rank == 0
 say = print if first and not options.quiet else lambda *_: None
 
 # ## The sector
@@ -43,24 +44,26 @@ model = rom.fe.model(
 full = rom.CyclicSector.from_model(model, fixed=("bore",))
 full = rom.rotating_sector(full, model)
 clock = perf_counter()
-sector = rom.reduce_sector(full, n_modes=30, functions=rom.Polynomial(7))
+sector = rom.reduce_sector(full, n_modes=60, functions=rom.Polynomial(7))
 say(f"{full.n_sectors} sectors of {full.n} dofs, wheel of {full.n_wheel}; reduced to "
     f"{sector.free.size} per sector in {perf_counter() - clock:.1f} s")  # fmt: skip
 
 # ## Families of modes
 #
-# The sector is reduced once for all nodal diameters. Four of them are compared with the full
-# sector, whose inertia counts prove that no mode is missing.
+# The sector is reduced once for all nodal diameters. The ten lowest frequencies of each are
+# compared with the full sector, whose inertia counts prove that no mode is missing; processes share
+# the diameters.
 
-F = 4
-at_rest = np.array([rom.cyclic_modes(sector, n, F).frequencies for n in sector.diameters])
-worst = 0.0
-say("diameters  frequencies at rest [Hz]          error of the reduction")
-for n in (0, 2, 5, 12):
-    exact = rom.cyclic_modes(full, n, F).frequencies
-    error = np.abs(at_rest[n] / exact - 1).max()
-    worst = max(worst, error)
-    say(f"{n:9d}", *(f"{f:9.2f}" for f in at_rest[n]), f"{error:12.1e}")
+F, TEN = 4, 10
+ten = np.array([rom.cyclic_modes(sector, n, TEN).frequencies for n in sector.diameters])
+at_rest, ratio = ten[:, :F], np.ones(ten.shape)
+for n in sector.diameters[comm.rank :: comm.size]:
+    ratio[n] = ten[n] / rom.cyclic_modes(full, n, TEN).frequencies
+ratio = comm.allreduce(ratio - 1) + 1
+worst, lowest = ratio.max(), ratio.min()
+say("diameters  frequencies at rest [Hz]          error of the reduction, ten families")
+for n in sector.diameters:
+    say(f"{n:9d}", *(f"{f:9.2f}" for f in at_rest[n]), f"{ratio[n].max() - 1:12.1e}")
 
 # ## Speed
 #
@@ -157,7 +160,8 @@ volume += N * 0.07 * ((0.015 - 0.003 * share) * (0.003 - 0.001 * share)).mean()
 results = {
     "mass [kg]": (N * model.mass(), 4430.0 * volume, 5e-3),
     "sectors": (N, 24, 0.0),
-    "worst reduced frequency at rest": (1 + worst, 1.0, 1e-3),
+    "worst reduced frequency, ten families, all diameters": (worst, 1.0, 1e-3),
+    "none below that of the full sector": (min(lowest, 1.0), 1.0, 1e-9),
     "worst reduced wave at speed": (1 + spinning, 1.0, 1e-3),
     "share of the dofs, 5 % at most": (max(0.05, sector.free.size / full.free.size), 0.05, 1e-9),
     "splitting of family 2 grows with speed, n = 1": (

@@ -10,7 +10,7 @@ from solid import block
 from wheels import mass_ring
 
 import rom
-from rom.cyclic.reduced import face_functions
+from rom.cyclic.reduced import distance, face_functions, fading
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 
@@ -72,6 +72,18 @@ def test_functions_fade_out_where_the_face_is_held():
     at_rest = bar.face.points[:, 2] == 0.0
     assert not Q[at_rest].any()
     assert_allclose(Q.T @ bar.face.surface_mass @ Q, np.eye(Q.shape[1]), atol=1e-10)
+
+
+def test_functions_rise_from_a_held_edge_within_half_the_thickness():
+    """On a strip of thickness h, held at s = 0: s / (s + h / 2), also beside and between nodes."""
+    h, L = 0.2, 3.0
+    s, t = (x.ravel() for x in np.meshgrid(np.linspace(0, L, 61), np.linspace(0, h, 41)))
+    at_rest = (s == 0.0) & (np.arange(41).repeat(61) % 10 == 0)
+    points = np.column_stack([0.6 * s, 0.8 * s, t])
+    face = rom.model.Interface("strip", np.arange(s.size), points, identity(s.size), points[0])
+    assert_allclose(distance(points, points[at_rest]), s, atol=1e-12)
+    assert_allclose(fading(face, at_rest), s / (s + h / 2), rtol=0.03, atol=1e-12)
+    assert_allclose(distance(points, points[:1]), np.hypot(s, t), atol=1e-12)
 
 
 def test_shapes_expand_to_the_whole_wheel():
