@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rom.cyclic.reduced import reduce_sector
     from rom.cyclic.rotation import rotating_sector
     from rom.cyclic.sector import CyclicSector
+    from rom.cyclic.springs import supported_sector
     from rom.cyclic.travelling import TravellingModes, travelling_modes
     from rom.errors import RomError
     from rom.fmu.export import write_fmu
@@ -152,6 +153,7 @@ __all__ = [
     "simulate",
     "steady_motion",
     "substructure",
+    "supported_sector",
     "surface_load",
     "transmissibility",
     "travelling_modes",
@@ -242,6 +244,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "simulate": "mbs.integrate",
     "steady_motion": "mbs.steady",
     "substructure": "workflow",
+    "supported_sector": "cyclic.springs",
     "surface_load": "body.spread",
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",

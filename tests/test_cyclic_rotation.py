@@ -169,4 +169,4 @@ def test_a_missed_wave_is_noticed():
     lam = np.array([1j, -1j]) * rom.travelling_modes(held, 1, 1, speed=1.0).omega[0]
     lam = np.r_[lam, lam * 30]
     with pytest.raises(ModesMissedError, match="one direction were found below"):
-        _verify(M, G, K, lam, 2)
+        _verify(M, G, K, lam, np.eye(M.shape[0], 4, dtype=complex), 2)

@@ -141,8 +141,60 @@ def _quads(face, closed=False):
     return np.stack([c.ravel() for c in corners], axis=1)
 
 
+def revolved_mesh(N, r, z, solid, faces):
+    """Bricks of one sector of a body of revolution about z, one cell around.
+
+    Radii are of circles whose area the polygons of N corners have.
+
+    Args:
+        N: number of sectors.
+        r: (a,) lines of the grid of the section, from the bore on [m].
+        z: (b,) [m].
+        solid: (radius, z of the middle of a cell) -> name of its region, or nothing.
+        faces: {name: (z line, largest r)} of faces across the axis that are interfaces.
+    """
+    from rom.fe.mesh import checked
+    from rom.fe.solid import SolidMesh
+
+    angle = 2 * np.pi / N
+    i, j, k = np.meshgrid(np.arange(2), np.arange(len(r)), np.arange(len(z)), indexing="ij")
+    R = np.asarray(r)[j] / np.sqrt(np.sin(angle) / angle)
+    points = np.stack([R * np.cos(angle * i), R * np.sin(angle * i), np.asarray(z)[k]], axis=-1)
+    number = np.arange(i.size).reshape(i.shape)
+    lower = [(0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0)]
+    corners = [(*c[:2], s) for s in (0, 1) for c in lower]
+    made = {c: solid((r[c[0]] + r[c[0] + 1]) / 2, (z[c[1]] + z[c[1] + 1]) / 2)
+            for c in np.ndindex(len(r) - 1, len(z) - 1)}  # fmt: skip
+    there = [c for c, name in made.items() if name]
+    names = dict(enumerate(sorted({made[c] for c in there}), start=1))
+    tags = {name: tag for tag, name in names.items()}
+    cubes = np.array([[number[a, j + b, k + d] for a, b, d in corners] for j, k in there])
+    quad = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    facets = {
+        name: np.array([[number[side, j + b, k + d] for b, d in quad] for j, k in there])
+        for side, name in enumerate(("cyclic_low", "cyclic_high"))
+    }
+    for name, (at, outside) in faces.items():
+        plane = int(np.argmin(abs(np.asarray(z) - at)))
+        radial = [j for j in range(len(r) - 1) if r[j + 1] <= outside * (1 + 1e-9)]
+        facets[name] = np.array([[number[a, j + b, plane] for a, b in quad] for j in radial])
+    used, cubes = np.unique(cubes, return_inverse=True)
+    place = np.full(i.size, -1)
+    place[used] = np.arange(used.size)
+    return checked(SolidMesh(
+        points.reshape(-1, 3)[used], cubes.reshape(-1, 8), "hex8",
+        np.array([tags[made[c]] for c in there]), names,
+        {name: place[quads] for name, quads in facets.items()},
+    ))  # fmt: skip
+
+
 def bladed_model(N, sectors=1, degree=2, material=None, **sizes):
     """FEModel of `bladed_mesh`; Titanium-like material unless given."""
+    return model_of(bladed_mesh(N, sectors, **sizes), degree=degree, material=material)
+
+
+def model_of(mesh, degree=2, material=None):
+    """FEModel of a mesh; Titanium-like material unless given."""
     from mpi4py import MPI
 
     import rom
@@ -150,7 +202,6 @@ def bladed_model(N, sectors=1, degree=2, material=None, **sizes):
     from rom.fe.jit import compiling
     from rom.fe.mesh import to_dolfinx
 
-    mesh = bladed_mesh(N, sectors, **sizes)
     with compiling(MPI.COMM_SELF):
         grid, cell_tags, facet_tags = to_dolfinx(mesh, MPI.COMM_SELF)
     regions = {name: tag for tag, name in mesh.region_names.items()}

@@ -54,6 +54,7 @@ class CyclicSector:
         centrifugal: (n, n) change of the stiffness per (rad/s)^2 [kg]: geometric stiffness of the
             centrifugal stress less spin softening; None for a wheel at rest.
         regions: {region: (n, n) stiffness of its elements alone}.
+        sprung: True when K has springs to the ground, see `supported_sector`.
     """
 
     n_sectors: int
@@ -73,6 +74,7 @@ class CyclicSector:
     coriolis: Any = None
     centrifugal: Any = None
     regions: dict[str, Any] = field(default_factory=dict)
+    sprung: bool = False
 
     def __post_init__(self) -> None:
         if int(self.n_sectors) != self.n_sectors or self.n_sectors < 2:
@@ -152,8 +154,8 @@ class CyclicSector:
 
     @property
     def supported(self) -> bool:
-        """True when something is held."""
-        return self.held.size > 0
+        """True when something is held, or stands on springs."""
+        return self.held.size > 0 or self.sprung
 
     @property
     def angle(self) -> float:

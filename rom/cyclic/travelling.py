@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eig
-from scipy.sparse import bmat, csc_matrix, csr_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from rom.cyclic.modes import spinning
+from rom.cyclic.modes import real_form, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.eigen import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError
@@ -99,7 +99,7 @@ def travelling_modes(
     lam, U = _lowest(M, G, K, wanted, 0.0 if sector.supported else 0.3 * abs(speed))
     _refuse_growth(lam if sector.supported else _elastic(lam, speed), diameter, speed)
     if sector.supported and lam.size > wanted:
-        _verify(M, G, K, lam, wanted)
+        _verify(M, G, K, lam, U, wanted)
     keep = np.arange(wanted) if not standing else np.flatnonzero(lam.imag > 0)[:n]
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
@@ -159,17 +159,27 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
         )
 
 
-def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, m: int) -> None:
-    """Waves below a frequency: the inertia of K - w^2 M + i w G, for both directions."""
+def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Complex, m: int) -> None:
+    """Waves below a frequency: the inertia of L(w) = K - w^2 M + i w G, for both directions.
+
+    An eigenvalue of L falls through zero at each wave; it rises through zero where a wave that the
+    rotation carries along seems to run back, as all do that are slower than the wheel turns. The
+    softening has then made K indefinite, and the count begins there.
+    """
     count, square = count_shift(abs(lam) ** 2, m)
     w = np.sqrt(square)
-    below = np.concatenate([lam.imag[:count] > 0, lam.imag[:count] < 0]).reshape(2, -1)
-    for sign, found in zip((1, -1), below.sum(axis=1), strict=True):
-        A = csc_matrix(K - square * M + 1j * sign * w * G)
-        true = negative_count(csc_matrix(bmat([[A.real, -A.imag], [A.imag, A.real]]))) // 2
-        if true != found:
+    start = negative_count(csc_matrix(real_form(K))) // 2
+    U, lam = U[:, :count], lam[:count]
+    inertia = np.einsum("fm,fm->m", U.conj(), M @ U).real
+    coriolis = np.einsum("fm,fm->m", U.conj(), G @ U).imag
+    for sign in (1, -1):
+        here = np.sign(lam.imag) == sign
+        falls = np.sign(2 * abs(lam.imag) * inertia + sign * coriolis)[here]
+        A = csr_matrix(K - square * M + 1j * sign * w * G)
+        true = negative_count(csc_matrix(real_form(A))) // 2
+        if true != start + falls.sum():
             raise ModesMissedError(
-                f"{found} waves of one direction were found below {w / (2 * np.pi):.6g} Hz, "
-                f"but the inertia of the system counts {true}.",
+                f"{falls.size} waves of one direction were found below {w / (2 * np.pi):.6g} Hz, "
+                f"which does not agree with the inertia of the system, {true} from {start} on.",
                 hint="Ask for more waves.",
             )

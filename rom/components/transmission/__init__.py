@@ -3,6 +3,12 @@
 from rom.components.transmission.motion import Run, Whirl, linearised, simulate, threshold, whirl
 from rom.components.transmission.response import Response, mesh_response
 from rom.components.transmission.shaft import Disc, Shaft
+from rom.components.transmission.supports import (
+    ShaftWhirl,
+    Support,
+    critical_speeds,
+    shaft_whirl,
+)
 from rom.components.transmission.unit import Forces, Rest, Rotor, Transmission, rest
 
 __all__ = [
@@ -13,11 +19,15 @@ __all__ = [
     "Rotor",
     "Run",
     "Shaft",
+    "ShaftWhirl",
+    "Support",
     "Transmission",
     "Whirl",
+    "critical_speeds",
     "linearised",
     "mesh_response",
     "rest",
+    "shaft_whirl",
     "simulate",
     "threshold",
     "whirl",

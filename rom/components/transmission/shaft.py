@@ -51,18 +51,22 @@ class Shaft:
         diameter: (n - 1,) of the pieces between them [m], or one number.
         discs: on the shaft.
         material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3].
+        bore: (n - 1,) diameters of a hole along the axis [m], or one number.
     """
 
     z: npt.ArrayLike
     diameter: npt.ArrayLike
     discs: Sequence[Disc] = ()
     material: tuple[float, float, float] = STEEL
+    bore: npt.ArrayLike = 0.0
 
     def __post_init__(self) -> None:
         z = np.asarray(self.z, dtype=float)
-        d = np.asarray(self.diameter, dtype=float)
+        d, hole = (np.asarray(x, dtype=float) for x in (self.diameter, self.bore))
         if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
             raise ModelError(f"no shaft has nodes at {z.tolist()} m and diameters {d.tolist()} m.")
+        if np.any(hole < 0) or np.any(hole >= d):
+            raise ModelError(f"bores of {hole.tolist()} m in shafts of {d.tolist()} m.")
         if any(not 0 <= disc.node < z.size for disc in self.discs):
             raise ModelError(f"a disc sits beyond the last of {z.size} nodes.")
 
@@ -74,11 +78,14 @@ class Shaft:
     def matrices(self) -> tuple[Array, Array, Array]:
         """(n, n) mass, stiffness, and gyroscopic matrix per speed of rotation."""
         z = np.asarray(self.z, dtype=float)
-        d = np.broadcast_to(np.asarray(self.diameter, dtype=float), z.size - 1)
+        d, hole = (
+            np.broadcast_to(np.asarray(x, dtype=float), z.size - 1)
+            for x in (self.diameter, self.bore)
+        )
         M, K, G = (np.zeros((self.n, self.n)) for _ in range(3))
-        for k, (length, across) in enumerate(zip(np.diff(z), d, strict=True)):
+        for k, piece in enumerate(zip(np.diff(z), d, hole, strict=True)):
             at = slice(6 * k, 6 * k + 12)
-            for whole, part in zip((M, K, G), _beam(length, across, *self.material), strict=True):
+            for whole, part in zip((M, K, G), _beam(*piece, *self.material), strict=True):
                 whole[at, at] += part
         for disc in self.discs:
             i = 6 * disc.node
@@ -90,10 +97,16 @@ class Shaft:
         return M, K, G
 
 
-def _beam(l: float, d: float, E: float, nu: float, rho: float) -> tuple[Array, Array, Array]:
-    """(12, 12) mass, stiffness and gyroscopic matrix of a round piece."""
-    area, I, shear = np.pi * d**2 / 4, np.pi * d**4 / 64, E / (2 * (1 + nu))
-    kappa = 6 * (1 + nu) / (7 + 6 * nu)
+def _beam(
+    l: float, d: float, hole: float, E: float, nu: float, rho: float
+) -> tuple[Array, Array, Array]:
+    """(12, 12) mass, stiffness and gyroscopic matrix of a round piece.
+
+    Share of the section that carries shear: Cowper, J. Appl. Mech. 33 (1966) 335.
+    """
+    area, I = np.pi * (d**2 - hole**2) / 4, np.pi * (d**4 - hole**4) / 64
+    shear, m = E / (2 * (1 + nu)), (hole / d) ** 2
+    kappa = 6 * (1 + nu) * (1 + m) ** 2 / ((7 + 6 * nu) * (1 + m) ** 2 + (20 + 12 * nu) * m)
     stiff = kappa * shear * area
     phi = 12 * E * I / (stiff * l**2)
     M, K, G = (np.zeros((12, 12)) for _ in range(3))

@@ -1,0 +1,169 @@
+"""Whirl of one shaft on linear bearings: frequencies at a speed, directions, critical speeds.
+
+In axes that do not spin, bending in both planes obeys::
+
+    M q'' + (C + Omega G) q' + K q = 0
+
+with bearings in C and K. Gyroscopic forces part forward from backward whirl.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eig, eigh
+
+from rom.components.transmission.shaft import Shaft
+from rom.errors import ModelError
+from rom.model import Array
+
+LATERAL = (0, 1, 3, 4)  # coordinates of a node that bend the shaft
+ROUND = 1e-6  # smallest over largest axis of an orbit below which it is a line
+LOOSE = 1e-12  # of the stiffest push back, below which there is none
+
+
+@dataclass(frozen=True)
+class Support:
+    """A linear bearing.
+
+    Attributes:
+        stiffness: across the shaft [N/m], a number or a (2, 2) matrix.
+        damping: [N s/m], likewise.
+    """
+
+    stiffness: npt.ArrayLike
+    damping: npt.ArrayLike = 0.0
+
+
+@dataclass(frozen=True)
+class ShaftWhirl:
+    """Whirl of a shaft at one speed, lowest first.
+
+    Attributes:
+        values: (m,) eigenvalues with a positive imaginary part [rad/s].
+        shapes: (n, m) complex coordinates of the shaft, as in `Shaft.matrices`.
+        direction: (m,) +1 forward, with the rotation, -1 backward, 0 along a line.
+    """
+
+    values: npt.NDArray[np.complex128]
+    shapes: npt.NDArray[np.complex128]
+    direction: Array
+
+    @property
+    def omega(self) -> Array:
+        """(m,) circular frequencies of the damped whirl [rad/s]."""
+        return self.values.imag
+
+    @property
+    def frequencies(self) -> Array:
+        """(m,) its frequencies [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """(m,) share of critical damping; negative where whirl grows."""
+        return -self.values.real / np.abs(self.values)
+
+
+def shaft_whirl(
+    shaft: Shaft, supports: Mapping[int, Support], speed: float, *, n: int | None = None
+) -> ShaftWhirl:
+    """Whirl frequencies of a shaft on bearings.
+
+    Args:
+        shaft: with its discs.
+        supports: {node: bearing}.
+        speed: of rotation, from X to Y if positive [rad/s].
+        n: number of frequencies, lowest first; None for all.
+
+    Raises:
+        ModelError: if a bearing sits beyond the shaft, or the bearings leave a rigid motion free.
+    """
+    M, C, K, G, rows = _matrices(shaft, supports)
+    size = rows.size
+    A = np.block([
+        [np.zeros((size, size)), np.eye(size)],
+        [-np.linalg.solve(M, K), -np.linalg.solve(M, C + speed * G)],
+    ])  # fmt: skip
+    values, vectors = eig(A)
+    keep = np.flatnonzero(values.imag > 0)
+    keep = keep[np.argsort(values[keep].imag, kind="stable")][:n]
+    shapes = np.zeros((shaft.n, keep.size), dtype=complex)
+    shapes[rows] = vectors[:size, keep]
+    turn = 1.0 if speed == 0 else np.sign(speed)
+    return ShaftWhirl(values[keep], shapes, _direction(shapes, M) * turn)
+
+
+def critical_speeds(shaft: Shaft, supports: Mapping[int, Support]) -> tuple[Array, Array]:
+    """Speeds at which a whirl is as fast as the rotation, damping left out.
+
+    Args:
+        shaft: with its discs.
+        supports: {node: bearing}, their stiffness symmetric.
+
+    Returns:
+        speeds (m,) [rad/s], ascending, and directions (m,) as in `ShaftWhirl`. A thin disc may
+        leave fewer forward speeds than backward ones: its own moment stiffens the shaft ever more.
+
+    Raises:
+        ModelError: as in `shaft_whirl`, or if a stiffness is not symmetric.
+    """
+    M, _, K, G, rows = _matrices(shaft, supports)
+    if not np.allclose(K, K.T, rtol=1e-9, atol=1e-9 * np.abs(K).max()):
+        raise ModelError("a bearing whose stiffness is not symmetric: speeds grow or decay.")
+    inverse, vectors = eigh(M - 1j * G, K)
+    keep = np.flatnonzero(inverse > 1e-12 * inverse.max())[::-1]
+    shapes = np.zeros((shaft.n, keep.size), dtype=complex)
+    shapes[rows] = vectors[:, keep]
+    return 1 / np.sqrt(inverse[keep]), _direction(shapes, M)
+
+
+def _matrices(
+    shaft: Shaft, supports: Mapping[int, Support]
+) -> tuple[Array, Array, Array, Array, npt.NDArray[np.int64]]:
+    """Mass, damping, stiffness, gyroscopic matrix of bending, and its coordinates."""
+    M, K, G = shaft.matrices()
+    C = np.zeros_like(K)
+    for node, support in supports.items():
+        if not 0 <= node < shaft.n // 6:
+            raise ModelError(f"a bearing sits at node {node}, beyond the last of {shaft.n // 6}.")
+        at = slice(6 * node, 6 * node + 2)
+        K[at, at] += _square(support.stiffness)
+        C[at, at] += _square(support.damping)
+    _refuse_loose(shaft, supports)
+    rows = (6 * np.arange(shaft.n // 6)[:, None] + LATERAL).ravel()
+    M, C, K, G = (A[np.ix_(rows, rows)] for A in (M, C, K, G))
+    return M, C, K, G, rows
+
+
+def _refuse_loose(shaft: Shaft, supports: Mapping[int, Support]) -> None:
+    """Bearings must push back against both translations and both tilts."""
+    z = np.asarray(shaft.z, dtype=float)
+    arms = (z - z.mean()) / np.ptp(z)
+    S = np.zeros((4, 4))
+    for node, support in supports.items():
+        R = np.kron([1.0, arms[node]], np.eye(2))
+        S += R.T @ _square(support.stiffness) @ R
+    size = np.linalg.svd(S, compute_uv=False)
+    if not size[-1] > LOOSE * size[0]:
+        raise ModelError(
+            f"bearings at the nodes {sorted(supports)} leave a rigid motion of the shaft free.",
+            hint="Give it two bearings that push back in both directions.",
+        )
+
+
+def _square(value: npt.ArrayLike) -> Array:
+    given = np.asarray(value, dtype=float)
+    if given.shape not in ((), (2, 2)):
+        raise ModelError(f"a bearing has a number or a (2, 2) matrix, not the shape {given.shape}.")
+    return given * np.eye(2) if given.ndim == 0 else given
+
+
+def _direction(shapes: npt.NDArray[np.complex128], M: Array) -> Array:
+    """+1 where orbits of q = Re(shape e^{i w t}) turn from X to Y, by the sense of most mass."""
+    x, y = shapes[0::6], shapes[1::6]
+    weight = np.diag(M)[0::4][:, None]
+    area = (weight * (x.conj() * y).imag).sum(axis=0)
+    size = 0.5 * (weight * (np.abs(x) ** 2 + np.abs(y) ** 2)).sum(axis=0)
+    return np.where(np.abs(area) > ROUND * size, -np.sign(area), 0.0)
