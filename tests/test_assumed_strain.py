@@ -1,5 +1,10 @@
 """Assumed-strain triangle: published problems, closed forms, and the reduction chain."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -16,6 +21,7 @@ from rom.components.assumed_strain import (
     mass,
     rectangle,
     sheet,
+    stiffness_by_sides,
     tangent,
 )
 from rom.components.assumed_strain.space import bending
@@ -113,33 +119,24 @@ def test_frequencies_of_a_cantilever(n):
         assert np.all(error[1] < error[0] / 3)
 
 
-def by_sides(body, metal):
-    """Stiffness summed over sides: each averages two constant triangles by area."""
-    X, T = body.points, body.triangles
-    G = sheet(X, T, element="CST").gradients[:, 0, 0, :3]
-    E, nu = metal.E, metal.nu
-    D = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
-    owners = {}
-    for t, nodes in enumerate(T):
-        for k in range(3):
-            owners.setdefault(frozenset((nodes[k - 1], nodes[k - 2])), []).append(t)
-    K = np.zeros((2 * len(X),) * 2)
-    for own in owners.values():
-        B, area = np.zeros((3, 2 * len(X))), sum(body.area[t] for t in own)
-        for t in own:
-            for i, node in enumerate(T[t]):
-                gx, gy = G[t, i] * body.area[t] / area
-                B[:, 2 * node : 2 * node + 2] += [[gx, 0], [0, gy], [gy, gx]]
-        K += area / 3 * B.T @ D @ B
-    return K
-
-
-def test_patches_and_sides_give_the_same_stiffness():
+@pytest.mark.parametrize("state", ["plane stress", "plane strain"])
+def test_patches_and_sides_give_the_same_stiffness(state):
     """The gradient at a side is the mean of its two triangles, weighted by area: ES-FEM."""
     X, T = distorted()
-    body = sheet(X, T)
-    K = tangent(body, Metal(1.0, 0.3), X).toarray()
-    assert_allclose(K, by_sides(body, Metal(1.0, 0.3)), atol=2e-9)
+    body, metal = sheet(X, T, state=state, thickness=0.3), Metal(1.0, 0.3)
+    K = stiffness_by_sides(body, metal).toarray()
+    assert_allclose(tangent(body, metal, X).toarray(), K, rtol=0, atol=2e-9)  # by differences
+    G, n = body.gradients[:, :, 0], 2 * len(X)
+    E, nu = (1.0, 0.3) if state == "plane stress" else (1 / (1 - 0.3**2), 0.3 / 0.7)
+    D = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
+    patches = np.zeros((n, n))
+    for e, p in np.ndindex(G.shape[:2]):
+        B = np.zeros((3, n))
+        for i, node in enumerate(body.patch[e]):
+            gx, gy = G[e, p, i]
+            B[:, 2 * node : 2 * node + 2] += [[gx, 0], [0, gy], [gy, gx]]
+        patches += body.weights[e, p] * B.T @ D @ B
+    assert_allclose(patches, K, rtol=0, atol=1e-13)
     constant = sheet(X, T, element="CST").gradients[:, 0, 0]
     u = np.random.default_rng(0).normal(size=len(X))
     side = np.einsum("tsi,ti->ts", body.gradients[:, :, 0, :, 0], u[body.patch])
@@ -149,6 +146,36 @@ def test_patches_and_sides_give_the_same_stiffness():
         both = [e for e in range(len(T)) if sides[t][k] in sides[e]]
         mean = (own[both] * body.area[both]).sum() / body.area[both].sum()
         assert side[t, k] == pytest.approx(mean, abs=1e-13)
+
+
+def test_processes_share_the_sides():
+    """Any number of shares adds up to the whole, even more shares than sides."""
+    body, metal = sheet(*distorted((2, 1))), Metal(1.0, 0.3)
+    K = stiffness_by_sides(body, metal)
+    for n in (2, 3, 12):
+        parts = [stiffness_by_sides(body, metal, share=(k, n)) for k in range(n)]
+        assert abs(sum(parts) - K).max() < 1e-15
+        assert abs(parts[0] - K).max() > 0.1
+
+
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+def test_two_processes_find_the_frequencies_of_one(tmp_path):
+    """Each assembles its sides; the sum has the spectrum of the patches on one process."""
+    pytest.importorskip("mpi4py", reason="needs MPI")
+    script = Path(__file__).with_name("sheet_under_mpi.py")
+    environment = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    subprocess.run(
+        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, str(script), str(tmp_path / "s")],
+        env=os.environ | environment, check=True, timeout=120,
+    )  # fmt: skip
+    found = np.load(tmp_path / "s.npz")
+    body, metal = sheet(*distorted((8, 6))), Metal(210e9, 0.3, 7850.0)
+    lam = np.linalg.eigvalsh(tangent(body, metal, body.points).toarray())
+    assert_allclose(found["spectrum"], lam, atol=1e-8 * lam[-1])
+    one = stiffness_by_sides(body, metal).toarray()
+    assert_allclose(found["spectrum"], np.linalg.eigvalsh(one), atol=1e-13 * lam[-1])
+    assert len(found["work"]) == 2 and found["work"].max() < 0.9 * np.count_nonzero(one)
 
 
 @pytest.mark.parametrize("element", ["F1", "F3", "CST"])
@@ -345,6 +372,29 @@ def test_a_strip_twists_like_a_free_bar_and_bends_in_spite_of_poisson():
     assert np.abs(f[5:] / twist - 1).min() < 0.03
 
 
+def test_crossed_diagonals_bend_too_easily_whatever_the_mesh():
+    """A limit of the element: energies of uniform curvature converge, yet inner nodes are loaded.
+
+    With diagonals along one direction the moments balance at each node, and frequencies converge.
+    """
+    D = 210e9 * 0.01**3 / 12 / (1 - 0.3**2)
+    for diagonal, energy, load in (("/", 0.91, 0.0), ("x", 0.97, 5.2)):
+        X, T = rectangle((12, 12), [(0, 0), (1, 0), (1, 1), (0, 1)], diagonal)
+        K = bending(sheet(X, T, thickness=0.01), STEEL)
+        w = X[:, 0] ** 2 / 2
+        inside = np.all((X > 0.17) & (X < 0.83), axis=1)
+        assert w @ K @ w / D == pytest.approx(energy, abs=2e-3)
+        assert np.abs((K @ w)[inside]).max() / D == pytest.approx(load, abs=1e-9)
+    unit = 4.730041**2 * np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2
+    for n in ((20, 2), (40, 4)):
+        for diagonal, ratio in (("/", 1.0), ("x", 0.8178)):
+            X, T = rectangle(n, [(0, 0), (0.4, 0), (0.4, 0.04), (0, 0.04)], diagonal)
+            body, metal = sheet(X, T, thickness=0.002), Metal(210e9, 0.0, 7850.0)
+            K, M = bending(body, metal), mass(body, metal)[::2, ::2]
+            lam = eigsh(K, 4, M, sigma=-1.0)[0]
+            assert np.sqrt(lam[-1]) / unit == pytest.approx(ratio, abs=2e-4)
+
+
 def test_a_sheet_in_space_has_six_rigid_motions():
     X, T = distorted((3, 3))
     model = in_space(sheet(X, T), Metal(1.0, 0.3), {"all": np.arange(len(X))})
@@ -398,6 +448,10 @@ def test_wrong_input_is_named():
         in_space(sheet(X, T, state="plane strain"), STEEL, {})
     with pytest.raises(InterfaceError, match="'edge' has no triangle"):
         in_space(sheet(X, T), STEEL, {"edge": np.flatnonzero(X[:, 0] < 1e-9)})
+    with pytest.raises(ConfigError, match="share 2 of 2"):
+        stiffness_by_sides(sheet(X, T), STEEL, share=(2, 2))
+    with pytest.raises(ConfigError, match="axisymmetric"):
+        stiffness_by_sides(sheet(X, T, state="axisymmetric"), STEEL)
     body, f, held, _ = cook(2, "/", 1e6, state="plane strain")
     with pytest.raises(SolverError, match="load step 1 of 1"):
         equilibrium(body, Metal(240.0, 0.3), f, held)

@@ -13,6 +13,7 @@ from rom.components.assumed_strain.motion import (
     mass,
     tangent,
 )
+from rom.components.assumed_strain.sides import stiffness_by_sides
 from rom.components.assumed_strain.space import in_space
 from rom.components.assumed_strain.triangles import Sheet, rectangle, sheet
 
@@ -27,5 +28,6 @@ __all__ = [
     "mass",
     "rectangle",
     "sheet",
+    "stiffness_by_sides",
     "tangent",
 ]

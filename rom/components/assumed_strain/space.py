@@ -39,7 +39,8 @@ def bending(body: Sheet, metal: Metal) -> csr_matrix:
 
     The curvature of a triangle is that of the quadratic through the nodes of its patch. At an edge,
     where nodes are missing, it is the one of least energy: the edge is free. Meshes with diagonals
-    along one direction converge; with crossed ones frequencies of bending stay a fifth too low.
+    along one direction converge. Crossed ones do not, whatever their size: a uniform curvature has
+    its energy, but its moments load inner nodes, and bending frequencies stay a fifth too low.
 
     Source:
         After Nay and Utku, who fit a quadratic to the patch by least squares.

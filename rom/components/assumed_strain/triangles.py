@@ -69,7 +69,7 @@ def sheet(
     if element not in ELEMENTS or state not in STATES:
         raise ConfigError(f"{element!r}, {state!r}: known are {ELEMENTS} and {tuple(STATES)}.")
     X, T = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
-    constant, area = _constant_gradients(X, T)
+    constant, area = constant_gradients(X, T)
     patch = np.hstack([T, _opposite(T)])
     G = np.zeros((len(T), 3, 6, 2))
     for k in range(3):
@@ -88,7 +88,7 @@ def sheet(
     return Sheet(X, T, patch, np.ascontiguousarray(G), weights, area, state, thickness)
 
 
-def _constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
+def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
     """Gradients (t, 6, 2) of the linear triangle, neighbours zero, and areas (t,)."""
     a, b, c = X[T[:, 0]], X[T[:, 1]], X[T[:, 2]]
     area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
