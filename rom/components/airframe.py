@@ -1,7 +1,8 @@
 """A test bed like an aircraft: beams with the dimensions of GARTEUR SM-AG19, without its layer.
 
-Fuselage, wing, drums at the wing tips, fin and tailplane of aluminium; where neutral axes do not
-meet, a rigid link joins them.
+Fuselage, wing, drums at the wing tips, fin and tailplane of aluminium. Neutral axes do not meet;
+the parts are joined rigidly, or by joints that give way to moments: bolted plates do, and what they
+give is hardly known before a test.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from scipy.linalg import block_diag
 
 from rom.errors import ConfigError
 from rom.model import Array, Index, Material
+from rom.rotation import skew
 
 ALUMINIUM = Material(E=72e9, nu=0.3, rho=2700.0)
 KINDS = ("axial", "torsion", "bending", "sideways")  # bending: across the thin side
@@ -37,7 +39,18 @@ class Part:
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 PARTS = (
-    Part("fuselage", ((0.6, 0, 0), (0, 0, 0), (-0.85, 0, 0), (-0.9, 0, 0)), Z, (0.15, 0.05)),
+    Part(
+        "fuselage",
+        (
+            (0.6, 0, 0),
+            (0, 0, 0),
+            (-0.29, 0, 0),
+            (-0.85, 0, 0),
+            (-0.9, 0, 0),
+        ),  # hangs at two of them
+        Z,
+        (0.15, 0.05),
+    ),
     Part(
         "wing",
         ((0, 1, 0.096), (0, 0.95, 0.096), (0, 0, 0.096), (0, -0.95, 0.096), (0, -1, 0.096)),
@@ -53,7 +66,7 @@ PARTS = (
         "tailplane", ((-0.85, 0.2, 0.355), (-0.85, 0, 0.355), (-0.85, -0.2, 0.355)), X, (0.1, 0.01)
     ),
 )
-LINKS = (  # a point of one part follows a point of another rigidly
+LINKS = (  # a point of each part after the first follows a point of another
     ((0, 0, 0.096), (0, 0, 0)),
     ((0, 0.95, 0.106), (0, 0.95, 0.096)),
     ((0, -0.95, 0.106), (0, -0.95, 0.096)),
@@ -69,7 +82,8 @@ class Airframe:
     Attributes:
         points: (n, 3) nodes [m].
         beams: (m, 2) nodes of each element.
-        K: {(part, kind): (r, r)} stiffness by part and kind of deformation.
+        K: {(part, kind): (r, r)} stiffness by part and kind of deformation; of the kind "joint" is
+            what holds the part, if it gives way.
         M: {part: (r, r)} mass by part.
         T: (6 n, r) displacements and rotations of all nodes from the independent coordinates.
     """
@@ -96,14 +110,30 @@ class Airframe:
         return self.T[6 * self.node(point) + axis]
 
 
-def airframe(size: float = 0.05, *, material: Material = ALUMINIUM) -> Airframe:
+def airframe(
+    size: float = 0.05, *, material: Material = ALUMINIUM, joints: float = np.inf
+) -> Airframe:
     """The structure with beam elements no longer than ``size`` [m].
 
     The section of a beam is rigid: no shear, no warping; masses are consistent.
+
+    Args:
+        size: longest element [m].
+        material: of all parts.
+        joints: stiffness of the five joints against rotation about each axis [N m/rad].
+
+    Raises:
+        ConfigError: for a size or a stiffness that is not positive.
     """
+    if not (size > 0 and joints > 0):
+        raise ConfigError(f"size = {size} m, joints = {joints} N m/rad: both must be positive.")
     points, beams, owners = _meshed(size)
-    T = _linked(points)
+    T = _linked(points, np.isinf(joints))
     K, M = {}, {}
+    if np.isfinite(joints):
+        for part, link in zip(PARTS[1:], LINKS, strict=True):
+            a, b = (T[6 * n + 3 : 6 * n + 6] for n in _ends(points, link))
+            K[part.name, "joint"] = joints * (a - b).T @ (a - b)
     for part in PARTS:
         own = [b for b, owner in zip(beams, owners, strict=True) if owner == part.name]
         for kind in KINDS:
@@ -128,18 +158,25 @@ def _meshed(size: float) -> tuple[Array, list[tuple[int, int]], list[str]]:
     return np.array(points), beams, owners
 
 
-def _linked(points: Array) -> Array:
-    """T of u = T a, with the links' first points following the second ones."""
-    T = np.eye(6 * len(points))
-    dependent = []
-    for first, second in LINKS:
-        a, b = (int(np.abs(points - np.array(p)).sum(axis=1).argmin()) for p in (first, second))
-        x, y, z = points[a] - points[b]
-        rows = slice(6 * a, 6 * a + 6)
-        T[rows] = T[6 * b : 6 * b + 6]
-        T[rows][:3] -= np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ T[6 * b + 3 : 6 * b + 6]
-        dependent += range(6 * a, 6 * a + 6)
+def _linked(points: Array, rigid: bool) -> Array:
+    """T of u = T a, with the links' first points following the second ones, if rigid also turning.
+
+    A link turns with its second point.
+    """
+    T, dependent = np.eye(6 * len(points)), []
+    follow = 6 if rigid else 3
+    for link in LINKS:
+        a, b = _ends(points, link)
+        T[6 * a : 6 * a + follow] = T[6 * b : 6 * b + follow]
+        T[6 * a : 6 * a + 3] -= skew(points[a] - points[b]) @ T[6 * b + 3 : 6 * b + 6]
+        dependent += range(6 * a, 6 * a + follow)
     return np.delete(T, dependent, axis=1)
+
+
+def _ends(points: Array, link: npt.ArrayLike) -> tuple[int, int]:
+    """Numbers of the nodes at the two points of a link."""
+    first, second = (int(np.abs(points - p).sum(axis=1).argmin()) for p in np.asarray(link))
+    return first, second
 
 
 def _summed(
