@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp, trapezoid
 from scipy.linalg import eigh
 from scipy.sparse.linalg import splu
+from scipy.special import gamma
 from solid import _interface, block
 
 import rom
@@ -97,6 +98,23 @@ def test_a_rigid_gallery_is_struck_as_hertz_says():
     assert contact == pytest.approx(2.943275 * d / v, rel=1e-3)
     assert got.t[got.forces[:, 0].argmax()] == pytest.approx(0.042274, rel=1e-3)
     assert got.v[-1, 0] == pytest.approx(-v, rel=1e-3)
+
+
+def test_how_long_a_sphere_touches():
+    """Of depth over speed 2.943275, of (m^2 / k^2 v)^(1/5) 3.218: integral, Gamma function, motion.
+
+    Time is twice the integral of dx / v sqrt(1 - x^(5/2)) over the way in.
+    """
+    by_depth = quad(lambda u: 4 * u / np.sqrt(1 - (1 - u * u) ** 2.5), 0, 1)[0]  # x = 1 - u^2
+    assert by_depth == pytest.approx(0.8 * np.sqrt(np.pi) * gamma(0.4) / gamma(0.9), rel=1e-10)
+    assert by_depth == pytest.approx(2.943275, abs=5e-7)
+    assert by_depth * 1.25**0.4 == pytest.approx(3.218, abs=5e-4)
+    for boulder, height in ((1e3, 10.0), (5e3, 2.0)):
+        g = stiff(boulder, height, 1e6)
+        got = strike(g, t_end=0.2, keep=10**5)
+        contact = got.t[np.flatnonzero(got.forces[:, 0] > 0)[-1]]
+        unit = (boulder**2 / g.cushion.stiffness**2 / g.speed) ** 0.2
+        assert contact == pytest.approx(by_depth * 1.25**0.4 * unit, rel=1e-3)
 
 
 @pytest.mark.parametrize(
