@@ -39,7 +39,6 @@ model = rom.fe.model(
     material=rom.Material(E=114e9, nu=0.33, rho=4430.0),
     parameters={"width": 0.016, "chord": 0.015, "chord_tip": 0.012, "t": 0.003, "t_tip": 0.002,
                 "stagger": 20, "lc": 0.010, "lc_blade": 0.0065},
-    comm=MPI.COMM_SELF,
 )  # fmt: skip
 full = rom.CyclicSector.from_model(model, fixed=("bore",))
 full = rom.rotating_sector(full, model)

@@ -101,10 +101,14 @@ class CyclicSector:
     ) -> "CyclicSector":
         """Sector of a finite element model; the number of sectors follows from its faces.
 
+        Under mpirun all ranks call, each gets all rows of the sector, and whatever is computed
+        from it is computed on each of them alike: the mesh and its matrices are made in parallel,
+        the waves are not.
+
         Faces with different nodes are tied by interpolation: the finer one follows the coarser.
 
         Args:
-            model: one sector, on one process, with its two cyclic faces as interfaces.
+            model: one sector, with its two cyclic faces as interfaces.
             low: name of one cyclic face.
             high: name of the other.
             axis: (3,) direction of the axis of rotation.
@@ -113,13 +117,12 @@ class CyclicSector:
             regions: names of regions whose stiffness is kept apart, for blades that differ.
 
         Raises:
-            ConfigError: if a region is unknown, or the matrices are distributed.
+            ConfigError: if a region is unknown.
             InterfaceError: if an interface is unknown, the angle between the faces does not divide
                 the circle, or they are no images of each other.
+            ResourceError: on all ranks, if the sector does not fit on each of them.
         """
         fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
-        if not hasattr(model.K, "tocsr"):
-            raise ConfigError("cyclic symmetry needs the matrices of the sector on one process.")
         for name in (low, high, *fixed):
             if name not in model.interfaces:
                 raise InterfaceError(
@@ -127,12 +130,12 @@ class CyclicSector:
                 )
         e, at = unit_axis(axis), np.asarray(at, dtype=float)
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
-        dM = added_mass(model, 0, model.n_dofs)
+        M, dM = _all_rows(model, model.M), added_mass(model, 0, model.n_dofs)
         held = [model.interfaces[name].dofs for name in fixed]
         return cls(
             n_sectors=pair.n_sectors,
-            K=csr_matrix(model.K),
-            M=csr_matrix(model.M if dM is None else model.M + dM),
+            K=_all_rows(model, model.K),
+            M=M if dM is None else csr_matrix(M + dM),
             slave=pair.slave.dofs,
             master=pair.master.dofs,
             coupling=kron(pair.weights, turned(e, pair.step * 2 * np.pi / pair.n_sectors), "csr"),
@@ -274,11 +277,12 @@ class CyclicSector:
 
 
 def _region(model: FEModel, name: str) -> csr_matrix:
-    """Stiffness of one region, whichever library holds it."""
+    """Stiffness of one region."""
     if name not in model.regions:
         raise ConfigError(f"the sector has no region {name!r}; it has {sorted(model.regions)}.")
-    K = model.regions[name].K
-    if hasattr(K, "tocsr"):
-        return csr_matrix(K)
-    starts, columns, values = K.getValuesCSR()
-    return csr_matrix((values, columns, starts), shape=K.getSize())
+    return _all_rows(model, model.regions[name].K)
+
+
+def _all_rows(model: FEModel, A: Any) -> csr_matrix:
+    """A matrix of the model on this process, whichever library holds it."""
+    return csr_matrix(A if hasattr(A, "tocsr") else model.operators.gathered(A))

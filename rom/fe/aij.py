@@ -5,7 +5,13 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
+import numpy as np
 from scipy.sparse import csr_matrix
+
+from rom.errors import ResourceError
+from rom.fe.memory import THIN, allowed_bytes, factor_bytes
+
+COPIES = 20  # matrices as large as the one gathered that one rank then makes of it
 
 
 def symmetrized(A: PETSc.Mat) -> PETSc.Mat:
@@ -43,3 +49,42 @@ def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
     matrix = PETSc.Mat().createAIJ(size=sizes, csr=csr, comm=comm)
     matrix.assemble()
     return matrix
+
+
+def gathered(A: PETSc.Mat) -> csr_matrix:
+    """All rows of a distributed square matrix, on every rank; symmetric to the last digit.
+
+    Raises:
+        ResourceError: on all ranks, if each of them having the whole and a factor of two such
+            matrices side by side would not fit.
+    """
+    comm, (n, _) = A.comm.tompi4py(), A.getSize()
+    starts, columns, values = A.getValuesCSR()
+    counts = np.array(comm.allgather(values.size))
+    need = THIN * factor_bytes(2 * n) + 12.0 * COPIES * counts.sum()
+    there = allowed_bytes(comm)
+    if need > there:
+        raise ResourceError(
+            f"each of {comm.size} ranks needs all {n} dofs for itself, predicted to take "
+            f"{need / 2**30:.2f} GiB; {there / 2**30:.2f} GiB may be used by each.",
+            hint="Use fewer ranks, which share the memory, or a coarser mesh.",
+        )
+    lengths = _from_all(comm, np.diff(starts).astype(np.int64), None)
+    whole = csr_matrix(
+        (
+            _from_all(comm, 0.5 * values, counts),
+            _from_all(comm, columns.astype(np.int64), counts),
+            np.concatenate([[0], np.cumsum(lengths)]),
+        ),
+        shape=(n, n),
+    )
+    return (whole + whole.T).tocsr()
+
+
+def _from_all(comm: MPI.Comm, mine: np.ndarray, counts: np.ndarray | None) -> np.ndarray:
+    """The arrays of all ranks in their order, one after the other."""
+    if counts is None:
+        counts = np.array(comm.allgather(mine.size))
+    every = np.empty(counts.sum(), dtype=mine.dtype)
+    comm.Allgatherv(np.ascontiguousarray(mine), (every, counts))
+    return every

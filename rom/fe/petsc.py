@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 
 from rom.eigen import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.fe.aij import aij, symmetrized, weighted
+from rom.fe.aij import aij, gathered, symmetrized, weighted
 from rom.fe.counting import verify_count
 from rom.fe.factor import Factor, dense_rows
 from rom.fe.held import ZERO, HeldPETSc
@@ -156,6 +156,10 @@ class PETScOperators:
         M = self.M.copy()
         M.axpy(1.0, aij(csr_matrix(dM), sizes, self.comm))
         return self._like(self.K, M, self.rigid)
+
+    def gathered(self, A: PETSc.Mat) -> csr_matrix:
+        """All rows of a matrix with the layout of K, on every rank."""
+        return gathered(A)
 
     def product(self, A: PETSc.Mat, X: Array) -> Array:
         """A X."""

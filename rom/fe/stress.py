@@ -9,7 +9,7 @@ import ufl
 from dolfinx import fem
 from scipy.sparse import csr_matrix
 
-from rom.errors import ParallelError
+from rom.fe.aij import gathered
 from rom.fe.compat import (
     assemble_matrix,
     cell_dofs,
@@ -110,21 +110,21 @@ class Stresses:
         return 0.5 * (out + out.transpose(0, 2, 1))
 
     def prestress(self, u: Array) -> csr_matrix:
-        """(n, n) geometric stiffness of the stress of one displacement; on one process.
+        """(n, n) geometric stiffness of the stress of one displacement, equal on all ranks.
 
         Args:
-            u: (n,) displacement [m].
+            u: (n,) displacement of all dofs [m], equal on all ranks.
         """
-        if self.mesh.comm.size > 1:
-            raise ParallelError("the matrix of a prestress is made on one process only.")
         load = fem.Function(self.V)
-        load.x.array[: u.size] = u
+        rows, per_node = self.V.dofmap.index_map.local_range, self.V.dofmap.index_map_bs
+        own = u[rows[0] * per_node : rows[1] * per_node]
+        load.x.array[: own.size] = own
+        load.x.scatter_forward()
         with compiling(self.mesh.comm):
             A = assemble_matrix(self._second_variation(load))
-        starts, columns, values = A.getValuesCSR()
-        half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
+        K_geo = gathered(A)
         A.destroy()
-        return (half + half.T).tocsr()
+        return K_geo
 
     def _second_variation(self, load: Any) -> ufl.Form:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""

@@ -1,0 +1,70 @@
+"""Run by test_cyclic_mpi.py under mpirun, or in its own process: a wheel from a shared sector."""
+
+import json
+import sys
+import warnings
+
+from mpi4py import MPI
+
+import numpy as np
+
+import rom
+from rom.errors import RomError
+
+
+def wheel():
+    """Frequencies at rest, at speed and reduced, stiffness of the blade, and errors by name."""
+    model = rom.fe.model(
+        "meshes/bladed_disk.geo", material=rom.Material(E=114e9, nu=0.33, rho=4430.0),
+        parameters={"lc": 0.018, "lc_blade": 0.015},
+    )  # fmt: skip
+    plain = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))
+    sector = rom.rotating_sector(plain, model)
+    loaded = rom.FEModel(
+        model.K, model.M, model.points, model.interfaces, (rom.Attachment("tip", 0.01),),
+        operators=model.operators,
+    )  # fmt: skip
+    heavy = rom.CyclicSector.from_model(loaded, fixed=("bore",))
+    x = np.sin(plain.points).ravel()
+    found = {
+        "at rest": rom.cyclic_modes(plain, 2, 5).omega,
+        "standing": rom.cyclic_modes(plain, 0, 5).omega,
+        "at speed": rom.travelling_modes(sector, 2, 6, speed=2000.0).omega,
+        "reduced": rom.cyclic_modes(rom.reduce_sector(plain, n_modes=8), 2, 5).omega,
+        "loaded": rom.cyclic_modes(heavy, 2, 5).omega,
+        "blade": [x @ plain.regions["blade"] @ x],
+        "stress": [x @ sector.centrifugal @ x],
+    }
+    errors = {
+        "interface": said(lambda: rom.CyclicSector.from_model(model, fixed=("rim",))),
+        "region": said(lambda: rom.CyclicSector.from_model(model, regions=("rim",))),
+        "memory": said(lambda: _in_a_megabyte(model)),
+    }
+    return {name: np.asarray(f).tolist() for name, f in found.items()}, errors
+
+
+def _in_a_megabyte(model):
+    from rom.fe import aij
+
+    plenty, aij.allowed_bytes = aij.allowed_bytes, lambda comm: 2.0**20
+    try:
+        return rom.CyclicSector.from_model(model)
+    finally:
+        aij.allowed_bytes = plenty
+
+
+def said(call):
+    """Kind and text of the error of a call."""
+    try:
+        call()
+    except RomError as error:
+        return f"{type(error).__name__}: {error}"
+    return ""
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    every = MPI.COMM_WORLD.gather(wheel())
+    if MPI.COMM_WORLD.rank == 0:
+        with open(sys.argv[1], "w") as file:
+            json.dump(every, file)
