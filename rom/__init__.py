@@ -14,12 +14,15 @@ if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.body.spread import SpreadLoad, mass_load, surface_load
     from rom.checks import check
+    from rom.cyclic.bladed_wheel import BladedWheel, bladed_wheel
+    from rom.cyclic.blades import ReducedBlade, reduced_blade
     from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
     from rom.cyclic.rotation import rotating_sector
     from rom.cyclic.sector import CyclicSector
     from rom.cyclic.springs import supported_sector
+    from rom.cyclic.substructures import substructured_sector
     from rom.cyclic.travelling import TravellingModes, travelling_modes
     from rom.errors import RomError
     from rom.fmu.export import write_fmu
@@ -83,6 +86,7 @@ __all__ = [
     "Attachment",
     "BalancedTruncation",
     "Basis",
+    "BladedWheel",
     "BodyFamily",
     "Characteristic",
     "CraigBampton",
@@ -109,6 +113,7 @@ __all__ = [
     "Orthotropic",
     "Polynomial",
     "Rayleigh",
+    "ReducedBlade",
     "Region",
     "Report",
     "RomError",
@@ -122,6 +127,7 @@ __all__ = [
     "WithLoads",
     "YoungsModulus",
     "audit",
+    "bladed_wheel",
     "campbell",
     "check",
     "craig_bampton",
@@ -145,6 +151,7 @@ __all__ = [
     "reduce",
     "reduce_parametric",
     "reduce_sector",
+    "reduced_blade",
     "release",
     "rotating_sector",
     "save",
@@ -154,6 +161,7 @@ __all__ = [
     "steady_motion",
     "substructure",
     "supported_sector",
+    "substructured_sector",
     "surface_load",
     "transmissibility",
     "travelling_modes",
@@ -174,6 +182,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "Attachment": "model",
     "BalancedTruncation": "reduction.balanced",
     "Basis": "model",
+    "BladedWheel": "cyclic.bladed_wheel",
     "BodyFamily": "body.family",
     "Characteristic": "reduction.characteristic",
     "CraigBampton": "reduction.method",
@@ -201,6 +210,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "Polynomial": "reduction.polynomial",
     "Rayleigh": "body.damping",
     "Region": "model",
+    "ReducedBlade": "cyclic.blades",
     "Report": "model",
     "RomError": "errors",
     "Rubin": "reduction.free_interface",
@@ -213,6 +223,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "WithLoads": "reduction.loads",
     "YoungsModulus": "parameters",
     "audit": "mbs.audit",
+    "bladed_wheel": "cyclic.bladed_wheel",
     "campbell": "mbs.campbell",
     "check": "checks",
     "craig_bampton": "reduction.fixed_interface",
@@ -236,6 +247,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
     "reduce_sector": "cyclic.reduced",
+    "reduced_blade": "cyclic.blades",
     "release": "mbs.release",
     "rotating_sector": "cyclic.rotation",
     "save": "io.family",
@@ -245,6 +257,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "steady_motion": "mbs.steady",
     "substructure": "workflow",
     "supported_sector": "cyclic.springs",
+    "substructured_sector": "cyclic.substructures",
     "surface_load": "body.spread",
     "transmissibility": "mbs.response",
     "write_animation": "view.motion",

@@ -1,0 +1,214 @@
+"""Blades as substructures: the motion of a root that all share, and cantilever modes of their own.
+
+A blade that is cut from its disk keeps the coefficients a of functions on its root, and its modes
+with the root held, the cantilever modes, which a test bench measures blade by blade::
+
+    u = Psi_root a + Phi eta,    K = diag(K_root, omega_k^2),    M = [[M_root, L], [L^T, I]]
+
+Blades with equal functions fit on one disk, whatever their mesh, material or shape.
+
+Source:
+    Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
+    Castanier, Ottarsson and Pierre, A reduced order modeling technique for mistuned bladed disks,
+    J. Vibration and Acoustics 119 (1997) 439: deviations of the cantilever blades.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix, identity
+
+from rom.cyclic.faces import interpolation
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, FEModel, Index, Interface
+from rom.scipy_operators import SciPyOperators
+
+if TYPE_CHECKING:
+    from rom.cyclic.substructures import SubstructuredSector
+
+APART = 0.05  # of the size of a root: how far another one may lie, or differ in size
+ELSEWHERE = 1e-9  # of the stiffness of a dof: what other regions add to it counts as nothing
+
+
+@dataclass(frozen=True)
+class ReducedBlade:
+    """One blade in r coordinates of its root, then m cantilever modes.
+
+    Attributes:
+        K: (r + m, r + m) stiffness [N/m; 1/s^2].
+        M: (r + m, r + m) mass [kg; 1].
+        Psi: (n, r + m) displacement shapes on the dofs of the model the blade comes from.
+        n_root: number r of root coordinates.
+    """
+
+    K: Array
+    M: Array
+    Psi: Array
+    n_root: int
+
+    @property
+    def n_modes(self) -> int:
+        """Number m of cantilever modes."""
+        return len(self.K) - self.n_root
+
+    @property
+    def omega(self) -> Array:
+        """(m,) circular frequencies of the cantilever blade [rad/s]."""
+        modes = slice(self.n_root, None)
+        found: Array = np.sqrt(self.K.diagonal()[modes] / self.M.diagonal()[modes])
+        return found
+
+    def varied(
+        self, *, stiffness: float = 0.0, density: float = 0.0, cantilever: npt.ArrayLike = ()
+    ) -> "ReducedBlade":
+        """The blade with other parameters.
+
+        Args:
+            stiffness: relative deviation of the stiffness of the blade.
+            density: relative deviation of its density.
+            cantilever: (k,) relative deviations of its first k cantilever frequencies, beyond what
+                the two others do; shapes and root keep theirs.
+
+        Raises:
+            ConfigError: for a deviation not above -1, or of a mode the blade does not have.
+        """
+        delta = np.atleast_1d(np.asarray(cantilever, dtype=float))
+        all_of_them = np.r_[stiffness, density, delta]
+        if not np.isfinite(all_of_them).all() or all_of_them.min() <= -1.0:
+            raise ConfigError(f"deviations {all_of_them}: each must be a number above -1.")
+        if delta.ndim != 1 or delta.size > self.n_modes:
+            raise ConfigError(
+                f"{delta.size} deviations of cantilever frequencies; the blade has {self.n_modes} "
+                "cantilever modes."
+            )
+        K = (1.0 + stiffness) * self.K
+        modes = self.n_root + np.arange(delta.size)
+        K[modes, modes] *= (1.0 + delta) ** 2
+        return replace(self, K=K, M=(1.0 + density) * self.M)
+
+
+def reduced_blade(
+    sector: "SubstructuredSector",
+    model: FEModel,
+    *,
+    n_modes: int,
+    blade: str | None = "blade",
+    root: str | None = None,
+) -> ReducedBlade:
+    """A blade of other shape, mesh or material that fits on the disk of a sector.
+
+    Args:
+        sector: with the functions of the root.
+        model: finite elements of the blade, in place: a sector with the blade as a region, or the
+            blade alone.
+        n_modes: number of cantilever modes.
+        blade: name of the region; None if the model is the blade alone.
+        root: name of the interface of a blade alone that stands on the disk.
+
+    Raises:
+        ConfigError: if the region is unknown, or the blade cannot have so many modes.
+        InterfaceError: if the root is unknown, or not that of the sector.
+    """
+    if blade is None:
+        if root not in model.interfaces:
+            raise InterfaceError(
+                f"the blade has no interface {root!r}; it has {sorted(model.interfaces)}."
+            )
+        K, M, inner = csr_matrix(model.K), csr_matrix(model.M), np.arange(model.n_dofs)
+        nodes = model.interfaces[root].nodes
+    else:
+        K, M = region(model, blade)
+        inner, nodes = cut(model.K, K, blade)
+    Q = _same_functions(sector, model.points[nodes])
+    dofs = dofs_of(nodes)
+    E = np.zeros((K.shape[0], 3 * Q.shape[1]))
+    E[dofs] = np.kron(Q, np.eye(3))
+    return _cantilevered(K, M, E, np.union1d(inner, dofs), dofs, n_modes)
+
+
+def _cantilevered(
+    K: csr_matrix, M: csr_matrix, E: Array, mine: Index, root: Index, n_modes: int
+) -> ReducedBlade:
+    """Craig-Bampton of the dofs of a blade, whose root moves by E."""
+    ops = SciPyOperators(K[mine][:, mine], M[mine][:, mine])
+    held = ops.hold(np.searchsorted(mine, root))
+    _, Phi = ops.modes(held, n_modes)
+    Psi = np.zeros((K.shape[0], E.shape[1] + n_modes))
+    Psi[mine] = np.hstack([E[mine] - held(ops.apply_K(E[mine])), Phi])
+    return blade_in(K, M, Psi, E.shape[1])
+
+
+def blade_in(K: csr_matrix, M: csr_matrix, Psi: Array, n_root: int) -> ReducedBlade:
+    """The blade with these matrices in the coordinates of Psi; K is free of root-mode coupling."""
+    K_small, M_small = Psi.T @ (K @ Psi), Psi.T @ (M @ Psi)
+    K_small[:n_root, n_root:] = 0.0  # by orthogonality; what is there is round-off
+    K_small[n_root:, :n_root] = 0.0
+    return ReducedBlade(0.5 * (K_small + K_small.T), 0.5 * (M_small + M_small.T), Psi, n_root)
+
+
+def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
+    """(n, n) stiffness and mass of one region.
+
+    Raises:
+        ConfigError: if it is unknown.
+    """
+    if name not in model.regions:
+        raise ConfigError(
+            f"the model has no region {name!r}; it has {sorted(model.regions)}.",
+            hint="Name the volume of the blade in the geometry.",
+        )
+    return _sparse(model.regions[name].K), _sparse(model.regions[name].M)
+
+
+def _sparse(A: Any) -> csr_matrix:
+    if hasattr(A, "tocsr"):
+        return csr_matrix(A)
+    starts, columns, values = A.getValuesCSR()
+    return csr_matrix((values, columns, starts), shape=A.getSize())
+
+
+def cut(K: Any, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
+    """Inner dofs of a blade, and nodes of its root: those it shares with the rest.
+
+    Raises:
+        InterfaceError: if it shares none.
+    """
+    total, mine = _sparse(K).diagonal(), K_blade.diagonal()
+    shared = (mine > 0.0) & (total - mine > ELSEWHERE * total)
+    nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
+    if nodes.size == 0:
+        raise InterfaceError(f"region {name!r} shares no node with the rest of the sector.")
+    return np.setdiff1d(np.flatnonzero(mine > 0.0), dofs_of(nodes)), nodes
+
+
+def dofs_of(nodes: Index) -> Index:
+    """(3k,) dofs of nodes."""
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
+
+
+def root_of(model: FEModel, nodes: Index) -> Interface:
+    """The root as an interface; as each node weighs alike, no facets are needed."""
+    points = model.points[nodes]
+    equal = identity(nodes.size, format="csr") / nodes.size
+    return Interface("root of the blade", nodes, points, equal, points.mean(axis=0))
+
+
+def _same_functions(sector: "SubstructuredSector", points: Array) -> Array:
+    """(k, m) functions of the root of a sector at nodes of another blade.
+
+    Raises:
+        InterfaceError: if the nodes cover another surface.
+    """
+    own = sector.root_points
+    size = np.ptp(own, axis=0).max()
+    boxes = [np.array([p.min(axis=0), p.max(axis=0)]) for p in (own, points)]
+    apart = np.abs(boxes[0] - boxes[1]).max()
+    if apart > APART * size:
+        raise InterfaceError(
+            f"the root of this blade ends up to {apart:.3g} m from that of the sector, which is "
+            f"{size:.3g} m wide.",
+            hint="Only above the root may blades differ in shape.",
+        )
+    return np.asarray(interpolation(own, points) @ sector.root_functions)

@@ -1,0 +1,109 @@
+"""A sector of two substructures, disk and blade, joined by a-priori functions on the root."""
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from rom.cyclic.blades import ReducedBlade, blade_in, cut, dofs_of, region, root_of
+from rom.cyclic.reduced import ReducedSector, face_functions, projected
+from rom.cyclic.sector import NONE, CyclicSector
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, FEModel, Index
+from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions
+from rom.scipy_operators import SciPyOperators
+
+
+@dataclass(frozen=True)
+class SubstructuredSector(ReducedSector):
+    """Coordinates: two cyclic faces, the root, modes of the disk, cantilever modes of the blade.
+
+    Attributes:
+        blade: the nominal blade, in its root coordinates and its cantilever modes.
+        root: (r,) which coordinates are those of the root.
+        cantilever: (m,) which are cantilever modes.
+        root_points: (k, 3) nodes of the root [m].
+        root_functions: (k, r / 3) functions on it, alike for the three directions.
+    """
+
+    blade: ReducedBlade | None = None
+    root: Index = field(default_factory=lambda: NONE)
+    cantilever: Index = field(default_factory=lambda: NONE)
+    root_points: Array | None = None
+    root_functions: Array | None = None
+
+
+def substructured_sector(
+    sector: CyclicSector,
+    model: FEModel,
+    *,
+    n_modes: int,
+    n_blade_modes: int,
+    functions: Polynomial | FourierLegendre | None = None,
+    root: Polynomial | FourierLegendre | None = None,
+    blade: str = "blade",
+) -> SubstructuredSector:
+    """Craig-Bampton reduction of disk and blade, with a-priori functions on all faces.
+
+    As `rom.reduce_sector`, and the blade is cut off where it shares nodes with the rest: both sides
+    follow the same functions there, so that frequencies are never below those of the full sector.
+    All of rom.cyclic takes the result like any sector; `rom.bladed_wheel` gives each of its blades
+    parameters or a shape of its own.
+
+    Args:
+        sector: the full sector, made from the model by `CyclicSector.from_model`.
+        model: the finite elements, with the blade as a region.
+        n_modes: number of modes of the disk with its cyclic faces and the root held.
+        n_blade_modes: number of cantilever modes.
+        functions: on the cyclic faces; `Polynomial` of order 4 unless given.
+        root: on the root of the blade; `Polynomial` of order 3 unless given.
+        blade: name of the region.
+
+    Raises:
+        ConfigError: if the region or the geometry of the faces is missing, or for too many modes.
+        InterfaceError: if the blade shares no node with the disk, or reaches a cyclic face.
+
+    Source:
+        Castanier, Ottarsson and Pierre, J. Vibration and Acoustics 119 (1997) 439; polynomials on
+        the interfaces as in `rom.reduce_sector`.
+    """
+    if sector.face is None or sector.n != model.n_dofs:
+        raise ConfigError(
+            "substructures need the full sector and the model it was made from.",
+            hint="Make the sector with rom.CyclicSector.from_model.",
+        )
+    K_blade, M_blade = region(model, blade)
+    inner, nodes = cut(sector.K, K_blade, blade)
+    shared, faces = dofs_of(nodes), np.union1d(sector.slave, sector.master)
+    if np.intersect1d(np.union1d(inner, shared), faces).size:
+        raise InterfaceError(
+            f"the blade {blade!r} reaches a cyclic face, on which sectors meet.",
+            hint="Cut the wheel between the blades.",
+        )
+    face = root_of(model, nodes)
+    Q = face_functions(sector, functions or Polynomial(4))
+    Q_root = interface_functions(root or Polynomial(3), face)
+    q, r = 3 * Q.shape[1], 3 * Q_root.shape[1]
+    E = np.zeros((sector.n, 2 * q + r))
+    E[sector.master, :q] = np.kron(Q, np.eye(3))
+    E[sector.slave, q : 2 * q] = sector.coupling @ E[sector.master, :q]
+    E[shared, 2 * q :] = np.kron(Q_root, np.eye(3))
+    E[sector.held] = 0.0
+    ops, cuts = SciPyOperators(sector.K, sector.M), np.union1d(faces, sector.held)
+    cuts = np.union1d(cuts, shared)
+    static = E - ops.hold(cuts)(ops.apply_K(E))
+    omega, disk = ops.modes(np.union1d(cuts, inner), n_modes)
+    _, cantilever = ops.modes(np.setdiff1d(np.arange(sector.n), inner), n_blade_modes)
+    small = projected(sector, np.hstack([static, disk, cantilever]), q, omega)
+    root_at = 2 * q + np.arange(r)
+    modes_at = 2 * q + r + n_modes + np.arange(n_blade_modes)
+    Psi = np.zeros((sector.n, r + n_blade_modes))
+    mine = np.union1d(inner, shared)
+    Psi[mine] = small.Psi[np.ix_(mine, np.r_[root_at, modes_at])]
+    return SubstructuredSector(
+        **{f.name: getattr(small, f.name) for f in fields(ReducedSector)},
+        blade=blade_in(K_blade, M_blade, Psi, r),
+        root=root_at,
+        cantilever=modes_at,
+        root_points=face.points,
+        root_functions=Q_root,
+    )
