@@ -29,6 +29,7 @@ LEFT_BEHIND = {
     "demo_pendulum_chain": {"pendulum_chain.png"},
     "demo_rockfall": {"rockfall.png"},
     "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
+    "demo_rotor": {"rotor_modes.png", "rotor_whirl.png"},
     "demo_robot_arm": {"robot_arm.png", "robot_arm.gif"},
     "demo_satellite": {"satellite.png", "satellite.gif"},
     "demo_rolling_wheel": {"rolling_wheel.png"},

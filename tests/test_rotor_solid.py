@@ -200,3 +200,15 @@ def test_springs_that_hold_nothing_are_refused(published):
     small = rom.reduce_sector(published, n_modes=5)
     with pytest.raises(InterfaceError, match="nodes of 'cyclic_low'"):
         rom.supported_sector(small, face, across=1.0)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "culprit"),
+    [({"N": 7.5}, "whole number of sectors"), ({"d": 0.3}, "d = 0.3 < d_1 = 0.28"),
+     ({"w": 0.5}, "discs of width w = 0.5")],
+)  # fmt: skip
+def test_impossible_rotors_are_named(parameters, culprit):
+    from rom.fe.mesh import read_mesh
+
+    with pytest.raises(ConfigError, match=culprit):
+        read_mesh("meshes/rotor.geo", parameters=parameters)
