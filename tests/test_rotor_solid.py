@@ -63,6 +63,22 @@ def test_a_rigid_disc_on_springs_whirls_as_euler_says(width, speed):
     assert_allclose(found[np.argsort(found)], np.sort(exact), rtol=3e-4)
 
 
+def test_springs_hold_a_disc_along_its_axis_and_about_it():
+    """Rigid: 2 k = m w^2 along the axis; about it the springs have the radius of gyration of it."""
+    model = model_of(
+        revolved_mesh(16, [0.02, 0.06, 0.1], [-0.01, 0.01], lambda r, z: "disc",
+                      {"left": (-0.01, 0.1), "right": (0.01, 0.1)}), material=STEEL
+    )  # fmt: skip
+    sector = rom.CyclicSector.from_model(model)
+    assert not sector.supported
+    for face in ("left", "right"):
+        sector = rom.supported_sector(sector, model.interfaces[face], across=1e4, along=4e4)
+    assert sector.supported
+    mass = 16 * model.mass()
+    exact = np.sqrt(np.array([2e4, 8e4]) / mass)
+    assert_allclose(rom.cyclic_modes(sector, 0, 2).omega, exact, rtol=1e-4)
+
+
 LEFT, RIGHT, WIDE, NECK, GAP = 0.5, 1.0, 0.07, 0.003, 0.03
 BORE, R = 0.002, 0.025
 
