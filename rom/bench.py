@@ -298,11 +298,24 @@ def wheel(families: int = 4, parameters: dict[str, float] | None = None) -> Iter
         yield Figure("wheel", case, f"{name}: difference of {f.size} frequencies", error, "", aim)
 
 
+def loops(*sizes: int) -> Iterator[Figure]:
+    """Stones in contact, a map of postures, a bar that flows: compiled loops on one processor.
+
+    Args:
+        sizes: as `rom.bench_loops.measured` takes them.
+    """
+    from rom.bench_loops import measured
+
+    for case, quantity, value, unit, aim in measured(*sizes):
+        yield Figure("loops", case, quantity, value, unit, aim)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
     "integrator": integrator,
     "chain": chain,
+    "loops": loops,
     "reduction": reduction,
     "large-reduction": large_reduction,
     "wheel": wheel,

@@ -148,3 +148,13 @@ def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
     errors = [figure.value for figure in figures if "difference" in figure.quantity]
     assert errors[0] < 1e-8 and 1e-8 < errors[1] < 1e-3
     assert all(figure.value > 0.0 for figure in figures)
+
+
+def test_compiled_loops_are_timed_on_motions_that_are_right():
+    """A short arch that rests on its abutments, postures near an isotropic one, a coarse bar."""
+    figures = {f"{f.case.split(',')[0]}: {f.quantity}": f for f in bench.loops(10, 400, 120, 10)}
+    assert [f.aim for f in figures.values()][::2] == ["below 30", "below 2", "below 20"]
+    assert all(f.value > 0 for f in figures.values())
+    assert figures["arch of 10 blocks: fastest stone"].value < 1e-4
+    assert figures["five-bar linkage: best index of isotropy"].value == pytest.approx(1, abs=1e-3)
+    assert 5.5 < figures["Taylor's bar: radius of its foot"].value < 7.1

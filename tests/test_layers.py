@@ -17,6 +17,7 @@ ANYTHING = {
     "__init__",
     "__main__",
     "bench",
+    "bench_loops",
     "bench_models",
     "cli",
     "doctor",
