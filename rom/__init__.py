@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from rom.checks import check
     from rom.cyclic.bladed_wheel import BladedWheel, bladed_wheel
     from rom.cyclic.blades import ReducedBlade, reduced_blade
+    from rom.config.component import read_component
+    from rom.config.mechanism import read_mechanism
     from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
@@ -146,6 +148,8 @@ __all__ = [
     "mistuned_wheel",
     "modes",
     "motion_sensitivity",
+    "read_component",
+    "read_mechanism",
     "read_model",
     "read_sid",
     "reduce",
@@ -242,6 +246,8 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "mistuned_wheel": "cyclic.mistuning",
     "modes": "workflow",
     "motion_sensitivity": "mbs.sensitivity",
+    "read_component": "config.component",
+    "read_mechanism": "config.mechanism",
     "read_model": "io.foreign_model",
     "read_sid": "io.sid_dialect",
     "reduce": "workflow",

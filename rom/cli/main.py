@@ -4,7 +4,8 @@ import os
 import sys
 import traceback
 
-from rom.cli.parser import build_parser
+from rom.cli.described import TOML
+from rom.cli.parser import build_parser, given
 from rom.cli.ranks import ranks, stop_all
 from rom.cli.speech import Manner, complain, manner_of, present, say, speaking
 from rom.errors import ConfigError, InterruptedRun, QualityGateError, ResourceError, RomError
@@ -45,6 +46,9 @@ def main(argv: list[str] | None = None) -> int:
 def run(argv: list[str], manner: Manner) -> int:
     """Parse, run the verb, write its files, print its answer."""
     args = build_parser().parse_args(argv)
+    if str(getattr(args, "file", "")).endswith(TOML):
+        args.given = given(argv)
+    args.argv = argv
     if args.version:
         from rom import __version__
 

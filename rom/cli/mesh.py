@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, table
+from rom.cli.described import component, described
 from rom.cli.options import (
     add_geometry,
     add_solid,
@@ -24,6 +25,7 @@ DECK = ".inp"
 SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
+  rom mesh meshes/connecting_rod.toml      # its geometry
   rom mesh part.msh --scale 1e-3 --save part.vtu
   rom mesh part.step --faces
   rom mesh part.step -p lc=0.002 --face pin=0,0,0.01
@@ -60,13 +62,19 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.fe.mesh import read_mesh
     from rom.fe.summary import summary
 
-    solid = _solid(args)
+    if described(args):
+        part = component(args, "save", "faces")
+        file, how = part.mesh
+        deck = args.save is not None and args.save.suffix.lower() == DECK
+        solid = part.material() if deck else None
+    else:
+        solid, file, how = _solid(args), args.file, reading(args)
+        how["faces"] = unique([(name, _point(at)) for name, at in args.face], "--face")
     if args.save:
         _check_save(args.save)
-    faces: dict[str, Any] = unique([(name, _point(at)) for name, at in args.face], "--face")
     if args.faces:
-        faces["face"] = "every"
-    mesh = read_mesh(args.file, faces=faces, **reading(args))
+        how["faces"] = how["faces"] | {"face": "every"}
+    mesh = read_mesh(file, **how)
     data = summary(mesh)
     if not args.save:
         return Answer(data, _text(data))

@@ -4,23 +4,12 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.options import count, number, positive
+from rom.config.methods import CRAIG_BAMPTON, METHODS
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.reduction.characteristic import Characteristic
     from rom.reduction.method import Method
-
-CRAIG_BAMPTON = "craig-bampton"
-METHODS = {  # word: class, and what -m is when it is not given; None for none
-    CRAIG_BAMPTON: ("CraigBampton", 20),
-    "enhanced": ("EnhancedCraigBampton", 20),
-    "guyan": ("Guyan", None),
-    "rubin": ("Rubin", 20),
-    "herting": ("Herting", 20),
-    "free-free": ("FreeFree", 20),
-    "moment-matching": ("MomentMatching", 2),
-    "balanced": ("BalancedTruncation", 20),
-}
 
 
 def frequencies(text: str) -> tuple[float, ...]:
@@ -92,7 +81,7 @@ def method(args: argparse.Namespace) -> "Method | Characteristic":
 def _plain(args: argparse.Namespace) -> "Method":
     import rom
 
-    name, default = METHODS[args.method]
+    _, name, default = METHODS[args.method]
     if args.f_max and args.method != CRAIG_BAMPTON:
         raise ConfigError(f"--f-max belongs to {CRAIG_BAMPTON}; give {args.method} a number -m.")
     if args.tol is not None and not args.f_max:

@@ -2,7 +2,7 @@
 
 import argparse
 from difflib import get_close_matches
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from rom.cli import (
     bench,
@@ -84,6 +84,22 @@ def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:
         if isinstance(action, argparse._SubParsersAction) and verb in action.choices:
             parser = action.choices[verb]
     return sorted(s for s in parser._option_string_actions if s.startswith("--"))
+
+
+def given(argv: list[str]) -> dict[str, Any]:
+    """Only the options that a command line says, by their destination."""
+    parser = build_parser()
+    for sub in _verb_parsers(parser):
+        for action in sub._actions:
+            action.default = argparse.SUPPRESS
+    return vars(parser.parse_args(argv))
+
+
+def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            return list(action.choices.values())
+    return []
 
 
 def build_parser() -> Parser:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
+from rom.cli.described import component, described
 from rom.cli.matrices import add_matrices
 from rom.cli.method import add_method, method
 from rom.cli.options import (
@@ -35,6 +36,7 @@ EXAMPLES = """\
       --f-max 3e3 --reference root,tip --damping-ratio 0.01 -o beam.rom.npz
   rom reduce rod.op4:KAA --mass rod.op4:MAA --nodes rod.bdf --units mm-t-s \\
       --set pin_a=11-14 --set pin_b=81-84 -i pin_a=rbe2 -i pin_b=rbe2 -o rod.rom.npz
+  rom reduce meshes/connecting_rod.toml -m 30 -o rod.rom.npz   # options go before the file
 """
 
 
@@ -63,16 +65,38 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", help="name of the body (default: that of the file)")
     parser.add_argument("--stress", action="store_true", help="make surface stress recoverable")
     parser.add_argument("--no-certificate", action="store_true", help="skip the comparison")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="e.g. rod.rom.npz")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="e.g. rod.rom.npz; may be said by a .toml file"
+    )
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Assemble, reduce, compare; the file is written at the end."""
-    from rom.io.files import check_writable
     from rom.io.native import save
+
+    body, output = _described(args) if described(args) else _by_options(args)
+    failed = failures(body.certificate) if body.certificate else ()
+    return Answer(_data(body, output), _text(body, output), lambda: save(body, output), failed)
+
+
+def _checked(output: Path | None) -> Path:
+    from rom.io.files import check_writable
+
+    if output is None:
+        raise ConfigError("the following arguments are required: -o/--output.")
+    return check_writable(output)
+
+
+def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
+    part = component(args)
+    output = _checked(args.output or part.output)
+    return part.body(), output
+
+
+def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     from rom.workflow import reduce
 
-    check_writable(args.output)
+    output = _checked(args.output)
     chosen, damping = method(args), _damping(args)
     kinds = unique(args.interface, "-i")
     if not kinds:
@@ -88,10 +112,7 @@ def run(args: argparse.Namespace) -> Answer:
         stiffening=args.stiffening,
         certify=not args.no_certificate,
     )
-    failed = failures(body.certificate) if body.certificate else ()
-    return Answer(
-        _data(body, args.output), _text(body, args.output), lambda: save(body, args.output), failed
-    )
+    return body, output
 
 
 def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":

@@ -1,36 +1,44 @@
-"""Let a body swing about one of its interfaces under gravity, and write the motion as a table."""
+"""Move the mechanism of a .toml file; or let a body swing about one of its interfaces.
+
+The motion is written as a table, with pictures and films when they are asked for.
+"""
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
+from rom.cli.described import described, mechanism
 from rom.cli.options import positive, vector
 from rom.cli.ranks import ranks
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
+    from rom.model import Report
 
-SUMMARY = "let a body swing as a pendulum"
+SUMMARY = "move a mechanism, or let a body swing as a pendulum"
 EXAMPLES = """\
+  rom simulate demos/slider_crank.toml -o out/
+  rom simulate demos/slider_crank.toml --t-end 0.01 --film glb -o out/
   rom simulate rod.rom.npz --hinge pin_a --gravity 0,-9.81,0 --t-end 1 --dt 1e-3 -o out/
   rom simulate rod.rom.npz --hinge pin_a --axis=-1,0,0 --t-end 0.2 --dt 1e-4 -o out/
   rom simulate rod.rom.npz --hinge pin_a --t-end 1 --dt 1e-3 --film glb --history h5 -o out/
-Mechanisms of several bodies are built in Python, see demos/.
+Mechanisms of several bodies are described in a file, or built in Python, see demos/.
 """
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz")
-    parser.add_argument("--hinge", required=True, help="interface the body hangs on")
+    parser.add_argument("file", type=Path, help="mechanism, .toml, or body, e.g. rod.rom.npz")
+    parser.add_argument("--hinge", help="interface the body hangs on")
     parser.add_argument("--axis", type=vector, default=(0.0, 0.0, 1.0), help="default 0,0,1")
     parser.add_argument(
         "--gravity", type=vector, default=(0.0, -9.81, 0.0), help="[m/s^2], default 0,-9.81,0"
     )
-    parser.add_argument("--t-end", type=positive, required=True, help="duration [s]")
-    parser.add_argument("--dt", type=positive, required=True, help="time step [s]")
+    parser.add_argument("--t-end", type=positive, help="duration [s]")
+    parser.add_argument("--dt", type=positive, help="time step [s]")
     parser.add_argument(
         "--film", choices=("glb", "vtkhdf"), help="film in space: for browsers, or for ParaView"
     )
@@ -42,8 +50,40 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Load, simulate, audit; the table is written at the end."""
+    return _mechanism(args) if described(args) else _pendulum(args)
+
+
+def _mechanism(args: argparse.Namespace) -> Answer:
+    from rom import __version__
+    from rom.config.run import run as move
+
+    file = mechanism(args)
+    _check_folder(args.output)
+    command = f"rom {' '.join(map(quote, args.argv))}"
+    aloud = ranks()[0] == 0 and not args.quiet
+    done = move(file, command=command, version=__version__, progress=aloud)
+    paths = done.paths(args.output)
+    return _answer(done.solution, done.audit, paths, lambda: done.write(args.output))
+
+
+def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
+    data = {
+        "output": str(paths[0]),
+        "also": [str(also) for also in paths[1:]],
+        "steps": len(solution.t) - 1,
+        "status": solution.status,
+        "audit": report_data(audit),
+    }
+    text = f"{paths[0]}: {data['steps']} steps. {solution.status}\n\n{audit}"
+    return Answer(data, text, write, failures(audit))
+
+
+def _pendulum(args: argparse.Namespace) -> Answer:
     from rom.io.native import load
 
+    needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
+    if missing := [name for name, value in needed.items() if value is None]:
+        raise ConfigError(f"the following arguments are required: {', '.join(missing)}.")
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):
@@ -53,19 +93,10 @@ def run(args: argparse.Namespace) -> Answer:
     body.marker(args.hinge)
     solution, audit = _swing(body, args)
     path = args.output / f"{body.name}.csv"
-    data = {
-        "output": str(path),
-        "also": [str(also) for also in _more(path, args)],
-        "steps": len(solution.t) - 1,
-        "status": solution.status,
-        "audit": report_data(audit),
-    }
-    return Answer(
-        data,
-        f"{path}: {data['steps']} steps. {solution.status}\n\n{audit}",
+    return _answer(
+        solution, audit, [path, *_more(path, args)],
         lambda: _write_all(path, body, solution, args),
-        failures(audit),
-    )
+    )  # fmt: skip
 
 
 def _swing(body: "FlexibleBody", args: argparse.Namespace) -> tuple[Any, Any]:

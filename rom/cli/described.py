@@ -1,0 +1,130 @@
+"""Components and mechanisms described by files: what a command line says goes before the file."""
+
+import argparse
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.options import number_or_text, unique, vector
+from rom.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rom.config.component import Component
+    from rom.config.mechanism import MechanismFile
+
+TOML = ".toml"
+COMMON = {"verb", "file", "run", "output", "json", "quiet", "verbose", "strict", "debug", "version"}
+Changes = dict[tuple[str, ...], Any]
+PLACES: dict[str, tuple[str, ...]] = {  # option: key
+    "E": ("material", "E"),
+    "nu": ("material", "nu"),
+    "rho": ("material", "rho"),
+    "degree": ("geometry", "degree"),
+    "solver": ("geometry", "solver"),
+    "method": ("reduction", "method"),
+    "modes": ("reduction", "modes"),
+    "f_max": ("reduction", "f_max"),
+    "tol": ("reduction", "tol"),
+    "at": ("reduction", "at"),
+    "characteristic": ("reduction", "characteristic"),
+    "gravity_shapes": ("reduction", "gravity_shapes"),
+    "reference": ("reduction", "reference"),
+    "stiffening": ("reduction", "stiffening"),
+    "stress": ("reduction", "stress"),
+    "name": ("name",),
+    "number": ("modes", "number"),
+    "fixed": ("modes", "fixed"),
+}
+MOTION: dict[str, tuple[str, ...]] = {
+    "gravity": ("gravity",),
+    "t_end": ("simulation", "t_end"),
+    "dt": ("simulation", "dt"),
+    "film": ("output", "film"),
+    "history": ("output", "history"),
+}
+WITHOUT = {  # an option takes the place of what contradicts it
+    "modes": (("reduction", "f_max"), ("reduction", "tol")),
+    "f_max": (("reduction", "modes"),),
+}
+
+
+def described(args: argparse.Namespace) -> bool:
+    """Whether the file of the verb is a description."""
+    return bool(args.file.suffix.lower() == TOML)
+
+
+def component(args: argparse.Namespace, *extra: str) -> "Component":
+    """The component of the file, with what the command line changes.
+
+    Args:
+        args: the options.
+        extra: options the verb looks after itself.
+
+    Raises:
+        ConfigError: for an option that has no key, and as `rom.read_component`.
+    """
+    from rom.config.component import read_component
+
+    return read_component(args.file, changes(args.given, PLACES, extra))
+
+
+def mechanism(args: argparse.Namespace) -> "MechanismFile":
+    """The mechanism of the file, with what the command line changes.
+
+    Raises:
+        ConfigError: for an option that has no key, and as `rom.read_mechanism`.
+    """
+    from rom.config.mechanism import read_mechanism
+
+    return read_mechanism(args.file, changes(args.given, MOTION, ()))
+
+
+def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:
+    """What options say, by the keys of the file."""
+    found: Changes = {}
+    for option, value in given.items():
+        if option in COMMON or option in extra:
+            continue
+        if option in places:
+            found |= dict.fromkeys(WITHOUT.get(option, ()))
+            found[places[option]] = list(value) if isinstance(value, tuple) else value
+        elif option in SPECIAL and places is PLACES:
+            found |= SPECIAL[option](value)
+        else:
+            name = "--" + option.replace("_", "-")
+            raise ConfigError(f"{name} does not go with a {TOML} file.", hint="Write it there.")
+    return found
+
+
+def _parameters(pairs: list[tuple[str, str]]) -> Changes:
+    values = unique([number_or_text(pair) for pair in pairs], "-p")
+    return {("geometry", "parameters", name): value for name, value in values.items()}
+
+
+def _interfaces(pairs: list[tuple[str, str]]) -> Changes:
+    return {("interfaces", name): kind for name, kind in unique(pairs, "-i").items()}
+
+
+def _faces(pairs: list[tuple[str, str]]) -> Changes:
+    try:
+        points = {name: list(vector(text)) for name, text in unique(pairs, "--face").items()}
+    except argparse.ArgumentTypeError as error:
+        raise ConfigError(f"--face: {error}.") from None
+    return {("geometry", "faces", name): point for name, point in points.items()}
+
+
+def _rayleigh(text: str) -> Changes:
+    try:
+        alpha, beta = map(float, text.split(","))
+    except ValueError:
+        raise ConfigError(f"--rayleigh {text} is not two numbers, as in 0.1,1e-6.") from None
+    return {("damping",): {"alpha": alpha, "beta": beta}}
+
+
+SPECIAL: dict[str, Callable[[Any], Changes]] = {
+    "parameter": _parameters,
+    "interface": _interfaces,
+    "face": _faces,
+    "damping_ratio": lambda ratio: {("damping",): {"ratio": ratio}},
+    "rayleigh": _rayleigh,
+    "no_certificate": lambda _: {("reduction", "certificate"): False},
+}

@@ -1,0 +1,404 @@
+"""The component file: a geometry, its material, and how it becomes a flexible body."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.config.document import Document, KeyPath, read_document
+from rom.config.keys import (
+    Anything,
+    Either,
+    FilePath,
+    Flag,
+    Key,
+    Named,
+    Place,
+    Quantity,
+    Table,
+    Text,
+    Variants,
+    Whole,
+    Words,
+    read_table,
+    shown,
+)
+from rom.config.methods import METHODS, chosen
+from rom.errors import ConfigError, RomError
+from rom.units import LENGTH, SYSTEMS, UNITS, in_si, unit
+
+if TYPE_CHECKING:
+    from rom.body.damping import ModalDamping, Rayleigh
+    from rom.body.flexible import FlexibleBody
+    from rom.model import Attachment, FEModel
+
+LENGTHS = tuple(name for name, u in UNITS.items() if u.dimension == LENGTH)
+ISOTROPIC = Table("An isotropic solid.", (
+    Key("E", Quantity("Pa"), "Young's modulus.", ...),
+    Key("nu", Quantity(), "Poisson's ratio.", ...),
+    Key("rho", Quantity("kg/m^3"), "Density.", ...),
+))  # fmt: skip
+ORTHOTROPIC = Table("An orthotropic solid, known by its key G.", (
+    Key("E", Quantity("Pa", ((3,),)), "Young's moduli E1, E2, E3.", ...),
+    Key("nu", Quantity("1", ((3,),)), "Poisson's ratios nu12, nu13, nu23.", ...),
+    Key("G", Quantity("Pa", ((3,),)), "Shear moduli G12, G13, G23.", ...),
+    Key("rho", Quantity("kg/m^3"), "Density.", ...),
+    Key("axes", Quantity("1", ((3, 3),)), "Rows are the axes 1, 2, 3 in the geometry."),
+))  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Solids:
+    """One material, or a table of them by region."""
+
+    said: str = "isotropic or orthotropic table, or a table of them by region"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values of the material, or of each region under "regions"."""
+        if (
+            isinstance(value, Mapping)
+            and value
+            and all(isinstance(v, dict) for v in value.values())
+        ):
+            return {"regions": Named(_Solid(), "materials").read(value, place)}
+        return _Solid().read(value, place)
+
+
+@dataclass(frozen=True, slots=True)
+class _Solid:
+    said: str = "material"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values of one material."""
+        other = isinstance(value, Mapping) and "G" in value
+        return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
+
+
+INTERFACE = Either(Text(), Variants({
+    "full": Table("Keeps all its dofs.", ()),
+    "rbe2": Table("Moves as a rigid surface.", ()),
+    "rbe3": Table("Moves freely about its mean.", ()),
+    "polynomial": Table("Deforms by polynomials.", (
+        Key("order", Whole(), "Their order; by the band and tol of the reduction if missing."),
+    )),
+    "fourier": Table("A bore: Fourier series around, Legendre polynomials along.", (
+        Key("harmonics", Whole(), "Harmonics around.", ...),
+        Key("order", Whole(), "Order along.", ...),
+    )),
+}))  # fmt: skip
+TABLE = Table("A component.", (
+    Key("name", Text(), "Name of the body; that of the file if missing."),
+    Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (
+        Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.inp` or `.bdf`.", ...),
+        Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
+        Key("degree", Whole(1, 3), "Degree of the displacement.", 2),
+        Key("solver", Text(), "How equations are solved, as `rom reduce --solver`.", "direct"),
+        Key("parameters", Named(Anything("number or text"), "parameters"),
+            "Parameters of the geometry. A plain number goes there as it is; a length with its "
+            "unit is converted to that of the geometry (`.step`: to metres), another quantity "
+            "to SI."),
+        Key("faces", Named(Anything("number or points"), "faces"),
+            "Names for faces of a `.step`: a number, a point [m], or a list of these."),
+    )), "The solid as a geometry or mesh."),
+    Key("matrices", Table("The solid as matrices of another program, in place of a geometry.", (
+        Key("stiffness", Text(), "File, `:NAME` behind it where it holds several.", ...),
+        Key("mass", Text(), "Likewise.", ...),
+        Key("nodes", FilePath(), "`.inp`, `.bdf`, `.dat` or `.csv`.", ...),
+        Key("units", Text(tuple(SYSTEMS)), "Unit system of the files.", "SI"),
+        Key("sets", Named(Quantity("1", ((None,),)), "labels"),
+            "Labels of the nodes of an interface, where the `.inp` has no set of its name."),
+    )), "The solid as matrices of another program."),
+    Key("material", Solids(), "What it is made of; by region where there are several."),
+    Key("interfaces", Named(INTERFACE, "interfaces"),
+        "Surfaces through which it touches others, and their kinds."),
+    Key("attachments", Named(Table("A rigid body on an interface.", (
+        Key("interface", Text(), "Which carries it.", ...),
+        Key("mass", Quantity("kg", positive=True), "Mass.", ...),
+        Key("inertia", Quantity("kg m^2", ((3, 3),)), "About its mass centre; none for a point."),
+        Key("at", Quantity("m", ((3,),)), "Mass centre; the middle of the interface if missing."),
+    )), "attachments"), "Rigid bodies and point masses it carries."),
+    Key("reduction", Table("How it is reduced.", (
+        Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
+        Key("modes", Whole(), "How many; 20 if missing. For moment-matching blocks, 2."),
+        Key("f_max", Quantity("Hz", positive=True), "Craig-Bampton: all modes up to here instead."),
+        Key("tol", Quantity("1", positive=True),
+            "With f_max: the fewest modes with this relative error in the band."),
+        Key("at", Quantity("Hz", ((None,),)), "Moment-matching: where to be exact; 0 if missing."),
+        Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
+        Key("gravity_shapes", Flag(), "Keep the answers to gravity along each axis.", False),
+        Key("reference", Words(), "The frame: mean-axis, an interface, or two of them.",
+            ("mean-axis",)),
+        Key("stiffening", Flag(), "Add the geometric stiffness of rotation and loads.", False),
+        Key("stress", Flag(), "Make stress on the surface recoverable.", False),
+        Key("certificate", Flag(), "Compare with the full model.", True),
+    )), "How it is reduced.", {"method": "craig-bampton", "gravity_shapes": False,
+        "reference": ("mean-axis",), "stiffening": False, "stress": False, "certificate": True}),
+    Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
+        Key("ratio", Quantity(), "Damping ratio of every mode."),
+        Key("alpha", Quantity("1/s"), "D = alpha M + beta K."),
+        Key("beta", Quantity("s"), "D = alpha M + beta K."),
+    )), "Structural damping; none if missing."),
+    Key("modes", Table("What `rom modes` computes.", (
+        Key("number", Whole(1), "Number of modes, rigid ones too.", 12),
+        Key("fixed", Words(), "Interfaces held.", ()),
+    )), "What `rom modes` computes.", {"number": 12, "fixed": ()}),
+    Key("output", Table("What `rom reduce` writes.", (
+        Key("file", FilePath(), "The body file, `.rom.npz`.", ...),
+    )), "What `rom reduce` writes."),
+))  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A component as its file describes it.
+
+    Attributes:
+        document: the file.
+        values: its values in SI, by the keys of `TABLE`.
+    """
+
+    document: Document
+    values: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the body."""
+        return str(self.values.get("name") or self.document.path.stem)
+
+    @property
+    def output(self) -> Path | None:
+        """Where its body is to be written."""
+        path: Path | None = self.values.get("output", {}).get("file")
+        return path
+
+    @property
+    def kinds(self) -> dict[str, Any]:
+        """Kinds of the interfaces, for `rom.reduce`."""
+        from rom.reduction.kinds import parsed
+        from rom.reduction.polynomial import FourierLegendre, Polynomial
+
+        records = {"polynomial": Polynomial, "fourier": FourierLegendre}
+        found = {}
+        for name, value in self.values.get("interfaces", {}).items():
+            rest = dict(value) if isinstance(value, dict) else {"kind": value}
+            kind = rest.pop("kind")
+            with self.at("interfaces", name):
+                found[name] = records[kind](**rest) if rest else parsed(name, kind)
+        return found
+
+    @property
+    def mesh(self) -> tuple[Path, dict[str, Any]]:
+        """File and keywords for `rom.fe.mesh.read_mesh`.
+
+        Raises:
+            ConfigError: without a geometry.
+        """
+        geometry = self._section("geometry")
+        own = geometry["file"].suffix.lower() in (".step", ".stp")
+        if own and geometry["unit"] != "m":
+            raise Place(self.document, ("geometry", "unit")).error(
+                "a .step file knows its unit.", "Leave the unit out."
+            )
+        scale = in_si(f"1 {geometry['unit']}", "m")
+        parameters = {
+            name: self._parameter(name, value, scale)
+            for name, value in geometry.get("parameters", {}).items()
+        }
+        keywords = {"parameters": parameters, "faces": geometry.get("faces", {}), "scale": scale}
+        return geometry["file"], keywords
+
+    def model(self) -> "FEModel":
+        """The finite element model; a geometry needs FEniCSx.
+
+        Raises:
+            RomError: of what is wrong with file, mesh, material or matrices.
+        """
+        given = [name for name in ("geometry", "matrices") if name in self.values]
+        if len(given) != 1:
+            what = "both a geometry and matrices" if given else "neither a geometry nor matrices"
+            raise ConfigError(f"the component has {what}.", where=str(self.document.path))
+        if given == ["matrices"]:
+            return self._matrices()
+        from rom.fe.elasticity import model
+
+        file, keywords = self.mesh
+        geometry = self.values["geometry"]
+        return model(
+            file, material=self.material(), degree=geometry["degree"], solver=geometry["solver"],
+            attachments=self._attachments(), **keywords,
+        )  # fmt: skip
+
+    def body(self) -> "FlexibleBody":
+        """The reduced body.
+
+        Raises:
+            RomError: as `model` and `rom.reduce`.
+        """
+        from rom.workflow import reduce
+
+        reduction, kinds = self.values["reduction"], self.kinds
+        if not kinds:
+            raise ConfigError(
+                "the component has no interface.", where=str(self.document.path),
+                hint='For example [interfaces] and pin_a = "rbe2".',
+            )  # fmt: skip
+        with self.at("reduction"):
+            method = chosen(reduction, full=any(kind == "full" for kind in kinds.values()))
+        reference = reduction["reference"]
+        damping = self.damping()
+        return reduce(
+            self.model(), method=method, interfaces=kinds, damping=damping, name=self.name,
+            reference=reference[0] if len(reference) == 1 else reference,
+            stress=reduction["stress"], stiffening=reduction["stiffening"],
+            certify=reduction["certificate"],
+        )  # fmt: skip
+
+    def material(self) -> Any:
+        """`Material`, `Orthotropic`, or a dictionary of them by region."""
+        solids = self._section("material")
+        if "regions" in solids:
+            return {
+                name: self._solid(values, "material", name)
+                for name, values in solids["regions"].items()
+            }
+        return self._solid(solids, "material")
+
+    def damping(self) -> "Rayleigh | ModalDamping | None":
+        """Damping for `rom.reduce`."""
+        from rom.body.damping import ModalDamping, Rayleigh
+
+        values = self.values.get("damping")
+        if values is None:
+            return None
+        if ("ratio" in values) == bool({"alpha", "beta"} & set(values)):
+            raise Place(self.document, ("damping",)).error(
+                "[damping] needs either ratio, or alpha and beta."
+            )
+        return ModalDamping(values["ratio"]) if "ratio" in values else Rayleigh(**values)
+
+    def at(self, *path: str) -> "Located":
+        """Context that tells the line of a key in errors raised below it."""
+        return Located(self.document, path)
+
+    def _section(self, name: str) -> dict[str, Any]:
+        if name not in self.values:
+            raise ConfigError(f"[{name}] is missing.", where=str(self.document.path))
+        found: dict[str, Any] = self.values[name]
+        return found
+
+    def _solid(self, values: dict[str, Any], *path: str) -> Any:
+        from rom.model import Material, Orthotropic
+
+        with self.at(*path):
+            if "G" not in values:
+                return Material(**values)
+            return Orthotropic(**{k: _tuples(v) for k, v in values.items()})
+
+    def _parameter(self, name: str, value: Any, scale: float) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            found = unit(value.lstrip("+-.0123456789eE ") or "1")
+        except ConfigError:
+            return value  # a text of its own, e.g. for a geometry written in Python
+        place = Place(self.document, ("geometry", "parameters", name))
+        if found.dimension == LENGTH:
+            return Quantity("m").read(value, place) / scale
+        try:
+            return in_si(value, _si(found.dimension))
+        except ConfigError as error:
+            raise place.error(f"{place.name}: {error.message}", error.hint) from None
+
+    def _attachments(self) -> "list[Attachment]":
+        from rom.model import Attachment
+
+        return [Attachment(**values) for values in self.values.get("attachments", {}).values()]
+
+    def _matrices(self) -> "FEModel":
+        from dataclasses import replace
+
+        from rom.io.foreign_model import read_model
+        from rom.io.node_files import read_node_sets
+
+        m = self.values["matrices"]
+        for name in ("material", "geometry"):
+            if name in self.values:
+                raise Place(self.document, (name,)).error(f"matrices need no [{name}].")
+        sets: dict[str, Any] = {
+            name: [int(x) for x in labels] for name, labels in m.get("sets", {}).items()
+        }
+        rest = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
+        sets |= read_node_sets(m["nodes"], rest) if rest else {}
+        sources = (self._source(m[name]) for name in ("stiffness", "mass"))
+        model = read_model(*sources, nodes=m["nodes"], interfaces=sets, units=m["units"])
+        return replace(model, attachments=tuple(self._attachments()))
+
+    def _source(self, text: str) -> Any:
+        """A file beside the document, or (file, name) from FILE:NAME."""
+        folder = self.document.path.parent
+        path, colon, name = text.rpartition(":")
+        if colon and path and not (folder / text).exists():
+            return str(folder / path), name
+        return str(folder / text)
+
+
+class Located:
+    """Context that puts file and line in front of errors raised inside."""
+
+    def __init__(self, document: Document, path: KeyPath) -> None:
+        self.document, self.path = document, path
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, _: Any) -> None:
+        if isinstance(error, RomError) and not error.where.startswith(str(self.document.path)):
+            where = self.document.where(self.path)
+            error.where = f"{where}: {error.where}" if error.where else where
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _si(dimension: tuple[int, ...]) -> str:
+    """A unit of SI of that dimension."""
+    bases = ("kg", "m", "s", "rad", "Hz s")
+    return " ".join(f"{b}^{n}" for b, n in zip(bases, dimension, strict=True) if n) or "1"
+
+
+def read_component(
+    path: str | Path, changes: Mapping[tuple[str, ...], Any] | None = None
+) -> Component:
+    """A component file.
+
+    Args:
+        path: ``.toml``; its keys are listed on the page about files.
+        changes: {("material", "E"): "70 GPa", ...} in place of what the file says; None removes.
+
+    Raises:
+        FileFormatError: if there is no such file.
+        ConfigError: with every mistake and its line: unknown or missing keys, wrong units.
+    """
+    document = read_document(path)
+    if "bodies" in document.data:
+        raise ConfigError(
+            "this is a mechanism; a component is needed.", where=document.where(("bodies",)),
+            hint="rom simulate moves it.",
+        )  # fmt: skip
+    for key, value in (changes or {}).items():
+        change(document.data, key, value)
+    return Component(document, read_table(TABLE, document))
+
+
+def change(data: dict[str, Any], key: tuple[str, ...], value: Any) -> None:
+    """Put a value at a place in nested tables; None removes what is there."""
+    for name in key[:-1]:
+        inner = data.setdefault(name, {})
+        if not isinstance(inner, dict):
+            raise ConfigError(f"{name} = {shown(inner)} is no table.")
+        data = inner
+    if value is None:
+        data.pop(key[-1], None)
+    else:
+        data[key[-1]] = value

@@ -1,0 +1,140 @@
+"""A TOML file with the line of each of its keys."""
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rom.errors import ConfigError, FileFormatError
+
+LARGEST = 1_000_000  # bytes
+DEEPEST = 40  # brackets inside each other: more is an accident, and costs the stack
+STRING = r'"""(?:\\.|[^\\])*?"""' + r"|'''.*?'''" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'"
+TOKEN = re.compile(STRING + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
+WORD = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'|[A-Za-z0-9_-]+')
+KeyPath = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """What a file says, and where.
+
+    Attributes:
+        path: the file.
+        data: its tables.
+        lines: line of each key, as far as keys stand on lines of their own.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    lines: dict[KeyPath, int] = field(default_factory=dict)
+
+    def where(self, path: KeyPath) -> str:
+        """File and line of a key, or of the table around it."""
+        for n in range(len(path), 0, -1):
+            if path[:n] in self.lines:
+                return f"{self.path}:{self.lines[path[:n]]}"
+        return str(self.path)
+
+
+def read_document(path: str | Path) -> Document:
+    """Read a TOML file.
+
+    Raises:
+        FileFormatError: if it is missing, too large, or no text.
+        ConfigError: naming the line that is no TOML, or the key that is given twice.
+    """
+    path = Path(path)
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "there is no such file"
+        raise FileFormatError(f"{what}.", where=str(path))
+    if path.stat().st_size > LARGEST:
+        raise FileFormatError(f"more than {LARGEST} bytes are no description.", where=str(path))
+    try:
+        text = path.read_bytes().decode("utf-8").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"is no text in UTF-8: {error.reason}.", where=str(path)) from None
+    return parsed(text, path)
+
+
+def parsed(text: str, path: Path) -> Document:
+    """The document of a text.
+
+    Raises:
+        ConfigError: as `read_document`.
+    """
+    found = list(statements(text))
+    _check_depth(text, path)
+    try:
+        data = tomllib.loads(text)
+    except ValueError as error:
+        raise _refusal(str(error), found, path) from None
+    lines: dict[KeyPath, int] = {}
+    for key, line in found:
+        for n in range(len(key), 0, -1):  # tables that stand nowhere begin with their first key
+            lines.setdefault(key[:n], line)
+    return Document(path, data, lines)
+
+
+def _check_depth(text: str, path: Path) -> None:
+    depth = 0
+    for token in TOKEN.finditer(text):
+        depth += (token[0] in ("[", "{")) - (token[0] in ("]", "}"))
+        if depth > DEEPEST:
+            raise ConfigError(f"has more than {DEEPEST} brackets in each other.", where=str(path))
+
+
+def _refusal(said: str, found: list[tuple[KeyPath, int]], path: Path) -> ConfigError:
+    """What the parser says, with file and line; for a key given twice both lines."""
+    if said.startswith("Cannot"):
+        seen: dict[KeyPath, int] = {}
+        for key, line in found:
+            if key in seen:
+                return ConfigError(
+                    f"{'.'.join(key)!r} is given twice, in lines {seen[key]} and {line}.",
+                    where=f"{path}:{line}",
+                    hint="Keep one of them.",
+                )
+            seen[key] = line
+    place = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", said)
+    line_number = f":{place[1]}" if place and place[1] else ""
+    reason = re.sub(r" \(at [^)]*\)", "", said).rstrip(".")
+    return ConfigError(
+        f"this is no TOML: {reason[0].lower()}{reason[1:]}.",
+        where=f"{path}{line_number}",
+        hint="Texts stand in quotes, and so do numbers with a unit.",
+    )
+
+
+def statements(text: str) -> Iterator[tuple[KeyPath, int]]:
+    """Full path and line of every table and key that begins a line; inline tables count as one."""
+    table: KeyPath = ()
+    for head, line in _heads(text):
+        words = tuple(word.strip("\"'") for word in WORD.findall(head))
+        if head.startswith("["):
+            table = words
+            if not head.startswith("[["):
+                yield table, line
+        else:
+            yield (*table, *words), line
+
+
+def _heads(text: str) -> Iterator[tuple[str, int]]:
+    """What stands before each ``=`` outside of values, and each line in brackets."""
+    line, depth, head, in_value = 1, 0, "", False
+    for token in TOKEN.finditer(text + "\n"):
+        word = token[0]
+        if word == "\n" and depth <= 0:
+            if head.strip().startswith("["):
+                yield head.strip(), line
+            head, in_value, depth = "", False, 0
+        elif in_value:
+            depth += (word in ("[", "{")) - (word in ("]", "}"))
+        elif word == "=" and not head.lstrip().startswith("["):
+            yield head.strip(), line
+            in_value = True
+        elif not word.startswith("#"):
+            head += word
+        line += word.count("\n")

@@ -1,0 +1,384 @@
+"""The keys of a file as a table: validation, error messages and documentation follow from it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Protocol
+
+from rom.config.document import Document, KeyPath
+from rom.errors import ConfigError
+from rom.units import in_si
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A key in a document; its mistakes are collected, so that all are told at once."""
+
+    document: Document
+    path: KeyPath = ()
+    mistakes: list[ConfigError] = field(default_factory=list)
+
+    def at(self, key: str) -> "Place":
+        """A key below this one."""
+        return replace(self, path=(*self.path, str(key)))
+
+    @property
+    def name(self) -> str:
+        """The key with its tables, e.g. material.E."""
+        return ".".join(self.path)
+
+    def error(self, message: str, hint: str = "") -> ConfigError:
+        """An error about this key, which says file and line."""
+        return ConfigError(message, where=self.document.where(self.path), hint=hint)
+
+
+class Kind(Protocol):
+    """How the value of a key is written."""
+
+    @property
+    def said(self) -> str:
+        """In a few words, for the documentation."""
+
+    def read(self, value: Any, place: Place) -> Any:
+        """The value, checked and in SI.
+
+        Raises:
+            ConfigError: if it is none of this kind.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number with a unit: text, or a plain number in SI; or an array of them.
+
+    Attributes:
+        unit: SI unit of the dimension it must have; "1" for none.
+        shapes: of an array, e.g. ((3,), (3, 3)); None in a shape for any length.
+        positive: whether it must be above zero.
+    """
+
+    unit: str = "1"
+    shapes: tuple[tuple[int | None, ...], ...] = ((),)
+    positive: bool = False
+
+    @property
+    def said(self) -> str:
+        """Number, vector or matrix, and unit."""
+        forms = {0: "number", 1: "list", 2: "matrix"}
+        sizes = ["x".join("n" if n is None else str(n) for n in s) for s in self.shapes]
+        shapes = zip(self.shapes, sizes, strict=True)
+        words = [f"{forms[len(s)]} {size}".strip() for s, size in shapes]
+        unit = "" if self.unit == "1" else f" [{self.unit}]"
+        return " or ".join(words) + unit + (", positive" if self.positive else "")
+
+    def read(self, value: Any, place: Place) -> Any:
+        """Number or nested lists of numbers in SI."""
+        found = _shape(value)
+        if not any(_matches(found, shape) for shape in self.shapes):
+            raise place.error(f"{place.name} = {shown(value)}: needed is a {self.said}.")
+        return self._number(value, place)
+
+    def _number(self, value: Any, place: Place) -> Any:
+        if isinstance(value, list):
+            return [self._number(item, place) for item in value]
+        if isinstance(value, str):
+            try:
+                x = in_si(value, self.unit)
+            except ConfigError as error:
+                raise place.error(f"{place.name}: {error.message}", error.hint) from None
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            x = float(value) if abs(value) <= 1e300 else math.inf
+        else:
+            raise place.error(f"{place.name} = {shown(value)} is not a {self.said}.")
+        if not math.isfinite(x) or (self.positive and x <= 0):
+            what = "is not positive" if math.isfinite(x) else "is not a finite number"
+            raise place.error(f"{place.name} = {shown(value)} {what}.")
+        return x
+
+
+def _shape(value: Any) -> tuple[int, ...] | None:
+    """Lengths of nested lists, None when they differ."""
+    if not isinstance(value, list):
+        return ()
+    inner = {_shape(item) for item in value}
+    if len(inner) > 1 or None in inner:
+        return None
+    return (len(value), *(inner.pop() if inner else ()))
+
+
+def _matches(found: tuple[int, ...] | None, shape: tuple[int | None, ...]) -> bool:
+    if found is None or len(found) != len(shape):
+        return False
+    return all(n in (None, m) for m, n in zip(found, shape, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A whole number."""
+
+    least: int = 0
+    most: int = 10**9
+
+    @property
+    def said(self) -> str:
+        """Whole number from the least one on."""
+        return f"whole number from {self.least}"
+
+    def read(self, value: Any, place: Place) -> int:
+        """The number."""
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise place.error(f"{place.name} = {shown(value)} is not a {self.said}.")
+        if not self.least <= value <= self.most:
+            raise place.error(f"{place.name} = {shown(value)} is not a {self.said}.")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """true or false."""
+
+    said: str = "true or false"
+
+    def read(self, value: Any, place: Place) -> bool:
+        """The value."""
+        if not isinstance(value, bool):
+            raise place.error(f"{place.name} = {shown(value)} is not true or false.")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text, if need be one of some."""
+
+    choices: tuple[str, ...] = ()
+
+    @property
+    def said(self) -> str:
+        """Text, or the choices."""
+        return ", ".join(f'"{c}"' for c in self.choices) or "text"
+
+    def read(self, value: Any, place: Place) -> str:
+        """The text."""
+        if not isinstance(value, str) or not value or "\0" in value:
+            raise place.error(f"{place.name} = {shown(value)} is not a text.")
+        if self.choices and value not in self.choices:
+            hint = nearest(value, self.choices)
+            raise place.error(f"{place.name} = {value!r} does not exist.", hint)
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """A text or a list of texts."""
+
+    said: str = "text, or list of texts"
+
+    def read(self, value: Any, place: Place) -> tuple[str, ...]:
+        """The texts."""
+        values = value if isinstance(value, list) else [value]
+        return tuple(Text().read(item, place) for item in values)
+
+
+@dataclass(frozen=True, slots=True)
+class FilePath:
+    """A file, relative to the folder of the document."""
+
+    said: str = "file"
+
+    def read(self, value: Any, place: Place) -> Path:
+        """The path."""
+        return place.document.path.parent / Text().read(value, place)
+
+
+@dataclass(frozen=True, slots=True)
+class Anything:
+    """Left to whoever uses it."""
+
+    said: str
+
+    def read(self, value: Any, place: Place) -> Any:
+        """The value as it is."""
+        if isinstance(value, int | float | str | list | dict):
+            return value
+        raise place.error(f"{place.name} = {shown(value)} is no {self.said}.")
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a table.
+
+    Attributes:
+        name: as written.
+        kind: how its value is written.
+        about: one sentence.
+        default: value when it is not given; None for no value, ``...`` when it must be given.
+    """
+
+    name: str
+    kind: Kind
+    about: str
+    default: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The keys a table may hold.
+
+    Attributes:
+        about: one sentence.
+        keys: what it knows.
+    """
+
+    about: str
+    keys: tuple[Key, ...]
+
+    @property
+    def said(self) -> str:
+        """Called a table."""
+        return "table"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values by key: those given, and defaults that are values."""
+        if not isinstance(value, Mapping):
+            raise place.error(f"{place.name} = {shown(value)}: needed is a table [{place.name}].")
+        known = {key.name: key for key in self.keys}
+        for name in value:
+            if name not in known:
+                place.mistakes.append(unknown(name, tuple(known), place))
+        found: dict[str, Any] = {}
+        for key in self.keys:
+            if key.name in value:
+                collect(found, key.name, key.kind, value[key.name], place)
+            elif key.default is ...:
+                inside = f" in [{place.name}]" if place.path else ""
+                place.mistakes.append(
+                    place.error(f"{key.name} is missing{inside}.", f"{key.about} ({key.kind.said})")
+                )
+            elif key.default is not None:
+                found[key.name] = key.default
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """A table of things by name."""
+
+    kind: Kind
+    what: str
+
+    @property
+    def said(self) -> str:
+        """Called a table by name."""
+        return f"table of {self.what} by name"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values by name."""
+        if not isinstance(value, Mapping):
+            raise place.error(f"{place.name} = {shown(value)}: needed is a {self.said}.")
+        found: dict[str, Any] = {}
+        for name, item in value.items():
+            if not name or "\0" in name:
+                place.mistakes.append(place.error(f"{place.name} has a name that is empty."))
+            else:
+                collect(found, name, self.kind, item, place)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Variants:
+    """Tables told apart by their key ``kind``."""
+
+    tables: Mapping[str, Table]
+
+    @property
+    def said(self) -> str:
+        """The kinds."""
+        return "table with a kind: " + ", ".join(self.tables)
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values by key, ``kind`` among them."""
+        if not isinstance(value, Mapping):
+            raise place.error(f"{place.name} = {shown(value)}: needed is a table [{place.name}].")
+        if "kind" not in value:
+            raise place.error(f"kind is missing in [{place.name}].", nearest("", self.tables))
+        kind = Text(tuple(self.tables)).read(value["kind"], place.at("kind"))
+        rest = {key: item for key, item in value.items() if key != "kind"}
+        return {"kind": kind} | self.tables[kind].read(rest, place)
+
+
+@dataclass(frozen=True, slots=True)
+class Either:
+    """A table, or something shorter that stands for it."""
+
+    short: Kind
+    table: Kind
+
+    @property
+    def said(self) -> str:
+        """Both forms."""
+        return f"{self.short.said}; or {self.table.said}"
+
+    def read(self, value: Any, place: Place) -> Any:
+        """Either form."""
+        return (self.table if isinstance(value, Mapping) else self.short).read(value, place)
+
+
+def collect(found: dict[str, Any], name: str, kind: Kind, value: Any, place: Place) -> None:
+    """Read one value into a dictionary; a mistake goes to the others."""
+    try:
+        found[name] = kind.read(value, place.at(name))
+    except ConfigError as error:
+        place.mistakes.append(error)
+
+
+def unknown(name: str, known: tuple[str, ...], place: Place) -> ConfigError:
+    """The error of a key that does not exist, with the nearest that does."""
+    inside = f" in [{place.name}]" if place.path else ""
+    return place.at(name).error(f"there is no key {name!r}{inside}.", nearest(name, known))
+
+
+def nearest(word: str, known: Any) -> str:
+    """The nearest known word, and the list of them."""
+    words = [str(k) for k in known]
+    near = get_close_matches(word, words, n=1)
+    return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(words)}."
+
+
+def shown(value: Any) -> str:
+    """A value, not longer than a line."""
+    text = repr(value) if not isinstance(value, int) or abs(value) < 10**18 else "a huge number"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def read_table(table: Table, document: Document) -> dict[str, Any]:
+    """The values of a document.
+
+    Raises:
+        ConfigError: with every mistake, and its line.
+    """
+    place = Place(document)
+    values = table.read(document.data, place)
+    raise_mistakes(place)
+    return values
+
+
+def raise_mistakes(place: Place) -> None:
+    """Raise what has been collected, the first mistake in front.
+
+    Raises:
+        ConfigError: if there is any.
+    """
+    found = place.mistakes
+    if len(found) == 1:
+        raise found[0]
+    if found:
+        file = str(place.document.path)
+        by_line = sorted(
+            ((int("0" + e.where.removeprefix(file).strip(":")), e) for e in found),
+            key=lambda pair: pair[0],
+        )
+        told = [f"line {line}: {e.message}" if line else e.message for line, e in by_line]
+        hint = by_line[0][1].hint
+        raise ConfigError(f"{len(found)} mistakes. {' '.join(told)}", where=file, hint=hint)

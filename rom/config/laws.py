@@ -1,0 +1,193 @@
+"""Functions of time in a file: constant, steady, run-up, ramp, harmonic, table."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from rom.config.keys import Either, Key, Kind, Place, Quantity, Table, Variants, raise_mistakes
+from rom.errors import ConfigError
+
+Function = Callable[[Any], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A function of time with its first and second derivative; each takes numbers and arrays."""
+
+    value: Function
+    rate: Function
+    acceleration: Function
+
+
+def law_kind(unit: str) -> Kind:
+    """How a law is written whose values have this SI unit."""
+    value, rate = Quantity(unit), Quantity("1/s" if unit == "1" else f"{unit}/s")
+    still = 0.0
+    tables = {
+        "constant": Table("Always the same.", (Key("value", value, "Its value.", ...),)),
+        "steady": Table("start + rate t.", (
+            Key("rate", rate, "Change per time.", ...),
+            Key("start", value, "Value at t = 0.", still),
+        )),
+        "run-up": Table(
+            "From rest to a steady rate, without a jolt: the rate is that of a cycloid, "
+            "rate (s - sin(2 pi s) / 2 pi) with s = t / duration.", (
+            Key("rate", rate, "Rate at the end.", ...),
+            Key("duration", Quantity("s", positive=True), "Time until then.", ...),
+        )),
+        "ramp": Table(
+            "From one value to another on a cycloid, from + (to - from) (s - sin(2 pi s) / 2 pi) "
+            "with s = (t - start) / duration.", (
+            Key("from", value, "Value before.", still),
+            Key("to", value, "Value after.", ...),
+            Key("start", Quantity("s"), "When it begins.", still),
+            Key("duration", Quantity("s", positive=True), "How long it takes.", ...),
+        )),
+        "harmonic": Table("mean + amplitude sin(2 pi frequency t + phase).", (
+            Key("amplitude", value, "Amplitude.", ...),
+            Key("frequency", Quantity("Hz", positive=True), "Frequency.", ...),
+            Key("phase", Quantity("rad"), "Phase.", still),
+            Key("mean", value, "Mean.", still),
+        )),
+        "table": Table("A cubic spline through points; it must cover the whole run.", (
+            Key("t", Quantity("s", ((None,),)), "Times, ascending.", ...),
+            Key("values", Quantity(unit, ((None,),)), "Values.", ...),
+        )),
+    }  # fmt: skip
+    return Either(value, Variants(tables))
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """A value whose unit depends on whether a joint turns or slides."""
+
+    value: Any
+    place: Place
+    kinds: tuple[Kind, Kind]
+
+    def of(self, *, turns: bool) -> Any:
+        """The value for an angle, or for a way.
+
+        Raises:
+            ConfigError: if it has the unit of the other one.
+        """
+        place = Place(self.place.document, self.place.path)
+        found = self.kinds[0 if turns else 1].read(self.value, place)
+        raise_mistakes(place)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class ByCoordinate:
+    """A kind with one unit for joints that turn, another for joints that slide."""
+
+    turning: Kind
+    sliding: Kind
+
+    @property
+    def said(self) -> str:
+        """Both kinds."""
+        return f"{self.turning.said}; of a joint that slides {self.sliding.said}"
+
+    def read(self, value: Any, place: Place) -> Pending:
+        """The value, which fits at least one of them."""
+        pending = Pending(value, place, (self.turning, self.sliding))
+        try:
+            pending.of(turns=True)
+        except ConfigError:
+            pending.of(turns=False)
+        return pending
+
+
+def law_of(values: Any, place: Place, *, t_end: float | None = None) -> Law:
+    """The functions of a law.
+
+    Args:
+        values: what `law_kind` has read: a number, or a table with its kind.
+        place: its place in the file.
+        t_end: until when it is asked for [s].
+
+    Raises:
+        ConfigError: for a table of points that is none, or that ends too early.
+    """
+    import numpy as np
+
+    values = dict(values) if isinstance(values, Mapping) else {"kind": "constant", "value": values}
+    kind = values.pop("kind")
+    if kind == "table":
+        _check_points(values, place, t_end)
+    if kind == "constant":
+        return _polynomial(values["value"], 0.0)
+    if kind == "steady":
+        return _polynomial(values["start"], values["rate"])
+    if kind == "table":
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(np.array(values["t"]), np.array(values["values"]))
+        return Law(spline, spline.derivative(1), spline.derivative(2))
+    return {"run-up": _run_up, "ramp": _ramp, "harmonic": _harmonic}[kind](values)
+
+
+def _polynomial(start: float, slope: float) -> Law:
+    return Law(lambda t: start + slope * t, lambda t: slope + 0 * t, lambda t: 0.0 * t)
+
+
+def _run_up(values: dict[str, Any]) -> Law:
+    import numpy as np
+
+    speed, T = values["rate"], values["duration"]
+    w = 2 * np.pi / T
+
+    def angle(t: Any) -> Any:
+        s = np.minimum(t, T)
+        return speed * (s**2 / (2 * T) + (np.cos(w * s) - 1) / (w * 2 * np.pi) + t - s)
+
+    def rate(t: Any) -> Any:
+        s = np.minimum(t, T)
+        return speed * (s / T - np.sin(w * s) / (2 * np.pi))
+
+    def acceleration(t: Any) -> Any:
+        return speed / T * (1 - np.cos(w * np.minimum(t, T)))
+
+    return Law(angle, rate, acceleration)
+
+
+def _ramp(values: dict[str, Any]) -> Law:
+    import numpy as np
+
+    low, high, T = values["from"], values["to"], values["duration"]
+    w, rise = 2 * np.pi, high - low
+
+    def s(t: Any) -> Any:
+        return np.clip((t - values["start"]) / T, 0.0, 1.0)
+
+    return Law(
+        lambda t: low + rise * (s(t) - np.sin(w * s(t)) / w),
+        lambda t: rise / T * (1 - np.cos(w * s(t))),
+        lambda t: rise / T**2 * w * np.sin(w * s(t)),
+    )
+
+
+def _harmonic(values: dict[str, Any]) -> Law:
+    import numpy as np
+
+    A, w, phase = values["amplitude"], 2 * np.pi * values["frequency"], values["phase"]
+    return Law(
+        lambda t: values["mean"] + A * np.sin(w * t + phase),
+        lambda t: w * A * np.cos(w * t + phase),
+        lambda t: -(w**2) * A * np.sin(w * t + phase),
+    )
+
+
+def _check_points(values: dict[str, Any], place: Place, t_end: float | None) -> None:
+    t, y = values["t"], values["values"]
+    if len(t) != len(y) or len(t) < 2:
+        raise place.error(f"{place.name} has {len(t)} times and {len(y)} values.")
+    if any(b <= a for a, b in pairwise(t)):
+        raise place.error(f"the times of {place.name} do not ascend.")
+    if t_end is not None and not (t[0] <= 0.0 and t[-1] >= t_end):
+        raise place.error(
+            f"the points of {place.name} cover {t[0]:g} s to {t[-1]:g} s; "
+            f"the run needs 0 s to {t_end:g} s."
+        )

@@ -1,0 +1,309 @@
+"""The mechanism file: bodies, joints, forces, and how they are moved."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.config.component import Located, change, read_component
+from rom.config.document import Document, read_document
+from rom.config.keys import Place, nearest, read_table
+from rom.config.laws import Pending, law_of
+from rom.config.mechanism_keys import IMPACT, SECTIONS, TABLE
+from rom.errors import ConfigError, RomWarning
+
+if TYPE_CHECKING:
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.solution import Solution
+
+GROUND = "ground"
+METHODS = {  # section: method of a mechanism; in the others the kind of the entry
+    "drives": "drive",
+    "motors": "motor",
+    "springs": "spring_damper",
+    "rotational_springs": "rotational_spring",
+    "bushings": "bushing",
+    "forces": "force",
+    "torques": "torque",
+    "frictions": "friction",
+    "stops": "stop",
+}
+ON_JOINTS = ("drives", "motors", "frictions", "stops")
+ONE_POINT = ("revolute", "spherical", "universal", "fixed")
+APART = (
+    1e-2  # of the size of the mechanism; bores of a mesh are polygons, so that a little is normal
+)
+JOINT_KEYS = ("joint", "joint1", "joint2")
+
+
+@dataclass(frozen=True, slots=True)
+class MechanismFile:
+    """A mechanism as its file describes it.
+
+    Attributes:
+        document: the file.
+        values: its values in SI, by the keys of `rom.config.mechanism_keys.TABLE`.
+    """
+
+    document: Document
+    values: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return str(self.values.get("name") or self.document.path.stem)
+
+    def mechanism(self) -> "Mechanism":
+        """The mechanism, ready to move; component files in it are meshed and reduced.
+
+        Raises:
+            ConfigError, ModelError: with file and line of the body, joint or force.
+        """
+        from rom.mbs.mechanism import Mechanism
+
+        made = Mechanism(gravity=self.values["gravity"])
+        for name, values in self.values["bodies"].items():
+            with self.at("bodies", name):
+                _add_body(made, name, dict(values))
+        for section, name, values in self._connections():
+            with self.at(section, name):
+                self._connect(made, section, name, dict(values))
+        for name in self.values["joints"]:
+            self._warn_if_apart(made, name)
+        return made
+
+    def simulate(self, *, progress: bool = False) -> "Solution":
+        """Move it as ``[simulation]`` says.
+
+        Raises:
+            RomError: as `mechanism` and `rom.simulate`.
+        """
+        from rom.mbs.integrate import simulate
+
+        made = self.mechanism()
+        with self.at("simulation"):
+            return simulate(made, progress=progress, **self.values["simulation"])
+
+    def at(self, *path: str) -> Located:
+        """Context that tells the line of a key in errors raised below it."""
+        return Located(self.document, path)
+
+    def _connections(self) -> list[tuple[str, str, dict[str, Any]]]:
+        """Section, name and values; gears behind the joints they couple."""
+        entries = [(s, name, v) for s in SECTIONS for name, v in self.values[s].items()]
+        gears = [entry for entry in entries if entry[2].get("kind") == "gear"]
+        joints = [e for e in entries if e[0] == "joints" and e not in gears]
+        return [*joints, *gears, *(entry for entry in entries if entry[0] != "joints")]
+
+    def _connect(self, made: "Mechanism", section: str, name: str, values: dict[str, Any]) -> None:
+        """Call the method of the mechanism with what the entry says."""
+        method = METHODS.get(section) or values.pop("kind")
+        place = Place(self.document, (section, name))
+        markers = values.pop("between", None) or [values.pop("marker", None)]
+        first: list[Any] = [self._marker(made, m, place) for m in markers if m is not None]
+        for joint in (values.pop(key) for key in JOINT_KEYS if key in values):
+            if joint not in made.joints:
+                raise place.error(f"there is no joint {joint!r}.", nearest(joint, made.joints))
+            first.append(joint)
+        turns = _turns(made, first[0], values.get("coordinate")) if section in ON_JOINTS else True
+        for key, value in values.items():
+            if isinstance(value, Pending):
+                values[key] = value.of(turns=turns)
+        adapt = ADAPTED.get(section)
+        if adapt is not None:
+            first, values = adapt(first, values, place, self.values["simulation"]["t_end"])
+        getattr(made, method)(name, *first, **values)
+
+    def _warn_if_apart(self, made: "Mechanism", name: str) -> None:
+        """Two points that are to be one should be near each other at the start."""
+        import numpy as np
+
+        joint = made.joints[name]
+        if joint.kind not in ONE_POINT:
+            return
+        ends = [made.design_point(marker) for marker in joint.markers]
+        placed = [part.at for part in made.parts.values()] + ends
+        gap = float(np.linalg.norm(ends[0] - ends[1]))
+        if gap > APART * max(float(np.ptp(placed, axis=0).max()), 1e-300):
+            where = self.document.where(("joints", name))
+            warnings.warn(
+                f"{where}: the markers of joint {name!r} are {gap:.3g} m apart as the bodies are "
+                "placed; the start pulls them together.",
+                RomWarning,
+                stacklevel=2,
+            )
+
+    def _marker(self, made: "Mechanism", marker: tuple[str, Any], place: Place) -> Any:
+        body, where = marker
+        if body == GROUND:
+            if not isinstance(where, str):
+                return made.ground.marker(where)
+            points = self.values["ground"]
+            if where not in points:
+                raise place.error(f"the ground has no point {where!r}.", nearest(where, points))
+            return made.ground.marker(points[where])
+        if body not in made.parts:
+            raise place.error(f"there is no body {body!r}.", nearest(body, [GROUND, *made.parts]))
+        part = made.parts[body]
+        if isinstance(where, str) and where not in part.names:
+            hint = nearest(where, part.names)
+            raise place.error(f"body {body!r} has no marker {where!r}.", hint)
+        return part.marker(where)
+
+
+def _turns(made: "Mechanism", joint: str, coordinate: str | None) -> bool:
+    """Whether the coordinate of a joint is an angle."""
+    found = made.joints[joint]
+    if coordinate is not None:
+        return coordinate == "angle"
+    return found.coordinate is None or found.coordinate is found.turn
+
+
+def _add_body(made: "Mechanism", name: str, values: dict[str, Any]) -> None:
+    if "." in name or name == GROUND:
+        raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
+    if "orientation" in values:
+        values["orientation"] = _orientation(values["orientation"])
+    if "file" not in values:
+        made.add_rigid(name, **values)
+        return
+    file, rigid = values.pop("file"), values.pop("rigid")
+    reference = values.pop("reference", None)
+    if rigid:
+        _add_rigid_from(made, name, file, values)
+        return
+    body = _body_of(file)
+    if reference is not None:
+        body = body.with_reference(reference[0] if len(reference) == 1 else reference)
+    made.add_flexible(name, body, **values)
+
+
+def _orientation(value: Any) -> Any:
+    from rom import rotation
+    from rom.mbs.arguments import unit_vector
+
+    if not isinstance(value, Mapping):
+        return value
+    return rotation.exp(value["angle"] * unit_vector("axis", value["axis"]))
+
+
+def _body_of(file: Path) -> Any:
+    from rom.io.native import load
+
+    return read_component(file).body() if file.suffix == ".toml" else load(file)
+
+
+def _add_rigid_from(made: "Mechanism", name: str, file: Path, values: dict[str, Any]) -> None:
+    """A rigid body with the mass properties and interfaces of a body or a component."""
+    import numpy as np
+
+    from rom.mbs.arguments import start_pose
+    from rom.rotation import matrix
+
+    mass, centre, inertia, points = _mass_of(file)
+    pose = (values.get(key) for key in ("orientation", "velocity", "omega"))
+    at, p, velocity, omega = start_pose(values["at"], *pose)
+    A = matrix(p)
+    made.add_rigid(
+        name,
+        mass=mass,
+        inertia=inertia,
+        at=at + A @ centre,
+        orientation=p,
+        markers={key: x - centre for key, x in points.items()},
+        velocity=velocity + A @ np.cross(omega, centre),
+        omega=omega,
+    )
+
+
+def _mass_of(file: Path) -> tuple[float, Any, Any, dict[str, Any]]:
+    """Mass, centre (3,), inertia (3, 3) about it, and interface points by name."""
+    import numpy as np
+
+    from rom.io.native import load
+
+    if file.suffix == ".toml":
+        from rom.workflow import mass_properties
+
+        model = read_component(file).model()
+        found = mass_properties(model)
+        points = {key: interface.origin for key, interface in model.interfaces.items()}
+        return found.mass, found.centre, found.inertia, points
+    body = load(file)
+    c = body.first_moment / body.mass
+    inertia = body.inertia - body.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return body.mass, c, inertia, {key: marker.point for key, marker in body.markers.items()}
+
+
+def _drive(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
+    law = law_of(values["law"], place.at("law"), t_end=t_end)
+    return [*first, law.value], {"rate": law.rate, "acceleration": law.acceleration}
+
+
+def _motor(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
+    rest = {key: value for key, value in values.items() if key != "law"}
+    if not isinstance(values["law"], Mapping):
+        constant = values["law"]
+        return [*first, lambda t, x, rate: constant], rest
+    value = law_of(values["law"], place.at("law"), t_end=t_end).value
+    return [*first, lambda t, x, rate: float(value(t))], rest | {"compiled": False}
+
+
+def _load(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
+    import numpy as np
+
+    vector = np.array(values["vector"])
+    rest = {"frame": values["frame"]}
+    if "factor" not in values:
+        return [*first, vector], rest
+    factor = law_of(values["factor"], place.at("factor"), t_end=t_end).value
+    return [*first, lambda t: float(factor(t)) * vector], rest
+
+
+def _bushing(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:
+    for key in ("stiffness", "damping"):
+        values[key] = [*values[key], *values.pop(f"turning_{key}")]
+    return first, values
+
+
+def _impact(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:
+    from rom.mbs.impact import Impact
+
+    numbers = {key.name: values.pop(key.name) for key in IMPACT if key.name in values}
+    return [*first, Impact(**numbers)], values
+
+
+ADAPTED = {
+    "drives": _drive,
+    "motors": _motor,
+    "forces": _load,
+    "torques": _load,
+    "bushings": _bushing,
+    "stops": _impact,
+    "contacts": _impact,
+}
+
+
+def read_mechanism(
+    path: str | Path, changes: Mapping[tuple[str, ...], Any] | None = None
+) -> MechanismFile:
+    """A mechanism file.
+
+    Args:
+        path: ``.toml``; its keys are listed on the page about files.
+        changes: {("simulation", "t_end"): "1 s", ...} in place of what the file says; None removes.
+
+    Raises:
+        FileFormatError: if there is no such file.
+        ConfigError: with every mistake and its line: unknown or missing keys, wrong units.
+    """
+    document = read_document(path)
+    if "bodies" not in document.data and {"geometry", "matrices"} & set(document.data):
+        raise ConfigError(
+            "this is a component; a mechanism is needed.", where=str(path),
+            hint="A mechanism has [bodies], one of which may have this file.",
+        )  # fmt: skip
+    for key, value in (changes or {}).items():
+        change(document.data, key, value)
+    return MechanismFile(document, read_table(TABLE, document))

@@ -1,0 +1,252 @@
+"""The keys of a mechanism file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rom.config.keys import (
+    Either,
+    FilePath,
+    Flag,
+    Key,
+    Kind,
+    Named,
+    Place,
+    Quantity,
+    Table,
+    Text,
+    Variants,
+    Whole,
+    Words,
+    shown,
+)
+from rom.config.laws import ByCoordinate, law_kind
+
+POINT, DIRECTION = Quantity("m", ((3,),)), Quantity("1", ((3,),))
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerName:
+    """A marker: "body.marker", or a point of a rigid body or the ground."""
+
+    said: str = '"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body'
+
+    def read(self, value: Any, place: Place) -> tuple[str, Any]:
+        """Name of the body, and name or coordinates of the marker."""
+        if isinstance(value, Mapping) and len(value) == 1:
+            ((body, point),) = value.items()
+            return body, POINT.read(point, place.at(body))
+        if isinstance(value, str) and "." in value.strip("."):
+            body, _, marker = value.partition(".")
+            return body, marker
+        raise place.error(
+            f"{place.name} = {shown(value)} is no marker.",
+            'Write "body.marker", or { ground = [x, y, z] }.',
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Two:
+    """Two markers of different bodies."""
+
+    said: str = "list of two markers"
+
+    def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
+        """The two."""
+        if not isinstance(value, list) or len(value) != 2:
+            raise place.error(f"{place.name} = {shown(value)}: two markers are needed.")
+        return [MarkerName().read(item, place) for item in value]
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body: rigid by its numbers, or from a file."""
+
+    said: str = "table with a file, or with mass and inertia"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Its values."""
+        from_file = isinstance(value, Mapping) and "file" in value
+        return (FROM_FILE if from_file else RIGID).read(value, place)
+
+
+POSE = (
+    Key("orientation", Either(Quantity("1", ((4,), (3, 3))), Table("A rotation.", (
+        Key("axis", DIRECTION, "Axis.", ...),
+        Key("angle", Quantity("rad"), "Angle, right-handed.", ...),
+    ))), "Body to world: quaternion (scalar first), matrix, or { axis, angle }; none if missing."),
+    Key("velocity", Quantity("m/s", ((3,),)), "At the start, in the world; at rest if missing."),
+    Key("omega", Quantity("rad/s", ((3,),)), "Angular velocity at the start, in the body frame."),
+)  # fmt: skip
+RIGID = Table("A rigid body by its numbers; its frame sits at the mass centre.", (
+    Key("mass", Quantity("kg", positive=True), "Mass.", ...),
+    Key("inertia", Quantity("kg m^2", ((3,), (3, 3))), "About the mass centre, body frame.", ...),
+    Key("at", POINT, "Mass centre at the start.", ...),
+    *POSE,
+    Key("markers", Named(POINT, "points"), "Points from the mass centre, body frame.", {}),
+))  # fmt: skip
+FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
+    Key("file", FilePath(), "A body file `.rom.npz`, or a component file `.toml`.", ...),
+    Key("rigid", Flag(), "Take mass, inertia and interfaces of it only.", False),
+    Key("reference", Words(), "Another floating frame, see the component file."),
+    Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
+    *POSE,
+))  # fmt: skip
+
+BETWEEN = Key("between", Two(), "Its markers; forces and coordinates are those of the second.", ...)
+AXIS = Key("axis", DIRECTION, "In the world at the start.", ...)
+NORMAL = Key("normal", DIRECTION, "In the world at the start.", ...)
+SIDE = ("angle", "way")
+JOINTS = {
+    "revolute": Table("A hinge.", (BETWEEN, AXIS)),
+    "cylindrical": Table("Turns about and slides along an axis.", (BETWEEN, AXIS)),
+    "prismatic": Table("Slides along an axis.", (BETWEEN, AXIS)),
+    "spherical": Table("A ball joint.", (BETWEEN,)),
+    "universal": Table("A Cardan joint.", (
+        BETWEEN,
+        Key("axis1", DIRECTION, "On the first body.", ...),
+        Key("axis2", DIRECTION, "On the second body, perpendicular.", ...),
+    )),
+    "fixed": Table("A weld.", (BETWEEN,)),
+    "planar": Table("Slides in a plane and turns about its normal.", (BETWEEN, NORMAL)),
+    "screw": Table("Advances as it turns.", (
+        BETWEEN, AXIS, Key("pitch", Quantity("m"), "Advance per turn.", ...),
+    )),
+    "point_on_line": Table("A point on a line of the first body.", (BETWEEN, AXIS)),
+    "point_on_plane": Table("A point in a plane of the first body.", (BETWEEN, NORMAL)),
+    "distance": Table("A massless rod.", (
+        BETWEEN,
+        Key("length", Quantity("m", positive=True), "That at the start if missing."),
+    )),
+    "rolling": Table("A ball or wheel that rolls on a plane.", (
+        BETWEEN, NORMAL,
+        Key("radius", Quantity("m", positive=True), "Of ball or wheel.", ...),
+        Key("axis", DIRECTION, "Of a wheel; none for a ball."),
+    )),
+    "gear": Table("Couples the coordinates of two joints.", (
+        Key("joint1", Text(), "Driving joint.", ...),
+        Key("joint2", Text(), "Driven joint.", ...),
+        Key("ratio", Quantity(), "Coordinate 2 over coordinate 1 [rad/rad, m/rad, ...].", ...),
+        Key("coordinate1", Text(SIDE), "Which, where a joint has two."),
+        Key("coordinate2", Text(SIDE), "Likewise."),
+    )),
+}  # fmt: skip
+JOINT = Key("joint", Text(), "Name of the joint.", ...)
+WHICH = Key("coordinate", Text(SIDE), "Which, where the joint has two.")
+LEVEL = ByCoordinate(Quantity("N m"), Quantity("N"))
+SPEED = ByCoordinate(Quantity("rad/s", positive=True), Quantity("m/s", positive=True))
+WAY = ByCoordinate(Quantity("rad"), Quantity("m"))
+IMPACT = (
+    Key("stiffness", Quantity("1", positive=True),
+        "Force per depth^exponent, a plain number in SI.", ...),
+    Key("exponent", Quantity("1", positive=True), "1 for linear, 1.5 for Hertz.", 1.5),
+    Key("damping", Quantity("s/m"), "Force grows by this factor of the closing speed.", 0.0),
+    Key("restitution", Quantity("1", positive=True), "In place of damping, with impact_speed."),
+    Key("impact_speed", Quantity("m/s", positive=True), "At which restitution holds."),
+    Key("mu", Quantity("1"), "Coefficient of friction.", 0.0),
+    Key("transition_speed", Quantity("m/s", positive=True), "Over which friction turns.", 1e-3),
+)  # fmt: skip
+RADIUS = Quantity("m", positive=True)
+CONTACTS = {
+    "sphere_on_plane": Table("A sphere about the second marker, a plane through the first.", (
+        BETWEEN, NORMAL, Key("radius", RADIUS, "Of the sphere.", ...), *IMPACT,
+    )),
+    "disc_on_plane": Table("The rim of a disc about the second marker on such a plane.", (
+        BETWEEN, NORMAL, AXIS, Key("radius", RADIUS, "Of the disc.", ...), *IMPACT,
+    )),
+    "sphere_on_sphere": Table("Spheres about both markers.", (
+        BETWEEN, Key("radius1", RADIUS, "First one.", ...),
+        Key("radius2", RADIUS, "Second one.", ...), *IMPACT,
+    )),
+    "sphere_on_cylinder": Table("A sphere about the second marker, a cylinder about the first.", (
+        BETWEEN, AXIS, Key("radius1", RADIUS, "Of the cylinder.", ...),
+        Key("radius2", RADIUS, "Of the sphere.", ...),
+        Key("inside", Flag(), "Whether it is in the bore.", False), *IMPACT,
+    )),
+}  # fmt: skip
+MARKER = Key("marker", MarkerName(), "Where it acts.", ...)
+FRAME = Key("frame", Text(("world", "body")), "Axes of the vector.", "world")
+FACTOR = Key("factor", law_kind("1"), "A law that multiplies the vector; constant if missing.")
+SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how
+    "joints": ("joints", Variants(JOINTS)),
+    "drives": ("prescribed joint coordinates", Table("A joint coordinate prescribed in time.", (
+        JOINT,
+        Key("law", ByCoordinate(law_kind("rad"), law_kind("m")), "Coordinate over time.", ...),
+    ))),
+    "motors": ("forces along joint coordinates", Table("A torque or force along a coordinate.", (
+        JOINT, WHICH,
+        Key("law", ByCoordinate(law_kind("N m"), law_kind("N")), "Force over time.", ...),
+    ))),
+    "springs": ("springs and dampers between markers", Table("A spring and damper.", (
+        BETWEEN,
+        Key("stiffness", Quantity("N/m"), "Stiffness.", 0.0),
+        Key("damping", Quantity("N s/m"), "Damping.", 0.0),
+        Key("free_length", Quantity("m"), "Length without force; that at the start if missing."),
+    ))),
+    "rotational_springs": ("springs about joints", Table("A spring and damper about a joint.", (
+        JOINT,
+        Key("stiffness", Quantity("N m/rad"), "Stiffness.", 0.0),
+        Key("damping", Quantity("N m s/rad"), "Damping.", 0.0),
+        Key("free_angle", Quantity("rad"), "Angle without torque.", 0.0),
+    ))),
+    "bushings": ("bushings", Table("Six springs and dampers between two markers.", (
+        BETWEEN,
+        Key("stiffness", Quantity("N/m", ((3,),)), "Along x, y, z.", ...),
+        Key("turning_stiffness", Quantity("N m/rad", ((3,),)), "About them.", [0.0, 0.0, 0.0]),
+        Key("damping", Quantity("N s/m", ((3,),)), "Along them.", [0.0, 0.0, 0.0]),
+        Key("turning_damping", Quantity("N m s/rad", ((3,),)), "About them.", [0.0, 0.0, 0.0]),
+        Key("axes", Quantity("1", ((4,), (3, 3))), "Axes to world at the start; world if missing."),
+    ))),
+    "forces": ("forces", Table("A force on a marker.", (
+        MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,
+    ))),
+    "torques": ("torques", Table("A torque on a marker.", (
+        MARKER, Key("vector", Quantity("N m", ((3,),)), "The torque.", ...), FACTOR, FRAME,
+    ))),
+    "frictions": ("friction in joints", Table("Dry and viscous friction along a coordinate.", (
+        JOINT, WHICH,
+        Key("transition_speed", SPEED, "Over which it changes its sign.", ...),
+        Key("coulomb", LEVEL, "Level that is always there."),
+        Key("mu", Quantity(), "Coefficient of friction, times the force in the joint.", 0.0),
+        Key("radius", RADIUS, "Of the pin, for mu on an angle."),
+        Key("static", Quantity(), "Level at rest over that of fast motion.", 1.0),
+        Key("stribeck_speed", SPEED, "Over which this fades."),
+        Key("viscous", ByCoordinate(Quantity("N m s/rad"), Quantity("N s/m")), "Viscous part."),
+    ))),
+    "stops": ("stops of joints", Table("Compliant limits of a joint coordinate.", (
+        JOINT, WHICH, Key("lower", WAY, "Lower limit."), Key("upper", WAY, "Upper limit."), *IMPACT,
+    ))),
+    "contacts": ("contacts", Variants(CONTACTS)),
+}  # fmt: skip
+SIMULATION = Table("How it is moved.", (
+    Key("t_end", Quantity("s", positive=True), "End.", ...),
+    Key("dt", Quantity("s", positive=True), "Time step; chosen by rtol if missing."),
+    Key("method", Text(("generalized-alpha", "bdf", "dop853")), "Integrator.", "generalized-alpha"),
+    Key("rho_inf", Quantity(), "Spectral radius at infinite frequency, 0 to 1.", 0.9),
+    Key("tolerance", Quantity("1", positive=True), "Of the Newton iteration.", 1e-9),
+    Key("rtol", Quantity("1", positive=True), "Relative tolerance of variable steps."),
+    Key("save_every", Whole(1), "Keep every so many steps.", 1),
+    Key("order", Whole(1, 5), "Of bdf.", 2),
+    Key("stabilised", Flag(), "Keep constraints of the velocities, too.", False),
+))  # fmt: skip
+OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
+    Key("history", Text(("csv", "h5")), "Form of the table of all motions, loads and energies.",
+        "csv"),
+    Key("film", Text(("gif", "glb", "vtkhdf")), "A film: picture, browsers, ParaView."),
+    Key("picture", Flag(), "A picture of four instants.", False),
+    Key("plot", Words(), "Columns of the table to draw over time, without their unit.", ()),
+    Key("magnify", Quantity("1", positive=True), "Deformations are drawn so much larger.", 1.0),
+    Key("view", DIRECTION, "Direction to the eye."),
+    Key("up", DIRECTION, "Upright direction."),
+))  # fmt: skip
+TABLE = Table("A mechanism.", (
+    Key("name", Text(), "Its name; that of the file if missing."),
+    Key("gravity", Quantity("m/s^2", ((3,),)), "Acceleration of gravity.", [0.0, 0.0, -9.81]),
+    Key("bodies", Named(Body(), "bodies"), "What moves.", ...),
+    Key("ground", Named(POINT, "points"), "Named points of the ground.", {}),
+    *(Key(name, Named(kind, what), what.capitalize() + ".", {})
+      for name, (what, kind) in SECTIONS.items()),
+    Key("simulation", SIMULATION, "How it is moved.", ...),
+    Key("output", OUTPUT, "What is written.",
+        {"history": "csv", "picture": False, "plot": (), "magnify": 1.0}),
+))  # fmt: skip

@@ -1,0 +1,69 @@
+"""Reduction methods by name."""
+
+from typing import TYPE_CHECKING, Any
+
+from rom.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rom.reduction.characteristic import Characteristic
+    from rom.reduction.method import Method
+
+CRAIG_BAMPTON = "craig-bampton"
+METHODS = {  # name: module, class, and how many modes when nobody says; None for none
+    CRAIG_BAMPTON: ("method", "CraigBampton", 20),
+    "enhanced": ("enhanced", "EnhancedCraigBampton", 20),
+    "guyan": ("method", "Guyan", None),
+    "rubin": ("free_interface", "Rubin", 20),
+    "herting": ("free_interface", "Herting", 20),
+    "free-free": ("free_interface", "FreeFree", 20),
+    "moment-matching": ("krylov", "MomentMatching", 2),
+    "balanced": ("balanced", "BalancedTruncation", 20),
+}
+
+
+def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic":
+    """The method of a table [reduction].
+
+    Args:
+        settings: values by the keys method, modes, f_max, tol, at, characteristic, gravity_shapes.
+        full: whether any interface keeps all its dofs.
+
+    Raises:
+        ConfigError: if they contradict each other.
+    """
+    from rom.reduction.characteristic import Characteristic
+    from rom.reduction.loads import WithLoads
+
+    method = _plain(settings)
+    if settings.get("gravity_shapes"):
+        method = WithLoads(method)
+    if "characteristic" not in settings:
+        return method
+    if not full:
+        raise ConfigError("characteristic needs a full interface.")
+    return Characteristic(method, settings["characteristic"])
+
+
+def _plain(settings: dict[str, Any]) -> "Method":
+    from importlib import import_module
+
+    name = settings["method"]
+    module, kind, default = METHODS[name]
+    modes, f_max = settings.get("modes"), settings.get("f_max")
+    for key, owner in (("f_max", CRAIG_BAMPTON), ("at", "moment-matching")):
+        if key in settings and name != owner:
+            raise ConfigError(f"{key} belongs to {owner}, not to {name}.")
+    if "tol" in settings and f_max is None:
+        raise ConfigError("tol needs the band f_max.")
+    if modes is not None and (f_max is not None or default is None):
+        raise ConfigError(f"{name} {'keeps no modes' if default is None else 'has f_max'}: "
+                          "leave modes out.")  # fmt: skip
+    make: Any = getattr(import_module(f"rom.reduction.{module}"), kind)
+    if f_max is not None:
+        made = make(f_max=f_max, tol=settings.get("tol"))
+    elif name == "moment-matching":
+        made = make(tuple(settings.get("at", (0.0,))), modes or default)
+    else:
+        made = make() if default is None else make(default if modes is None else modes)
+    found: Method = made
+    return found

@@ -1,0 +1,183 @@
+"""A run of a mechanism file: the motion, and the folder it is kept in."""
+
+import json
+import platform
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.config.keys import Place, nearest
+from rom.config.mechanism import MechanismFile
+
+if TYPE_CHECKING:
+    from rom.mbs.solution import Solution
+    from rom.model import Report
+
+RECORD = "run.json"
+INSTANTS = 4  # in the picture
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A motion and what is to be kept of it.
+
+    Attributes:
+        file: the mechanism file.
+        solution: the motion.
+        audit: whether it is to be believed.
+        command: what was typed.
+        version: of rom.
+    """
+
+    file: MechanismFile
+    solution: "Solution"
+    audit: "Report"
+    command: str
+    version: str = ""
+
+    def paths(self, folder: Path) -> list[Path]:
+        """The files to be written, the table of the motion first."""
+        out = self.file.values["output"]
+        names = [f"motion.{out['history']}"]
+        names += ["instants.png"] if out["picture"] else []
+        names += ["curves.png"] if out["plot"] else []
+        names += [f"motion.{out['film']}"] if "film" in out else []
+        return [folder / name for name in [*names, RECORD]]
+
+    def write(self, folder: Path) -> None:
+        """Write them; the folder is made if it is missing."""
+        from rom.io.files import write_whole
+        from rom.io.history import write_history
+
+        folder.mkdir(exist_ok=True)
+        paths = self.paths(folder)
+        write_history(self.solution, paths[0])
+        self._draw(paths)
+        text = json.dumps(self.record([path.name for path in paths]), indent=2)
+        write_whole(folder / RECORD, lambda file: file.write(text.encode()))
+
+    def record(self, files: list[str]) -> dict[str, Any]:
+        """What a report wants to know later, as plain data."""
+        parts = self.solution.mechanism.parts.items()
+        return {
+            "schema": "rom-run",
+            "version": [1, 0],
+            "name": self.file.name,
+            "command": self.command,
+            "versions": {"rom": self.version} | versions(),
+            "source": self.file.document.path.read_text(encoding="utf-8"),
+            "files": files,
+            "status": self.solution.status,
+            "steps": len(self.solution.t) - 1,
+            "t_end": float(self.solution.t[-1]),
+            "bodies": {
+                name: {"mass": float(p.mass), "elastic coordinates": p.r, "markers": list(p.names)}
+                for name, p in parts
+            },
+            "joints": {name: j.kind for name, j in self.solution.mechanism.joints.items()},
+            "audit": {
+                "title": self.audit.title,
+                "rows": [
+                    [r.quantity, float(r.value), r.limit, bool(r.ok)] for r in self.audit.rows
+                ],
+            },
+        }
+
+    def _draw(self, paths: list[Path]) -> None:
+        out, solution = self.file.values["output"], self.solution
+        names = {path.name: path for path in paths}
+        look = {key: out[key] for key in ("view", "up") if key in out}
+        if "instants.png" in names:
+            import numpy as np
+
+            from rom.view.film import instants
+
+            times = np.linspace(solution.t[0], solution.t[-1], INSTANTS)
+            how = look | {"times": times, "magnify": out["magnify"]}
+            instants(solution.mechanism, solution, names["instants.png"], **how)
+        if "motion.gif" in names:
+            from rom.view.film import animate
+
+            how = look | {"magnify": out["magnify"]}
+            animate(solution.mechanism, solution, names["motion.gif"], **how)
+        for path in (p for p in paths if p.suffix in (".glb", ".vtkhdf")):
+            from rom.view.motion import write_animation
+
+            write_animation(solution, path, magnify=out["magnify"], up=out.get("up"))
+        if "curves.png" in names:
+            self._curves(names["curves.png"])
+
+    def _curves(self, path: Path) -> None:
+        from rom.view.curves import history
+
+        panels: dict[str, dict[str, Any]] = {}
+        found = columns(self.solution)
+        for name in self.file.values["output"]["plot"]:
+            unit, values = found[name]
+            panels.setdefault(unit, {})[name] = values
+        title = f"Motion of {self.file.name}"
+        told = [(f"[{unit}]", curves) for unit, curves in panels.items()]
+        caption = (
+            f"Histories of {self.file.name} over {self.solution.t[-1]:g} s, one panel for each "
+            "unit; names as in the table of the motion."
+        )
+        history(path, self.solution.t, told, title=title, caption=caption)
+
+
+def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:
+    """Unit and values (n_t,) of every column of the table of a motion, by name."""
+    from rom.io.history import channels
+
+    return {
+        f"{' '.join(c.path[1:])} {x}".strip(): (c.unit, c.values.reshape(len(solution.t), -1)[:, k])
+        for c in channels(solution)
+        for k, x in enumerate(c.columns)
+    }
+
+
+def run(
+    file: MechanismFile, *, command: str = "", version: str = "", progress: bool = False
+) -> Run:
+    """Move the mechanism of a file.
+
+    Args:
+        file: the description.
+        command: what was typed, for the record.
+        version: of rom, for the record.
+        progress: report on stderr.
+
+    Raises:
+        RomError: as `MechanismFile.simulate`; for an unknown column to plot before the run.
+    """
+    from rom.mbs.audit import audit
+
+    if file.values["output"]["plot"]:
+        _check_plot(file)
+    solution = file.simulate(progress=progress)
+    return Run(file, solution, audit(solution), command, version)
+
+
+def _check_plot(file: MechanismFile) -> None:
+    """One short step tells the names of the columns, before the whole run is spent."""
+    from rom.mbs.integrate import simulate
+
+    t = 1e-6 * file.values["simulation"]["t_end"]
+    known = columns(simulate(file.mechanism(), t_end=t, dt=t))
+    for name in file.values["output"]["plot"]:
+        if name not in known:
+            place = Place(file.document, ("output", "plot"))
+            raise place.error(f"there is no column {name!r} to plot.", nearest(name, known))
+
+
+def versions() -> dict[str, str]:
+    """Of what a result depends on, beside rom itself."""
+    import numpy as np
+    import scipy
+
+    return {
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "platform": f"{platform.system()} {platform.machine()}, {sys.byteorder} endian",
+    }
