@@ -22,6 +22,7 @@ LEFT_BEHIND = {
     },
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
+    "demo_lost_tip": {"lost_tip.png"},
     "demo_masonry": {"masonry.png"},
     "demo_mistuning": {"mistuning.png"},
     "demo_parameters": {"parameters.png"},
