@@ -21,6 +21,7 @@ th, td { padding: 0.25rem 0.8rem; border-bottom: 1px solid #dfe3e8; text-align: 
 th:first-child, td:first-child { text-align: left; }
 thead th { border-bottom: 2px solid #5c636e; }
 td.ok { color: #2c7a4b; } td.failed { color: #b3261e; font-weight: bold; }
+pre { background: #f4f6f8; padding: 0.6rem 0.9rem; font-size: 0.85rem; overflow-x: auto; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
 figcaption, caption { font-size: 0.9rem; color: #4a515b; text-align: left; caption-side: bottom; }
 """
@@ -31,6 +32,11 @@ LARGEST = 20_000_000  # bytes of one picture: more makes a report nobody can ope
 def paragraph(text: str) -> str:
     """A paragraph of plain text."""
     return f"<p>{html.escape(text)}</p>"
+
+
+def source(text: str) -> str:
+    """A command, or a file, as it was written."""
+    return f"<pre>{html.escape(text)}</pre>"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[Any]], caption: str) -> str:
@@ -92,7 +98,7 @@ def write_report(path: str | Path, title: str, sections: dict[str, Sequence[str]
     Args:
         path: file to write, .html.
         title: heading.
-        sections: {heading: blocks} with blocks of `paragraph`, `table`, `checks`, `picture`.
+        sections: {heading: blocks} with blocks of the functions above.
 
     Returns:
         The path.

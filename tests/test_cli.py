@@ -53,7 +53,7 @@ def answer(capsys, *arguments):
 
 
 def test_verbs_are_those_of_the_design():
-    design = "doctor mesh modes reduce check export simulate view swing bench completion"
+    design = "doctor mesh modes reduce check export simulate view report swing bench completion"
     assert design.split() == NAMES
 
 

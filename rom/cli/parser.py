@@ -13,13 +13,27 @@ from rom.cli import (
     mesh,
     modes,
     reduce,
+    report,
     simulate,
     swing,
     view,
 )
 from rom.errors import ConfigError
 
-VERBS = (doctor, mesh, modes, reduce, check, export, simulate, view, swing, bench, completion)
+VERBS = (
+    doctor,
+    mesh,
+    modes,
+    reduce,
+    check,
+    export,
+    simulate,
+    view,
+    report,
+    swing,
+    bench,
+    completion,
+)
 EXIT_CODES = """\
 exit codes:
   0  done

@@ -73,15 +73,19 @@ class MechanismFile:
             self._warn_if_apart(made, name)
         return made
 
-    def simulate(self, *, progress: bool = False) -> "Solution":
+    def simulate(self, made: "Mechanism | None" = None, *, progress: bool = False) -> "Solution":
         """Move it as ``[simulation]`` says.
+
+        Args:
+            made: the mechanism, if it has been built already.
+            progress: report on stderr.
 
         Raises:
             RomError: as `mechanism` and `rom.simulate`.
         """
         from rom.mbs.integrate import simulate
 
-        made = self.mechanism()
+        made = self.mechanism() if made is None else made
         with self.at("simulation"):
             return simulate(made, progress=progress, **self.values["simulation"])
 

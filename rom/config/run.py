@@ -11,6 +11,7 @@ from rom.config.keys import Place, nearest
 from rom.config.mechanism import MechanismFile
 
 if TYPE_CHECKING:
+    from rom.mbs.mechanism import Mechanism
     from rom.mbs.solution import Solution
     from rom.model import Report
 
@@ -152,18 +153,19 @@ def run(
     """
     from rom.mbs.audit import audit
 
+    made = file.mechanism()
     if file.values["output"]["plot"]:
-        _check_plot(file)
-    solution = file.simulate(progress=progress)
+        _check_plot(file, made)
+    solution = file.simulate(made, progress=progress)
     return Run(file, solution, audit(solution), command, version)
 
 
-def _check_plot(file: MechanismFile) -> None:
+def _check_plot(file: MechanismFile, made: "Mechanism") -> None:
     """One short step tells the names of the columns, before the whole run is spent."""
     from rom.mbs.integrate import simulate
 
     t = 1e-6 * file.values["simulation"]["t_end"]
-    known = columns(simulate(file.mechanism(), t_end=t, dt=t))
+    known = columns(simulate(made, t_end=t, dt=t))
     for name in file.values["output"]["plot"]:
         if name not in known:
             place = Place(file.document, ("output", "plot"))
