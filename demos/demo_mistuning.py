@@ -40,7 +40,6 @@ model = rom.fe.model(
     material=rom.Material(E=114e9, nu=0.33, rho=4430.0),
     parameters={"N": N, "width": 0.012, "chord": 0.010, "chord_tip": 0.010, "stagger": 20,
                 "twist": 10, "t": 0.003, "t_tip": 0.002, "lc": 0.012, "lc_blade": 0.009},
-    comm=MPI.COMM_SELF,
 )  # fmt: skip
 full = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))
 sector = rom.reduce_sector(full, n_modes=20, functions=rom.Polynomial(4))

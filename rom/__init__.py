@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.body.spread import SpreadLoad, mass_load, surface_load
     from rom.checks import check
-    from rom.cyclic.bladed_wheel import BladedWheel, bladed_wheel
-    from rom.cyclic.blades import ReducedBlade, reduced_blade
     from rom.config.component import read_component
     from rom.config.mechanism import read_mechanism
+    from rom.cyclic.bladed_wheel import BladedWheel, bladed_wheel
+    from rom.cyclic.blades import ReducedBlade, reduced_blade
     from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
@@ -164,8 +164,8 @@ __all__ = [
     "simulate",
     "steady_motion",
     "substructure",
-    "supported_sector",
     "substructured_sector",
+    "supported_sector",
     "surface_load",
     "transmissibility",
     "travelling_modes",
