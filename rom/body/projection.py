@@ -17,6 +17,7 @@ from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Interface
 
+BUCKLED = 1e-9  # of the largest eigenvalue of K, below zero, that is no round-off
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
 
 
@@ -41,7 +42,8 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
     """Split the span of Psi into rigid motions and mass-normalised free-free modes.
 
     Raises:
-        ModelError: if a rigid motion is not in the span, or the columns are dependent.
+        ModelError: if a rigid motion is not in the span, the columns are dependent, or the body
+            freed of its supports would buckle under its own stress.
     """
     MPsi = ops.apply_M(Psi)
     M, K = ops.gram(Psi, MPsi), ops.gram(Psi, ops.apply_K(Psi))
@@ -63,6 +65,12 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
         )
     Z = null_space(B.T @ M)
     lam, Y = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    if lam.size and lam[0] < -BUCKLED * lam[-1]:
+        raise ModelError(
+            f"{np.count_nonzero(lam < -BUCKLED * lam[-1])} shapes of the free body have negative "
+            "stiffness: without its supports it would buckle under the stress it carries.",
+            hint="Heat it less; rom.modes takes it with its supports held.",
+        )
     V = scale[:, None] * (Z @ Y)
     return Elastic(V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
 

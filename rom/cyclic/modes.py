@@ -10,7 +10,7 @@ from rom.cyclic.rotation import divergence_speed
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
-from rom.scipy_operators import SciPyOperators
+from rom.scipy_operators import SciPyOperators, negative_count
 
 SPARE = 2  # modes beyond those asked for, so that no pair is cut
 
@@ -91,15 +91,17 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
 
 
 def _refuse_divergence(sector: CyclicSector, diameter: int, speed: float) -> None:
-    spinning(sector, speed)
+    K = spinning(sector, speed)
     if sector.motions is not None:
         raise ConfigError(
             "a free wheel at speed has no modes without Coriolis forces: its floating motion has "
             "no other stiffness.",
             hint="Use rom.travelling_modes.",
         )
-    limit = divergence_speed(sector, diameter)
-    if abs(speed) >= limit:
+    T = sector.harmonic(diameter)
+    K = csr_matrix(T.conj().T @ K @ T)
+    if negative_count(K if sector.standing(diameter) else real_form(K)):
+        limit = divergence_speed(sector, diameter)
         raise ModelError(
             f"at {speed:g} rad/s the wheel is above its instability: spin softening has used up "
             f"the stiffness against {diameter} nodal diameters at {limit:.6g} rad/s."

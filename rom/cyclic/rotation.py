@@ -17,11 +17,14 @@ from scipy.linalg import LinAlgError, eigh, qr
 from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from rom.cyclic.sector import CyclicSector
+from rom.cyclic.sector import NONE, CyclicSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, FEModel
+from rom.model import Array, FEModel, Index
 from rom.rotation import skew
 from rom.scipy_operators import DENSE, SciPyOperators
+
+RESIDUAL = 1e-7  # of eigenvectors; the error of eigenvalues apart from others is its square
+NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender solids
 
 
 def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
@@ -71,13 +74,20 @@ def centrifugal_displacement(sector: CyclicSector) -> Array:
     x = sector.points - sector.at
     load = sector.M @ (x - np.outer(x @ sector.axis, sector.axis)).ravel()
     ops = SciPyOperators(T.T @ sector.K @ T, T.T @ sector.M @ T)
-    rigid = sector.rigid(0)[sector.free].real
-    loose = np.zeros(0, dtype=np.int64)
-    if rigid.shape[1]:  # the load neither pushes along the axis nor turns about it
-        scaled = rigid / np.linalg.norm(rigid, axis=0)
-        loose = np.sort(qr(scaled.T, mode="r", pivoting=True)[1][: rigid.shape[1]])
-    found: Array = T @ ops.hold(loose)((T.T @ load)[:, None])[:, 0]
+    found: Array = T @ ops.hold(axial_pins(sector))((T.T @ load)[:, None])[:, 0]
     return found
+
+
+def axial_pins(sector: CyclicSector) -> Index:
+    """Independent dofs that keep a free wheel from moving along its axis and turning about it.
+
+    Loads that are the same in all sectors and balance each other leave them without force.
+    """
+    rigid = sector.rigid(0)[sector.free].real
+    if not rigid.shape[1]:
+        return NONE
+    scaled = rigid / np.linalg.norm(rigid, axis=0)
+    return np.sort(qr(scaled.T, mode="r", pivoting=True)[1][: rigid.shape[1]]).astype(np.int64)
 
 
 def divergence_speed(sector: CyclicSector, diameter: int) -> float:
@@ -94,14 +104,31 @@ def divergence_speed(sector: CyclicSector, diameter: int) -> float:
     """
     T = sector.harmonic(sector.checked(diameter))
     H = T.conj().T
-    K, C = csr_matrix(H @ sector.K @ T), csr_matrix(-(H @ sector.centrifugal @ T))
-    if K.shape[0] <= DENSE:
-        most = _largest(C.toarray(), K.toarray())
-    else:
-        inverse = LinearOperator(K.shape, matvec=splu(K.tocsc()).solve, dtype=K.dtype)
-        start = np.sin(1.0 + np.arange(K.shape[0])).astype(K.dtype)
-        most = eigsh(C, 1, K, Minv=inverse, which="LA", v0=start, return_eigenvectors=False)[0]
+    most = largest_ratio(csr_matrix(-(H @ sector.centrifugal @ T)), csr_matrix(H @ sector.K @ T))
     return float(1 / np.sqrt(most)) if most > 0 else np.inf
+
+
+def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
+    """Largest eigenvalue mu of C x = mu K x, zero if none is positive.
+
+    Args:
+        C: (n, n) symmetric or Hermitian.
+        K: (n, n) the same, positive definite.
+
+    Raises:
+        ModelError: if K is not.
+    """
+    if K.shape[0] <= DENSE:
+        return max(_largest(C.toarray(), K.toarray()), 0.0)
+    inverse = LinearOperator(K.shape, matvec=splu(K.tocsc()).solve, dtype=K.dtype)
+    start = np.sin(1.0 + np.arange(K.shape[0])).astype(K.dtype)
+    how = {"Minv": inverse, "v0": start, "return_eigenvectors": False}
+    size = float(abs(eigsh(C, 1, K, which="LM", tol=0.1, **how)[0]))
+    if size == 0.0:
+        return 0.0
+    # where none is positive they crowd at zero, which has no relative accuracy; one has
+    most = float(eigsh(C / size + K, 1, K, which="LA", tol=RESIDUAL, **how)[0]) - 1.0
+    return most * size if most > NONE_POSITIVE else 0.0
 
 
 def _largest(C: Array, K: Array) -> float:

@@ -14,6 +14,13 @@ from rom.fe.memory import THIN, allowed_bytes, factor_bytes
 COPIES = 20  # matrices as large as the one gathered that one rank then makes of it
 
 
+def symmetric(A: PETSc.Mat) -> csr_matrix:
+    """(A + A^T) / 2 as a SciPy matrix, on one process."""
+    starts, columns, values = A.getValuesCSR()
+    half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
+    return (half + half.T).tocsr()
+
+
 def symmetrized(A: PETSc.Mat) -> PETSc.Mat:
     """(A + A^T) / 2: sums over thousands of rows differ in their last digits.
 

@@ -72,6 +72,14 @@ def assemble_matrix(form: ufl.Form) -> PETSc.Mat:
     return copy
 
 
+def assemble_vector(form: ufl.Form) -> Array:
+    """(n,) vector of a linear form, on one process."""
+    b = fem_petsc.assemble_vector(compiled(form))
+    values = b.array.copy()
+    b.destroy()
+    return values
+
+
 def compiled(form: ufl.Form) -> Any:
     """Form ready to assemble; our options win over option files found in the working folder."""
     name = "jit_options" if hasattr(fem, "functionspace") else "jit_params"

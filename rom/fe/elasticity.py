@@ -13,6 +13,7 @@ import numpy as np
 
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagError
+from rom.fe.aij import symmetric
 from rom.fe.compat import assemble_matrix, cell_name, lagrange, versions
 from rom.fe.jit import compiling
 from rom.fe.material import by_region, coefficients, described, doubts
@@ -20,7 +21,7 @@ from rom.fe.memory import give_back
 from rom.fe.nodes import all_points, interface, outer_surface
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.fe.petsc import PETScOperators
-from rom.fe.region import Regions, aij, forms, symmetric
+from rom.fe.region import Regions, aij, forms
 from rom.fe.solid import SolidMesh
 from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
@@ -140,7 +141,7 @@ def assemble(
         "interfaces": interfaces,
         "attachments": tuple(attachments),
         "surface": outer_surface(V, points, degree),
-        "stresses": Stresses(V, numbers, degree),
+        "stresses": Stresses(V, numbers, degree, (tags, regions)),
         "regions": Regions(V, tags, solids, regions, degree),
         "provenance": {
             "material": described(named),

@@ -10,6 +10,7 @@ import numpy as np
 import ufl
 from scipy.sparse import csr_matrix
 
+from rom.fe.aij import symmetric
 from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, geometry_degree
 from rom.fe.jit import compiling
 from rom.fe.material import Solid, of_region, stress
@@ -125,13 +126,6 @@ def _quadrature(name: str, degree: int, curved: int) -> tuple[int, int]:
     if name == "tetrahedron":
         return 2 * (degree - 1) + 3 * (curved - 1), 2 * degree + 3 * (curved - 1)
     return 2 * degree + 2 * (curved - 1), 2 * degree + 3 * curved - 1
-
-
-def symmetric(A: PETSc.Mat) -> csr_matrix:
-    """(A + A^T) / 2 as a SciPy matrix, on one process."""
-    starts, columns, values = A.getValuesCSR()
-    half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
-    return (half + half.T).tocsr()
 
 
 def aij(A: csr_matrix) -> PETSc.Mat:

@@ -34,10 +34,11 @@ class Stresses:
         V: displacement space.
         numbers: coefficients of the material, see `rom.fe.material.coefficients`.
         degree: of the displacement.
+        regions: (cells,) region of each cell and {region: tag}; None where they are not known.
     """
 
-    def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
-        self.V, self.numbers, self.degree = V, numbers, degree
+    def __init__(self, V: Any, numbers: dict[str, Any], degree: int, regions: Any = None):
+        self.V, self.numbers, self.degree, self.regions = V, numbers, degree, regions
         self.mesh = V.mesh
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
@@ -125,6 +126,12 @@ class Stresses:
         K_geo = gathered(A)
         A.destroy()
         return K_geo
+
+    def finite_strain(self) -> Any:
+        """The same solid in large motion, `rom.fe.finite_strain.FiniteStrain`; on one process."""
+        from rom.fe.finite_strain import FiniteStrain
+
+        return FiniteStrain(self.V, self.numbers, self.degree, *self.regions)
 
     def _second_variation(self, load: Any) -> ufl.Form:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""
