@@ -12,6 +12,7 @@ DEMOS = sorted((Path(__file__).parents[1] / "demos").glob("demo_*.py"))
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
     "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
+    "demo_bent_blade": {"bent_blade.png"},
     "demo_best_matching": {"best_matching.png"},
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
