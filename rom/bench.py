@@ -248,6 +248,25 @@ def film(solves: int = 400) -> Iterator[Figure]:
         yield Figure("film", case, "systems solved per film", changes / solves)
 
 
+def transmission(
+    speeds: int = 100, cells: tuple[int, int] = (120, 8), ross: bool = True
+) -> Iterator[Figure]:
+    """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
+
+    Args:
+        speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
+        cells: of each film.
+        ross: compare with ROSS, which is installed from the package index.
+    """
+    from rom.peers.films import coefficients_compared, speeds_run_through
+
+    if ross:
+        for row in coefficients_compared():
+            yield Figure("transmission", *row)
+    for row in speeds_run_through(speeds, cells):
+        yield Figure("transmission", *row)
+
+
 def wheel(families: int = 4, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
     """Modes of a bladed disk: one reduced sector, one full sector, the whole wheel.
 
@@ -313,6 +332,7 @@ def loops(*sizes: int) -> Iterator[Figure]:
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
+    "transmission": transmission,
     "integrator": integrator,
     "chain": chain,
     "loops": loops,

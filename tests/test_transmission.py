@@ -121,7 +121,7 @@ def test_both_journals_rest_where_a_journal_alone_would(loaded):
         assert_allclose(f.motion[:2], lone.motion[:2], atol=2e-3 * 50e-6)
     teeth = loaded.forces.mesh.load.sum()
     assert teeth == pytest.approx(200 / u.mesh.pair.rb[0], rel=5e-3)
-    own = np.array([1, -1]) * (loaded.q[loaded.unit.wheels[6:8]])
+    own = np.array([1, -1]) * (loaded.unit.wheels @ loaded.q)[6:8]
     gear = loaded.forces.films[2].motion[:2]
     bent = teeth * 0.2**3 / (48 * E * np.pi * 0.05**4 / 64)
     assert np.hypot(*(own - gear)) == pytest.approx(bent, rel=0.15)  # and is sheared
@@ -144,8 +144,7 @@ def test_relieved_teeth_are_closed_before_they_are_loaded(loaded):
     flat = replace(cut, correction=Correction(relief=(2e-5, 2e-5), extent=(0.02, 0.02)))
     assert flat.least_gap(0.0) > 5e-6
     moved = rest(replace(loaded.unit, mesh=flat)).q - loaded.q
-    w = loaded.unit.wheels
-    turned = loaded.unit.mesh.pair.rb @ moved[w[[5, 11]]]
+    turned = loaded.unit.mesh.pair.rb @ (loaded.unit.wheels @ moved)[[5, 11]]
     assert turned > flat.least_gap(0.0)
 
 
@@ -159,7 +158,7 @@ def test_derivatives_of_all_forces_are_exact(loaded):
     u, q, rng = loaded.unit, loaded.q, np.random.default_rng(3)
     v = 1e-3 * rng.normal(size=q.size)
     f = u.forces(q, v, 0.0)
-    films = np.concatenate([at[:4] for at, _, _ in u.journals])
+    films = np.flatnonzero(np.vstack([rows[:4] for rows, _, _ in u.journals]).any(axis=0))
     for _ in range(3):
         d = 1e-9 * rng.normal(size=q.size)
         by_q = u.forces(q - d, v, 0.0).force - u.forces(q + d, v, 0.0).force
@@ -178,7 +177,7 @@ def test_a_stiff_unit_whirls_as_its_bearings_say():
     M, _, K = linearised(s)
     assert_allclose(M, M.T, atol=1e-12)
     assert np.abs(K - K.T).max() > 1e5  # films are not elastic
-    i = s.unit.journals[0][0][:2]
+    i = np.argmax(s.unit.journals[0][0][:2], axis=1)
     alone = s.unit.matrices[1] + 0
     assert_allclose((K - alone)[np.ix_(i, i)], film.stiffness[:2, :2], rtol=1e-9)
     assert whirl(s).stable == bool(whirl(s).values.real.max() < 0)
@@ -265,8 +264,7 @@ def test_slow_units_have_the_error_of_their_teeth(helix, rel):
     u = replace(unit(speed=20.0, torque=50.0, helix=helix, width=width), viscosity=0.2)
     linear = mesh_response(rest(u), harmonics=30, positions=128)
     still = [rest(u, t) for t in 2 * np.pi / 26 * np.arange(16) / 16]
-    rb, w = u.mesh.pair.rb, u.wheels
-    error = np.array([rb[0] * s.q[w[5]] + rb[1] * s.q[w[11]] for s in still])
+    error = np.array([u.mesh.pair.rb @ (u.wheels @ s.q)[[5, 11]] for s in still])
     assert linear.error_rms == pytest.approx(np.std(error), rel=rel)
 
 

@@ -1,5 +1,6 @@
 """Shafts of beams against shafts of solid finite elements, reduced on their journals and wheel."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,21 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 import rom
-from rom.components.transmission import Disc, Shaft
+from rom.components.gear_mesh import GearPair, Mesh
+from rom.components.journal_bearing import Groove, JournalBearing
+from rom.components.transmission import (
+    Disc,
+    Rotor,
+    Shaft,
+    SolidShaft,
+    Transmission,
+    mesh_response,
+    rest,
+    simulate,
+    whirl,
+)
+from rom.components.transmission.housing import motion_of
+from rom.errors import ModelError
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -43,23 +58,14 @@ def beam(solid):
     return z, Shaft(z, d, [Disc.of_ring(wheel, **RING)])
 
 
-def rows(body, name):
-    """(6, 6 + r) mean motion of a seat."""
-    marker = body.marker(name)
-    x, y, z = marker.point
-    arm = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
-    rigid = np.block([[np.eye(3), arm], [np.zeros((3, 3)), np.eye(3)]])
-    return np.hstack([rigid, np.vstack([marker.translation, marker.rotation])])
-
-
 def supported_solid(body):
     """Mass and stiffness with the ring and the films."""
     M, K = body.full_matrices()
     ring = Disc.of_ring(0, **RING)
-    R = rows(body, "wheel")
+    R = motion_of(body, "wheel")
     M = M + R.T @ np.diag([ring.mass] * 3 + [ring.diametral] * 2 + [ring.polar]) @ R
     for name in ("journal_a", "journal_b"):
-        R = rows(body, name)[:2]
+        R = motion_of(body, name)[:2]
         K = K + FILM * R.T @ R
     return M, K
 
@@ -99,10 +105,10 @@ def test_beam_and_solid_respond_alike_to_unbalance(solid, beam, speed):
     """In axes that spin, an unbalanced solid is at rest; the beam whirls in axes that do not."""
     ring, force = Disc.of_ring(0, **RING), 1e-4 * speed**2  # 1e-4 kg m on the wheel
     M, K = supported_solid(solid)
-    R = rows(solid, "wheel")
+    R = motion_of(solid, "wheel")
     soft = np.diag([ring.mass] * 2 + [0] + [ring.diametral - ring.polar] * 2 + [0])
     whole = K - speed**2 * (in_plane(solid) + R.T @ soft @ R)
-    hold = rows(solid, "wheel")[[2, 5]]  # neither slides nor spins
+    hold = motion_of(solid, "wheel")[[2, 5]]  # neither slides nor spins
     whole = whole + 1e9 * hold.T @ hold
     x = np.linalg.solve(whole, force * R[0])
     z, shaft = beam
@@ -117,7 +123,108 @@ def test_beam_and_solid_respond_alike_to_unbalance(solid, beam, speed):
     for name, at in SEATS.items():
         i = 6 * int(np.argmin(np.abs(z - at)))
         assert abs(y[i]) == pytest.approx(abs(y[i + 1]))
-        assert (rows(solid, name) @ x)[0] == pytest.approx(y[i].real, rel=0.01)
+        assert (motion_of(solid, name) @ x)[0] == pytest.approx(y[i].real, rel=0.01)
+
+
+# --- in axes that do not spin, with films and teeth ---
+
+
+@pytest.fixture(scope="module")
+def still(solid):
+    """The solid in axes that do not spin, with its ring."""
+    return SolidShaft(solid, tuple(SEATS), [Disc.of_ring(1, **RING)])
+
+
+def test_a_solid_shaft_knows_its_rigid_motions(solid, still):
+    M, K, G = still.matrices()
+    R = still.rigid()
+    assert_allclose(K @ R, 0, atol=1e-9 * np.abs(K).max())
+    for k, (name, z) in enumerate(SEATS.items()):
+        expected = np.eye(6)
+        expected[0, 4], expected[1, 3] = z, -z
+        assert_allclose(still.rows(k) @ R, expected, atol=1e-6)
+        assert solid.marker(name).point[2] == pytest.approx(z, abs=1e-6)
+    ring = Disc.of_ring(1, **RING)
+    J = R.T @ M @ R
+    assert_allclose(np.diag(J)[:3], solid.mass + ring.mass, rtol=1e-9)
+    assert J[5, 5] == pytest.approx(solid.inertia[2, 2] + ring.polar, rel=1e-9)
+    polar = solid.inertia[2, 2] + ring.polar
+    assert (R.T @ G @ R)[3, 4] == pytest.approx(polar, rel=2e-3)  # as a spinning disc
+    assert_allclose(G, -G.T)
+
+
+def test_a_solid_spins_as_a_beam_in_axes_that_do_not_spin(still, beam):
+    """Forward and backward whirl on springs: gyroscopic forces split the pairs."""
+    z, shaft = beam
+    found = []
+    for model, nodes in ((still, range(3)), (shaft, [int(np.argmin(np.abs(z - at)))
+                                                      for at in SEATS.values()])):  # fmt: skip
+        M, K, G = model.matrices()
+        nodes = list(nodes)
+        for node in (nodes[0], nodes[2]):
+            R = model.rows(node)[:2]
+            K = K + FILM * R.T @ R
+        n = len(M)
+        A = np.block([[np.zeros((n, n)), np.eye(n)],
+                      [-np.linalg.solve(M, K), -8000.0 * np.linalg.solve(M, G)]])  # fmt: skip
+        values = np.sort(np.linalg.eigvals(A).imag)
+        found.append(values[values > 100.0][:8])
+    assert_allclose(found[0], found[1], rtol=5e-3)
+    assert found[1][1] / found[1][0] > 1.02
+
+
+def unit(shafts, nodes):
+    """Both shafts alike, 24 to 36 teeth of module 4."""
+    loose = GearPair((24, 36), 4e-3, 0.03)
+    pair = replace(loose, centre_distance=loose.distance + 5e-5)
+    a, wheel, b = nodes
+    rotors = []
+    for shaft, load in zip(shafts, (np.pi / 2 - pair.alpha + np.pi, pair.alpha - np.pi / 2),
+                           strict=True):  # fmt: skip
+        grooves = [Groove(load + side * np.pi / 2, np.radians(20)) for side in (1, -1)]
+        held = JournalBearing(0.04, 0.025, 4e-5, grooves, cells=(60, 4))
+        rotors.append(Rotor(shaft, wheel, {a: held, b: held}, end=a))
+    return Transmission(*rotors, Mesh(pair, 15e9, damping=2e-6), 300.0, 60.0 * 36 / 24, 0.03)
+
+
+@pytest.fixture(scope="module")
+def states(still, beam):
+    """At rest: of beams, and of solids."""
+    z, shaft = beam
+    nodes = [int(np.argmin(np.abs(z - at))) for at in SEATS.values()]
+    return rest(unit((shaft, shaft), nodes)), rest(unit((still, still), range(3)))
+
+
+def test_solids_rest_on_films_and_teeth_as_beams_do(states):
+    one, three = states
+    for a, b in zip(one.forces.films, three.forces.films, strict=True):
+        assert_allclose(b.force[:2], a.force[:2], rtol=0.01)
+        assert_allclose(b.motion[:2], a.motion[:2], atol=0.005 * 4e-5)
+    moved = [s.unit.wheels @ s.q for s in states]
+    for at in ([0, 1, 6, 7], [5, 11]):
+        assert_allclose(moved[1][at], moved[0][at], atol=0.01 * np.abs(moved[0][at]).max())
+    given, taken, heat = three.powers
+    assert given - taken - heat == pytest.approx(0, abs=1e-8 * given)
+
+
+def test_solids_respond_to_the_mesh_as_beams_do(states):
+    one, three = (mesh_response(s, harmonics=3) for s in states)
+    assert three.error_rms == pytest.approx(one.error_rms, rel=0.01)
+    assert three.load_factor == pytest.approx(one.load_factor, rel=0.01)
+    growth = [whirl(s).values[0] for s in states]
+    assert growth[1].imag == pytest.approx(growth[0].imag, rel=0.01)
+
+
+def test_work_is_balanced_between_solids(states):
+    assert simulate(states[1], periods=0.2, steps=100).balance < 1e-6
+
+
+def test_a_body_that_is_not_round_is_refused(solid):
+    bent = replace(solid, K=solid.K * np.where(np.arange(solid.n_modes) == 0, 1.2, 1.0))
+    with pytest.raises(ModelError, match="is not round about its Z axis"):
+        SolidShaft(bent, tuple(SEATS)).matrices()
+    with pytest.raises(ModelError, match="beyond the last of 3 seats"):
+        SolidShaft(solid, tuple(SEATS), [Disc.of_ring(3, **RING)])
 
 
 def test_seats_that_overlap_are_refused():

@@ -52,23 +52,29 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
             yield f"{ours['dofs']} dofs, rbe3", "exudyn over rom", ratio, "", "above 10"
 
 
-def interpreter() -> str:
+def interpreter(environment: Path | None = None, packages: tuple[str, ...] = ()) -> str:
     """The Python of the environment in which the other programs live; made if missing.
+
+    Args:
+        environment: its folder; by default that of Exudyn and CHOLMOD.
+        packages: what is installed there.
 
     Raises:
         ResourceError: if a package cannot be installed.
     """
-    python = ENVIRONMENT / "bin" / "python"
-    done = ENVIRONMENT / "complete"
+    if environment is None:
+        environment, packages = ENVIRONMENT, PACKAGES
+    python = environment / "bin" / "python"
+    done = environment / "complete"
     if not done.exists():
         for command in (
-            [sys.executable, "-m", "venv", "--clear", str(ENVIRONMENT)],
-            [str(python), "-m", "pip", "install", "--quiet", *PACKAGES],
+            [sys.executable, "-m", "venv", "--clear", str(environment)],
+            [str(python), "-m", "pip", "install", "--quiet", *packages],
         ):
             made = subprocess.run(command, capture_output=True, text=True, check=False)
             if made.returncode:
                 raise ResourceError(
-                    f"the environment {ENVIRONMENT} could not be made: "
+                    f"the environment {environment} could not be made: "
                     f"{made.stderr.strip().splitlines()[-1]}",
                     hint="It needs the package index and, for CHOLMOD, apt-get install "
                     "libsuitesparse-dev.",

@@ -137,7 +137,7 @@ class Film:
         """Viscosity times revolutions times L D / W (R/c)^2."""
         return float(self.unit / (np.pi * np.hypot(*self.force[:2])))
 
-    @property
+    @cached_property
     def friction_torque(self) -> float:
         """That brakes the journal [N m]: shear of the oil there is, and pressure on its slope."""
         b, (H, dH) = self.bearing, self._films()

@@ -137,7 +137,7 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
             hint="Lower the speed, load the bearings more, or let it whirl with whirling=True.",
         )
     dt, n_t = unit.mesh_period / steps, round(periods * steps)
-    step = _Step(unit, state.q, state.theta)
+    step = Step(unit, state.q, state.theta)
     rows = [step.row()]
     for k in range(n_t):
         step.advance(dt, state.theta + unit.speed * (k + 1) * dt)
@@ -148,34 +148,41 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
     return Run(unit, dt * np.arange(n_t + 1), q, v, teeth, error, heat, named, step.iterations)
 
 
-class _Step:
+class Step:
     """The state of a run: position, rates, forces, work done so far."""
 
     NAMES = ("drive", "load", "films", "teeth", "shafts")
 
-    def __init__(self, unit: Transmission, q: Array, theta: float):
-        self.unit, self.q, self.v = unit, q, np.zeros(q.size)
+    def __init__(
+        self,
+        unit: Transmission,
+        q: Array,
+        theta: float,
+        v: Array | None = None,
+        enough: float = ENOUGH,
+    ):
+        self.enough = enough
+        self.unit, self.q, self.v = unit, q, np.zeros(q.size) if v is None else v
         self.M, self.K, self.G = unit.matrices
         self.C = unit.loss * self.K + self.G
-        self.spin = np.zeros(q.size)
-        cut = unit.pinion.shaft.n
-        self.spin[5:cut:6], self.spin[cut + 5 :: 6] = unit.spins
+        self.spin = unit.spinning
         self.now = unit.forces(q, self.v, theta)
         self.a = np.linalg.solve(self.M, self._parts(q, self.v).sum(axis=0))
         self.work, self.iterations = np.zeros(len(self.NAMES)), 0
 
     def _parts(self, q: Array, v: Array) -> Array:
         """(5, n) forces of drive, load, films, teeth, shafts."""
-        at, w = 6 * self.unit.pinion.end + 5, self.unit.wheels
-        drive, teeth = np.zeros(q.size), np.zeros(q.size)
-        drive[at], teeth[w] = -self.unit.motor * q[at], self.now.mesh.force
+        turned = self.unit.drive
+        drive = -self.unit.motor * (turned @ q) * turned
+        teeth = self.now.mesh.force @ self.unit.wheels
         shafts = -self.K @ q - self.C @ v - drive
         return np.stack([drive, self.unit.load, self.now.force - teeth, teeth, shafts])
 
     def advance(self, dt: float, theta: float) -> None:
         """One step of average acceleration."""
         unit, before, q0, v0, a0 = self.unit, self._parts(self.q, self.v), self.q, self.v, self.a
-        q, size = q0 + dt * v0 + dt**2 / 4 * a0, np.abs(before).max()
+        ahead, size = dt * v0 + dt**2 / 4 * a0, np.abs(before).max()
+        q = q0 + unit.allowed(q0, ahead) * ahead
         linear = 4 / dt**2 * self.M + 2 / dt * self.C + self.K
         for _ in range(TIMES):
             v = 2 / dt * (q - q0) - v0
@@ -183,7 +190,7 @@ class _Step:
             self.now = unit.forces(q, v, theta, self.now.films)
             R = unit.load + self.now.force - self.K @ q - self.C @ v - self.M @ a
             self.iterations += 1
-            if np.abs(R).max() < ENOUGH * size:
+            if np.abs(R).max() < self.enough * size:
                 break
             J = linear + self.now.stiffness + 2 / dt * self.now.damping
             d = np.linalg.solve(J, R)
@@ -197,11 +204,25 @@ class _Step:
         mean = (before + self._parts(q, v)) / 2
         self.work = self.work + mean @ (q - q0 + dt * self.spin)
 
+    def first_tangents(self) -> tuple[Array, Array, Array]:
+        """(n, 2n) derivatives of q, v and a by q and v, where a motion starts."""
+        n, C, K = self.q.size, self.C + self.now.damping, self.K + self.now.stiffness
+        return np.eye(n, 2 * n), np.eye(n, 2 * n, n), -np.linalg.solve(self.M, np.hstack([K, C]))
+
+    def carried(self, dt: float, D: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        """Derivatives of q, v and a after the last step, from those before it."""
+        q, v, a = D
+        C, K = self.C + self.now.damping, self.K + self.now.stiffness
+        J = 4 / dt**2 * self.M + 2 / dt * C + K
+        b = self.M @ (4 / dt**2 * q + 4 / dt * v + a) + C @ (2 / dt * q + v)
+        new = np.linalg.solve(J, b)
+        moved = 2 / dt * (new - q)
+        return new, moved - v, 2 / dt * (moved - 2 * v) - a
+
     def row(self) -> tuple:
         """What a run remembers of this moment."""
         w, rb = self.v + self.spin, self.unit.mesh.pair.rb
-        turned = self.q[self.unit.wheels]
-        error = rb[0] * turned[5] + rb[1] * turned[11]
+        error = rb @ (self.unit.wheels @ self.q)[[5, 11]]
         heat = sum(f.dissipated for f in self.now.films)
         work = np.append(self.work, 0.5 * w @ self.M @ w)
         return self.q, self.v, self.now.mesh.load.sum(), error, heat, work

@@ -55,7 +55,7 @@ def mesh_response(state: Rest, *, harmonics: int = 6, positions: int = 96) -> Re
     Raises:
         ModelError: if the unit whirls at that speed.
     """
-    unit, w = state.unit, state.unit.wheels
+    unit, W = state.unit, state.unit.wheels
     if not whirl(state).stable:
         raise ModelError(
             f"{unit.speed:.1f} rad/s are above the threshold: journals whirl, and no periodic "
@@ -63,20 +63,15 @@ def mesh_response(state: Rest, *, harmonics: int = 6, positions: int = 96) -> Re
             hint="Lower the speed, or load the bearings more.",
         )
     M, C, K = linearised(state)
-    at = np.ix_(w, w)
-    K[at] -= state.forces.mesh.stiffness
-    C[at] -= state.forces.mesh.damping
     push, k = _excitation(state, positions)
-    K[at] += k
-    C[at] += unit.mesh.damping * k
+    K += W.T @ (k - state.forces.mesh.stiffness) @ W
+    C += W.T @ (unit.mesh.damping * k - state.forces.mesh.damping) @ W
     waves = 2 * np.fft.rfft(push, axis=0)[1 : harmonics + 1] / positions
     F, load = state.forces.mesh.force, float(state.forces.mesh.load.sum())
     rb, error, force = unit.mesh.pair.rb, [], []
     for h, wave in enumerate(waves, start=1):
         s = 2j * np.pi * h / unit.mesh_period
-        f = np.zeros(state.q.size, dtype=complex)
-        f[w] = wave
-        x = np.linalg.solve(K + s * C + s**2 * M, f)[w]
+        x = W @ np.linalg.solve(K + s * C + s**2 * M, wave @ W)
         felt = wave - (1 + s * unit.mesh.damping) * (k @ x)
         error.append(abs(rb[0] * x[5] + rb[1] * x[11]))
         force.append(load * abs(felt[5] / F[5]))
@@ -85,7 +80,7 @@ def mesh_response(state: Rest, *, harmonics: int = 6, positions: int = 96) -> Re
 
 def _excitation(state: Rest, positions: int) -> tuple[Array, Array]:
     """(positions, 12) forces on the wheels held fast, (12, 12) mean stiffness of the teeth."""
-    mesh, q = state.unit.mesh, state.q[state.unit.wheels].copy()
+    mesh, q = state.unit.mesh, state.unit.wheels @ state.q
     wanted, turned, forces, stiffness = state.forces.mesh.force[5], [], [], []
     for t in 2 * np.pi / mesh.pair.teeth[0] * np.arange(positions) / positions:
         for _ in range(TIMES):

@@ -75,6 +75,27 @@ class Shaft:
         """Number of coordinates."""
         return 6 * np.asarray(self.z).size
 
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return self.n // 6
+
+    @property
+    def in_metres(self) -> npt.NDArray[np.bool_]:
+        """(n,) whether a coordinate is a length; else it is an angle."""
+        return np.tile([True] * 3 + [False] * 3, self.nodes)
+
+    def rows(self, node: int) -> Array:
+        """(6, n) motion of a node per coordinate."""
+        return np.eye(self.n)[6 * node : 6 * node + 6]
+
+    def rigid(self) -> Array:
+        """(n, 6) coordinates of rigid motions: along the axes, and about them at z = 0."""
+        found = np.tile(np.eye(6), (self.nodes, 1))
+        z = np.asarray(self.z, dtype=float)
+        found[0::6, 4], found[1::6, 3] = z, -z
+        return found
+
     def matrices(self) -> tuple[Array, Array, Array]:
         """(n, n) mass, stiffness, and gyroscopic matrix per speed of rotation."""
         z = np.asarray(self.z, dtype=float)

@@ -8,14 +8,17 @@ load torque brakes its end.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from rom.components.gear_mesh import Mesh, MeshForce
 from rom.components.journal_bearing import Film, JournalBearing, film
+from rom.components.transmission.housing import Housing
 from rom.components.transmission.shaft import Shaft
+from rom.components.transmission.solid_shaft import SolidShaft
 from rom.errors import ModelError, SolverError
-from rom.model import Array, Index
+from rom.model import Array
 
 MIRROR = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
 LOADS = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
@@ -27,7 +30,7 @@ class Rotor:
     """A shaft, its wheel and its bearings.
 
     Attributes:
-        shaft: its nodes and pieces.
+        shaft: of beams, or a reduced solid whose seats are its nodes.
         wheel: node in the middle of the face width.
         bearings: {node: bearing}; each described so that its journal turns from X to Y. Those of
             the gear are seen from the other end: angles count from X towards -Y.
@@ -35,7 +38,7 @@ class Rotor:
         thrust: axial stiffness of the thrust bearing, at the first of the bearings [N/m].
     """
 
-    shaft: Shaft
+    shaft: Shaft | SolidShaft
     wheel: int
     bearings: Mapping[int, JournalBearing]
     end: int = 0
@@ -72,7 +75,8 @@ class Transmission:
         viscosity: of the oil in the bearings [Pa s].
         motor: torsional stiffness between drive and pinion [N m/rad].
         loss: damping over stiffness of the shafts [s].
-        gravity: along X and Y [m/s^2].
+        gravity: along X and Y [m/s^2]; a housing is measured from where it sags to.
+        housing: that holds the bushes; rigid if None.
     """
 
     pinion: Rotor
@@ -84,6 +88,7 @@ class Transmission:
     motor: float = 1e5
     loss: float = 4e-6
     gravity: tuple[float, float] = (0.0, 0.0)
+    housing: Housing | None = None
 
     def __post_init__(self) -> None:
         if not (self.speed > 0 and self.viscosity > 0 and self.motor > 0):
@@ -98,25 +103,60 @@ class Transmission:
                 hint="Give a positive torque; turn the unit around to drive with the gear.",
             )
         for name, rotor in (("pinion", self.pinion), ("gear", self.gear)):
-            nodes = rotor.shaft.n // 6
+            nodes = rotor.shaft.nodes
             if not rotor.bearings or not all(0 <= k < nodes for k in (*rotor.bearings, rotor.end)):
                 raise ModelError(f"the {name} has no bearings, or one beyond {nodes} nodes.")
+        if self.housing is not None:
+            self.housing.check(self.pinion.bearings, self.gear.bearings)
+
+    @cached_property
+    def parts(self) -> tuple[slice, slice, slice]:
+        """Coordinates of pinion, gear and housing."""
+        last = 0 if self.housing is None else self.housing.n
+        ends = np.cumsum([0, self.pinion.shaft.n, self.gear.shaft.n, last])
+        first, second, third = (slice(int(a), int(b)) for a, b in pairwise(ends))
+        return first, second, third
 
     @cached_property
     def matrices(self) -> tuple[Array, Array, Array]:
         """(n, n) mass, stiffness with the drive, gyroscopic forces per velocity."""
-        parts = [rotor.shaft.matrices() for rotor in (self.pinion, self.gear)]
-        sizes = [self.pinion.shaft.n, self.gear.shaft.n]
-        M, K, G = (np.zeros((sum(sizes), sum(sizes))) for _ in range(3))
-        for k, (rotor, part) in enumerate(zip((self.pinion, self.gear), parts, strict=True)):
-            spin = self.spins[k]
-            at = slice(k * sizes[0], k * sizes[0] + sizes[k])
-            M[at, at], K[at, at], G[at, at] = part[0], part[1], spin * part[2]
-            thrust = at.start + 6 * min(rotor.bearings) + 2
-            K[thrust, thrust] += rotor.thrust
-        drive = 6 * self.pinion.end + 5
-        K[drive, drive] += self.motor
-        return M, K, G
+        n = self.parts[2].stop
+        M, K, G = (np.zeros((n, n)) for _ in range(3))
+        for k, (rotor, at) in enumerate(zip((self.pinion, self.gear), self.parts, strict=False)):
+            M[at, at], K[at, at], gyroscopic = rotor.shaft.matrices()
+            G[at, at] = self.spins[k] * gyroscopic
+            thrust = self.rows(k, min(rotor.bearings))[2]
+            K += rotor.thrust * np.outer(thrust, thrust)
+        if self.housing is not None:
+            at = self.parts[2]
+            M[at, at], K[at, at] = self.housing.M, self.housing.K
+        return M, K + self.motor * np.outer(self.drive, self.drive), G
+
+    def rows(self, k: int, node: int) -> Array:
+        """(6, n) motion of a node of the pinion, 0, or of the gear, 1, per coordinate."""
+        found = np.zeros((6, self.parts[2].stop))
+        found[:, self.parts[k]] = (self.pinion, self.gear)[k].shaft.rows(node)
+        return found
+
+    @cached_property
+    def drive(self) -> Array:
+        """(n,) turn of the driven end per coordinate."""
+        return self.rows(0, self.pinion.end)[5]
+
+    @cached_property
+    def rigid(self) -> tuple[Array, Array]:
+        """(n, 6) rigid motions of pinion and gear about the origin of each."""
+        found = []
+        for rotor, at in zip((self.pinion, self.gear), self.parts, strict=False):
+            motion = np.zeros((self.parts[2].stop, 6))
+            motion[at] = rotor.shaft.rigid()
+            found.append(motion)
+        return found[0], found[1]
+
+    @cached_property
+    def spinning(self) -> Array:
+        """(n,) rates of the coordinates as the shafts turn."""
+        return self.spins[0] * self.rigid[0][:, 5] + self.spins[1] * self.rigid[1][:, 5]
 
     @property
     def spins(self) -> tuple[float, float]:
@@ -131,29 +171,33 @@ class Transmission:
 
     @cached_property
     def wheels(self) -> Array:
-        """(12,) coordinates of the wheels."""
-        second = self.pinion.shaft.n + 6 * self.gear.wheel
-        first = 6 * self.pinion.wheel
-        return np.concatenate([np.arange(first, first + 6), np.arange(second, second + 6)])
+        """(12, n) motion of both wheels per coordinate."""
+        return np.vstack([self.rows(0, self.pinion.wheel), self.rows(1, self.gear.wheel)])
 
     @cached_property
-    def journals(self) -> list[tuple[Index, JournalBearing, float]]:
-        """Coordinates x, y, phi_x, phi_y, phi_z; bearing; +1 or -1 as the journal turns."""
+    def journals(self) -> list[tuple[Array, JournalBearing, float]]:
+        """(5, n) motion x, y, phi_x, phi_y, phi_z in the bush; bearing; +1 or -1 as it turns.
+
+        Motions of the gear, which turns from Y to X, are mirrored to those of a journal that turns
+        from X to Y.
+        """
         found = []
-        for rotor, first, turn in ((self.pinion, 0, 1.0), (self.gear, self.pinion.shaft.n, -1.0)):
+        for k, (rotor, turn) in enumerate(((self.pinion, 1.0), (self.gear, -1.0))):
             for node, bearing in rotor.bearings.items():
-                found.append((first + 6 * node + np.array([0, 1, 3, 4, 5]), bearing, turn))
+                inside = self.rows(k, node)
+                if self.housing is not None:
+                    inside[:, self.parts[2]] -= self.housing.bushes[k][node]
+                mirror = np.append(MIRROR if turn < 0 else np.ones(4), turn)
+                found.append((mirror[:, None] * inside[[0, 1, 3, 4, 5]], bearing, turn))
         return found
 
     @cached_property
     def load(self) -> Array:
         """(n,) weight and torque of the load."""
-        f, M = np.zeros(len(self.matrices[0])), self.matrices[0]
+        M = self.matrices[0]
+        f = self.torque * self.rows(1, self.gear.end)[5]
         for axis, g in enumerate(self.gravity):
-            fall = np.zeros(f.size)
-            fall[axis::6] = g
-            f += M @ fall
-        f[self.pinion.shaft.n + 6 * self.gear.end + 5] += self.torque
+            f = f + g * (M @ (self.rigid[0] + self.rigid[1])[:, axis])
         return f
 
     def forces(self, q: Array, v: Array, theta: float, warm: list[Film] | None = None) -> Forces:
@@ -170,32 +214,33 @@ class Transmission:
         """
         n = q.size
         F, K, C, films = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), []
-        for k, (at, bearing, turn) in enumerate(self.journals):
-            S = MIRROR if turn < 0 else np.ones(4)
-            speed, i = abs(self.spins[0 if turn > 0 else 1]), at[:4]
+        for k, (inside, bearing, turn) in enumerate(self.journals):
+            B, speed = inside[:4], abs(self.spins[0 if turn > 0 else 1])
             start = None if warm is None else warm[k].active
-            f = film(bearing, S * q[i], S * v[i], speed=speed, viscosity=self.viscosity, warm=start)
-            F[i] += S * f.force
-            F[at[4]] -= turn * f.friction_torque
-            K[np.ix_(i, i)] += np.outer(S, S) * f.stiffness
-            C[np.ix_(i, i)] += np.outer(S, S) * f.damping
+            f = film(bearing, B @ q, B @ v, speed=speed, viscosity=self.viscosity, warm=start)
+            F += f.force @ B - f.friction_torque * inside[4]
+            K += B.T @ f.stiffness @ B
+            C += B.T @ f.damping @ B
             films.append(f)
-        w = self.wheels
-        teeth = self.mesh.forces(q[w], theta, v[w])
-        F[w] += teeth.force
-        K[np.ix_(w, w)] += teeth.stiffness
-        C[np.ix_(w, w)] += teeth.damping
-        return Forces(F, K, C, films, teeth)
+        W = self.wheels
+        teeth = self.mesh.forces(W @ q, theta, W @ v)
+        felt = W.T @ teeth.stiffness @ W
+        K += felt
+        C += self.mesh.damping * felt
+        return Forces(F + teeth.force @ W, K, C, films, teeth)
 
     def allowed(self, q: Array, step: Array) -> float:
         """Share of a step that keeps films: no journal moves far, or loses half of its film."""
         share = 1.0
-        for at, bearing, turn in self.journals:
-            i, S = at[:4], MIRROR if turn < 0 else np.ones(4)
-            moved = float(np.hypot(*step[i[:2]])) / bearing.clearance
+        for inside, bearing, _ in self.journals:
+            at, d = inside[:4] @ q, inside[:4] @ step
+            moved = float(np.hypot(*d[:2])) / bearing.clearance
             share = min(share, STEP / max(moved, 1e-30))
-            here = bearing.thinnest(S * q[i])
-            while bearing.thinnest(S * (q[i] + share * step[i])) < 0.5 * here and share > 1e-9:
+            here = bearing.thinnest(at)
+            reach = share * (np.hypot(*d[:2]) + bearing.length / 2 * np.hypot(*d[2:]))
+            if reach < 0.5 * here:
+                continue
+            while bearing.thinnest(at + share * d) < 0.5 * here and share > 1e-9:
                 share /= 2
         return share
 
@@ -221,7 +266,7 @@ class Rest:
     @property
     def input_torque(self) -> float:
         """Of the drive [N m]."""
-        return -self.unit.motor * float(self.q[6 * self.unit.pinion.end + 5])
+        return -self.unit.motor * float(self.unit.drive @ self.q)
 
     @property
     def powers(self) -> tuple[float, float, float]:
@@ -250,13 +295,21 @@ def rest(
         SolverError: if films or teeth cannot carry the load.
     """
     K, f = unit.matrices[1], unit.load
-    q = np.zeros(f.size) if start is None else np.array(start, dtype=float)
-    if start is None:
-        closed = 1e-7 + unit.mesh.least_gap(theta)  # teeth touch
-        q[unit.pinion.shaft.n + 5 :: 6] = closed / unit.mesh.pair.rb[1]
+    q = _touching(unit, theta) if start is None else np.array(start, dtype=float)
     for share in loads if start is None else (1.0,):
         q, forces, residual = _newton(unit, K, share * f, q, theta)
     return Rest(unit, q, theta, forces, residual)
+
+
+def _touching(unit: Transmission, theta: float) -> Array:
+    """Teeth touch, and journals are where films begin to carry: ahead of the load, as they turn."""
+    closed = 1e-7 + unit.mesh.least_gap(theta)
+    q = closed / unit.mesh.pair.rb[1] * unit.rigid[1][:, 5]
+    x, y = unit.mesh.forces(unit.wheels @ q, theta).force[:2]
+    # the gear is loaded and turns the other way than the pinion: both move alike
+    ahead = np.array([-y, x]) / max(np.hypot(x, y), 1e-300)
+    least = min(bearing.clearance for _, bearing, _ in unit.journals)
+    return q + STEP * least * (unit.rigid[0] + unit.rigid[1])[:, :2] @ ahead
 
 
 def _newton(
@@ -295,6 +348,7 @@ def _newton(
 
 def _scale(unit: Transmission) -> Array:
     """(n,) lengths that turn forces into moments."""
-    scale = np.full(unit.load.size, 1.0)
-    scale.reshape(-1, 6)[:, :3] = unit.mesh.pair.rb[0]
-    return scale
+    metres = [rotor.shaft.in_metres for rotor in (unit.pinion, unit.gear)]
+    if unit.housing is not None:
+        metres.append(np.ones(unit.housing.n, dtype=bool))
+    return np.where(np.concatenate(metres), unit.mesh.pair.rb[0], 1.0)

@@ -1,0 +1,158 @@
+"""Motion that repeats with every tooth: films and teeth as they are, found by shooting.
+
+The state after one mesh period is a function of the state before it. Newton's method makes both
+equal; the derivatives come with the time steps. Their eigenvalues, Floquet's multipliers, say
+whether the motion is stable (Nayfeh and Balachandran, Applied Nonlinear Dynamics, 1995).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rom.components.transmission.motion import Step
+from rom.components.transmission.unit import Rest, Transmission, rest
+from rom.errors import ModelError, SolverError
+from rom.model import Array
+
+PASSES, ENOUGH, PRECISE = 40, 1e-6, 1e-7  # periods; of the motion; of forces in a step
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A motion through one mesh period that ends as it began.
+
+    Attributes:
+        unit: what moves.
+        theta: angle that the drive has turned at the start [rad].
+        t: (n_t,) [s]; first and last are a period apart.
+        q, v: (n_t, n) coordinates and rates.
+        teeth: (n_t,) normal force between the teeth [N].
+        error: (n_t,) of transmission, along the line of action [m].
+        heat: (n_t,) power that becomes heat in the films [W].
+        multipliers: (2n,) of Floquet, largest first.
+        passes: through the period until it closed.
+        gap: what is left of it, over the largest coordinate.
+    """
+
+    unit: Transmission
+    theta: float
+    t: Array
+    q: Array
+    v: Array
+    teeth: Array
+    error: Array
+    heat: Array
+    multipliers: Array
+    passes: int
+    gap: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances decay."""
+        return bool(np.abs(self.multipliers[0]) < 1)
+
+    @property
+    def error_rms(self) -> float:
+        """Root mean square of the error of transmission about its mean [m]."""
+        return float(np.std(self.error[1:]))
+
+    @property
+    def load_factor(self) -> float:
+        """Largest over mean force between the teeth."""
+        return float(self.teeth.max() / self.teeth[1:].mean())
+
+    @property
+    def apart(self) -> float:
+        """Share of the time in which no teeth touch."""
+        return float(np.mean(self.teeth[1:] == 0))
+
+    @property
+    def orbits(self) -> Array:
+        """(bearings, n_t, 2) path of each journal in its bush; the gear's is seen mirrored [m]."""
+        return np.stack([self.q @ inside[:2].T for inside, _, _ in self.unit.journals])
+
+
+def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
+    """The motion that repeats with the mesh, near an equilibrium or a motion nearby.
+
+    Where Newton's method does not come closer, time goes on for a period, as it does in a machine.
+
+    Args:
+        start: equilibrium, or a motion; its unit is what moves.
+        steps: per mesh period.
+
+    Raises:
+        ModelError: if teeth differ, so that nothing repeats with the mesh.
+        SolverError: if a step fails, or no such motion is found.
+    """
+    unit = start.unit
+    if any(len(errors) for errors in unit.mesh.correction.pitch):
+        raise ModelError(
+            "with pitch errors no motion repeats with every tooth.",
+            hint="Leave out the pitch errors, or simulate.",
+        )
+    q, v = (start.q, np.zeros(start.q.size)) if isinstance(start, Rest) else (
+        start.q[0], start.v[0])  # fmt: skip
+    n, last, dt = q.size, np.inf, unit.mesh_period / steps
+    for count in range(1, PASSES + 1):
+        rows, F = _period(unit, q, v, start.theta, steps)
+        ends = np.array([rows[-1][k] - rows[0][k] for k in (0, 1)])
+        gap = float(np.abs(ends * [[1.0], [unit.mesh_period]]).max() / np.abs(q).max())
+        if gap < ENOUGH:
+            return _found(unit, start.theta, rows, F, count, gap)
+        if gap > last:
+            q, v, last = rows[-1][0], rows[-1][1], np.inf
+            continue
+        last, change = gap, np.linalg.solve(np.eye(2 * n) - F, ends.ravel())
+        share = min(unit.allowed(q, change[:n]), unit.allowed(q, dt * change[n:]))
+        q, v = q + share * change[:n], v + share * change[n:]
+    raise SolverError(
+        f"no motion repeats with the mesh at {unit.speed:.1f} rad/s: after {PASSES} periods "
+        f"{gap:.1e} of the motion are left.",
+        hint="Start from a speed nearby, take more steps per period, or simulate.",
+    )
+
+
+def sweep(unit: Transmission, speeds: Iterable[float], *, steps: int = 60) -> list[Steady]:
+    """Motion that repeats with the mesh at many speeds, each found from the one before.
+
+    Where two motions are possible, going up and going down may find different ones.
+
+    Args:
+        unit: the transmission; its own speed does not matter.
+        speeds: of the pinion, in the order in which they are run through [rad/s].
+        steps: per mesh period.
+
+    Raises:
+        ModelError, SolverError: as `rest` and `steady`.
+    """
+    found: list[Steady] = []
+    for speed in speeds:
+        there = replace(unit, speed=float(speed))
+        start = replace(found[-1], unit=there) if found else rest(there)
+        found.append(steady(start, steps=steps))
+    return found
+
+
+def _period(
+    unit: Transmission, q: Array, v: Array, theta: float, steps: int
+) -> tuple[list[tuple], Array]:
+    """What happens at every step, and the (2n, 2n) derivatives of the end by the start."""
+    step, dt = Step(unit, q, theta, v, enough=PRECISE), unit.mesh_period / steps
+    rows, D = [step.row()], step.first_tangents()
+    for k in range(steps):
+        step.advance(dt, theta + unit.speed * (k + 1) * dt)
+        rows.append(step.row())
+        D = step.carried(dt, D)
+    return rows, np.vstack(D[:2])
+
+
+def _found(
+    unit: Transmission, theta: float, rows: list[tuple], F: Array, count: int, gap: float
+) -> Steady:
+    q, v, teeth, error, heat, _ = (np.array(column) for column in zip(*rows, strict=True))
+    values = np.linalg.eigvals(F)
+    values = values[np.argsort(-np.abs(values))]
+    t = unit.mesh_period * np.linspace(0, 1, len(rows))
+    return Steady(unit, theta, t, q, v, teeth, error, heat, values, count, gap)
