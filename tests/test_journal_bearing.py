@@ -47,35 +47,36 @@ def numbers(line):
 
 
 # Raimondi and Boyd (1958), film from the largest gap: L/D, eccentricity, S, attitude [deg],
-# (R/c) f, Q / (R c N L), share of Q that leaves at the sides. The S printed at 1, 0.4 is 1.4 % off.
+# (R/c) f, Q / (R c N L), share of Q that leaves at the sides, mean over largest pressure. The S
+# printed at 1, 0.4 is 1.4 % off; the last pressures are those of coarse grids.
 RAIMONDI_BOYD = [numbers(line) for line in """
-1 .1 1.33 79.5 26.4 3.37 .150
-1 .2 .631 74.02 12.8 3.59 .280
-1 .4 .264 63.10 5.79 3.99 .497
-1 .6 .121 50.58 3.22 4.33 .680
-1 .8 .0446 36.24 1.70 4.62 .842
-1 .9 .0188 26.45 1.05 4.74 .919
-1 .97 .00474 15.47 .514 4.82 .973
-.5 .1 4.31 81.62 85.6 3.43 .173
-.5 .2 2.03 74.94 40.9 3.72 .318
-.5 .4 .779 61.45 17.0 4.29 .552
-.5 .6 .319 48.14 8.10 4.85 .730
-.5 .8 .0923 33.31 3.26 5.41 .874
-.5 .9 .0313 23.66 1.60 5.69 .939
-.5 .97 .00609 13.75 .610 5.88 .980
-.25 .1 16.2 82.31 322 3.45 .180
-.25 .2 7.57 75.18 153 3.76 .330
-.25 .4 2.83 60.86 61.1 4.37 .567
-.25 .6 1.07 46.72 26.7 4.99 .746
-.25 .8 .261 31.04 8.80 5.60 .884
-.25 .9 .0736 21.85 3.50 5.91 .945
-.25 .97 .0101 12.22 .922 6.12 .984
+1 .1 1.33 79.5 26.4 3.37 .150 .540
+1 .2 .631 74.02 12.8 3.59 .280 .529
+1 .4 .264 63.10 5.79 3.99 .497 .484
+1 .6 .121 50.58 3.22 4.33 .680 .415
+1 .8 .0446 36.24 1.70 4.62 .842 .313
+1 .9 .0188 26.45 1.05 4.74 .919 .247
+1 .97 .00474 15.47 .514 4.82 .973 .152
+.5 .1 4.31 81.62 85.6 3.43 .173 .523
+.5 .2 2.03 74.94 40.9 3.72 .318 .506
+.5 .4 .779 61.45 17.0 4.29 .552 .441
+.5 .6 .319 48.14 8.10 4.85 .730 .365
+.5 .8 .0923 33.31 3.26 5.41 .874 .267
+.5 .9 .0313 23.66 1.60 5.69 .939 .206
+.5 .97 .00609 13.75 .610 5.88 .980 .126
+.25 .1 16.2 82.31 322 3.45 .180 .515
+.25 .2 7.57 75.18 153 3.76 .330 .489
+.25 .4 2.83 60.86 61.1 4.37 .567 .415
+.25 .6 1.07 46.72 26.7 4.99 .746 .334
+.25 .8 .261 31.04 8.80 5.60 .884 .240
+.25 .9 .0736 21.85 3.50 5.91 .945 .180
+.25 .97 .0101 12.22 .922 6.12 .984 .108
 """.strip().splitlines()]  # fmt: skip
 
 
 @pytest.mark.parametrize("row", RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
-    slender, e, S, attitude, friction, flow, side = row
+    slender, e, S, attitude, friction, flow, side, peak = row
     b = bearing(slender, [Groove(np.pi)], (240, 16))
     f = film(b, [e * b.clearance, 0.0], **RUN)
     F, nominal = f.force, b.radius * b.clearance * RUN["speed"] / (2 * np.pi) * b.length
@@ -86,6 +87,9 @@ def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
     into = f.flow_around[len(f.P) // 2]
     assert into / nominal == pytest.approx(flow, rel=0.008)
     assert f.side_flow / into == pytest.approx(side, rel=0.008)
+    mean = np.hypot(*F[:2]) / (b.diameter * b.length)
+    coarse = {0.8: 0.03, 0.9: 0.025, 0.97: 0.075}.get(e, 0.015)
+    assert mean / f.pressure.max() == pytest.approx(peak, rel=coarse)
 
 
 # Lund and Thomsen (1978), grooves of 20 degrees on both sides of the load: L/D, S, eccentricity,
@@ -142,22 +146,23 @@ SHORT = [numbers(line) for line in """
 .3 .272176 68.178 1.7949 4.4825 -2.6246 2.4126 8.1530 2.4270 6.0612 .5194 2.6058
 .5 .106049 53.680 2.9233 3.9766 -.8577 2.2099 6.6148 2.2450 3.0539 .5146 2.5417
 .7 .032964 38.704 5.6594 4.5347 .1734 1.9695 7.0987 2.0267 1.6240 .3446 3.6278
+.9 .003315 20.826 19.0955 7.2637 1.4213 1.7294 10.9978 1.8059 .6869 0 inf
 """.strip().splitlines()]  # fmt: skip
 
 
 @pytest.mark.parametrize("row", SHORT, ids=lambda r: f"{r[0]}")
 def test_short_bearings_have_their_closed_form_by_quadrature_too(row):
     e, S, attitude, *rest = row
-    assert_allclose(short_sommerfeld(e), S, rtol=2e-5)
+    assert_allclose(short_sommerfeld(e), S, atol=6e-7)
     assert_allclose(np.degrees(short_attitude(e)), attitude, atol=6e-4)
-    assert short_eccentricity(S) == pytest.approx(e, rel=2e-5)
+    assert short_eccentricity(S) == pytest.approx(e, rel=3e-5)
     K, C = short_coefficients(e)
     assert_allclose([*K.ravel(), C[0, 0], C[0, 1], C[1, 1]], rest[:7], atol=6e-5)
     s = stability(K, C, 1.0)
     assert_allclose([s.whirl_ratio, np.sqrt(s.critical_mass)], rest[7:], atol=6e-5)
     x = e * np.array([np.cos(short_attitude(e)), np.sin(short_attitude(e))])
     W, h, still = -short_force(x, (0, 0)), 1e-5, np.zeros(2)
-    assert_allclose(W, [1 / (4 * np.pi * S), 0.0], atol=2e-5 * W[0])
+    assert_allclose(W, [1 / (4 * np.pi * S), 0.0], atol=2e-4 * W[0])
     for k, d in enumerate(h * np.eye(2)):
         by_x = short_force(x - d, still) - short_force(x + d, still)
         by_v = short_force(x, still - d) - short_force(x, still + d)
@@ -170,6 +175,7 @@ def test_the_short_bearing_of_friswell():
     S = 0.1 * 25 * 0.03 * 0.1 / 525 * 500**2 * 0.3**2
     e = short_eccentricity(S)
     assert e == pytest.approx(0.266298, abs=1e-6)
+    assert short_eccentricity(S * 2000 / 1500) == pytest.approx(0.212571, abs=1e-6)
     K, C = (a[::-1, ::-1] * [[1, -1], [-1, 1]] * 525 / 1e-4 for a in short_coefficients(e))
     assert_allclose(K / 1e6, [[12.80796, 16.393593], [-25.060393, 8.815303]], rtol=1e-6)
     assert_allclose(C[0] * 1e-3 / (50 * np.pi), [232.89693, -81.924371], rtol=1e-6)
@@ -195,7 +201,8 @@ def test_the_film_of_a_long_bearing_is_sommerfelds():
     for k, turn in ((0, lambda t: -np.cos(t)), (1, np.sin)):
         F = quad(lambda t, turn=turn: long_pressure(t, 0.5) * turn(t), 0, np.pi)[0]
         assert long_force(0.5)[k] == pytest.approx(F, rel=1e-9)
-    assert 1 / (np.pi * np.hypot(*long_force(0.5))) == pytest.approx(0.061770, rel=2e-5)
+    for e, S in ((0.2, 0.167359), (0.5, 0.061770), (0.8, 0.025491)):
+        assert 1 / (np.pi * np.hypot(*long_force(e))) == pytest.approx(S, rel=2e-5)
 
 
 # --- the film itself ---
@@ -294,11 +301,13 @@ def test_the_force_converges_with_the_square_of_the_cells():
 INLETS = [
     (180, "reynolds", .504, 55.1, 2.55, 3.65, -.93, 2.14, 2.57),
     (180, "jfo", .503, 53.5, 2.66, 3.58, -1.11, 2.18, 2.48),
+    (-90, "reynolds", .509, 49.4, 2.84, 3.67, -.68, 1.76, 2.33),
     (-90, "jfo", .509, 49.1, 2.87, 3.64, -.65, 1.71, 2.32),
     (90, "reynolds", .504, 55.1, 2.55, 3.65, -.93, 2.14, 2.57),
     (90, "jfo", .556, 35.9, 5.30, 2.37, -1.13, 2.19, 3.26),
     (-45, "reynolds", .580, 38.6, 3.78, 4.78, -.30, 1.94, 2.06),
     (-45, "jfo", .611, 27.4, 4.92, 4.79, -.23, 1.02, 1.19),
+    (135, "reynolds", .504, 55.1, 2.55, 3.65, -.93, 2.14, 2.57),
     (135, "jfo", .514, 46.9, 3.52, 3.25, -1.23, 2.16, 2.46),
 ]  # fmt: skip
 
