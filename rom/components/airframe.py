@@ -163,7 +163,8 @@ def _linked(points: Array, rigid: bool) -> Array:
 
     A link turns with its second point.
     """
-    T, dependent = np.eye(6 * len(points)), []
+    T = np.eye(6 * len(points))
+    dependent: list[int] = []
     follow = 6 if rigid else 3
     for link in LINKS:
         a, b = _ends(points, link)
@@ -185,7 +186,7 @@ def _summed(
     A = np.zeros((6 * len(points),) * 2)
     for i, j in beams:
         along = points[j] - points[i]
-        L = np.linalg.norm(along)
+        L = float(np.linalg.norm(along))
         e = along / L
         R = np.array([e, part.broad, np.cross(e, part.broad)])
         local = _mass(L, part, material) if what == "mass" else _stiffness(L, part, material, what)
