@@ -92,9 +92,28 @@ def test_five_bar_has_the_eight_isotropic_configurations_of_the_table(found):
     assert_allclose(A, found.inertia[:, None, None] * np.eye(2), atol=1e-11)
 
 
-@pytest.mark.parametrize("n", [200, 800])
+@pytest.mark.parametrize("n", [60, 120, 200, 800])
 def test_the_number_of_configurations_does_not_depend_on_the_grid(found, n):
     assert_allclose(isotropic_configurations(FIVE.inertia, n=n).q, found.q, atol=1e-9)
+
+
+def test_other_lengths_have_other_numbers_of_configurations():
+    """Shorter couplers that still close everywhere: twelve, and the windings cancel again."""
+    short = FiveBar(0.65, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.7),) * 2, payload=0.5)
+    assert 2 * 0.7 > 0.65 + 2 * 0.3 and 0.65 > 2 * 0.3
+    for n in (150, 300):
+        found = isotropic_configurations(short.inertia, n=n)
+        assert found.winding.size == 12 and found.winding.sum() == 0
+
+
+def test_principal_directions_make_half_a_turn_around_each_point(found):
+    """Eigenvectors of A have no sign: followed around a circle they come back turned by pi."""
+    angle = np.linspace(0, 2 * np.pi, 721)
+    for q, winding in zip(found.q, found.winding, strict=True):
+        A = FIVE.inertia(*(q[:, None] + 0.01 * np.array([np.cos(angle), np.sin(angle)])))
+        easy = np.linalg.eigh(A)[1][:, :, 0]
+        direction = np.unwrap(np.arctan2(easy[:, 1], easy[:, 0]), period=np.pi)
+        assert direction[-1] - direction[0] == pytest.approx(winding * np.pi, abs=1e-6)
 
 
 def test_four_configurations_do_not_move_the_tip(found):

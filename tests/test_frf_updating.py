@@ -183,6 +183,7 @@ def test_static_condensation_floors_the_error_whatever_the_noise():
         found = errors(update_by_output(model, measured(level), START, GUESS))
         assert found[0] == pytest.approx(0.0535, abs=0.004)
         assert found[1] == pytest.approx(0.0225, abs=0.005)
+        assert found[2] < 0.01 + level  # damping: .009 without noise, else what the draw says
 
 
 def test_condensed_frequencies_are_too_high_by_what_is_known():
@@ -220,7 +221,7 @@ def test_equations_converge_as_newton_does():
 
 def test_fewer_columns_than_modes_fail():
     found = errors(update_by_input(AtSensors(BEAM), measured(0.05), START, GUESS, rank=4))
-    assert found[0] > 0.3
+    assert found[0] > 0.3 and found[1] > 0.2 and found[2] > 0.2
 
 
 def test_the_common_basis_holds_both_sets():
@@ -234,10 +235,14 @@ def test_the_common_basis_holds_both_sets():
 def test_one_linear_solution_is_exact_when_everything_is_measured():
     C = damping_matrix(BEAM.at(TRUE), ZETA)
     seen = ParametricModel(BEAM.K, BEAM.M, BEAM.dK, BEAM.dM, np.eye(48))
-    inputs = (16, 46)
+    inputs, w = (16, 46), OMEGA[:, None, None]
     H = responses(seen, TRUE, ZETA, OMEGA, inputs)
     found = response_function_method(seen, Measurement(OMEGA, H, inputs), START, C)
     assert_allclose(found.p, TRUE, atol=1e-8)
+    here = BEAM.at(TRUE)  # with the inverse there is no round-off of a synthesis
+    H = np.linalg.inv(here.K - w**2 * here.M + 1j * w * C)[:, :, list(inputs)]
+    test = Measurement(OMEGA, H, inputs, 1 / np.abs(H))
+    assert_allclose(response_function_method(seen, test, START, C).p, TRUE, atol=2e-11)
 
 
 def test_eight_sensors_need_some_linear_solutions():
