@@ -25,7 +25,7 @@ from rom.components.assumed_strain import (
     tangent,
 )
 from rom.components.assumed_strain.space import bending
-from rom.errors import ConfigError, InterfaceError, MeshError, SolverError
+from rom.errors import ConfigError, InterfaceError, MaterialError, MeshError, SolverError
 
 COOK = [(0, 0), (48, 44), (48, 60), (0, 44)]
 COOK_TABLE = {  # n: tip deflections of CST, F3, F1 with one diagonal, then with the other
@@ -474,6 +474,38 @@ def test_plane_matrices_reduce_as_they_are():
     free = dofs(X[:, 0] > 1e-9)
     full = np.sqrt(eigsh(K[free][:, free], 5, M[free][:, free], sigma=0.0)[0]) / (2 * np.pi)
     assert np.all((reduced / full - 1 > -1e-9) & (reduced / full - 1 < 1e-3))
+
+
+CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
+SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: Metal(1.0, 0.5), MaterialError, "no solid is .*nu=0.5.* nu < 0.5"),
+        (lambda: Metal(-1.0, 0.3), MaterialError, "E, rho, yield_stress > 0"),
+        (lambda: Metal(1.0, 0.3, 1.0, 1.0, -2.0), MaterialError, "hardening=-2.0"),
+        (lambda: rectangle((0, 2), CORNERS), ConfigError, r"n = \(0, 2\)"),
+        (lambda: rectangle((1, 2), CORNERS, "y"), ConfigError, "diagonal = 'y'"),
+        (lambda: sheet(SMALL.points, SMALL.triangles + 5), MeshError, "nodes 5 to 13; there are 9"),
+        (lambda: sheet(SMALL.points.T, SMALL.triangles), MeshError, r"points \(2, 9\)"),
+        (lambda: sheet(*distorted((2, 2)), thickness=0.0), ConfigError, "thickness = 0.0 m"),
+        (lambda: sheet(SMALL.points - 2, SMALL.triangles, state="axisymmetric"), MeshError,
+         "radius of node 0 is -2 m"),
+        (lambda: sheet(np.nan * SMALL.points, SMALL.triangles), MeshError, "has the area nan"),
+        (lambda: forces(SMALL, SOFT, SMALL.points[:3]), ConfigError, r"shape \(3, 2\): \(9, 2\)"),
+        (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "finite numbers"),
+        (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities of the"),
+        (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
+        (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, "t_end = -1.0 s"),
+        (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "loads of the shape"),
+        (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "0 load"),
+    ],
+)  # fmt: skip
+def test_messages_name_what_is_wrong(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
 
 
 def test_wrong_input_is_named():

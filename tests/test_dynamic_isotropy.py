@@ -20,7 +20,7 @@ from rom.components.two_dof_linkages import (
     rigid_link,
     rod,
 )
-from rom.errors import SolverError
+from rom.errors import ConfigError, ModelError, SolverError
 
 FIVE = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
 TWO = TwoLink(rod(1.0, 0.5), rod(2.0, 0.4))
@@ -71,8 +71,8 @@ def test_equal_diagonal_makes_a_curve_of_isotropy():
 
 
 def test_relative_angles_need_twice_the_inertia():
-    """a = 2 c and cos q2 = -c / b, whatever q1."""
-    second, l1 = rod(1.0, 0.3), 0.5
+    """a = 2 c and cos q2 = -c / b, whatever q1; b^2 < a c, as for any real links."""
+    second, l1 = rod(1.0, 0.3), 0.22
     c, b = 0.03, l1 * 0.15
     first = rigid_link(1.0, l1, (0.1, 0.0), 2 * c - 0.01 - l1**2 + 0.3)
     a = first.M[2, 2] + l1**2
@@ -230,3 +230,22 @@ def test_missed_configurations_are_not_passed_over(found):
 
     with pytest.raises(SolverError, match="add up to 1, not 0"):
         isotropic_configurations(torn, n=100)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: isotropic_configurations(TWO.inertia, n=0), ConfigError, "n = 0"),
+        (lambda: isotropic_configurations(lambda a, b: np.eye(3)), ModelError, r"not \(3, 3\)"),
+        (lambda: isotropy_index(np.diag([1.0, -0.5])), ModelError, "no kinetic energy"),
+        (lambda: isotropy_index(np.eye(2), lengths=(0.0, 1.0)), ConfigError, "two positive"),
+        (lambda: closed_loci(np.zeros((3, 4)), 0.1), ConfigError, r"a field \(3, 4\)"),
+        (lambda: closed_loci(np.full((4, 4), np.nan), 0.1), ConfigError, "finite values"),
+        (lambda: replace(TWO, payload=-1.0), ModelError, "mass -1.0 kg"),
+        (lambda: replace(FIVE, base=-1.0), ModelError, "base = -1.0 m"),
+        (lambda: replace(FIVE, side=0), ModelError, "side = 0"),
+    ],
+)
+def test_what_is_no_linkage_is_refused(make, error, words):
+    with pytest.raises(error, match=words):
+        make()

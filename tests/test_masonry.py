@@ -20,7 +20,7 @@ from rom.components.masonry import (
 )
 from rom.components.masonry_limits import Rock, arch, stands
 from rom.eigen import rigid_motions
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, MaterialError, ModelError
 
 G = 9.81
 SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
@@ -360,6 +360,20 @@ def test_what_cannot_be_is_refused():
         simulate(one, t_end=1.0, dt=0.1, q=[0.0, 1.0])
     with pytest.raises(ConfigError, match="0 steps"):
         simulate(one, t_end=0.0, dt=0.1)
+    for times in ({"t_end": np.nan, "dt": 0.1}, {"t_end": 1.0, "dt": -0.1}):
+        with pytest.raises(ConfigError, match="both must be positive"):
+            simulate(one, **times)
+    block, numbers = one.stones[0], {"E": 1e9, "nu": 0.2, "rho": 2000.0}
+    for wrong in ({"E": -1.0}, {"nu": 0.5}, {"rho": 0.0}, {"thickness": 0.0}):
+        with pytest.raises(MaterialError, match=f"{next(iter(wrong))} = .*E, rho, thickness > 0"):
+            stone(box(), **numbers | wrong)
+    with pytest.raises(ConfigError, match="'liquid' is no state"):
+        stone(box(), **numbers, state="liquid")
+    for wrong in ({"stiffness": -1e9}, {"friction": -0.1}):
+        with pytest.raises(ConfigError, match="needed are > 0, >= 0"):
+            replace(one, **wrong)
+    with pytest.raises(ConfigError, match=r"held are \(2,\) of the stones 0 to 1"):
+        Masonry((block, block), (2,), 1e9, 0.1)
 
 
 def test_a_corner_without_a_node_is_refused(meshed):

@@ -10,6 +10,7 @@ from rom.components.masonry import (
     simulate,
 )
 from rom.components.masonry_limits import Rock, arch, minimum_thickness, stands, wall
+from rom.errors import ConfigError
 
 G = 9.81
 
@@ -141,3 +142,18 @@ def test_wall_with_an_opening_carries_its_weight_to_the_ground():
     count = sum(s.M[0, 0] for s in whole.stones[1:]) / (2000 * area)
     assert count == pytest.approx(8 * 3.0 / 0.5)
     assert weight == pytest.approx((8 * 3.0 * 0.25 - 3 * 0.25) * 2000 * G)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: wall(-1.0, 3), "no wall is -1.0 m long"),
+        (lambda: wall(3.0, 8, opening=(2.0, 1.0, 2, 5)), "is not in a wall of 3.0 m"),
+        (lambda: minimum_thickness(half_angle=0.01), "half_angle = 0.01 rad"),
+        (lambda: arch(10, 5.0, 20.0), "no arch has 10 voussoirs, radius 5.0, thickness 20.0"),
+        (lambda: arch(10, 5.0, 0.5, rock=Rock(friction=-1.0)), "friction = -1.0"),
+    ],
+)
+def test_what_cannot_be_laid_is_refused(make, words):
+    with pytest.raises(ConfigError, match=words):
+        make()

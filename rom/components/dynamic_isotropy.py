@@ -19,13 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rom.errors import SolverError
+from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
 Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
 STEP = 1e-5  # of central differences [rad]
 # least Jacobian of the normalised equations for an isotropic point that stands alone
 ISOLATED = 1e-6
+SINGULAR = 1e-12  # share of the squared trace by which round-off may lower a determinant
 
 
 def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
@@ -35,9 +36,14 @@ def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
         A: (..., 2, 2) generalised inertia.
         lengths: (2,) by which the coordinates are multiplied first: (1, 1) for two angles, (L, 1)
             with a characteristic length L for an angle beside a displacement.
+
+    Raises:
+        ConfigError, ModelError: for lengths that are not positive; for an inertia that is not.
     """
     scale = np.asarray(lengths, dtype=float)
-    A = A / np.multiply.outer(scale, scale)
+    if scale.shape != (2,) or not (scale > 0).all():
+        raise ConfigError(f"lengths = {lengths}: two positive numbers are needed.")
+    A = _positive(np.asarray(A, dtype=float) / np.multiply.outer(scale, scale))
     determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
     return 2 * np.sqrt(np.maximum(determinant, 0.0)) / (A[..., 0, 0] + A[..., 1, 1])
 
@@ -86,8 +92,12 @@ def isotropic_configurations(inertia: Inertia, *, n: int = 400) -> Isotropic:
         n: number of cells per turn; points closer than a cell may be taken for one.
 
     Raises:
+        ConfigError, ModelError: for a grid of less than four cells; if the function returns no
+            inertia.
         SolverError: if the windings of isolated points do not add up to zero: some were missed.
     """
+    if n < 4:
+        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
     start = _suspects(_anisotropy(inertia, *angle_grid(n)))
     q = 2 * np.pi * (start + 0.5) / n
     for _ in range(40):
@@ -108,9 +118,20 @@ def isotropic_configurations(inertia: Inertia, *, n: int = 400) -> Isotropic:
 
 def _anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
     """(..., 2) half the difference of the diagonal, and the coupling, over half the trace."""
-    A = inertia(q1, q2)
+    A = _positive(inertia(q1, q2))
     trace = A[..., 0, 0] + A[..., 1, 1]
     return np.stack([(A[..., 0, 0] - A[..., 1, 1]) / trace, 2 * A[..., 0, 1] / trace], axis=-1)
+
+
+def _positive(A: Array) -> Array:
+    """A (..., 2, 2) if it can be an inertia: of positive trace and no negative determinant."""
+    if np.shape(A)[-2:] != (2, 2):
+        raise ModelError(f"an inertia of two motors has the shape (..., 2, 2), not {np.shape(A)}.")
+    trace = A[..., 0, 0] + A[..., 1, 1]
+    determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
+    if not ((trace > 0) & (determinant > -SINGULAR * trace**2)).all():
+        raise ModelError("the inertia is not positive: some motion would have no kinetic energy.")
+    return A
 
 
 def _gradient(inertia: Inertia, q: Array) -> Array:
@@ -151,7 +172,12 @@ def closed_loci(index: Array, level: float) -> list[Array]:
     Returns:
         (k, 2) angles of each curve [rad], continuous; the last point is the first one, moved by
         whole turns if the curve goes around the torus.
+
+    Raises:
+        ConfigError: if the field is not that of a square grid, or has gaps.
     """
+    if np.ndim(index) != 2 or len(set(np.shape(index))) != 1 or not np.isfinite(index).all():
+        raise ConfigError(f"a field {np.shape(index)}: (n, n) finite values are needed.")
     names, neighbours = _joined(index, level)
     points, fresh, curves = _crossings(index, level, names), np.ones(len(names), dtype=bool), []
     for start in range(len(names)):

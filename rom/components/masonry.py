@@ -27,7 +27,7 @@ from rom.components.block_contact import (
     find_contacts,
 )
 from rom.components.discontinuous_deformation import advance, work
-from rom.errors import ConfigError, ModelError, SolverError
+from rom.errors import ConfigError, MaterialError, ModelError, SolverError
 from rom.model import Array
 
 NEAR = 0.05  # of the shortest edge: how near a corner must be to an edge to be watched
@@ -76,8 +76,16 @@ def stone(
         solid: (m, 2) polygon the mass comes from, if finer than the outline.
 
     Raises:
+        ConfigError, MaterialError: for an unknown state; if no stone has these numbers.
         ModelError: if the outline does not enclose an area counterclockwise.
     """
+    if state not in ("plane stress", "plane strain"):
+        raise ConfigError(f'{state!r} is no state of a stone: "plane stress" or "plane strain".')
+    if not (E > 0 and -1 < nu < 0.5 and rho > 0 and thickness > 0):
+        raise MaterialError(
+            f"no stone has E = {E} Pa, nu = {nu}, rho = {rho} kg/m^3, thickness = {thickness} m.",
+            hint="E, rho, thickness > 0; -1 < nu < 0.5.",
+        )
     corners = np.asarray(outline, dtype=float)
     area, centre, S = polygon_moments(np.asarray(corners if solid is None else solid, dtype=float))
     if corners.ndim != 2 or len(corners) < 3 or not area > 0:
@@ -154,6 +162,9 @@ class Masonry:
         friction: tangent of the angle of friction.
         gravity: (2,) [m/s^2].
         reach: distance within which corners watch edges [m]; None for 5 % of the shortest edge.
+
+    Raises:
+        ConfigError: if contacts do not press, friction pushes, or a held stone does not exist.
     """
 
     stones: tuple[Stone, ...]
@@ -162,6 +173,15 @@ class Masonry:
     friction: float
     gravity: tuple[float, float] = (0.0, -9.81)
     reach: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.stiffness > 0 and self.friction >= 0):
+            raise ConfigError(
+                f"stiffness = {self.stiffness} N/m, friction = {self.friction}: needed are > 0, "
+                ">= 0."
+            )
+        if not set(self.held) <= set(range(len(self.stones))):
+            raise ConfigError(f"held are {self.held} of the stones 0 to {len(self.stones) - 1}.")
 
     @property
     def law(self) -> Law:
@@ -309,6 +329,8 @@ def simulate(
         SolverError: if contacts do not settle even in the shortest steps.
     """
     B, law = masonry.blocks(), masonry.law
+    if not (0 < dt < np.inf and abs(t_end) < np.inf):
+        raise ConfigError(f"t_end = {t_end} s in steps of dt = {dt} s: both must be positive.")
     n = round(t_end / dt)
     if n < 1 or save_every < 1 or not 0 <= keep <= 1:
         raise ConfigError(f"{n} steps, save_every = {save_every}, keep = {keep}: nothing to do.")

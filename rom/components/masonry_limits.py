@@ -116,8 +116,18 @@ def wall(
         brick: length and height of a brick [m].
         opening: left and right end [m], first course and the course of the lintel.
         rock: material and joints; the default is hard stone.
+
+    Raises:
+        ConfigError: if nothing of the wall is left, or the opening is not inside it.
     """
     rock, (b, h) = rock or Rock(), brick
+    if not (length > 0 and courses >= 1 and min(brick) > 0):
+        raise ConfigError(f"no wall is {length} m long with {courses} courses of bricks {brick}.")
+    if opening and not (0 < opening[0] < opening[1] < length and opening[2] <= opening[3]):
+        raise ConfigError(
+            f"the opening {opening} is not in a wall of {length} m.",
+            hint="Left end, right end [m], first course, course of the lintel.",
+        )
     stones = [rock.stone(_box(-b, length + b, -h, 0.0))]
     for r in range(courses):
         cuts = np.r_[0.0, np.arange(b / 2 if r % 2 else b, length - 1e-9, b), length]
@@ -202,6 +212,9 @@ def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True
         true_weight: weight in the mass centre of each sector, c = 1 + ratio^2 / 12 (Milankovitch);
             otherwise on the centre line, c = 1.
 
+    Raises:
+        ConfigError: if hinges cannot open inside: thin arches as flat are stable until they slip.
+
     Source:
         After Milankovitch, as cited by Alexakis and Makris; derived anew.
     """
@@ -220,5 +233,9 @@ def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True
         )
         return best.fun - (1 - ratio / 2), best.x, H
 
+    if not 0 < half_angle <= np.pi / 2 or lowest(1e-6)[0] >= 0:
+        raise ConfigError(
+            f"half_angle = {half_angle} rad: between 0 and pi / 2, and not too flat for hinges."
+        )
     ratio = brentq(lambda x: lowest(x)[0], 1e-6, 0.5, xtol=1e-15)
     return Limit(float(ratio), *map(float, lowest(ratio)[1:]))

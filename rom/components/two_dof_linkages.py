@@ -114,12 +114,19 @@ class TwoLink:
         payload: mass at the tip [kg].
         relative: the second coordinate is the angle of the second link against the first one
             (motor on the elbow) and not against the ground.
+
+    Raises:
+        ModelError: for a payload that is negative.
     """
 
     first: Link
     second: Link
     payload: float = 0.0
     relative: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.payload >= 0:
+            raise ModelError(f"no payload has the mass {self.payload} kg.")
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad].
@@ -151,6 +158,9 @@ class FiveBar:
         cranks, couplers: the links of the left and the right side, first pins towards the motors.
         payload: point mass at the tip [kg].
         side: 1 for the tip to the left of the line from the left to the right elbow, -1 for right.
+
+    Raises:
+        ModelError: for a payload or a base that is negative, or an unknown side.
     """
 
     base: float
@@ -158,6 +168,13 @@ class FiveBar:
     couplers: tuple[Link, Link]
     payload: float = 0.0
     side: int = 1
+
+    def __post_init__(self) -> None:
+        if not (self.payload >= 0 and self.base >= 0 and self.side in (1, -1)):
+            raise ModelError(
+                f"base = {self.base} m, payload = {self.payload} kg, side = {self.side}: needed "
+                "are >= 0, >= 0, and 1 or -1."
+            )
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad] of the cranks.

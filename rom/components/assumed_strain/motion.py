@@ -10,8 +10,8 @@ from scipy.sparse.linalg import spsolve
 
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.triangles import STATES, Sheet
-from rom.errors import SolverError
-from rom.model import Array
+from rom.errors import ConfigError, MaterialError, SolverError
+from rom.model import Array, Index
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,9 @@ class Metal:
         yield_stress: first yield stress [Pa].
         hardening: slope of the yield stress over plastic strain [Pa].
         linear: St. Venant and Kirchhoff's law S = D E in place of Hencky's; never yields.
+
+    Raises:
+        MaterialError: if no solid has these numbers.
     """
 
     E: float
@@ -33,6 +36,14 @@ class Metal:
     yield_stress: float = np.inf
     hardening: float = 0.0
     linear: bool = False
+
+    def __post_init__(self) -> None:
+        plastic = self.yield_stress > 0 and self.hardening >= 0
+        if not (self.E > 0 and -1 < self.nu < 0.5 and self.rho > 0 and plastic):
+            raise MaterialError(
+                f"no solid is {self}.",
+                hint="E, rho, yield_stress > 0; -1 < nu < 0.5; hardening >= 0.",
+            )
 
     @property
     def numbers(self) -> Array:
@@ -49,8 +60,8 @@ class Metal:
 
 def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -> csr_matrix:
     """(2n, 2n) tangent stiffness [N/m] at positions x (n, 2), where they began the linear one."""
-    K = np.zeros((len(body.patch), 12, 12))
-    kernels.tangents(np.ascontiguousarray(x), *_parts(body, metal, history), K)
+    K, x = np.zeros((len(body.patch), 12, 12)), _nodal("positions", x, body)
+    kernels.tangents(x, *_parts(body, metal, history), K)
     dofs = (2 * body.patch[:, :, None] + np.arange(2)).reshape(-1, 12)
     rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
     K = 0.5 * (K + np.swapaxes(K, 1, 2))
@@ -66,7 +77,7 @@ def forces(
     """
     f, parts = np.zeros(body.points.shape), _parts(body, metal, history)
     new = np.empty_like(parts[-1])
-    kernels.forces(np.ascontiguousarray(x), *parts, f, new)
+    kernels.forces(_nodal("positions", x, body), *parts, f, new)
     return f, new
 
 
@@ -92,24 +103,32 @@ def equilibrium(
         steps: load steps.
 
     Raises:
+        ConfigError: if loads or held dofs do not fit, or without a step.
         SolverError: if Newton's method does not find equilibrium.
     """
+    load, held = _nodal("loads", load, body), _dofs(held, body)
+    if steps < 1:
+        raise ConfigError(f"{steps} load steps: one or more are needed.")
     free = np.setdiff1d(np.arange(load.size), held)
     x, history, most = body.points.copy(), None, 0
     for k in range(1, steps + 1):
         for i in range(30):
             f, new = forces(body, metal, x, history)
             r = (k / steps * load - f).ravel()[free]
-            if i and np.linalg.norm(r) < 1e-10 * np.linalg.norm(load):
+            if i and np.linalg.norm(r) <= 1e-10 * np.linalg.norm(load):
                 break
             K = tangent(body, metal, x, history)[free][:, free]
             x.reshape(-1)[free] += spsolve(K.tocsc(), r)
+            if not np.isfinite(x).all():
+                raise _lost(k, steps)
         else:
-            raise SolverError(
-                f"no equilibrium in load step {k} of {steps}.", hint="Take more steps."
-            )
+            raise _lost(k, steps)
         history, most = new, max(most, i)
     return x, history, most
+
+
+def _lost(k: int, steps: int) -> SolverError:
+    return SolverError(f"no equilibrium in load step {k} of {steps}.", hint="Take more steps.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +156,12 @@ def fly(
     """Explicit motion from rest lengths with velocities v (n, 2) [m/s]; held dofs do not move.
 
     Raises:
+        ConfigError: if velocities, held dofs, duration or pictures do not fit.
         SolverError: if the motion is lost.
     """
+    v, held = _nodal("velocities", v, body), _dofs(held, body)
+    if not 0 < t_end < np.inf or pictures < 2:
+        raise ConfigError(f"t_end = {t_end} s with {pictures} pictures: nothing to show.")
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
     free.reshape(-1)[held] = False
@@ -153,6 +176,27 @@ def fly(
             "the explicit motion was lost.", hint="Use the element F1, or finer time."
         )
     return Flight(t, path, seen, work, steps)
+
+
+def _nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
+    """Finite values (n, 2) at the nodes of the sheet; kernels check no bounds."""
+    x = np.ascontiguousarray(values, dtype=float)
+    if x.shape != body.points.shape or not np.isfinite(x).all():
+        raise ConfigError(
+            f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
+        )
+    return x
+
+
+def _dofs(held: npt.ArrayLike, body: Sheet) -> Index:
+    """Numbers of dofs, 2 * node + axis."""
+    dofs = np.asarray(held, dtype=np.int64).ravel()
+    if dofs.size and (dofs.min() < 0 or dofs.max() >= body.points.size):
+        raise ConfigError(
+            f"held dofs {dofs.min()} to {dofs.max()}; the sheet has 0 to {body.points.size - 1}.",
+            hint="A dof is 2 * node + axis.",
+        )
+    return dofs
 
 
 def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:

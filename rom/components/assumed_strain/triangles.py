@@ -63,12 +63,16 @@ def sheet(
         thickness: of a plane solid [m].
 
     Raises:
-        ConfigError: for an unknown element or state.
-        MeshError: if a triangle is turned over, or a side belongs to three.
+        ConfigError: for an unknown element or state, or a thickness that is not positive.
+        MeshError: if a triangle is turned over or names no point, a side belongs to three, or a
+            radius is negative.
     """
     if element not in ELEMENTS or state not in STATES:
         raise ConfigError(f"{element!r}, {state!r}: known are {ELEMENTS} and {tuple(STATES)}.")
+    if not 0 < thickness < np.inf:
+        raise ConfigError(f"thickness = {thickness} m: no sheet is as thin or as thick.")
     X, T = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+    _refuse_no_mesh(X, T, state)
     constant, area = constant_gradients(X, T)
     patch = np.hstack([T, _opposite(T)])
     G = np.zeros((len(T), 3, 6, 2))
@@ -86,6 +90,23 @@ def sheet(
     depth = 2 * np.pi * X[T, 0].mean(axis=1) if state == "axisymmetric" else thickness
     weights = np.repeat((area * depth / G.shape[1])[:, None], G.shape[1], axis=1)
     return Sheet(X, T, patch, np.ascontiguousarray(G), weights, area, state, thickness)
+
+
+def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
+    if X.ndim != 2 or X.shape[1] != 2 or T.ndim != 2 or T.shape[1] != 3 or not len(T):
+        raise MeshError(
+            f"points {X.shape} and triangles {T.shape} where (n, 2) and (t, 3) were expected."
+        )
+    if T.min() < 0 or T.max() >= len(X):
+        raise MeshError(
+            f"triangles name the nodes {T.min()} to {T.max()}; there are {len(X)} points.",
+            hint="Count nodes from zero.",
+        )
+    if state == "axisymmetric" and X[:, 0].min() < 0:
+        raise MeshError(
+            f"the radius of node {int(X[:, 0].argmin())} is {X[:, 0].min():.3g} m.",
+            hint="The first coordinate of an axisymmetric solid is its radius.",
+        )
 
 
 def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
@@ -139,7 +160,12 @@ def rectangle(
 
     Rows of points follow each other from the first side to the third; quadrilaterals are split by
     "/", by the other diagonal, or by both with "x".
+
+    Raises:
+        ConfigError: for fewer than one division, or another way to split.
     """
+    if min(n) < 1 or diagonal not in ("/", "\\", "x"):
+        raise ConfigError(f'n = {n}, diagonal = {diagonal!r}: one or more, and "/", "\\\\" or "x".')
     s, t = (np.linspace(0, 1, k + 1) for k in n)
     C = np.asarray(corners, dtype=float)
     a, b = (x.ravel() for x in np.meshgrid(s, t))
