@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.errors import MaterialError
+from rom.notebook import shown
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -336,6 +337,20 @@ class Modes:
         """(m,) natural frequencies [Hz]."""
         return self.omega / (2 * np.pi)
 
+    def __repr__(self) -> str:
+        return f"Modes({self._said})"
+
+    @property
+    def _said(self) -> str:
+        if not self.omega.size:
+            return "none"
+        f = self.frequencies
+        return f"{f.size} modes, {f[0]:.5g} to {f[-1]:.5g} Hz"
+
+    def _repr_html_(self) -> str:
+        rows = zip(range(1, self.omega.size + 1), self.frequencies, self.residual, strict=True)
+        return shown(f"Modes: {self._said}", ("mode", "frequency [Hz]", "residual"), rows)
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -376,5 +391,16 @@ class Report:
             + ("ok" if row.ok else "FAILED")
             for row in self.rows
         ]
-        verdict = "ok" if self.ok else f"{len(self.failures)} of {len(self.rows)} failed"
-        return "\n".join([f"{self.title}: {verdict}", *lines])
+        return "\n".join([f"{self.title}: {self._verdict}", *lines])
+
+    def __repr__(self) -> str:
+        return f"Report({self.title!r}: {self._verdict})"
+
+    @property
+    def _verdict(self) -> str:
+        return "ok" if self.ok else f"{len(self.failures)} of {len(self.rows)} failed"
+
+    def _repr_html_(self) -> str:
+        ordered = (*self.failures, *(row for row in self.rows if row.ok))
+        rows = ((r.quantity, r.value, r.limit, "ok" if r.ok else "FAILED") for r in ordered)
+        return shown(f"{self.title}: {self._verdict}", ("quantity", "value", "limit", ""), rows)

@@ -25,7 +25,8 @@ ANYTHING = {
 }  # they stand in front
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
     "errors": set(),
-    "model": {"errors"},
+    "notebook": set(),
+    "model": {"errors", "notebook"},
     "units": {"errors"},
     "rotation": {"errors"},
     "eigen": {"model", "errors"},
@@ -42,8 +43,8 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
         "reduction",
         "errors",
     },
-    "body": {"model", "eigen", "rotation", "attachment", "parameters", "errors"},
-    "mbs": {"model", "rotation", "io", "errors"},
+    "body": {"model", "eigen", "rotation", "attachment", "parameters", "notebook", "errors"},
+    "mbs": {"model", "rotation", "io", "notebook", "errors"},
     "io": {"model", "units", "body", "parameters", "errors"},
     "checks": {"model", "eigen", "body", "scipy_operators", "errors"},
     "certificate": {"model", "eigen", "body", "reduction", "errors"},

@@ -14,6 +14,7 @@ from rom.body.spread import point_areas
 from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
+from rom.notebook import listed, shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +121,29 @@ class FlexibleBody:
     units: str = "SI"
     provenance: dict[str, Any] = field(default_factory=dict)
     certificate: Report | None = None
+
+    def __repr__(self) -> str:
+        return (
+            f"FlexibleBody({self.name!r}: {self.mass:.5g} kg, {self.n_modes} elastic coordinates, "
+            f"interfaces {listed(self.markers)}, frame {self.reference})"
+        )
+
+    def _repr_html_(self) -> str:
+        evidence = "none" if self.certificate is None else repr(self.certificate)
+        centre = ", ".join(f"{x:.5g}" for x in self.first_moment / self.mass)
+        lowest = ", ".join(f"{w / (2 * np.pi):.5g}" for w in self.omega[:6])
+        rows = [
+            ("mass [kg]", self.mass),
+            ("mass centre [m]", centre),
+            ("elastic coordinates", self.n_modes),
+            ("their lowest frequencies [Hz]", lowest),
+            ("frame", self.reference),
+            ("geometric stiffness", listed(self.K_geo)),
+            ("certificate", evidence),
+            *((f"interface {m.name}", f"{m.kind} at {m.point.tolist()}")
+              for m in self.markers.values()),
+        ]  # fmt: skip
+        return shown(f"Flexible body {self.name}", ("", ""), rows)
 
     @property
     def M(self) -> Array:

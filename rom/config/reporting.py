@@ -66,7 +66,7 @@ def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
     """A flexible body: what it is, mass, frequencies, interfaces, checks, pictures."""
     from rom.checks import check
 
-    sections = {
+    sections: Sections = {
         "What it is": [report.paragraph(_sentence(body)), *_mode_picture(body)],
         "Mass properties": [_mass_table(body)],
         "Frequencies": _frequency_blocks(body),

@@ -18,6 +18,7 @@ from rom.mbs.nonlinear import Assembly, NonlinearBodies
 from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
+from rom.notebook import listed, shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +101,17 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
     def __post_init__(self) -> None:
         self.gravity = finite("gravity", self.gravity, (3,))
         self.ground = ground_part()
+
+    def __repr__(self) -> str:
+        return f"Mechanism(bodies {listed(self.parts)}; joints {listed(self.joints)})"
+
+    def _repr_html_(self) -> str:
+        kinds = [(name, f"flexible, {p.r} elastic coordinates" if p.r else "rigid", p.mass,
+                  listed(p.names)) for name, p in self.parts.items()]  # fmt: skip
+        ends = [(name, j.kind, "", listed(f"{m.body}.{m.place}" for m in j.markers))
+                for name, j in self.joints.items()]  # fmt: skip
+        title = f"Mechanism of {len(self.parts)} bodies and {len(self.joints)} joints"
+        return shown(title, ("name", "kind", "mass [kg]", "markers"), [*kinds, *ends])
 
     def add_rigid(  # noqa: PLR0913  one keyword per property of a body
         self,

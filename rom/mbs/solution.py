@@ -18,6 +18,7 @@ from rom.mbs.signals import sample_all
 from rom.mbs.state import State
 from rom.mbs.tracks import Tracks, follow
 from rom.model import Array
+from rom.notebook import listed, shown
 from rom.rotation import matrix
 
 
@@ -89,6 +90,27 @@ class Solution:
     final: State
     events: dict[str, Occurrences] = field(default_factory=dict)
     _tracks: dict[Any, Tracks] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"Solution({self.t.size} instants, {self.t[0]:g} to {self.t[-1]:g} s, bodies "
+            f"{listed(self.packed.names)}: {self.status})"
+        )
+
+    def _repr_html_(self) -> str:
+        plain = [(key, x) for key, x in self.statistics.items() if isinstance(x, int | float | str)]
+        happened = [
+            (f"event {name}", f"{len(found.t)} times") for name, found in self.events.items()
+        ]
+        rows = [
+            ("time [s]", f"{self.t[0]:g} to {self.t[-1]:g}"),
+            ("instants", self.t.size),
+            ("bodies", listed(self.packed.names)),
+            ("joints and drives", listed(dict.fromkeys(self.packed.row_owner))),
+            *plain,
+            *happened,
+        ]
+        return shown(f"Motion. {self.status}", ("", ""), rows)
 
     def at(self, t: Any) -> "Solution":
         """The motion at other times, with everything that can be asked of a solution.

@@ -1,0 +1,43 @@
+"""How records show themselves in notebooks: short tables, nothing computed, everything escaped."""
+
+import html
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+MOST = 20  # rows shown
+
+
+def shown(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A title and a table in HTML; beyond `MOST` rows it says how many there are.
+
+    Args:
+        title: one line of text.
+        header: names of the columns.
+        rows: texts and numbers, which are written with five digits.
+    """
+    listed = list(rows)
+    lines = [_line("td", row) for row in listed[:MOST]]
+    if len(listed) > MOST:
+        more = f"and {len(listed) - MOST} more"
+        lines.append(f"<tr><td colspan='{len(header)}'>{more}</td></tr>")
+    head = f"<thead>{_line('th', header)}</thead>" if any(header) else ""
+    return (
+        f"<div><b>{html.escape(title)}</b>"
+        f"<table>{head}<tbody>{''.join(lines)}</tbody></table></div>"
+    )
+
+
+def _line(tag: str, cells: Sequence[Any]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{_text(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+
+def _text(value: Any) -> str:
+    number = hasattr(value, "__float__") and not isinstance(value, int | bool)
+    return html.escape(f"{float(value):.5g}" if number else str(value))
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names with commas, the first eight of them."""
+    words = [str(name) for name in names]
+    more = f", and {len(words) - 8} more" if len(words) > 8 else ""
+    return ", ".join(words[:8]) + more if words else "none"
