@@ -12,6 +12,7 @@ import pytest
 from command import environment
 from command import rom as command
 from numpy.testing import assert_allclose
+from schema import errors
 from solid import block
 
 import rom
@@ -19,6 +20,7 @@ from rom.cli import check
 from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
 from rom.cli.parser import VERBS, build_parser
+from rom.cli.schemas import schema
 from rom.errors import RomWarning
 
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
@@ -48,7 +50,7 @@ def answer(capsys, *arguments):
     """The JSON object a verb prints."""
     assert main([*map(str, arguments), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["ok"] is True
+    assert found["ok"] is True and errors(found, schema(str(arguments[0]))) == []
     return found
 
 
@@ -215,7 +217,8 @@ def test_warnings_are_said_once_and_go_into_the_json(monkeypatch, capsys):
     warned(monkeypatch)
     assert main(["check", "x"]) == 0
     assert capsys.readouterr() == ("done\n", "warning: E looks like GPa.\n")
-    found = answer(capsys, "check", "x", "-q")
+    assert main(["check", "x", "-q", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
     assert found["warnings"] == ["E looks like GPa."]
     assert found["value"] is None and found["array"] == [0, 1]
 

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from command import rom as run_rom
 from numpy.testing import assert_allclose
+from schema import errors
 from solid import block
 from test_cli import step_box
 
 import rom
 from rom.cli import swing
+from rom.cli.schemas import schema
 from rom.errors import ConfigError, RomWarning
 
 L, B, H = 1.0, 0.1, 0.08
@@ -84,6 +86,7 @@ def test_a_step_file_swings_on_the_face_chosen(tmp_path):
                    timeout=250)  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
+    assert errors(found, schema("swing")) == []
     assert found["mass"] == pytest.approx(2700 * 4e-5, rel=1e-9)
     thin = 1.875104**2 / (2 * np.pi) * np.sqrt(70e9 * 0.01**2 / (12 * 2700)) / 0.2**2
     assert found["frequencies"][0] == pytest.approx(thin, rel=0.02)

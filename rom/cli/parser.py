@@ -56,6 +56,19 @@ examples:
 """
 
 
+class ShowSchema(argparse.Action):
+    """Prints the JSON Schema of the answer of a verb and leaves, whatever else is missing."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        """Print and leave."""
+        from rom.cli.answer import to_json
+        from rom.cli.schemas import schema
+        from rom.cli.speech import say
+
+        say(to_json(schema(parser.prog.split()[-1])))
+        parser.exit()
+
+
 class Parser(argparse.ArgumentParser):
     """Reports what it does not understand as a `ConfigError` with the nearest thing it knows."""
 
@@ -139,6 +152,9 @@ def build_parser() -> Parser:
             allow_abbrev=False,
         )
         module.add_options(sub)
+        sub.add_argument(
+            "--json-schema", action=ShowSchema, nargs=0, help="print what --json holds, and leave"
+        )
         add_common(sub, default=argparse.SUPPRESS)
         sub.set_defaults(run=module.run)
     return parser

@@ -1,0 +1,220 @@
+"""JSON Schemas of what each verb prints with ``--json``; one more for errors.
+
+They are the contract: a key may be added, none removed or given another meaning, within one major
+version. Numbers that are not finite are null.
+"""
+
+from typing import Any
+
+Schema = dict[str, Any]
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def text(about: str) -> Schema:
+    """A text."""
+    return {"type": "string", "description": about}
+
+
+def number(about: str) -> Schema:
+    """A number, null when it is not finite."""
+    return {"type": ["number", "null"], "description": about}
+
+
+def whole(about: str) -> Schema:
+    """A whole number."""
+    return {"type": "integer", "description": about}
+
+
+def flag(about: str) -> Schema:
+    """True or false."""
+    return {"type": "boolean", "description": about}
+
+
+def each(item: Schema, about: str) -> Schema:
+    """A list."""
+    return {"type": "array", "items": item, "description": about}
+
+
+def by_name(item: Schema, about: str) -> Schema:
+    """An object with any names."""
+    return {"type": "object", "additionalProperties": item, "description": about}
+
+
+def record(about: str, optional: tuple[str, ...] = (), **keys: Schema) -> Schema:
+    """An object with these keys and no other."""
+    return {
+        "type": "object",
+        "description": about,
+        "properties": keys,
+        "required": [name for name in keys if name not in optional],
+        "additionalProperties": False,
+    }
+
+
+def maybe(schema: Schema) -> Schema:
+    """Or null."""
+    return {"anyOf": [schema, {"type": "null"}], "description": schema["description"]}
+
+
+FILE, OUTPUT = text("the file read"), text("the file written")
+FREQUENCIES = each(number("[Hz]"), "natural frequencies [Hz], ascending")
+REPORT = record(
+    "outcome of checks",
+    title=text("what was checked"),
+    ok=flag("whether every row holds"),
+    rows=each(
+        record(
+            "one check",
+            quantity=text("what"),
+            value=number("its value"),
+            limit=text("its limit in words"),
+            ok=flag("whether it holds"),
+        ),
+        "the checks",
+    ),
+)
+STIFFENED = {"geometric stiffness": each(text("load"), "unit loads it stiffens under")}
+VERBS: dict[str, Schema] = {
+    "doctor": record(
+        "what is installed and works",
+        rom=text("version of rom"),
+        findings=each(
+            record(
+                "one thing looked at",
+                topic=text("heading"),
+                name=text("what"),
+                value=text("version, place or number"),
+                state={"enum": ["ok", "note", "missing", "broken"], "description": "verdict"},
+                advice=text("what to type; empty if nothing"),
+            ),
+            "everything looked at",
+        ),
+    ),
+    "mesh": record(
+        "what a mesh holds",
+        optional=("saved",),
+        file=FILE,
+        cell_type=text("tet4, tet10, hex8 or hex27"),
+        cells=whole("number of cells"),
+        nodes=whole("number of nodes"),
+        box=each(each(number("[m]"), "lowest, highest [m]"), "extent along x, y, z"),
+        volume=number("[m^3]"),
+        regions=by_name(
+            record("a region", cells=whole("number of cells"), volume=number("[m^3]")), "regions"
+        ),
+        interfaces=by_name(
+            record(
+                "an interface",
+                facets=whole("number of facets"),
+                nodes=whole("number of nodes"),
+                middle=each(number("[m]"), "middle of its box [m]"),
+            ),
+            "interfaces",
+        ),
+        quality=by_name(number("figure"), "figures of quality"),
+        saved=text("the file written by --save"),
+    ),
+    "modes": record(
+        "natural modes of the full model",
+        file=FILE,
+        n_dofs=whole("displacement dofs"),
+        mass=number("[kg]"),
+        fixed=each(text("interface"), "interfaces held"),
+        frequencies=FREQUENCIES,
+        residual=each(number("relative"), "relative residual of each mode"),
+    ),
+    "reduce": record(
+        "the reduced body",
+        (),
+        output=OUTPUT,
+        name=text("name of the body"),
+        mass=number("[kg]"),
+        n_modes=whole("elastic coordinates"),
+        reference=text("how its frame follows"),
+        interfaces=each(text("interface"), "names"),
+        frequencies=FREQUENCIES,
+        certificate=maybe(REPORT),
+        provenance={"type": "object", "description": "how it was made"},
+        **STIFFENED,
+    ),
+    "check": record(
+        "checks of a body file",
+        optional=("dialect",),
+        file=FILE,
+        name=text("name of the body"),
+        dialect=text("of a .SID_FEM"),
+        report=REPORT,
+    ),
+    "export": record("a file of another program", file=FILE, output=OUTPUT, format=text("which")),
+    "simulate": record(
+        "a motion",
+        output=text("the table of the motion"),
+        also=each(text("file"), "other files written"),
+        steps=whole("time steps kept"),
+        status=text("how the run ended"),
+        audit=REPORT,
+    ),
+    "view": record(
+        "a picture, or a window that was closed again",
+        file=FILE,
+        output=maybe(text("the picture; null for a window")),
+    ),
+    "report": record(
+        "a report",
+        file=FILE,
+        output=OUTPUT,
+        title=text("its heading"),
+        sections=each(text("heading"), "its parts"),
+    ),
+    "swing": record(
+        "a part on its hinge",
+        files=each(text("file"), "files written"),
+        mass=number("[kg]"),
+        gravity=each(number("[m/s^2]"), "gravity [m/s^2]"),
+        t_end=number("duration [s]"),
+        magnify=number("deformations are drawn so much larger"),
+        frequencies=FREQUENCIES,
+        certificate=REPORT,
+    ),
+    "bench": record(
+        "figures of speed and memory; with --list the benchmarks",
+        optional=("figures", "benchmarks"),
+        benchmarks=by_name(text("what it measures"), "the benchmarks there are"),
+        figures=each(
+            record(
+                "one figure",
+                benchmark=text("its name"),
+                case=text("what was run"),
+                quantity=text("what was measured"),
+                value=number("the number"),
+                unit=text("its unit; empty for a ratio"),
+                aim=text("what it should be; empty if for information"),
+            ),
+            "what was measured",
+        ),
+    ),
+    "completion": record("completion", shell=text("bash or zsh"), text=text("the script")),
+}
+ERROR = record(
+    "an error",
+    ok={"const": False, "description": "nothing was done"},
+    error=text("its class"),
+    message=text("what happened"),
+    hint=text("what to do; may be empty"),
+    exit_code=whole("1 to 7"),
+)
+
+
+def schema(verb: str) -> Schema:
+    """The schema of everything a verb can print with ``--json``: its answer, or an error."""
+    own = VERBS[verb]
+    answer = own | {
+        "properties": {"ok": flag("whether everything holds")}
+        | own["properties"]
+        | {
+            "warnings": each(text("warning"), "what a careful user wants to know"),
+            "failed": each(text("failure"), "what did not hold, if anything"),
+        },
+        "required": ["ok", *own["required"], "warnings"],
+    }
+    return {"$schema": DRAFT, "title": f"rom {verb} --json", "anyOf": [answer, ERROR]}
