@@ -50,7 +50,7 @@ clock = perf_counter()
 sector = rom.substructured_sector(
     full, model, n_modes=40, n_blade_modes=15, functions=rom.Polynomial(6), root=rom.Polynomial(4)
 )
-disk = rom.bladed_wheel(sector, 10)
+disk = rom.bladed_wheel(sector, 10, n_root=30)
 short = rom.reduced_blade(sector, damaged, n_modes=15)
 say(f"sector of {full.free.size} dofs reduced to {sector.free.size}, in "
     f"{perf_counter() - clock:.1f} s; cantilever frequencies [Hz]")  # fmt: skip

@@ -87,6 +87,11 @@ def test_equal_blades_are_the_tuned_wheel(small, disk):
     few = disk.modes([small.blade] * N)[0][:30]
     assert_allclose(few, exact, rtol=5e-4)
     assert np.all(few > exact * (1 - 1e-9))
+    fewer = rom.bladed_wheel(small, 12, n_root=18)
+    assert fewer.roots.shape == (N, small.root.size, N * 18)
+    fewest = fewer.modes([small.blade] * N)[0][:30]
+    assert_allclose(fewest, few, rtol=3e-4)
+    assert np.all(fewest > few * (1 - 1e-9))
 
 
 def test_every_blade_may_be_another_one(model, full, small, disk, short):
@@ -101,6 +106,8 @@ def test_every_blade_may_be_another_one(model, full, small, disk, short):
     found = disk.modes(blades)[0]
     assert_allclose(found[:36], omega[:36], rtol=1e-3)
     assert np.all(found[:36] > omega[:36] * (1 - 1e-9))
+    fewer = rom.bladed_wheel(small, 12, n_root=18).modes(blades)[0]
+    assert_allclose(fewer[:36], omega[:36], rtol=1e-3)
     tip = 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))
     force = np.zeros(full.n)
     force[tip : tip + 3] = 0.3, 0.2, 1.0
@@ -200,6 +207,8 @@ def test_wrong_arguments_are_named(model, full, small, disk):
         disk.modes([small.blade] * 5)
     with pytest.raises(ConfigError, match="n_waves = 1000"):
         rom.bladed_wheel(small, 1000)
+    with pytest.raises(ConfigError, match="n_root = 58: a root has 1 to 57"):
+        rom.bladed_wheel(small, 2, n_root=58)
     drive = {"engine_order": 1, "omega": [1.0], "damping": 1e-3, "at": [0]}
     alike, force = [small.blade] * N, np.zeros(full.n)
     tip = 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))

@@ -1,16 +1,18 @@
 """A disk whose blades are substructures of their own: each with its parameters, or its shape.
 
-The disk alone is cyclic. Each of its harmonics n is condensed to the roots of the blades and a few
-waves with all roots held; the roots then go back from waves r_n to blades r_j::
+The disk alone is cyclic. For each harmonic n it is condensed to the roots of the blades, which move
+by r_j = sum_n exp(i n j alpha) V_n a_n / sqrt(N), and a few waves with all roots held; its matrices
+are diagonal in n, whatever stands on it::
 
-    K_jl = 1/N sum_n exp(i n (j - l) alpha) C_n^H K_n C_n,    C_n = [I; -K_ii^-1 K_ir]
+    K_n = V_n^H C_n^H K C_n V_n,    C_n = [I; -K_ii^-1 K_ir]
 
-which is block-circulant, whatever stands on the disk. The blades add their own matrices to the root
-each of them stands on. Nothing is assumed to be small: a blade may be cracked, or another one.
+The blades add their own matrices to the root each of them stands on. Nothing is assumed to be
+small: a blade may be cracked, or another one.
 
 Source:
     Castanier, Ottarsson and Pierre, A reduced order modeling technique for mistuned bladed disks,
-    J. Vibration and Acoustics 119 (1997) 439; on the disk with waves and fixed roots ours.
+    J. Vibration and Acoustics 119 (1997) 439; Castanier, Tan and Pierre, Characteristic constraint
+    modes for component mode synthesis, AIAA J. 39 (2001) 1182, here of the roots of a wheel.
 """
 
 from collections.abc import Sequence
@@ -19,13 +21,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
+from scipy.linalg import block_diag, eigh
 
 from rom.cyclic.blades import ReducedBlade
 from rom.cyclic.sector import Complex
 from rom.cyclic.substructures import SubstructuredSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Index
+from rom.model import Array
 
 RIGID = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
@@ -36,42 +38,55 @@ class BladedWheel:
 
     Attributes:
         sector: the sector of the tuned wheel.
-        K: (d, d) stiffness of the disk; coordinates are the roots of blades 0 to N - 1, then
-            mass-normalised waves with all roots held.
+        K: (d, d) stiffness of the disk in c coordinates of the roots, then mass-normalised waves
+            with all roots held.
         M: (d, d) its mass.
+        roots: (N, r, c) how the roots of the blades move by these coordinates.
     """
 
     sector: SubstructuredSector
     K: Array
     M: Array
+    roots: Array
 
-    def places(self, blades: Sequence[ReducedBlade]) -> list[Index]:
-        """Coordinates of each blade in those of the wheel: its root, then its cantilever modes.
+    def matrices(self, blades: Sequence[ReducedBlade]) -> tuple[Array, Array]:
+        """Stiffness and mass of the wheel: disk, then the cantilever modes of all blades.
 
         Raises:
             ConfigError: if there is not one blade for each sector, or one has another root.
         """
-        N, r = self.sector.n_sectors, self.sector.root.size
+        N, r, c = self.roots.shape
         if len(blades) != N or any(blade.n_root != r for blade in blades):
             raise ConfigError(
                 f"{len(blades)} blades, with {sorted({b.n_root for b in blades})} root "
                 f"coordinates: give {N} with {r}.",
                 hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
             )
-        first = len(self.K) + np.cumsum([0, *(blade.n_modes for blade in blades)])
-        return [np.r_[j * r : (j + 1) * r, first[j] : first[j + 1]] for j in range(N)]
-
-    def matrices(self, blades: Sequence[ReducedBlade]) -> tuple[Array, Array]:
-        """Stiffness and mass of the wheel: disk, then the cantilever modes of all blades."""
-        places = self.places(blades)
+        X = self.roots.reshape(N * r, c)
+        K, M = (
+            block_diag(disk, *(A[r:, r:] for A in own))
+            for disk, own in ((self.K, [b.K for b in blades]), (self.M, [b.M for b in blades]))
+        )
+        K[:c, :c] += X.T @ np.vstack(
+            [b.K[:r, :r] @ Y for b, Y in zip(blades, self.roots, strict=True)]
+        )
+        M[:c, :c] += X.T @ np.vstack(
+            [b.M[:r, :r] @ Y for b, Y in zip(blades, self.roots, strict=True)]
+        )
+        across = np.hstack([Y.T @ b.M[:r, r:] for b, Y in zip(blades, self.roots, strict=True)])
         d = len(self.K)
-        n = d + sum(blade.n_modes for blade in blades)
-        K, M = np.zeros((n, n)), np.zeros((n, n))
-        K[:d, :d], M[:d, :d] = self.K, self.M
-        for blade, at in zip(blades, places, strict=True):
-            K[np.ix_(at, at)] += blade.K
-            M[np.ix_(at, at)] += blade.M
+        M[:c, d:] = across
+        M[d:, :c] = across.T
         return K, M
+
+    def of_blades(self, blades: Sequence[ReducedBlade], Phi: Array) -> list[Array]:
+        """(r + m, k) per blade: root and cantilever coordinates in k motions Phi (n, k)."""
+        c = self.roots.shape[2]
+        ends = len(self.K) + np.cumsum([blade.n_modes for blade in blades])
+        return [
+            np.vstack([Y @ Phi[:c], Phi[end - blade.n_modes : end]])
+            for blade, Y, end in zip(blades, self.roots, ends, strict=True)
+        ]
 
     def modes(self, blades: Sequence[ReducedBlade]) -> tuple[Array, Array]:
         """Circular frequencies [rad/s] and mass-normalised modes of the wheel with these blades.
@@ -83,7 +98,7 @@ class BladedWheel:
             omega (n,), ascending, and Phi (n, n) in the coordinates of `matrices`.
 
         Raises:
-            ConfigError: see `places`.
+            ConfigError: see `matrices`.
             ModelError: if a motion is left without stiffness.
         """
         lam, Phi = eigh(*self.matrices(blades))
@@ -94,9 +109,9 @@ class BladedWheel:
     def energies(self, blades: Sequence[ReducedBlade], n: int) -> Array:
         """(n, N) share of the strain energy of the blades that each of them has, lowest modes."""
         _, Phi = self.modes(blades)
-        places = self.places(blades)
-        each = np.array([np.einsum("am,ab,bm->m", Phi[at, :n], blade.K, Phi[at, :n])
-                         for blade, at in zip(blades, places, strict=True)])  # fmt: skip
+        each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q)
+                         for blade, q in zip(blades, self.of_blades(blades, Phi[:, :n]),
+                                             strict=True)])  # fmt: skip
         found: Array = (each / each.sum(axis=0)).T
         return found
 
@@ -137,17 +152,17 @@ class BladedWheel:
             )
         N, sweep = self.sector.n_sectors, np.atleast_1d(np.asarray(omega, dtype=float))
         frequencies, Phi = self.modes(blades)
-        places = self.places(blades)
+        moved = self.of_blades(blades, Phi)
         forces, rows = _each(force, N), _each(at, N)
         phase = np.exp(1j * engine_order * self.sector.angle * np.arange(N))
         load = sum(
-            phase[j] * (Phi[places[j]].T @ (blades[j].Psi.T @ _on(blades[j], forces[j], j)))
-            for j in range(N)
+            phase[j] * (q.T @ (blade.Psi.T @ _on(blade, forces[j], j)))
+            for j, (blade, q) in enumerate(zip(blades, moved, strict=True))
         )
         gap = frequencies**2 - sweep[:, None] ** 2
-        q = load / (gap + 2j * damping * sweep[:, None] * frequencies)
-        seen = [_rows(blade, rows[j], j) @ Phi[places[j]] for j, blade in enumerate(blades)]
-        return np.stack([q @ row.T for row in seen], axis=1)
+        amplitude = load / (gap + 2j * damping * sweep[:, None] * frequencies)
+        seen = [_rows(blade, rows[j], j) @ moved[j] for j, blade in enumerate(blades)]
+        return np.stack([amplitude @ row.T for row in seen], axis=1)
 
     def amplification(
         self, blades: Sequence[ReducedBlade], force: Any, *, at: Any, **sweep: Any
@@ -205,57 +220,81 @@ def _rows(blade: ReducedBlade, at: npt.ArrayLike, j: int) -> Array:
     return found
 
 
-def bladed_wheel(sector: SubstructuredSector, n_waves: int) -> BladedWheel:
+def bladed_wheel(
+    sector: SubstructuredSector, n_waves: int, *, n_root: int | None = None
+) -> BladedWheel:
     """The disk of a substructured sector, on which each blade may be another one.
 
     Args:
         sector: made by `rom.substructured_sector`.
-        n_waves: number of waves of the disk for each number of nodal diameters, roots held; of
-            those above twice the highest frequency of interest a few are enough.
+        n_waves: number of waves of the disk for each number of nodal diameters, roots held.
+        n_root: number of shapes of the roots for each, the lowest of the statically condensed
+            tuned wheel (characteristic constraint modes); all of them unless given.
 
     Raises:
         ConfigError: if the disk has not so many.
     """
-    N, r = sector.n_sectors, sector.root.size
-    K, M, omega, coupling = np.zeros((N, r, N, r)), np.zeros((N, r, N, r)), [], []
-    apart = np.subtract.outer(np.arange(N), np.arange(N))
+    j = np.arange(sector.n_sectors)
+    Ks: list[Array] = []
+    Ms: list[Array] = []
+    couplings: list[Array] = []
+    waves, roots = [], []
     for n in sector.diameters:
-        K_n, M_n, w, B = _condensed(sector, n, n_waves)
-        pair = 1 if sector.standing(n) else 2
-        turn = np.exp(1j * n * sector.angle * apart)
-        for whole, part in ((K, K_n), (M, M_n)):
-            whole += pair / N * np.einsum("jl,ab->jalb", turn, part).real
-        wave = np.sqrt(pair / N) * np.einsum("j,aw->jaw", turn[:, 0], B).reshape(N * r, -1)
-        for side in (wave.real, wave.imag)[:pair]:
-            omega.append(w)
-            coupling.append(side)
-    lam, L = np.concatenate(omega) ** 2, np.hstack(coupling)
-    K_disk, M_disk = (A.reshape(N * r, N * r) for A in (K, M))
-    zero = np.zeros(L.shape)
+        standing = sector.standing(n)
+        K, M, omega, B = _condensed(sector, n, n_waves)
+        V = _root_shapes(sector, K, M, n_root)
+        for found, A in ((Ks, K @ V), (Ms, M @ V), (couplings, B)):
+            found.append(_real(V.conj().T @ A, standing))
+        waves += [omega] if standing else [omega, omega]
+        moved = np.exp(1j * n * sector.angle * j)[:, None, None] * V
+        size = np.sqrt((1 if standing else 2) / sector.n_sectors)
+        roots += [size * part for part in (moved.real, moved.imag)[: 1 if standing else 2]]
+    L, omega = block_diag(*couplings), np.concatenate(waves)
     return BladedWheel(
         sector,
-        np.block([[K_disk, zero], [zero.T, np.diag(lam)]]),
-        np.block([[M_disk, L], [L.T, np.eye(lam.size)]]),
+        block_diag(*Ks, np.diag(omega**2)),
+        np.block([[block_diag(*Ms), L], [L.T, np.eye(omega.size)]]),
+        np.concatenate(roots, axis=2),
     )
+
+
+def _real(A: Complex, standing: bool) -> Array:
+    """Of a_n^H A b_n and its conjugate for -n, in (a', a'') of a_n = (a' - i a'') / sqrt(2)."""
+    return A.real if standing else np.block([[A.real, A.imag], [-A.imag, A.real]])
+
+
+def _root_shapes(
+    sector: SubstructuredSector, K: Complex, M: Complex, n_root: int | None
+) -> Complex:
+    """(r, c) shapes of the roots: all, or the lowest with the nominal blades on them."""
+    r = len(K)
+    if n_root is None:
+        return np.eye(r, dtype=complex)
+    if isinstance(n_root, bool) or not 1 <= n_root <= r:
+        raise ConfigError(f"n_root = {n_root!r}: a root has 1 to {r} shapes.")
+    static = (A[:r, :r] for A in (sector.blade.K, sector.blade.M))
+    V = eigh(*(A + own for A, own in zip((K, M), static, strict=True)))[1]
+    return np.asarray(V[:, :n_root], dtype=complex)
 
 
 def _condensed(
     sector: SubstructuredSector, n: int, n_waves: int
 ) -> tuple[Complex, Complex, Array, Complex]:
     """Stiffness and mass (r, r) of roots, waves (w,) with roots held, and their coupling (r, w)."""
-    T = sector.harmonic(n)[:, np.isin(sector.free, sector.cantilever, invert=True)].toarray()
-    root = np.flatnonzero(T[sector.root].any(axis=0))
+    kept = np.isin(sector.free, sector.cantilever, invert=True)
+    T = sector.harmonic(n)[:, kept].toarray()
+    root = np.searchsorted(sector.free[kept], sector.root)
     inner = np.setdiff1d(np.arange(T.shape[1]), root)
     if isinstance(n_waves, bool) or not 0 <= n_waves <= inner.size:
         raise ConfigError(f"n_waves = {n_waves!r}: the disk has 0 to {inner.size} with roots held.")
     K, M = (T.conj().T @ A @ T for A in _disk(sector))
-    K_ii, K_ir = K[np.ix_(inner, inner)], K[np.ix_(inner, root)]
-    C = np.zeros((T.shape[1], root.size), dtype=T.dtype)
+    K_ii = K[np.ix_(inner, inner)]
+    C: Complex = np.zeros((T.shape[1], root.size), dtype=complex)
     C[root] = np.eye(root.size)
-    C[inner] = -np.linalg.solve(K_ii, K_ir)
-    omega2, Phi = eigh(K_ii, M[np.ix_(inner, inner)])
+    C[inner] = -np.linalg.solve(K_ii, K[np.ix_(inner, root)])
+    square, Phi = eigh(K_ii, M[np.ix_(inner, inner)])
     B = C.conj().T @ M[:, inner] @ Phi[:, :n_waves]
-    return C.conj().T @ K @ C, C.conj().T @ M @ C, np.sqrt(omega2[:n_waves]), B
+    return C.conj().T @ K @ C, C.conj().T @ M @ C, np.sqrt(square[:n_waves]), B
 
 
 def _disk(sector: SubstructuredSector) -> tuple[Array, Array]:
