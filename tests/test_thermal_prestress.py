@@ -153,6 +153,9 @@ def test_blades_hotter_than_the_disc_by_region_and_by_node():
     one, other = (rom.heated(model, h).K for h in (by_region, everywhere))
     assert abs(one - model.K).max() > 1e-5 * abs(model.K).max()
     assert_allclose(one.toarray(), other.toarray(), atol=1e-12 * abs(one).max())
+    field = rom.Heat({"blade": 9e-6}, lambda x: 200.0 + 5e3 * x[:, 0])
+    same = replace(field, temperature=200.0 + 5e3 * model.points[:, 0])
+    assert (rom.heated(model, field).K != rom.heated(model, same).K).nnz == 0
     alone = rom.heated(model, rom.Heat(9e-6, 200.0)).K  # all of it hot: free to expand
     assert abs(alone - model.K).max() < 1e-12 * abs(model.K).max()
 
