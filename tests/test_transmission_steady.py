@@ -27,17 +27,16 @@ def found(lossy):
 
 
 def test_it_is_where_motion_through_time_settles(lossy, found):
-    run = simulate(lossy, periods=10, steps=STEPS)
-    last = slice(-STEPS - 1, None)
-    size = np.ptp(found.error)
-    assert_allclose(run.error[last], found.error, atol=0.01 * size)
-    assert_allclose(run.teeth[last], found.teeth, atol=0.01 * found.teeth.max())
+    """But for the little that its steps damp."""
+    run = simulate(lossy, periods=8, steps=STEPS)
+    last, size = slice(-STEPS - 1, None), np.ptp(found.error)
+    assert_allclose(run.error[last], found.error, atol=0.025 * size)
+    assert_allclose(run.teeth[last], found.teeth, atol=0.05 * found.teeth.max())
     first = np.abs(run.error[: STEPS + 1] - found.error).max()
-    assert first > 0.03 * size  # it has settled, it did not start there
-    assert found.error_rms == pytest.approx(np.std(run.error[last][1:]), rel=0.01)
-    assert found.load_factor == pytest.approx(
-        run.teeth[last].max() / run.teeth[last][1:].mean(), rel=0.01
-    )
+    assert first > 0.05 * size  # it has settled, it did not start there
+    assert found.error_rms == pytest.approx(np.std(run.error[last][1:]), rel=0.02)
+    top = run.teeth[last].max() / run.teeth[last][1:].mean()
+    assert found.load_factor == pytest.approx(top, rel=0.03)
 
 
 def test_it_ends_as_it_began(found):

@@ -159,9 +159,17 @@ class Step:
         q: Array,
         theta: float,
         v: Array | None = None,
+        *,
         enough: float = ENOUGH,
+        alpha: float = 0.0,
     ):
-        self.enough = enough
+        """Start from balance; alpha from -1/3 to 0 damps what steps do not resolve.
+
+        Source:
+            Hilber, Hughes and Taylor, Earthq. Eng. Struct. Dyn. 5 (1977) 283.
+        """
+        self.enough, self.alpha = enough, alpha
+        self.beta, self.gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
         self.unit, self.q, self.v = unit, q, np.zeros(q.size) if v is None else v
         self.M, self.K, self.G = unit.matrices
         self.C = unit.loss * self.K + self.G
@@ -178,22 +186,21 @@ class Step:
         shafts = -self.K @ q - self.C @ v - drive
         return np.stack([drive, self.unit.load, self.now.force - teeth, teeth, shafts])
 
-    def advance(self, dt: float, theta: float) -> None:
-        """One step of average acceleration."""
-        unit, before, q0, v0, a0 = self.unit, self._parts(self.q, self.v), self.q, self.v, self.a
-        ahead, size = dt * v0 + dt**2 / 4 * a0, np.abs(before).max()
+    def advance(self, dt: float, theta: float, guess: Array | None = None) -> None:
+        """One step of average acceleration, to the drive's angle; a guess of q saves iterations."""
+        unit, before, q0 = self.unit, self._parts(self.q, self.v), self.q
+        self.last = self.now
+        old, size, now = -self.alpha * before.sum(axis=0), np.abs(before).max(), 1 + self.alpha
+        ahead = guess - q0 if guess is not None else dt * self.v + dt**2 / 4 * self.a
         q = q0 + unit.allowed(q0, ahead) * ahead
-        linear = 4 / dt**2 * self.M + 2 / dt * self.C + self.K
         for _ in range(TIMES):
-            v = 2 / dt * (q - q0) - v0
-            a = 2 / dt * (v - v0) - a0
+            v, a = self._rates(dt, q - q0, self.v, self.a)
             self.now = unit.forces(q, v, theta, self.now.films)
-            R = unit.load + self.now.force - self.K @ q - self.C @ v - self.M @ a
+            R = now * (unit.load + self.now.force - self.K @ q - self.C @ v) + old - self.M @ a
             self.iterations += 1
             if np.abs(R).max() < self.enough * size:
                 break
-            J = linear + self.now.stiffness + 2 / dt * self.now.damping
-            d = np.linalg.solve(J, R)
+            d = np.linalg.solve(self._jacobian(dt), R)
             q = q + unit.allowed(q, d) * d
         else:
             raise SolverError(
@@ -204,6 +211,17 @@ class Step:
         mean = (before + self._parts(q, v)) / 2
         self.work = self.work + mean @ (q - q0 + dt * self.spin)
 
+    def _rates(self, dt: float, moved: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        """Newmark's v and a after a step that moved so far, from those before it."""
+        new = (moved - dt * v) / (self.beta * dt**2) - (0.5 / self.beta - 1) * a
+        return v + dt * ((1 - self.gamma) * a + self.gamma * new), new
+
+    def _jacobian(self, dt: float) -> Array:
+        """(n, n) minus the derivative of what is not balanced, by q."""
+        K = self.K + self.now.stiffness
+        K = K + self.gamma / (self.beta * dt) * (self.C + self.now.damping)
+        return self.M / (self.beta * dt**2) + (1 + self.alpha) * K
+
     def first_tangents(self) -> tuple[Array, Array, Array]:
         """(n, 2n) derivatives of q, v and a by q and v, where a motion starts."""
         n, C, K = self.q.size, self.C + self.now.damping, self.K + self.now.stiffness
@@ -212,12 +230,14 @@ class Step:
     def carried(self, dt: float, D: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
         """Derivatives of q, v and a after the last step, from those before it."""
         q, v, a = D
+        still = self._rates(dt, np.zeros_like(q), v, a)
         C, K = self.C + self.now.damping, self.K + self.now.stiffness
-        J = 4 / dt**2 * self.M + 2 / dt * C + K
-        b = self.M @ (4 / dt**2 * q + 4 / dt * v + a) + C @ (2 / dt * q + v)
-        new = np.linalg.solve(J, b)
-        moved = 2 / dt * (new - q)
-        return new, moved - v, 2 / dt * (moved - 2 * v) - a
+        R = -(1 + self.alpha) * (K @ q + C @ still[0]) - self.M @ still[1]
+        if self.alpha:
+            C, K = self.C + self.last.damping, self.K + self.last.stiffness
+            R += self.alpha * (K @ q + C @ v)
+        moved = np.linalg.solve(self._jacobian(dt), R)
+        return q + moved, *self._rates(dt, moved, v, a)
 
     def row(self) -> tuple:
         """What a run remembers of this moment."""

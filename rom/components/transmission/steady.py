@@ -16,6 +16,7 @@ from rom.errors import ModelError, SolverError
 from rom.model import Array
 
 PASSES, ENOUGH, PRECISE = 40, 1e-6, 1e-7  # periods; of the motion; of forces in a step
+DAMPED = -0.05  # films are so stiff that without it rates alternate from step to step
 
 
 @dataclass(frozen=True)
@@ -94,19 +95,20 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
         )
     q, v = (start.q, np.zeros(start.q.size)) if isinstance(start, Rest) else (
         start.q[0], start.v[0])  # fmt: skip
-    n, last, dt = q.size, np.inf, unit.mesh_period / steps
+    n, last, dt, guess = q.size, np.inf, unit.mesh_period / steps, None
     for count in range(1, PASSES + 1):
-        rows, F = _period(unit, q, v, start.theta, steps)
+        rows, F, Q = _period(unit, q, v, start.theta, steps, guess)
         ends = np.array([rows[-1][k] - rows[0][k] for k in (0, 1)])
         gap = float(np.abs(ends * [[1.0], [unit.mesh_period]]).max() / np.abs(q).max())
         if gap < ENOUGH:
             return _found(unit, start.theta, rows, F, count, gap)
         if gap > last:
-            q, v, last = rows[-1][0], rows[-1][1], np.inf
+            q, v, last, guess = rows[-1][0], rows[-1][1], np.inf, None
             continue
         last, change = gap, np.linalg.solve(np.eye(2 * n) - F, ends.ravel())
-        share = min(unit.allowed(q, change[:n]), unit.allowed(q, dt * change[n:]))
-        q, v = q + share * change[:n], v + share * change[n:]
+        change *= min(unit.allowed(q, change[:n]), unit.allowed(q, dt * change[n:]))
+        q, v = q + change[:n], v + change[n:]
+        guess = np.array([row[0] for row in rows]) + Q @ change
     raise SolverError(
         f"no motion repeats with the mesh at {unit.speed:.1f} rad/s: after {PASSES} periods "
         f"{gap:.1e} of the motion are left.",
@@ -136,16 +138,27 @@ def sweep(unit: Transmission, speeds: Iterable[float], *, steps: int = 60) -> li
 
 
 def _period(
-    unit: Transmission, q: Array, v: Array, theta: float, steps: int
-) -> tuple[list[tuple], Array]:
-    """What happens at every step, and the (2n, 2n) derivatives of the end by the start."""
-    step, dt = Step(unit, q, theta, v, enough=PRECISE), unit.mesh_period / steps
+    unit: Transmission,
+    q: Array,
+    v: Array,
+    theta: float,
+    steps: int,
+    guess: Array | None = None,
+) -> tuple[list[tuple], Array, Array]:
+    """What happens at every step, and derivatives by the start: of the end, of q at every step.
+
+    The derivatives are (2n, 2n) and (steps + 1, n, 2n), the guess is (steps + 1, n).
+    """
+    step, dt = Step(unit, q, theta, v, enough=PRECISE, alpha=DAMPED), unit.mesh_period / steps
     rows, D = [step.row()], step.first_tangents()
-    for k in range(steps):
-        step.advance(dt, theta + unit.speed * (k + 1) * dt)
+    Q = [D[0]]
+    for k in range(1, steps + 1):
+        near = None if guess is None else guess[k]
+        step.advance(dt, theta + unit.speed * k * dt, near)
         rows.append(step.row())
         D = step.carried(dt, D)
-    return rows, np.vstack(D[:2])
+        Q.append(D[0])
+    return rows, np.vstack(D[:2]), np.array(Q)
 
 
 def _found(
