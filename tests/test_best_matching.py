@@ -463,6 +463,13 @@ def test_time_is_read_off_a_stack_of_pictures(janus):
         (lambda: match(np.ones(2), CORNERS, CORNERS), ConfigError, r"shape \(2,\) does not fit 9"),
         (lambda: match(MASS, CORNERS, CORNERS[:2]), ConfigError, "6 velocities do not fit 9"),
         (lambda: frame(MASS, line(0, 1, 3), line(0, 1, 3)), ModelError, "no rotation is better"),
+        (lambda: frame(MASS, CORNERS, CORNERS[:2]), ConfigError, "2 particles cannot be laid"),
+        (lambda: match(MASS, np.nan * CORNERS, CORNERS), ConfigError, "entries that are not"),
+        (lambda: stacked(MASS, CORNERS), ConfigError, r"a film has .* not \(3, 3\)"),
+        (lambda: emergent_rate(MASS, CORNERS, CORNERS, -1.0), ModelError, "E - V = -1 J"),
+        (lambda: Bodies(MASS).potential(CORNERS[:2]), ConfigError, "2 positions or .* of 3 bodies"),
+        (lambda: Bodies(MASS).complexity(0 * CORNERS), ModelError, "in the same place"),
+        (lambda: Bodies(MASS).move(CORNERS, CORNERS[:2], [0.0, 1.0]), ConfigError, "of 3 bodies"),
         (
             lambda: Bodies(MASS).at_rest_as_a_whole(CORNERS, np.ones((3, 3))),
             ModelError, "velocities are a rigid motion",
