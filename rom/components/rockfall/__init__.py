@@ -1,0 +1,34 @@
+"""Rockfall on a gallery: boulder, cushion, plug and slab, after Schellenberg, Kishi and Kon-No.
+
+Three masses and three springs: the boulder m_1 presses the cushion (1), the cushion a plug m_2 of
+cushion and concrete, the plug shears (2) into the slab m_3, which bends (3)::
+
+    m_1 z_1'' = m_1 g - F_1(z_1 - z_2)
+    m_2 z_2'' = F_1 - F_2(z_2 - z_3)
+    m_3 z_3'' = F_2 - F_3(z_3)
+
+z points down and counts from contact; plug and slab rest in balance with their weight. The modes
+of a slab, such as those of a reduced finite element body, can take the place of the last mass:
+q'' + 2 zeta omega q' + omega^2 q = phi F_2, z_3 = phi . q.
+
+The laws are simple ones chosen here; no parameter and no result of a test is reproduced.
+
+Source:
+    After Schellenberg, On the design of rockfall protection galleries, ETH Zurich (2009), and
+    Schellenberg, Kishi and Kon-No on its use for a large-scale test, of which the abstract alone
+    was read. Hertz: Johnson, Contact Mechanics (1985).
+"""
+
+from rom.components.rockfall.impact import Gallery, Impact, Slab, sensitivity, strike
+from rom.components.rockfall.laws import Cushion, CushionForce, Shear
+
+__all__ = [
+    "Cushion",
+    "CushionForce",
+    "Gallery",
+    "Impact",
+    "Shear",
+    "Slab",
+    "sensitivity",
+    "strike",
+]

@@ -1,0 +1,135 @@
+"""What cushion and plug answer to being pressed."""
+
+from dataclasses import astuple, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from rom.components.rockfall import kernels
+from rom.errors import ConfigError
+from rom.model import Array
+
+ROCK = 2600.0  # kg/m^3
+
+
+@dataclass(frozen=True, slots=True)
+class Cushion:
+    """Resistance of the cushion to penetration d; it cannot pull.
+
+    Loading k d^n / (1 - d / limit)^m; below the deepest penetration so far a share of it recovers,
+    F_max ((d - d_r) / (d_max - d_r))^n with d_r = (1 - recovery) d_max.
+
+    Attributes:
+        stiffness: k [N/m^n].
+        exponent: n; 3/2 for a sphere after Hertz, 1 for a spring.
+        recovery: share of the penetration that comes back, in (0, 1]; 1 is elastic.
+        limit: penetration at which the compacted cushion is rigid [m].
+        hardening: m of the compaction, 0 for none.
+
+    Raises:
+        ConfigError: for a number out of its range.
+    """
+
+    stiffness: float
+    exponent: float = 1.5
+    recovery: float = 1.0
+    limit: float = np.inf
+    hardening: float = 0.0
+
+    def __post_init__(self) -> None:
+        good = self.stiffness > 0 and self.limit > 0 and 0 < self.recovery <= 1
+        if not (good and self.exponent >= 1 and self.hardening >= 0):
+            needed = "stiffness and limit > 0, 0 < recovery <= 1, exponent >= 1, hardening >= 0"
+            raise ConfigError(f"{self}: needed are {needed}.")
+
+    @classmethod
+    def of_sand(cls, boulder: float, lame: float, *, rock: float = ROCK, **more: Any) -> "Cushion":
+        """Hertz's half space, with equal Lame constants, under a spherical boulder.
+
+        Its largest force is P = 2.108 (m g)^(2/3) lame^(2/5) H^(3/5) in t, m and kN, the formula
+        of the Japanese handbook.
+
+        Args:
+            boulder: mass [kg].
+            lame: Lame constant of the sand [Pa]; nu = 1/4, E = 2.5 lame.
+            rock: density of the boulder [kg/m^3].
+            more: further attributes.
+
+        Raises:
+            ConfigError: if a number is not positive.
+        """
+        if not (boulder > 0 and lame > 0 and rock > 0):
+            raise ConfigError(
+                f"boulder = {boulder} kg, lame = {lame} Pa, rock = {rock} kg/m^3: all must be > 0."
+            )
+        radius = (3 * boulder / (4 * np.pi * rock)) ** (1 / 3)
+        return cls(4 / 3 * 2.5 * lame / (1 - 0.25**2) * np.sqrt(radius), **more)
+
+    def force(self, d: float, deepest: float = 0.0) -> float:
+        """Force [N] at penetration d after it has been as deep as ``deepest`` [m]."""
+        law = tuple(map(float, astuple(self)))
+        return kernels.cushion(float(d), float(max(d, deepest)), law)
+
+    def penetration(self, energy: float) -> float:
+        """Penetration [m] at which loading has taken up an energy [J].
+
+        Raises:
+            ConfigError: for a negative energy.
+        """
+        if not 0 <= energy < np.inf:
+            raise ConfigError(f"energy = {energy} J: the cushion takes up what the boulder has.")
+        n = self.exponent + 1
+        high = min((n * energy / self.stiffness) ** (1 / n), self.limit * (1 - 1e-9))
+        rest = lambda d: quad(self.force, 0, d, limit=200)[0] - energy  # noqa: E731
+        return float(brentq(rest, 0, high) if self.hardening > 0 < rest(high) else high)
+
+
+@dataclass(frozen=True, slots=True)
+class Shear:
+    """Resistance of the plug to being pushed through the slab.
+
+    Attributes:
+        stiffness: of the uncracked concrete [N/m].
+        capacity: force at which it cracks [N].
+        reinforced: stiffness left to the reinforcement then [N/m].
+        ultimate: deformation at which that fails, too: the slab is punched [m].
+        damping: share of critical damping of the plug on the uncracked concrete alone.
+
+    Raises:
+        ConfigError: for a number out of its range.
+    """
+
+    stiffness: float
+    capacity: float = np.inf
+    reinforced: float = 0.0
+    ultimate: float = np.inf
+    damping: float = 0.05
+
+    def __post_init__(self) -> None:
+        good = self.stiffness > 0 and self.capacity > 0 and self.ultimate > 0
+        if not (good and self.reinforced >= 0 and self.damping >= 0):
+            needed = "stiffness, capacity, ultimate > 0, reinforced, damping >= 0"
+            raise ConfigError(f"{self}: needed are {needed}.")
+
+
+class CushionForce:
+    """The cushion between two markers of a mechanism, for one run of ``mechanism.user_force``.
+
+    Args:
+        cushion: its law.
+        down: (3,) direction of the blow, world.
+        gap: distance of the markers along it before contact [m].
+    """
+
+    def __init__(self, cushion: Cushion, down: Any, gap: float):
+        self.cushion, self.down, self.gap = cushion, np.asarray(down, dtype=float), gap
+        self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0
+
+    def __call__(self, t: float, boulder: Any, below: Any) -> tuple[Array, Array]:
+        """Force and moment on the boulder; only a step that has ended leaves a trace."""
+        if t > self.t:
+            self.t, self.deepest = t, max(self.deepest, self.trial)
+        self.trial = self.gap - float((below.position - boulder.position) @ self.down)
+        return -self.cushion.force(self.trial, self.deepest) * self.down, np.zeros(3)
