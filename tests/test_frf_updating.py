@@ -403,6 +403,23 @@ def test_a_wing_alone_is_a_free_beam():
         (lambda: update_by_input(AtSensors(BEAM), measured(), START, GUESS, rank=9), "rank = 9"),
         (lambda: AtSensors(BEAM.in_basis(np.eye(48)[:, ::-1] * 2)).at(START), "no dofs"),
         (lambda: modal(BEAM, np.ones(60)), "60 damping ratios"),
+        (lambda: Measurement(OMEGA, EXACT, (2, 8)), r"inputs = \(2, 8\) of the sensors 0 to 7"),
+        (lambda: measured(weights=np.ones(7)), r"weights \(7,\) fit neither"),
+        (lambda: responses(BEAM, START, GUESS, OMEGA, (2, 99)), r"inputs = \(2, 99\)"),
+        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "at finite omega"),
+        (lambda: update_by_output(BEAM, measured(), START, -GUESS), "ratios to start from"),
+        (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), "9 of them"),
+        (
+            lambda: update_by_output(BEAM, Measurement(OMEGA, EXACT[:, :5], (2, 4)), START, GUESS),
+            "8 sensors, the test 5",
+        ),
+        (lambda: response_function_method(BEAM, measured(), START, np.eye(3)), "3\\) for 48 dofs"),
+        (lambda: response_function_method(BEAM, measured(), START, BEAM.K, steps=0), "0 steps"),
+        (lambda: parametric_basis(BEAM, 0, START), "n_modes = 0"),
+        (lambda: data.noisy(EXACT, -0.1, np.random.default_rng(0)), "level = -0.1"),
+        (lambda: data.random_error(0.5, 0), "n_averages = 0"),
+        (lambda: data.beside_poles(OMEGA, [1.0, 2.0], [0.1], 30.0), "2 poles"),
+        (lambda: data.frac(EXACT, EXACT[:3]), "cannot be compared"),
     ],
 )
 def test_wrong_input_is_named(change, message):
@@ -415,3 +432,5 @@ def test_a_structure_that_lost_its_stiffness_is_refused():
         modal(BEAM.at([-2.0] * 6 + [0.0] * 3), [])
     with pytest.raises(ModelError, match="mass matrix"):
         modal(BEAM.at([0.0] * 6 + [-2.0] * 3), [])
+    with pytest.raises(ModelError, match=r"n_rigid = 2, .* 137.1 rad/s: the structure is held"):
+        modal(ParametricModel(BEAM.K, BEAM.M, BEAM.dK, BEAM.dM, BEAM.sensors, 2), [])

@@ -11,7 +11,13 @@ PERFECT = 1e-6  # coherence is not believed to be closer to 0 or 1
 
 
 def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
-    """H with complex Gaussian errors of a relative standard deviation, any shape."""
+    """H with complex Gaussian errors of a relative standard deviation, any shape.
+
+    Raises:
+        ConfigError: for a negative level.
+    """
+    if not (np.asarray(level) >= 0).all():
+        raise ConfigError(f"level = {level}: noise has a standard deviation of zero or more.")
     real, imaginary = rng.standard_normal((2, *H.shape))
     return H * (1 + level * (real + 1j * imaginary) / np.sqrt(2))
 
@@ -40,9 +46,14 @@ def estimators(x: Complex, f: Complex) -> tuple[Complex, Complex, Complex, Array
 def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
     """Relative standard deviation of |H1| under noise on the response.
 
+    Raises:
+        ConfigError: without averages.
+
     Source:
         Bendat and Piersol, Random data: sqrt((1 - g^2) / (2 n g^2)) with the coherence g^2.
     """
+    if n_averages < 1:
+        raise ConfigError(f"n_averages = {n_averages}: one or more.")
     g2 = np.asarray(coherence, dtype=float)
     return np.sqrt((1 - g2) / (2 * n_averages * g2))
 
@@ -61,14 +72,25 @@ def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width:
         poles: (m,) natural frequencies [rad/s].
         zeta: (m,) their damping ratios, roughly.
         width: number of half bandwidths zeta omega from where on lines count fully.
+
+    Raises:
+        ConfigError: if poles and ratios differ in number, or a bandwidth is not positive.
     """
+    if np.shape(poles) != np.shape(zeta) or not (width * np.asarray(zeta) > 0).all():
+        raise ConfigError(f"{np.size(poles)} poles, zeta = {zeta}, width = {width}: all positive.")
     reach = width * np.asarray(zeta) * np.asarray(poles)
     far = np.abs(omega[:, None] - np.asarray(poles)) / reach
     return np.minimum(far, 1.0).prod(axis=1)[:, None, None]
 
 
 def frac(H: Complex, G: Complex) -> Array:
-    """(n_s, n_e) frequency response assurance over the lines of H, G (n_f, n_s, n_e), in [0, 1]."""
+    """(n_s, n_e) frequency response assurance over the lines of H, G (n_f, n_s, n_e), in [0, 1].
+
+    Raises:
+        ConfigError: if the shapes differ.
+    """
+    if np.shape(H) != np.shape(G):
+        raise ConfigError(f"responses {np.shape(H)} and {np.shape(G)} cannot be compared.")
     cross = np.abs((H.conj() * G).sum(axis=0)) ** 2
     return cross / (np.abs(H) ** 2).sum(axis=0) / (np.abs(G) ** 2).sum(axis=0)
 

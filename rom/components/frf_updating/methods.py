@@ -1,134 +1,29 @@
-"""Updating of a model by measured frequency responses, after Berriet, Fillod and Bouhaddi.
-
-Unknown are relative changes of stiffness and mass and the damping ratios of the modes. The model
-can be condensed to the sensors, and test and model together to one common basis.
-"""
+"""Least squares over responses and over equations, and the response function method."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from rom.errors import ConfigError, ModelError
+from rom.components.frf_updating.models import (
+    AtSensors,
+    Complex,
+    Measurement,
+    Modal,
+    Model,
+    ParametricModel,
+    modal,
+    sensor_dofs,
+)
+from rom.errors import ConfigError
 from rom.model import Array
-from rom.reduction.fixed_interface import craig_bampton
 
-Complex = NDArray[np.complex128]
-DEPENDENT = 1e-7  # singular value of a basis, relative, below which a column says nothing new
 EVALUATIONS = 100  # of the responses; what has not converged by then started too far away
 STEPS, CLIP = 40, 0.2  # linear solutions, and the largest change of a parameter in each
 LEAST = -0.95  # a change that leaves a twentieth of the stiffness or mass
 EQUAL = 1e-12  # relative distance of eigenvalues that are one; their modes have no derivative
-
-
-@dataclass(frozen=True, slots=True)
-class ParametricModel:
-    """K(p) = K + sum p_i dK_i and M(p) = M + sum p_i dM_i, seen at sensors.
-
-    Attributes:
-        K: (n, n) stiffness at p = 0 [N/m].
-        M: (n, n) mass at p = 0 [kg].
-        dK: (n_p, n, n) what each parameter adds to K; zeros where it does not.
-        dM: (n_p, n, n) what each parameter adds to M.
-        sensors: (n_s, n) rows that give the measured displacements.
-        n_rigid: number of rigid motions, 0 for a supported and 6 for a free structure.
-    """
-
-    K: Array
-    M: Array
-    dK: Array
-    dM: Array
-    sensors: Array
-    n_rigid: int = 0
-
-    def __post_init__(self) -> None:
-        n, n_p = len(self.K), len(self.dK)
-        wanted = {"M": (n, n), "dK": (n_p, n, n), "dM": (n_p, n, n)}
-        wanted["sensors"] = (len(self.sensors), n)
-        for name, shape in wanted.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise ConfigError(f"{name} is {found} where {shape} belongs to {n} dofs.")
-
-    def at(self, p: ArrayLike) -> "ParametricModel":
-        """The model with its origin at p (n_p,)."""
-        p = np.asarray(p, dtype=float)
-        if p.shape != (len(self.dK),):
-            raise ConfigError(f"p has the shape {p.shape}; the model has {len(self.dK)} of them.")
-        K, M = (A + np.tensordot(p, dA, 1) for A, dA in ((self.K, self.dK), (self.M, self.dM)))
-        return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
-
-    def in_basis(self, T: Array) -> "ParametricModel":
-        """The model reduced to u = T a, T (n, r) the same for all p: fast, still parametric."""
-        K, M, dK, dM = (T.T @ A @ T for A in (self.K, self.M, self.dK, self.dM))
-        return ParametricModel(K, M, dK, dM, self.sensors @ T, self.n_rigid)
-
-
-@dataclass(frozen=True, slots=True)
-class AtSensors:
-    """A parametric model condensed statically to its sensors, anew for each p.
-
-    With T = [1; -K_oo^-1 K_os] the stiffness at the sensors has the derivative T^T dK T, and the
-    mass also that of T. What is between the sensors follows them statically, so that frequencies
-    are too high however good the data.
-
-    Attributes:
-        full: the model; its sensors are dofs.
-    """
-
-    full: ParametricModel
-
-    def at(self, p: ArrayLike) -> ParametricModel:
-        """The condensed model with its origin at p and the derivatives there.
-
-        Raises:
-            ConfigError, ModelError: if sensors are no dofs, or do not hold the structure.
-        """
-        model = self.full.at(p)
-        s = _sensor_dofs(model)
-        o = np.setdiff1d(np.arange(len(model.K)), s)
-        try:
-            K_oo = cho_factor(model.K[np.ix_(o, o)])
-        except LinAlgError as error:
-            raise ModelError("held at its sensors, the structure can still move.") from error
-        T = np.zeros((len(model.K), s.size))
-        T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
-        dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
-        moved = np.swapaxes(dT, 1, 2) @ (model.M @ T)[o]
-        K, M, dK, dM = (T.T @ A @ T for A in (model.K, model.M, model.dK, model.dM))
-        dM = dM + moved + np.swapaxes(moved, 1, 2)
-        return ParametricModel(K, M, dK, dM, np.eye(s.size), model.n_rigid)
-
-
-Model = ParametricModel | AtSensors
-
-
-@dataclass(frozen=True, slots=True)
-class Measurement:
-    """Measured receptances.
-
-    Attributes:
-        omega: (n_f,) circular frequencies [rad/s].
-        H: (n_f, n_s, n_e) displacement at each sensor per unit force at each exciter [m/N];
-            a sensor that symmetry keeps at rest has only noise to say and is left out.
-        inputs: (n_e,) which sensors have an exciter.
-        weights: (n_f, n_s, n_e), (n_f, 1, 1) or one number: how far to trust each value.
-    """
-
-    omega: Array
-    H: Complex
-    inputs: tuple[int, ...]
-    weights: Any = 1.0
-
-    def __post_init__(self) -> None:
-        if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
-            n = (len(self.omega), len(self.inputs))
-            raise ConfigError(f"H is {np.shape(self.H)} for {n[0]} frequencies, {n[1]} exciters.")
-        if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
-            raise ConfigError("H has entries that are zero or not finite: a dead channel.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,65 +45,21 @@ class Update:
     residual: float
 
 
-@dataclass(frozen=True, slots=True)
-class Modal:
-    """A model in its own modes: Z^-1 = Phi diag(g(omega)) Phi^T with modal damping.
-
-    Attributes:
-        lam: (n,) eigenvalues [rad^2/s^2].
-        Phi: (n, n) modes, mass-normalised.
-        d: (n,) damping 2 zeta omega [rad/s] of each mode.
-    """
-
-    lam: Array
-    Phi: Array
-    d: Array
-
-    def g(self, omega: Array) -> Complex:
-        """(n_f, n) receptance of each mode."""
-        w = omega[:, None]
-        return 1.0 / (self.lam - w**2 + 1j * w * self.d)
-
-
-def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
-    """Modes of a model at its origin; zeta (m,) for the lowest elastic ones, the others undamped.
-
-    Raises:
-        ConfigError, ModelError: for more ratios than modes; for mass or stiffness not positive.
-    """
-    try:
-        lam, Phi = eigh(model.K, model.M)
-    except LinAlgError as error:
-        raise ModelError("the changes leave a mass matrix that is not positive.") from error
-    elastic = slice(model.n_rigid, None)
-    lam[: model.n_rigid] = 0.0
-    if not (lam[elastic] > 0).all():
-        raise ModelError(
-            f"{model.n_rigid} rigid motions leave the eigenvalue {lam[elastic].min():.3g}"
-            " rad^2/s^2: the stiffness is not positive."
-        )
-    zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
-    if zeta.size > lam.size - model.n_rigid:
-        raise ConfigError(f"{zeta.size} damping ratios for {lam.size - model.n_rigid} modes.")
-    damped = slice(model.n_rigid, model.n_rigid + zeta.size)
-    d[damped] = 2 * zeta * np.sqrt(lam[damped])
-    return Modal(lam, Phi, d)
-
-
-def damping_matrix(model: ParametricModel, zeta: ArrayLike) -> Array:
-    """(n, n) C = sum 2 zeta omega (M phi)(M phi)^T at the origin of the model [N s/m]."""
-    modes = modal(model, zeta)
-    return (model.M @ modes.Phi * modes.d) @ (model.M @ modes.Phi).T
-
-
 def responses(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> Complex:
     """Receptances (n_f, n_s, n_e) [m/N] at the sensors, for forces at the sensors ``inputs``.
 
     Parameters p (n_p,), damping ratios zeta (m,) of the lowest elastic modes, omega (n_f,) [rad/s].
+
+    Raises:
+        ConfigError: for an input that is no sensor, or a frequency that is not finite.
     """
     here = model.at(p)
+    if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
+        raise ConfigError(
+            f"inputs = {inputs} of the sensors 0 to {len(here.sensors) - 1}, at finite omega."
+        )
     return _receptance(here, modal(here, zeta), omega, inputs)
 
 
@@ -280,6 +131,7 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
 
     Each value counts by its relative error, so that antiresonances weigh as much as resonances.
     """
+    test.check(model, zeta)
     n_p, path = np.size(p), []
 
     def residual(x: Array) -> Array:
@@ -309,6 +161,7 @@ def update_by_input(
     are condensed with it. The rank, at most the number of sensors, must reach the number of modes
     in the band. Otherwise as `update_by_output`.
     """
+    test.check(model, zeta)
     if not 1 <= rank <= test.H.shape[1]:
         raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
     p, zeta = np.array(p, dtype=float), np.array(zeta, dtype=float)
@@ -338,10 +191,19 @@ def response_function_method(
     follow the measured ones as the model at the last p says. Of several steps none changes a
     parameter by more than 0.2. The damping C (n, n) [N s/m] is known, sensors are dofs.
 
+    Raises:
+        ConfigError: if damping or sensors do not fit the model, or without a step.
+
     Source:
         The identity is that of the response function method of Lin and Ewins.
     """
-    p, path, s = np.array(p, dtype=float), [], _sensor_dofs(model)
+    test.check(model)
+    if np.shape(C) != model.K.shape or steps < 1:
+        raise ConfigError(
+            f"C is {np.shape(C)} for {len(model.K)} dofs, with {steps} steps: square, and one or "
+            "more."
+        )
+    p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
     clip = CLIP if steps > 1 else np.inf
     o = np.setdiff1d(np.arange(len(model.K)), s)
     w = test.omega[:, None, None]
@@ -368,15 +230,6 @@ def common_basis(test: Complex, model: Complex, rank: int) -> Array:
     return np.linalg.svd(np.hstack([Y.real, Y.imag]), full_matrices=False)[0][:, :rank]
 
 
-def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -> Array:
-    """(n, r) basis for a range of p: Craig-Bampton at samples (k, n_p), held at the sensors."""
-    s = _sensor_dofs(model)
-    at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]
-    Psi = np.hstack([craig_bampton(here.K, here.M, s, n_modes).Psi for here in at])
-    U, size, _ = np.linalg.svd(Psi / np.linalg.norm(Psi, axis=0), full_matrices=False)
-    return U[:, size > DEPENDENT * size[0]]
-
-
 def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update:
     variance = (r @ r) / max(r.size - x.size, 1)
     spread = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)) * variance)
@@ -390,10 +243,3 @@ def _weighted(weights: Any, r: Complex) -> Array:
         return np.concatenate([(part * weights).ravel() for part in (r.real, r.imag)])
     weights = weights[..., None] if weights.ndim else weights
     return np.vstack([(part * weights).reshape(-1, r.shape[-1]) for part in (r.real, r.imag)])
-
-
-def _sensor_dofs(model: ParametricModel) -> Any:
-    s = model.sensors.argmax(axis=1)
-    if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
-        raise ConfigError("the sensors are no dofs of the model; condense before reducing.")
-    return s
