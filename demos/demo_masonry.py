@@ -63,7 +63,7 @@ def thinnest(n, friction, accuracy=1e-5):
 
 
 frictions = np.array(
-    [0.311, 0.315, 0.32, 0.33, 0.34, 0.35, 0.36, 0.37, 0.38, 0.39, 0.4, 0.43, 0.46]
+    [0.311, 0.315, 0.32, 0.33, 0.34, 0.35, 0.36, 0.37, 0.38, 0.39, 0.395, 0.4, 0.43, 0.46]
 )
 needed = np.array([thinnest(40, mu, 1e-4) for mu in frictions])
 for mu, ratio in zip(frictions, needed, strict=True):

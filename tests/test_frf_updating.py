@@ -370,6 +370,26 @@ def test_joints_lower_the_seventh_frequency_and_hardly_any_other():
     assert drop[6] == pytest.approx(0.143, abs=2e-3) and np.delete(drop, 6).max() < 0.015
 
 
+def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
+    """What updating is for on this structure; a basis of free modes serves for both parameters."""
+    bed = aircraft.airframe(0.2, joints=6e5)
+    K, M = sum(bed.K.values()), sum(bed.M.values())
+    dK = np.array([bed.K["wing", "joint"], bed.K["wing", "torsion"]])
+    places = [((0.2, 0.95, 0.106), 2), ((-0.2, -0.95, 0.106), 2), ((0, 0.95, 0.096), 0),
+              ((0.6, 0, 0), 1), ((-0.9, 0, 0), 2), ((-0.85, 0.2, 0.355), 2)]  # fmt: skip
+    seen = np.array([bed.sensor(*place) for place in places])
+    model = ParametricModel(K, M, dK, 0 * dK, seen, n_rigid=6)
+    true, zeta = np.array([0.30, -0.10]), np.full(8, 0.01)
+    modes = [modal(model.at(p), []).Phi[:, :40] for p in ((0.0, 0.0), (0.4, -0.3), (-0.3, 0.3))]
+    small = model.in_basis(np.linalg.svd(np.hstack(modes), full_matrices=False)[0][:, :60])
+    omega, inputs = 2 * np.pi * np.linspace(4, 62, 150), (0, 3)
+    exact = responses(model, true, zeta, omega, inputs)
+    test = Measurement(omega, data.noisy(exact, 0.02, np.random.default_rng(5)), inputs)
+    found = update_by_output(small, test, np.zeros(2), zeta)
+    assert_allclose(found.p, true, atol=0.01)
+    assert np.all(np.abs(found.p - true) < 4 * found.deviation[:2])
+
+
 @pytest.mark.parametrize("wrong", [{"size": 0.0}, {"joints": -1.0}, {"size": np.nan}])
 def test_an_airframe_of_nothing_is_refused(wrong):
     with pytest.raises(ConfigError, match="must be positive"):
