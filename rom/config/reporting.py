@@ -174,9 +174,11 @@ def of_mechanism(file: "MechanismFile", made: list[str]) -> tuple[str, Sections]
     )
 
     def draw(path: Path) -> None:
-        from rom.view.film import instants
+        from rom.view.start import start
 
-        instants(mechanism, AtStart(mechanism), path, times=[0.0])
+        how = {key: file.values["output"][key] for key in ("view", "up")
+               if key in file.values["output"]}  # fmt: skip
+        start(mechanism, path, title=f"Mechanism {file.name}", **how)
 
     sections: Sections = {
         "What it is": [report.paragraph(words), *drawn(draw, "As its bodies are placed.")],
@@ -205,27 +207,6 @@ def _connection_table(file: "MechanismFile") -> str:
             where += [values[key] for key in ("joint", "joint1", "joint2") if key in values]
             rows.append((name, values.get("kind", section.rstrip("s")), " and ".join(where)))
     return report.table(("name", "kind", "at"), rows, "Joints, drives and forces.")
-
-
-class AtStart:
-    """A mechanism as its bodies are placed, in the form pictures ask for."""
-
-    def __init__(self, mechanism: Any) -> None:
-        import numpy as np
-
-        self.mechanism, self.t = mechanism, np.zeros(1)
-
-    def position(self, body: str) -> Any:
-        """(1, 3) origin of a body."""
-        return self.mechanism.parts[body].at[None]
-
-    def orientation(self, body: str) -> Any:
-        """(1, 4) quaternion of a body."""
-        return self.mechanism.parts[body].p[None]
-
-    def elastic(self, body: str) -> Any:
-        """(1, r) elastic coordinates of a body."""
-        return self.mechanism.parts[body].q[None]
 
 
 def of_run(folder: Path) -> tuple[str, Sections]:

@@ -10,6 +10,7 @@ from rom.view.rods import sleeves
 from rom.view.shapes import mode_shapes
 from rom.view.solids import box, cylinder
 from rom.view.spectra import updating
+from rom.view.start import start
 from rom.view.wheels import wheel_modes
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "panels",
     "plane",
     "sleeves",
+    "start",
     "updating",
     "wheel_modes",
 ]

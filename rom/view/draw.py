@@ -25,15 +25,15 @@ def main(folder: Path) -> None:
     width, height = scene["size"]
     plotter = pyvista.Plotter(off_screen=True, window_size=[FINER * width, FINER * height])
     plotter.set_background("white")
-    _aim(plotter, scene, arrays)
+    aim(plotter, scene, arrays)
     moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
     for k in range(len(scene["actors"])):
-        _add(plotter, scene, arrays, k, 0)
+        add(plotter, scene, arrays, k, 0)
     n = max(len(arrays[f"points {k}"]) for k in range(len(scene["actors"])))
     pictures = np.empty((n, height, width, 3), dtype=np.uint8)
     for frame in range(n):
         for k in moving if frame else ():
-            _add(plotter, scene, arrays, k, frame)
+            add(plotter, scene, arrays, k, frame)
         plotter.render()
         fine = plotter.screenshot(return_img=True)[..., :3].astype(np.uint16)
         blocks = fine.reshape(height, FINER, width, FINER, 3).sum(axis=(1, 3))
@@ -42,7 +42,7 @@ def main(folder: Path) -> None:
     plotter.close()
 
 
-def _aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
+def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
     """Set the camera; its clipping range holds all frames, VTK's own would be that of the first."""
     focus, toward = arrays["focus"], arrays["toward"]
     actors = range(len(scene["actors"]))
@@ -55,7 +55,7 @@ def _aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
     plotter.camera.clipping_range = (reach - depth, reach + depth)
 
 
-def _add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, frame: int) -> None:
+def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, frame: int) -> None:
     """Add an actor, or replace it by the one of the next frame."""
     style, values = scene["actors"][k], arrays.get(f"values {k}")
     points = arrays[f"points {k}"][frame]

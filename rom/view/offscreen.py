@@ -38,17 +38,17 @@ def render(
     """
     require("pyvista")
     with tempfile.TemporaryDirectory(prefix="rom-view-") as folder:
-        _write(Path(folder), actors, camera, limits)
+        write_scene(Path(folder), actors, camera, limits)
         done = subprocess.run(
             [sys.executable, "-m", "rom.view.draw", folder],
-            env=_environment(),
+            env=child_environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             check=False,
         )
         pictures = Path(folder, "pictures.npy")
         if done.returncode or not pictures.exists():
-            raise _failure(done)
+            raise child_failure(done)
         return np.load(pictures, allow_pickle=False)
 
 
@@ -62,9 +62,10 @@ def require(package: str) -> None:
         raise ConfigError(f"pictures need {package}, which is not installed.", hint=f"{INSTALL}.")
 
 
-def _write(
+def write_scene(
     folder: Path, actors: Sequence[Actor], camera: Camera, limits: tuple[float, float]
 ) -> None:
+    """Leave a scene where a child process finds it."""
     arrays = {"focus": camera.focus, "toward": camera.toward, "up": camera.up}
     for k, actor in enumerate(actors):
         arrays |= {f"points {k}": actor.points.astype(np.float32), f"cells {k}": actor.cells}
@@ -76,13 +77,15 @@ def _write(
     (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOURS}))
 
 
-def _environment() -> dict[str, str]:
+def child_environment() -> dict[str, str]:
+    """Variables of a child process, which finds rom where this one has found it."""
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
     return os.environ | {"PYTHONPATH": path}
 
 
-def _failure(done: subprocess.CompletedProcess[bytes]) -> ConfigError:
+def child_failure(done: subprocess.CompletedProcess[bytes]) -> ConfigError:
+    """What a child process that did not end well has said."""
     said = done.stderr.decode(errors="replace").strip().splitlines()
     how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
     return ConfigError(

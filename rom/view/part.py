@@ -38,15 +38,21 @@ def mesh(
         ConfigError: if the model has no surface, or pictures cannot be made here.
     """
     path = page.checked(path, ".png")
-    if model.surface is None:
-        raise ConfigError("the model has no surface to draw.", hint="Give it a `SurfaceMesh`.")
-    points, triangles = model.points[model.surface.nodes], model.surface.triangles
-    image = render(_actors(model, points, triangles), aimed(points, WIDTH, view=view, up=up))[0]
+    actors = mesh_actors(model)
+    image = render(actors, aimed(actors[0].points, WIDTH, view=view, up=up))[0]
     with page.styled():
         return page.save(_sheet(model, image, title), path)
 
 
-def _actors(model: FEModel, points: Any, triangles: Any) -> list[Actor]:
+def mesh_actors(model: FEModel) -> list[Actor]:
+    """The outer surface, its elements, and its interfaces in colour.
+
+    Raises:
+        ConfigError: if the model has no surface.
+    """
+    if model.surface is None:
+        raise ConfigError("the model has no surface to draw.", hint="Give it a `SurfaceMesh`.")
+    points, triangles = model.points[model.surface.nodes], model.surface.triangles
     edges = np.unique(np.sort(directed_edges(triangles)[0], axis=1), axis=0)
     actors = [Actor(points[None], triangles, colour=PART)]
     actors.append(Actor(points[None], edges, colour=NET, width=0.6))
