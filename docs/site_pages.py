@@ -8,6 +8,7 @@ import importlib
 import inspect
 import re
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from sphinx.application import Sphinx
 import rom
 from rom import errors
 from rom.cli.parser import EXIT_CODES, VERBS, build_parser
+from rom.cli.schemas import ERROR
+from rom.cli.schemas import VERBS as VERBS_SCHEMAS
+from rom.config.page import page
 
 ROOT = Path(rom.__file__).parents[1]
 DEMOS = ROOT / "demos"
@@ -141,6 +145,50 @@ def command_page() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def files_page() -> str:
+    """Component and mechanism files, with every key."""
+    samples = (ROOT / "meshes" / "connecting_rod.toml", ROOT / "demos" / "slider_crank.toml")
+    return page(*(path.read_text() for path in samples))
+
+
+def answers_page() -> str:
+    """What ``--json`` holds, verb by verb."""
+    parts = [
+        "# Answers for programs",
+        "Every verb prints one JSON object with `--json`; `rom VERB --json-schema` prints its"
+        " JSON Schema. Numbers that are not finite are null. Every answer also has `ok`, `warnings`"
+        " and, where something does not hold, `failed`. An error has these keys instead:",
+        _keys(ERROR),
+    ]
+    for verb, schema in VERBS_SCHEMAS.items():
+        parts += [f"## rom {verb}", f"{schema['description'].capitalize()}.", _keys(schema)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _keys(schema: dict[str, Any]) -> str:
+    rows = ["| key | type | meaning |", "|---|---|---|"]
+    for path, part in _parts(schema, ""):
+        kinds = part.get("type", "")
+        kinds = " or ".join(kinds) if isinstance(kinds, list) else kinds
+        rows.append(f"| `{path}` | {kinds} | {part['description']} |")
+    return "\n".join(rows)
+
+
+def _parts(schema: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every key below a schema, with its path."""
+    for name, part in schema.get("properties", {}).items():
+        yield f"{path}{name}", part
+        yield from _parts(part, f"{path}{name}.")
+    for inner, mark in (
+        (schema.get("items"), "[]."),
+        (schema.get("additionalProperties"), "NAME."),
+    ):
+        if isinstance(inner, dict):
+            yield from _parts(inner, f"{path.rstrip('.')}{mark if mark == '[].' else '.' + mark}")
+    for one in schema.get("anyOf", ()):
+        yield from _parts(one, path)
+
+
 def interface_pages() -> dict[str, str]:
     """One page per part of the package, with its public names; and the list of these pages."""
     parts: dict[str, list[str]] = {}
@@ -210,6 +258,7 @@ def write_all(out: Path) -> None:
     pages |= interface_pages()
     pages["demos.md"] = gallery_page(scripts, pictures)
     pages["errors.md"], pages["commands.md"] = error_page(), command_page()
+    pages["files.md"], pages["answers.md"] = files_page(), answers_page()
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text()
     for name, text in pages.items():
         (out / name).write_text(text)

@@ -240,3 +240,32 @@ def test_the_sample_describes_the_rod_of_the_demo(capsys, monkeypatch):
     assert_allclose(found[0]["frequencies"], found[1]["frequencies"], rtol=1e-12)
     assert main(["mesh", "meshes/connecting_rod.toml", "-p", "lc=0.009", "--json", "-q"]) == 0
     assert set(json.loads(capsys.readouterr().out)["interfaces"]) == {"pin_a", "pin_b"}
+
+
+def keys_of(kind, seen):
+    """Names of all keys a kind knows, however deep."""
+    from rom.config.page import tables
+
+    for _, table in tables(kind):
+        for key in table.keys:
+            seen.add((key.name, key.about))
+            keys_of(key.kind, seen)
+    return seen
+
+
+def test_the_page_has_every_key_with_its_meaning():
+    from rom.config.component import TABLE
+    from rom.config.mechanism_keys import TABLE as MECHANISM
+    from rom.config.page import page
+
+    samples = [(ROOT / name).read_text()
+               for name in ("meshes/connecting_rod.toml", "demos/slider_crank.toml")]  # fmt: skip
+    text = page(*samples)
+    known = keys_of(MECHANISM, keys_of(TABLE, set()))
+    assert len(known) > 120
+    for name, about in known:
+        meant = about.replace("[", "\\[").replace("]", "\\]")
+        row = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
+        assert any(meant in line for line in row), name
+    assert "| must be given | Young's modulus. |" in text and '"mean-axis"' in text
+    assert all(sample.strip() in text for sample in samples)

@@ -240,6 +240,7 @@ t_end = 1
 """
 
 
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")  # its joints are anywhere
 def test_every_section_reaches_the_mechanism(folder):
     (folder / "all.toml").write_text(ALL)
     mech = read_mechanism("all.toml").mechanism()

@@ -81,6 +81,20 @@ def test_every_verb_is_shown_with_its_help(pages):
         assert module.EXAMPLES.splitlines()[0] in page
 
 
+def test_the_answers_page_has_every_key_of_every_schema(pages):
+    page = pages.answers_page()
+    for module in VERBS:
+        assert f"## rom {module.__name__.rpartition('.')[2]}\n" in page
+    for path in ("interfaces.NAME.middle", "findings[].state", "certificate.rows[].value",
+                 "geometric stiffness", "exit_code"):  # fmt: skip
+        assert f"| `{path}` |" in page, path
+
+
+def test_the_files_page_shows_the_samples(pages):
+    page = pages.files_page()
+    assert 'E = "210 GPa"' in page and 'rate = "300 rad/s"' in page and "| `rho_inf` |" in page
+
+
 @pytest.mark.fenicsx
 @pytest.mark.slow
 def test_the_site_builds_without_warnings(tmp_path):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rom.config.document import Document, KeyPath, read_document
 from rom.config.keys import (
@@ -51,6 +51,7 @@ ORTHOTROPIC = Table("An orthotropic solid, known by its key G.", (
 class Solids:
     """One material, or a table of them by region."""
 
+    parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
     said: str = "isotropic or orthotropic table, or a table of them by region"
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
@@ -131,8 +132,7 @@ TABLE = Table("A component.", (
         Key("stiffening", Flag(), "Add the geometric stiffness of rotation and loads.", False),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
         Key("certificate", Flag(), "Compare with the full model.", True),
-    )), "How it is reduced.", {"method": "craig-bampton", "gravity_shapes": False,
-        "reference": ("mean-axis",), "stiffening": False, "stress": False, "certificate": True}),
+    )), "How it is reduced.", {}),
     Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
         Key("ratio", Quantity(), "Damping ratio of every mode."),
         Key("alpha", Quantity("1/s"), "D = alpha M + beta K."),
@@ -141,7 +141,7 @@ TABLE = Table("A component.", (
     Key("modes", Table("What `rom modes` computes.", (
         Key("number", Whole(1), "Number of modes, rigid ones too.", 12),
         Key("fixed", Words(), "Interfaces held.", ()),
-    )), "What `rom modes` computes.", {"number": 12, "fixed": ()}),
+    )), "What `rom modes` computes.", {}),
     Key("output", Table("What `rom reduce` writes.", (
         Key("file", FilePath(), "The body file, `.rom.npz`.", ...),
     )), "What `rom reduce` writes."),

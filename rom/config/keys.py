@@ -213,7 +213,8 @@ class Key:
         name: as written.
         kind: how its value is written.
         about: one sentence.
-        default: value when it is not given; None for no value, ``...`` when it must be given.
+        default: value when it is not given; None for no value, ``...`` when it must be given, {}
+            for a table of defaults.
     """
 
     name: str
@@ -256,6 +257,8 @@ class Table:
                 place.mistakes.append(
                     place.error(f"{key.name} is missing{inside}.", f"{key.about} ({key.kind.said})")
                 )
+            elif key.default == {}:  # a table of its own defaults
+                collect(found, key.name, key.kind, {}, place)
             elif key.default is not None:
                 found[key.name] = key.default
         return found

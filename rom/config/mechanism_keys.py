@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from rom.config.keys import (
     Either,
@@ -49,25 +49,13 @@ class MarkerName:
 class Two:
     """Two markers of different bodies."""
 
-    said: str = "list of two markers"
+    said: str = 'list of two markers, each "body.marker" or { body = [x, y, z] }'
 
     def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
         """The two."""
         if not isinstance(value, list) or len(value) != 2:
             raise place.error(f"{place.name} = {shown(value)}: two markers are needed.")
         return [MarkerName().read(item, place) for item in value]
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A body: rigid by its numbers, or from a file."""
-
-    said: str = "table with a file, or with mass and inertia"
-
-    def read(self, value: Any, place: Place) -> dict[str, Any]:
-        """Its values."""
-        from_file = isinstance(value, Mapping) and "file" in value
-        return (FROM_FILE if from_file else RIGID).read(value, place)
 
 
 POSE = (
@@ -92,6 +80,20 @@ FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
     Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
     *POSE,
 ))  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body: rigid by its numbers, or from a file."""
+
+    parts: ClassVar[dict[str, Table]] = {"rigid": RIGID, "from a file": FROM_FILE}
+    said: str = "table with a file, or with mass and inertia"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Its values."""
+        from_file = isinstance(value, Mapping) and "file" in value
+        return (FROM_FILE if from_file else RIGID).read(value, place)
+
 
 BETWEEN = Key("between", Two(), "Its markers; forces and coordinates are those of the second.", ...)
 AXIS = Key("axis", DIRECTION, "In the world at the start.", ...)
@@ -247,6 +249,5 @@ TABLE = Table("A mechanism.", (
     *(Key(name, Named(kind, what), what.capitalize() + ".", {})
       for name, (what, kind) in SECTIONS.items()),
     Key("simulation", SIMULATION, "How it is moved.", ...),
-    Key("output", OUTPUT, "What is written.",
-        {"history": "csv", "picture": False, "plot": (), "magnify": 1.0}),
+    Key("output", OUTPUT, "What is written.", {}),
 ))  # fmt: skip
