@@ -13,7 +13,7 @@ def environment(**more):
     return os.environ | {"PYTHONPATH": path, "OMPI_MCA_mpi_yield_when_idle": "1"} | more
 
 
-def rom(*arguments, n=1, timeout=60, **options):
+def rom(*arguments, n=1, timeout=180, **options):
     """Finished process of ``rom …``, on n ranks."""
     launcher = ["mpirun", "--oversubscribe", "-n", str(n)] if n > 1 else []
     command = [*launcher, sys.executable, "-m", "rom", *map(str, arguments)]

@@ -185,7 +185,7 @@ def test_two_processes_find_the_frequencies_of_one(tmp_path):
     environment = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     subprocess.run(
         ["mpirun", "--oversubscribe", "-n", "2", sys.executable, str(script), str(tmp_path / "s")],
-        env=os.environ | environment, check=True, timeout=120,
+        env=os.environ | environment, check=True, timeout=600,
     )  # fmt: skip
     found = np.load(tmp_path / "s.npz")
     body, metal = sheet(*distorted((8, 6))), Metal(210e9, 0.3, 7850.0)

@@ -42,7 +42,7 @@ needs_ccx = pytest.mark.skipif(
 
 def run(folder, deck):
     (folder / "job.inp").write_text(deck)
-    done = subprocess.run(["ccx", "job"], cwd=folder, capture_output=True, text=True, timeout=100,
+    done = subprocess.run(["ccx", "job"], cwd=folder, capture_output=True, text=True, timeout=600,
                           check=False)  # fmt: skip
     assert done.returncode == 0 and "*WARNING" not in done.stdout, done.stdout[-2000:]
     return (folder / "job.dat").read_text()

@@ -98,7 +98,7 @@ def test_keys_and_time_change_what_the_window_shows(bar, tmp_path):
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     window.leave(window.mode_scenes(bar, 2), tmp_path)
     done = subprocess.run([sys.executable, "-c", CODE, tmp_path], env=environment(),
-                          capture_output=True, text=True, timeout=120, check=False)  # fmt: skip
+                          capture_output=True, text=True, timeout=600, check=False)  # fmt: skip
     assert done.stdout.split() == ["True", "True", "True", "0"], done.stderr
 
 

@@ -381,7 +381,7 @@ def test_it_moves_without_fenicsx_and_pictures(folder):
     code += "from rom.cli.main import main\n"
     code += "sys.exit(main(['simulate', 'crank.toml', '-q', '-o', 'out']))"
     done = subprocess.run([sys.executable, "-c", code], env=environment(), cwd=folder,
-                          capture_output=True, text=True, timeout=120, check=False)  # fmt: skip
+                          capture_output=True, text=True, timeout=600, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (folder / "out" / "motion.csv").exists()
 

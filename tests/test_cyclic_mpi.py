@@ -25,7 +25,7 @@ def every(tmp_path_factory):
     file = tmp_path_factory.mktemp("sectors") / "ranks.json"
     done = subprocess.run(
         ["mpirun", "--oversubscribe", "-n", "3", sys.executable, str(SCRIPT), str(file)],
-        env=ENVIRONMENT, timeout=200, capture_output=True, text=True, check=False,
+        env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
         cwd=SCRIPT.parents[1],
     )  # fmt: skip
     assert file.exists(), done.stderr

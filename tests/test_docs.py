@@ -104,7 +104,7 @@ def test_the_site_builds_without_warnings(tmp_path):
     shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("generated", "__pycache__"))
     command = [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "--keep-going", source]
     done = subprocess.run([*command, tmp_path / "site"], capture_output=True, text=True,
-                          timeout=240, check=False)  # fmt: skip
+                          timeout=600, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     site = {p.relative_to(tmp_path / "site").as_posix(): p for p in tmp_path.rglob("*.html")}
     assert {"index.html", "generated/errors.html", "generated/demo_beam.html"} <= set(site)

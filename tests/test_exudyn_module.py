@@ -108,7 +108,7 @@ def test_exudyn_moves_the_body_as_we_do(tmp_path):
     rom.export(body, tmp_path / "rod.py")
     done = subprocess.run(
         [PEER, "-c", SCRIPT, str(tmp_path), json.dumps(root.tolist())],
-        capture_output=True, text=True, timeout=120, check=False,
+        capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     theirs = np.array(json.loads(done.stdout.splitlines()[-1]))

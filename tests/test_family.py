@@ -300,7 +300,7 @@ print(found[0], found[-1], len(found), bodies[0].mass)
 """
     environment = os.environ | {"PYTHONPATH": str(Path(rom.__file__).parents[1])}
     done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=100,
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=600,
         check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -174,7 +174,7 @@ def families(tmp_path_factory):
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
              str(script / "family_under_mpi.py"), "material", str(folder / f"{n}.npz")],
-            env=ENVIRONMENT, timeout=200, capture_output=True, text=True, check=False, cwd=ROOT,
+            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip
         assert (folder / f"{n}.npz").exists(), done.stderr
     return {n: rom.load(folder / f"{n}.npz") for n in (1, 2, 3)}

@@ -281,7 +281,7 @@ def test_layers_are_blind_to_the_number_of_processes(tmp_path):
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
              str(Path(__file__).with_name("family_under_mpi.py")), "thickness", str(path)],
-            env=ENVIRONMENT, timeout=200, capture_output=True, text=True, check=False, cwd=ROOT,
+            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip
         assert path.exists(), done.stderr
         family = rom.load(path)

@@ -37,7 +37,7 @@ def bodies(request, tmp_path_factory):
         command += [word for kind in KINDS[request.param] for word in ("-i", kind)]
         command += ["-m", "20", "--reference", "pin_a", "-q", "-o", str(written[n])]
         done = subprocess.run(
-            command, env=ENVIRONMENT, timeout=200, capture_output=True, text=True, check=False
+            command, env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False
         )
         assert written[n].exists(), done.stderr
     return {n: rom.load(path) for n, path in written.items()}

@@ -21,7 +21,7 @@ def found(tmp_path_factory):
         file = folder / f"{n}.json"
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, str(SCRIPT), str(file)],
-            env=ENVIRONMENT, timeout=200, capture_output=True, text=True, check=False,
+            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
             cwd=SCRIPT.parents[1],
         )  # fmt: skip
         assert file.exists(), done.stderr

@@ -25,7 +25,7 @@ ENVIRONMENT = os.environ | {
 }
 
 
-def mpirun(n, *arguments, timeout=120):
+def mpirun(n, *arguments, timeout=360):
     command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "under_mpi.py"]
     return subprocess.run(
         [*command, *map(str, arguments)],

@@ -279,7 +279,7 @@ def test_the_number_of_processes_does_not_matter(tmp_path):
         path = tmp_path / f"{n}.rom.npz"
         command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-c", SCRIPT, path]
         done = subprocess.run(
-            command, env=os.environ | ENVIRONMENT, timeout=200, capture_output=True, text=True,
+            command, env=os.environ | ENVIRONMENT, timeout=600, capture_output=True, text=True,
             check=False,
         )  # fmt: skip
         assert path.exists(), done.stderr

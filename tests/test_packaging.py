@@ -46,7 +46,7 @@ def hook(name, folder, out):
     """Call a build hook in a process of its own, as every installer does."""
     code = f"from setuptools import build_meta; print(build_meta.{name}({str(out)!r}))"
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True,
-                          timeout=120, check=True)  # fmt: skip
+                          timeout=600, check=True)  # fmt: skip
     return out / done.stdout.splitlines()[-1]
 
 
@@ -71,7 +71,7 @@ def installed(shipped, tmp_path_factory):
     folder = tmp_path_factory.mktemp("installed")
     subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index",
                     "--disable-pip-version-check", "--no-compile", "--target", folder, shipped[1]],
-                   check=True, timeout=120)  # fmt: skip
+                   check=True, timeout=600)  # fmt: skip
     return folder
 
 
@@ -106,7 +106,7 @@ def test_a_saved_slider_crank_runs_from_the_wheel_alone(installed, tmp_path):
     )  # fmt: skip
     rom.save(rod, tmp_path / "rod.rom.npz")
     done = subprocess.run([sys.executable, "-c", SLIDER_CRANK], cwd=tmp_path, text=True,
-                          capture_output=True, env=environment(installed), timeout=120,
+                          capture_output=True, env=environment(installed), timeout=600,
                           check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     place, line = done.stdout.splitlines()[-2:]

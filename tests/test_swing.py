@@ -83,7 +83,7 @@ def test_a_step_file_swings_on_the_face_chosen(tmp_path):
     step_box(tmp_path / "bar.step", 200, 20, 10)
     done = run_rom("swing", "bar.step", "--hinge", "0,0.01,0.005", "--material", "aluminium",
                    "-m", 8, "--t-end", "0.02", "-o", "out", "--json", cwd=tmp_path,
-                   timeout=250)  # fmt: skip
+                   timeout=600)  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert errors(found, schema("swing")) == []
