@@ -1,5 +1,6 @@
 """Motions that repeat with the mesh, against motion through time and the linearised unit."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from test_transmission import unit
 from rom.components.gear_mesh import Correction
 from rom.components.transmission import rest, simulate, steady, sweep, whirl
 from rom.components.transmission.steady import _period
-from rom.errors import ModelError
+from rom.errors import ModelError, SolverError
 
 STEPS = 60
 
@@ -87,6 +88,21 @@ def test_a_sweep_goes_on_from_speed_to_speed(lossy, found):
     assert [s.unit.speed for s in passed] == [144.0, 150.0]
     assert_allclose(passed[1].teeth, found.teeth, rtol=1e-3)
     assert np.abs(passed[0].error - passed[1].error).max() > 1e-8
+
+
+def test_a_step_that_fails_is_moved(lossy, found, monkeypatch):
+    """From the motion itself, so that one period suffices."""
+    module = importlib.import_module("rom.components.transmission.steady")
+
+    def failing(unit, q, v, theta, steps, guess=None):
+        if steps == STEPS:
+            raise SolverError("a step fails.")
+        return _period(unit, q, v, theta, steps, guess)
+
+    monkeypatch.setattr(module, "_period", failing)
+    moved = steady(found, steps=STEPS)
+    assert moved.t.size == STEPS + 2
+    assert moved.error_rms == pytest.approx(found.error_rms, rel=0.02)
 
 
 def test_pitch_errors_repeat_with_no_tooth(lossy):

@@ -16,6 +16,7 @@ from rom.errors import ModelError, SolverError
 from rom.model import Array
 
 PASSES, ENOUGH, PRECISE = 40, 1e-6, 1e-7  # periods; of the motion; of forces in a step
+TRIALS = 3
 DAMPED = -0.05  # films are so stiff that without it rates alternate from step to step
 
 
@@ -78,6 +79,7 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
     """The motion that repeats with the mesh, near an equilibrium or a motion nearby.
 
     Where Newton's method does not come closer, time goes on for a period, as it does in a machine.
+    A step that ends just when a tooth leaves may have no solution; then one step more is taken.
 
     Args:
         start: equilibrium, or a motion; its unit is what moves.
@@ -87,12 +89,21 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
         ModelError: if teeth differ, so that nothing repeats with the mesh.
         SolverError: if a step fails, or no such motion is found.
     """
-    unit = start.unit
-    if any(len(errors) for errors in unit.mesh.correction.pitch):
+    if any(len(errors) for errors in start.unit.mesh.correction.pitch):
         raise ModelError(
             "with pitch errors no motion repeats with every tooth.",
             hint="Leave out the pitch errors, or simulate.",
         )
+    for more in range(TRIALS - 1):
+        try:
+            return _closed(start, steps + more)
+        except SolverError:
+            continue
+    return _closed(start, steps + TRIALS - 1)
+
+
+def _closed(start: Rest | Steady, steps: int) -> Steady:
+    unit = start.unit
     q, v = (start.q, np.zeros(start.q.size)) if isinstance(start, Rest) else (
         start.q[0], start.v[0])  # fmt: skip
     n, last, dt, guess = q.size, np.inf, unit.mesh_period / steps, None
