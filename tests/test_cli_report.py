@@ -84,11 +84,6 @@ def test_a_mechanism_is_described_as_it_starts(folder, monkeypatch):
         assert words in text, words
 
 
-def test_a_mechanism_is_drawn_as_it_starts(folder):
-    pytest.importorskip("pyvista", reason="VTK comes with the pictures")
-    assert len(reported("pendulum.toml").links) == 1
-
-
 def test_a_finished_run_is_described(folder, monkeypatch):
     without_pictures(monkeypatch)
     assert main(["simulate", "pendulum.toml", "--t-end", "0.1", "-q", "-o", "out"]) == 0
