@@ -27,6 +27,16 @@ class Held(Protocol):
         """Solve K_ii X_i = F_i for (n_local, k) loads; rows of held dofs come back zero."""
 
 
+class Mass(Protocol):
+    """What a scalar product with the mass needs of `Operators`."""
+
+    def apply_M(self, X: Array) -> Array:
+        """M X, (n_local, k)."""
+
+    def gram(self, X: Array, Y: Array) -> Array:
+        """X^T Y summed over the ranks."""
+
+
 class Operators(Protocol):
     """Stiffness and mass of one body, wherever their rows live.
 
@@ -161,7 +171,7 @@ def whole_clusters(lam: Array, m: int) -> int:
     return m
 
 
-def orthonormal(ops: Operators, X: Array) -> Array:
+def orthonormal(ops: Mass, X: Array) -> Array:
     """M-orthonormal columns with the span of X, in the order given (Gram-Schmidt, twice)."""
     Q = np.zeros((X.shape[0], 0))
     for k in range(X.shape[1]):

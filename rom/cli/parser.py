@@ -119,7 +119,7 @@ def given(argv: list[str]) -> dict[str, Any]:
     for sub in _verb_parsers(parser):
         for action in sub._actions:
             action.default = argparse.SUPPRESS
-    return vars(parser.parse_args(argv))
+    return dict(vars(parser.parse_args(argv)))
 
 
 def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:

@@ -25,7 +25,7 @@ from rom.components.cosserat import RodBody
 from rom.components.cosserat.elements import rotation_of
 from rom.components.wind_turbine import BLADE, HUB_RADIUS
 from rom.errors import ConfigError
-from rom.model import Array
+from rom.model import Array, Mask
 
 RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 40.45, 44.55, 48.65,
           52.75, 56.1667, 58.9, 61.6333)  # m from the axis of the rotor  # fmt: skip
@@ -124,7 +124,7 @@ def in_wind(
     return replace(blade, elements=(*blade.elements, blown))
 
 
-def strips(blade: RodBody) -> tuple[Array, Array]:
+def strips(blade: RodBody) -> tuple[Array, Mask]:
     """(N + 1,) areas of the strips of the vertices [m^2], and whether they make lift."""
     radius = HUB_RADIUS + BLADE * np.linspace(0.0, 1.0, blade.rod.h.size + 1)
     wide = np.zeros_like(radius)

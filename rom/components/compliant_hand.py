@@ -22,7 +22,7 @@ from rom.components.cable import Hole, Tendon
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.helical_spring import HelicalSpring
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.model import Array
+from rom.model import Array, Mask
 
 RIGID = 1e5  # rigidity of a phalanx over that of the springs
 STOP = 50.0  # stiffness of touching coils over that of the spring
@@ -79,7 +79,10 @@ class Finger:
     @cached_property
     def rod(self) -> Rod:
         """The finger as a rod."""
-        h, stretch, cells, bends = [], [], [], []
+        h: list[float] = []
+        stretch: list[Array] = []
+        cells: list[Array] = []
+        bends: list[bool] = []
         for spring, link in zip(self.springs, self.phalanges, strict=True):
             own = {k: np.array(v) for k, v in spring.rigidities().items()}
             own["stretch"][1] *= self.stiffener
@@ -90,13 +93,13 @@ class Finger:
             bends += [True] * self.n
             if link > 0:
                 h, bends = [*h, link], [*bends, False]
-                stretch.append((RIGID * spring.axial,) * 3)
+                stretch.append(np.full(3, RIGID * spring.axial))
         if self.phalanges[-1] > 0:
-            cells.append((RIGID * self.springs[-1].bending,) * 3)
+            cells.append(np.full(3, RIGID * self.springs[-1].bending))
         x = np.zeros((len(h) + 1, 3))
         x[1:, 2] = np.cumsum(h)
         still = np.tile([1.0, 0, 0, 0], (len(h) + 2, 1))
-        return rod(x, still, stretch=stretch, bend=cells, bends=bends)
+        return rod(x, still, stretch=np.array(stretch), bend=np.array(cells), bends=bends)
 
     @cached_property
     def tendon(self) -> Tendon:
@@ -175,7 +178,7 @@ class Posture:
         return self.finger.angles(self.shape)
 
     @property
-    def bound(self) -> Array:
+    def bound(self) -> Mask:
         """(joints,) whether coils of a joint touch."""
         return self.finger.clearances(self.shape) < 0
 

@@ -7,6 +7,7 @@ been beyond its border for a while; both muscles together, strong and long, swit
 and opening.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from scipy.signal import butter, lfilter
 
 from rom.errors import ConfigError
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 
 GROUPS = ("thumb", "index", "middle", "ring and little", "all")
 COUPLING = np.array(  # (5 fingers, 5 groups): which fingers a group draws
@@ -41,10 +42,10 @@ class Chart:
 
     threshold: float = 0.12
     full: float = 0.68
-    margin: float = np.radians(2.0)
+    margin: float = math.radians(2.0)
     dwell: float = 0.15
     together: tuple[float, float] = (0.8, 0.3)
-    middle: float = np.radians(9.0)
+    middle: float = math.radians(9.0)
     rate: float = 0.04
     pull: float = 14e-3
 
@@ -70,14 +71,17 @@ class Chart:
         Raises:
             ConfigError: if the signals differ in length, or dt is not positive.
         """
-        x, y = np.atleast_1d(np.asarray(x, dtype=float)), np.atleast_1d(np.asarray(y, dtype=float))
-        if x.shape != y.shape or not dt > 0:
-            raise ConfigError(f"{x.size} and {y.size} samples {dt:g} s apart are no two signals.")
-        groups, pulls = np.empty(x.size, dtype=int), np.empty((x.size, len(GROUPS)))
-        opening = np.empty(x.size, dtype=bool)
+        flexor, extensor = (np.array(part, dtype=float, ndmin=1) for part in (x, y))
+        if flexor.shape != extensor.shape or not dt > 0:
+            raise ConfigError(
+                f"{flexor.size} and {extensor.size} samples {dt:g} s apart are no two signals."
+            )
+        n = flexor.size
+        groups, pulls = np.empty(n, dtype=np.int64), np.empty((n, len(GROUPS)))
+        opening = np.empty(n, dtype=np.bool_)
         group, waited, both, opens, armed = REST, 0.0, 0.0, False, True
         pull = np.zeros(len(GROUPS))
-        for k, (a, b) in enumerate(zip(x, y, strict=True)):
+        for k, (a, b) in enumerate(zip(flexor, extensor, strict=True)):
             now = int(self.group(a, b))
             waited = 0.0 if now in (REST, group) or self._near(a, b, group) else waited + dt
             if group == REST or waited > self.dwell:
@@ -117,7 +121,7 @@ class Commands:
 
     groups: Index
     pulls: Array
-    opening: Array
+    opening: Mask
 
     def fingers(self) -> Array:
         """(n, 5) pull of thumb, index, middle, ring and little finger [m]: the largest command."""

@@ -42,7 +42,7 @@ def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
     """
     scale = np.asarray(lengths, dtype=float)
     if scale.shape != (2,) or not (scale > 0).all():
-        raise ConfigError(f"lengths = {lengths}: two positive numbers are needed.")
+        raise ConfigError(f"lengths = {lengths!r}: two positive numbers are needed.")
     A = _positive(np.asarray(A, dtype=float) / np.multiply.outer(scale, scale))
     determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
     return 2 * np.sqrt(np.maximum(determinant, 0.0)) / (A[..., 0, 0] + A[..., 1, 1])

@@ -10,6 +10,7 @@ Source:
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -165,7 +166,7 @@ class HelicalSpring:
         return shear, 32 * moment / (np.pi * self.wire**3)
 
 
-def spring_rod(spring: HelicalSpring, n: int = 16, **options: object) -> Rod:
+def spring_rod(spring: HelicalSpring, n: int = 16, **options: Any) -> Rod:
     """The spring as a rod of n segments; options as for `cosserat.straight`."""
     return straight(spring.length, n, **spring.rigidities(), **options)
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom import rotation
 from rom.components.cosserat import Motion, Rod, along, equilibrium, loads, simulate
@@ -60,11 +59,11 @@ def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: flo
     cells = np.concatenate(([eta[1] / 4], eta[1:-1], [1 - eta[1] / 4]))  # what bends at a vertex
     turn = rotation.matrix(rotation.exp([azimuth, 0, 0]))
 
-    def at(name: str, where: npt.ArrayLike) -> Array:
+    def at(name: str, where: float | Array) -> Array:
         return np.interp(where, table["eta"], table[name])
 
     def place(s: float) -> tuple[Array, Array]:
-        twist = np.radians(at("twist_deg", s))  # leading edge into the wind
+        twist = float(np.radians(at("twist_deg", s)))  # leading edge into the wind
         return turn @ [0, 0, HUB_RADIUS + BLADE * s], turn @ rotation.matrix(
             rotation.exp([0, 0, -twist])
         )
@@ -181,8 +180,11 @@ def run_up(
         return x, rotation.multiply(turn, home[1]), np.cross([speed(t), 0, 0], x), speed(t) * axis
 
     weight = loads(rod, weight=(0, 0, -gravity))
-    options = {"load": weight, "start": equilibrium(rod, weight) if gravity else None} | options
-    motion = simulate(rod, t_end, dt, root=root, **options)
+    given: dict[str, Any] = {
+        "load": weight,
+        "start": equilibrium(rod, weight) if gravity else None,
+    } | options
+    motion = simulate(rod, t_end, dt, root=root, **given)
     angles = np.array([angle(t) for t in motion.t])
     outward = rod.x[-1] / np.linalg.norm(rod.x[-1])
     behind = np.cross(outward, [1.0, 0, 0])

@@ -56,7 +56,7 @@ class FiniteStrain:
         with compiling(self.mesh.comm):
             self.expansion, self.in_cells = per_cell(self.mesh, cold), per_cell(self.mesh, cold)
         # the first component is the temperature: nodes of another space have other numbers
-        self.share = fem.Constant(self.mesh, np.float64(1.0))
+        self.share = fem.Constant(self.mesh, 1.0)
         self.theta = self.share * self.expansion * (self.in_cells + self.at_nodes[0])
         self.dx = ufl.Measure(
             "dx", domain=self.mesh, metadata={"quadrature_degree": self._quadrature(degree)}

@@ -25,7 +25,8 @@ class HeldPETSc:
         mine = np.arange(ops.first, ops.first + ops.n_local)
         self.mine = np.flatnonzero(~np.isin(mine, held))
         self.n_free = ops.n - held.size
-        self.inner = self.factor = None
+        self.inner: Any = None
+        self.factor: Any = None
         if self.n_free:
             self.inner = ops.part(self.mine)
             if ops.solver.iterative:

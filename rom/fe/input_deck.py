@@ -143,13 +143,13 @@ def _materials(mesh: SolidMesh, material: Any) -> Iterator[str]:
         solid, turned = solids[tag], ""
         yield f"*MATERIAL, NAME={name}"
         if isinstance(solid, Orthotropic):
+            axes = np.asarray(solid.axes, dtype=np.float64)[:2].ravel()
             turned = f", ORIENTATION={name}"
             yield from _orthotropic(solid)
         else:
             yield f"*ELASTIC\n{_numbers((solid.E, solid.nu))}"
         yield f"*DENSITY\n{_numbers((solid.rho,))}"
         if turned:
-            axes = np.asarray(solid.axes, dtype=float)[:2].ravel()
             yield f"*ORIENTATION, NAME={name}, SYSTEM=RECTANGULAR\n{_numbers(axes)}"
         yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}{turned}"
 

@@ -82,6 +82,9 @@ class ConjugateGradients:
         return self.comm.allreduce(np.einsum("ij,ij->j", X, Y), op=MPI.SUM)
 
 
+Inverse = Factor | ConjugateGradients
+
+
 def multigrid(A: PETSc.Mat, near_null: Array) -> ConjugateGradients:
     """Conjugate gradients preconditioned by smoothed aggregation.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import SolverError
-from rom.fe.factor import Factor
+from rom.fe.iterative import Inverse
 from rom.model import Array
 
 BLOCK = 6  # columns solved together: fewer make solving dearer, more make the space larger
@@ -38,7 +38,7 @@ class BlockLanczos:
     """
 
     def __init__(
-        self, ops: Any, factor: Factor, sigma: float, deflated: Array, k: int, spare: int = 0
+        self, ops: Any, factor: Inverse, sigma: float, deflated: Array, k: int, spare: int = 0
     ):
         self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
         self.tolerance = np.repeat([TOLERANCE, ROUGH], [k - spare, spare])

@@ -21,7 +21,7 @@ from rom.fe.aij import aij, gathered, weighted
 from rom.fe.counting import verify_count
 from rom.fe.factor import Factor, dense_rows
 from rom.fe.held import ZERO, HeldPETSc
-from rom.fe.iterative import ConjugateGradients, davidson, multigrid, refined
+from rom.fe.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
 from rom.fe.krylov_schur import krylov_schur
 from rom.fe.lanczos import BlockLanczos, capacity
 from rom.fe.memory import check_factor_memory
@@ -32,7 +32,6 @@ from rom.scipy_operators import dof_set
 
 SPARE = 3  # modes computed beyond the ones asked for, so that a gap for counting is found
 DENSE = 300  # dofs up to which all eigenvalues are computed at once
-Inverse = Factor | ConjugateGradients
 SHIFT = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 
 
@@ -309,7 +308,7 @@ class PETScOperators:
         self, k: int, sigma: float, factor: Inverse, deflated: Array, *, in_blocks: bool = False
     ) -> tuple[Array, Array]:
         """The k eigenvalues above sigma beside the deflated columns, and their modes."""
-        if self.solver.iterative:
+        if self.solver.iterative and isinstance(factor, ConjugateGradients):
             return davidson(self, factor, deflated, k)
         if not in_blocks and isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)

@@ -8,6 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,13 @@ from typing import Any
 def main(arguments: list[str]) -> None:
     """Write one JSON line per library."""
     for name, look in LIBRARIES.items():
-        _write(name, lambda look=look: {"version": look()})
+        _write(name, partial(_version, look))
     _write("forms", lambda: _forms("--fix" in arguments))
     _write("mapped", lambda: {"value": mapped_files()})
+
+
+def _version(look: Callable[[], str]) -> dict[str, Any]:
+    return {"version": look()}
 
 
 def _write(name: str, look: Callable[[], dict[str, Any]]) -> None:

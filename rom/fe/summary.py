@@ -13,8 +13,10 @@ from rom.model import Array, Index
 VTK_TYPES = {"tet4": 10, "tet10": 24, "hex8": 12, "hex27": 29}
 # Corner sets of VTK's nodes where its order differs from gmsh's.
 VTK_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-VTK_HEX_EDGES = ((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7))
-VTK_HEX_EDGES += ((0, 4), (1, 5), (2, 6), (3, 7))
+VTK_HEX_EDGES = (
+    *((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7)),
+    *((0, 4), (1, 5), (2, 6), (3, 7)),
+)
 VTK_HEX_FACES = ((0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
 
 

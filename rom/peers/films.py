@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ ENVIRONMENT = Path(".venv-ross")
 SCRIPT = Path(__file__).with_name("ross_films.py")
 STIFFNESS = np.array([[2.67, 3.70], [-0.78, 1.75]])  # c/W, x along the load
 DAMPING = np.array([[6.96, 1.94], [1.94, 2.40]])  # c speed/W
-CASE = {
+CASE: dict[str, Any] = {
     "diameter": 0.1, "length": 0.05, "clearance": 1e-4, "viscosity": 0.03, "speed": 300.0,
     "groove_deg": 20, "cells": (53, 8), "guess": (0.5, -0.7),
 }  # fmt: skip
@@ -97,7 +98,7 @@ def gear_unit(cells: tuple[int, int] = (120, 8), torque: float = 300.0) -> Trans
     """
     pair = GearPair((26, 157), 4e-3, 0.04)
     pair = replace(pair, centre_distance=pair.distance + 1e-4)
-    z, load, rotors = np.linspace(0.0, 0.2, 5), np.pi / 2 - pair.alpha, []
+    z, load, rotors = np.linspace(0.0, 0.2, 5), np.pi / 2 - pair.alpha, list[Rotor]()
     wheels = ((0.104, load + np.pi, (0.05, 0.025, 5e-5)), (0.628, -load, (0.09, 0.06, 8e-5)))
     for outer, way, size in wheels:
         grooves = [Groove(way + side * np.pi / 2, np.radians(20)) for side in (1, -1)]
@@ -106,7 +107,8 @@ def gear_unit(cells: tuple[int, int] = (120, 8), torque: float = 300.0) -> Trans
         rotors.append(Rotor(Shaft(z, size[0], [wheel]), 2, {0: held, 4: held}))
     k = stiffness_table(pair, force=torque / pair.rb[0] / pair.width)
     oil = float(iso_vg(46).viscosity(60.0))
-    return Transmission(*rotors, Mesh(pair, k, damping=2e-6), 100 * np.pi, torque * 157 / 26, oil)
+    mesh, (pinion, gear) = Mesh(pair, k, damping=2e-6), rotors
+    return Transmission(pinion, gear, mesh, 100 * np.pi, torque * 157 / 26, oil)
 
 
 def speeds_run_through(n: int, cells: tuple[int, int]) -> Iterator[Row]:

@@ -56,7 +56,7 @@ class Run:
     rho_inf: float = 0.9
     times: int = 1
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.steps % self.samples:
             raise ConfigError(f"{self.samples} samples do not divide {self.steps} steps.")
 
@@ -94,7 +94,7 @@ def by_exudyn(model: FEModel, body: FlexibleBody, runs: list[Run]) -> list[Moved
         save(body, files[0])
         save_for_exudyn(model, files[1])
         Path(files[2]).write_text(json.dumps([run.described for run in runs]))
-        answers = answer_of([interpreter(), str(SCRIPT), *files])
+        answers: Any = answer_of([interpreter(), str(SCRIPT), *files])
     return [
         Moved(run.steps / found["seconds"], np.array(found["positions"]), found["version"])
         for run, found in zip(runs, answers, strict=True)
@@ -115,7 +115,11 @@ def save_for_exudyn(model: FEModel, path: str) -> None:
 def by_rom(body: FlexibleBody, run: Run) -> Moved:
     """The same run here. A long one is timed, without its set-up, for steps are short."""
     mech, dt = built(run.mechanism, body), run.t_end / run.steps
-    options = {"dt": dt, "rho_inf": run.rho_inf, "save_every": run.steps // run.samples}
+    options: dict[str, Any] = {
+        "dt": dt,
+        "rho_inf": run.rho_inf,
+        "save_every": run.steps // run.samples,
+    }
     path = simulate(mech, t_end=run.t_end, **options).position(*run.mechanism["watch"])
     steps = max(run.steps, TIMED // len(run.mechanism["bodies"]))
     setup, whole = (

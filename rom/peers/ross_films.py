@@ -9,6 +9,7 @@ import json
 import sys
 from importlib.metadata import version
 from time import process_time
+from typing import Any
 
 import numpy as np
 from ross.bearings.lubricants import lubricants_dict
@@ -37,7 +38,8 @@ def bearing(case: dict, cells: list[int], method: str) -> PlainJournal:
 
 def main(text: str) -> None:
     """Time every method and print what it found."""
-    case, found = json.loads(text), {"version": version("ross-rotordynamics")}
+    case = json.loads(text)
+    found: dict[str, Any] = {"version": version("ross-rotordynamics")}
     for method in METHODS:
         bearing(case, [8, 3], method)
         start = process_time()

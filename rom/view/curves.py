@@ -94,7 +94,8 @@ def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> 
             full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
             error = np.maximum(np.abs(reduced / full - 1), EXACT)
             longest = max(longest, full.size)
-            look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
+            look: dict[str, Any] = {"color": LINES[k % len(LINES)]}
+            look["marker"] = MARKERS[k % len(MARKERS)]
             look |= {"ls": "--" if k % 2 else "-", "ms": max(4, 10 - 2 * k)}  # curves may coincide
             axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
         axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")

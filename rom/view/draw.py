@@ -23,7 +23,7 @@ def main(folder: Path) -> None:
     with np.load(folder / "arrays.npz", allow_pickle=False) as file:
         arrays = dict(file)
     width, height = scene["size"]
-    plotter = pyvista.Plotter(off_screen=True, window_size=[FINER * width, FINER * height])
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[FINER * width, FINER * height])
     plotter.set_background("white")
     aim(plotter, scene, arrays)
     moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
@@ -62,7 +62,12 @@ def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, fra
     if arrays[f"cells {k}"].shape[1] < 3:  # lines and dots lie in front of the faces they are on
         points = points + LIFT * scene["height"] * arrays["toward"].astype(np.float32)
     grid = _grid(points, arrays[f"cells {k}"])
-    look = {"opacity": style["opacity"], "reset_camera": False, "render": False, "name": f"{k}"}
+    look: dict[str, Any] = {
+        "opacity": style["opacity"],
+        "reset_camera": False,
+        "render": False,
+        "name": f"{k}",
+    }
     if values is None:
         look["color"] = style["colour"]
     else:
@@ -82,8 +87,8 @@ def _grid(points: Any, cells: Any) -> Any:
     import pyvista
 
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
-    kind = {1: "verts", 2: "lines", 3: "faces"}[cells.shape[1]]
-    return pyvista.PolyData(points, **{kind: counted})
+    given: dict[str, Any] = {{1: "verts", 2: "lines", 3: "faces"}[cells.shape[1]]: counted}
+    return pyvista.PolyData(points, **given)
 
 
 if __name__ == "__main__":

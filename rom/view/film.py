@@ -79,8 +79,8 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
 ) -> Path:
     """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`, .png."""
     path = page.checked(path, ".png")
-    times = np.atleast_1d(np.asarray(times, dtype=float))
-    steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in times])
+    wanted = np.asarray(times, dtype=float).ravel()
+    steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in wanted])
     stage = _stage(mechanism, solution, steps, shapes or {}, magnify)
     images = render(stage.actors, stage.camera(STILL, view, up), limits=stage.limits)
     with page.styled():
@@ -117,7 +117,9 @@ def _stage(
         raise ConfigError(
             f"shapes: no body {sorted(unknown)[0]!r}; there are {sorted(mechanism.parts)}."
         )
-    actors, flexible, shades = [], {}, shades_of(mechanism)
+    actors: list[Actor] = []
+    flexible: dict[str, int] = {}
+    shades = shades_of(mechanism)
     for name, part in mechanism.parts.items():
         pose = _poses(solution, name, steps)
         surface = getattr(part.flexible, "surface", None)
@@ -195,7 +197,7 @@ def _deformation(surface: Any, q: Array) -> Array:
 def bars(part: Any) -> Mesh:
     """Round bars from the mass centre to the markers, or a small cube-like knot without any."""
     ends = [np.asarray(p) for p in part.points.values() if np.linalg.norm(p) > 0]
-    reach = max((np.linalg.norm(p) for p in ends), default=0.0)
+    reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
     if not ends:
         reach = float(np.sqrt(np.trace(part.second) / part.mass)) or 1e-2
         ends = [np.array([reach, 0, 0]), np.array([-reach, 0, 0])]

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -66,7 +67,11 @@ def write_scene(
     folder: Path, actors: Sequence[Actor], camera: Camera, limits: tuple[float, float]
 ) -> None:
     """Leave a scene where a child process finds it."""
-    arrays = {"focus": camera.focus, "toward": camera.toward, "up": camera.up}
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "focus": camera.focus,
+        "toward": camera.toward,
+        "up": camera.up,
+    }
     for k, actor in enumerate(actors):
         arrays |= {f"points {k}": actor.points.astype(np.float32), f"cells {k}": actor.cells}
         if actor.values is not None:

@@ -82,8 +82,8 @@ def place(figure: "Figure", image: Image, left: float, top: float) -> Any:
 def words(figure: "Figure", text: str, left: float, top: float, **options: Any) -> Any:
     """Write text whose upper left corner is at a pixel."""
     w, h = figure.get_size_inches() * DPI
-    options = {"size": BODY, "va": "top", "color": INK} | options
-    return figure.text(left / w, 1 - top / h, text, **options)
+    look: dict[str, Any] = {"size": BODY, "va": "top", "color": INK} | options
+    return figure.text(left / w, 1 - top / h, text, **look)
 
 
 def caption(text: str, width: int) -> tuple[str, int]:

@@ -103,7 +103,7 @@ class Window:
         self.plotter: Any = pyvista.Plotter(
             off_screen=off_screen, window_size=[SIZE, 3 * SIZE // 4]
         )
-        self.plotter.set_background("white")
+        self.plotter.background_color = "white"
         self.go(0)
 
     def go(self, step: int) -> None:

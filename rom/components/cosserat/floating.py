@@ -136,8 +136,9 @@ def mean_axis(rod: Rod, now: Instant) -> tuple[Array, Array]:
         C[:3, at], C[3:, at] = m * np.eye(3), m * rotation.skew(xi)
     rate = np.zeros(6)
     for k, (J, q) in enumerate(zip(rod.inertia, now.theta, strict=True)):
-        at, R, w = FRAME + 6 * k, rotation.matrix(q), now.parts[3][k]
-        C[3:, at : at + 3] += R * J
+        at = slice(FRAME + 6 * k, FRAME + 6 * k + 3)
+        R, w = rotation.matrix(q), now.parts[3][k]
+        C[3:, at] += R * J
         rate[3:] += R @ np.cross(w, J * w)
     return C, rate
 

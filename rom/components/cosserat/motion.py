@@ -33,7 +33,7 @@ from rom.components.cosserat.statics import add_loads, clamped, largest
 from rom.components.cosserat.vibration import lumped_mass
 from rom.errors import ConfigError, SolverError
 from rom.mbs.alpha import coefficients
-from rom.model import Array
+from rom.model import Array, Mask
 
 HELD, HEAVY, LIGHT = 0, 1, 2  # dofs; light ones have no mass and follow the rest
 CONVERGED, ITERATIONS = 1e-9, 25  # last increment, in rad and lengths of the rod
@@ -237,12 +237,12 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
     if not (dt > 0 and t_end > 0 and 0 <= rho_inf <= 1):
         raise ConfigError(f"dt={dt:g}, t_end={t_end:g}, rho_inf={rho_inf:g} is no run.",
                           hint="Times are positive, rho_inf lies between 0 and 1.")  # fmt: skip
-    free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
-    kinds = np.where(free, np.where(lumped_mass(rod) > 0, HEAVY, LIGHT), HELD)
+    moving = clamped(rod) if free is None else np.asarray(free, dtype=np.bool_)
+    kinds = np.where(moving, np.where(lumped_mass(rod) > 0, HEAVY, LIGHT), HELD)
     shape, W = reference(rod) if start is None else start, work(rod)
     loads = load if callable(load) else _always(rod, load)
     S = scheme(dt, rho_inf)
-    point = _begin(rod, shape, loads(0.0), root, free)
+    point = _begin(rod, shape, loads(0.0), root, moving)
     kept = [(0.0, point, np.zeros(6))]
     total = np.zeros(2, dtype=int)
     steps = round(t_end / dt)
@@ -274,7 +274,7 @@ def _put(point: Point, placement: Placement) -> None:
 
 
 def _begin(
-    rod: Rod, shape: Shape, load: Loads, root: Callable[[float], Placement] | None, free: Array
+    rod: Rod, shape: Shape, load: Loads, root: Callable[[float], Placement] | None, free: Mask
 ) -> Point:
     """Rest, or the rigid motion of the root, with the accelerations of what has mass."""
     W = work(rod)
@@ -302,5 +302,5 @@ def _begin(
 
 def _motion(rod: Rod, kept: list[Any], total: Any) -> Motion:
     t, points, root = zip(*kept, strict=True)
-    rows = [np.array([getattr(point, part) for point in points]) for part in ("x", "p", "v")]
-    return Motion(rod, np.array(t), *rows, np.array(root), int(total[0]), int(total[1]))
+    x, p, v = (np.array([getattr(point, part) for point in points]) for part in ("x", "p", "v"))
+    return Motion(rod, np.array(t), x, p, v, np.array(root), int(total[0]), int(total[1]))

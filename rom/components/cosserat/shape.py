@@ -82,10 +82,10 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
     C[:], B[:] = stretch, bend
     _refuse((C <= 0).any(axis=1), "segment", "has a stretch rigidity that is not positive", "")
     _refuse((B <= 0).any(axis=1), "vertex", "has a bending rigidity that is not positive", "")
-    p = p / np.linalg.norm(p, axis=1)[:, None]
-    s = np.array([_root(a, b) for a, b in pairwise(p)])
+    turns: Array = p / np.linalg.norm(p, axis=1)[:, None]
+    s = np.array([_root(a, b) for a, b in pairwise(turns)])
     _refuse(s[:, 0] < FLAT, "vertex", "turns back on itself", "Place stations more densely.")
-    a0 = np.array([rotation.matrix(q).T @ d for q, d in zip(p[1:-1], np.diff(x, axis=0),
+    a0 = np.array([rotation.matrix(q).T @ d for q, d in zip(turns[1:-1], np.diff(x, axis=0),
                                                           strict=True)]) / h[:, None]  # fmt: skip
     lumped = np.zeros(n + 1)
     lumped[:-1] += h / 2 * mass
@@ -94,7 +94,7 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
     J[1:-1] = h[:, None] * np.asarray(inertia, dtype=float)
     viscosity = np.broadcast_to(np.asarray(viscosity, dtype=float), 6)
     S = np.array([rotation.matrix(r) for r in s])
-    return Rod(h, C, a0, l, B, s, S, lumped, J, C * viscosity[:3], B * viscosity[3:], x, p)
+    return Rod(h, C, a0, l, B, s, S, lumped, J, C * viscosity[:3], B * viscosity[3:], x, turns)
 
 
 def _root(a: Array, b: Array) -> Array:
@@ -140,7 +140,8 @@ def along(place: Callable[[float], tuple[npt.ArrayLike, npt.ArrayLike]], station
     s = np.asarray(stations, dtype=float)
     middles = np.concatenate(([s[0]], (s[1:] + s[:-1]) / 2, [s[-1]]))
     frames = [rotation.quaternion(place(at)[1]) for at in middles]
-    return rod([place(at)[0] for at in s], frames, **section)
+    x = np.array([place(at)[0] for at in s], dtype=float)
+    return rod(x, np.array(frames), **section)
 
 
 def reference(rod: Rod) -> Shape:

@@ -16,7 +16,7 @@ from rom.components.cosserat.elements import (
 )
 from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ConfigError, SolverError
-from rom.model import Array
+from rom.model import Array, Mask
 
 CAP = 0.2  # largest rotation of an iteration [rad]: larger steps jump to other equilibria
 CONVERGED = 1e-8  # last increment, in rad and in lengths of the rod; the next one is its square
@@ -112,9 +112,9 @@ def newton(rod, x, p, load, spin, free, W):
     return -1
 
 
-def clamped(rod: Rod, *, start: bool = True, end: bool = False) -> Array:
+def clamped(rod: Rod, *, start: bool = True, end: bool = False) -> Mask:
     """(6 N + 9,) which dofs are free when plates are held; order plate, x_0, segment, x_1, ..."""
-    free = np.ones(6 * rod.h.size + 9, dtype=bool)
+    free = np.ones(6 * rod.h.size + 9, dtype=np.bool_)
     free[:6], free[-6:] = not start, not end
     return free
 

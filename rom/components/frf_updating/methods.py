@@ -106,7 +106,7 @@ def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) 
         return np.swapaxes(flipped, 1, 2)
     n_f, n, b = right.shape
     columns = np.ascontiguousarray(np.moveaxis(right, 1, 0).reshape(n, n_f * b))
-    w, pushed = np.repeat(omega, b), 0.0
+    w, pushed = np.repeat(omega, b), np.zeros((), dtype=complex)
     for part, factor in zip(S, (1.0, -(w**2), 1j * w), strict=True):
         pairs = part.reshape(-1, n) @ (columns * factor).view(np.float64)  # a quarter of the work
         pushed = pushed + pairs.view(np.complex128)
@@ -164,22 +164,23 @@ def update_by_input(
     test.check(model, zeta)
     if not 1 <= rank <= test.H.shape[1]:
         raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
-    p, zeta = np.array(p, dtype=float), np.array(zeta, dtype=float)
+    x, ratios, path = np.array(p, dtype=float), np.array(zeta, dtype=float), []
     weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
-    weights, path = weights.mean(axis=1, keepdims=True), []
+    weights = weights.mean(axis=1, keepdims=True)
     for _ in range(STEPS):
-        here = model.at(p)
-        modes = modal(here, zeta)
+        here = model.at(x)
+        modes = modal(here, ratios)
         H = _receptance(here, modes, test.omega, test.inputs)
         U = common_basis(test.H, H, rank)
         y = modes.Phi.T @ here.M @ (U @ (U.T @ test.H))  # Phi^-1 = Phi^T M
         left = (U.T @ modes.Phi) * modes.g(test.omega)[:, None, :]
-        J = _weighted(weights, _by_all(here, modes, zeta.size, left, y, test.omega))
+        J = _weighted(weights, _by_all(here, modes, ratios.size, left, y, test.omega))
         r = _weighted(weights, U.T @ (test.H - H))
         step = np.clip(-np.linalg.lstsq(J, r, rcond=None)[0], -CLIP, CLIP)
-        p, zeta = np.maximum(p + step[: p.size], LEAST), zeta * np.exp(step[p.size :])
-        path.append(p)
-    return _update(np.concatenate([p, np.log(zeta)]), p.size, r, J, path)
+        ratios = ratios * np.exp(step[x.size :])
+        x = np.maximum(x + step[: x.size], LEAST)
+        path.append(x)
+    return _update(np.concatenate([x, np.log(ratios)]), x.size, r, J, path)
 
 
 def response_function_method(
@@ -215,8 +216,8 @@ def response_function_method(
         known = np.empty((w.size, *F.shape), dtype=complex)
         known[:, s] = test.H
         known[:, o] = np.linalg.solve(Z[:, o][:, :, o], F[o] - Z[:, o][:, :, s] @ test.H)
-        J = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
-        J, r = _weighted(test.weights, J), _weighted(test.weights, H @ F - test.H)
+        change = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
+        J, r = _weighted(test.weights, change), _weighted(test.weights, H @ F - test.H)
         step = np.linalg.lstsq(J, r, rcond=None)[0]
         p = np.maximum(p + np.clip(step, -clip, clip), LEAST)
         path.append(p)

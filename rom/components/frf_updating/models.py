@@ -142,7 +142,7 @@ class Measurement:
                 f"the model has {len(full.sensors)} sensors, the test {self.H.shape[1]}."
             )
         if not (np.asarray(zeta) > 0).all():
-            raise ConfigError(f"zeta = {zeta}: damping ratios to start from must be positive.")
+            raise ConfigError(f"zeta = {zeta!r}: damping ratios to start from must be positive.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -184,15 +184,17 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
         (*astuple(g.shear)[:4], 2 * g.shear.damping * np.sqrt(g.shear.stiffness * g.plug)),
         (g.slab.damping, g.slab.capacity, g.slab.stiffness),
     )
-    numbers = tuple(tuple(map(float, group)) for group in numbers)
+    laws = tuple(tuple(map(float, group)) for group in numbers)
     modes = tuple(np.array(x, dtype=float) for x in (g.slab.phi, g.slab.omega))
     out, last = np.zeros((n // every + 1, 17)), np.zeros(7)
-    kernels.strike(numbers, modes, t_end / n, every, out, last)
+    kernels.strike(laws, modes, t_end / n, every, out, last)
     if not np.isfinite(out).all():
         raise SolverError(f"the impact grows without bound with a step of {t_end / n:.3g} s.")
-    t, *rest = np.split(out, [1, 4, 7, 10], axis=1)
+    t, z, v, forces, energy = np.split(out, [1, 4, 7, 10], axis=1)
     deepest, deflection, plastic = map(float, last[3:6])
-    return Impact(t[:, 0], *rest, last[:3], deepest, deflection, plastic, STATES[int(last[6])])
+    return Impact(
+        t[:, 0], z, v, forces, energy, last[:3], deepest, deflection, plastic, STATES[int(last[6])]
+    )
 
 
 VARIED = {  # what `sensitivity` changes: where it stands, and the power of the factor there

@@ -73,11 +73,11 @@ class Housing:
             )
         N = np.sqrt(body.mass) * N @ V
         turn = np.kron(np.eye(2), A)
-        bushes = [
+        left, right = (
             {node: turn @ motion_of(body, name) @ N for node, name in where.items()}
             for where in (pinion, gear)
-        ]
-        return cls(body.mass * np.eye(omega2.size), np.diag(body.mass * omega2), tuple(bushes))
+        )
+        return cls(body.mass * np.eye(omega2.size), np.diag(body.mass * omega2), (left, right))
 
     def check(self, *bearings: Mapping[int, object]) -> None:
         """See that every bearing has a bush.

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.components.transmission.motion import Step
 from rom.components.transmission.unit import Rest, Transmission, rest
@@ -45,7 +46,7 @@ class Steady:
     teeth: Array
     error: Array
     heat: Array
-    multipliers: Array
+    multipliers: npt.NDArray[np.complex128]
     passes: int
     gap: float
 
@@ -176,7 +177,7 @@ def _found(
     unit: Transmission, theta: float, rows: list[tuple], F: Array, count: int, gap: float
 ) -> Steady:
     q, v, teeth, error, heat, _ = (np.array(column) for column in zip(*rows, strict=True))
-    values = np.linalg.eigvals(F)
+    values = np.linalg.eigvals(F).astype(complex)
     values = values[np.argsort(-np.abs(values))]
     t = unit.mesh_period * np.linspace(0, 1, len(rows))
     return Steady(unit, theta, t, q, v, teeth, error, heat, values, count, gap)
