@@ -103,7 +103,7 @@ class Window:
         self.plotter: Any = pyvista.Plotter(
             off_screen=off_screen, window_size=[SIZE, 3 * SIZE // 4]
         )
-        self.plotter.background_color = "white"
+        self.plotter.background_color = pyvista.Color("white")
         self.go(0)
 
     def go(self, step: int) -> None:
