@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from command import ROOT
 from numpy.testing import assert_allclose
+from schema import errors
 from solid import block
 
 import rom
 from rom.cli.main import main
+from rom.cli.schemas import schema
 from rom.config.component import read_component
 from rom.errors import ConfigError, FileFormatError
 from rom.io.op4 import write_op4
@@ -102,6 +104,7 @@ def test_options_go_before_the_file(folder, capsys):
     assert main(["reduce", "bar.toml", "--f-max", "3e3", "--reference", "tip", "--no-certificate",
                  "-o", "other.npz", "--json", "-q"]) == 0  # fmt: skip
     found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema("reduce")) == []
     assert found["output"] == "other.npz" and found["certificate"] is None
     assert "tip" in found["reference"] and "f_max=3000" in str(found["provenance"])
 

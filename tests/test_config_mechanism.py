@@ -249,6 +249,9 @@ def test_every_section_reaches_the_mechanism(folder):
     assert a.r == 0 and a.mass == body.mass
     assert_allclose(a.at, [-c[1], c[0], c[2]], atol=1e-12)  # turned by a quarter about z
     assert_allclose(a.velocity, 2 * np.pi * np.array([-c[0], -c[1], 0]), atol=1e-12)
+    inertia = np.trace(a.second) * np.eye(3) - a.second  # of a box 1 m x 0.1 m x 0.08 m
+    box = a.mass / 12 * np.array([0.1**2 + 0.08**2, 1 + 0.08**2, 1 + 0.1**2])
+    assert_allclose(inertia, np.diag(box), rtol=1e-9, atol=1e-9)
     assert_allclose(a.points["tip"], body.marker("tip").point - c, atol=1e-12)
     x = body.marker("tip").point
     assert_allclose(mech.design_point(a.marker("tip")), [-x[1], x[0], x[2]], atol=1e-12)

@@ -49,6 +49,7 @@ def test_a_quantity_in_si(text, unit, value):
         ("210 mm", "Pa", "is a length; a pressure or stress [Pa] is wanted"),
         ("50 Hz", "rad/s", "is a frequency; an angular speed [rad/s] is wanted"),
         ("3 rad/s", "Hz", "is an angular speed; a frequency [Hz] is wanted"),
+        ("3 %", "rad", "is a number; an angle [rad] is wanted"),
         ("30 deg", "1", "is an angle; a number without unit"),
         ("1 m^5 kg", "N", "kg m^5; a force"),
         ("210", "Pa", "has no unit; Pa is wanted"),
