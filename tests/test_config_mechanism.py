@@ -166,6 +166,17 @@ def test_simulate_leaves_a_folder_that_says_how_it_came_about(folder, capsys):
     assert record["joints"] == {"pivot": "revolute"} and record["bodies"]["bob"]["mass"] == 2.0
 
 
+def test_a_film_and_another_form_of_the_table_when_the_file_asks(folder):
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    text = CRANK + '[output]\nfilm = "glb"\nhistory = "h5"\nmagnify = 20\n'
+    (folder / "c.toml").write_text(text)
+    assert main(["simulate", "c.toml", "--t-end", "2e-3", "-q", "-o", "out"]) in (0, 5)
+    assert {path.name for path in (folder / "out").iterdir()} == {
+        "motion.h5", "motion.glb", "run.json",
+    }  # fmt: skip
+    assert (folder / "out" / "motion.glb").read_bytes()[:4] == b"glTF"
+
+
 def test_a_column_to_plot_is_looked_for_before_the_run(folder, capsys):
     text = PENDULUM + '[output]\nplot = ["bob position x", "pivto force x"]\n'
     (folder / "p.toml").write_text(text)
