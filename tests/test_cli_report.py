@@ -99,6 +99,15 @@ def test_a_finished_run_is_described(folder, monkeypatch):
     assert_allclose(gained, 2 * 9.81 * -numbers["bob_position_y_m"][-1], rtol=1e-4)
 
 
+def test_a_body_on_its_hinge_is_described_too(folder, monkeypatch):
+    without_pictures(monkeypatch)
+    words = ["simulate", "rod.rom.npz", "--hinge", "root", "--t-end", "1e-3", "--dt", "1e-4"]
+    assert main([*words, "-q", "-o", "swing"]) in (0, 5)
+    text = reported("swing").text
+    for words in ("Motion of bar <1>", "hinge", "revolute", "10 steps", "bar <1>.csv"):
+        assert words in text, words
+
+
 def test_what_is_no_run_is_refused(folder, capsys):
     (folder / "empty").mkdir()
     (folder / "broken").mkdir()

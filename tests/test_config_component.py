@@ -262,7 +262,7 @@ def keys_of(kind, seen):
 
 
 def test_the_page_has_every_key_with_its_meaning():
-    from rom.config.component import TABLE
+    from rom.config.component_keys import TABLE
     from rom.config.mechanism_keys import TABLE as MECHANISM
     from rom.config.page import page
 

@@ -59,9 +59,8 @@ def _mechanism(args: argparse.Namespace) -> Answer:
 
     file = mechanism(args)
     _check_folder(args.output)
-    command = f"rom {' '.join(map(quote, args.argv))}"
     aloud = ranks()[0] == 0 and not args.quiet
-    done = move(file, command=command, version=__version__, progress=aloud)
+    done = move(file, command=_command(args), version=__version__, progress=aloud)
     paths = done.paths(args.output)
     return _answer(done.solution, done.audit, paths, lambda: done.write(args.output))
 
@@ -79,6 +78,8 @@ def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> An
 
 
 def _pendulum(args: argparse.Namespace) -> Answer:
+    from rom import __version__
+    from rom.config.run import RECORD, Record
     from rom.io.native import load
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
@@ -93,10 +94,17 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     body.marker(args.hinge)
     solution, audit = _swing(body, args)
     path = args.output / f"{body.name}.csv"
-    return _answer(
-        solution, audit, [path, *_more(path, args)],
-        lambda: _write_all(path, body, solution, args),
-    )  # fmt: skip
+    paths = [path, *_more(path, args), args.output / RECORD]
+
+    def write() -> None:
+        _write_all(path, body, solution, args)
+        Record(body.name, _command(args), __version__).write(paths, solution, audit)
+
+    return _answer(solution, audit, paths, write)
+
+
+def _command(args: argparse.Namespace) -> str:
+    return f"rom {' '.join(map(quote, args.argv))}"
 
 
 def _swing(body: "FlexibleBody", args: argparse.Namespace) -> tuple[Any, Any]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from rom.config.component import TABLE as COMPONENT
+from rom.config.component_keys import TABLE as COMPONENT
 from rom.config.keys import Either, Key, Kind, Named, Table, Variants
 from rom.config.laws import law_kind
 from rom.config.mechanism_keys import TABLE as MECHANISM

@@ -236,7 +236,8 @@ def of_run(folder: Path) -> tuple[str, Sections]:
         "Checks": [report.checks(audit, "Is the computed motion believable?")],
         "Energy": _energy(folder, record),
         "How it was made": [
-            *how(record["command"], record["versions"]), report.source(record["source"])
+            *how(record["command"], record["versions"]),
+            *([report.source(record["source"])] if record["source"] else []),
         ],
     }  # fmt: skip
 
@@ -265,7 +266,8 @@ def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
     """Energies over time from the table of the motion."""
     path = folder / "motion.csv"
     if not path.is_file():
-        return [report.paragraph("The motion is kept in motion.h5.")]
+        kept = record["files"][0] if record["files"] else "no file"
+        return [report.paragraph(f"The motion is kept in {kept}, without energies over time.")]
     import numpy as np
 
     with path.open(newline="", encoding="utf-8") as file:

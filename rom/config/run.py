@@ -20,6 +20,55 @@ INSTANTS = 4  # in the picture
 
 
 @dataclass(frozen=True, slots=True)
+class Record:
+    """How a run came about: what `rom report` tells of it later.
+
+    Attributes:
+        name: of the mechanism.
+        command: what was typed.
+        version: of rom.
+        source: the file that describes it; empty without one.
+    """
+
+    name: str
+    command: str
+    version: str
+    source: str = ""
+
+    def write(self, paths: list[Path], solution: "Solution", audit: "Report") -> None:
+        """Write it as the last of the files of a run."""
+        from rom.io.files import write_whole
+
+        files = [path.name for path in paths]
+        text = json.dumps(self._data(files, solution, audit), indent=2)
+        write_whole(paths[-1], lambda file: file.write(text.encode()))
+
+    def _data(self, files: list[str], solution: "Solution", audit: "Report") -> dict[str, Any]:
+        parts, joints = solution.mechanism.parts.items(), solution.mechanism.joints.items()
+        return {
+            "schema": "rom-run",
+            "version": [1, 0],
+            "name": self.name,
+            "command": self.command,
+            "versions": {"rom": self.version} | versions(),
+            "source": self.source,
+            "files": files,
+            "status": solution.status,
+            "steps": len(solution.t) - 1,
+            "t_end": float(solution.t[-1]),
+            "bodies": {
+                name: {"mass": float(p.mass), "elastic coordinates": p.r, "markers": list(p.names)}
+                for name, p in parts
+            },
+            "joints": {name: joint.kind for name, joint in joints},
+            "audit": {
+                "title": audit.title,
+                "rows": [[r.quantity, float(r.value), r.limit, bool(r.ok)] for r in audit.rows],
+            },
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
     """A motion and what is to be kept of it.
 
@@ -48,42 +97,17 @@ class Run:
 
     def write(self, folder: Path) -> None:
         """Write them; the folder is made if it is missing."""
-        from rom.io.files import write_whole
         from rom.io.history import write_history
 
         folder.mkdir(exist_ok=True)
         paths = self.paths(folder)
         write_history(self.solution, paths[0])
         self._draw(paths)
-        text = json.dumps(self.record([path.name for path in paths]), indent=2)
-        write_whole(folder / RECORD, lambda file: file.write(text.encode()))
-
-    def record(self, files: list[str]) -> dict[str, Any]:
-        """What a report wants to know later, as plain data."""
-        parts = self.solution.mechanism.parts.items()
-        return {
-            "schema": "rom-run",
-            "version": [1, 0],
-            "name": self.file.name,
-            "command": self.command,
-            "versions": {"rom": self.version} | versions(),
-            "source": self.file.document.path.read_text(encoding="utf-8"),
-            "files": files,
-            "status": self.solution.status,
-            "steps": len(self.solution.t) - 1,
-            "t_end": float(self.solution.t[-1]),
-            "bodies": {
-                name: {"mass": float(p.mass), "elastic coordinates": p.r, "markers": list(p.names)}
-                for name, p in parts
-            },
-            "joints": {name: j.kind for name, j in self.solution.mechanism.joints.items()},
-            "audit": {
-                "title": self.audit.title,
-                "rows": [
-                    [r.quantity, float(r.value), r.limit, bool(r.ok)] for r in self.audit.rows
-                ],
-            },
-        }
+        record = Record(
+            self.file.name, self.command, self.version,
+            self.file.document.path.read_text(encoding="utf-8"),
+        )  # fmt: skip
+        record.write(paths, self.solution, self.audit)
 
     def _draw(self, paths: list[Path]) -> None:
         out, solution = self.file.values["output"], self.solution

@@ -1,0 +1,138 @@
+"""The keys of a component file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from rom.config.keys import (
+    Anything,
+    Either,
+    FilePath,
+    Flag,
+    Key,
+    Named,
+    Place,
+    Quantity,
+    Table,
+    Text,
+    Variants,
+    Whole,
+    Words,
+)
+from rom.config.methods import METHODS
+from rom.units import LENGTH, SYSTEMS, UNITS
+
+LENGTHS = tuple(name for name, u in UNITS.items() if u.dimension == LENGTH)
+ISOTROPIC = Table("An isotropic solid.", (
+    Key("E", Quantity("Pa"), "Young's modulus.", ...),
+    Key("nu", Quantity(), "Poisson's ratio.", ...),
+    Key("rho", Quantity("kg/m^3"), "Density.", ...),
+))  # fmt: skip
+ORTHOTROPIC = Table("An orthotropic solid, known by its key G.", (
+    Key("E", Quantity("Pa", ((3,),)), "Young's moduli E1, E2, E3.", ...),
+    Key("nu", Quantity("1", ((3,),)), "Poisson's ratios nu12, nu13, nu23.", ...),
+    Key("G", Quantity("Pa", ((3,),)), "Shear moduli G12, G13, G23.", ...),
+    Key("rho", Quantity("kg/m^3"), "Density.", ...),
+    Key("axes", Quantity("1", ((3, 3),)), "Rows are the axes 1, 2, 3 in the geometry."),
+))  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Solids:
+    """One material, or a table of them by region."""
+
+    parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
+    said: str = "isotropic or orthotropic table, or a table of them by region"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values of the material, or of each region under "regions"."""
+        if (
+            isinstance(value, Mapping)
+            and value
+            and all(isinstance(v, dict) for v in value.values())
+        ):
+            return {"regions": Named(_Solid(), "materials").read(value, place)}
+        return _Solid().read(value, place)
+
+
+@dataclass(frozen=True, slots=True)
+class _Solid:
+    said: str = "material"
+
+    def read(self, value: Any, place: Place) -> dict[str, Any]:
+        """Values of one material."""
+        other = isinstance(value, Mapping) and "G" in value
+        return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
+
+
+INTERFACE = Either(Text(), Variants({
+    "full": Table("Keeps all its dofs.", ()),
+    "rbe2": Table("Moves as a rigid surface.", ()),
+    "rbe3": Table("Moves freely about its mean.", ()),
+    "polynomial": Table("Deforms by polynomials.", (
+        Key("order", Whole(), "Their order; by the band and tol of the reduction if missing."),
+    )),
+    "fourier": Table("A bore: Fourier series around, Legendre polynomials along.", (
+        Key("harmonics", Whole(), "Harmonics around.", ...),
+        Key("order", Whole(), "Order along.", ...),
+    )),
+}))  # fmt: skip
+TABLE = Table("A component.", (
+    Key("name", Text(), "Name of the body; that of the file if missing."),
+    Key("geometry", Table("The solid as a geometry or mesh; needs FEniCSx.", (
+        Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.inp` or `.bdf`.", ...),
+        Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
+        Key("degree", Whole(1, 3), "Degree of the displacement.", 2),
+        Key("solver", Text(), "How equations are solved, as `rom reduce --solver`.", "direct"),
+        Key("parameters", Named(Anything("number or text"), "parameters"),
+            "Parameters of the geometry. A plain number goes there as it is; a length with its "
+            "unit is converted to that of the geometry (`.step`: to metres), another quantity "
+            "to SI."),
+        Key("faces", Named(Anything("number or points"), "faces"),
+            "Names for faces of a `.step`: a number, a point [m], or a list of these."),
+    )), "The solid as a geometry or mesh."),
+    Key("matrices", Table("The solid as matrices of another program, in place of a geometry.", (
+        Key("stiffness", Text(), "File, `:NAME` behind it where it holds several.", ...),
+        Key("mass", Text(), "Likewise.", ...),
+        Key("nodes", FilePath(), "`.inp`, `.bdf`, `.dat` or `.csv`.", ...),
+        Key("units", Text(tuple(SYSTEMS)), "Unit system of the files.", "SI"),
+        Key("sets", Named(Quantity("1", ((None,),)), "labels"),
+            "Labels of the nodes of an interface, where the `.inp` has no set of its name."),
+    )), "The solid as matrices of another program."),
+    Key("material", Solids(), "What it is made of; by region where there are several."),
+    Key("interfaces", Named(INTERFACE, "interfaces"),
+        "Surfaces through which it touches others, and their kinds."),
+    Key("attachments", Named(Table("A rigid body on an interface.", (
+        Key("interface", Text(), "Which carries it.", ...),
+        Key("mass", Quantity("kg", positive=True), "Mass.", ...),
+        Key("inertia", Quantity("kg m^2", ((3, 3),)), "About its mass centre; none for a point."),
+        Key("at", Quantity("m", ((3,),)), "Mass centre; the middle of the interface if missing."),
+    )), "attachments"), "Rigid bodies and point masses it carries."),
+    Key("reduction", Table("How it is reduced.", (
+        Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
+        Key("modes", Whole(), "How many; 20 if missing. For moment-matching blocks, 2."),
+        Key("f_max", Quantity("Hz", positive=True), "Craig-Bampton: all modes up to here instead."),
+        Key("tol", Quantity("1", positive=True),
+            "With f_max: the fewest modes with this relative error in the band."),
+        Key("at", Quantity("Hz", ((None,),)), "Moment-matching: where to be exact; 0 if missing."),
+        Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
+        Key("gravity_shapes", Flag(), "Keep the answers to gravity along each axis.", False),
+        Key("reference", Words(), "The frame: mean-axis, an interface, or two of them.",
+            ("mean-axis",)),
+        Key("stiffening", Flag(), "Add the geometric stiffness of rotation and loads.", False),
+        Key("stress", Flag(), "Make stress on the surface recoverable.", False),
+        Key("certificate", Flag(), "Compare with the full model.", True),
+    )), "How it is reduced.", {}),
+    Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
+        Key("ratio", Quantity(), "Damping ratio of every mode."),
+        Key("alpha", Quantity("1/s"), "D = alpha M + beta K."),
+        Key("beta", Quantity("s"), "D = alpha M + beta K."),
+    )), "Structural damping; none if missing."),
+    Key("modes", Table("What `rom modes` computes.", (
+        Key("number", Whole(1), "Number of modes, rigid ones too.", 12),
+        Key("fixed", Words(), "Interfaces held.", ()),
+    )), "What `rom modes` computes.", {}),
+    Key("output", Table("What `rom reduce` writes.", (
+        Key("file", FilePath(), "The body file, `.rom.npz`.", ...),
+    )), "What `rom reduce` writes."),
+))  # fmt: skip
