@@ -316,9 +316,9 @@ def test_laws_have_the_values_they_say():
 
 MISTAKES = {
     "unknown marker": ('"bob.top"', '"bob.topp"',
-                       "p.toml:10: body 'bob' has no marker 'topp'. Did you mean top?"),
+                       "p.toml:12: body 'bob' has no marker 'topp'. Did you mean top?"),
     "unknown body": ('"bob.top"', '"bo.top"',
-                     "p.toml:10: there is no body 'bo'. Did you mean bob? Known: ground, bob."),
+                     "p.toml:12: there is no body 'bo'. Did you mean bob? Known: ground, bob."),
     "no marker": ('"bob.top"', '"bob"', "p.toml:12: joints.pivot.between = 'bob' is no marker."),
     "three markers": ('"bob.top"]', '"bob.top", "bob.top"]', "two markers are needed"),
     "unknown kind": ('"revolute"', '"revolut"', "Did you mean revolute?"),
@@ -372,7 +372,7 @@ def test_a_mistake_of_a_connection_is_told(case, tmp_path):
     with pytest.raises(rom.RomError) as refused:
         read_mechanism(tmp_path / "p.toml").mechanism()
     assert expected in str(refused.value)
-    assert refused.value.where.partition("p.toml:")[2].partition(":")[0] in ("19", "21")
+    assert refused.value.where.partition("p.toml:")[2].partition(":")[0] in ("19", "20", "21")
 
 
 def test_markers_far_apart_are_warned_of(tmp_path):

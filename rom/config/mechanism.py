@@ -104,11 +104,16 @@ class MechanismFile:
         """Call the method of the mechanism with what the entry says."""
         method = METHODS.get(section) or values.pop("kind")
         place = Place(self.document, (section, name))
-        markers = values.pop("between", None) or [values.pop("marker", None)]
-        first: list[Any] = [self._marker(made, m, place) for m in markers if m is not None]
-        for joint in (values.pop(key) for key in JOINT_KEYS if key in values):
+        first: list[Any] = []
+        for key in ("between", "marker"):
+            found = values.pop(key, [])
+            markers = [found] if isinstance(found, tuple) else found
+            first += [self._marker(made, marker, place.at(key)) for marker in markers]
+        for key in (key for key in JOINT_KEYS if key in values):
+            joint = values.pop(key)
             if joint not in made.joints:
-                raise place.error(f"there is no joint {joint!r}.", nearest(joint, made.joints))
+                hint = nearest(joint, made.joints)
+                raise place.at(key).error(f"there is no joint {joint!r}.", hint)
             first.append(joint)
         turns = _turns(made, first[0], values.get("coordinate")) if section in ON_JOINTS else True
         for key, value in values.items():
