@@ -16,19 +16,14 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import identity, kron
 
-from rom.bench_models import SPEED, STEEL, bar, chain_of, slider_crank
+from rom.bench_models import SPEED, STEEL, TITANIUM, bar, chain_of, slider_crank
 from rom.errors import ConfigError
-from rom.model import FEModel, Material
+from rom.model import FEModel
 from rom.reduction.interface import connect
 from rom.reduction.method import CraigBampton
 from rom.workflow import operators, reduce
 
-TITANIUM = Material(E=114e9, nu=0.33, rho=4430.0)
 BED = TITANIUM.E / 0.010  # as soft as 10 mm of the same metal [N/m^3]
-WHEEL = {
-    "width": 0.016, "chord": 0.015, "chord_tip": 0.012, "t": 0.003, "t_tip": 0.002,
-    "stagger": 20, "lc": 0.010, "lc_blade": 0.0065,
-}  # fmt: skip
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
@@ -267,54 +262,20 @@ def transmission(
         yield Figure("transmission", *row)
 
 
-def wheel(families: int = 4, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
+def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
     """Modes of a bladed disk: one reduced sector, one full sector, the whole wheel.
 
-    Both kinds of sectors give all nodal diameters; the whole wheel is asked for as many modes. The
-    peak of the memory is that of the process so far.
+    Both kinds of sectors give all nodal diameters; the whole wheel is asked for as many modes. Time
+    is that of the processor, the peak of the memory that of the process so far.
 
     Args:
         families: modes for each number of nodal diameters.
         parameters: of the geometry.
     """
-    from rom.cyclic.modes import cyclic_modes
-    from rom.cyclic.reduced import reduce_sector
-    from rom.cyclic.sector import CyclicSector
-    from rom.fe import model as read_model
-    from rom.reduction.polynomial import Polynomial
-    from rom.scipy_operators import SciPyOperators
+    from rom.bench_wheel import measured
 
-    def frequencies(part: Any) -> Any:
-        """All below the first that belongs to a family left out."""
-        found = [cyclic_modes(part, n, families) for n in part.diameters]
-        f = np.concatenate([np.repeat(modes.frequencies, modes.multiplicity) for modes in found])
-        return np.sort(f[f < min(modes.frequencies[-1] for modes in found)])
-
-    model = read_model(geometry("bladed_disk"), material=TITANIUM, parameters=parameters or WHEEL)
-    sector = CyclicSector.from_model(model, fixed=("bore",))
-
-    def by_reduction() -> Any:
-        return frequencies(reduce_sector(sector, n_modes=30, functions=Polynomial(7)))
-
-    def whole() -> Any:
-        ops, m = SciPyOperators(*sector.wheel()), families * sector.n_sectors
-        return ops.modes(np.zeros(0, dtype=np.int64), m)[0] / (2 * pi)
-
-    case, answers, taken = f"{sector.n_wheel} dofs, {sector.n_sectors} sectors", {}, {}
-    ways = {"reduced sector": by_reduction, "sector": lambda: frequencies(sector), "wheel": whole}
-    for name, way in ways.items():
-        start = perf_counter()
-        answers[name] = way()
-        taken[name] = perf_counter() - start
-        yield Figure("wheel", case, name, taken[name], "s")
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
-        yield Figure("wheel", case, f"{name}: peak memory so far", peak, "GiB")
-    for name in ("reduced sector", "sector"):
-        yield Figure("wheel", case, f"{name}, times as fast", taken["wheel"] / taken[name])
-    for name, aim in (("sector", "below 1e-8"), ("reduced sector", "below 0.001")):
-        f = answers[name]
-        error = np.abs(f / answers["wheel"][: f.size] - 1).max()
-        yield Figure("wheel", case, f"{name}: difference of {f.size} frequencies", error, "", aim)
+    for row in measured(geometry("bladed_disk"), families, parameters):
+        yield Figure("wheel", *row)
 
 
 def loops(*sizes: int) -> Iterator[Figure]:

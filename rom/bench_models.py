@@ -8,6 +8,7 @@ from scipy.sparse import bmat, csr_matrix, identity, kron
 from rom.model import FEModel, Interface, Material
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+TITANIUM = Material(E=114e9, nu=0.33, rho=4430.0)
 SPEED = 300.0  # of the crank [rad/s]
 
 

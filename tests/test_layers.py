@@ -19,6 +19,7 @@ ANYTHING = {
     "bench",
     "bench_loops",
     "bench_models",
+    "bench_wheel",
     "cli",
     "doctor",
     "peers",
