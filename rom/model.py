@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import sqrt
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,8 @@ from rom.notebook import shown
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+Integers = npt.NDArray[np.integer[Any]]
+Numbers = TypeVar("Numbers", Array, Index)
 
 
 @dataclass(frozen=True, slots=True)

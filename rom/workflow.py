@@ -17,7 +17,7 @@ from rom.body.projection import elastic_part, flexible_body
 from rom.certificate import certify_body
 from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
-from rom.model import Array, FEModel, Modes
+from rom.model import Array, FEModel, Index, Modes
 from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
@@ -107,7 +107,7 @@ def modes(
     return Modes(omega, connection.ops.expand(Phi), residual)
 
 
-def _residual(ops: Operators, held: np.ndarray, omega: np.ndarray, Phi: np.ndarray) -> np.ndarray:
+def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
     """norm(K phi - lambda M phi) / (lambda norm(M phi)) on the free dofs."""
     free = ~np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
     inertia = ops.apply_M(Phi)

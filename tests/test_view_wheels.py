@@ -16,7 +16,7 @@ def test_a_wheel_is_drawn_from_one_sector(tmp_path):
     from rom.view.wheels import _joined, _outside
 
     model = block((0.3, 0.1, 0.08), (3, 2, 2), origin=(-0.15, 0.2, 0.0))
-    nodes, triangles = _outside(model, WORDS["hidden"])
+    nodes, triangles = _outside(model, model.surface, WORDS["hidden"])
     inside = np.concatenate([model.interfaces[name].nodes for name in WORDS["hidden"]])
     assert not np.isin(nodes[triangles], inside).all(axis=1).any()
     assert len(triangles) == len(model.surface.triangles) - 2 * 8

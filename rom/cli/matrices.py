@@ -10,7 +10,7 @@ from rom.errors import ConfigError
 if TYPE_CHECKING:
     from rom.model import FEModel
 
-GEOMETRY = {  # options of a geometry, and what they are when not given
+GEOMETRY: dict[str, Any] = {  # options of a geometry, and what they are when not given
     "E": None,
     "nu": None,
     "rho": None,

@@ -1,6 +1,7 @@
 """The grammar of the command line, with the exit codes and examples that ``--help`` shows."""
 
 import argparse
+from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
@@ -80,7 +81,9 @@ class Parser(argparse.ArgumentParser):
             hint = f"Write {option}=-1 where the value begins with a minus. {hint}"
         raise ConfigError(f"{message}.", hint=hint)
 
-    def parse_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def]
+    def parse_args(  # type: ignore[override]  # one signature for its three overloads
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> Any:
         """Parse, and suggest a spelling for an option that does not exist."""
         found, rest = self.parse_known_args(args, namespace)
         if rest:

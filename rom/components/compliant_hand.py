@@ -237,7 +237,7 @@ def close(
     here = rest(finger) if start is None else start
     drawn = pull is not None
     first = here.pull if drawn else here.tension
-    goal = np.append(np.asarray(load, dtype=float), pull if drawn else (tension or 0.0))
+    goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
     begin = np.append(here.load, first)
     share, part = 0.0, 1.0
     while share < 1.0:

@@ -77,9 +77,7 @@ def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width:
         ConfigError: if poles and ratios differ in number, or a bandwidth is not positive.
     """
     if np.shape(poles) != np.shape(zeta) or not (width * np.asarray(zeta) > 0).all():
-        raise ConfigError(
-            f"{np.size(poles)} poles, zeta = {zeta!r}, width = {width}: positive."
-        )
+        raise ConfigError(f"{np.size(poles)} poles, zeta = {zeta!r}, width = {width}: positive.")
     reach = width * np.asarray(zeta) * np.asarray(poles)
     far = np.abs(omega[:, None] - np.asarray(poles)) / reach
     return np.minimum(far, 1.0).prod(axis=1)[:, None, None]

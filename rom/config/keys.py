@@ -102,10 +102,11 @@ def _shape(value: Any) -> tuple[int, ...] | None:
     """Lengths of nested lists, None when they differ."""
     if not isinstance(value, list):
         return ()
-    inner = {_shape(item) for item in value}
-    if len(inner) > 1 or None in inner:
+    inner = [_shape(item) for item in value]
+    first = inner[0] if inner else ()
+    if first is None or any(shape != first for shape in inner):
         return None
-    return (len(value), *(inner.pop() if inner else ()))
+    return (len(value), *first)
 
 
 def _matches(found: tuple[int, ...] | None, shape: tuple[int | None, ...]) -> bool:

@@ -14,7 +14,7 @@ def main() -> None:
     _write("pyvista", version=pyvista.__version__)
     _write("vtk", version=vtk.vtkVersion().GetVTKVersion())
     began = time.perf_counter()
-    plotter = pyvista.Plotter(off_screen=True, window_size=[200, 200])
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[200, 200])
     plotter.add_mesh(pyvista.Sphere())
     picture = plotter.screenshot(return_img=True)
     _write(

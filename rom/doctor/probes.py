@@ -21,7 +21,7 @@ class Probe:
         ending: "" after a good end, else what happened.
     """
 
-    process: subprocess.Popen
+    process: subprocess.Popen[str]
     ending: str = ""
 
     def answer(self) -> dict[str, dict[str, Any]]:

@@ -23,7 +23,7 @@ from rom.fe.deck import (
     rings,
     to_gmsh,
 )
-from rom.fe.readers import packed
+from rom.fe.readers import Read, packed
 from rom.model import Array, Index
 
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
@@ -49,7 +49,7 @@ class Deck:
     sections: list[str] = field(default_factory=list)
 
 
-def read(path: str) -> tuple[dict, dict]:
+def read(path: str) -> Read:
     """Read a deck; see `rom.fe.readers.read`.
 
     Raises:

@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from rom.errors import ResourceError
 from rom.fe.memory import THIN, allowed_bytes, factor_bytes
+from rom.model import Index, Numbers
 
 COPIES = 20  # matrices as large as the one gathered that one rank then makes of it
 
@@ -88,7 +89,7 @@ def gathered(A: PETSc.Mat) -> csr_matrix:
     return (whole + whole.T).tocsr()
 
 
-def _from_all(comm: MPI.Comm, mine: np.ndarray, counts: np.ndarray | None) -> np.ndarray:
+def _from_all(comm: MPI.Comm, mine: Numbers, counts: Index | None) -> Numbers:
     """The arrays of all ranks in their order, one after the other."""
     if counts is None:
         counts = np.array(comm.allgather(mine.size))

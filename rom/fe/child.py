@@ -19,14 +19,14 @@ import numpy as np
 
 from rom import errors
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
-from rom.fe.readers import GEOMETRIES, read
+from rom.fe.readers import GEOMETRIES, Read, read
 
 MEGABYTE = 2**20
 # The launcher of MPI recognises its processes by these; the child is none of them.
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
 
 
-def read_apart(request: dict[str, Any], *, where: str, size: int) -> tuple[dict, dict]:
+def read_apart(request: dict[str, Any], *, where: str, size: int) -> Read:
     """Run a reader in a child process.
 
     Args:
@@ -81,7 +81,7 @@ def _environment() -> dict[str, str]:
     return kept | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
 
-def _result(folder: Path, done: subprocess.CompletedProcess, where: str) -> tuple[dict, dict]:
+def _result(folder: Path, done: subprocess.CompletedProcess[bytes], where: str) -> Read:
     answer = folder / "answer.json"
     if not answer.exists():
         raise _died(done, where)
@@ -94,7 +94,7 @@ def _result(folder: Path, done: subprocess.CompletedProcess, where: str) -> tupl
         return dict(arrays), notes
 
 
-def _died(done: subprocess.CompletedProcess, where: str) -> BaseException:
+def _died(done: subprocess.CompletedProcess[bytes], where: str) -> BaseException:
     if done.returncode > 0:
         return RuntimeError(f"the mesh reader failed:\n{done.stderr.decode(errors='replace')}")
     name = signal.Signals(-done.returncode).name
@@ -143,7 +143,7 @@ def _described(error: RomError | MemoryError) -> dict[str, str]:
             "hint": error.hint}  # fmt: skip
 
 
-def _answer(folder: str, notes: dict) -> None:
+def _answer(folder: str, notes: dict[str, Any]) -> None:
     part = Path(folder, "answer.part")
     part.write_text(json.dumps(notes))
     part.rename(Path(folder, "answer.json"))

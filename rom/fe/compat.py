@@ -14,7 +14,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
 from rom.fe.jit import JIT_OPTIONS
-from rom.model import Array
+from rom.model import Array, Index, Integers
 
 # ffcx routes all warnings of the process into a log; a warning belongs to whoever listens for it.
 logging.captureWarnings(False)
@@ -48,7 +48,7 @@ def per_cell(mesh: Any, values: Array) -> Any:
     return function
 
 
-def cell_dofs(space: Any) -> np.ndarray:
+def cell_dofs(space: Any) -> Integers:
     """(cells, k) node numbers of each cell on this rank, ghosts included."""
     table = space.dofmap.list
     table = np.asarray(getattr(table, "array", table))
@@ -102,7 +102,7 @@ def sub_entities(name: str) -> list[list[list[int]]]:
     return basix.topology(getattr(basix.CellType, name))
 
 
-def to_global(index_map: Any, local: np.ndarray) -> np.ndarray:
+def to_global(index_map: Any, local: Integers) -> Index:
     """Global numbers of local entities."""
     return np.asarray(index_map.local_to_global(local.astype(np.int32)), dtype=np.int64)
 
@@ -116,7 +116,7 @@ def versions() -> dict[str, str]:
     return {"dolfinx": dolfinx.__version__, **number}
 
 
-def create_mesh(comm: Any, cells: np.ndarray, points: Array, shape: str, degree: int) -> Any:
+def create_mesh(comm: Any, cells: Integers, points: Array, shape: str, degree: int) -> Any:
     """Distributed mesh from arrays on rank 0; the other ranks give none.
 
     Args:
@@ -137,7 +137,7 @@ def create_mesh(comm: Any, cells: np.ndarray, points: Array, shape: str, degree:
     return create_mesh(comm, cells, points, ufl.Mesh(e))
 
 
-def gmsh_order(shape: str, n_nodes: int) -> np.ndarray:
+def gmsh_order(shape: str, n_nodes: int) -> Integers:
     """Positions in gmsh's node order, listed in the order of dolfinx."""
     from dolfinx.cpp.io import perm_gmsh
     from dolfinx.cpp.mesh import CellType
@@ -145,7 +145,7 @@ def gmsh_order(shape: str, n_nodes: int) -> np.ndarray:
     return np.array(perm_gmsh(getattr(CellType, shape), n_nodes))
 
 
-def tag_entities(mesh: Any, dim: int, nodes: np.ndarray, values: np.ndarray) -> Any:
+def tag_entities(mesh: Any, dim: int, nodes: Integers, values: Integers) -> Any:
     """MeshTags of cells or facets that rank 0 knows by their nodes.
 
     Args:
@@ -184,7 +184,7 @@ def quadrature_points(mesh: Any, degree: int) -> Array:
     return np.asarray(basix.make_quadrature(kind, max(degree, 1))[0])
 
 
-def evaluated(expression: Any, mesh: Any, cells: np.ndarray) -> Array:
+def evaluated(expression: Any, mesh: Any, cells: Integers) -> Array:
     """Values of an expression at its points in some cells."""
     parameters = inspect.signature(expression.eval).parameters
     arguments = (mesh, cells) if "mesh" in parameters else (cells,)

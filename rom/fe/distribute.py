@@ -12,7 +12,7 @@ from rom.fe.elements import CELL_TYPES
 from rom.fe.mesh import checked
 from rom.fe.parallel import on_root
 from rom.fe.solid import SolidMesh
-from rom.model import Index
+from rom.model import Index, Integers
 
 FACET_SHAPE = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 
@@ -31,7 +31,7 @@ def distribute(mesh: SolidMesh | None, comm: MPI.Comm) -> tuple[Any, Any, dict[s
     facet_tags = {}
     for name in names:
         facets = _rows(solid.facets[name] if solid else None, order)
-        facet_tags[name] = tag_entities(made, 2, facets, np.ones(len(facets)))
+        facet_tags[name] = tag_entities(made, 2, facets, np.ones(len(facets), dtype=np.int32))
         facet_tags[name].name = name
     return made, cell_tags, facet_tags
 
@@ -53,7 +53,7 @@ def _prepared(
     return (kept[0] if kept else None), head
 
 
-def _rows(rows: Index | None, order: np.ndarray) -> Index:
+def _rows(rows: Index | None, order: Integers) -> Index:
     """Rows in the order of dolfinx; none on ranks that hold no mesh."""
     if rows is None:
         return np.empty((0, order.size), dtype=np.int64)

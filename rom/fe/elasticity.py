@@ -25,7 +25,7 @@ from rom.fe.region import Regions, aij, forms
 from rom.fe.solid import SolidMesh
 from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
-from rom.model import Array, Attachment, FEModel
+from rom.model import Array, Attachment, FEModel, Index
 
 WHOLE = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
@@ -177,7 +177,7 @@ def _check_mesh(mesh: Any, degree: int) -> str:
     return name
 
 
-def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> np.ndarray:
+def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> Index:
     """(cells of this rank with ghosts,) tag of each cell."""
     cells = mesh.topology.index_map(3)
     tags = np.full(cells.size_local + cells.num_ghosts, min(regions.values()), dtype=np.int64)

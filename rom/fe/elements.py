@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from rom.model import Array
+from rom.model import Array, Integers
 
 TET_CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 TET_FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
@@ -79,7 +79,7 @@ class CellType:
         return tuple(int(np.abs(self.nodes - x).sum(axis=1).argmin()) for x in flipped)
 
     @cached_property
-    def _exponents(self) -> np.ndarray:
+    def _exponents(self) -> Integers:
         powers = np.array(list(product(range(self.degree + 1), repeat=3)))
         return powers if self.shape == "hexahedron" else powers[powers.sum(axis=1) <= self.degree]
 
@@ -100,11 +100,11 @@ class CellType:
         return np.column_stack([u, v * (1 - u), w * (1 - u) * (1 - v)])
 
 
-def _monomials(x: Array, exponents: np.ndarray) -> Array:
+def _monomials(x: Array, exponents: Integers) -> Array:
     return np.prod(x[:, None, :] ** exponents, axis=2)
 
 
-def _derivative(x: Array, exponents: np.ndarray, axis: int) -> Array:
+def _derivative(x: Array, exponents: Integers, axis: int) -> Array:
     lowered = exponents.copy()
     lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
     return exponents[:, axis] * _monomials(x, lowered)

@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 
 from rom.errors import FileFormatError, MeshError, TagError
-from rom.fe.readers import packed
+from rom.fe.readers import Read, packed
+from rom.model import Index
 
 # gmsh element types
 SOLIDS = {4: "tet4", 5: "hex8", 11: "tet10", 12: "hex27", 17: "hex20"}
 NAMES = re.compile(rb'^\s*([0-3])\s+(\d+)\s+"([^"\r\n]*)"\s*$', re.MULTILINE)
 DIMENSIONS = ("point", "curve", "surface", "volume")
+Blocks = dict[int, tuple[Index, Index]]  # numbers and nodes of the elements of each volume
+Groups = dict[tuple[int, int], str]  # names by dimension and tag
 
 
 def declared_groups(path: Path) -> list[tuple[int, int, str]]:
@@ -47,7 +50,7 @@ def version(path: Path) -> int:
     return int(found[1]) if found else 0
 
 
-def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> tuple[dict, dict]:
+def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
     """Arrays and notes of the mesh, as `rom.fe.readers.read` returns them.
 
     Args:
@@ -82,7 +85,7 @@ def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> tuple
     )
 
 
-def _group_names(gmsh: Any) -> dict[tuple[int, int], str]:
+def _group_names(gmsh: Any) -> Groups:
     """{(dimension, tag): name}; nameless groups get one."""
     names = {
         (dim, tag): gmsh.model.getPhysicalName(dim, tag) or f"{DIMENSIONS[dim]}_{tag}"
@@ -120,7 +123,7 @@ def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:
     return found
 
 
-def _solids(gmsh: Any) -> tuple[int, dict[int, tuple[np.ndarray, np.ndarray]]]:
+def _solids(gmsh: Any) -> tuple[int, Blocks]:
     """Element type in gmsh, and element numbers and nodes of each volume."""
     blocks, kinds = {}, set()
     for _, volume in gmsh.model.getEntities(3):
@@ -165,7 +168,7 @@ def _no_solid(gmsh: Any) -> MeshError:
     )
 
 
-def _regions(gmsh: Any, blocks: dict, groups: dict, *, strict: bool) -> dict[int, int]:
+def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
     """{volume: region number}; every volume in exactly one group, or no group at all."""
     if not any(dim == 3 for dim, _ in groups):
         if groups and strict and any(dim == 2 for dim, _ in groups):
@@ -178,7 +181,7 @@ def _regions(gmsh: Any, blocks: dict, groups: dict, *, strict: bool) -> dict[int
     return {volume: _region(gmsh, volume, blocks, groups) for volume in blocks}
 
 
-def _region(gmsh: Any, volume: int, blocks: dict, groups: dict) -> int:
+def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
     tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
     names = [groups[3, tag] for tag in tags]
     if len(tags) > 1:
@@ -196,7 +199,7 @@ def _region(gmsh: Any, volume: int, blocks: dict, groups: dict) -> int:
     return tags[0]
 
 
-def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> np.ndarray:
+def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> Index:
     """(f, kf) node tags of a physical surface."""
     found = []
     for surface in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
@@ -214,7 +217,7 @@ def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> np.ndarray:
     return np.vstack(found)
 
 
-def _check_copies(rows: np.ndarray, groups: int, name: str) -> None:
+def _check_copies(rows: Index, groups: int, name: str) -> None:
     """Without a copy of each facet for each group, gmsh has mixed up the groups."""
     if len(np.unique(np.sort(rows, axis=1), axis=0)) * groups != len(rows):
         raise TagError(
@@ -224,7 +227,7 @@ def _check_copies(rows: np.ndarray, groups: int, name: str) -> None:
         )
 
 
-def _rows(tags: np.ndarray, nodes: np.ndarray, what: str) -> np.ndarray:
+def _rows(tags: Index, nodes: Index, what: str) -> Index:
     """Positions of node tags among the sorted tags of all nodes."""
     place = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
     if not tags.size or not np.array_equal(tags[place], nodes):

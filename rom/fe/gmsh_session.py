@@ -9,13 +9,14 @@ from typing import Any
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
 from rom.fe import builder, step
 from rom.fe.gmsh_groups import check_declared, collect, version
+from rom.fe.readers import Read
 
 HXT = 10  # Mesh.Algorithm3D whose meshes differ from run to run
 # gmsh hands a file without this start to its script parser, which can run shell commands
 MSH_START = (b"$MeshFormat", b"$Comments")
 
 
-def run(request: dict[str, Any]) -> tuple[dict, dict]:
+def run(request: dict[str, Any]) -> Read:
     """Answer a request for ``.geo``, ``.py``, ``.step`` or ``.msh``; see `rom.fe.readers.read`."""
     import gmsh
 

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
@@ -109,7 +110,7 @@ def _unfinished(source: Path) -> bool:
     return source.exists() and not source.with_suffix(".c.cached").exists()
 
 
-def _defaults() -> dict:
+def _defaults() -> dict[str, Any]:
     for name in ("DOLFINX_DEFAULT_JIT_OPTIONS", "DOLFINX_DEFAULT_JIT_PARAMETERS"):
         if hasattr(dolfinx.jit, name):
             return getattr(dolfinx.jit, name)

@@ -10,7 +10,7 @@ from dolfinx import fem
 
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
-from rom.model import Array, Material, Orthotropic
+from rom.model import Index, Material, Orthotropic
 
 Solid = Material | Orthotropic
 PLAUSIBLE_SPEED = (50.0, 2.0e4)  # m/s, from foams to diamond
@@ -47,7 +47,7 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
     return {regions[name]: value for name, value in material.items()}
 
 
-def coefficients(mesh: Any, tags: Array, solids: dict[int, Solid]) -> dict[str, Any]:
+def coefficients(mesh: Any, tags: Index, solids: dict[int, Solid]) -> dict[str, Any]:
     """Coefficients of the forms: "rho", and "lam", "mu" or the full stiffness "C".
 
     Constants for one material, one value per cell for several, so that other numbers never mean
@@ -69,7 +69,7 @@ def coefficients(mesh: Any, tags: Array, solids: dict[int, Solid]) -> dict[str, 
     return {n: per_cell(mesh, np.array([tables[t][n] for t in order])[rows]) for n in names}
 
 
-def of_region(mesh: Any, tags: Array, solids: dict[int, Solid], tag: int) -> dict[str, Any]:
+def of_region(mesh: Any, tags: Index, solids: dict[int, Solid], tag: int) -> dict[str, Any]:
     """Coefficients that vanish outside one region, one value per cell; see `coefficients`."""
     inside = tags == tag
     return {

@@ -16,7 +16,7 @@ import numpy as np
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError, RomWarning
 from rom.fe.child import read_apart
 from rom.fe.quality import straighten
-from rom.fe.readers import GEOMETRIES
+from rom.fe.readers import GEOMETRIES, Arrays
 from rom.fe.repair import repair
 from rom.fe.solid import SolidMesh
 from rom.fe.validate import validate
@@ -125,7 +125,9 @@ def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, A
     return distribute(mesh, comm)
 
 
-def _solid(arrays: dict, notes: dict, provenance: dict, scale: float) -> SolidMesh:
+def _solid(
+    arrays: Arrays, notes: dict[str, Any], provenance: dict[str, Any], scale: float
+) -> SolidMesh:
     return SolidMesh(
         points=arrays["points"] * scale,
         cells=arrays["cells"],
@@ -154,7 +156,7 @@ def _reader(path: Path) -> str:
         ) from None
 
 
-def _check_request(path: Path, request: dict, scale: float) -> None:
+def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
     reader = request["reader"]
     if request["parameters"] and reader not in GEOMETRIES:
         raise ConfigError(

@@ -13,14 +13,14 @@ import numpy as np
 
 from rom.errors import FileFormatError, MeshError
 from rom.fe.deck import facets_of_nodes, only_type, outer_facets, positions, to_gmsh
-from rom.fe.readers import packed
+from rom.fe.readers import Read, packed
 from rom.model import Index
 
 SOLIDS = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20"}
 PROPERTY = "nastran:ref"
 
 
-def read(path: str) -> tuple[dict, dict]:
+def read(path: str) -> Read:
     """Read bulk data; see `rom.fe.readers.read`.
 
     Raises:

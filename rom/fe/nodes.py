@@ -6,6 +6,7 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import exterior_facet_indices
@@ -13,13 +14,13 @@ from scipy.sparse import csr_matrix
 
 from rom.errors import InterfaceError
 from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, sub_entities, to_global
-from rom.model import Array, Index, Interface, SurfaceMesh
+from rom.model import Array, Index, Integers, Interface, Numbers, SurfaceMesh
 
 RESOLUTION = 1e-8  # of the size: nodes closer than this count as equal when sorted
 OFFSET = 0.381966  # keeps round coordinates away from the edge between two cells of that grid
 
 
-def gathered(comm: MPI.Comm, rows: np.ndarray) -> np.ndarray:
+def gathered(comm: MPI.Comm, rows: Numbers) -> Numbers:
     """Rows of all ranks, one below the other, on all ranks."""
     return np.concatenate(comm.allgather(rows)) if comm.size > 1 else rows
 
@@ -63,13 +64,13 @@ def interface(name: str, tags: Any, V: Any, points: Array) -> Interface:
     return Interface(name, nodes, points[nodes], S, weights @ points[nodes] / weights.sum())
 
 
-def _nodes(V: Any, facets: np.ndarray) -> Index:
+def _nodes(V: Any, facets: npt.NDArray[np.int32]) -> Index:
     """Global numbers of all nodes on the facets, ascending."""
     local = fem.locate_dofs_topological(V, 2, facets)
     return np.unique(gathered(V.mesh.comm, to_global(V.dofmap.index_map, local)))
 
 
-def _surface_mass(V: Any, facets: np.ndarray, nodes: Index) -> csr_matrix:
+def _surface_mass(V: Any, facets: Integers, nodes: Index) -> csr_matrix:
     """(k, k) integrals of N_i N_j over the facets, on all ranks."""
     from dolfinx.mesh import meshtags
 
@@ -89,7 +90,7 @@ def _surface_mass(V: Any, facets: np.ndarray, nodes: Index) -> csr_matrix:
     return 0.5 * (S + S.T)
 
 
-def _positions(nodes: Index, numbers: np.ndarray) -> np.ndarray:
+def _positions(nodes: Index, numbers: Integers) -> Integers:
     order = np.argsort(nodes)
     return order[np.searchsorted(nodes[order], numbers)]
 

@@ -30,7 +30,8 @@ def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named
         RomError: on all ranks, when the function raised one.
         ParallelError: on all ranks, when the function raised anything else under mpirun.
     """
-    value = error = None
+    value: Any = None
+    error: Exception | None = None
     if comm.rank == 0:
         try:
             value = function(*arguments, **named)

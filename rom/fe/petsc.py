@@ -180,7 +180,7 @@ class PETScOperators:
         self, K: PETSc.Mat, M: PETSc.Mat, rigid: Array | None, solver: Solver | None = None
     ) -> "PETScOperators":
         """Other matrices in the same coordinates."""
-        fields = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
+        fields: dict[str, Any] = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
         return PETScOperators(K, M, rigid, **fields, solver=solver or self.solver)
 
     def modes(

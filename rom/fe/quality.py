@@ -7,7 +7,7 @@ import numpy as np
 from rom.errors import MeshError
 from rom.fe.elements import CELL_TYPES, CellType, jacobians
 from rom.fe.solid import SolidMesh, cell_names
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 
 # Smallest over largest possible determinant: round-off of coordinates gives 1e-16 times the
 # distance from the origin over the cell size, bad but usable cells of gmsh have 1e-4.
@@ -50,7 +50,7 @@ def check_shape(mesh: SolidMesh) -> list[str]:
     ]
 
 
-def _refuse(mesh: SolidMesh, bad: np.ndarray, quality: Array, what: str, hint: str) -> None:
+def _refuse(mesh: SolidMesh, bad: Mask, quality: Array, what: str, hint: str) -> None:
     cells = np.flatnonzero(bad)
     if cells.size:
         worst = quality[cells[np.abs(quality[cells]).argmin() if "no" in what else 0]]
@@ -114,9 +114,9 @@ def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
     return np.concatenate(found) if found else np.empty(0)
 
 
-def _bent(points: Array, cells: Index, kind: CellType) -> np.ndarray:
+def _bent(points: Array, cells: Index, kind: CellType) -> Mask:
     """(m,) whether any node lies away from the mean of its corners."""
-    bent = np.zeros(len(cells), dtype=bool)
+    bent = np.zeros(len(cells), dtype=np.bool_)
     for node, support in enumerate(kind.supports[kind.n_corners :], kind.n_corners):
         corners = points[cells[:, list(support)]]
         away = np.abs(points[cells[:, node]] - corners.mean(axis=1)).max(axis=1)

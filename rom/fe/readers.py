@@ -4,13 +4,17 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.errors import ConfigError, FileFormatError, RomError
+from rom.model import Array, Integers
 
 GEOMETRIES = ("geo", "builder", "step")
+Arrays = dict[str, npt.NDArray[Any]]
+Read = tuple[Arrays, dict[str, Any]]  # arrays and notes
 
 
-def read(request: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def read(request: dict[str, Any]) -> Read:
     """Read or make the mesh a request asks for.
 
     Returns:
@@ -34,7 +38,7 @@ def read(request: dict[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]
         ) from error
 
 
-def _reader(name: str) -> Callable[[dict[str, Any]], tuple[dict, dict]]:
+def _reader(name: str) -> Callable[[dict[str, Any]], Read]:
     """The reading function; only its own libraries are loaded."""
     if name == "abaqus":
         from rom.fe import abaqus
@@ -50,16 +54,16 @@ def _reader(name: str) -> Callable[[dict[str, Any]], tuple[dict, dict]]:
 
 
 def packed(
-    points: np.ndarray,
-    cells: np.ndarray,
+    points: Array,
+    cells: Integers,
     cell_type: str,
-    regions: np.ndarray,
-    cell_ids: np.ndarray,
+    regions: Integers,
+    cell_ids: Integers,
     **notes: Any,
-) -> tuple[dict, dict]:
+) -> Read:
     """Arrays and notes in the form of `read`; ``facets`` and ``region_names`` among the notes."""
     facets = notes.pop("facets")
-    arrays = {
+    arrays: Arrays = {
         "points": np.asarray(points, dtype=float),
         "cells": np.asarray(cells, dtype=np.int64),
         "regions": np.asarray(regions, dtype=np.int64),

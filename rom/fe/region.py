@@ -15,7 +15,7 @@ from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, geometry_degree
 from rom.fe.jit import compiling
 from rom.fe.material import Solid, of_region, stress
 from rom.fe.stress import Stresses
-from rom.model import Array, Layered, Region
+from rom.model import Array, Index, Layered, Region
 
 TOUCH = 1e-9  # of the extent: cells that close belong to one layer
 
@@ -32,7 +32,7 @@ class Regions(Mapping[str, Region]):
     """
 
     def __init__(
-        self, V: Any, tags: Array, solids: dict[int, Solid], names: dict[str, int], degree: int
+        self, V: Any, tags: Index, solids: dict[int, Solid], names: dict[str, int], degree: int
     ):
         self.V, self.tags, self.solids, self.names, self.degree = V, tags, solids, names, degree
 

@@ -24,7 +24,7 @@ from rom.fe.factor import dense_rows
 from rom.fe.jit import compiling
 from rom.fe.material import stress
 from rom.fe.memory import give_back
-from rom.model import PAIRS, Array, Index
+from rom.model import PAIRS, Array, Index, Integers
 
 
 class Stresses:
@@ -145,7 +145,7 @@ class Stresses:
         dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": max(degree, 1)})
         return ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * dx
 
-    def _evaluated(self, U: Array, cells: np.ndarray, X: Array) -> Any:
+    def _evaluated(self, U: Array, cells: Integers, X: Array) -> Any:
         """(cells, points, 6) stress of each column."""
         u = fem.Function(self.V)
         s = stress(ufl.sym(ufl.grad(u)), self.numbers)
@@ -157,14 +157,14 @@ class Stresses:
             u.x.scatter_forward()
             yield evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), 6)
 
-    def _cells_at(self, nodes: Index) -> tuple[np.ndarray, np.ndarray]:
+    def _cells_at(self, nodes: Index) -> tuple[Integers, Index]:
         """Cells of this rank that touch the nodes, and the global numbers of their nodes."""
         local = cell_dofs(self.V)[: self.n_cells]
         table = to_global(self.V.dofmap.index_map, local.ravel()).reshape(local.shape)
         touching = np.isin(table, nodes).any(axis=1)
         return np.flatnonzero(touching).astype(np.int32), table[touching]
 
-    def _order(self, cells: np.ndarray, X: Array) -> np.ndarray:
+    def _order(self, cells: Integers, X: Array) -> Index:
         """(cells, k) which evaluated point is which node: edges may run either way."""
         with compiling(self.mesh.comm):
             expression = fem.Expression(ufl.SpatialCoordinate(self.mesh), X)

@@ -26,6 +26,8 @@ class TiedOperators(PETScOperators):
         rigid: (n_local, 6) rigid motions in the coordinates a.
     """
 
+    parent: PETScOperators
+
     def __init__(self, parent: PETScOperators, T: csr_matrix, rigid: Array):
         self.parent, self.rigid, self.comm, self.solver = parent, rigid, parent.comm, parent.solver
         self.affordable = parent.affordable

@@ -7,7 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from rom.fe.elements import CellType
-from rom.model import Index
+from rom.model import Index, Integers
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Faces:
     """
 
     of_cell: Index
-    sign: np.ndarray
+    sign: Integers
     count: Index
     corners: Index
 
@@ -49,7 +49,7 @@ def row_ids(rows: Index, n: int) -> tuple[Index, int]:
     return key, values.size
 
 
-def _direction(faces: Index) -> np.ndarray:
+def _direction(faces: Index) -> Integers:
     """(k,) +1 or -1: whether the list runs from its smallest node to the smaller neighbour."""
     k, c = faces.shape
     first = faces.argmin(axis=1)

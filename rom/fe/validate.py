@@ -14,6 +14,7 @@ from rom.fe.elements import CELL_TYPES
 from rom.fe.quality import check_shape
 from rom.fe.solid import SHOWN, SolidMesh, cell_names
 from rom.fe.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
+from rom.model import Mask
 
 COINCIDENT = 1e-9  # of the size: nodes closer than this are at the same place
 
@@ -43,7 +44,7 @@ def validate(mesh: SolidMesh) -> list[str]:
     return [*warnings, *_slits(mesh, faces)]
 
 
-def _refuse(mesh: SolidMesh, bad: np.ndarray, text: Callable[[int], str], hint: str) -> None:
+def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -> None:
     """Raise when any cell is bad, with their number and the first few."""
     cells = np.flatnonzero(bad)
     if cells.size:

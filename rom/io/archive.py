@@ -129,8 +129,10 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
     try:
         with archive.open(info) as member:
             version = npy.read_magic(member)
-            read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-            shape, fortran, dtype = read(member)
+            if version == (1, 0):
+                shape, fortran, dtype = npy.read_array_header_1_0(member)
+            else:
+                shape, fortran, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
         raise FileFormatError(
             f"the array {name!r} has a broken header.", where=str(path)

@@ -150,24 +150,27 @@ def _block(depth: int, name: str, block: Taylor, r: int, dialect: str) -> Iterat
         for i, j in np.argwhere(M0):
             if not triangle or i >= j:
                 yield _assigned(depth + 1, f"m0({i + 1:2d},{j + 1:2d})", _number(M0[i, j]))
-    for k, i, j in np.argwhere(M1) if M1 is not None else ():
-        if not triangle or i >= j:
-            a, b = (k, j) if mode_second else (j, k)
-            key = f"m1({i + 1:2d},{a + 1:2d},{b + 1:2d})"
-            yield _assigned(depth + 1, key, _number(M1[k, i, j]))
+    if M1 is not None:
+        for k, i, j in np.argwhere(M1):
+            if not triangle or i >= j:
+                a, b = (k, j) if mode_second else (j, k)
+                key = f"m1({i + 1:2d},{a + 1:2d},{b + 1:2d})"
+                yield _assigned(depth + 1, key, _number(M1[k, i, j]))
     yield _indented(depth, f"end {name}")
 
 
 def in_dialect(name: str, block: Taylor, dialect: str) -> tuple[Array, Array | None]:
     """M0 and M1 with rows and columns as a dialect has them."""
     _, gr_by_axis, ge_by_axis, column = DIALECTS[dialect]
-    parts = [block.M0, block.M1]
-    if name == "J" and column:
-        i, j = np.transpose(TENSOR)
-        parts = [None if A is None else A[..., i, j][..., None] for A in parts]
-    if (name, gr_by_axis) == ("Gr", False) or (name, ge_by_axis) == ("Ge", False):
-        parts = [None if A is None else repacked(A, by_axis=False) for A in parts]
-    return parts[0], parts[1]
+    by_mode = (name, gr_by_axis) == ("Gr", False) or (name, ge_by_axis) == ("Ge", False)
+
+    def turned(A: Array) -> Array:
+        if name == "J" and column:
+            i, j = np.transpose(TENSOR)
+            A = A[..., i, j][..., None]
+        return repacked(A, by_axis=False) if by_mode else A
+
+    return turned(block.M0), None if block.M1 is None else turned(block.M1)
 
 
 def _structure(name: str, M0: Array, M1: Array | None) -> int:

@@ -109,12 +109,13 @@ def assemble(
         ConfigError: if a function is missing or has other frequencies.
     """
     known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
-    columns, x = [], None
+    columns: list[npt.NDArray[np.complex128]] = []
+    x = np.empty(0)
     for wanted in ((r, e) for r in responses for e in references):
         if wanted not in known:
             raise ConfigError(f"no frequency response of {wanted[0]} to a force at {wanted[1]}.")
         f = known[wanted]
-        x = f.x if x is None else x
+        x = x if columns else f.x
         if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=1e-5, atol=0):
             raise ConfigError(f"{_name(f)} has other frequencies than those before.")
         sign = np.sign(f.response[1]) * np.sign(f.reference[1])

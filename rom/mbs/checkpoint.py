@@ -56,15 +56,15 @@ def load_state(path: str | Path, *, limit: int = LIMIT) -> State:
     """
     manifest, arrays = read_archive(path, KIND, limit)
     try:
-        main = {name: arrays[name] for name in NEEDED}
-        rest = {name: arrays.get(name) for name in OPTIONAL}
+        fields: dict[str, Any] = {name: arrays[name] for name in NEEDED}
+        fields |= {name: arrays.get(name) for name in OPTIONAL}
         memory = _memory(manifest.get("memory"), arrays)
         t, rank = float.fromhex(manifest["t"]), int(manifest["rank"])
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             f"the manifest lacks or misstates {error}.", where=str(path)
         ) from error
-    return State(t=t, rank=rank, **main, **rest, memory=memory)
+    return State(t=t, rank=rank, **fields, memory=memory)
 
 
 def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory | None:

@@ -237,9 +237,10 @@ class Connections:
         rows = {None: found.coordinate, "angle": found.turn, "way": found.way}
         if which not in rows:
             raise ConfigError(f"coordinate {which!r} of {joint!r}: it is 'angle' or 'way'.")
-        if rows[which] is None:
+        row = rows[which]
+        if row is None:
             raise ConfigError(f"joint {joint!r} is {found.kind}: it has no coordinate {which!r}.")
-        return rows[which]
+        return row
 
 
 def _not_zero(name: str, value: float) -> float:

@@ -18,7 +18,7 @@ from ross.bearings.plain_journal import PlainJournal
 METHODS = ("lund", "perturbation")
 
 
-def bearing(case: dict, cells: list[int], method: str) -> PlainJournal:
+def bearing(case: dict[str, Any], cells: list[int], method: str) -> PlainJournal:
     """Two pads between axial grooves at the ends of a level line; the load points down."""
     mu = case["viscosity"]
     oil = lubricants_dict["ISOVG32"] | {

@@ -52,9 +52,8 @@ class Heat:
         names, cold = tuple(model.regions), np.zeros(len(model.points))
         alpha = _by_region("expansion", self.expansion, names)
         given = self.temperature
-        if isinstance(given, Mapping) or np.ndim(0 if callable(given) else given) == 0:
-            if not callable(given):
-                return alpha, _by_region("temperature", given, names), cold
+        if not callable(given) and (isinstance(given, Mapping) or np.ndim(given) == 0):
+            return alpha, _by_region("temperature", given, names), cold
         values = np.asarray(given(model.points) if callable(given) else given, dtype=float)
         if values.shape != cold.shape or not np.isfinite(values).all():
             raise ConfigError(

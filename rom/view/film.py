@@ -152,11 +152,12 @@ def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:
     """Colours in a unit in which the largest deformation is between 1 and 1000."""
     if not flexible:
         return Stage(together(actors), (0.0, 1.0), "m", "")
-    largest = max(float(actors[k].values.max()) for k in flexible.values())
+    sizes = {k: v for k in flexible.values() if (v := actors[k].values) is not None}
+    largest = max(float(v.max()) for v in sizes.values())
     factor, unit = next((s for s in SCALES if largest * s[0] >= 1.0), SCALES[-1])
-    for k in flexible.values():
-        a = actors[k]
-        actors[k] = Actor(a.points, a.cells, a.values * factor, a.colour)
+    for k, v in sizes.items():
+        shown: Array = v * factor
+        actors[k] = Actor(actors[k].points, actors[k].cells, shown, actors[k].colour)
     limits = 0.0, max(largest * factor, 1e-12)
     return Stage(together(actors), limits, unit, " and ".join(flexible))
 

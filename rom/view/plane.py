@@ -123,7 +123,7 @@ def flow(
     path = page.checked(path, ".gif")
     if len(times) != len(shapes):
         raise ConfigError(f"{len(times)} times for {len(shapes)} shapes.")
-    highest = max(float(s.values.max()) for s in shapes)
+    highest = max(float(s.values.max()) for s in shapes if s.values is not None)
     everything = np.concatenate([s.points for s in shapes])
     frame = np.array([everything.min(axis=0), everything.max(axis=0)])
     width, height = FILM

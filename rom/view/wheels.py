@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.errors import ConfigError
-from rom.model import Array, FEModel, Index
+from rom.model import Array, FEModel, Index, SurfaceMesh
 from rom.view import page
 from rom.view.shapes import drawn, sheet
 
@@ -49,7 +49,7 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     N = U[0].shape[0]
     if any(u.shape != (N, 3 * model.points.shape[0]) for u in U):
         raise ConfigError(f"each shape needs {3 * model.points.shape[0]} numbers per sector.")
-    nodes, triangles = _outside(model, hidden)
+    nodes, triangles = _outside(model, model.surface, hidden)
     e = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     turns = [rotation.matrix(rotation.exp(2 * np.pi * j / N * e)) for j in range(N)]
     points = np.vstack([model.points[nodes] @ R.T for R in turns])
@@ -61,10 +61,9 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
         return page.save(sheet(images, list(shapes), title, caption, "wheel"), path)
 
 
-def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
+def _outside(model: FEModel, surface: SurfaceMesh, hidden: tuple[str, ...]) -> tuple[Index, Index]:
     """Nodes of the model on the outer surface of the wheel, and triangles between them."""
-    surface = model.surface
-    inside = np.zeros(len(surface.triangles), dtype=bool)
+    inside = np.zeros(len(surface.triangles), dtype=np.bool_)
     for name in hidden:
         inside |= np.isin(surface.nodes[surface.triangles], model.interfaces[name].nodes).all(1)
     used, triangles = np.unique(surface.triangles[~inside], return_inverse=True)

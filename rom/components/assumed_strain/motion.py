@@ -92,7 +92,7 @@ def mass(body: Sheet, metal: Metal) -> csr_matrix:
 
 def equilibrium(
     body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
-) -> tuple[Array, Array, int]:
+) -> tuple[Array, Array | None, int]:
     """Positions (n, 2), history and the most Newton iterations under dead loads in equal steps.
 
     Args:

@@ -82,7 +82,10 @@ class Cushion:
             raise ConfigError(f"energy = {energy} J: the cushion takes up what the boulder has.")
         n = self.exponent + 1
         high = min((n * energy / self.stiffness) ** (1 / n), self.limit * (1 - 1e-9))
-        rest = lambda d: quad(self.force, 0, d, limit=200)[0] - energy  # noqa: E731
+
+        def rest(d: float) -> float:
+            return float(quad(self.force, 0, d, limit=200)[0] - energy)
+
         return float(brentq(rest, 0, high) if self.hardening > 0 < rest(high) else high)
 
 

@@ -16,6 +16,10 @@ from rom.model import Array
 TIMES, ENOUGH = 30, 1e-9
 
 
+# coordinates, rates, normal force of the teeth, error of transmission, heat, work
+Row = tuple[Array, Array, float, float, float, Array]
+
+
 @dataclass(frozen=True)
 class Whirl:
     """Eigenvalues about an equilibrium.
@@ -239,10 +243,10 @@ class Step:
         moved = np.linalg.solve(self._jacobian(dt), R)
         return q + moved, *self._rates(dt, moved, v, a)
 
-    def row(self) -> tuple:
+    def row(self) -> Row:
         """What a run remembers of this moment."""
         w, rb = self.v + self.spin, self.unit.mesh.pair.rb
         error = rb @ (self.unit.wheels @ self.q)[[5, 11]]
-        heat = sum(f.dissipated for f in self.now.films)
+        heat = float(sum(f.dissipated for f in self.now.films))
         work = np.append(self.work, 0.5 * w @ self.M @ w)
-        return self.q, self.v, self.now.mesh.load.sum(), error, heat, work
+        return self.q, self.v, float(self.now.mesh.load.sum()), float(error), heat, work

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rom.components.transmission.motion import Step
+from rom.components.transmission.motion import Row, Step
 from rom.components.transmission.unit import Rest, Transmission, rest
 from rom.errors import ModelError, SolverError
 from rom.model import Array
@@ -156,7 +156,7 @@ def _period(
     theta: float,
     steps: int,
     guess: Array | None = None,
-) -> tuple[list[tuple], Array, Array]:
+) -> tuple[list[Row], Array, Array]:
     """What happens at every step, and derivatives by the start: of the end, of q at every step.
 
     The derivatives are (2n, 2n) and (steps + 1, n, 2n), the guess is (steps + 1, n).
@@ -174,7 +174,7 @@ def _period(
 
 
 def _found(
-    unit: Transmission, theta: float, rows: list[tuple], F: Array, count: int, gap: float
+    unit: Transmission, theta: float, rows: list[Row], F: Array, count: int, gap: float
 ) -> Steady:
     q, v, teeth, error, heat, _ = (np.array(column) for column in zip(*rows, strict=True))
     values = np.linalg.eigvals(F).astype(complex)
