@@ -8,7 +8,14 @@ from rom.cli.described import TOML
 from rom.cli.parser import build_parser, given
 from rom.cli.ranks import ranks, stop_all
 from rom.cli.speech import Manner, complain, manner_of, present, say, speaking
-from rom.errors import ConfigError, InterruptedRun, QualityGateError, ResourceError, RomError
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    InterruptedRun,
+    QualityGateError,
+    ResourceError,
+    RomError,
+)
 
 
 class InternalError(RomError):
@@ -78,6 +85,8 @@ def translated(error: BaseException) -> RomError:
         return ResourceError(
             f"{error.name} is not installed.", hint="rom doctor says what to type."
         )
+    if isinstance(error, OSError) and error.filename is not None:
+        return FileFormatError(f"{error.strerror}.", where=str(error.filename))
     return InternalError(
         f"{type(error).__name__}: {error} ({_place(error)})",
         hint="This is a mistake of ours: please report it with what --debug prints.",

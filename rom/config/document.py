@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rom.errors import ConfigError, FileFormatError
+from rom.io.files import check_readable
 
 LARGEST = 1_000_000  # bytes
 DEEPEST = 40  # brackets inside each other: more is an accident, and costs the stack
@@ -46,10 +47,7 @@ def read_document(path: str | Path) -> Document:
         FileFormatError: if it is missing, too large, or no text.
         ConfigError: naming the line that is no TOML, or the key that is given twice.
     """
-    path = Path(path)
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "there is no such file"
-        raise FileFormatError(f"{what}.", where=str(path))
+    path = check_readable(path)
     if path.stat().st_size > LARGEST:
         raise FileFormatError(f"more than {LARGEST} bytes are no description.", where=str(path))
     try:

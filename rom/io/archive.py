@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import write_whole
+from rom.io.files import LARGEST, check_readable, write_whole
 from rom.model import Array
 
 LIMIT = 4 * 1024**3  # bytes the arrays may have in memory before reading is refused
@@ -79,9 +79,7 @@ def read_archive(
         FileFormatError: if the file is missing, cut, changed, or of another kind.
         UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
+    path = check_readable(path, max(limit, LARGEST))
     try:
         with zipfile.ZipFile(path) as archive:
             _refuse_oversize(archive, path, limit)

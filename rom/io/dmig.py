@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
 
-from rom.errors import FileFormatError, UnsafeFileError
-from rom.io.files import write_whole
+from rom.errors import FileFormatError
+from rom.io.files import check_last_line, check_readable, write_whole
 from rom.model import Array, Index
 
-LARGEST = 2**32  # bytes of a file that is still read
 BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
+WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 SYMMETRIC, SQUARE = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
 
@@ -31,6 +31,8 @@ def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
         FileFormatError: naming the line, if the file is missing, cut, or a matrix is complex.
         UnsafeFileError: if it is larger than 4 GiB.
     """
+    path = Path(path)
+    check_last_line(path)
     entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
     for number, fields in cards(path, "DMIG"):
         try:
@@ -54,7 +56,7 @@ def read_grids(path: str | Path) -> tuple[Index, Array]:
         try:
             if fields[1].strip("0") or (len(fields) > 5 and fields[5].strip("0")):
                 raise ValueError("its coordinate system is not the basic one")
-            labels.append(int(fields[0]))
+            labels.append(whole(fields[0]))
             points.append([real(fields[k]) for k in (2, 3, 4)])
         except (ValueError, IndexError) as error:
             where = f"{path}, line {number}"
@@ -91,11 +93,7 @@ def cards(path: str | Path, wanted: str) -> Iterator[tuple[int, list[str]]]:
         FileFormatError: if the file is missing.
         UnsafeFileError: if it is larger than 4 GiB.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    if path.stat().st_size > LARGEST:
-        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    path = check_readable(path)
     start, fields = 0, list[str]()
     with path.open(encoding="ascii", errors="replace") as file:
         for number, line in enumerate(file, 1):
@@ -128,6 +126,17 @@ def real(text: str) -> float:
     return value
 
 
+def whole(text: str) -> int:
+    """The label of a node, or a component.
+
+    Raises:
+        ValueError: if it is no whole number that fits eight bytes.
+    """
+    if not WHOLE.fullmatch(text.strip()):
+        raise ValueError(f"{text.strip()[:20]!r} is no whole number of at most 18 digits")
+    return int(text)
+
+
 def _fields(line: str) -> list[str]:
     """Fields after the first: free, of 16 characters, or of 8; filled up to four or eight."""
     if "," in line:
@@ -146,11 +155,11 @@ def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: l
         return
     if name not in entries:
         raise ValueError(f"{name} has no header")
-    column = int(fields[1]), int(fields[2] or 0)
+    column = whole(fields[1]), whole(fields[2] or "0")
     for k in range(4, len(fields), 4):
         node, component, value = fields[k : k + 3]
         if node:
-            entries[name].append((int(node), int(component or 0), *column, real(value)))
+            entries[name].append((whole(node), whole(component or "0"), *column, real(value)))
 
 
 def _matrix(rows: list[tuple[int, int, int, int, float]]) -> tuple[Any, Dofs]:

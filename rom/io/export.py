@@ -129,5 +129,9 @@ def read_body(path: str | Path) -> FlexibleBody:
         FileFormatError: if the file is missing, cut, or not what its ending promises.
     """
     if Path(path).suffix.lower() == SID:
-        return sid_body(read_sid(path))
+        record = read_sid(path)
+        try:
+            return sid_body(record)
+        except ConfigError as error:
+            raise ConfigError(error.message, where=str(path), hint=error.hint) from error
     return load(path)

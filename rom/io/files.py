@@ -1,12 +1,15 @@
-"""Files are written whole or not at all."""
+"""Files are written whole or not at all, and looked at before they are read."""
 
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-from rom.errors import ConfigError, FileFormatError, ResourceError
+from rom.errors import ConfigError, FileFormatError, ResourceError, UnsafeFileError
+
+LARGEST = 2**32  # bytes of a file that is still read
 
 
 def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -56,15 +59,38 @@ def check_writable(path: str | Path) -> Path:
     return path
 
 
+def check_readable(path: str | Path, largest: int = LARGEST) -> Path:
+    """The path, if it is a file that may be read and is not too large.
+
+    Raises:
+        FileFormatError: if it is missing, a folder, a pipe, a circle of links, or not for us.
+        UnsafeFileError: if it has more than the largest number of bytes.
+    """
+    path = Path(path)
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:  # also names that no file can have
+        raise FileFormatError(
+            "there is no such file.", where=str(path), hint="Relative paths start where you are."
+        ) from error
+    if stat.S_ISDIR(found.st_mode):
+        raise FileFormatError("this is a folder, not a file.", where=str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise FileFormatError("there is no such file, but a pipe or device.", where=str(path))
+    if not os.access(path, os.R_OK):
+        raise FileFormatError("the file may not be read by you.", where=str(path))
+    if found.st_size > largest:
+        raise UnsafeFileError(f"the file is larger than {largest / 2**20:g} MiB.", where=str(path))
+    return path
+
+
 def check_last_line(path: Path) -> None:
     """For programs that end every line: a number that is cut would still be a number.
 
     Raises:
         FileFormatError: if the file is missing or empty, or its last line is not ended.
     """
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    with path.open("rb") as file:
+    with check_readable(path).open("rb") as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(size - 1, 0))
         if file.read(1) != b"\n":

@@ -5,20 +5,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import mmread
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError
 from rom.io.calculix import STORED, read_stored_matrix
-from rom.io.dmig import Dofs, read_dmig
-from rom.io.files import write_whole
+from rom.io.dmig import Dofs, read_dmig, whole
+from rom.io.files import check_last_line, check_readable, write_whole
+from rom.io.market import BANNER, read_market
 from rom.io.op4 import read_op4
 from rom.io.user_element import read_user_element
 
-LARGEST = 2**32  # bytes of a file that is still read
-BANNER = b"%%MatrixMarket"
 HEAD = 10_000  # bytes among which a user element is announced
-MOST_ROWS = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +49,7 @@ def read_matrix(source: Any) -> NamedMatrix:
         UnsafeFileError: if it asks for more memory than its size can mean.
     """
     path, name = source if isinstance(source, tuple) else (source, None)
-    path = Path(path)
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    if path.stat().st_size > LARGEST:
-        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    path = check_readable(path)
     found = _all(path)
     if name is None and len(found) > 1:
         raise ConfigError(
@@ -112,33 +105,14 @@ def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
         start = file.read(HEAD)
     if ending == ".inp" or b"*USER ELEMENT" in start.upper():
         return dict(read_user_element(path))
-    return {"": (_market(path), None) if start.startswith(BANNER) else _abaqus(path)}
-
-
-def _market(path: Path) -> Any:
-    """A file of Matrix Market; its sizes are compared with its length before it is read."""
-    with path.open("rb") as file:
-        words = file.readline(200).lower().split()
-        line = file.readline(2000)
-        while line.startswith(b"%"):
-            line = file.readline(2000)
-    if words[1:2] != [b"matrix"] or not {b"real", b"integer"} & set(words):
-        raise FileFormatError("the matrix is not real.", where=str(path))
-    try:
-        sizes = [int(word) for word in line.split()]
-        entries = sizes[2] if b"coordinate" in words else sizes[0]
-        if max(sizes[:2]) > MOST_ROWS or 2 * entries > path.stat().st_size:
-            raise UnsafeFileError(f"sizes {sizes} do not fit the file.", where=str(path))
-        A = mmread(str(path))
-    except (ValueError, IndexError, TypeError, OverflowError, StopIteration) as error:
-        raise FileFormatError(
-            f"this is no Matrix Market file: {error}.", where=str(path)
-        ) from error
-    return _finite(csr_matrix(A), path)
+    return {
+        "": (_finite(read_market(path), path), None) if start.startswith(BANNER) else _abaqus(path)
+    }
 
 
 def _abaqus(path: Path) -> tuple[Any, Dofs]:
     """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE`` output."""
+    check_last_line(path)
     rows = []
     with path.open(encoding="ascii", errors="replace") as file:
         for number, line in enumerate(file, 1):
@@ -148,7 +122,7 @@ def _abaqus(path: Path) -> tuple[Any, Dofs]:
             try:
                 if len(words) != 5:
                     raise ValueError(f"{len(words)} numbers instead of 5")
-                rows.append([*(int(word) for word in words[:4]), float(words[4])])
+                rows.append([*(whole(word) for word in words[:4]), float(words[4])])
             except ValueError as error:
                 where = f"{path}, line {number}"
                 raise FileFormatError(f"this is no entry: {error}.", where=where) from error

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, FileFormatError, InterfaceError, UnsafeFileError
-from rom.io.dmig import read_grids
+from rom.io.dmig import read_grids, whole
+from rom.io.files import check_readable
 from rom.model import Array, Index
 
-LARGEST = 2**32  # bytes of a file that is still read
 CARDS = (".bdf", ".dat")
 WITH_FILES, MOST_INCLUDED = ("*INCLUDE", "*NODE", "*NSET"), 20
 MOST_NESTED, MOST_NODES = 200, 100_000_000  # sets in sets, nodes in a set
@@ -50,7 +50,7 @@ def _node_file(path: Path) -> tuple[Index, Array]:
     for line in _lines(path):
         if line.keyword == ("" if ending == ".csv" else "*NODE"):
             try:
-                rows.append((int(line.words[0]), *(float(line.words[k]) for k in (1, 2, 3))))
+                rows.append((whole(line.words[0]), *(float(line.words[k]) for k in (1, 2, 3))))
             except (ValueError, IndexError) as error:
                 raise FileFormatError("a node is label, x, y, z.", where=line.where) from error
     labels = np.array([row[0] for row in rows], dtype=np.int64)
@@ -87,7 +87,9 @@ def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]
             step = line.whole(2) if len(line.words) > 2 else 1
             members.append(range(line.whole(0), line.whole(1) + 1, max(step, 1)))
         else:
-            members += [int(w) if w.isdecimal() else w.upper() for w in line.words if w]
+            members += [
+                line.whole(k) if w.isdecimal() else w.upper() for k, w in enumerate(line.words) if w
+            ]
     known = {name: name.upper() for name in names}
     missing = [name for name, key in known.items() if key not in sets.members]
     if missing:
@@ -132,7 +134,7 @@ class _Line:
 
     def whole(self, k: int) -> int:
         try:
-            return int(self.words[k])
+            return whole(self.words[k])
         except (ValueError, IndexError) as error:
             raise FileFormatError("a label is a whole number.", where=self.where) from error
 
@@ -141,10 +143,7 @@ def _lines(
     path: Path, keyword: str = "", options: dict[str, str] | None = None, depth: int = 0
 ) -> Iterator[_Line]:
     """Lines of data of a deck and of the files it includes, whole or as data of a keyword."""
-    if not _is_file(path):
-        raise FileFormatError("there is no such file.", where=str(path))
-    if path.stat().st_size > LARGEST:
-        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    check_readable(path)
     if depth > MOST_INCLUDED:
         raise FileFormatError("files include each other too deep.", where=str(path))
     options = options or {}
@@ -163,10 +162,3 @@ def _lines(
             if "INPUT" in found and words[0].upper() in WITH_FILES:
                 other = path.parent / found["INPUT"].strip("\"'")
                 yield from _lines(other, keyword, options, depth + 1)
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name longer than names can be
-        return False

@@ -18,10 +18,9 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
 from rom.errors import FileFormatError, UnsafeFileError
-from rom.io.files import write_whole
+from rom.io.files import check_readable, write_whole
 from rom.model import Array
 
-LARGEST = 2**32  # bytes of a file that is still read
 MOST_ROWS = 10_000_000
 SYMMETRIC, RECTANGULAR = 6, 2
 DIGITS = re.compile(rb"[ \d-]{24}")
@@ -63,11 +62,7 @@ def read_op4(path: str | Path) -> dict[str, csr_matrix]:
         FileFormatError: if the file is missing, cut, or holds a complex matrix.
         UnsafeFileError: if it is larger than 4 GiB, or a matrix has more than ten million rows.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    if path.stat().st_size > LARGEST:
-        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    path = check_readable(path)
     data = path.read_bytes()
     reader: Any = _Text(data) if DIGITS.match(data[:24]) else _Binary(data)
     out: dict[str, csr_matrix] = {}

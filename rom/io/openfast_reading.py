@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
+from rom.io.files import check_readable
 from rom.model import Array
 
 MARK = "flex 5 format"  # second line of files for versions 2.3 to 4
@@ -20,7 +21,7 @@ DIMENSION, STEP, DURATION = (
 )
 MATRICES = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness": "K_W"}
 WEIGHT, LOADING = "!weight constant", "!loading and wave elevation"
-LARGEST, MOST = 2**32, 10_000  # bytes, coordinates
+MOST = 10_000  # coordinates
 ASYMMETRY, UNEVEN = 1e-6, 1e-3
 
 
@@ -56,11 +57,7 @@ def read_openfast(path: str | Path) -> Superelement:
         QualityGateError: if a matrix is not symmetric, or the mass not positive.
         UnsafeFileError: if it announces more coordinates than a dense matrix can have.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    if path.stat().st_size > LARGEST:
-        raise UnsafeFileError("the file is larger than 4 GiB.", where=str(path))
+    path = check_readable(path)
     reader = _Reader(str(path), path.read_text(encoding="latin1").splitlines())
     reader.run()
     return reader.superelement()

@@ -9,6 +9,7 @@ from typing import NoReturn
 import numpy as np
 
 from rom.errors import FileFormatError, UnsafeFileError
+from rom.io.files import check_readable
 from rom.io.sid import BLOCKS, GENERAL, NODE_BLOCKS, SYMMETRIC, UNIT, shape_of
 from rom.model import Array
 
@@ -81,11 +82,7 @@ def read_raw(path: str | Path) -> RawFile:
         FileFormatError: naming the line, if the file is missing, cut, or no SID.
         UnsafeFileError: if it is larger than 256 MiB or has more than 1000 coordinates.
     """
-    file = RawFile(Path(path))
-    if not file.path.is_file():
-        raise FileFormatError("there is no such file.", where=str(path))
-    if file.path.stat().st_size > LARGEST:
-        raise UnsafeFileError("the file is larger than 256 MiB.", where=str(path))
+    file = RawFile(check_readable(path, LARGEST))
     lines = _Lines(file, file.path.read_bytes().decode("ascii", "replace"))
     file.title = HEAD.sub("", lines.next()).strip()
     _expect(lines, "part")

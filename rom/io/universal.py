@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError
+from rom.io.files import check_readable
 from rom.model import Array
 
 LARGEST = 2**30  # bytes of a file that is still read
@@ -70,11 +71,7 @@ def read_universal(path: str | Path) -> tuple[Function, ...]:
         FileFormatError: if the file is missing, cut, or holds no function.
         UnsafeFileError: if it is larger than 1 GiB.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise FileFormatError(f"{path} does not exist.")
-    if path.stat().st_size > LARGEST:
-        raise UnsafeFileError(f"{path} is larger than 1 GiB.")
+    path = check_readable(path, LARGEST)
     data, place = path.read_bytes(), 0
     found: list[Function] = []
     while (place := _mark(data, place)) >= 0:

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, tril
 
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
-from rom.io.dmig import Dofs
+from rom.io.dmig import Dofs, whole
 from rom.io.files import check_last_line, write_whole
 from rom.model import Array
 
@@ -92,7 +92,7 @@ def _comment(element: _Element, keyword: str, line: str) -> str:
         element.labels = []
         return NODE_LIST
     if keyword == NODE_LIST:
-        element.labels += [int(word) for word in re.findall(r"\d+", line)]
+        element.labels += [whole(word) for word in re.findall(r"\d+", line)]
     return keyword
 
 
@@ -104,7 +104,7 @@ def _keyword(element: _Element, line: str) -> tuple[str, str]:
             raise ValueError("there is a second one in the file")
         if "LINEAR" not in options or "UNSYMM" in options:
             raise ValueError("it is not linear and symmetric")
-        element.n_nodes = int(options.get("NODES", ""))
+        element.n_nodes = whole(options.get("NODES", ""))
     kind = options.get("TYPE", "") if words[0] == "*MATRIX" else ""
     if words[0] == "*MATRIX":
         if kind in element.values:
@@ -117,7 +117,7 @@ def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
     if keyword == "*MATRIX":
         element.values[kind] += [float(word.replace("D", "E").replace("d", "e")) for word in words]
     elif keyword in ("*USER ELEMENT", NODE_LIST):
-        numbers = [int(word) for word in words]
+        numbers = [whole(word) for word in words]
         place, components = (numbers[0], numbers[1:]) if element.lists else (1, numbers)
         after = element.lists[-1][0] if element.lists else 0
         if not after < place <= element.n_nodes or not set(components) <= set(range(1, 7)):
@@ -178,8 +178,8 @@ def _document(matrices: dict[str, Any], dofs: Dofs, nodes: dict[int, Array]) -> 
     for k in range(0, len(labels), PER_LINE):
         yield "** " + ", ".join(map(str, labels[k : k + PER_LINE]))
     before: list[int] = []
-    for place, label in enumerate(labels, 1):
-        now = [max(component, 1) for component in components[label]]
+    for place, node in enumerate(labels, 1):
+        now = [max(component, 1) for component in components[node]]
         if now != before:
             yield ", ".join(map(str, now if place == 1 else [place, *now]))
         before = now

@@ -1,0 +1,76 @@
+"""Damage to files: what a reader must refuse by name, or read without harm."""
+
+import re
+import tracemalloc
+
+import pytest
+
+from rom.errors import RomError
+
+NUMBER = re.compile(rb"[-+]?\d+(\.\d*)?([EDed][-+]?\d+)?")
+HOSTILE = (b"-1", b"0", b"1e999", b"nan", b"99999999", b"999999999999999999999", b"1_0", b"0x7",
+           b"-", b"\xb2", b"2147483648", b"1.5", b"1" * 5000)  # fmt: skip
+MEMORY = 32e6  # bytes that reading a file of some kilobytes may take
+
+
+def flipped(data, rng):
+    """One to three bits turned."""
+    out = bytearray(data)
+    for at in rng.integers(0, len(out), rng.integers(1, 4)):
+        out[at] ^= 1 << rng.integers(0, 8)
+    return bytes(out)
+
+
+def cut(data, rng):
+    """The beginning of it, at least a byte."""
+    return data[: rng.integers(1, len(data))]
+
+
+def grown(data, rng):
+    """Some bytes put in."""
+    at = rng.integers(0, len(data))
+    return data[:at] + rng.bytes(rng.integers(1, 9)) + data[at:]
+
+
+def shuffled(data, rng):
+    """A line left out, doubled, or emptied."""
+    lines = data.splitlines(keepends=True)
+    at = rng.integers(0, len(lines))
+    lines[at : at + 1] = ([], 2 * lines[at : at + 1], [b"\n"])[rng.integers(0, 3)]
+    return b"".join(lines)
+
+
+def misnumbered(data, rng):
+    """A number replaced by one that is no size, no label and no value; early ones more often."""
+    places = list(NUMBER.finditer(data))
+    if not places:
+        return data[:-1]
+    found = places[min(int(rng.exponential(0.1) * len(places)), len(places) - 1)]
+    return data[: found.start()] + HOSTILE[rng.integers(len(HOSTILE))] + data[found.end() :]
+
+
+WAYS = (flipped, cut, grown, shuffled, misnumbered)
+
+
+def damaged(data, rng, n, ways=WAYS):
+    """n times (way, bytes), each way as often as the others."""
+    for k in range(n):
+        way = ways[k % len(ways)]
+        yield way, way(data, rng)
+
+
+def outcome(read, path):
+    """The RomError of reading a small file, or None; other errors and much memory end the test."""
+    tracemalloc.start()
+    try:
+        read(path)
+    except RomError as error:
+        assert str(path.parent) in str(error) and error.message, error
+        assert error.exit_code in (2, 3, 4, 5), error
+        return error
+    finally:
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        if peak > MEMORY:
+            pytest.fail(f"{path}: reading took {peak / 1e6:.0f} MB")
+    return None

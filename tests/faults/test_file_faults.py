@@ -1,0 +1,188 @@
+"""Damaged and hostile files of every reader of `rom.io`: typed errors that name the file."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from damage import damaged, outcome
+from mbs_cases import random_body
+from scipy.io import mmwrite
+from scipy.sparse import random as random_matrix
+from solid import block
+
+import rom
+from rom.io.calculix import read_stored_matrix
+from rom.io.dmig import read_dmig, read_grids
+from rom.io.export import read_body
+from rom.io.matrix_files import read_matrix, write_abaqus_matrix
+from rom.io.node_files import read_node_sets, read_nodes
+from rom.io.op4 import read_op4
+from rom.io.openfast_reading import read_openfast
+from rom.io.sid_dialect import read_sid
+from rom.io.universal import read_universal
+from rom.io.user_element import read_user_element
+
+HERE = Path(__file__).parents[1] / "reference" / "foreign"
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+MUTANTS = 60
+pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+
+
+def universal(binary):
+    """Two functions as other programs write them."""
+    from test_universal import IM, RE, X, dataset, header
+
+    if not binary:
+        return (dataset(5, 0, [X, RE, IM]) + dataset(6, 1, [RE, IM])).encode()
+    packed = np.column_stack([RE, IM]).astype("<f4").tobytes()
+    head = f"    58b{1:6d}{2:6d}{11:12d}{len(packed):12d}" + " 0 0 0 0"
+    return f"{-1:6d}\n{head}\n{header(5, 5, 1)}".encode() + packed + b"\n    -1\n"
+
+
+def deck(_):
+    from test_foreign_matrices import DECK
+
+    return DECK.encode()
+
+
+def user_element(_):
+    from test_calculix import BY_HAND
+
+    return BY_HAND.encode()
+
+
+def market(folder, **how):
+    A = random_matrix(6, 6, 0.4, random_state=np.random.default_rng(1))
+    mmwrite(str(folder / "m.mtx"), A.toarray() if how else A + A.T)
+    return (folder / "m.mtx").read_bytes()
+
+
+def abaqus(folder):
+    dofs = np.column_stack([np.repeat([3, 9], 3), np.tile([1, 2, 3], 2)])
+    return write_abaqus_matrix(np.eye(6) + 1.0, dofs, folder / "m.mtx").read_bytes()
+
+
+def exported(to, held=()):
+    def content(folder):
+        body = rom.reduce(block(cells=(2, 1, 1)), method=rom.CraigBampton(2), interfaces=KINDS,
+                          certify=False)  # fmt: skip
+        return rom.export(body, folder / "export", to=to, held=held).read_bytes()
+
+    return content
+
+
+def sid(dialect):
+    def content(folder):
+        body = random_body(np.random.default_rng(1), r=2)
+        return rom.export(body, folder / "export", to=dialect).read_bytes()
+
+    return content
+
+
+def whole(name):
+    return lambda folder: (HERE / name).read_bytes()
+
+
+TEXTS = {  # case: (file name, its content, reader)
+    "sid": ("x.SID_FEM", sid("sid"), lambda path: read_sid(path, ge="as_written")),
+    "sid-pysid": ("x.SID_FEM", sid("sid-pysid"), read_body),
+    "sid-geisler": ("x.sid_fem", sid("sid-geisler"), read_body),
+    "op4 text": ("x.op4", whole("dense.op4"), read_op4),
+    "op4 sparse": ("x.op4", whole("nonbigmat_text.op4"), read_op4),
+    "op4 long": ("x.op4", whole("bigmat_text.op4"), read_op4),
+    "op4 binary": ("x.op4", whole("dense_binary.op4"), read_op4),
+    "op4 binary sparse": ("x.op4", whole("nonbigmat_binary.op4"), read_op4),
+    "op4 binary long": ("x.op4", whole("bigmat_binary.op4"), read_op4),
+    "dmig": ("x.dmig", whole("brick.dmig"), read_dmig),
+    "punch": ("x.pch", exported("dmig"), lambda path: read_matrix((path, "KAAX"))),
+    "grids": ("x.bdf", whole("brick.bdf"), read_grids),
+    "market": ("x.mtx", market, read_matrix),
+    "market dense": ("x.mtx", lambda folder: market(folder, dense=True), read_matrix),
+    "abaqus": ("x.mtx", abaqus, read_matrix),
+    "user element": ("x.mtx", user_element, read_user_element),
+    "substructure": ("x.mtx", whole("calculix.mtx"), read_matrix),
+    "user element of a body": ("x.inp", exported("abaqus"), read_user_element),
+    "openfast": ("x.dat", exported("openfast", ["root"]), read_openfast),
+    "openfast-4": ("x.dat", exported("openfast-4", ["root"]), read_openfast),
+    "universal": ("x.unv", lambda folder: universal(False), read_universal),
+    "universal binary": ("x.uff", lambda folder: universal(True), read_universal),
+    "nodes": ("x.inp", deck, read_nodes),
+    "sets": ("x.inp", deck, lambda path: read_node_sets(path, ("root", "tip"))),
+    "table of nodes": ("x.csv", lambda folder: b"1, 0, 0, 1.5\n2, 1e-1, 0, 0\n3, 0, 1, 0\n",
+                       read_nodes),
+    "stiffness": ("calculix.sti", whole("calculix.sti"), read_stored_matrix),
+    "labels": ("calculix.dof", whole("calculix.dof"),
+               lambda path: read_stored_matrix(path.with_suffix(".sti"))),
+}  # fmt: skip
+
+COMPLETE = {  # case: bytes at the end that no reader needs
+    "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
+    "op4 binary": 0, "op4 binary sparse": 0, "op4 binary long": 0, "market": 0, "market dense": 0,
+    "user element of a body": 0, "substructure": 0, "openfast": 22, "openfast-4": 22,
+    "stiffness": 0, "labels": 0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def file(request, tmp_path):
+    """(path, content, reader) of a case; the other files of CalculiX stand beside."""
+    name, content, read = TEXTS[request.param]
+    for part in (".sti", ".dof"):
+        shutil.copy(HERE / f"calculix{part}", tmp_path)
+    data, path = content(tmp_path), tmp_path / name
+    path.write_bytes(data)
+    assert outcome(read, path) is None
+    return path, data, read
+
+
+@pytest.mark.parametrize("file", TEXTS, indirect=True)
+def test_damage_is_refused_or_harmless(file):
+    path, data, read = file
+    found = []
+    for _, content in damaged(data, np.random.default_rng(3), MUTANTS):
+        path.write_bytes(content)
+        found.append(outcome(read, path))
+    assert sum(error is not None for error in found) > MUTANTS // 5
+
+
+@pytest.mark.parametrize("file", COMPLETE, indirect=True)
+def test_a_cut_is_noticed_wherever_it_is(file, request):
+    """But for what stands behind the last number that counts."""
+    path, data, read = file
+    end = len(data) - COMPLETE[request.node.callspec.params["file"]]
+    rng = np.random.default_rng(4)
+    for at in {*rng.integers(1, end, 30), *range(end - 12, end)}:
+        path.write_bytes(data[:at])
+        assert outcome(read, path) is not None, f"cut at {at} of {len(data)} and not noticed"
+
+
+@pytest.mark.parametrize("file", TEXTS, indirect=True)
+def test_what_is_no_file_is_named(file, monkeypatch):
+    path, data, read = file
+    path.unlink()
+    assert "no such file" in str(outcome(read, path))
+    path.symlink_to(path.name)  # a circle
+    assert "no such file" in str(outcome(read, path))
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    assert "pipe or device" in str(outcome(read, path))
+    path.unlink()
+    os.mkfifo(path)  # reading it would wait for ever
+    assert "pipe or device" in str(outcome(read, path))
+    path.unlink()
+    path.mkdir()
+    assert "folder" in str(outcome(read, path))
+    path.rmdir()
+    path.write_bytes(b"")
+    assert outcome(read, path) is not None or path.suffix in (".bdf", ".inp", ".csv")
+    path.write_bytes(data)
+    refused = {str(path), str(path.with_suffix(".sti"))}
+    monkeypatch.setattr(os, "access", lambda name, mode: str(name) not in refused)
+    assert "may not be read" in str(outcome(read, path))  # even by root
+
+
+def test_names_that_no_file_can_have(tmp_path):
+    for name in ("x" * 300 + ".npz", "nul\0.npz"):
+        assert "no such file" in str(outcome(rom.load, tmp_path / name))
