@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
-from rom.eigen import Held, Operators, mac, residual_errors
+from rom.eigen import Held, Operators, given_rigid_motions, mac, residual_errors
 from rom.model import Array, Basis, Report, Row
 from rom.reduction.interface import Connection
 
@@ -180,7 +180,7 @@ def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:
 
 def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
     """Rigid motions of the body against those of the full model."""
-    R = ops.rigid
+    R = given_rigid_motions(ops)
     KR, MR = ops.apply_K(R), ops.apply_M(R)
     full = ops.gram(R, MR)
     size = np.r_[np.ones(3), np.full(3, body.size)]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import identity, kron
 
-from rom.errors import InterfaceError
+from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Interface
 
 Weighted = tuple[float, list[tuple[float, Any]]]
@@ -181,6 +181,20 @@ def orthonormal(ops: Mass, X: Array) -> Array:
             x = x / np.sqrt(ops.gram(x, ops.apply_M(x)).item())
         Q = np.hstack([Q, x])
     return Q
+
+
+def given_rigid_motions(ops: Operators) -> Array:
+    """The (n_local, 6) rigid motions of a body.
+
+    Raises:
+        ModelError: if its operators were made without geometry.
+    """
+    if ops.rigid is None:
+        raise ModelError(
+            "the operators of the model do not know its rigid motions.",
+            hint="Make them with rigid=rom.eigen.rigid_motions(points).",
+        )
+    return ops.rigid
 
 
 def rigid_motions(points: Array) -> Array:

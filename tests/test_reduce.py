@@ -14,6 +14,7 @@ from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen import mean_motion, rigid_motions
 from rom.errors import ConfigError, InterfaceError, MaterialError, ModelError
 from rom.reduction.interface import connect
+from rom.scipy_operators import SciPyOperators
 from rom.workflow import operators
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -424,3 +425,13 @@ def test_a_single_interface_has_a_certificate(model):
     assert body.certificate.ok, body.certificate
     (row,) = [r for r in body.certificate.rows if r.quantity.startswith("constraint against")]
     assert row.value == 0.0
+
+
+def test_operators_without_geometry_are_told_what_they_lack(model):
+    blind = replace(model, operators=SciPyOperators(model.K, model.M))
+    for ask in (
+        lambda: rom.check(blind),
+        lambda: rom.reduce(blind, method=rom.CraigBampton(2), interfaces=KINDS),
+    ):
+        with pytest.raises(ModelError, match="do not know its rigid motions"):
+            ask()

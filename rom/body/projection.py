@@ -13,7 +13,13 @@ from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.body.prestress import UnitLoads
 from rom.body.recovery import StressRecovery
-from rom.eigen import Operators, mean_motion, orthonormal, rigid_motions
+from rom.eigen import (
+    Operators,
+    given_rigid_motions,
+    mean_motion,
+    orthonormal,
+    rigid_motions,
+)
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Interface
 
@@ -54,7 +60,7 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
             "the basis has columns that depend on each other.",
             hint="Ask for fewer modes, or remove an interface that repeats another.",
         )
-    R = orthonormal(ops, ops.rigid)
+    R = orthonormal(ops, given_rigid_motions(ops))
     B = np.linalg.solve(M, scale[:, None] * ops.gram(MPsi, R))
     gap = R - Psi @ (scale[:, None] * B)
     residual = float(np.sqrt(np.diag(ops.gram(gap, ops.apply_M(gap))).max()))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space, orth
 from scipy.sparse import identity, kron
 
-from rom.eigen import Operators, rigid_motions, whole_clusters
+from rom.eigen import Operators, given_rigid_motions, rigid_motions, whole_clusters
 from rom.errors import ConfigError
 from rom.model import Array, Interface
 from rom.reduction.method import Guyan, Method
@@ -74,7 +74,7 @@ class Characteristic:
             )
         ops, full = connection.ops, np.concatenate([connection.parts[name] for name in names])
         basis = Guyan().basis(ops, connection.boundary, connection.labels)
-        rigid = ops.rows(ops.rigid, connection.boundary[full])
+        rigid = ops.rows(given_rigid_motions(ops), connection.boundary[full])
         lam, chi = _interface_modes(ops, basis.Psi[:, full], rigid)
         ends, found = np.cumsum(sizes)[:-1], {}
         for name, part, R in zip(names, np.split(chi, ends), np.split(rigid, ends), strict=True):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.eigen import Operators, rigid_motions
+from rom.eigen import Operators, given_rigid_motions, rigid_motions
 from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
 from rom.reduction.kinds import Tie, tie
@@ -116,7 +116,7 @@ def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) ->
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     T = csr_matrix(coo_matrix(entries, shape=(ops.n_local, n_kept + n_masters)))
     T.eliminate_zeros()
-    rigid = [ops.rigid[stays]]
+    rigid = [given_rigid_motions(ops)[stays]]
     if ops.last:
         moved = [i for i in chosen if ties[i.name].n_masters]
         rigid += [ties[i.name].coordinates @ rigid_motions(i.points) for i in moved]

@@ -82,7 +82,7 @@ class CraigBampton:
             )
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
-        if self.tol is None:
+        if self.tol is None or self.f_max is None:
             omega, Phi = self._normal_modes(ops, held)
         else:
             band = 2 * np.pi * self.f_max
@@ -97,12 +97,13 @@ class CraigBampton:
                     f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
                 )
             return _lowest(ops, held, int(self.n_modes))
+        limit = 2 * np.pi * (np.inf if self.f_max is None else self.f_max)
         m = min(FIRST_BATCH, held.n_free)
         omega, Phi = ops.modes(held, m)
-        while omega.size and omega[-1] <= 2 * np.pi * self.f_max and m < held.n_free:
+        while omega.size and omega[-1] <= limit and m < held.n_free:
             m = min(2 * m, held.n_free)
             omega, Phi = ops.modes(held, m)
-        keep = int(np.searchsorted(omega, 2 * np.pi * self.f_max, side="right"))
+        keep = int(np.searchsorted(omega, limit, side="right"))
         return omega[:keep], Phi[:, :keep]
 
 
