@@ -164,7 +164,11 @@ def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str
         schema, (major, _) = manifest["schema"], manifest["version"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
-    if schema not in kind.schemas or major != kind.schemas[schema][0]:
+    if (
+        not isinstance(schema, str)
+        or schema not in kind.schemas
+        or major != kind.schemas[schema][0]
+    ):
         known = " or ".join(f"{name!r} {list(version)}" for name, version in kind.schemas.items())
         raise FileFormatError(
             f"the file has the schema {schema!r} {manifest['version']}; it was to be {known}.",

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.recovery import STATES, StressRecovery
-from rom.errors import FileFormatError, QualityGateError
+from rom.errors import FileFormatError, ParameterError, QualityGateError
 from rom.io.archive import LIMIT, Kind, read_archive, write_archive
 from rom.model import Array, Report, Row
 from rom.units import SYSTEMS
@@ -63,7 +63,7 @@ def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
 def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[str, Array]]:
     """The manifest and the arrays of a file as written; see `load` for what is raised."""
     manifest, arrays = read_archive(path, kind, limit)
-    if manifest.get("units") not in SYSTEMS:
+    if manifest.get("units") not in list(SYSTEMS):
         raise FileFormatError(
             f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}.",
             where=str(path),
@@ -79,6 +79,8 @@ def stated(path: Path) -> Iterator[None]:
     """Turn what a wrong manifest causes into an error that names the file."""
     try:
         yield
+    except ParameterError as error:
+        raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise FileFormatError(
             f"the manifest lacks or misstates {error}.", where=str(path)

@@ -1,0 +1,121 @@
+"""Body, family and state files with right checksums and wrong content: typed errors only."""
+
+import json
+
+import numpy as np
+import pytest
+from damage import outcome
+from solid import block
+
+import rom
+from rom.io.archive import write_archive
+from rom.mbs.state import Memory, State
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+WRONG = (None, -1, 1e308, "x", [1], {"x": 1}, True)
+pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning", "ignore::RuntimeWarning")
+
+
+def body(folder):
+    made = rom.reduce(block(cells=(2, 1, 1)), method=rom.CraigBampton(1), interfaces=KINDS)
+    return rom.save(made, folder / "x.rom.npz")
+
+
+def family(folder):
+    made = rom.reduce_parametric(
+        block(cells=(2, 1, 1)), parameters={"rho": rom.Density(None, 0.5, 2.0)}, tol=0.5,
+        method=rom.CraigBampton(1), interfaces=KINDS, damping=rom.Rayleigh(0.0, 1e-6),
+    )  # fmt: skip
+    return rom.save(made, folder / "x.rom.npz")
+
+
+def state(folder):
+    rng = np.random.default_rng(1)
+    q, v, a, lam = (rng.normal(size=n) for n in (7, 6, 6, 5))
+    memory = Memory("generalized-alpha", 1e-2, 0.0, 3, {"a": a})
+    return rom.save_state(State(t=0.3, rank=5, q=q, v=v, a=a, lam=lam, memory=memory),
+                          folder / "x.state.npz")  # fmt: skip
+
+
+FILES = {"body": (body, rom.load), "family": (family, rom.load), "state": (state, rom.load_state)}
+
+
+@pytest.fixture(scope="module", params=FILES)
+def file(request, tmp_path_factory):
+    """(path, manifest, arrays, reader)."""
+    make, read = FILES[request.param]
+    path = make(tmp_path_factory.mktemp("files"))
+    with np.load(path) as found:
+        arrays = {name: found[name] for name in found.files}
+    manifest = json.loads(arrays.pop("manifest").tobytes())
+    del manifest["sha256"]
+    return path, manifest, arrays, read
+
+
+def leaves(tree, place=()):
+    """Places of all tables, lists and values in what JSON holds."""
+    yield place
+    inside = {dict: dict.items, list: enumerate}.get(type(tree), lambda _: ())
+    for key, value in inside(tree):
+        yield from leaves(value, (*place, key))
+
+
+def changed(tree, place, value):
+    """A copy with another value at a place."""
+    if not place:
+        return value
+    out = tree.copy()
+    out[place[0]] = changed(tree[place[0]], place[1:], value)
+    return out
+
+
+def shapes(A):
+    """The array in wrong shapes and with wrong numbers."""
+    yield from (
+        np.zeros(()),
+        np.zeros(0),
+        np.zeros((0, 3)),
+        A[None],
+        A.ravel()[:-1],
+        -A,
+        np.clip(1e300 * A, -1e300, 1e300),
+    )
+    yield np.full(A.shape, 7)
+    yield np.full(A.shape, -(2**62))
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr("os.fsync", lambda handle: None)
+
+
+def test_a_manifest_with_any_other_value_is_refused_or_harmless(file):
+    """What was computed and how is told to people alone; of the certificate one row will do."""
+    path, manifest, arrays, read = file
+    found = {}
+    for place in leaves(manifest):
+        if place[:1] in ((), ("provenance",)) or (place[0] == "certificate" and place[2:3] > (0,)):
+            continue
+        for value in WRONG:
+            write_archive(path, changed(manifest, place, value), arrays, "it")
+            found[(*place, repr(value))] = outcome(read, path, memory=None)
+    for name in ("schema", "version", "memory" if "memory" in manifest else "units"):
+        assert found[name, "{'x': 1}"] is not None
+    assert sum(error is not None for error in found.values()) > len(found) // 3
+
+
+def test_arrays_of_any_other_shape_are_refused_or_harmless(file):
+    path, manifest, arrays, read = file
+    refused = n = 0
+    for name, A in arrays.items():
+        for other in shapes(A):
+            write_archive(path, manifest, arrays | {name: other}, "it")
+            refused, n = refused + (outcome(read, path, memory=None) is not None), n + 1
+    assert refused > n // 3 or read is rom.load_state
+
+
+def test_a_missing_array_is_named(file):
+    path, manifest, arrays, read = file
+    for name in arrays:
+        write_archive(path, manifest, {k: A for k, A in arrays.items() if k != name}, "it")
+        assert outcome(read, path, memory=None) is not None or "/" in name
