@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from rom.checks import check
     from rom.config.component import read_component
     from rom.config.mechanism import read_mechanism
-    from rom.cyclic.bladed_wheel import BladedWheel, bladed_wheel
+    from rom.cyclic.bladed_wheel import BladedWheel
+    from rom.cyclic.bladeless_disk import bladed_wheel
     from rom.cyclic.blades import ReducedBlade, reduced_blade
     from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
@@ -242,7 +243,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "WithLoads": "reduction.loads",
     "YoungsModulus": "parameters",
     "audit": "mbs.audit",
-    "bladed_wheel": "cyclic.bladed_wheel",
+    "bladed_wheel": "cyclic.bladeless_disk",
     "campbell": "mbs.campbell",
     "check": "checks",
     "craig_bampton": "reduction.fixed_interface",

@@ -7,7 +7,9 @@ are diagonal in n, whatever stands on it::
     K_n = V_n^H C_n^H K C_n V_n,    C_n = [I; -K_ii^-1 K_ir]
 
 The blades add their own matrices to the root each of them stands on. Nothing is assumed to be
-small: a blade may be cracked, or another one.
+small: a blade may be cracked, or another one. At speed disk and blades bring their Coriolis and
+centrifugal matrices, K(Omega) = K + Omega^2 C, in the same coordinates; the roots of all blades are
+pulled outwards as those of the tuned wheel.
 
 Source:
     Castanier, Ottarsson and Pierre, A reduced order modeling technique for mistuned bladed disks,
@@ -24,6 +26,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
 from rom.cyclic.blades import ReducedBlade
+from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
 from rom.cyclic.sector import Complex
 from rom.cyclic.substructures import SubstructuredSector
 from rom.errors import ConfigError, ModelError
@@ -42,42 +45,71 @@ class BladedWheel:
             with all roots held.
         M: (d, d) its mass.
         roots: (N, r, c) how the roots of the blades move by these coordinates.
+        rigid: (c, k) rigid motions of a free wheel; k = 0 if it is held.
+        coriolis: (d, d) Coriolis matrix of the disk per rad/s [kg], or None.
+        centrifugal: (d, d) change of K per (rad/s)^2 [kg]; None at rest.
     """
 
     sector: SubstructuredSector
     K: Array
     M: Array
     roots: Array
+    rigid: Array
+    coriolis: Array | None = None
+    centrifugal: Array | None = None
 
-    def matrices(self, blades: Sequence[ReducedBlade]) -> tuple[Array, Array]:
+    def matrices(
+        self, blades: Sequence[ReducedBlade], *, speed: float = 0.0
+    ) -> tuple[Array, Array]:
         """Stiffness and mass of the wheel: disk, then the cantilever modes of all blades.
 
+        Args:
+            blades: N of them, in the order of the sectors.
+            speed: angular speed that stiffens and softens [rad/s].
+
         Raises:
-            ConfigError: if there is not one blade for each sector, or one has another root.
+            ConfigError: if there is not one blade for each sector, one has another root, or the
+                matrices of rotation are missing.
         """
-        N, r, c = self.roots.shape
+        self._check(blades)
+        K, M = (self._joined(name, blades) for name in ("K", "M"))
+        return (K + speed**2 * self._joined("centrifugal", blades) if speed else K), M
+
+    def coriolis_matrix(self, blades: Sequence[ReducedBlade]) -> Array:
+        """Skew-symmetric Coriolis matrix per rad/s, in the coordinates of `matrices`.
+
+        Raises:
+            ConfigError: see `matrices`.
+        """
+        self._check(blades)
+        return self._joined("coriolis", blades)
+
+    def _check(self, blades: Sequence[ReducedBlade]) -> None:
+        N, r, _ = self.roots.shape
         if len(blades) != N or any(blade.n_root != r for blade in blades):
             raise ConfigError(
                 f"{len(blades)} blades, with {sorted({b.n_root for b in blades})} root "
                 f"coordinates: give {N} with {r}.",
                 hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
             )
-        X = self.roots.reshape(N * r, c)
-        K, M = (
-            block_diag(disk, *(A[r:, r:] for A in own))
-            for disk, own in ((self.K, [b.K for b in blades]), (self.M, [b.M for b in blades]))
-        )
-        K[:c, :c] += X.T @ np.vstack(
-            [b.K[:r, :r] @ Y for b, Y in zip(blades, self.roots, strict=True)]
-        )
-        M[:c, :c] += X.T @ np.vstack(
-            [b.M[:r, :r] @ Y for b, Y in zip(blades, self.roots, strict=True)]
-        )
-        across = np.hstack([Y.T @ b.M[:r, r:] for b, Y in zip(blades, self.roots, strict=True)])
-        d = len(self.K)
-        M[:c, d:] = across
-        M[d:, :c] = across.T
-        return K, M
+
+    def _joined(self, name: str, blades: Sequence[ReducedBlade]) -> Array:
+        """The matrix of that name of the disk, and those of the blades on their roots."""
+        disk, own = getattr(self, name), [getattr(blade, name) for blade in blades]
+        if disk is None or any(B is None for B in own):
+            place = "disk" if disk is None else f"blade {[B is None for B in own].index(True)}"
+            raise ConfigError(
+                f"the {place} has no matrices of rotation.",
+                hint="Substructure a sector of rom.rotating_sector, and reduce blades on it.",
+            )
+        N, r, c = self.roots.shape
+        d, X = len(disk), self.roots.reshape(N * r, c)
+        each = list(zip(own, self.roots, strict=True))
+        A = block_diag(disk, *(B[r:, r:] for B in own))
+        A[:c, :c] += X.T @ np.vstack([B[:r, :r] @ Y for B, Y in each])
+        A[:c, d:] += np.hstack([Y.T @ B[:r, r:] for B, Y in each])
+        A[d:, :c] += np.vstack([B[r:, :r] @ Y for B, Y in each])
+        return A
 
     def of_blades(self, blades: Sequence[ReducedBlade], Phi: Array) -> list[Array]:
         """(r + m, k) per blade: root and cantilever coordinates in k motions Phi (n, k)."""
@@ -88,23 +120,63 @@ class BladedWheel:
             for blade, Y, end in zip(blades, self.roots, ends, strict=True)
         ]
 
-    def modes(self, blades: Sequence[ReducedBlade]) -> tuple[Array, Array]:
+    def modes(self, blades: Sequence[ReducedBlade], *, speed: float = 0.0) -> tuple[Array, Array]:
         """Circular frequencies [rad/s] and mass-normalised modes of the wheel with these blades.
 
         Args:
             blades: N of them, in the order of the sectors.
+            speed: angular speed [rad/s]; Coriolis forces are left out, see `waves`.
 
         Returns:
-            omega (n,), ascending, and Phi (n, n) in the coordinates of `matrices`.
+            omega (n,), ascending, rigid motions of a free wheel exactly zero, and Phi (n, n) in the
+            coordinates of `matrices`.
 
         Raises:
-            ConfigError: see `matrices`.
-            ModelError: if a motion is left without stiffness.
+            ConfigError: see `matrices`; for a free wheel at speed.
+            ModelError: if a motion is left without stiffness, by the blades or by the speed.
         """
-        lam, Phi = eigh(*self.matrices(blades))
-        if lam[0] < -RIGID * lam[-1]:
-            raise ModelError("these blades leave a motion without stiffness.")
+        if speed and not self.sector.supported:
+            raise ConfigError(
+                "a free wheel of different blades has no modes at speed: nothing holds it on its "
+                "axis.",
+                hint="Hold the disk, fixed=(…), or put it on springs, rom.supported_sector.",
+            )
+        K, M = self.matrices(blades, speed=speed)
+        lam, Phi = _apart(K, M, self.rigid)
+        if lam[0] < -RIGID * lam[-1] or (speed and lam[0] <= 0.0):
+            raise ModelError(
+                f"at {speed:g} rad/s the wheel with these blades is above its instability: spin "
+                "softening has used up its stiffness."
+                if speed
+                else "these blades leave a motion without stiffness."
+            )
         return np.sqrt(np.maximum(lam, 0.0)), Phi
+
+    def waves(self, blades: Sequence[ReducedBlade], *, speed: float) -> tuple[Array, Complex]:
+        """Circular frequencies [rad/s], seen from the wheel, and shapes with Coriolis forces.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            speed: angular speed [rad/s]; its sign is that of the axis.
+
+        Returns:
+            omega (n,), ascending, and complex Phi (n, n) in the coordinates of `matrices`, which
+            turn with exp(i omega t); of unit modal mass.
+
+        Raises:
+            ConfigError, ModelError: see `modes`.
+        """
+        Phi, motions = self._gyroscopic(blades, speed)
+        omega, q = motions.waves()
+        return omega, Phi @ q
+
+    def _gyroscopic(
+        self, blades: Sequence[ReducedBlade], speed: float
+    ) -> tuple[Array, GyroscopicModes]:
+        """Modes at speed, and the motions among them that Coriolis forces leave."""
+        omega, Phi = self.modes(blades, speed=speed)
+        g = speed * (Phi.T @ self.coriolis_matrix(blades) @ Phi)
+        return Phi, gyroscopic_modes(omega, 0.5 * (g - g.T))
 
     def energies(self, blades: Sequence[ReducedBlade], n: int) -> Array:
         """(n, N) share of the strain energy of the blades that each of them has, lowest modes."""
@@ -124,10 +196,12 @@ class BladedWheel:
         omega: npt.ArrayLike,
         damping: float,
         at: Any,
+        speed: float = 0.0,
     ) -> Complex:
         """Answer of all blades to forces that travel around the wheel.
 
-        Blade j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E; every mode
+        Blade j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E: for E > 0
+        the wave runs against the rotation, as that of a wheel past struts at rest does. Every mode
         of the wheel has the same share of critical damping.
 
         Args:
@@ -139,19 +213,23 @@ class BladedWheel:
             damping: share of critical damping of each mode.
             at: (p,) dofs of the model of a blade, or (p, n) rows, whose displacements are wanted;
                 or a list of N of them.
+            speed: angular speed [rad/s], with Coriolis forces.
 
         Returns:
             (w, N, p) complex displacements [m], in the axes of each sector.
 
         Raises:
-            ConfigError: for damping that is not positive, or a force or place off the blades.
+            ConfigError: for damping not between 0 and 1, or a force or place off the blades.
         """
-        if not damping > 0.0:
+        if not 0.0 < damping < 1.0:
             raise ConfigError(
-                f"damping = {damping!r} must be a positive share of critical damping."
+                f"damping = {damping!r} must be a positive share of critical damping, below 1."
             )
         N, sweep = self.sector.n_sectors, np.atleast_1d(np.asarray(omega, dtype=float))
-        frequencies, Phi = self.modes(blades)
+        if speed:
+            Phi, motions = self._gyroscopic(blades, speed)
+        else:
+            frequencies, Phi = self.modes(blades)
         moved = self.of_blades(blades, Phi)
         forces, rows = _each(force, N), _each(at, N)
         phase = np.exp(1j * engine_order * self.sector.angle * np.arange(N))
@@ -159,8 +237,11 @@ class BladedWheel:
             phase[j] * (q.T @ (blade.Psi.T @ _on(blade, forces[j], j)))
             for j, (blade, q) in enumerate(zip(blades, moved, strict=True))
         )
-        gap = frequencies**2 - sweep[:, None] ** 2
-        amplitude = load / (gap + 2j * damping * sweep[:, None] * frequencies)
+        if speed:
+            amplitude = motions.response(load, sweep, damping)
+        else:
+            gap = frequencies**2 - sweep[:, None] ** 2
+            amplitude = load / (gap + 2j * damping * sweep[:, None] * frequencies)
         seen = [_rows(blade, rows[j], j) @ moved[j] for j, blade in enumerate(blades)]
         return np.stack([amplitude @ row.T for row in seen], axis=1)
 
@@ -173,8 +254,8 @@ class BladedWheel:
             blades: see `response`.
             force: see `response`; on the tuned wheel the first of a list acts everywhere.
             at: the amplitude is the norm of these displacements; of a list, as with the force.
-            sweep: engine_order, omega and damping of `response`; the tuned peak is found in the
-                same sweep.
+            sweep: engine_order, omega, damping and speed of `response`; the tuned peak is found in
+                the same sweep.
         """
         found = self.response(blades, force, at=at, **sweep)
         alike = [self.sector.blade] * self.sector.n_sectors
@@ -220,89 +301,15 @@ def _rows(blade: ReducedBlade, at: npt.ArrayLike, j: int) -> Array:
     return found
 
 
-def bladed_wheel(
-    sector: SubstructuredSector, n_waves: int, *, n_root: int | None = None
-) -> BladedWheel:
-    """The disk of a substructured sector, on which each blade may be another one.
-
-    Args:
-        sector: made by `rom.substructured_sector`.
-        n_waves: number of waves of the disk for each number of nodal diameters, roots held.
-        n_root: number of shapes of the roots for each, the lowest of the statically condensed
-            tuned wheel (characteristic constraint modes); all of them unless given.
-
-    Raises:
-        ConfigError: if the disk has not so many.
-    """
-    j = np.arange(sector.n_sectors)
-    Ks: list[Array] = []
-    Ms: list[Array] = []
-    couplings: list[Array] = []
-    waves, roots = [], []
-    for n in sector.diameters:
-        standing = sector.standing(n)
-        K, M, omega, B = _condensed(sector, n, n_waves)
-        V = _root_shapes(sector, K, M, n_root)
-        for found, A in ((Ks, K @ V), (Ms, M @ V), (couplings, B)):
-            found.append(_real(V.conj().T @ A, standing))
-        waves += [omega] if standing else [omega, omega]
-        moved = np.exp(1j * n * sector.angle * j)[:, None, None] * V
-        size = np.sqrt((1 if standing else 2) / sector.n_sectors)
-        roots += [size * part for part in (moved.real, moved.imag)[: 1 if standing else 2]]
-    L, omega = block_diag(*couplings), np.concatenate(waves)
-    return BladedWheel(
-        sector,
-        block_diag(*Ks, np.diag(omega**2)),
-        np.block([[block_diag(*Ms), L], [L.T, np.eye(omega.size)]]),
-        np.concatenate(roots, axis=2),
-    )
-
-
-def _real(A: Complex, standing: bool) -> Array:
-    """Of a_n^H A b_n and its conjugate for -n, in (a', a'') of a_n = (a' - i a'') / sqrt(2)."""
-    return A.real if standing else np.block([[A.real, A.imag], [-A.imag, A.real]])
-
-
-def _root_shapes(
-    sector: SubstructuredSector, K: Complex, M: Complex, n_root: int | None
-) -> Complex:
-    """(r, c) shapes of the roots: all, or the lowest with the nominal blades on them."""
-    r = len(K)
-    if n_root is None:
-        return np.eye(r, dtype=complex)
-    if isinstance(n_root, bool) or not 1 <= n_root <= r:
-        raise ConfigError(f"n_root = {n_root!r}: a root has 1 to {r} shapes.")
-    static = (A[:r, :r] for A in (sector.blade.K, sector.blade.M))
-    V = eigh(*(A + own for A, own in zip((K, M), static, strict=True)))[1]
-    return np.asarray(V[:, :n_root], dtype=complex)
-
-
-def _condensed(
-    sector: SubstructuredSector, n: int, n_waves: int
-) -> tuple[Complex, Complex, Array, Complex]:
-    """Stiffness and mass (r, r) of roots, waves (w,) with roots held, and their coupling (r, w)."""
-    kept = np.isin(sector.free, sector.cantilever, invert=True)
-    T = sector.harmonic(n)[:, kept].toarray()
-    root = np.searchsorted(sector.free[kept], sector.root)
-    inner = np.setdiff1d(np.arange(T.shape[1]), root)
-    if isinstance(n_waves, bool) or not 0 <= n_waves <= inner.size:
-        raise ConfigError(f"n_waves = {n_waves!r}: the disk has 0 to {inner.size} with roots held.")
-    K, M = (T.conj().T @ A @ T for A in _disk(sector))
-    K_ii = K[np.ix_(inner, inner)]
-    C: Complex = np.zeros((T.shape[1], root.size), dtype=complex)
-    C[root] = np.eye(root.size)
-    C[inner] = -np.linalg.solve(K_ii, K[np.ix_(inner, root)])
-    square, Phi = eigh(K_ii, M[np.ix_(inner, inner)])
-    B = C.conj().T @ M[:, inner] @ Phi[:, :n_waves]
-    return C.conj().T @ K @ C, C.conj().T @ M @ C, np.sqrt(square[:n_waves]), B
-
-
-def _disk(sector: SubstructuredSector) -> tuple[Array, Array]:
-    """Stiffness and mass of the sector without its blade."""
-    at = np.r_[sector.root, sector.cantilever]
-    found = []
-    for A, blade in ((sector.K, sector.blade.K), (sector.M, sector.blade.M)):
-        disk = A.toarray()
-        disk[np.ix_(at, at)] -= blade
-        found.append(disk)
-    return found[0], found[1]
+def _apart(K: Array, M: Array, rigid: Array) -> tuple[Array, Array]:
+    """Squared frequencies and modes, rigid motions first and exact."""
+    n, k = len(K), rigid.shape[1]
+    if k == 0:
+        lam, Phi = eigh(K, M)
+        return lam, Phi
+    R = np.zeros((n, k))
+    R[: len(rigid)] = rigid
+    R = np.linalg.solve(np.linalg.cholesky(R.T @ M @ R), R.T).T
+    Z = np.linalg.qr(M @ R, mode="complete")[0][:, k:]
+    lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    return np.r_[np.zeros(k), lam], np.hstack([R, Z @ V])

@@ -21,6 +21,8 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity
 
 from rom.cyclic.faces import interpolation
+from rom.cyclic.rotation import arms, rotation_matrices
+from rom.cyclic.sector import all_rows, region
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.scipy_operators import SciPyOperators
@@ -41,12 +43,17 @@ class ReducedBlade:
         M: (r + m, r + m) mass [kg; 1].
         Psi: (n, r + m) displacement shapes on the dofs of the model the blade comes from.
         n_root: number r of root coordinates.
+        coriolis: (r + m, r + m) skew-symmetric Coriolis matrix per rad/s [kg], or None.
+        centrifugal: (r + m, r + m) change of K per (rad/s)^2: geometric stiffness of centrifugal
+            stress less spin softening; None for a blade at rest.
     """
 
     K: Array
     M: Array
     Psi: Array
     n_root: int
+    coriolis: Array | None = None
+    centrifugal: Array | None = None
 
     @property
     def n_modes(self) -> int:
@@ -64,6 +71,8 @@ class ReducedBlade:
         self, *, stiffness: float = 0.0, density: float = 0.0, cantilever: npt.ArrayLike = ()
     ) -> "ReducedBlade":
         """The blade with other parameters.
+
+        Centrifugal stress follows from equilibrium: it grows with the density, not the stiffness.
 
         Args:
             stiffness: relative deviation of the stiffness of the blade.
@@ -86,7 +95,14 @@ class ReducedBlade:
         K = (1.0 + stiffness) * self.K
         modes = self.n_root + np.arange(delta.size)
         K[modes, modes] *= (1.0 + delta) ** 2
-        return replace(self, K=K, M=(1.0 + density) * self.M)
+        heavier = 1.0 + density
+        return replace(
+            self,
+            K=K,
+            M=heavier * self.M,
+            coriolis=None if self.coriolis is None else heavier * self.coriolis,
+            centrifugal=None if self.centrifugal is None else heavier * self.centrifugal,
+        )
 
 
 def reduced_blade(
@@ -98,6 +114,9 @@ def reduced_blade(
     root: str | None = None,
 ) -> ReducedBlade:
     """A blade of other shape, mesh or material that fits on the disk of a sector.
+
+    On a sector with matrices of rotation it has its own: those of its centrifugal stress when the
+    root moves with the disk as that of the sector does.
 
     Args:
         sector: with the functions of the root.
@@ -116,28 +135,29 @@ def reduced_blade(
             raise InterfaceError(
                 f"the blade has no interface {root!r}; it has {sorted(model.interfaces)}."
             )
-        K, M, inner = csr_matrix(model.K), csr_matrix(model.M), np.arange(model.n_dofs)
-        nodes = model.interfaces[root].nodes
+        K, M = all_rows(model, model.K), all_rows(model, model.M)
+        inner, nodes = np.arange(model.n_dofs), model.interfaces[root].nodes
     else:
         K, M = region(model, blade)
-        inner, nodes = cut(model.K, K, blade)
-    Q = _same_functions(sector, model.points[nodes])
-    dofs = dofs_of(nodes)
+        inner, nodes = cut(all_rows(model, model.K), K, blade)
+    like = _same_surface(sector, model.points[nodes])
+    Q, dofs = like @ sector.root_functions, dofs_of(nodes)
     E = np.zeros((K.shape[0], 3 * Q.shape[1]))
     E[dofs] = np.kron(Q, np.eye(3))
-    return _cantilevered(K, M, E, np.union1d(inner, dofs), dofs, n_modes)
-
-
-def _cantilevered(
-    K: csr_matrix, M: csr_matrix, E: Array, mine: Index, root: Index, n_modes: int
-) -> ReducedBlade:
-    """Craig-Bampton of the dofs of a blade, whose root moves by E."""
+    mine = np.union1d(inner, dofs)
     ops = SciPyOperators(K[mine][:, mine], M[mine][:, mine])
-    held = ops.hold(np.searchsorted(mine, root))
+    held = ops.hold(np.searchsorted(mine, dofs))
     _, Phi = ops.modes(held, n_modes)
     Psi = np.zeros((K.shape[0], E.shape[1] + n_modes))
     Psi[mine] = np.hstack([E[mine] - held(ops.apply_K(E[mine])), Phi])
-    return blade_in(K, M, Psi, E.shape[1])
+    found = blade_in(K, M, Psi, E.shape[1])
+    if sector.root_moved is None:
+        return found
+    u = np.zeros((K.shape[0], 1))
+    u[dofs, 0] = (like @ sector.root_moved).ravel()
+    pull = (M @ arms(sector, model.points).ravel())[:, None]
+    u[mine] += held(pull[mine] - ops.apply_K(u[mine]))
+    return turning(found, M, stresses_of(model, blade), sector.axis, u[:, 0])
 
 
 def blade_in(K: csr_matrix, M: csr_matrix, Psi: Array, n_root: int) -> ReducedBlade:
@@ -148,34 +168,45 @@ def blade_in(K: csr_matrix, M: csr_matrix, Psi: Array, n_root: int) -> ReducedBl
     return ReducedBlade(0.5 * (K_small + K_small.T), 0.5 * (M_small + M_small.T), Psi, n_root)
 
 
-def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
-    """(n, n) stiffness and mass of one region.
+def turning(blade: ReducedBlade, M: csr_matrix, stresses: Any, axis: Array, u: Array) -> Any:
+    """The blade with the matrices of its rotation.
+
+    Args:
+        blade: at rest.
+        M: (n, n) its mass [kg].
+        stresses: of its elements alone.
+        axis: (3,) unit vector.
+        u: (n,) displacement at 1 rad/s [m].
+    """
+    G, softening = rotation_matrices(M, axis)
+    Psi = blade.Psi
+    C = Psi.T @ ((stresses.prestress(u) - softening) @ Psi)
+    return replace(blade, coriolis=Psi.T @ (G @ Psi), centrifugal=0.5 * (C + C.T))
+
+
+def stresses_of(model: FEModel, blade: str | None) -> Any:
+    """Stress that the elements of a blade carry.
 
     Raises:
-        ConfigError: if it is unknown.
+        ConfigError: if there are none.
     """
-    if name not in model.regions:
+    found = (model if blade is None else model.regions[blade]).stresses
+    if found is None:
         raise ConfigError(
-            f"the model has no region {name!r}; it has {sorted(model.regions)}.",
-            hint="Name the volume of the blade in the geometry.",
+            "the model of the blade has no finite elements, from which alone the stiffness of "
+            "centrifugal stress follows.",
+            hint="Make it with rom.fe.model, or its disk without rom.rotating_sector.",
         )
-    return _sparse(model.regions[name].K), _sparse(model.regions[name].M)
+    return found
 
 
-def _sparse(A: Any) -> csr_matrix:
-    if hasattr(A, "tocsr"):
-        return csr_matrix(A)
-    starts, columns, values = A.getValuesCSR()
-    return csr_matrix((values, columns, starts), shape=A.getSize())
-
-
-def cut(K: Any, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
+def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
     """Inner dofs of a blade, and nodes of its root: those it shares with the rest.
 
     Raises:
         InterfaceError: if it shares none.
     """
-    total, mine = _sparse(K).diagonal(), K_blade.diagonal()
+    total, mine = K.diagonal(), K_blade.diagonal()
     shared = (mine > 0.0) & (total - mine > ELSEWHERE * total)
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
     if nodes.size == 0:
@@ -195,8 +226,8 @@ def root_of(model: FEModel, nodes: Index) -> Interface:
     return Interface("root of the blade", nodes, points, equal, points.mean(axis=0))
 
 
-def _same_functions(sector: "SubstructuredSector", points: Array) -> Array:
-    """(k, m) functions of the root of a sector at nodes of another blade.
+def _same_surface(sector: "SubstructuredSector", points: Array) -> csr_matrix:
+    """(k, m) values at nodes of the root of another blade from those at the root of a sector.
 
     Raises:
         InterfaceError: if the nodes cover another surface.
@@ -211,4 +242,4 @@ def _same_functions(sector: "SubstructuredSector", points: Array) -> Array:
             f"{size:.3g} m wide.",
             hint="Only above the root may blades differ in shape.",
         )
-    return np.asarray(interpolation(own, points) @ sector.root_functions)
+    return interpolation(own, points)

@@ -80,7 +80,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     R = sector.rigid(diameter) if speed == 0.0 else np.zeros((sector.n, 0), dtype=complex)
     R, held = R[sector.free], sector.supported
     if sector.standing(diameter):
-        omega, real = _real(T.T @ K @ T, T.T @ sector.M @ T, _span(R), n, held=held)
+        omega, real = _real(T.T @ K @ T, T.T @ sector.M @ T, real_span(R), n, held=held)
         return CyclicModes(sector, diameter, omega, (T @ real).astype(complex))
     parts = real_form(T)
     K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
@@ -134,7 +134,7 @@ def _stacked(Z: Complex) -> Array:
     return np.vstack([Z.real, Z.imag])
 
 
-def _span(R: Complex) -> Array:
+def real_span(R: Complex) -> Array:
     """Real independent columns with the span of the real and imaginary parts."""
     U, s, _ = np.linalg.svd(np.hstack([R.real, R.imag]), full_matrices=False)
     return U[:, s > 1e-9 * s.max(initial=0.0)] if s.size else R.real

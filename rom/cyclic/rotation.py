@@ -71,10 +71,16 @@ def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
 def centrifugal_displacement(sector: CyclicSector) -> Array:
     """(n,) displacement of the sector in a wheel that turns at 1 rad/s [m]."""
     T = sector.harmonic(0)
-    x = sector.points - sector.at
-    load = sector.M @ (x - np.outer(x @ sector.axis, sector.axis)).ravel()
+    load = sector.M @ arms(sector, sector.points).ravel()
     ops = SciPyOperators(T.T @ sector.K @ T, T.T @ sector.M @ T)
     found: Array = T @ ops.hold(axial_pins(sector))((T.T @ load)[:, None])[:, 0]
+    return found
+
+
+def arms(sector: CyclicSector, points: Array) -> Array:
+    """(k, 3) vectors from the axis of rotation to points, across it [m]."""
+    x = points - sector.at
+    found: Array = x - np.outer(x @ sector.axis, sector.axis)
     return found
 
 

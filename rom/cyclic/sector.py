@@ -130,11 +130,11 @@ class CyclicSector:
                 )
         e, at = unit_axis(axis), np.asarray(at, dtype=float)
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
-        M, dM = _all_rows(model, model.M), added_mass(model, 0, model.n_dofs)
+        M, dM = all_rows(model, model.M), added_mass(model, 0, model.n_dofs)
         held = [model.interfaces[name].dofs for name in fixed]
         return cls(
             n_sectors=pair.n_sectors,
-            K=_all_rows(model, model.K),
+            K=all_rows(model, model.K),
             M=M if dM is None else csr_matrix(M + dM),
             slave=pair.slave.dofs,
             master=pair.master.dofs,
@@ -147,7 +147,7 @@ class CyclicSector:
             axis=e,
             at=at,
             matching=pair.matching,
-            regions={name: _region(model, name) for name in regions},
+            regions={name: region(model, name)[0] for name in regions},
         )
 
     @property
@@ -276,13 +276,21 @@ class CyclicSector:
         return found
 
 
-def _region(model: FEModel, name: str) -> csr_matrix:
-    """Stiffness of one region."""
+def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
+    """(n, n) stiffness [N/m] and mass [kg] of one region, on every rank.
+
+    Raises:
+        ConfigError: if it is unknown.
+    """
     if name not in model.regions:
-        raise ConfigError(f"the sector has no region {name!r}; it has {sorted(model.regions)}.")
-    return _all_rows(model, model.regions[name].K)
+        raise ConfigError(
+            f"the sector has no region {name!r}; it has {sorted(model.regions)}.",
+            hint="Name the volume of the blade in the geometry.",
+        )
+    share = model.regions[name]
+    return all_rows(model, share.K), all_rows(model, share.M)
 
 
-def _all_rows(model: FEModel, A: Any) -> csr_matrix:
-    """A matrix of the model on this process, whichever library holds it."""
+def all_rows(model: FEModel, A: Any) -> csr_matrix:
+    """A matrix of the model on this process, on all ranks alike, whichever library holds it."""
     return csr_matrix(A if hasattr(A, "tocsr") else model.operators.gathered(A))

@@ -4,9 +4,18 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from rom.cyclic.blades import ReducedBlade, blade_in, cut, dofs_of, region, root_of
+from rom.cyclic.blades import (
+    ReducedBlade,
+    blade_in,
+    cut,
+    dofs_of,
+    root_of,
+    stresses_of,
+    turning,
+)
 from rom.cyclic.reduced import ReducedSector, face_functions, projected
-from rom.cyclic.sector import NONE, CyclicSector
+from rom.cyclic.rotation import centrifugal_displacement
+from rom.cyclic.sector import NONE, CyclicSector, region
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index
 from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions
@@ -23,6 +32,7 @@ class SubstructuredSector(ReducedSector):
         cantilever: (m,) which are cantilever modes.
         root_points: (k, 3) nodes of the root [m].
         root_functions: (k, r / 3) functions on it, alike for the three directions.
+        root_moved: (k, 3) displacement of the root in a wheel at 1 rad/s [m]; None at rest.
     """
 
     blade: ReducedBlade | None = None
@@ -30,6 +40,7 @@ class SubstructuredSector(ReducedSector):
     cantilever: Index = field(default_factory=lambda: NONE)
     root_points: Array | None = None
     root_functions: Array | None = None
+    root_moved: Array | None = None
 
 
 def substructured_sector(
@@ -46,7 +57,8 @@ def substructured_sector(
 
     As `rom.reduce_sector`, and the blade is cut off where it shares nodes with the rest: both sides
     follow the same functions there, so that frequencies are never below those of the full sector.
-    All of rom.cyclic takes the result like any sector; `rom.bladed_wheel` gives each of its blades
+    All of rom.cyclic takes the result like any sector, at speed if this one has matrices of
+    rotation, see `rom.rotating_sector`; `rom.bladed_wheel` gives each of its blades
     parameters or a shape of its own.
 
     Args:
@@ -99,11 +111,17 @@ def substructured_sector(
     Psi = np.zeros((sector.n, r + n_blade_modes))
     mine = np.union1d(inner, shared)
     Psi[mine] = small.Psi[np.ix_(mine, np.r_[root_at, modes_at])]
+    own, moved = blade_in(K_blade, M_blade, Psi, r), None
+    if sector.centrifugal is not None:
+        u = centrifugal_displacement(sector)
+        own = turning(own, M_blade, stresses_of(model, blade), sector.axis, u)
+        moved = u[shared].reshape(-1, 3)
     return SubstructuredSector(
         **{f.name: getattr(small, f.name) for f in fields(ReducedSector)},
-        blade=blade_in(K_blade, M_blade, Psi, r),
+        blade=own,
         root=root_at,
         cantilever=modes_at,
         root_points=face.points,
         root_functions=Q_root,
+        root_moved=moved,
     )

@@ -1,0 +1,69 @@
+"""Motions of a structure that turns: Coriolis forces between the modes it has without them.
+
+In mass-normalised modes q of the stiffness at speed, with g = Omega Phi^T G Phi::
+
+    q'' + g q' + omega^2 q = p,    y = [q'; omega q],    y' = S y + [p; 0],
+    S = [[-g, -omega], [omega, 0]] = -S^T
+
+so that S has the eigenvalues i w with orthonormal eigenvectors: nothing grows, and no left
+eigenvectors are needed.
+
+Source:
+    Meirovitch, A new method of solution of the eigenvalue problem for gyroscopic systems, AIAA J.
+    12 (1974) 1337.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom.cyclic.sector import Complex
+from rom.model import Array
+
+
+@dataclass(frozen=True)
+class GyroscopicModes:
+    """Motions exp(i w t) of a conservative gyroscopic system.
+
+    Attributes:
+        w: (2n,) circular frequencies [rad/s], ascending, of both signs.
+        velocities: (n, 2n) q' of each, where |q'|^2 + |omega q|^2 = 1.
+        shapes: (n, 2n) q of each.
+    """
+
+    w: Array
+    velocities: Complex
+    shapes: Complex
+
+    def waves(self) -> tuple[Array, Complex]:
+        """Positive w (n,), ascending, and shapes (n, n) of length 1, which turn with exp(i w t)."""
+        n = len(self.shapes)
+        q = self.shapes[:, n:]
+        return self.w[n:], q / np.linalg.norm(q, axis=0)
+
+    def response(self, p: Complex, sweep: Array, damping: float) -> Complex:
+        """(w, n) answers q to p exp(i omega t), each motion with its share of critical damping.
+
+        Args:
+            p: (n,) modal forces.
+            sweep: (w,) circular frequencies omega [rad/s].
+            damping: a motion decays at this share zeta of its w, as exp(i w sqrt(1 - zeta^2) t).
+        """
+        slower = np.sqrt(1.0 - damping**2)
+        met = self.velocities.conj().T @ p
+        gap = 1j * (sweep[:, None] - slower * self.w) + damping * np.abs(self.w)
+        found: Complex = (met / gap) @ self.shapes.T / slower
+        return found
+
+
+def gyroscopic_modes(omega: Array, g: Array) -> GyroscopicModes:
+    """Motions of q'' + g q' + omega^2 q = 0.
+
+    Args:
+        omega: (n,) circular frequencies without g, positive [rad/s].
+        g: (n, n) skew-symmetric [rad/s].
+    """
+    n, D = omega.size, np.diag(omega)
+    w, W = eigh(-1j * np.block([[-g, -D], [D, np.zeros((n, n))]]))
+    return GyroscopicModes(w, W[:n], W[n:] / omega[:, None])
