@@ -25,12 +25,15 @@ def wheel():
         operators=model.operators,
     )  # fmt: skip
     heavy = rom.CyclicSector.from_model(loaded, fixed=("bore",))
+    parts = rom.substructured_sector(sector, model, n_modes=8, n_blade_modes=4)
+    blades = [rom.reduced_blade(parts, model, n_modes=4)] * sector.n_sectors
     x = np.sin(plain.points).ravel()
     found = {
         "at rest": rom.cyclic_modes(plain, 2, 5).omega,
         "standing": rom.cyclic_modes(plain, 0, 5).omega,
         "at speed": rom.travelling_modes(sector, 2, 6, speed=2000.0).omega,
         "reduced": rom.cyclic_modes(rom.reduce_sector(plain, n_modes=8), 2, 5).omega,
+        "blades": rom.bladed_wheel(parts, 2, n_root=4).waves(blades, speed=2000.0)[0][:6],
         "loaded": rom.cyclic_modes(heavy, 2, 5).omega,
         "blade": [x @ plain.regions["blade"] @ x],
         "stress": [x @ sector.centrifugal @ x],

@@ -35,7 +35,7 @@ def every(tmp_path_factory):
 def test_three_ranks_find_the_waves_of_one_process(every, monkeypatch):
     monkeypatch.chdir(SCRIPT.parents[1])
     one, _ = wheel()
-    assert len(every) == 3 and len(one) == 7
+    assert len(every) == 3 and len(one) == 8
     for found, _ in every:
         assert set(found) == set(one)
         for name, values in one.items():
