@@ -120,7 +120,7 @@ def _condensed(
 def _disk(sector: SubstructuredSector) -> dict[str, Any]:
     """Matrices of the sector without its blade, those of rotation None at rest."""
     at = np.r_[sector.root, sector.cantilever]
-    found = {}
+    found: dict[str, Any] = {}
     for name in ("K", "M", "coriolis", "centrifugal"):
         whole = getattr(sector, name)
         found[name] = None if whole is None else whole.toarray()
