@@ -66,16 +66,15 @@ for n in sector.diameters:
 
 # ## Speed
 #
-# Waves with and against the rotation, seen from the wheel, for three numbers of nodal diameters.
+# Waves with and against the rotation, seen from the wheel, for three numbers of nodal diameters;
+# from speed to speed each is the one whose shape is most like it, so that lines may cross.
 
 TOP = 2 * np.pi * 300
 speeds = np.linspace(0.0, TOP, 7)
 waves = {}
 for n in (1, 2, 3):
-    found = [rom.travelling_modes(sector, n, 6, speed=s) for s in speeds[1:]]
-    for label, side in (("forward", 1), ("backward", -1)):
-        lines = [w.frequencies[w.direction == side][:2] for w in found]
-        waves[n, label] = np.vstack([at_rest[n, :2], lines])
+    found = rom.wheel_campbell(sector, n, 4, speeds=speeds)
+    waves[n, "forward"], waves[n, "backward"] = found.forward, found.backward
 say(f"at {30 * TOP / np.pi:.0f} 1/min  forward and backward [Hz]")
 for n in (1, 2, 3):
     ahead, back = (waves[n, label][-1] for label in ("forward", "backward"))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rom.cyclic.bladed_wheel import BladedWheel
     from rom.cyclic.bladeless_disk import bladed_wheel
     from rom.cyclic.blades import ReducedBlade, reduced_blade
+    from rom.cyclic.campbell import WheelCampbell, wheel_campbell
     from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
@@ -134,6 +135,7 @@ __all__ = [
     "SurfaceMesh",
     "Thickness",
     "TravellingModes",
+    "WheelCampbell",
     "WithLoads",
     "YoungsModulus",
     "audit",
@@ -182,6 +184,7 @@ __all__ = [
     "thermal_buckling",
     "transmissibility",
     "travelling_modes",
+    "wheel_campbell",
     "write_animation",
     "write_body_fmu",
     "write_fmu",
@@ -240,6 +243,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "SurfaceMesh": "model",
     "Thickness": "parameters",
     "TravellingModes": "cyclic.travelling",
+    "WheelCampbell": "cyclic.campbell",
     "WithLoads": "reduction.loads",
     "YoungsModulus": "parameters",
     "audit": "mbs.audit",
@@ -287,6 +291,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "surface_load": "body.spread",
     "thermal_buckling": "prestress.thermal",
     "transmissibility": "mbs.response",
+    "wheel_campbell": "cyclic.campbell",
     "write_animation": "view.motion",
     "write_body_fmu": "io.fmu.body",
     "write_fmu": "fmu.export",

@@ -1,0 +1,105 @@
+"""Waves of a wheel followed over its speed, by their shapes and not by their order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
+
+from rom.cyclic.modes import cyclic_modes
+from rom.cyclic.sector import Complex, CyclicSector
+from rom.cyclic.travelling import travelling_modes
+from rom.errors import ConfigError
+from rom.model import Array
+
+SPARE = 4  # waves computed beyond those followed, which may come down from above
+
+
+@dataclass(frozen=True)
+class WheelCampbell:
+    """Frequencies over the speed, each column one wave.
+
+    Attributes:
+        speeds: (s,) [rad/s].
+        diameter: number of nodal diameters.
+        omega: (s, n) circular frequencies seen from the wheel [rad/s]; a column may cross others.
+        direction: (n,) +1 for waves that run ahead with the rotation, -1 against it, 0 standing.
+        mac: (s, n) likeness, 0 to 1, of each shape to that at the speed before; where it is near
+            one half two waves change their shapes, and the speeds are too far apart.
+    """
+
+    speeds: Array
+    diameter: int
+    omega: Array
+    direction: Array
+    mac: Array
+
+    @property
+    def frequencies(self) -> Array:
+        """(s, n) frequencies seen from the wheel [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def forward(self) -> Array:
+        """(s, k) frequencies of the waves that run ahead [Hz]."""
+        return self.frequencies[:, self.direction > 0]
+
+    @property
+    def backward(self) -> Array:
+        """(s, k) frequencies of the waves that run back [Hz]."""
+        return self.frequencies[:, self.direction < 0]
+
+
+def wheel_campbell(
+    sector: CyclicSector, diameter: int, n: int, *, speeds: npt.ArrayLike
+) -> WheelCampbell:
+    """Follow the lowest waves of the first speed through all others by their shapes.
+
+    From speed to speed each wave takes the one of its direction that is most like it, no two the
+    same: the modal assurance criterion |a^H M b|^2 of mass-normalised shapes, summed over all, is
+    the largest there is.
+
+    Args:
+        sector: with matrices of rotation, see `rom.rotating_sector`; full or reduced.
+        diameter: number of nodal diameters.
+        n: number of waves, counting both directions.
+        speeds: (s,) angular speeds [rad/s], not negative; the first may be zero.
+
+    Raises:
+        ConfigError: if a speed is negative, or the wheel has not so many waves.
+        ModelError, ModesMissedError: see `rom.travelling_modes`.
+    """
+    Omega = np.atleast_1d(np.asarray(speeds, dtype=float))
+    if Omega.ndim != 1 or not Omega.size or not np.isfinite(Omega).all() or Omega.min() < 0.0:
+        raise ConfigError(f"speeds = {speeds!r}: give angular speeds [rad/s], none below 0.")
+    omega, direction, shapes = _waves(sector, diameter, n, Omega[0])
+    omega, direction, shapes = omega[:n], direction[:n], shapes[:, :n]
+    found, likeness = [omega], [np.ones(n)]
+    for speed in Omega[1:]:
+        w, sides, U = _waves(sector, diameter, n, speed)
+        mac = np.abs(shapes.conj().T @ (sector.M @ U)) ** 2
+        mac[direction[:, None] != sides] = -1.0
+        kept = linear_sum_assignment(-mac)[1]
+        found.append(w[kept])
+        likeness.append(mac[np.arange(n), kept])
+        shapes = U[:, kept]
+    return WheelCampbell(Omega, diameter, np.array(found), direction, np.array(likeness))
+
+
+def _waves(
+    sector: CyclicSector, diameter: int, n: int, speed: float
+) -> tuple[Array, Array, Complex]:
+    """Circular frequencies, directions and mass-normalised shapes of n waves and a few more."""
+    standing, free = sector.standing(diameter), sector.free.size
+    most = free if standing else 2 * free
+    if isinstance(n, bool) or int(n) != n or not 1 <= n <= most:
+        raise ConfigError(f"n = {n!r}: the wheel has 1 to {most} waves.")
+    if speed:
+        waves = travelling_modes(sector, diameter, min(n + SPARE, most), speed=speed)
+        return waves.omega, waves.direction, waves.shapes
+    if standing:
+        modes = cyclic_modes(sector, diameter, min(n + SPARE, free))
+        return modes.omega, np.zeros(modes.omega.size), modes.shapes
+    modes = cyclic_modes(sector, diameter, min((n + 1) // 2 + SPARE, free))
+    both = np.tile([1.0, -1.0], modes.omega.size)  # at rest a wave runs either way
+    return np.repeat(modes.omega, 2), both, np.repeat(modes.shapes, 2, axis=1)
