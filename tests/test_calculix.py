@@ -137,6 +137,9 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
     lines = path.read_text().splitlines()
     assert lines[lines.index("** 1003") + 1 :][:3] == [
         "1, 2, 3, 4, 5, 6", "3, 1", "*MATRIX, TYPE=STIFFNESS"]  # fmt: skip
+    # readers of such files put the comments together: a line that goes on ends in a comma
+    comments = "".join(line[2:] for line in lines if line.startswith("**")).split("NODES")[1]
+    assert [int(word) for word in comments.split(",")] == [1, 2, 1001, 1002, 1003]
     with pytest.raises(ConfigError, match="node by node"):
         write_user_element({"MASS": np.eye(3)}, [[1, 1], [2, 1], [1, 2]], path, nodes={})
 

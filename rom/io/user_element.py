@@ -175,8 +175,7 @@ def _document(matrices: dict[str, Any], dofs: Dofs, nodes: dict[int, Array]) -> 
     yield from (f"{k}, " + _row(nodes.get(k, np.zeros(3))) for k in labels)
     yield f"*USER ELEMENT, TYPE=U1, NODES={len(labels)}, LINEAR"
     yield f"** {NODE_LIST}"
-    for k in range(0, len(labels), PER_LINE):
-        yield "** " + ", ".join(map(str, labels[k : k + PER_LINE]))
+    yield from (f"** {line}" for line in _wrapped(labels))
     before: list[int] = []
     for place, node in enumerate(labels, 1):
         now = [max(component, 1) for component in components[node]]
