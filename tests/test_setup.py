@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import rom
 from rom.doctor.libraries import PACKAGES
 from rom.doctor.machine import SLOW_ADVICE
 from rom.doctor.pictures import SYSTEM
@@ -108,3 +109,17 @@ def test_pip_does_not_shadow_what_debian_provides():
         "fenics-dolfinx",
     }
     assert {"numpy", "scipy", "numba"} <= names
+
+
+def test_types_are_checked_strictly_wherever_users_call():
+    """Kernels are left out, and no module from which a public name comes."""
+    checked = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
+    assert checked["strict"] and "rom" in checked["files"]
+    left_out = {path for path in ROOT.glob("rom/**/*.py")
+                if re.search(checked["exclude"], path.relative_to(ROOT).as_posix())}  # fmt: skip
+    public = {ROOT / "rom" / f"{name.replace('.', '/')}.py" for name in rom.MODULES.values()}
+    assert all(path.is_file() for path in public) and not public & left_out
+    assert {path.parent.name for path in left_out} == {"mbs"}
+    for exception in checked["overrides"]:
+        names = exception["module"]
+        assert isinstance(names, str) or len(set(names)) == len(names)

@@ -125,7 +125,7 @@ class Watch:
     start: float
     packed: Packed
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.signs: dict[str, float] = {}
         self.found: dict[str, list[tuple[float, Array, Array]]] = {n: [] for n in self.events}
         self.stop: tuple[str, float] | None = None
@@ -207,8 +207,8 @@ class Watch:
 
 
 def _stacked(items: list[tuple[float, Array, Array]], n_q: int, n: int) -> Occurrences:
-    t, q, v = ([item[k] for item in items] for k in range(3))
-    return Occurrences(np.array(t), np.reshape(q, (-1, n_q)), np.reshape(v, (-1, n)))
+    t, q, v = (np.array([item[k] for item in items]) for k in range(3))
+    return Occurrences(t, q.reshape(-1, n_q), v.reshape(-1, n))
 
 
 def watch_of(mechanism: Mechanism, packed: Packed, start: float) -> Watch | None:

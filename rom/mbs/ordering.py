@@ -39,7 +39,7 @@ def forest(groups: list[Group], n_bodies: int) -> Forest:
         if group.rows and not group.couples:
             for a, b in zip(group.bodies, reversed(group.bodies), strict=True):
                 edges[a].append((b, g))
-    grounded = {}
+    grounded: dict[int, int] = {}
     for g, group in enumerate(groups):
         if group.rows and not group.couples and len(group.bodies) == 1:
             grounded.setdefault(group.bodies[0], g)
@@ -133,7 +133,8 @@ class Ordering:
 
     def _loops(self) -> tuple[dict[int, list[int]], dict[int, int]]:
         """Groups that wait for each body, and for how many bodies each group waits."""
-        in_trees, waiting, waits = set(self.trees.joint), {}, {}
+        in_trees, waits = set(self.trees.joint), {}
+        waiting: dict[int, list[int]] = {}
         for g, group in enumerate(self.groups):
             if not group.rows or g in in_trees:
                 continue

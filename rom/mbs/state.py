@@ -12,7 +12,7 @@ from rom.mbs.bordered import factorised, gradient_times, least_motion, mass_diag
 from rom.mbs.motion import evaluate, linearise, moved, rates
 from rom.mbs.packing import Packed
 from rom.mbs.signals import first_failure, sample_all
-from rom.model import Array
+from rom.model import Array, Integers
 
 # relative singular value below which a constraint counts as a copy of others: assembled
 # mechanisms show 1e-12 and less, independent constraints 1e-4 and more
@@ -89,19 +89,18 @@ def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> Stat
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
-    state = _start(packed, table[0], t)
-    return _start(packed.whole(), table[0], t) if state is None else state
+    return _start(packed, table[0], t)
 
 
-def _start(packed: Packed, signal: Array, t: float) -> State | None:
-    """The state at the start; None if the rank of the constraints needs whole matrices."""
+def _start(packed: Packed, signal: Array, t: float) -> State:
+    """The state at the start, by whole matrices if the rank of the constraints needs them."""
     W = workspace(packed.system, len(packed.signals))
     W.signal[:] = signal
     if packed.by_blocks and not _independent(packed, W, packed.q):
-        return None
+        return _start(packed.whole(), signal, t)
     q = assembled(packed, W, packed.q)
     if packed.by_blocks and not _independent(packed, W, q):
-        return None
+        return _start(packed.whole(), signal, t)
     rank = W.value.size if packed.by_blocks else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
     v = fitting_velocity(packed, W, q, packed.v)
@@ -156,9 +155,9 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
 
 def _limited(packed: Packed, step: Array) -> Array:
     """The step, shortened to half a radian and to the size of the mechanism."""
-    B, largest = packed.system.bodies, 0.0
-    for t in B.v_at:
-        turn, shift = np.linalg.norm(step[t + 3 : t + 6]), np.linalg.norm(step[t : t + 3])
+    largest = 0.0
+    for t in packed.system.bodies.v_at:
+        turn, shift = (float(np.linalg.norm(step[i : i + 3])) for i in (t + 3, t))
         largest = max(largest, turn / 0.5, shift / packed.length)
     return step / max(largest, 1.0)
 
@@ -186,7 +185,7 @@ def _weights(packed: Packed, W: Work) -> Array:
     return 1 / np.sqrt(mass)
 
 
-def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Array) -> Array:
+def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Integers) -> Array:
     """Solution x of G x = gap in some rows, all by blocks, with the least weighted norm."""
     if packed.by_blocks:
         x = np.zeros(weight.size)

@@ -109,11 +109,11 @@ def sizes(packed: Packed, step: Array) -> tuple[float, float]:
     """Size of a correction, in rad or lengths of the mechanism, and the share of it to be taken."""
     turns, shifts = [0.0], [0.0]
     for b, at in enumerate(packed.system.bodies.v_at):
-        turns.append(np.linalg.norm(step[at + 3 : at + 6]))
-        shifts.append(np.linalg.norm(step[at : at + 3]) / packed.length)
+        turns.append(float(np.linalg.norm(step[at + 3 : at + 6])))
+        shifts.append(float(np.linalg.norm(step[at : at + 3])) / packed.length)
         r, mass = packed.system.bodies.r[b], packed.system.bodies.mass[b]
         modal = np.diag(packed.system.bodies.M[packed.system.bodies.flex[b]])[:r]
         bend = step[at + 6 : at + 6 + r] * np.sqrt(modal / mass)
-        shifts.append(np.linalg.norm(bend) / packed.length)
+        shifts.append(float(np.linalg.norm(bend)) / packed.length)
     turn, shift = max(turns), max(shifts)
     return float(max(turn, shift)), float(1 / max(1.0, turn / TURN, shift / SHIFT))
