@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from wheels import bladed_model, ring_frequency
 
 import rom
+from rom.errors import InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
@@ -121,6 +122,12 @@ def test_impossible_wheels_are_named(parameters, culprit):
 
     with pytest.raises(ConfigError, match=culprit):
         read_mesh("meshes/bladed_disk.geo", parameters=parameters)
+
+
+def test_an_axis_through_the_sector_is_no_axis_of_its_wheel(bladed_disk):
+    """Half a turn about the line in its middle maps this sector onto itself: two would fit."""
+    with pytest.raises(InterfaceError, match=r"axis \[1\.0, 0\.0, 0\.0\] .* axis=… and at=…"):
+        rom.CyclicSector.from_model(bladed_disk, axis=(1, 0, 0), fixed=("bore",))
 
 
 @pytest.mark.parametrize("fixed", [(), ("bore",)])

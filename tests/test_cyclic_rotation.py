@@ -67,6 +67,9 @@ def test_wrong_arguments_are_named():
     ring = beam_ring(6, 4)
     with pytest.raises(ConfigError, match=r"at rest are cyclic_modes"):
         rom.travelling_modes(ring, 2, 2, speed=0.0)
+    for call in (rom.travelling_modes, rom.cyclic_modes):
+        with pytest.raises(ConfigError, match="speed = nan"):
+            call(ring, 2, 2, speed=np.nan)
     with pytest.raises(ConfigError, match="1 to 24 waves"):
         rom.travelling_modes(ring, 2, 49, speed=1.0)
     with pytest.raises(ConfigError, match="no matrices of rotation"):

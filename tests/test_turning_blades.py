@@ -202,6 +202,8 @@ def test_wheels_that_cannot_turn_are_named(model, full, small, disk, short):
         disk.modes([*alike[:2], at_rest, *alike[3:]], speed=SPEED)
     with pytest.raises(ConfigError, match="the disk has no matrices of rotation"):
         replace(disk, coriolis=None).waves(alike, speed=SPEED)
+    with pytest.raises(ConfigError, match="speed = inf"):
+        disk.modes(alike, speed=np.inf)
     softer = replace(disk, centrifugal=-disk.M)
     with pytest.raises(ModelError, match=r"at 50000 rad/s .* above its instability"):
         softer.modes(alike, speed=5e4)

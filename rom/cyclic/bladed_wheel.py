@@ -72,6 +72,8 @@ class BladedWheel:
                 matrices of rotation are missing.
         """
         self._check(blades)
+        if not np.isfinite(speed):
+            raise ConfigError(f"speed = {speed!r}: give an angular speed in rad/s.")
         K, M = (self._joined(name, blades) for name in ("K", "M"))
         return (K + speed**2 * self._joined("centrifugal", blades) if speed else K), M
 

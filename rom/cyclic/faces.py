@@ -13,6 +13,7 @@ from rom.model import Array, Interface
 SAME = 1e-6  # of the size of a face: nodes that close are one
 WHOLE = 1e-3  # largest distance of the number of sectors from a whole number
 ALIKE = 0.02  # relative difference of area and spread of two faces cut into facets
+BESIDE = 0.05  # of the distance of its nodes from the axis: where the middle of a sector lies
 NEIGHBOURS = 15  # nodes that a node between them follows
 
 
@@ -84,6 +85,22 @@ def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:
         return Pairing(N, step, slave, master, W, matching=True)
     _refuse_different(slave, master, image, gap, 360 / N)
     return Pairing(N, step, slave, master, interpolation(image, slave.points), matching=False)
+
+
+def refuse_all_around(points: Array, axis: Array, at: Array) -> None:
+    """Faces may also be images of each other about an axis that runs through the sector.
+
+    Raises:
+        InterfaceError: if the nodes of the sector lie evenly all around the axis.
+    """
+    x = points - at
+    across = x - np.outer(x @ axis, axis)
+    if np.linalg.norm(across.mean(axis=0)) < BESIDE * np.sqrt((across**2).sum(axis=1).mean()):
+        raise InterfaceError(
+            f"the axis {np.round(axis, 6).tolist()} through {np.asarray(at).tolist()} m runs "
+            "through the middle of the sector, which would fill all of the circle.",
+            hint="Check axis=… and at=….",
+        )
 
 
 def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[int, bool]:

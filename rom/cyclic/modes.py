@@ -112,8 +112,10 @@ def spinning(sector: CyclicSector, speed: float) -> csr_matrix:
     """(n, n) stiffness at an angular speed [rad/s].
 
     Raises:
-        ConfigError: if the sector has no matrices of rotation.
+        ConfigError: if the sector has no matrices of rotation, or the speed is no number.
     """
+    if not np.isfinite(speed):
+        raise ConfigError(f"speed = {speed!r}: give an angular speed in rad/s.")
     if sector.centrifugal is None:
         raise ConfigError(
             "the sector has no matrices of rotation.", hint="Make it with rom.rotating_sector."

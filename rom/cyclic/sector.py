@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
 from rom.attachment import added_mass
-from rom.cyclic.faces import paired, turned, unit_axis
+from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
@@ -119,7 +119,7 @@ class CyclicSector:
         Raises:
             ConfigError: if a region is unknown.
             InterfaceError: if an interface is unknown, the angle between the faces does not divide
-                the circle, or they are no images of each other.
+                the circle, they are no images of each other, or the axis runs through the sector.
             ResourceError: on all ranks, if the sector does not fit on each of them.
         """
         fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
@@ -130,6 +130,7 @@ class CyclicSector:
                 )
         e, at = unit_axis(axis), np.asarray(at, dtype=float)
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
+        refuse_all_around(model.points, e, at)
         M, dM = all_rows(model, model.M), added_mass(model, 0, model.n_dofs)
         held = [model.interfaces[name].dofs for name in fixed]
         return cls(
