@@ -204,6 +204,9 @@ def test_wheels_that_cannot_turn_are_named(model, full, small, disk, short):
         replace(disk, coriolis=None).waves(alike, speed=SPEED)
     with pytest.raises(ConfigError, match="speed = inf"):
         disk.modes(alike, speed=np.inf)
+    stressed = replace(full, K=1.001 * full.K)
+    with pytest.raises(ConfigError, match=r"stiffness of its finite elements: .*heated_sector"):
+        rom.substructured_sector(stressed, model, **ROOM)
     softer = replace(disk, centrifugal=-disk.M)
     with pytest.raises(ModelError, match=r"at 50000 rad/s .* above its instability"):
         softer.modes(alike, speed=5e4)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from rom.cyclic.blades import (
+    ELSEWHERE,
     ReducedBlade,
     blade_in,
     cut,
@@ -15,7 +16,7 @@ from rom.cyclic.blades import (
 )
 from rom.cyclic.reduced import ReducedSector, face_functions, projected
 from rom.cyclic.rotation import centrifugal_displacement
-from rom.cyclic.sector import NONE, CyclicSector, region
+from rom.cyclic.sector import NONE, CyclicSector, all_rows, region
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index
 from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions
@@ -71,7 +72,8 @@ def substructured_sector(
         blade: name of the region.
 
     Raises:
-        ConfigError: if the region or the geometry of the faces is missing, or for too many modes.
+        ConfigError: if the region or the geometry of the faces is missing, for too many modes, or
+            if the blade of the sector has stiffness that its finite elements do not.
         InterfaceError: if the blade shares no node with the disk, or reaches a cyclic face.
 
     Source:
@@ -84,6 +86,7 @@ def substructured_sector(
             hint="Make the sector with rom.CyclicSector.from_model.",
         )
     K_blade, M_blade = region(model, blade)
+    _refuse_stiffened(sector, model, K_blade.diagonal() > 0.0)
     inner, nodes = cut(sector.K, K_blade, blade)
     shared, faces = dofs_of(nodes), np.union1d(sector.slave, sector.master)
     if np.intersect1d(np.union1d(inner, shared), faces).size:
@@ -125,3 +128,14 @@ def substructured_sector(
         root_functions=Q_root,
         root_moved=moved,
     )
+
+
+def _refuse_stiffened(sector: CyclicSector, model: FEModel, of_blade: Array) -> None:
+    """What heat adds to a sector cannot be told apart into disk and blade."""
+    own = all_rows(model, model.K).diagonal()[of_blade]
+    if np.any(abs(sector.K.diagonal()[of_blade] - own) > ELSEWHERE * own):
+        raise ConfigError(
+            "the blade of the sector does not have the stiffness of its finite elements: what "
+            "rom.heated_sector adds cannot be shared out between disk and blade.",
+            hint="Substructure the sector without heat, or reduce it whole by rom.reduce_sector.",
+        )
