@@ -1,6 +1,7 @@
 """Universal files: numbers of known files come back, broken files are named."""
 
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +47,7 @@ def dataset(kind, spacing, values, **options):
     return f"{-1:6d}\n{58:6d}\n{body}{-1:6d}\n"
 
 
+HERE = Path(__file__).parent / "reference" / "foreign"
 X = np.array([2.0, 2.5, 3.0, 3.5, 4.0])
 RE, IM = np.array([1.5, -2.25, 3e-7, 4.0, -5e6]), np.array([-1.0, 0.5, 2e-3, -7e-9, 8.0])
 
@@ -73,6 +75,29 @@ def test_binary_datasets_are_read_in_both_byte_orders(kind, order, tmp_path):
     (f,) = read_universal(tmp_path / "b.uff")
     assert_allclose(f.y, RE + 1j * IM, rtol=1e-6)
     assert_allclose(f.x, X)
+
+
+@pytest.mark.parametrize("name", ["pyuff_text.uff", "pyuff_binary.uff"])
+def test_files_of_another_program_are_read(name):
+    """Written by pyuff 2.5.8 from these numbers, real parts times 5 and 9.
+
+    Its binary files announce 40 bytes for 80, and close the dataset without an end of line.
+    """
+    found = read_universal(HERE / name)
+    assert [f.response for f in found] == [(5, 2), (9, 2)]
+    for f, k in zip(found, (5, 9), strict=True):
+        assert_allclose(f.x, X, rtol=1e-12)
+        assert_allclose(f.y, k * RE + 1j * IM, rtol=1e-11)
+        assert (f.reference, f.numerator, f.denominator) == ((11, -3), 12, 13)
+
+
+def test_bytes_that_are_missing_are_not_made_up(tmp_path):
+    """Fewer bytes than the numbers need, and no closing mark where they would end."""
+    data, path = (HERE / "pyuff_binary.uff").read_bytes(), tmp_path / "x.uff"
+    for bad in (data[:-30], data[:-7], data[:940] + data[944:]):
+        path.write_bytes(bad)
+        with pytest.raises(FileFormatError, match=r"x\.uff: dataset \d is cut"):
+            read_universal(path)
 
 
 def test_other_datasets_and_line_ends_do_not_disturb(tmp_path):

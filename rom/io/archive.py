@@ -173,7 +173,7 @@ def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str
         raise FileFormatError(
             f"the file has the schema {schema!r} {manifest['version']}; it was to be {known}.",
             where=str(path),
-            hint="Newer files need a newer program.",
+            hint="Newer files need a newer program." if schema in list(kind.schemas) else "",
         )
     return manifest
 

@@ -162,7 +162,8 @@ def _dataset(data: bytes, place: int, head: list[bytes]) -> tuple[int, Function 
         if spacing == 0 and kind in DOUBLE:
             raise ValueError("uneven abscissas of double values are not read from binary")
         values, place = _binary(data, place, head, kind, n * width)
-        place = _behind(data, place)
+        closing = _closing(data, place)
+        place = _behind(data, place) if closing < 0 else _line_end(data, closing)
     else:
         end = _mark(data, place)
         if end < 0:
@@ -208,7 +209,11 @@ def _numbers(text: str, kind: int, uneven: bool, parts: int) -> Array:
 
 
 def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -> tuple[Array, int]:
-    """Values of a 58b, whose head tells byte order (1 little) and floating point (2 IEEE)."""
+    """Values of a 58b, whose head tells byte order (1 little) and floating point (2 IEEE).
+
+    Some writers announce too few bytes: of complex numbers the real parts alone. They are believed
+    where the closing mark stands behind as many bytes as the numbers need.
+    """
     fields = [int(word) for word in b" ".join(head)[3:].split()]
     if fields[1] != 2:
         raise ValueError("its numbers are not IEEE floating point")
@@ -216,10 +221,18 @@ def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -
         raise ValueError(f"{fields[3]} bytes announced, {len(data) - place} left")
     order = "<" if fields[0] == 1 else ">"
     size = 8 if kind in DOUBLE else 4
-    if fields[3] < count * size:
+    needed = count * size
+    if fields[3] < needed and _closing(data, place + needed) < 0:
         raise ValueError(f"{fields[3]} bytes for {count} numbers of {size}")
     values = np.frombuffer(data, f"{order}f{size}", count, place).astype(float)
-    return values, place + fields[3]
+    return values, place + max(fields[3], needed)
+
+
+def _closing(data: bytes, place: int) -> int:
+    """The mark right behind values, with or without an end of line before it, or -1."""
+    while data[place : place + 1] in (b"\r", b"\n"):
+        place += 1
+    return place if data.startswith(MARK, place) else -1
 
 
 def _behind(data: bytes, place: int) -> int:

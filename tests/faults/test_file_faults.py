@@ -108,6 +108,7 @@ TEXTS = {  # case: (file name, its content, reader)
     "openfast-4": ("x.dat", exported("openfast-4", ["root"]), read_openfast),
     "universal": ("x.unv", lambda folder: universal(False), read_universal),
     "universal binary": ("x.uff", lambda folder: universal(True), read_universal),
+    "universal of another program": ("x.uff", whole("pyuff_binary.uff"), read_universal),
     "nodes": ("x.inp", deck, read_nodes),
     "sets": ("x.inp", deck, lambda path: read_node_sets(path, ("root", "tip"))),
     "table of nodes": ("x.csv", lambda folder: b"1, 0, 0, 1.5\n2, 1e-1, 0, 0\n3, 0, 1, 0\n",
