@@ -87,6 +87,20 @@ FILES = {
     "empty body": (3, ["check", "empty.npz"], "empty.npz"),
     "body cut": (3, ["check", "cut.npz"], "cut.npz"),
     "geometry as body": (3, ["check", BEAM], "beam.geo"),
+    "device as body": (3, ["check", "/dev/zero"], "/dev/zero: there is no such file, but a"),
+    "missing SID": (3, ["check", "nope.SID_FEM"], "nope.SID_FEM: there is no such file"),
+    "text as SID": (3, ["check", "text.SID_FEM"], "text.SID_FEM, line 1: "),
+    "exported file as body": (3, ["check", "good.op4"], "good.op4: this is not a complete body"),
+    "export of a folder": (3, ["export", ".", "x.op4"], ".: this is a folder"),
+    "export of a SID with nothing in it": (3, ["export", "text.SID_FEM", "x.op4"], "text.SID_FEM"),
+    "export into a folder": (2, ["export", "good.npz", ".", "--to", "op4"], ". is a folder"),
+    "export nowhere": (2, ["export", "good.npz", "no/x.op4"], "folder no does not exist"),
+    "format in capitals": (2, ["export", "good.npz", "x.op4", "--to", "OP4"], "'OP4' is unknown"),
+    "held for a format that holds nothing": (2, ["export", "good.npz", "x.op4", "--held", "root"],
+                                             "held for openfast alone, not for op4"),
+    "held misspelt": (2, ["export", "good.npz", "x.dat", "--to", "openfast", "--held", "rot"],
+                      "'rot' cannot be held; the interfaces are ('root', 'tip')"),
+    "modes for a format without": (2, ["export", "good.npz", "x.pch"], "reads interfaces alone"),
     "export to an unknown format": (2, ["export", "good.npz", "x.fbx"], "'.fbx'"),
     "hinge misspelt": (4, ["simulate", "good.npz", "--hinge", "rot", "--t-end", "1", "--dt", "1e-3",
                            "-o", "out"], "no interface 'rot'; it has ['root', 'tip']"),
@@ -121,6 +135,8 @@ def folder(good, tmp_path, monkeypatch):
     """A working folder with a good body and some that are not."""
     for name, data in {"good": good, "cut": good[:-100], "empty": b"", "text": b"hello\n"}.items():
         (tmp_path / f"{name}.npz").write_bytes(data)
+    (tmp_path / "text.SID_FEM").write_text("hello\n")
+    (tmp_path / "good.op4").write_text("       1       1       2       2A       1P,3E23.16\n")
     monkeypatch.chdir(tmp_path)
     before = set(os.listdir())
     yield tmp_path
