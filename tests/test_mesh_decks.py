@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from cells import solid
+from damage import damaged, outcome
 from numpy.testing import assert_allclose, assert_array_equal
 
-from rom.errors import FileFormatError, MeshError, RomWarning, TagError
-from rom.fe import abaqus, nastran
+from rom.errors import FileFormatError, MeshError, RomError, RomWarning, TagError
+from rom.fe import abaqus, nastran, readers
 from rom.fe.elements import CELL_TYPES
 from rom.fe.mesh import read_mesh
 
@@ -230,3 +231,25 @@ def test_broken_nastran_deck_is_refused(tmp_path, text):
     (tmp_path / "deck.bdf").write_text(text)
     with pytest.raises((FileFormatError, MeshError), match=r"deck\.bdf"):
         read_mesh(tmp_path / "deck.bdf")
+
+
+@pytest.mark.parametrize("ending", [".inp", ".bdf"])
+def test_damaged_decks_are_refused_or_harmless(ending, tmp_path):
+    """In this process, without the guard of `rom.fe.child`, which names the file."""
+    meshio, box, _ = meshio_box("tet4")
+    path, kind = tmp_path / f"x{ending}", {".inp": "abaqus", ".bdf": "nastran"}[ending]
+    box.cell_data = {"nastran:ref": [np.ones(len(box.cells[0].data), dtype=int)]}
+    meshio.write(path, box, file_format=kind)
+
+    def read(path):
+        try:
+            readers.read({"reader": kind, "path": str(path)})
+        except RomError as error:
+            raise type(error)(error.message, where=str(path)) from error
+
+    assert outcome(read, path) is None
+    data, refused = path.read_bytes(), 0
+    for _, content in damaged(data, np.random.default_rng(2), 100):
+        path.write_bytes(content)
+        refused += outcome(read, path) is not None
+    assert refused > 20

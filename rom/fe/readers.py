@@ -30,7 +30,8 @@ def read(request: dict[str, Any]) -> Read:
             f"reading this file needs {error.name}, which is not installed.",
             hint=f"On Debian: apt-get install python3-{error.name}",
         ) from error
-    except Exception as error:  # parsers raise whatever the broken line provokes
+    # parsers raise whatever the broken line provokes, and meshio leaves the process
+    except (Exception, SystemExit) as error:
         if request["reader"] in GEOMETRIES:
             raise
         raise FileFormatError(
