@@ -13,6 +13,7 @@ from scipy.sparse import random as random_matrix
 from solid import block
 
 import rom
+from rom.errors import FileFormatError
 from rom.io.calculix import read_stored_matrix
 from rom.io.dmig import read_dmig, read_grids
 from rom.io.export import read_body
@@ -187,3 +188,23 @@ def test_what_is_no_file_is_named(file, monkeypatch):
 def test_names_that_no_file_can_have(tmp_path):
     for name in ("x" * 300 + ".npz", "nul\0.npz"):
         assert "no such file" in str(outcome(rom.load, tmp_path / name))
+
+
+HUGE = "9" * 20  # no eight bytes hold it
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "read"),
+    [
+        ("x.mtx", f"{HUGE},1, 1,1, 1.0\n", read_matrix),
+        ("x.csv", f"{HUGE}, 0, 0, 0\n", read_nodes),
+        ("x.bdf", f"GRID,{HUGE},,0.,0.,0.\n", read_grids),
+        ("x.inp", f"*NSET, NSET=root\n{HUGE}\n", lambda path: read_node_sets(path, ("root",))),
+        ("x.dmig", f"DMIG,K,0,6,1,0\nDMIG,K,{HUGE},1,,1,1,2.0\n", read_dmig),
+        ("y.mtx", user_element(None).decode().replace("** 9, 4,", f"** {HUGE}, 4,"),
+         read_user_element),
+    ],
+)  # fmt: skip
+def test_labels_that_fit_no_integer_are_refused(name, content, read, tmp_path):
+    (tmp_path / name).write_text(content)
+    assert isinstance(outcome(read, tmp_path / name), FileFormatError)
