@@ -137,6 +137,7 @@ if first:
 
 rod_1, solid_1, reduced_1, linear_1 = table[:, :, 0].T
 results = {
+    "mass [kg]": (model.mass(), rho * b * h * L, 1e-3),
     "frequency 1, worst against the rod": (1 + np.abs(solid_1 / rod_1 - 1).max(), 1.0, 5e-3),
     "frequency 3, worst against the rod": (
         1 + np.abs(table[:, 1, 2] / table[:, 0, 2] - 1).max(), 1.0, 1e-2),
