@@ -89,14 +89,11 @@ class Component:
             raise ConfigError(f"the component has {what}.", where=str(self.document.path))
         if given == ["matrices"]:
             return self._matrices()
-        from rom.fe.elasticity import model
+        (file, keywords), geometry = self.mesh, self.values["geometry"]
+        keywords |= {"material": self.material(), "attachments": self._attachments()}
+        from rom.fe.elasticity import model  # after what the file itself may say wrong
 
-        file, keywords = self.mesh
-        geometry = self.values["geometry"]
-        return model(
-            file, material=self.material(), degree=geometry["degree"], solver=geometry["solver"],
-            attachments=self._attachments(), **keywords,
-        )  # fmt: skip
+        return model(file, degree=geometry["degree"], solver=geometry["solver"], **keywords)
 
     def body(self) -> "FlexibleBody":
         """The reduced body.
