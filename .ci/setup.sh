@@ -69,8 +69,11 @@ environment() { # folder, options of venv, what pip installs
   echo "$wanted" >"$folder/.stamp"
 }
 
+# both at once, as pip uses one core
+environment .venv-light "" -r .ci/light.txt &
+light=$!
 environment .venv --system-site-packages -c constraints.txt -e '.[view,dev,docs]'
-environment .venv-light "" -r .ci/light.txt
+wait "$light" || fail "the environment .venv-light could not be made"
 
 # Python runs lines of .pth files when it starts, before OpenBLAS is loaded.
 for folder in .venv/lib/python3*/site-packages; do
