@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.sparse import identity, kron
 
 from rom.errors import InterfaceError, ModelError
-from rom.model import Array, Interface
+from rom.model import Array, Index, Interface
 
 Weighted = tuple[float, list[tuple[float, Any]]]
 CLUSTER = 1e-5  # eigenvalues closer than this (relative) belong to one space
@@ -195,6 +195,11 @@ def given_rigid_motions(ops: Operators) -> Array:
             hint="Make them with rigid=rom.eigen.rigid_motions(points).",
         )
     return ops.rigid
+
+
+def dofs_of(nodes: Index) -> Index:
+    """(3k,) dofs of nodes."""
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
 def rigid_motions(points: Array) -> Array:

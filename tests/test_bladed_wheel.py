@@ -9,7 +9,8 @@ from scipy.sparse import csr_matrix
 from wheels import bladed_model
 
 import rom
-from rom.cyclic.blades import cut, dofs_of, region, root_of
+from rom.cyclic.blades import cut, region, root_of
+from rom.eigen import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.scipy_operators import SciPyOperators
 

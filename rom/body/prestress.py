@@ -15,7 +15,7 @@ from scipy.linalg import qr
 from rom.attachment import carried_displacements
 from rom.body.flexible import Marker
 from rom.body.stiffening import CENTRIFUGAL, PRODUCTS, interface_loads
-from rom.eigen import Operators, mean_motion, rigid_motions
+from rom.eigen import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
 
@@ -119,7 +119,7 @@ class UnitLoads:
         if candidates.size == 0:
             x = self.model.points
             nodes = np.unique(np.r_[x.argmin(axis=0), x.argmax(axis=0)])
-            candidates = (3 * nodes[:, None] + np.arange(3)).ravel()
+            candidates = dofs_of(nodes)
         rows = ops.rows(ops.rigid, candidates)
         rows = rows / np.linalg.norm(rows, axis=0)
         return np.sort(candidates[qr(rows.T, mode="r", pivoting=True)[1][:6]])

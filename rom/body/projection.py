@@ -15,6 +15,7 @@ from rom.body.prestress import UnitLoads
 from rom.body.recovery import StressRecovery
 from rom.eigen import (
     Operators,
+    dofs_of,
     given_rigid_motions,
     mean_motion,
     orthonormal,
@@ -171,7 +172,7 @@ def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
     if model.surface is None:
         return None
     nodes = model.surface.nodes
-    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    dofs = dofs_of(nodes)
     return Surface(model.points[nodes], model.surface.triangles, ops.rows(E, dofs))
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any, NoReturn
 
 from rom.cli import (
@@ -19,6 +18,7 @@ from rom.cli import (
     swing,
     view,
 )
+from rom.config.keys import nearest
 from rom.errors import ConfigError
 
 VERBS = (
@@ -104,8 +104,7 @@ class Parser(argparse.ArgumentParser):
 
 def suggestion(word: str, known: list[str]) -> str:
     """The nearest known word, and the list of them."""
-    near = get_close_matches(word.partition("=")[0], known, n=1)
-    return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(known)}."
+    return nearest(word.partition("=")[0], known)
 
 
 def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:

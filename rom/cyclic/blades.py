@@ -23,6 +23,7 @@ from scipy.sparse import csr_matrix, identity
 from rom.cyclic.faces import interpolation
 from rom.cyclic.rotation import arms, rotation_matrices
 from rom.cyclic.sector import all_rows, region
+from rom.eigen import dofs_of
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.scipy_operators import SciPyOperators
@@ -212,11 +213,6 @@ def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
     if nodes.size == 0:
         raise InterfaceError(f"region {name!r} shares no node with the rest of the sector.")
     return np.setdiff1d(np.flatnonzero(mine > 0.0), dofs_of(nodes)), nodes
-
-
-def dofs_of(nodes: Index) -> Index:
-    """(3k,) dofs of nodes."""
-    return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
 def root_of(model: FEModel, nodes: Index) -> Interface:

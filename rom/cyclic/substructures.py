@@ -9,7 +9,6 @@ from rom.cyclic.blades import (
     ReducedBlade,
     blade_in,
     cut,
-    dofs_of,
     root_of,
     stresses_of,
     turning,
@@ -17,6 +16,7 @@ from rom.cyclic.blades import (
 from rom.cyclic.reduced import ReducedSector, face_functions, projected
 from rom.cyclic.rotation import centrifugal_displacement
 from rom.cyclic.sector import NONE, CyclicSector, all_rows, region
+from rom.eigen import dofs_of
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index
 from rom.reduction.polynomial import FourierLegendre, Polynomial, interface_functions

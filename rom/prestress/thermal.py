@@ -20,7 +20,7 @@ from scipy.sparse import block_diag, csr_matrix, identity
 from rom.cyclic.modes import real_form
 from rom.cyclic.rotation import axial_pins, largest_ratio
 from rom.cyclic.sector import CyclicSector
-from rom.eigen import rigid_motions
+from rom.eigen import dofs_of, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.prestress.heat import Heat
@@ -172,7 +172,7 @@ def _loose(held: Index, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
 def _six_dofs(points: Array) -> Index:
     """Six dofs that stop every rigid motion and carry nothing when stress balances itself."""
     nodes = np.unique(np.r_[points.argmin(axis=0), points.argmax(axis=0)])
-    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    dofs = dofs_of(nodes)
     return dofs[_pins(rigid_motions(points[nodes] - points.mean(axis=0)))]
 
 
