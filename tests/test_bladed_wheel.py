@@ -228,3 +228,8 @@ def test_wrong_arguments_are_named(model, full, small, disk):
     soft = replace(small.blade, K=-small.blade.K)
     with pytest.raises(ModelError, match="without stiffness"):
         disk.modes([soft] * N)
+
+
+def test_dofs_of_nodes_count_three_per_node_in_the_order_of_the_axes():
+    """The convention of every file and matrix: dof 3 * node + axis."""
+    assert dofs_of(np.array([2, 0])).tolist() == [6, 7, 8, 0, 1, 2]
