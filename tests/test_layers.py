@@ -24,7 +24,10 @@ ANYTHING = {
     "doctor",
     "peers",
 }  # they stand in front
-MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom
+# what every part stands on: checks of arguments and names, child processes, signals
+GROUND = {"arguments", "child", "interruption", "names"}
+MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
+    **{part: {"errors", "interruption", "model", "rotation"} for part in GROUND},
     "errors": set(),
     "notebook": set(),
     "model": {"errors", "notebook"},
@@ -98,7 +101,8 @@ def wrong(part, name):
     if package == "rom" and part not in ANYTHING and target != part:
         if not target:
             return "the package root"
-        if target not in MAY_IMPORT[part]:
+        ground = GROUND - {part} if part not in {"errors", "notebook", *GROUND} else set()
+        if target not in MAY_IMPORT[part] | ground:
             return f"rom.{target}"
     return None
 
