@@ -43,13 +43,15 @@ def test_first_readme_block_runs(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
     assert len(block.splitlines()) <= 15
+    assert len(readme().splitlines()) <= 150
 
 
-def test_commands_in_the_readme_exist():
+def test_commands_in_the_readme_and_on_pages_exist():
     """Every line that starts with rom, with verbs and options the parser knows."""
     from rom.cli.parser import build_parser
 
-    text = readme().replace("\\\n", " ")
+    pages = (readme(), *(path.read_text() for path in (ROOT / "docs").glob("*.md")))
+    text = "\n".join(pages).replace("\\\n", " ")
     lines = re.findall(r"^(?:mpirun -n \d )?rom (.+)$", text, re.M)
     assert len(lines) >= len(VERBS)
     for line in lines:
