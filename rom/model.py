@@ -1,6 +1,6 @@
 """The records passed between the stages. Frozen, array-valued, without solvers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any, TypeVar
@@ -323,22 +323,31 @@ class Basis:
 
 @dataclass(frozen=True, slots=True)
 class Modes:
-    """Natural modes, lowest first, mass-normalised, largest entry positive.
+    """Natural modes, lowest first, mass-normalised; ``omega, shapes = modes`` unpacks them.
 
     Attributes:
         omega: (m,) circular frequencies [rad/s]; rigid motions are exactly zero.
-        shapes: (n, m) displacement shapes; under mpirun the rows of this rank.
-        residual: (m,) relative residual norm(K phi - lambda M phi) / norm(K phi).
+        shapes: (n, m) shapes: displacements of a model, largest entry positive, under mpirun the
+            rows of this rank; (6 + r, m) coordinates of a body; {name: (6 + r, m)} of the bodies
+            of an assembly; whatever coordinates the maker of the modes names.
+        residual: (m,) relative residual norm(K phi - lambda M phi) / norm(K phi); None where the
+            modes are those of small matrices, solved to round-off.
     """
 
     omega: Array
-    shapes: Array
-    residual: Array
+    shapes: Any
+    residual: Any = None
 
     @property
     def frequencies(self) -> Array:
         """(m,) natural frequencies [Hz]."""
         return self.omega / (2 * np.pi)
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter((self.omega, self.shapes))
+
+    def __getitem__(self, k: int) -> Any:
+        return (self.omega, self.shapes)[k]
 
     def __repr__(self) -> str:
         return f"Modes({self._said})"
@@ -351,8 +360,11 @@ class Modes:
         return f"{f.size} modes, {f[0]:.5g} to {f[-1]:.5g} Hz"
 
     def _repr_html_(self) -> str:
-        rows = zip(range(1, self.omega.size + 1), self.frequencies, self.residual, strict=True)
-        return shown(f"Modes: {self._said}", ("mode", "frequency [Hz]", "residual"), rows)
+        columns, names = [self.frequencies], ["frequency [Hz]"]
+        if self.residual is not None:
+            columns, names = [*columns, self.residual], [*names, "residual"]
+        rows = zip(range(1, self.omega.size + 1), *columns, strict=True)
+        return shown(f"Modes: {self._said}", ("mode", *names), rows)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,9 @@ import pickle
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from solid import block
 
+import rom
 from rom import rotation
 from rom.errors import ConfigError, MaterialError, MeshError, RomError
 from rom.model import Material, Orthotropic, Report, Row
@@ -88,3 +90,16 @@ def test_unit_systems_are_consistent():
     assert_allclose([crash.force, crash.pressure], [1e3, 1e9])  # kN, GPa
     with pytest.raises(ConfigError, match="unit system 'inch' is unknown"):
         unit_system("inch")
+
+
+def test_modes_of_everything_are_one_record():
+    """Whoever solves for modes gives omega, frequencies and shapes, which also unpack."""
+    body = rom.reduce(block(), method=rom.CraigBampton(6), interfaces={"root": "rbe2"})
+    pair = rom.Assembly({"one": body, "two": body}, [])
+    for modes in (rom.modes(block(), 8), body.modes(8), pair.modes(8)):
+        omega, shapes = modes
+        assert isinstance(modes, rom.Modes) and modes[0] is omega and modes[1] is shapes
+        assert_allclose(modes.frequencies, omega / (2 * np.pi))
+        assert modes.omega is omega and omega.shape == (8,)
+        assert "8 modes" in repr(modes) and "frequency [Hz]" in modes._repr_html_()
+    assert issubclass(rom.CyclicModes, rom.Modes) and issubclass(rom.TravellingModes, rom.Modes)

@@ -22,7 +22,7 @@ from rom.body.condensed import (
 from rom.body.coupling import coupled_rows
 from rom.body.flexible import FlexibleBody, Marker
 from rom.errors import ConfigError
-from rom.model import Array
+from rom.model import Array, Modes
 
 Place = tuple[str, str]  # body, interface
 
@@ -74,16 +74,14 @@ class Assembly:
         Raises:
             InterfaceError: if an interface is unknown.
         """
-        return self.modes(n, fixed=fixed)[0] / (2 * np.pi)
+        return self.modes(n, fixed=fixed).frequencies
 
-    def modes(
-        self, n: int | None = None, *, fixed: tuple[Place, ...] = ()
-    ) -> tuple[Array, dict[str, Array]]:
+    def modes(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Modes:
         """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
         M, K = self._matrices()
         N = self._free(fixed)
         omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
-        return omega[:n], per_body(self._widths(), N @ V[:, :n])
+        return Modes(omega[:n], per_body(self._widths(), N @ V[:, :n]))
 
     def reduced(
         self, n_interface: int, *, level: str = "system", fixed: tuple[Place, ...] = ()

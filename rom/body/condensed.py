@@ -21,7 +21,7 @@ from scipy.linalg import block_diag, eigh, null_space
 
 from rom.eigen import whole_clusters
 from rom.errors import ConfigError
-from rom.model import Array
+from rom.model import Array, Modes
 
 RANK = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
 RIGID = 1e-13  # eigenvalue, of the largest one, of a motion without stiffness
@@ -72,12 +72,12 @@ class CondensedAssembly:
 
     def frequencies(self, n: int | None = None) -> Array:
         """Natural frequencies [Hz], lowest first; None for all."""
-        return self.modes(n)[0] / (2 * np.pi)
+        return self.modes(n).frequencies
 
-    def modes(self, n: int | None = None) -> tuple[Array, dict[str, Array]]:
+    def modes(self, n: int | None = None) -> Modes:
         """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
         omega, V = natural_modes(self.M, self.K, self.n_rigid)
-        return omega[:n], per_body(self.widths, self.basis @ V[:, :n])
+        return Modes(omega[:n], per_body(self.widths, self.basis @ V[:, :n]))
 
 
 def natural_modes(M: Array, K: Array, n_rigid: int) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from rom.body.rotating import rotating_frequencies
 from rom.body.spread import point_areas
 from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
-from rom.model import Array, Index, Report
+from rom.model import Array, Index, Modes, Report
 from rom.notebook import listed, shown
 
 
@@ -212,7 +212,7 @@ class FlexibleBody:
         """
         return self.modes(n, fixed=fixed)[0] / (2 * np.pi)
 
-    def modes(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> tuple[Array, Array]:
+    def modes(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Modes:
         """Natural modes of the reduced body: omega (m,) [rad/s], shapes (6 + r, m).
 
         Rows of the shapes: translation of the frame, rotation about its origin, elastic part.
@@ -226,12 +226,12 @@ class FlexibleBody:
         M, K = self.full_matrices()
         N = self._supported(fixed)
         if not N.size:  # everything is held
-            return np.zeros(0), N
+            return Modes(np.zeros(0), N)
         lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
         omega = np.sqrt(np.maximum(lam, 0.0))
         n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed), tol=1e-9)
         omega[:n_rigid] = 0.0
-        return omega[:n], (N @ V)[:, :n]
+        return Modes(omega[:n], (N @ V)[:, :n])
 
     def check_support(self, fixed: tuple[str, ...]) -> None:
         """Refuse to hold an interface of a basis of free-free modes alone.

@@ -30,7 +30,7 @@ from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
 from rom.cyclic.sector import Complex
 from rom.cyclic.substructures import SubstructuredSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
+from rom.model import Array, Modes
 
 RIGID = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
@@ -122,7 +122,7 @@ class BladedWheel:
             for blade, Y, end in zip(blades, self.roots, ends, strict=True)
         ]
 
-    def modes(self, blades: Sequence[ReducedBlade], *, speed: float = 0.0) -> tuple[Array, Array]:
+    def modes(self, blades: Sequence[ReducedBlade], *, speed: float = 0.0) -> Modes:
         """Circular frequencies [rad/s] and mass-normalised modes of the wheel with these blades.
 
         Args:
@@ -152,9 +152,9 @@ class BladedWheel:
                 if speed
                 else "these blades leave a motion without stiffness."
             )
-        return np.sqrt(np.maximum(lam, 0.0)), Phi
+        return Modes(np.sqrt(np.maximum(lam, 0.0)), Phi)
 
-    def waves(self, blades: Sequence[ReducedBlade], *, speed: float) -> tuple[Array, Complex]:
+    def waves(self, blades: Sequence[ReducedBlade], *, speed: float) -> Modes:
         """Circular frequencies [rad/s], seen from the wheel, and shapes with Coriolis forces.
 
         Args:
@@ -170,7 +170,7 @@ class BladedWheel:
         """
         Phi, motions = self._gyroscopic(blades, speed)
         omega, q = motions.waves()
-        return omega, Phi @ q
+        return Modes(omega, Phi @ q)
 
     def _gyroscopic(
         self, blades: Sequence[ReducedBlade], speed: float

@@ -28,7 +28,7 @@ from scipy.linalg import eigh
 from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Index
+from rom.model import Array, Index, Modes
 
 STIFFER = 0.1  # relative change of the stiffness of all blades that enriches the basis
 NEW = 1e-12  # squared share of a mode that is new, below which it is round-off
@@ -73,7 +73,7 @@ class MistunedWheel:
         found: Complex = waves[..., k] * self.blade + np.diag(self.omega**2)
         return found
 
-    def modes(self, deviations: npt.ArrayLike) -> tuple[Array, Complex]:
+    def modes(self, deviations: npt.ArrayLike) -> Modes:
         """Frequencies [rad/s] (..., r) and modes in waves (..., r, r) of mistuned wheels.
 
         Raises:
@@ -82,7 +82,7 @@ class MistunedWheel:
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
             raise ModelError("blades with these deviations leave a motion without stiffness.")
-        return np.sqrt(np.maximum(lam, 0.0)), V
+        return Modes(np.sqrt(np.maximum(lam, 0.0)), V)
 
     def response(
         self,

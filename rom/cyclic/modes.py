@@ -9,35 +9,28 @@ from scipy.sparse import bmat, csr_matrix
 from rom.cyclic.rotation import divergence_speed
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
+from rom.model import Array, Modes
 from rom.scipy_operators import SciPyOperators, negative_count
 
 SPARE = 2  # modes beyond those asked for, so that no pair is cut
 
 
-@dataclass(frozen=True)
-class CyclicModes:
+@dataclass(frozen=True, kw_only=True)
+class CyclicModes(Modes):
     """Modes of a wheel with the same number of nodal diameters.
 
     Each stands for two modes of the wheel, its real and imaginary part, which one can add up to a
     wave that travels either way; with 0 and N / 2 diameters for one.
 
     Attributes:
-        sector: the sector.
-        diameter: number of nodal diameters.
         omega: (m,) circular frequencies [rad/s]; rigid motions are exactly zero.
         shapes: (n, m) complex displacements of sector 0, mass-normalised.
+        sector: the sector.
+        diameter: number of nodal diameters.
     """
 
     sector: CyclicSector
     diameter: int
-    omega: Array
-    shapes: Complex
-
-    @property
-    def frequencies(self) -> Array:
-        """(m,) natural frequencies [Hz]."""
-        return self.omega / (2 * np.pi)
 
     @property
     def multiplicity(self) -> int:
@@ -81,13 +74,14 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     R, held = R[sector.free], sector.supported
     if sector.standing(diameter):
         omega, real = _real(T.T @ K @ T, T.T @ sector.M @ T, real_span(R), n, held=held)
-        return CyclicModes(sector, diameter, omega, (T @ real).astype(complex))
+        shapes = (T @ real).astype(complex)
+        return CyclicModes(omega, shapes, sector=sector, diameter=diameter)
     parts = real_form(T)
     K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
     rigid = np.hstack([_stacked(R), _stacked(1j * R)])
     _, pairs = _real(K_2, M_2, rigid, 2 * (n + SPARE), held=held)
     omega, shapes = _waves(T, K, sector.M, pairs, rigid.shape[1], n)
-    return CyclicModes(sector, diameter, omega, T @ shapes)
+    return CyclicModes(omega, T @ shapes, sector=sector, diameter=diameter)
 
 
 def _refuse_divergence(sector: CyclicSector, diameter: int, speed: float) -> None:

@@ -11,7 +11,7 @@ from rom.cyclic.modes import real_form, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.eigen import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError
-from rom.model import Array
+from rom.model import Array, Modes
 from rom.scipy_operators import negative_count
 
 UNSTABLE = 1e-4  # growth rate, of the largest frequency found, of a motion that diverges
@@ -20,35 +20,28 @@ SPARE = 4  # waves computed beyond those asked for
 SMALL = 40  # dofs up to which all waves are computed at once
 
 
-@dataclass(frozen=True)
-class TravellingModes:
+@dataclass(frozen=True, kw_only=True)
+class TravellingModes(Modes):
     """Waves with the same number of nodal diameters on a wheel that turns steadily.
 
     Seen from the wheel; an observer at rest sees ``frequencies`` changed by the turning pattern,
     see `at_rest`.
 
     Attributes:
+        omega: (m,) circular frequencies seen from the wheel [rad/s], ascending.
+        shapes: (n, m) complex displacements of sector 0 at the time 0, u_j = exp(i n j alpha) u_0;
+            they turn with exp(-i omega t) in forward and exp(i omega t) in all other waves.
         sector: the sector.
         diameter: number n of nodal diameters.
         speed: angular speed Omega [rad/s].
-        omega: (m,) circular frequencies [rad/s], ascending.
         direction: (m,) +1 for waves that run ahead with the rotation, -1 against it, 0 where a
             wave stands: n = 0 and N / 2.
-        shapes: (n, m) complex displacements of sector 0 at the time 0, u_j = exp(i n j alpha) u_0;
-            they turn with exp(-i omega t) in forward and exp(i omega t) in all other waves.
     """
 
     sector: CyclicSector
     diameter: int
     speed: float
-    omega: Array
     direction: Array
-    shapes: Complex
-
-    @property
-    def frequencies(self) -> Array:
-        """(m,) frequencies seen from the wheel [Hz]."""
-        return self.omega / (2 * np.pi)
 
     @property
     def forward(self) -> Array:
@@ -104,7 +97,14 @@ def travelling_modes(
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
     size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
-    return TravellingModes(sector, diameter, abs(speed), abs(lam.imag), ahead, T @ (U / size))
+    return TravellingModes(
+        abs(lam.imag),
+        T @ (U / size),
+        sector=sector,
+        diameter=diameter,
+        speed=abs(speed),
+        direction=ahead,
+    )
 
 
 def _lowest(
