@@ -11,9 +11,9 @@ from rom.body.reference import rigid_mass
 from rom.eigen import Held, Operators, given_rigid_motions, mac, residual_errors
 from rom.model import Array, Basis, Report, Row
 from rom.reduction.interface import Connection
+from rom.rows import FREQUENCY_RTOL, frequency_rows, row
 
 N_COMPARED = 6  # elastic modes compared in each support
-FREQUENCY_ERROR = 1e-3  # relative; what a structural dynamicist accepts without asking
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
 # rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
 ASYMMETRY = 1e-6
@@ -59,13 +59,6 @@ def certify_body(
     rows += _matrix_rows(connection, basis, body)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
-
-
-def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Row:
-    """A line that holds when the value stays below (or above) its limit; NaN never holds."""
-    value = float(value)
-    ok = value >= limit if above else value <= limit
-    return Row(quantity, value, f"{'>=' if above else '<='} {limit:g}", bool(ok))
 
 
 def compared(
@@ -122,22 +115,6 @@ def _cluster_mac(table: Array, full: Array, reduced: Array) -> Array:
     return np.minimum((table * near).sum(axis=1), 1.0)
 
 
-def frequency_rows(
-    support: str, table: dict[str, list[float]], limit: float = FREQUENCY_ERROR
-) -> list[Row]:
-    """Errors and shapes against the full model."""
-    error = np.array(table["reduced"]) / np.array(table["full"]) - 1
-    n = error.size
-    rows = [
-        row(f"{support}: worst error of {n} frequencies", np.abs(error).max(), limit),
-        row(f"{support}: reduced never below full", error.min(), -1e-8, above=True),
-    ]
-    if table["mac"]:
-        said = f"{support}: lowest MAC of {n} shapes"
-        rows.append(row(said, min(table["mac"]), 0.99, above=True))
-    return rows
-
-
 def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     """The estimates; against the truth where that is known and more than round-off."""
     if not table["estimated"]:
@@ -146,7 +123,7 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     worst = row(
         f"{support}: estimated error of {estimate.size} frequencies",
         estimate.max(),
-        FREQUENCY_ERROR,
+        FREQUENCY_RTOL,
     )
     if not table["full"]:
         return [worst]

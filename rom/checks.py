@@ -9,6 +9,7 @@ from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen import given_rigid_motions, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Report, Row
+from rom.rows import row
 from rom.scipy_operators import SciPyOperators
 
 
@@ -118,10 +119,3 @@ def _schwarz(body: FlexibleBody) -> float:
     """Largest |int rho phi| over sqrt(m int rho phi^2); above one the integrals cannot be real."""
     momentum = np.linalg.norm(rigid_elastic(body)[:3], axis=0)
     return float((momentum / np.sqrt(body.mass * np.diag(body.M))).max())
-
-
-def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Row:
-    """A line that holds when the value stays below (or above) its limit; NaN never holds."""
-    value = float(value)
-    ok = value > limit if above else value <= limit
-    return Row(quantity, value, f"{'>' if above else '<='} {limit:g}", bool(ok))

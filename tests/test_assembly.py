@@ -1,5 +1,7 @@
 """Reduced bodies coupled on shared interfaces, against the whole in one piece."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,6 +9,7 @@ from solid import STEEL, block
 
 import rom
 from rom.errors import ConfigError, InterfaceError
+from rom.model import Row
 
 COUPLED = ((("left", "tip"), ("right", "root")),)
 ROOT = ("left", "root")
@@ -161,3 +164,25 @@ def test_study_of_interface_orders_on_two_blocks(kind):
     worst, first = STUDY[kind]
     assert_allclose(error.max(), worst, rtol=5e-3)
     assert_allclose(error[0], first, atol=6e-7, rtol=5e-3)  # digits of the full frequency
+
+
+def test_certificates_of_an_assembly_and_of_its_few_functions():
+    assembly = joined("full", n_modes=12)
+    assert not assembly.certificate.ok  # its bodies were reduced without
+    own = certify_of_parts(assembly)
+    rows = own.certificate.rows
+    assert own.certificate.ok
+    assert {line.quantity.partition(":")[0] for line in rows[:-1]} == {"left", "right"}
+    assert rows[-1].quantity.startswith("gap of coupled interfaces") and rows[-1].value > 0
+    assert assembly.reduced(20).certificate.ok
+    poor = assembly.reduced(2, fixed=(ROOT,)).certificate
+    assert [line.quantity for line in poor.failures] == [
+        "2 interface functions: worst error of 6 frequencies"
+    ]
+
+
+def certify_of_parts(assembly):
+    """The assembly of bodies that say of themselves that they are right."""
+    good = rom.Report("certificate", (Row("mass", 0.0, "<= 1e-09", True),))
+    bodies = {name: replace(body, certificate=good) for name, body in assembly.bodies.items()}
+    return rom.Assembly(bodies, assembly.couplings)

@@ -95,6 +95,13 @@ def test_equal_blades_are_the_tuned_wheel(small, disk):
     assert np.all(fewest > few * (1 - 1e-9))
 
 
+def test_the_certificates_of_sector_and_wheel(small, disk):
+    """Against the full sector; half the stiffness of a blade is noticed."""
+    assert small.certificate.ok and disk.certificate.ok
+    weak = replace(small.blade, K=0.5 * small.blade.K)
+    assert not replace(disk, sector=replace(small, blade=weak)).certificate.ok
+
+
 def test_every_blade_may_be_another_one(model, full, small, disk, short):
     """A fifth of the stiffness lost, a denser one, a shorter one: frequencies, response, factor."""
     (K, M), (K_short, M_short) = region(model, "blade"), region(short, "blade")

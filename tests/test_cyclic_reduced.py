@@ -57,6 +57,22 @@ def test_reduced_frequencies_fall_to_those_of_the_full_wheel(n):
     assert_allclose(before, exact, rtol=1e-3)
 
 
+def test_a_certificate_tells_good_from_poor_and_wrong():
+    bar = periodic_bar(held=True)
+    good = rom.reduce_sector(bar, n_modes=24, functions=rom.Polynomial(4))
+    assert good.certificate.ok and good.certificate is good.certificate  # solved once
+    worst = [abs(rom.cyclic_modes(good, n, 6).omega / rom.cyclic_modes(bar, n, 6).omega - 1).max()
+             for n in (0, 1, 2, 4)]  # fmt: skip
+    said = [line.value for line in good.certificate.rows if "worst error" in line.quantity]
+    assert_allclose(said, worst, rtol=1e-6)
+    poor = rom.reduce_sector(bar, n_modes=2, functions=rom.Polynomial(1)).certificate
+    assert {line.quantity.partition(": ")[2] for line in poor.failures} == {
+        "worst error of 6 frequencies"
+    }
+    wrong = replace(good, K=0.98 * good.K).certificate
+    assert any("never below full" in line.quantity for line in wrong.failures)
+
+
 def test_rigid_motions_survive():
     """Linear functions carry them exactly: what a translation is in full coordinates."""
     bar = periodic_bar()

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
 LIGHT = {"attachment", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parameters",
-         "reduction", "rotation", "scipy_operators", "units"}  # fmt: skip
+         "reduction", "rotation", "rows", "scipy_operators", "units"}  # fmt: skip
 ANYTHING = {
     "__init__",
     "__main__",
@@ -45,13 +45,24 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
         "scipy_operators",
         "attachment",
         "reduction",
+        "rows",
         "errors",
     },
-    "body": {"model", "eigen", "rotation", "attachment", "parameters", "notebook", "errors"},
+    "body": {
+        "model",
+        "eigen",
+        "rotation",
+        "attachment",
+        "parameters",
+        "notebook",
+        "rows",
+        "errors",
+    },
     "mbs": {"model", "rotation", "io", "notebook", "errors"},
     "io": {"model", "units", "body", "parameters", "errors"},
-    "checks": {"model", "eigen", "body", "scipy_operators", "errors"},
-    "certificate": {"model", "eigen", "body", "reduction", "errors"},
+    "rows": {"model"},
+    "checks": {"model", "eigen", "body", "rows", "scipy_operators", "errors"},
+    "certificate": {"model", "eigen", "body", "reduction", "rows", "errors"},
     "workflow": LIGHT | {"certificate"},
     "prestress": {
         "model",
@@ -60,9 +71,10 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
         "scipy_operators",
         "cyclic",
         "reduction",
+        "rows",
         "errors",
     },
-    "parametric": LIGHT | {"certificate", "workflow"},
+    "parametric": LIGHT | {"certificate", "rows", "workflow"},
     "fe": {"model", "eigen", "units", "scipy_operators", "errors"},
     "components": LIGHT,
     "view": {"model", "mbs", "rotation", "io", "errors"},

@@ -155,6 +155,8 @@ def test_a_reduced_blade_follows_the_speed(run_up):
     """Between tabulated speeds, against the full solid in its own state there."""
     small = run_up.reduced(8)
     assert small.error < 3e-4
+    assert small.certificate.ok and small.certificate.rows[-1].value == small.error
+    assert not replace(small, error=0.1).certificate.ok
     for speed in np.array([0.5, 0.7, 0.96]) * run_up.top:
         assert np.abs(run_up.speeds - speed).min() > 0.01 * run_up.top
         full = run_up.waves(3, speed=speed).omega

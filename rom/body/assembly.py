@@ -1,6 +1,6 @@
 """Reduced bodies coupled where they touch: modes of the whole from its parts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,9 +22,13 @@ from rom.body.condensed import (
 from rom.body.coupling import coupled_rows
 from rom.body.flexible import FlexibleBody, Marker
 from rom.errors import ConfigError
-from rom.model import Array, Modes
+from rom.model import Array, Modes, Report, Row
+from rom.rows import frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
+N_COMPARED = 6  # elastic modes that certificates look at
+GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
+MISSING = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
 
 
 @dataclass(frozen=True)
@@ -117,7 +121,37 @@ class Assembly:
         M, K = basis.T @ M @ basis, basis.T @ K @ basis
         n, n_rigid = W.shape[1], self._n_rigid(fixed)
         omega = natural_modes(M[:n, :n], K[:n, :n], n_rigid)[0]
-        return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid)
+        few = natural_modes(M, K, n_rigid)[0][n_rigid:][:N_COMPARED]
+        table = {"reduced": few.tolist(), "full": self._elastic(few.size, fixed).tolist()}
+        report = Report("certificate of the condensed assembly",
+                        tuple(frequency_rows(f"{n} interface functions", table)))  # fmt: skip
+        return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid, report)
+
+    def _elastic(self, n: int, fixed: tuple[Place, ...]) -> Array:
+        """(n,) lowest circular frequencies that are not those of rigid motions [rad/s]."""
+        n_rigid = self._n_rigid(fixed)
+        return self.modes(n_rigid + n, fixed=fixed).omega[n_rigid:]
+
+    @cached_property
+    def certificate(self) -> Report:
+        """The certificates of the bodies, and whether couplings close in the lowest modes."""
+        rows = [
+            replace(line, quantity=f"{name}: {line.quantity}")
+            for name, body in self.bodies.items()
+            for line in (body.certificate.rows if body.certificate is not None else MISSING)
+        ]
+        return Report("certificate of the assembly", (*rows, *self._gap_row()))
+
+    def _gap_row(self) -> list[Row]:
+        """Largest gap of the coupled coordinates over their motion, in the lowest elastic modes."""
+        if not self.couplings:
+            return []
+        M, K = self._matrices()
+        N, n_rigid = self._free(()), self._n_rigid(())
+        V = N @ natural_modes(N.T @ M @ N, N.T @ K @ N, n_rigid)[1][:, n_rigid:][:, :N_COMPARED]
+        sides = [np.abs(self._placed(term[:1]) @ V).max() for term in self._coupled]
+        gap = np.abs(self._rows(()) @ V).max()
+        return [row("gap of coupled interfaces, over their motion", gap / max(sides), GAP_RTOL)]
 
     def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
         """Per coupling, the interface motions that the modes of its two bodies ask for."""

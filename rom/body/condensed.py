@@ -21,7 +21,7 @@ from scipy.linalg import block_diag, eigh, null_space
 
 from rom.eigen import whole_clusters
 from rom.errors import ConfigError
-from rom.model import Array, Modes
+from rom.model import Array, Modes, Report
 
 RANK = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
 RIGID = 1e-13  # eigenvalue, of the largest one, of a motion without stiffness
@@ -59,6 +59,7 @@ class CondensedAssembly:
         K: (m, m) stiffness.
         widths: {body: number of its coordinates}.
         n_rigid: rigid motions that the supports leave free.
+        certificate: frequencies against the assembly with all its interface coordinates.
     """
 
     level: str
@@ -69,6 +70,7 @@ class CondensedAssembly:
     K: Array
     widths: dict[str, int]
     n_rigid: int
+    certificate: Report
 
     def frequencies(self, n: int | None = None) -> Array:
         """Natural frequencies [Hz], lowest first; None for all."""

@@ -19,6 +19,7 @@ Source:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,11 +27,12 @@ import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
 from rom.cyclic.blades import ReducedBlade
+from rom.cyclic.certificate import wheel_certificate
 from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
 from rom.cyclic.sector import Complex
 from rom.cyclic.substructures import SubstructuredSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Modes
+from rom.model import Array, Modes, Report
 
 RIGID = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
@@ -57,6 +59,12 @@ class BladedWheel:
     rigid: Array
     coriolis: Array | None = None
     centrifugal: Array | None = None
+
+    @cached_property
+    def certificate(self) -> Report:
+        """The wheel of equal blades against the full sector, solved when this is first asked."""
+        nominal = [self.sector.blade] * self.sector.n_sectors
+        return wheel_certificate(self.modes(nominal).frequencies, self.sector.full)
 
     def matrices(
         self, blades: Sequence[ReducedBlade], *, speed: float = 0.0

@@ -19,16 +19,18 @@ Source:
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
+from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Index, Modes
+from rom.model import Array, Index, Modes, Report
 
 STIFFER = 0.1  # relative change of the stiffness of all blades that enriches the basis
 NEW = 1e-12  # squared share of a mode that is new, below which it is round-off
@@ -45,6 +47,8 @@ class MistunedWheel:
         omega: (r,) circular frequencies of the tuned wheel [rad/s].
         shapes: (n, r) complex shapes of sector 0; sector j moves by exp(i n j alpha) times that.
         blade: (r, r) Hermitian, N Phi^H K_blade Phi of one blade [1/s^2].
+        blade_stiffness: (n, n) K_blade in the dofs of the sector [N/m].
+        speed: angular speed of the tuned modes [rad/s].
     """
 
     sector: CyclicSector
@@ -52,6 +56,16 @@ class MistunedWheel:
     omega: Array
     shapes: Complex
     blade: Complex
+    blade_stiffness: Any
+    speed: float = 0.0
+
+    @cached_property
+    def certificate(self) -> Report:
+        """Wheels with all blades a little stiffer, or softer, against the sector.
+
+        The sector is that of the wheel, which may be reduced: then it has a certificate too.
+        """
+        return mistuned_certificate(self)
 
     def stiffness(self, deviations: npt.ArrayLike) -> Complex:
         """(..., r, r) Hermitian stiffness in mass-normalised waves [1/s^2].
@@ -232,7 +246,8 @@ def mistuned_wheel(
     Phi = np.hstack(shapes) / np.sqrt(N)
     numbers = np.array(harmonics, dtype=np.int64)
     B = N * (Phi.conj().T @ (K_blade @ Phi))
-    return MistunedWheel(sector, numbers, np.concatenate(omega), Phi, 0.5 * (B + B.conj().T))
+    tuned = (sector, numbers, np.concatenate(omega), Phi)
+    return MistunedWheel(*tuned, 0.5 * (B + B.conj().T), K_blade, speed)
 
 
 def _tuned(

@@ -1,6 +1,7 @@
 """Component mode synthesis of one sector, good for all nodal diameters at once."""
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,10 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity
 from scipy.spatial import cKDTree
 
+from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, Interface
+from rom.model import Array, Interface, Report
 from rom.reduction.polynomial import DEPENDENT, FourierLegendre, Polynomial, orthonormal_in
 from rom.scipy_operators import SciPyOperators
 
@@ -33,6 +35,11 @@ class ReducedSector(CyclicSector):
     def supported(self) -> bool:
         """True when something of the full sector is held."""
         return self.full.supported
+
+    @cached_property
+    def certificate(self) -> Report:
+        """Frequencies against the full sector, which is solved when this is first asked for."""
+        return sector_certificate(self, self.full)
 
     def expand(self, shapes: Complex) -> Complex:
         """(n_full, m) displacements of the full sector."""

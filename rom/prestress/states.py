@@ -8,6 +8,7 @@ straightens has a pole near s = -omega_1^2, of which tau knows nothing.
 import warnings
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -18,9 +19,10 @@ from rom.cyclic.reduced import ReducedSector, projected, reduce_sector
 from rom.cyclic.sector import CyclicSector
 from rom.cyclic.travelling import TravellingModes, travelling_modes
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.model import Array
+from rom.model import Array, Report
 from rom.prestress.steady import SteadyRotation
 from rom.reduction.polynomial import FourierLegendre, Polynomial
+from rom.rows import row
 
 N_CHECKED = 3  # lowest modes by which a reduction is judged
 MORE = 2  # times as many modes, among which those of the neighbour are looked for
@@ -82,6 +84,17 @@ class ReducedSpinUp(SpeedTable):
 
     sectors: tuple[ReducedSector, ...] = ()
     error: float = np.nan
+
+    @cached_property
+    def certificate(self) -> Report:
+        """The sectors at rest and at the highest speed against the full ones, and the error."""
+        rows = [
+            replace(line, quantity=f"state at {speed:.5g} rad/s, {line.quantity}")
+            for speed, sector in ((self.speeds[0], self.sectors[0]), (self.top, self.sectors[-1]))
+            for line in sector.certificate.rows
+        ]
+        between = row(f"between states: worst error of {N_CHECKED} frequencies", self.error, COARSE)
+        return Report("certificate of the spin-up", (*rows, between))
 
     def at(self, speed: float) -> ReducedSector:
         """The reduced sector at a speed [rad/s], interpolated."""

@@ -1,0 +1,38 @@
+"""Lines of reports: a quantity, its value, its limit, and whether it holds."""
+
+import numpy as np
+
+from rom.model import Row
+
+FREQUENCY_RTOL = 1e-3  # what a structural dynamicist accepts without asking
+BELOW_FULL_RTOL = 1e-8  # round-off by which a reduced frequency may lie below the full one
+MIN_MAC = 0.99
+
+
+def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Row:
+    """A line that holds when the value stays below (or above) its limit; NaN never holds."""
+    value = float(value)
+    ok = value > limit if above else value <= limit
+    return Row(quantity, value, f"{'>' if above else '<='} {limit:g}", bool(ok))
+
+
+def frequency_rows(
+    support: str, table: dict[str, list[float]], limit: float = FREQUENCY_RTOL
+) -> list[Row]:
+    """Errors of frequencies, and of shapes where they are compared, against the full model.
+
+    Args:
+        support: what both models are held by, or which of their modes are compared.
+        table: "reduced" and "full" frequencies, and "mac" of the shapes, which may be empty.
+        limit: relative error of a frequency that is accepted.
+    """
+    error = np.array(table["reduced"]) / np.array(table["full"]) - 1
+    n = error.size
+    rows = [
+        row(f"{support}: worst error of {n} frequencies", np.abs(error).max(), limit),
+        row(f"{support}: reduced never below full", error.min(), -BELOW_FULL_RTOL, above=True),
+    ]
+    if table.get("mac"):
+        said = f"{support}: lowest MAC of {n} shapes"
+        rows.append(row(said, min(table["mac"]), MIN_MAC, above=True))
+    return rows
