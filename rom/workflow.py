@@ -4,7 +4,7 @@ import logging
 import re
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from rom.body.flexible import FlexibleBody, Marker
 from rom.body.prestress import UnitLoads
 from rom.body.projection import elastic_part, flexible_body
 from rom.certificate import certify_body
+from rom.cyclic.reduced import ReducedSector, reduce_sector
+from rom.cyclic.sector import CyclicSector
 from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Modes
@@ -22,11 +24,12 @@ from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
 from rom.reduction.kinds import by_name
-from rom.reduction.method import Method
+from rom.reduction.method import CraigBampton, Method
 from rom.reduction.order import with_orders
 from rom.scipy_operators import SciPyOperators
 
 log = logging.getLogger("rom")
+CYCLIC = "cyclic"  # what the faces are called where sectors of a wheel meet
 
 
 def mesh_operators(model: FEModel) -> Operators:
@@ -119,22 +122,44 @@ def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
     return norms[0] / (scale * norms[1])
 
 
-def reduce(  # noqa: PLR0913  one keyword per choice
+@overload
+def reduce(
     model: FEModel,
     *,
     method: Method | Characteristic,
-    interfaces: dict[str, Any],
+    interfaces: dict[str, Any] | None = None,
     reference: Any = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
     name: str = "body",
     stress: bool = False,
     stiffening: bool = False,
     certify: bool = True,
-) -> FlexibleBody:
+) -> FlexibleBody: ...
+
+
+@overload
+def reduce(
+    model: CyclicSector, *, method: CraigBampton, interfaces: dict[str, Any] | None = None
+) -> ReducedSector: ...
+
+
+def reduce(  # noqa: PLR0913  one keyword per choice
+    model: FEModel | CyclicSector,
+    *,
+    method: Method | Characteristic,
+    interfaces: dict[str, Any] | None = None,
+    reference: Any = "mean-axis",
+    damping: Rayleigh | ModalDamping | None = None,
+    name: str = "body",
+    stress: bool = False,
+    stiffening: bool = False,
+    certify: bool = True,
+) -> FlexibleBody | ReducedSector:
     """A flexible body that stands for the full model, with the evidence for it.
 
     Args:
-        model: the full model, free-free.
+        model: the full model, free-free; or one sector of a wheel, which gives a reduced sector
+            with ``interfaces={"cyclic": Polynomial(4)}`` on its cyclic faces, see `reduce_sector`.
         method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
             `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`.
         interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial`,
@@ -149,15 +174,18 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         certify: compare with the full model; costs one more factorisation per support.
 
     Returns:
-        FlexibleBody; its ``certificate`` tells how far to trust it.
+        FlexibleBody, or ReducedSector; its ``certificate`` tells how far to trust it.
 
     Raises:
         InterfaceError, ConfigError: for a wrong interface, kind, method or reference.
         ModesMissedError: if the inertia count says that a mode was skipped.
     """
+    if isinstance(model, CyclicSector):
+        of_bodies = (reference != "mean-axis", damping is not None, stress, stiffening)
+        return _reduced_sector(model, method, interfaces or {}, any(of_bodies))
     clock = perf_counter()
     bare, ops = mesh_operators(model), operators(model)
-    interfaces, method = with_orders(ops, model, by_name(interfaces), method)
+    interfaces, method = with_orders(ops, model, by_name(interfaces or {}), method)
     connection = connect(ops, model, interfaces)
     say = log.info if ops.first == 0 else log.debug
     say("reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)
@@ -196,6 +224,24 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
+
+
+def _reduced_sector(
+    sector: CyclicSector, method: Any, interfaces: dict[str, Any], of_bodies: bool
+) -> ReducedSector:
+    """One sector of a wheel by the method and the functions on its cyclic faces."""
+    if of_bodies:
+        raise ConfigError(
+            "reference, damping, stress and stiffening belong to bodies in motion; a sector has "
+            "none of them.",
+            hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
+        )
+    if set(interfaces) - {CYCLIC}:
+        raise ConfigError(
+            f"a sector has one interface, {CYCLIC!r}, not {sorted(interfaces)}.",
+            hint=f"Write interfaces={{{CYCLIC!r}: rom.Polynomial(4)}}.",
+        )
+    return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC))
 
 
 def substructure(model: FEModel, *, n_modes: int, interfaces: dict[str, Any]) -> FreeSubstructure:

@@ -57,6 +57,25 @@ def test_reduced_frequencies_fall_to_those_of_the_full_wheel(n):
     assert_allclose(before, exact, rtol=1e-3)
 
 
+def test_a_sector_is_reduced_like_a_body():
+    bar, functions = periodic_bar(held=True), rom.Polynomial(2)
+    exact = rom.reduce_sector(bar, n_modes=8, functions=functions)
+    small = rom.reduce(bar, method=rom.CraigBampton(8), interfaces={"cyclic": functions})
+    assert (small.K != exact.K).nnz == 0 and (small.M != exact.M).nnz == 0
+    default = rom.reduce(bar, method=rom.CraigBampton(8))
+    assert (default.K != rom.reduce_sector(bar, n_modes=8).K).nnz == 0
+    for options, words in (
+        ({"interfaces": {"root": "rbe2"}}, "one interface, 'cyclic', not"),
+        ({"stress": True}, "belong to bodies in motion"),
+        ({"method": rom.CraigBampton(f_max=10.0)}, "a number of fixed-interface modes, not by"),
+        ({"method": rom.Rubin(3)}, "not by Rubin"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            rom.reduce(bar, **({"method": rom.CraigBampton(8)} | options))
+    with pytest.raises(ConfigError, match="give the number of fixed-interface modes"):
+        rom.reduce_sector(bar)
+
+
 def test_a_certificate_tells_good_from_poor_and_wrong():
     bar = periodic_bar(held=True)
     good = rom.reduce_sector(bar, n_modes=24, functions=rom.Polynomial(4))

@@ -13,6 +13,7 @@ from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
+from rom.reduction.method import CraigBampton
 from rom.reduction.polynomial import DEPENDENT, FourierLegendre, Polynomial, orthonormal_in
 from rom.scipy_operators import SciPyOperators
 
@@ -54,8 +55,9 @@ class ReducedSector(CyclicSector):
 def reduce_sector(
     sector: CyclicSector,
     *,
-    n_modes: int,
+    n_modes: int | None = None,
     functions: Polynomial | FourierLegendre | None = None,
+    method: CraigBampton | None = None,
 ) -> ReducedSector:
     """Craig-Bampton reduction of a sector with a-priori functions on its cyclic faces.
 
@@ -66,10 +68,11 @@ def reduce_sector(
 
     Args:
         sector: the full sector, made by `CyclicSector.from_model`.
-        n_modes: number of fixed-interface modes.
+        n_modes: number of fixed-interface modes; or `method`.
         functions: on the cyclic faces; `Polynomial` of order 4 unless given. Where the face is
             held they fall to zero, see `fading`. Order 7 with 60 modes brings the ten lowest
             frequencies of each nodal diameter of a bladed disk within 0.1 %.
+        method: ``CraigBampton(n_modes)`` instead of the number.
 
     Returns:
         ReducedSector; `cyclic_modes` and the other functions take it like any sector.
@@ -82,6 +85,15 @@ def reduce_sector(
         Carassale and Maurici, Interface reduction in Craig-Bampton component mode synthesis by
         orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
     """
+    if method is not None:
+        if n_modes is not None or not _by_number(method):
+            raise ConfigError(
+                f"a sector is reduced by a number of fixed-interface modes, not by {method!r}.",
+                hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
+            )
+        n_modes = method.n_modes
+    if n_modes is None:
+        raise ConfigError("give the number of fixed-interface modes, for example n_modes=60.")
     if sector.face is None:
         raise ConfigError(
             "interface functions need the geometry of the cyclic faces.",
@@ -99,6 +111,10 @@ def reduce_sector(
     omega, Phi = ops.modes(inner, n_modes)
     Psi = np.hstack([E - inner(ops.apply_K(E)), Phi])
     return projected(sector, Psi, q, omega)
+
+
+def _by_number(method: Any) -> bool:
+    return isinstance(method, CraigBampton) and method.n_modes is not None
 
 
 def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> ReducedSector:
