@@ -153,8 +153,8 @@ free = pair.frequencies(7)
 
 options.out.mkdir(parents=True, exist_ok=True)
 view.convergence(
-    options.out / "assembly_errors.png",
     [("error, meshes match", errors), ("error, right seat does not match", projected)],
+    options.out / "assembly_errors.png",
     xlabel="coordinates of both seats (above), moments coupled on the right seat (below)",
     title="A frame from three reduced parts",
     caption="Largest relative error of the ten lowest frequencies of a portal frame with clamped "

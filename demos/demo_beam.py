@@ -75,8 +75,8 @@ if first:
     options.out.mkdir(parents=True, exist_ok=True)
     view.mode_shapes(body, options.out / "beam_modes.png", fixed=("root",))
     view.frequencies(
-        options.out / "beam_frequencies.png",
         body.provenance["comparison"],
+        options.out / "beam_frequencies.png",
         title="Beam, 24 fixed-interface modes",
     )
 

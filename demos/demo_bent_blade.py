@@ -121,7 +121,7 @@ if first:
         points={"solid": (shares * critical, np.square(warm) / cold**2)},
     )  # fmt: skip
     view.panels(
-        options.out / "bent_blade.png", [[campbell], [moved], [heated]],
+        [[campbell], [moved], [heated]], options.out / "bent_blade.png",
         title="A bent blade that rotation straightens, and a bar that heat buckles",
         caption=f"An aluminium strip of {1e3 * L:.0f} x {1e3 * b:.0f} x {1e3 * h:.0f} mm, bent by "
         "60 degrees, turns with its root 100 mm from the axis. Top: its first frequency by the "

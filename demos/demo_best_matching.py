@@ -148,7 +148,6 @@ if first:
     orbits = {"Newton": (x[some, :, 0].ravel(), x[some, :, 1].ravel())}
     options.out.mkdir(parents=True, exist_ok=True)
     view.panels(
-        options.out / "best_matching.png",
         [
             [
                 view.Panel("What a careless camera films", "x", "y",
@@ -173,6 +172,7 @@ if first:
                            {"best matched": (1e3 * t_beam[few], 1e3 * np.array(best)[few])}),
             ],
         ],
+        options.out / "best_matching.png",
         title="Best matching: motion without a frame",
         caption="Top: three bodies attract each other. A camera that shifts and turns at will "
         "films tangles (left). Every picture laid over the one before, so that the mass-weighted "

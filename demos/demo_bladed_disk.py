@@ -111,7 +111,7 @@ if first:
         name = f"{n} nodal diameters, family {k + 1}: {modes.frequencies[k]:.4g} Hz"
         drawn[name] = modes.on_wheel()[:, :, k]
     view.wheel_modes(
-        options.out / "bladed_disk_modes.png", model, drawn, view=(0.5, -0.6, 1.0),
+        model, drawn, options.out / "bladed_disk_modes.png", view=(0.5, -0.6, 1.0),
         title=f"Modes of a bladed disk of {N} sectors",
         caption=f"Waves of a titanium wheel held at its bore, from one sector of "
         f"{sector.free.size} coordinates.",
@@ -138,7 +138,7 @@ if first:
         "frequency [Hz]", curves=line | families, points=hits,
     )  # fmt: skip
     view.panels(
-        options.out / "bladed_disk_diagrams.png", [[campbell], [split], [safe]],
+        [[campbell], [split], [safe]], options.out / "bladed_disk_diagrams.png",
         title=f"A bladed disk of {N} sectors: {full.n_wheel} dofs from {sector.free.size}",
         caption="Top: thin rays are disturbances at rest with 1 to 4 lobes; centrifugal stress "
         "lifts all waves. Middle: Coriolis forces part waves that run with the rotation (forward) "

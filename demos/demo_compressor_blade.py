@@ -120,12 +120,12 @@ def curves(values):
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
     view.convergence(
-        options.out / "compressor_blade.png",
         [
             ("worst frequency error", curves(lambda k: np.abs(seated[k]).max())),
             ("worst 1 - MAC", curves(lambda k: lost[k])),
             ("time to reduce [s]", curves(lambda k: seconds[k])),
         ],
+        options.out / "compressor_blade.png",
         xlabel="interface coordinates of both flanks",
         title="A dovetailed compressor blade: how its interface is reduced",
         caption=f"Titanium blade of {model.n_dofs} dofs whose two dovetail flanks, "

@@ -108,7 +108,6 @@ for name, p in held.items():
 
 drawn = {f"friction {mu:g}": loop(mu) for mu in (0.2, 0.0)}
 view.panels(
-    options.out / "hand.png",
     [
         [Panel("Index finger, tension of the cable", "towards the palm [mm]", "along [mm]",
                curves=closing, equal=True),
@@ -121,6 +120,7 @@ view.panels(
          Panel("Five fingers around a bar of 40 mm", "across the hand [mm]", "along [mm]",
                curves=seen, equal=True)],
     ],
+    options.out / "hand.png",
     title="Fingers whose joints are springs",
     caption="Centre lines; fingers are 10 mm thick. Top: beyond 2.65 N coils touch on the palm "
     "side; friction of the cable opens a loop. Middle: the slack finger is as soft sideways as in "
@@ -139,13 +139,13 @@ effort = [envelope(muscle(steps[:, k], dt, rng), dt) for k in (0, 1)]
 commands = Chart().follow(effort[0][::10], effort[1][::10], 10 * dt)
 pulls = np.repeat(commands.fingers(), 10, axis=0) / MM
 view.history(
-    options.out / "hand_control.png", t,
-    [
+    t, [
         ("effort", {"flexor": effort[0], "extensor": effort[1]}),
         ("selected group,\n0 thumb to 4 all", {"": np.repeat(commands.groups, 10)}),
         ("pull [mm]", dict(zip(("thumb", "index", "middle", "ring", "little"), pulls.T,
                                strict=True))),
     ],
+    options.out / "hand_control.png",
     title="From two muscles to five fingers",
     caption="Top: envelopes of two synthetic muscle signals. Their ratio selects a group, in "
     "sectors of 18 degrees, their strength how far it closes. Middle: a group is kept through rest "

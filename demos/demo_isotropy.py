@@ -98,7 +98,6 @@ lowest = maps["rigid"].min()
 names = {"isotropic, index 1": best, f"worst, index {lowest:.2f}": worst}
 options.out.mkdir(parents=True, exist_ok=True)
 view.plane(
-    options.out / "isotropy.png",
     [
         torus("rigid", "Rigid cranks"),
         torus("bending", "Cranks that bend under sudden torque"),
@@ -107,6 +106,7 @@ view.plane(
         view.Drawing("Accelerations caused by torques of equal size", "left motor", "right motor",
                      curves={f"_{name}": [answer(q)] for name, q in names.items()}),
     ],
+    options.out / "isotropy.png",
     title="Where two motors of a five-bar linkage feel the same inertia",
     caption="Top: isotropy index 2 sqrt(det A) / tr A of the generalised inertia A over the angles "
     "of both cranks; left and right edges belong together, as do top and bottom. White: its curves "

@@ -121,7 +121,7 @@ if first:
         curves["short blade"] = (hz, 1e3 * u[:, 5])
         drawn.append([view.Panel(title, "frequency [Hz]", "amplitude of the tip [mm]", curves)])
     view.panels(
-        options.out / "lost_tip.png", drawn,
+        drawn, options.out / "lost_tip.png",
         title=f"One of {N} blades has lost a fifth of its length",
         caption=f"Titanium wheel of {ops.n} dofs; disk and blades are substructures, "
         f"{omega.size} coordinates in all. 1 N per blade, engine order {ORDER}, {100 * ZETA:g} % "

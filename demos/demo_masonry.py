@@ -87,7 +87,6 @@ level = np.array([[mu, limit.ratio] for mu in frictions[[0, -1]]])
 thrust = np.array([x for x, _ in resting.joints().values()])
 options.out.mkdir(parents=True, exist_ok=True)
 view.plane(
-    options.out / "masonry.png",
     [
         view.Drawing("Thickness 11.5 % of the radius: at rest", "x [m]", "y [m]",
                      polygons=resting.outlines(), curves={"line of thrust": [thrust]}),
@@ -101,6 +100,7 @@ view.plane(
                      curves={"linear programming": [np.column_stack([frictions, needed])],
                              "Milankovitch, 0.10748": [level]}),
     ],
+    options.out / "masonry.png",
     height=400,
     title="Arches and walls of stones that nothing glues",
     caption="Top left: a semicircular arch carries its weight if a line of thrust, through the "

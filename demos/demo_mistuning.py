@@ -131,8 +131,8 @@ if first:
         "standard deviation of the blade stiffness [%]", "amplification factor", curves=level,
     )  # fmt: skip
     view.panels(
-        options.out / "mistuning.png",
         [[one_wheel], [many]],
+        options.out / "mistuning.png",
         title=f"A disk of {N} blades that differ, driven by engine order {ORDER}",
         caption=f"Titanium wheel of {full.n_wheel} dofs, reduced to {sector.free.size} per sector, "
         f"with {100 * ZETA:g} % damping. Top: one wheel whose blades scatter by 0.4 % in "

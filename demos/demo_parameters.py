@@ -81,13 +81,13 @@ if first:
     options.out.mkdir(parents=True, exist_ok=True)
     names = [f"mode {k + 1}" for k in range(n)]
     view.history(
-        options.out / "parameters.png",
         t * 20.0,
         [
             ("frequency [Hz]", dict(zip(names, over_t.T, strict=True))),
             ("of a core of 20 mm", dict(zip(names, (over_t / family.frequencies(
                 n, fixed=clamped)).T, strict=True))),
         ],
+        options.out / "parameters.png",
         over="thickness of the core [mm]",
         title="A clamped sandwich panel, swept over the thickness of its core",
         caption="Natural frequencies of a hundred panels of 400 mm x 100 mm with faces of 2 mm, "

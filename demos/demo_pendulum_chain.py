@@ -120,7 +120,6 @@ if first:
     stone = (aside + 2.0, -G / 2 * shown.t**2)
     line = seconds[-1] * numbers / numbers[-1]
     view.panels(
-        options.out / "pendulum_chain.png",
         [[
             view.Panel(
                 "a folded chain of 41 links", "x [m], pictures side by side", "height [m]",
@@ -132,6 +131,7 @@ if first:
                 points={"measured": (numbers, 1e3 * np.array(seconds))},
             ),
         ]],
+        options.out / "pendulum_chain.png",
         title="Chains of flexible links",
         caption=f"Left: a chain of {total:g} m that hangs from the top and comes back up beside "
         f"itself is let go; pictures from 0 to {sol.t[-1]:.2f} s in equal steps, next to a stone "

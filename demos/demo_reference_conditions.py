@@ -139,7 +139,6 @@ say(f"rigid modes kept beside the frame: singular value ratio {singular:.1e}")
 
 options.out.mkdir(parents=True, exist_ok=True)
 view.convergence(
-    options.out / "reference_conditions.png",
     [
         (
             f"error, {joint}",
@@ -147,6 +146,7 @@ view.convergence(
         )
         for joint in joints
     ],
+    options.out / "reference_conditions.png",
     xlabel="number of shapes beside the rigid motion of the frame",
     title="One resonance from different reference conditions",
     caption="First natural frequency of a uniform beam held by joints, relative error against the "

@@ -173,7 +173,6 @@ energy = sol.energy
 spent = energy.total - energy.total[0] + energy.damping
 options.out.mkdir(parents=True, exist_ok=True)
 view.history(
-    options.out / "robot_arm.png",
     t,
     [
         ("joints [deg]", {"shoulder": np.degrees(sol.base[:, 0] + PICK[0]),
@@ -185,6 +184,7 @@ view.history(
         ("power [W]", {"of the motors": np.gradient(energy.drives, t),
                        "into energy and losses": np.gradient(spent, t)}),
     ],
+    options.out / "robot_arm.png",
     title="Pick and place with a light arm",
     caption=f"Links of {L1:g} m and {L2:g} m, {masses[0]:.1f} kg and {masses[1]:.1f} kg, carry an "
     f"elbow motor of {ELBOW:g} kg and a tool of {TOOL:g} kg through {MOVE:g} s of motion. From top "

@@ -119,7 +119,6 @@ if first:
     bent = {name: (1e3 * i.t, 1e3 * i.z[:, 2]) for name, i in impacts.items()}
     bars = {name: tuple(100 * np.sort(change)) for name, change in ordered}
     view.panels(
-        options.out / "rockfall.png",
         [
             [view.Panel("Three masses, three springs", "", "", sketch(), equal=True),
              forces("three masses", "Forces, three masses"),
@@ -128,6 +127,7 @@ if first:
              view.Panel("Each parameter halved and doubled", "change of the bending force [%]",
                         bars=bars)],
         ],
+        options.out / "rockfall.png",
         title="A boulder falls on a rockfall gallery",
         caption="A tonne of rock falls 15 m onto a sand cushion over a concrete slab, 4.5 m x "
         "3.5 m x 0.25 m, held along two edges; parameters for illustration. The boulder presses "

@@ -103,7 +103,7 @@ orders = view.Panel(
 )  # fmt: skip
 contact = view.Panel("velocity gap of the contact", "t [s]", "log10 of the gap [m/s]", gaps)
 view.panels(
-    options.out / "rolling_wheel.png", [[growth, orders, contact]],
+    [[growth, orders, contact]], options.out / "rolling_wheel.png",
     title="A wheel of 0.3 m that rolls without slip",
     caption="Left: where s is positive the upright wheel falls over; a disc needs 0.99 m/s, a hoop "
     "0.86 m/s. Middle: a disc wobbles at 2 m/s for 0.6 s; its error falls with the order of the "

@@ -134,7 +134,6 @@ if first:
     options.out.mkdir(parents=True, exist_ok=True)
     etas = np.array(list(FLAP), dtype=float)
     view.history(
-        options.out / "rotating_beam.png",
         etas,
         [
             (f"flap {mode + 1}  [units]", {
@@ -146,6 +145,7 @@ if first:
             "reduced solid": np.array([table[eta][1][0][0] for eta in FLAP]),
             "exact beam": (etas, [table[eta][1][1][0] for eta in FLAP]),
         })],
+        options.out / "rotating_beam.png",
         over="speed of rotation [units]",
         title="A rotating cantilever: reduced solid and exact beam",
         caption=f"A clamped bar of {beam_model.n_dofs} dofs, reduced to {beam.n_modes} coordinates "
@@ -156,7 +156,7 @@ if first:
         "does not.",
     )  # fmt: skip
     view.campbell(
-        options.out / "blade_campbell.png", diagram, orders=(1, 2, 3, 4, 6, 8),
+        diagram, options.out / "blade_campbell.png", orders=(1, 2, 3, 4, 6, 8),
         title="Campbell diagram of a compressor blade on its rotor",
         caption=f"Titanium blade of {blade_model.n_dofs} dofs, reduced to {blade.n_modes} "
         "coordinates, its platform at a radius of 250 mm. Frequencies are seen from the blade; "

@@ -116,7 +116,7 @@ if first:
                 for k, name in enumerate(names)},
     )  # fmt: skip
     view.panels(
-        options.out / "rotor_whirl.png", [[upper], [lower]],
+        [[upper], [lower]], options.out / "rotor_whirl.png",
         title="A shaft with two discs on two bearings",
         caption="Rings: Friswell et al., Dynamics of Rotating Machines, example 5.9.1. The thin "
         "line is the speed of rotation; where it meets a whirl, unbalance resonates. Below: discs "
@@ -124,9 +124,9 @@ if first:
     )  # fmt: skip
     still = rom.cyclic_modes(sector, 1, 3)
     view.wheel_modes(
-        options.out / "rotor_modes.png", model,
-        {f"whirl {k + 1} at rest: {f:.4g} Hz": still.on_wheel()[:, :, k]
+        model, {f"whirl {k + 1} at rest: {f:.4g} Hz": still.on_wheel()[:, :, k]
          for k, f in enumerate(still.frequencies)},
+        options.out / "rotor_modes.png",
         view=(1.0, 0.5, 0.4), title="Whirl of the solid rotor",
         caption="Modes with one nodal diameter of a rotor on springs, from one of 24 sectors.",
     )  # fmt: skip

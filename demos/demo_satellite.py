@@ -159,7 +159,6 @@ say(f"tumbling: momentum changes by {p:.1e}, angular momentum by {L_total:.1e}, 
 
 options.out.mkdir(parents=True, exist_ok=True)
 view.history(
-    options.out / "satellite.png",
     t,
     [
         ("attitude [deg]", {"flexible panels": np.degrees(theta), "rigid": np.degrees(rigid)}),
@@ -167,6 +166,7 @@ view.history(
         ("tips against hub [mm]", {k: 1e3 * x for k, x in deflection.items()}),
         ("speed of the wheel [rad/s]", {"": sol.omega("wheel")[:, 1]}),
     ],
+    options.out / "satellite.png",
     title="A satellite turns by sixty degrees and stays there",
     caption=f"Hub of {HUB:g} kg, two panels of {L:g} m and {m:.1f} kg, a wheel that gains and "
     f"loses {TORQUE * SLEW / np.pi:.0f} N m s within {SLEW:g} s. From top to bottom: angle of the "

@@ -105,9 +105,9 @@ options.out.mkdir(parents=True, exist_ok=True)
 X_c, T_c, u, _ = membrane["F3", 8]
 sizes = (2, 4, 8, 16, 32)
 view.deformed(
-    options.out / "sheet.png",
     {name: (sizes, [membrane[e, n][3] for n in sizes]) for e, name in ELEMENTS.items()},
     [view.Shape("Cook's membrane, 8 x 8", X_c + u, T_c, X_c), whole(-1)],
+    options.out / "sheet.png",
     limit=("converged", 23.965),
     xlabel="divisions of each side",
     ylabel="deflection of the tip",
@@ -118,9 +118,9 @@ view.deformed(
     "its section; its foot has flowed to more than twice its radius.",
 )
 view.flow(
-    options.out / "taylor_bar.gif",
     flight.t,
     [whole(k) for k in range(len(flight.t))],
+    options.out / "taylor_bar.gif",
     caption="A copper cylinder hits a rigid wall at 227 m/s; drawn to scale, dashed: before.",
 )
 

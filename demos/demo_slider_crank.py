@@ -194,9 +194,8 @@ rom.export(rod, out / "rod.vtu")
 view.mesh(rod_model, out / "rod_mesh.png", title="Connecting rod", **look)
 view.mesh(crank_model, out / "crank_mesh.png", title="Crank", view=(0.4, 1.0, -0.6), up=(0, 0, 1))
 view.mode_shapes(rod, out / "rod_modes.png", **look)
-view.frequencies(out / "rod_frequencies.png", comparison, title="Reduced against full rod")
+view.frequencies(comparison, out / "rod_frequencies.png", title="Reduced against full rod")
 view.history(
-    out / "motion.png",
     t,
     [
         (
@@ -207,6 +206,7 @@ view.history(
         ("stretch [um]", {"distance of the pins": 1e6 * stretch}),
         ("crank pin force [N]", {"flexible rod": force, "rigid rod": force_rigid}),
     ],
+    out / "motion.png",
     title="Slider-crank with a flexible connecting rod",
     caption=f"Crank radius {1e3 * radius:.0f} mm, distance of the pins {1e3 * length:.0f} mm, "
     f"slider {slider_mass:g} kg. The motor brings the crank to {speed:g} rad/s within the "
@@ -214,12 +214,12 @@ view.history(
     "displaces it, change of the distance of the pins, force in the crank pin.",
 )
 view.history(
-    out / "frames.png",
     sol.t,
     [
         ("pin_b across the rod [um]", {name: 1e6 * u for name, u in across.items()}),
         ("slider, difference [nm]", {name: 1e9 * u for name, u in apart.items()}),
     ],
+    out / "frames.png",
     title="One rod in four floating frames",
     caption="The first three turns. Above: where the far bore is in the axes of the rod, by the "
     "place of the frame: fixed to a bore, through both pins, on the mean axes. Below: "
@@ -242,8 +242,6 @@ frequencies = [
     )
 ]
 report.write_report(
-    out / "report.html",
-    "Slider-crank with a flexible connecting rod",
     {
         "Summary": [
             report.paragraph(
@@ -307,6 +305,8 @@ report.write_report(
             )
         ],
     },
+    out / "report.html",
+    title="Slider-crank with a flexible connecting rod",
 )
 done("report")
 

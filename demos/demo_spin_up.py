@@ -109,7 +109,6 @@ if first:
     runaway[: v_soft.size] = np.where(np.abs(v_soft) < 1.0, v_soft, np.nan)
     omega = sol.omega("bar")[:, 2]
     view.history(
-        options.out / "spin_up.png",
         sol.t,
         [
             ("deflection of the tip [m]", {
@@ -121,6 +120,7 @@ if first:
                 "base": omega, "frequency of the bar at rest": 0 * omega + 2 * np.pi * f_rest,
             }),
         ],
+        options.out / "spin_up.png",
         title="Spin-up of a flexible bar: 10 m, from rest to 6 rad/s",
         caption="The base accelerates and the tip lags behind; after 15 s the bar turns steadily. "
         "Points: spectral solution of a geometrically exact beam. Without geometric stiffness the "

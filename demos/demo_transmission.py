@@ -159,13 +159,13 @@ loci = {"_clearance": (np.cos(turn), np.sin(turn))} | {k: v.T for k, v in paths.
 theta = np.arange(-60, 60) * 3.0
 around = {name: (theta, np.roll(f.pressure[:, 6], 60) / 1e6) for name, f in inlets.items()}
 view.panels(
-    options.out / "transmission.png",
     [[view.Panel("Journal centres, 25 to 500 N m", "x / clearance", "y / clearance",
                  loci, points={"loads": np.vstack(list(paths.values())).T}, equal=True),
       view.Panel("Pressure around the bush", "angle from the load [degrees]", "pressure [MPa]",
                  around)],
      [view.Panel("Transmission error, spur gears, 300 N m", "speed of the pinion [rpm]",
                  "root mean square [micrometres]", curves)]],
+    options.out / "transmission.png",
     title="Geared shafts on oil films",
     caption="A pinion of 26 teeth drives a gear of 157; both shafts turn in plain bearings with 50 "
     "and 80 micrometres of clearance, ISO VG 46 at 60 degrees Celsius. Top left: where the "
@@ -182,7 +182,7 @@ drawings = [
     for name, (p, values) in fields.items()
 ]  # fmt: skip
 view.plane(
-    options.out / "transmission_fields.png", drawings, title="Load on the teeth",
+    drawings, options.out / "transmission_fields.png", title="Load on the teeth",
     caption="Force per length of contact line on the base plane of helical gears, 12.5 degrees, at "
     "500 N m on the pinion, swept through a mesh period. Left: shafts and films tilt, and one end "
     "of the face carries more. Right: crowning takes the load off both ends.",

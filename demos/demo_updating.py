@@ -102,7 +102,6 @@ names = [*(f"{name} stiffness" for name in stiffness), *masses]
 lines = np.vstack([bed.beams, [[bed.node(a), bed.node(b)] for a, b in LINKS]])
 options.out.mkdir(parents=True, exist_ok=True)
 view.updating(
-    options.out / "updating.png",
     f,
     {
         f"test, {100 * options.noise:g} % noise": test.H[:, 2, 0],
@@ -110,6 +109,7 @@ view.updating(
         "model updated": after[:, 2, 0],
     },
     {n: x for n, *x in zip(names, true, best.p, best.deviation, strict=False)},
+    options.out / "updating.png",
     structure=(bed.points, lines, *(np.array([sensors[k][0] for k in which], dtype=float)
                for which in (range(len(sensors)), inputs))),
     label="displacement per force [m/N]",

@@ -73,8 +73,7 @@ top = motion.position(top) - plant.mechanism.part(top).at
 tips = [plant.tip(motion, k) for k in range(3)]
 labels = ("first blade", "second blade", "third blade")
 view.history(
-    options.out / "whole_turbine.png", t,
-    [
+    t, [
         ("speed [1/min]", {"rotor": rotor, "generator / 97": fast}),
         ("tip behind the root,\nin the plane [m]",
          {name: tip[:, 1] for name, tip in zip(labels, tips, strict=True)}),
@@ -82,6 +81,7 @@ view.history(
          {name: tip[:, 0] for name, tip in zip(labels, tips, strict=True)}),
         ("top of the tower [m]", {"downwind": top[:, 0], "sideways": top[:, 1]}),
     ],
+    options.out / "whole_turbine.png",
     title="A wind turbine is brought to its speed by a torque",
     caption="Tower and blades are rods, nacelle, hub and generator rigid. A torque that is limited "
     "and vanishes at 12.1 turns a minute starts the rotor from rest. Blades lag behind while they "

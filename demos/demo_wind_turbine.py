@@ -44,7 +44,7 @@ for speed in speeds:
 table = np.array(table)
 diagram = Campbell(speeds, 2j * np.pi * table[:, :3], np.ones((len(speeds) - 1, 3)))
 view.campbell(
-    options.out / "wind_turbine_campbell.png", diagram, orders=(1, 3, 6), names=names,
+    diagram, options.out / "wind_turbine_campbell.png", orders=(1, 3, 6), names=names,
     title="Campbell diagram of a blade of the NREL 5 MW turbine",
     caption="Natural frequencies of one blade on a rigid hub, Coriolis and centrifugal forces "
     "included. The latter stiffen the blade, most where it flaps; rings mark where a mode meets "
@@ -72,8 +72,7 @@ t = runs[0].t
 total = sum(run.torque for run in runs)
 labels = ("first blade", "second blade", "third blade")
 view.history(
-    options.out / "wind_turbine.png", t,
-    [
+    t, [
         ("speed [1/min]", {"": runs[0].speed * 30 / np.pi}),
         ("tip behind the root,\nin the plane [m]",
          {name: run.tip[:, 1] for name, run in zip(labels, runs, strict=True)}),
@@ -81,6 +80,7 @@ view.history(
          {name: run.tip[:, 0] for name, run in zip(labels, runs, strict=True)}),
         ("torque [MN m]", {"first blade": runs[0].torque / 1e6, "all three": total / 1e6}),
     ],
+    options.out / "wind_turbine.png",
     title="Run-up of a rotor of three flexible blades",
     caption="The hub is driven from rest to 12.1 turns a minute in 20 s, axis horizontal; gravity "
     "acts, no wind blows. Second panel: blades lag while they gain speed, and their weight bends "
@@ -114,10 +114,10 @@ side = {name: (x[-4:, 2] - HUB_RADIUS, x[-4:, 0]) for name, x in bent.items()}
 whole = {"rod": (bent["rod"][:, 2] - HUB_RADIUS, bent["rod"][:, 0]),
          "_straight": (rod.x[:, 2] - HUB_RADIUS, rod.x[:, 0])}  # fmt: skip
 view.panels(
-    options.out / "wind_turbine_shapes.png",
     [rows[:2], rows[2:],
      [Panel("Blade under 267 kN", "along it [m]", "downwind [m]", curves=whole, equal=True),
       Panel("Its last four metres", "along it [m]", "downwind [m]", curves=side, equal=True)]],
+    options.out / "wind_turbine_shapes.png",
     title="Shapes of the blades",
     caption=f"Above: the rotor seen from upwind at four instants of the run-up, deflections drawn "
     f"{LARGER} times larger; grey lines are blades that do not bend. Below: a blade under a static "

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Report
@@ -92,13 +93,14 @@ def picture(path: str | Path, caption: str) -> str:
     )
 
 
-def write_report(path: str | Path, title: str, sections: dict[str, Sequence[str]]) -> Path:
+@path_came_first(2, 0, 1)
+def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: str) -> Path:
     """Write a report.
 
     Args:
+        sections: {heading: blocks} with blocks of the functions above.
         path: file to write, .html.
         title: heading.
-        sections: {heading: blocks} with blocks of the functions above.
 
     Returns:
         The path.

@@ -65,7 +65,7 @@ def crank(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT / "tests"))
         return rom.write_fmu(
-            folder / "slider crank.fmu", script, inputs=["gas"], outputs=["slider.b", "main"],
+            script, folder / "slider crank.fmu", inputs=["gas"], outputs=["slider.b", "main"],
             dt=1e-3,
         )  # fmt: skip
 
@@ -236,7 +236,7 @@ def hanging(tmp_path_factory):
     script.write_text(FLEXIBLE)
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("PYTHONPATH", raising=False)
-        return rom.write_fmu(folder / "hanging.fmu", script, inputs=["pull"], outputs=["one.b"],
+        return rom.write_fmu(script, folder / "hanging.fmu", inputs=["pull"], outputs=["one.b"],
                              dt=1e-2, files=[body])  # fmt: skip
 
 
@@ -362,7 +362,7 @@ def test_a_mechanism_that_cannot_start_says_why(tmp_path):
 
 def written(tmp_path, script, **options):
     (tmp_path / "m.py").write_text(script)
-    return rom.write_fmu(tmp_path / "m.fmu", tmp_path / "m.py", **{"dt": 1e-3, **options})
+    return rom.write_fmu(tmp_path / "m.py", tmp_path / "m.fmu", **{"dt": 1e-3, **options})
 
 
 @pytest.mark.parametrize(
@@ -397,7 +397,7 @@ def test_unknown_names_are_refused(inputs, outputs, message):
 
 def test_an_fmu_ends_in_fmu_and_needs_a_compiler(tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match=r"does not end in \.fmu"):
-        rom.write_fmu(tmp_path / "m.zip", "m.py", dt=1.0)
+        rom.write_fmu("m.py", tmp_path / "m.zip", dt=1.0)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ConfigError, match="needs a C compiler"):
         written(tmp_path, CRANK)

@@ -24,8 +24,8 @@ ANYTHING = {
     "doctor",
     "peers",
 }  # they stand in front
-# what every part stands on: checks of arguments and names, child processes, signals
-GROUND = {"arguments", "child", "interruption", "names"}
+# what every part stands on: checks of arguments and names, child processes, signals, old orders
+GROUND = {"arguments", "child", "deprecated", "interruption", "names"}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"errors", "interruption", "model", "rotation"} for part in GROUND},
     "errors": set(),

@@ -44,8 +44,6 @@ def test_the_report_needs_no_other_file(tmp_path):
     (tmp_path / "a.png").write_bytes(PNG)
     checks = Report("x", (Row("mass", 1.25, "<= 2", True), Row("gap & co", 3.0, "<= 2", False)))
     path = report.write_report(
-        tmp_path / "r.html",
-        "Beam <1 m>",
         {
             "One": [report.paragraph("a < b"), report.picture(tmp_path / "a.png", "It's small")],
             "Two": [
@@ -53,6 +51,8 @@ def test_the_report_needs_no_other_file(tmp_path):
                 report.checks(checks, "Checks"),
             ],
         },
+        tmp_path / "r.html",
+        title="Beam <1 m>",
     )
     reader = read(path)
     assert [base64.b64decode(link.split(",")[1]) for link in reader.links] == [PNG]
@@ -62,9 +62,9 @@ def test_the_report_needs_no_other_file(tmp_path):
 
 def test_a_report_that_cannot_be_written_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"\.html"):
-        report.write_report(tmp_path / "r.txt", "", {})
+        report.write_report({}, tmp_path / "r.txt", title="")
     with pytest.raises(ConfigError, match="does not exist"):
-        report.write_report(tmp_path / "no" / "r.html", "", {})
+        report.write_report({}, tmp_path / "no" / "r.html", title="")
     with pytest.raises(ConfigError, match="no picture"):
         report.picture(tmp_path / "missing.png", "")
     with pytest.raises(ConfigError, match="a row of 1 cells under a header of 2"):

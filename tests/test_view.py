@@ -81,13 +81,13 @@ def test_an_update_is_drawn_with_its_changes(tmp_path):
         "label": "displacement per force [m/N]", "title": "update", "caption": "words",
     }  # fmt: skip
     curves = {"test": 1 / (30 - f**2 + 0.1j), "before": 1 / (20 - f**2 + 0.1j)}
-    image = pixels(view.updating(tmp_path / "u.png", f, curves, **more))
+    image = pixels(view.updating(f, curves, path=tmp_path / "u.png", **more))
     assert colourful(image).sum() > 1000
     bars = (image == (213, 218, 225)).all(axis=2).sum(axis=1)
     middle = int(np.flatnonzero(bars > 60).mean())
     assert bars[:middle].max() == pytest.approx(4 * bars[middle:].max(), rel=0.03)
     with pytest.raises(ConfigError, match="7 values for 50"):
-        view.updating(tmp_path / "u.png", f, {"test": f[:7]}, **more)
+        view.updating(f, {"test": f[:7]}, path=tmp_path / "u.png", **more)
 
 
 def squeezed(amount):
@@ -101,23 +101,23 @@ def squeezed(amount):
 def test_a_plane_body_is_drawn_beside_its_curves(tmp_path):
     more = {"limit": ("exact", 1.0), "xlabel": "size", "ylabel": "answer", "title": "t"}
     curves = {"coarse": ([1, 2, 4], [0.2, 0.7, 0.9])}
-    path = view.deformed(tmp_path / "s.png", curves, [squeezed(0.5)], caption="words", **more)
+    path = view.deformed(curves, [squeezed(0.5)], tmp_path / "s.png", caption="words", **more)
     image = pixels(path)
     yellow = (image[..., 0] > 240) & (image[..., 1] > 220) & (image[..., 2] < 60)
     rows, columns = np.nonzero(yellow[:550])
     assert np.ptp(rows) == pytest.approx(3 * np.ptp(columns), rel=0.05)  # 1.5 high, 0.5 wide
     with pytest.raises(ConfigError, match="4 shapes"):
-        view.deformed(tmp_path / "s.png", curves, [squeezed(0.1)] * 4, caption="", **more)
+        view.deformed(curves, [squeezed(0.1)] * 4, tmp_path / "s.png", caption="", **more)
 
 
 def test_a_film_of_a_plane_body_keeps_its_frame_and_colours(tmp_path):
     shapes = [squeezed(a) for a in (0.0, 0.25, 0.5)]
-    path = view.flow(tmp_path / "s.gif", np.array([0.0, 1e-6, 2e-6]), shapes, caption="words")
+    path = view.flow(np.array([0.0, 1e-6, 2e-6]), shapes, tmp_path / "s.gif", caption="words")
     sizes = [int(colourful(pixels(path, frame)[:740]).sum()) for frame in range(3)]
     assert sizes[0] > sizes[1] > sizes[2]  # the area is 1 - amount^2
     assert sizes[2] == pytest.approx(0.75 * sizes[0], rel=0.1)
     with pytest.raises(ConfigError, match="2 times for 3"):
-        view.flow(tmp_path / "s.gif", np.zeros(2), shapes, caption="")
+        view.flow(np.zeros(2), shapes, tmp_path / "s.gif", caption="")
 
 
 def test_the_camera_sees_everything():
@@ -211,7 +211,7 @@ def test_histories_show_every_curve(tmp_path):
     t = np.linspace(0, 2, 50)
     panels = [("angle [rad]", {"one": np.sin(t), "two": np.cos(t)}), ("force [N]", {"": t})]
     panels[0][1]["points"] = ([0.5, 1.5], [0.5, -0.5])
-    view.history(tmp_path / "h.png", t, panels, title="Title", caption="Words.")
+    view.history(t, panels, tmp_path / "h.png", title="Title", caption="Words.")
     image = pixels(tmp_path / "h.png")
     for colour, least in (((0x2F, 0x7F, 0x9F), 300), ((0xD1, 0x49, 0x5B), 300),
                           ((0xED, 0xAE, 0x49), 60)):  # fmt: skip
@@ -220,7 +220,7 @@ def test_histories_show_every_curve(tmp_path):
 
 def test_errors_of_frequencies_are_drawn_per_support(tmp_path):
     table = {"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}
-    view.frequencies(tmp_path / "f.png", table, title="Title")
+    view.frequencies(table, tmp_path / "f.png", title="Title")
     assert (np.abs(pixels(tmp_path / "f.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12).sum() > 100
 
 
@@ -239,7 +239,7 @@ def test_wrong_requests_are_refused(bar, tmp_path):
     with pytest.raises(ConfigError, match="no two directions"):
         view.mode_shapes(bar, tmp_path / "modes.png", view=(0, 0, 1), up=(0, 0, 2))
     with pytest.raises(ConfigError, match="'one' has 3 values for 2 times"):
-        view.history(tmp_path / "h.png", [0, 1], [("x", {"one": [1, 2, 3]})], title="", caption="")
+        view.history([0, 1], [("x", {"one": [1, 2, 3]})], tmp_path / "h.png", title="", caption="")
     assert not list(tmp_path.iterdir())
 
 
@@ -287,12 +287,12 @@ def test_values_within_two_decades_have_ticks_at_one_two_five():
 def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
     curves = {"one": ([1, 2, 4], [1e-1, 1e-2, 0.0]), "two": ([1, 2, 4], [1e-2, 1e-3, 1e-4])}
     look = {"xlabel": "modes", "title": "Title", "caption": "Words."}
-    view.convergence(tmp_path / "c.png", [("error", curves)] * 2, **look)
+    view.convergence([("error", curves)] * 2, tmp_path / "c.png", **look)
     image = pixels(tmp_path / "c.png")
     for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):
         assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
     with pytest.raises(ConfigError, match="'x' has 1 errors for 2 sizes"):
-        view.convergence(tmp_path / "d.png", [("error", {"x": ([1, 2], [1.0])})], **look)
+        view.convergence([("error", {"x": ([1, 2], [1.0])})], tmp_path / "d.png", **look)
 
 
 def test_a_panel_may_have_logarithmic_scales():
@@ -313,7 +313,7 @@ def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
     x = np.linspace(0, 1, 9)
     path = view.Panel("Path", "x [m]", "y [m]", {"one": (x, x)}, {"seen": (x, 1 - x)}, equal=True)
     bars = view.Panel("Bars", "change [%]", bars={"first": (-2.0, 3.0), "second": (-1.0, 1.0)})
-    view.panels(tmp_path / "p.png", [[path, bars], [path]], title="Title", caption="Words.")
+    view.panels([[path, bars], [path]], tmp_path / "p.png", title="Title", caption="Words.")
     blue = np.abs(pixels(tmp_path / "p.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12
     middle = blue.shape[0] // 2
     assert blue[middle:].sum() > 300
@@ -322,7 +322,7 @@ def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
     assert rows.max() > 1.5 * rows[rows > 50].min()  # the first bar is 2.5 times as long
     wrong = view.Panel("", "", curves={"one": ([1, 2], [1])})
     with pytest.raises(ConfigError, match="'one' has 1 values for 2 places"):
-        view.panels(tmp_path / "q.png", [[wrong]], title="", caption="")
+        view.panels([[wrong]], tmp_path / "q.png", title="", caption="")
 
 
 def test_a_plane_shows_values_outlines_and_the_first_index_along_x(tmp_path):
@@ -333,14 +333,14 @@ def test_a_plane_shows_values_outlines_and_the_first_index_along_x(tmp_path):
         view.Drawing("map", "x [m]", "y [m]", (0.0, 4.0, 0.0, 3.0), shade, "height [m]"),
         view.Drawing("stone", "x [m]", "y [m]", polygons=[square], curves={"line": [square]}),
     ]
-    path = view.plane(tmp_path / "plane.png", drawings, title="T", caption="C " * 20)
+    path = view.plane(drawings, tmp_path / "plane.png", title="T", caption="C " * 20)
     image = pixels(path)
     row = image[110 + 240, 120:560]
     hue = row[colourful(row[None])[0]].sum(axis=1)
     assert hue.size > 300 and hue[-20:].mean() > 2 * hue[:20].mean()
     assert (image[:, 700:] == (0xD9, 0xD2, 0xC3)).all(axis=2).sum() > 20000
     with pytest.raises(ConfigError, match="nothing to draw"):
-        view.plane(tmp_path / "plane.png", [], title="T", caption="C")
+        view.plane([], tmp_path / "plane.png", title="T", caption="C")
 
 
 def test_a_campbell_diagram_shows_modes_multiples_and_where_they_meet(tmp_path):
@@ -348,13 +348,13 @@ def test_a_campbell_diagram_shows_modes_multiples_and_where_they_meet(tmp_path):
     modes = np.array([-2.0 + 60j + 0.1j * speeds, -1.0 + 90j - 0.1j * speeds]).T
     diagram = Campbell(speeds, modes, np.ones((10, 2)))
     words = {"title": "Rotor", "caption": "Two modes."}
-    file = view.campbell(tmp_path / "c.png", diagram, orders=(1, 2), names=("up", "down"), **words)
+    file = view.campbell(diagram, tmp_path / "c.png", orders=(1, 2), names=("up", "down"), **words)
     image = pixels(file)
     for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):  # in both panels
         rows = np.flatnonzero((np.abs(image - colour).max(axis=2) < 8).any(axis=1))
         assert np.ptp(rows) > 330
     undamped = Campbell(speeds, 1j * modes.imag, np.ones((10, 2)))
-    alone = pixels(view.campbell(tmp_path / "alone.png", undamped, **words))
+    alone = pixels(view.campbell(undamped, tmp_path / "alone.png", **words))
     assert alone.shape[0] < image.shape[0] - 300
     with pytest.raises(ConfigError, match="1 names for 2 modes"):
-        view.campbell(tmp_path / "c.png", diagram, names=("up",), **words)
+        view.campbell(diagram, tmp_path / "c.png", names=("up",), **words)

@@ -22,9 +22,9 @@ def test_a_wheel_is_drawn_from_one_sector(tmp_path):
     assert len(triangles) == len(model.surface.triangles) - 2 * 8
     rng = np.random.default_rng(0)
     shapes = {f"mode {k}": rng.normal(size=(6, model.n_dofs)) for k in (1, 2)}
-    one = view.wheel_modes(tmp_path / "one.png", model, shapes, **WORDS)
+    one = view.wheel_modes(model, shapes, tmp_path / "one.png", **WORDS)
     shapes["mode 2"] = shapes["mode 1"]
-    two = view.wheel_modes(tmp_path / "two.png", model, shapes, **WORDS)
+    two = view.wheel_modes(model, shapes, tmp_path / "two.png", **WORDS)
     assert one.read_bytes() != two.read_bytes()
     first, joined = _joined(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1e-9]]), np.array([[0, 1, 2]]))
     assert sorted(first) == [0, 1]
@@ -34,6 +34,6 @@ def test_a_wheel_is_drawn_from_one_sector(tmp_path):
 def test_what_cannot_be_drawn_is_named(tmp_path):
     model = block()
     with pytest.raises(ConfigError, match="no mode of the wheel"):
-        view.wheel_modes(tmp_path / "w.png", model, {}, **WORDS)
+        view.wheel_modes(model, {}, tmp_path / "w.png", **WORDS)
     with pytest.raises(ConfigError, match=f"needs {model.n_dofs} numbers per sector"):
-        view.wheel_modes(tmp_path / "w.png", model, {"one": np.zeros((6, 5))}, **WORDS)
+        view.wheel_modes(model, {"one": np.zeros((6, 5))}, tmp_path / "w.png", **WORDS)

@@ -44,4 +44,4 @@ def run(args: argparse.Namespace) -> Answer:
         "sections": list(sections),
     }
     text = f"{args.output}: {title}"
-    return Answer(data, text, lambda: write_report(args.output, title, sections))
+    return Answer(data, text, lambda: write_report(sections, args.output, title=title))

@@ -125,7 +125,7 @@ def _frequency_blocks(body: "FlexibleBody") -> list[str]:
     def draw(path: Path) -> None:
         from rom.view.curves import frequencies
 
-        frequencies(path, comparison, title=f"Reduced against full {body.name}")
+        frequencies(comparison, path, title=f"Reduced against full {body.name}")
 
     return [report.table(header, rows_, caption), *drawn(draw, "Errors of the frequencies.")]
 
@@ -281,7 +281,7 @@ def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
         from rom.view.curves import history
 
         words = f"Energies of {record['name']}: motion, deformation, height, and their sum."
-        history(target, numbers[:, 0], [("energy [J]", curves)], title="Energy", caption=words)
+        history(numbers[:, 0], [("energy [J]", curves)], target, title="Energy", caption=words)
 
     header = ("energy", "start", "lowest", "highest", "end")
     return [*drawn(draw, "Energies over time."), report.table(header, rows, "Energies.")]

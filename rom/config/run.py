@@ -147,7 +147,7 @@ class Run:
             f"Histories of {self.file.name} over {self.solution.t[-1]:g} s, one panel for each "
             "unit; names as in the table of the motion."
         )
-        history(path, self.solution.t, told, title=title, caption=caption)
+        history(self.solution.t, told, path, title=title, caption=caption)
 
 
 def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.fmu.server import SETTINGS
 from rom.io.files import check_writable
@@ -20,9 +21,10 @@ FOLDER = "model"  # of the Python file, below the resources
 LONGEST = 600  # seconds to build the mechanism, its compilation included
 
 
+@path_came_first(1, 0, suffix=".fmu")
 def write_fmu(
-    path: str | Path,
     script: str | Path,
+    path: str | Path,
     *,
     inputs: tuple[str, ...] | list[str] = (),
     outputs: tuple[str, ...] | list[str] = (),
@@ -46,8 +48,8 @@ def write_fmu(
     ``dt`` and ``rho_inf``.
 
     Args:
-        path: file ending in ``.fmu``.
         script: Python file with the function ``mechanism``.
+        path: file ending in ``.fmu``.
         inputs: names of loads, spread loads, motors or drives.
         outputs: "body.marker", names of joints or drives.
         dt: longest time step [s]; a communication step is divided into equal ones.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view import page
 
@@ -19,10 +20,11 @@ FEW = 10  # sizes that have room for a tick each
 EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
+@path_came_first(1, 2, 0)
 def history(
-    path: str | Path,
     t: npt.ArrayLike,
     panels: Sequence[tuple[str, dict[str, Any]]],
+    path: str | Path,
     *,
     title: str,
     caption: str,
@@ -31,10 +33,10 @@ def history(
     """Draw quantities over time, or over something else, one panel below the other.
 
     Args:
-        path: picture to write, .png.
         t: (n,) time [s], or values of what is named by ``over``.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
             (times, values) is drawn as points.
+        path: picture to write, .png.
         title: heading.
         caption: what a stranger has to know.
         over: label of the horizontal axis, with its unit, when that is not time.
@@ -67,12 +69,13 @@ def history(
         return page.save(figure, path)
 
 
-def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> Path:
+@path_came_first(1, 0)
+def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> Path:
     """Draw the relative errors of reduced frequencies in several supports.
 
     Args:
-        path: picture to write, .png.
         comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
+        path: picture to write, .png.
         title: heading.
 
     Raises:
@@ -106,9 +109,10 @@ def frequencies(path: str | Path, comparison: dict[str, Any], *, title: str) -> 
         return page.save(figure, path)
 
 
+@path_came_first(1, 0)
 def convergence(
-    path: str | Path,
     panels: Sequence[tuple[str, dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]]],
+    path: str | Path,
     *,
     xlabel: str,
     title: str,
@@ -117,9 +121,9 @@ def convergence(
     """Draw errors that fall with the size of a model, on logarithmic axes.
 
     Args:
-        path: picture to write, .png.
         panels: (label of the axis, {name: (sizes (n,), errors (n,))}) from top to bottom; errors
             at or below round-off are drawn at 1e-12.
+        path: picture to write, .png.
         xlabel: what the sizes count.
         title: heading.
         caption: what a stranger has to know.
@@ -147,9 +151,10 @@ def convergence(
         return page.save(figure, path)
 
 
+@path_came_first(1, 0)
 def campbell(
-    path: str | Path,
     diagram: Any,
+    path: str | Path,
     *,
     orders: Sequence[float] = (1.0,),
     names: Sequence[str] = (),
@@ -162,8 +167,8 @@ def campbell(
     unless there is none.
 
     Args:
-        path: picture to write, .png.
         diagram: what `rom.campbell` returned.
+        path: picture to write, .png.
         orders: multiples of the speed to draw.
         names: one per mode, in the order of the columns; without names modes are numbered.
         title: heading.

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view import page
 from rom.view.curves import LINES, WIDTH, finish
@@ -42,12 +43,13 @@ class Panel:
     log: bool = False
 
 
-def panels(path: str | Path, rows: Sequence[Sequence[Panel]], *, title: str, caption: str) -> Path:
+@path_came_first(1, 0)
+def panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str, caption: str) -> Path:
     """Draw rows of diagrams.
 
     Args:
-        path: picture to write, .png.
         rows: diagrams from top to bottom, and from left to right in each row.
+        path: picture to write, .png.
         title: heading.
         caption: what a stranger has to know.
 

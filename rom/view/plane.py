@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view import page
@@ -43,10 +44,11 @@ class Shape:
     width: int = 380
 
 
+@path_came_first(1, 2, 0)
 def deformed(  # noqa: PLR0913  keywords of one picture
-    path: str | Path,
     curves: dict[str, tuple[npt.ArrayLike, npt.ArrayLike]],
     shapes: Sequence[Shape],
+    path: str | Path,
     *,
     limit: tuple[str, float],
     xlabel: str,
@@ -57,9 +59,9 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     """Draw curves that tend to a limit beside the bodies they belong to.
 
     Args:
-        path: picture to write, .png.
         curves: {name: (x (n,), y (n,))}, x on a logarithmic axis.
         shapes: bodies, from left to right.
+        path: picture to write, .png.
         limit: name and value of a horizontal line.
         xlabel: of the curves.
         ylabel: of the curves.
@@ -100,10 +102,11 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
+@path_came_first(1, 2, 0)
 def flow(
-    path: str | Path,
     times: Array,
     shapes: Sequence[Shape],
+    path: str | Path,
     *,
     seconds: float = 4.0,
     caption: str,
@@ -111,9 +114,9 @@ def flow(
     """Film of one body; colours and frame stay the same from first to last.
 
     Args:
-        path: film to write, .gif.
         times: (k,) of the shapes [s].
         shapes: (k) states of the body, with values.
+        path: film to write, .gif.
         seconds: how long the film lasts.
         caption: what a stranger has to know.
 

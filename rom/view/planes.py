@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view import page
@@ -52,9 +53,10 @@ class Drawing:
     equal: bool = True
 
 
+@path_came_first(1, 0)
 def plane(
-    path: str | Path,
     drawings: Sequence[Drawing],
+    path: str | Path,
     *,
     title: str,
     caption: str,
@@ -64,8 +66,8 @@ def plane(
     """Draw things in a plane, side by side.
 
     Args:
-        path: picture to write, .png.
         drawings: row by row, from the top left.
+        path: picture to write, .png.
         title: heading.
         caption: what a stranger has to know.
         columns: drawings in a row.

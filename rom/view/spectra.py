@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view import page
@@ -17,11 +18,12 @@ WIDTH, TOP, BOTTOM = 1500, 430, 430  # pixel
 DOTS, FAINT = "#8b929c", "#6b7480"
 
 
+@path_came_first(1, 2, 3, 0)
 def updating(  # noqa: PLR0913  keywords of one picture
-    path: str | Path,
     f: npt.ArrayLike,
     curves: dict[str, npt.ArrayLike],
     changes: dict[str, tuple[float, float, float]],
+    path: str | Path,
     *,
     structure: tuple[Array, Index, Array, Array],
     label: str,
@@ -31,10 +33,10 @@ def updating(  # noqa: PLR0913  keywords of one picture
     """Draw one response of test and model above the changes that explain it.
 
     Args:
-        path: picture to write, .png.
         f: (n,) frequencies [Hz].
         curves: {name: (n,) complex receptance [m/N]}: test, model before, model after.
         changes: {parameter: (true, found, standard deviation)} as fractions.
+        path: picture to write, .png.
         structure: points (n, 3) [m], beams (m, 2), sensor and exciter positions (k, 3), (l, 3).
         label: what the response is, with its unit.
         title: heading.

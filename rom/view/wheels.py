@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, SurfaceMesh
 from rom.view import page
@@ -16,10 +17,11 @@ from rom.view.shapes import drawn, sheet
 SAME = 1e-6  # of the size of the wheel: nodes of neighbours that close are one
 
 
+@path_came_first(1, 2, 0)
 def wheel_modes(  # noqa: PLR0913  keywords of one picture
-    path: str | Path,
     model: FEModel,
     shapes: Mapping[str, npt.ArrayLike],
+    path: str | Path,
     *,
     title: str,
     caption: str,
@@ -30,9 +32,9 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     """Draw modes of a wheel on its deformed surface.
 
     Args:
-        path: picture to write, .png.
         model: one sector, with its surface.
         shapes: {name: (N, 3 k) displacements of the k nodes of each sector, axes of the wheel}.
+        path: picture to write, .png.
         title: heading.
         caption: what a stranger has to know.
         hidden: interfaces inside the wheel, not drawn.
