@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from rom.errors import MaterialError
 from rom.notebook import shown
+from rom.plausible import FOAM_SPEED, SOLID_DENSITY, STIFF_DENSITY, WAVE_SPEED, warn
+from rom.units import SYSTEMS, UnitSystem, unit_system
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -29,6 +31,9 @@ class Material:
 
     Raises:
         MaterialError: for E <= 0, rho <= 0, nu outside (-1, 0.5), or a number that is not finite.
+
+    Warns:
+        RomWarning: if sound would travel in it as in no solid: wrong units.
     """
 
     E: float
@@ -45,6 +50,25 @@ class Material:
                 f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative.",
                 hint="Metals have 0.27 to 0.35.",
             )
+        warn(self.doubt)
+
+    @classmethod
+    def from_units(cls, units: str, *, E: float, nu: float, rho: float) -> "Material":
+        """The solid with numbers in another unit system, e.g. "mm-t-s": MPa and t/mm^3.
+
+        Raises:
+            ConfigError: if the unit system is unknown.
+            MaterialError: as for numbers in SI.
+        """
+        unit = unit_system(units)
+        for name, value in (("E", E), ("rho", rho)):
+            _check_number(name, value)
+        return cls(E * unit.pressure, nu, rho * unit.density)
+
+    @property
+    def doubt(self) -> str:
+        """What is unusual about the numbers, in a sentence, or nothing."""
+        return _solid_doubt(self)
 
     @property
     def stiffness(self) -> Array:
@@ -76,6 +100,9 @@ class Orthotropic:
 
     Raises:
         MaterialError: if the stiffness is not positive definite or the axes are not orthonormal.
+
+    Warns:
+        RomWarning: if sound would travel in it as in no solid: wrong units.
     """
 
     E: tuple[float, float, float]
@@ -104,6 +131,29 @@ class Orthotropic:
                 "some load would release energy.",
                 hint="Check that |nu_ij| < sqrt(E_i / E_j).",
             )
+        warn(self.doubt)
+
+    @classmethod
+    def from_units(
+        cls, units: str, *, E: Any, nu: Any, G: Any, rho: float, axes: Any = None
+    ) -> "Orthotropic":
+        """The solid with numbers in another unit system, e.g. "mm-t-s": MPa and t/mm^3.
+
+        Raises:
+            ConfigError: if the unit system is unknown.
+            MaterialError: as for numbers in SI.
+        """
+        unit = unit_system(units)
+        for name, value in (("rho", rho), *(("E or G", x) for x in (*E, *G))):
+            _check_number(name, value)
+        moduli = (tuple(x * unit.pressure for x in values) for values in (E, G))
+        turned = {} if axes is None else {"axes": axes}
+        return cls(next(moduli), nu, next(moduli), rho * unit.density, **turned)
+
+    @property
+    def doubt(self) -> str:
+        """What is unusual about the numbers, in a sentence, or nothing."""
+        return _solid_doubt(self)
 
     def _compliance(self) -> Array:
         (E1, E2, E3), (n12, n13, n23), (G12, G13, G23) = self.E, self.nu, self.G
@@ -123,6 +173,24 @@ class Orthotropic:
     def wave_speed(self) -> float:
         """Largest speed of a longitudinal wave in a thin bar [m/s]."""
         return sqrt(max(self.E) / self.rho)
+
+
+def _solid_doubt(solid: Material | Orthotropic) -> str:
+    """Speed of sound or density that no solid has, and the unit system that may be meant."""
+    numbers = f"the solid with E = {solid.E}, rho = {solid.rho:g}"
+    density = STIFF_DENSITY if solid.wave_speed > FOAM_SPEED else SOLID_DENSITY
+    said = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
+    if not said:
+        return ""
+    meant = [name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)]
+    kind = type(solid).__name__
+    return f"{said} Units of {meant[0]}? {kind}.from_units({meant[0]!r}, …)." if meant else said
+
+
+def _is_stiff(solid: Material | Orthotropic, unit: UnitSystem) -> bool:
+    """Whether the numbers are those of a metal, mineral or wood in a unit system."""
+    speed, rho = solid.wave_speed * unit.length / unit.time, solid.rho * unit.density
+    return speed > FOAM_SPEED and not (WAVE_SPEED.doubt(speed) or STIFF_DENSITY.doubt(rho))
 
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy

@@ -12,6 +12,7 @@ import numpy as np
 
 from rom.errors import ParameterError, RomWarning
 from rom.model import Array
+from rom.plausible import FACTOR, warn_outside
 
 FEW = 3  # parameters up to which all corners of their range are visited
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
@@ -30,6 +31,9 @@ class Parameter:
 
     Raises:
         ParameterError: unless 0 < low <= high.
+
+    Warns:
+        RomWarning: for factors beyond a thousand, as when they are numbers of the material.
     """
 
     region: str | None
@@ -45,6 +49,8 @@ class Parameter:
             raise ParameterError(
                 f"the range {self.low:g} to {self.high:g} of {self} is not one of positive factors."
             )
+        for end in dict.fromkeys((self.low, self.high)):
+            warn_outside(FACTOR, end, str(self))
 
     def __str__(self) -> str:
         return f"{type(self).__name__} of {self.region or 'the whole body'}"

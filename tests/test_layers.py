@@ -24,13 +24,13 @@ ANYTHING = {
     "doctor",
     "peers",
 }  # they stand in front
-# what every part stands on: checks of arguments and names, child processes, signals, old orders
-GROUND = {"arguments", "child", "deprecated", "interruption", "names"}
+# what every part stands on, none of it above another
+GROUND = {"arguments", "child", "deprecated", "interruption", "names", "plausible"}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"errors", "interruption", "model", "rotation"} for part in GROUND},
     "errors": set(),
     "notebook": set(),
-    "model": {"errors", "notebook"},
+    "model": {"errors", "notebook", "units"},
     "units": {"errors"},
     "rotation": {"errors"},
     "eigen": {"model", "errors"},

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.model import Array
+from rom.plausible import DAMPING_RATIO, check_damping_ratio, refuse_negative, warn_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,16 +18,31 @@ class Rayleigh:
     Attributes:
         alpha: factor of the mass [1/s].
         beta: factor of the stiffness [s].
+
+    Raises:
+        ConfigError: for a factor that is negative or not finite.
     """
 
     alpha: float = 0.0
     beta: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name in ("alpha", "beta"):
+            refuse_negative(f"damping {name}", getattr(self, name))
+
     def matrix(self, body: FlexibleBody) -> Array:
         """(r, r) damping [N s/m]."""
-        _refuse_negative("alpha", self.alpha)
-        _refuse_negative("beta", self.beta)
+        self._warn_of_strong(body)
         return self.alpha * body.M + self.beta * body.K
+
+    def _warn_of_strong(self, body: FlexibleBody) -> None:
+        """Of the lowest coordinate: high ones are often damped beyond one on purpose."""
+        omega = body.omega[body.omega > 0]
+        if omega.size:
+            low = float(omega.min())
+            ratio = 0.5 * (self.alpha / low + self.beta * low)
+            of = f"the lowest coordinate of body {body.name!r}, at {low / (2 * np.pi):.4g} Hz,"
+            warn_outside(DAMPING_RATIO, ratio, of)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +50,22 @@ class ModalDamping:
     """D = diag(2 zeta omega) in the elastic coordinates of the body.
 
     Attributes:
-        ratio: damping ratio zeta, one number or one per elastic coordinate.
+        ratio: damping ratio zeta, one number or one per elastic coordinate; 0.02 is two per
+            cent. Nothing vibrates from one on: a ratio beyond is refused as a mistake for per
+            cent, and one itself, by which residual shapes are stilled, is taken at its word.
+
+    Raises:
+        ConfigError: for a ratio outside 0 to 1.
+
+    Warns:
+        RomWarning: for a ratio that no structure has.
     """
 
     ratio: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        for value in dict.fromkeys(np.ravel(self.ratio).tolist()):
+            check_damping_ratio(value)
 
     def matrix(self, body: FlexibleBody) -> Array:
         """(r, r) damping [N s/m]."""
@@ -46,7 +74,6 @@ class ModalDamping:
             raise ConfigError(
                 f"ModalDamping has {zeta.size} ratios for {body.n_modes} elastic coordinates."
             )
-        _refuse_negative("ratio", float(zeta.min(initial=0.0)))
         return np.diag(2 * zeta * body.omega)
 
 
@@ -54,11 +81,9 @@ def damped(body: FlexibleBody, damping: Rayleigh | ModalDamping) -> FlexibleBody
     """The body with this damping in place of what it had.
 
     Raises:
-        ConfigError: for a negative factor or a wrong number of ratios.
+        ConfigError: for a wrong number of ratios.
+
+    Warns:
+        RomWarning: for factors that damp the lowest coordinate as no structure is damped.
     """
     return replace(body, D=damping.matrix(body))
-
-
-def _refuse_negative(name: str, value: float) -> None:
-    if not value >= 0.0:
-        raise ConfigError(f"damping {name} = {value:g} is negative: the body would gain energy.")

@@ -141,7 +141,8 @@ class Component:
             raise Place(self.document, ("damping",)).error(
                 "[damping] needs either ratio, or alpha and beta."
             )
-        return ModalDamping(values["ratio"]) if "ratio" in values else Rayleigh(**values)
+        with self.at("damping"):
+            return ModalDamping(values["ratio"]) if "ratio" in values else Rayleigh(**values)
 
     def at(self, *path: str) -> "Located":
         """Context that tells the line of a key in errors raised below it."""

@@ -33,6 +33,7 @@ from rom.cyclic.sector import Complex
 from rom.cyclic.substructures import SubstructuredSector
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
+from rom.plausible import check_damping_ratio
 
 RIGID = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
@@ -235,6 +236,7 @@ class BladedWheel:
             raise ConfigError(
                 f"damping = {damping!r} must be a positive share of critical damping, below 1."
             )
+        check_damping_ratio(damping, "the wheel")
         N, sweep = self.sector.n_sectors, np.atleast_1d(np.asarray(omega, dtype=float))
         if speed:
             Phi, motions = self._gyroscopic(blades, speed)

@@ -31,6 +31,7 @@ from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report
+from rom.plausible import check_damping_ratio
 
 STIFFER = 0.1  # relative change of the stiffness of all blades that enriches the basis
 NEW = 1e-12  # squared share of a mode that is new, below which it is round-off
@@ -191,6 +192,7 @@ class MistunedWheel:
         """(..., w, r) modal amplitudes."""
         if not zeta > 0.0:
             raise ConfigError(f"damping = {zeta!r} must be a positive share of critical damping.")
+        check_damping_ratio(zeta, "the wheel")
         load = np.einsum("...km,k->...m", V.conj(), drive)
         gap = w[..., None, :] ** 2 - sweep[:, None] ** 2
         found: Complex = load[..., None, :] / (gap + 2j * zeta * sweep[:, None] * w[..., None, :])

@@ -137,6 +137,7 @@ def assemble(
     named = {region: solids[tag] for region, tag in regions.items()}
     remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
     _warn(mesh.comm, remarks)
+    told = list(dict.fromkeys(solid.doubt for solid in named.values() if solid.doubt))
     fields = {
         "interfaces": interfaces,
         "attachments": tuple(attachments),
@@ -149,7 +150,7 @@ def assemble(
             "cells": {name: mesh.topology.index_map(3).size_global},
             "units": "SI",
             "versions": versions(),
-            "warnings": remarks,
+            "warnings": [*told, *remarks],  # the first where the materials were made
         },
     }
     return _finish(K, M, points, fields)

@@ -11,10 +11,9 @@ from dolfinx import fem
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
 from rom.model import Index, Material, Orthotropic
+from rom.plausible import FOAM_SPEED
 
 Solid = Material | Orthotropic
-PLAUSIBLE_SPEED = (50.0, 2.0e4)  # m/s, from foams to diamond
-METALLIC_SPEED = 1000.0  # m/s; above it a body is no rubber and no soil
 LARGE = 20.0  # m; most machine parts above it are millimetres read as metres
 NEARLY_INCOMPRESSIBLE = 0.49
 CONTRAST = 1e8  # of the stiffness, beyond which the conditioning eats half the digits
@@ -119,13 +118,7 @@ def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Ite
             "per cent. Use degree=2."
         )
     for name, solid in solids.items():
-        slow, fast = PLAUSIBLE_SPEED
-        if not slow <= solid.wave_speed <= fast:
-            yield (
-                f"sound would travel at {solid.wave_speed:.3g} m/s in {name!r}; solids have "
-                f"{slow:g} to {fast:g} m/s. Check the units: E in Pa, rho in kg/m^3."
-            )
-        elif solid.wave_speed > METALLIC_SPEED and size > LARGE:
+        if not solid.doubt and solid.wave_speed > FOAM_SPEED and size > LARGE:
             yield (
                 f"the body is {size:.4g} m long and as stiff as metal. If the mesh is in "
                 "millimetres, give scale=1e-3."

@@ -1,0 +1,151 @@
+"""Numbers that are legal, but that no machine has: said with the number, where they come in.
+
+A wrong unit is nearly always wrong by a factor of 100 or more. The limits lie that far outside
+what is built, so that nobody is blamed who means what he writes.
+"""
+
+import math
+import os
+import sys
+import warnings
+from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+from rom.errors import ConfigError, RomWarning
+
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
+PACKAGE = str(Path(__file__).parent) + os.sep
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a quantity is in machines, buildings and instruments.
+
+    Attributes:
+        quantity: its name in a sentence.
+        low, high: limits, in ``unit``; None for no limit.
+        unit: SI unit, empty for a plain number.
+        known: what lies at the limits.
+        cure: what to look at.
+    """
+
+    quantity: str
+    low: float | None
+    high: float | None
+    unit: str
+    known: str
+    cure: str
+
+    def doubt(self, value: float, of: str = "") -> str:
+        """A sentence if the value lies outside, else nothing."""
+        low = -float("inf") if self.low is None else self.low
+        high = float("inf") if self.high is None else self.high
+        if low <= value <= high:
+            return ""
+        name = f"{self.quantity} of {of}" if of else self.quantity
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{name} is {value:.4g}{unit}; {self.known}. {self.cure}"
+
+
+WAVE_SPEED = Range(
+    "the speed of sound sqrt(E/rho)", 10.0, 2.0e4, "m/s",
+    "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
+    "Check the units: E in Pa, rho in kg/m^3.",
+)  # fmt: skip
+FOAM_SPEED = 1000.0  # m/s; no foam is faster
+SOLID_DENSITY = Range(
+    "the density", 0.1, 3.0e4, "kg/m^3", "solids have 0.1 kg/m^3 (aerogel) to 22600 (osmium)",
+    "Check the units: E in Pa, rho in kg/m^3.",
+)  # fmt: skip
+STIFF_DENSITY = Range(
+    "the density", 10.0, 3.0e4, "kg/m^3",
+    "solids as stiff for their weight have 10 kg/m^3 (honeycomb) to 22600 (osmium)",
+    "Check the units: E in Pa, rho in kg/m^3.",
+)  # fmt: skip
+FACTOR = Range(
+    "the factor", 1e-3, 1e3, "", "one is the model as it was made",
+    "Give factors of the number, not the number itself.",
+)  # fmt: skip
+SIZE = Range(
+    "the size", 1e-6, 1e4, "m", "bodies have 1e-06 m (microsystems) to 10000 m",
+    "Check the unit of the coordinates: scale=1e-3 is for millimetres.",
+)  # fmt: skip
+DENSITY = Range(
+    "the mass over the volume of the bounding box", None, 3.0e4, "kg/m^3",
+    "no solid is denser than 22600 kg/m^3 (osmium)",
+    "Check the units of mass and coordinates.",
+)  # fmt: skip
+GRAVITY = Range(
+    "gravity", None, 100.0, "m/s^2", "the earth has 9.81 m/s^2, the largest planet 25",
+    "It is in m/s^2: 9810 belongs to millimetres.",
+)  # fmt: skip
+DAMPING_RATIO = Range(
+    "the damping ratio", None, 0.3, "",
+    "metal has 0.0005 to 0.01, bolted structures up to 0.1, rubber up to 0.3",
+    "One is critical damping: write two per cent as 0.02.",
+)  # fmt: skip
+GYRATION = Range(
+    "the radius of gyration over the reach of the markers", None, 100.0, "",
+    "a body reaches as far as its mass",
+    "Check the unit of the inertia: kg m^2.",
+)  # fmt: skip
+STIFFNESS = Range(
+    "the stiffness", 0.0, None, "", "below zero it pushes away from its position without force",
+    "Check the sign.",
+)  # fmt: skip
+DAMPING = Range(
+    "the damping", 0.0, None, "", "below zero it gives energy to the motion", "Check the sign.",
+)  # fmt: skip
+
+
+def warn(sentence: str) -> None:
+    """Say a doubt once: on the first of several ranks, at the line outside that caused it."""
+    rank = next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
+    if not sentence or rank:
+        return
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and frame.f_code.co_filename.startswith((PACKAGE, "<string>")):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(RomWarning(sentence), stacklevel=level)
+
+
+def warn_outside(limits: Range, value: float, of: str = "") -> None:
+    """Warn if a value lies outside its range."""
+    warn(limits.doubt(value, of))
+
+
+def check_damping_ratio(ratio: Any, of: str = "") -> None:
+    """Take a share of critical damping at the border.
+
+    One is taken at its word: so are residual shapes stilled.
+
+    Raises:
+        ConfigError: for no number, one below zero, or one above one, which is per cent.
+
+    Warns:
+        RomWarning: for one that no structure has.
+    """
+    refuse_negative(f"the damping ratio of {of}" if of else "damping ratio", ratio)
+    if ratio > 1.0:
+        name = f"the damping ratio of {of}" if of else "damping ratio"
+        raise ConfigError(
+            f"{name} = {ratio:g} is beyond critical damping (1): nothing would vibrate.",
+            hint=f"For {ratio:g} per cent write {ratio / 100:g}; to damp beyond one on purpose, "
+            "use Rayleigh.",
+        )
+    if ratio < 1.0:
+        warn_outside(DAMPING_RATIO, ratio, of)
+
+
+def refuse_negative(name: str, value: Any) -> None:
+    """Refuse what is no finite number from zero on.
+
+    Raises:
+        ConfigError: naming it.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise ConfigError(f"{name} = {value!r} is not a finite number.")
+    if value < 0.0:
+        raise ConfigError(f"{name} = {value:g} is negative: it would give energy to the motion.")
