@@ -100,6 +100,34 @@ DAMPING = Range(
 )  # fmt: skip
 
 
+FAR = 100.0  # sizes from the origin: four of sixteen digits of an inertia cancel
+SCALED = 100.0  # times a default, from where a value is another unit
+
+
+def far_doubt(distance: float, size: float, of: str) -> str:
+    """A sentence if a body lies so far from the origin that digits cancel, else nothing."""
+    if distance <= FAR * size:
+        return ""
+    ratio = distance / size if size > 0.0 else math.inf
+    lost = min(2 * math.log10(ratio), 16.0)
+    return (
+        f"{of} lies {distance:.4g} m from the origin, {ratio:.3g} times its size {size:.4g} m: "
+        f"about {lost:.0f} of 16 digits of its inertia and frame cancel. Move the geometry to the "
+        "origin and place the body with at=."
+    )
+
+
+def scaled_doubt(name: str, value: Any, default: Any) -> str:
+    """A sentence if a length or count is out of all proportion to its default, else nothing."""
+    usual = all(isinstance(x, Real) and not isinstance(x, bool) and x for x in (value, default))
+    if not usual or 1 / SCALED <= abs(value / default) <= SCALED:
+        return ""
+    return (
+        f"parameter {name} = {value:g} is {abs(value / default):.3g} times its default "
+        f"{default:g}. Check its unit: lengths are in m."
+    )
+
+
 def warn(sentence: str) -> None:
     """Say a doubt once: on the first of several ranks, at the line outside that caused it."""
     rank = next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)

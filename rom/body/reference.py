@@ -18,6 +18,7 @@ import numpy as np
 
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
+from rom.plausible import far_doubt
 from rom.rotation import skew
 
 if TYPE_CHECKING:
@@ -54,9 +55,12 @@ def reference_motion(body: "FlexibleBody", reference: Any) -> Array:
         )
     scale = np.r_[np.ones(3), np.full(3, 1 / body.size)]
     if np.linalg.cond(from_rigid * scale) > 1e12:
+        away = far_doubt(
+            float(np.linalg.norm(body.first_moment)) / body.mass, body.size, "the body"
+        )
         raise ModelError(
             f"the reference condition {reference!r} leaves the frame undetermined.",
-            hint="Pins must not coincide, three points not lie on one line.",
+            hint=away or "Pins must not coincide, three points not lie on one line.",
         )
     return np.linalg.solve(from_rigid, from_shapes)
 

@@ -9,13 +9,14 @@ from types import ModuleType
 from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError
+from rom.fe.readers import Made
 
 
-def make(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
+def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     """Call ``build(gmsh, **parameters)`` of the file.
 
     Returns:
-        The parameters used, defaults included.
+        The parameters used, and their defaults.
 
     Raises:
         FileFormatError: the file is no Python, or has no function build.
@@ -26,6 +27,7 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
     if not callable(build):
         raise FileFormatError(f"{path.name} has no function build(gmsh, **parameters).")
     gmsh.model.add(path.stem)
+    defaults = _defaults(build)
     values = _arguments(build, request["parameters"], path)
     try:
         build(gmsh, **values)
@@ -33,7 +35,8 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
         raise
     except Exception as error:
         raise MeshError(f"build failed at {_place(error, path)}: {error}") from error
-    return {name: value for name, value in values.items() if isinstance(value, str | int | float)}
+    plain = {name: value for name, value in values.items() if isinstance(value, str | int | float)}
+    return plain, {name: x for name, x in defaults.items() if name in plain}
 
 
 def _load(path: Path) -> ModuleType:
@@ -58,11 +61,16 @@ def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
         raise ConfigError(
             f"{path.name} has no parameter {unknown[0]!r}; its parameters are {sorted(names)}."
         )
-    defaults = {p.name: p.default for p in known if p.default is not p.empty}
+    defaults = _defaults(build)
     missing = sorted(set(names) - set(defaults) - set(given))
     if missing:
         raise ConfigError(f"{path.name} needs a value for the parameter {missing[0]!r}.")
     return defaults | given
+
+
+def _defaults(build: Any) -> dict[str, Any]:
+    known = inspect.signature(build).parameters.values()
+    return {p.name: p.default for p in known if p.default is not p.empty}
 
 
 def _place(error: Exception, path: Path) -> str:

@@ -9,7 +9,8 @@ from typing import Any
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
 from rom.fe import builder, step
 from rom.fe.gmsh_groups import check_declared, collect, version
-from rom.fe.readers import Read
+from rom.fe.readers import Made, Read
+from rom.plausible import scaled_doubt
 
 HXT = 10  # Mesh.Algorithm3D whose meshes differ from run to run
 # gmsh hands a file without this start to its script parser, which can run shell commands
@@ -24,7 +25,7 @@ def run(request: dict[str, Any]) -> Read:
     with session(gmsh):
         declared = Path(request["folder"], "declared.msh")
         with complaints(gmsh):
-            values = MAKERS[reader](gmsh, path, request)
+            values, defaults = MAKERS[reader](gmsh, path, request)
         if reader == "msh":
             declared = path
         else:
@@ -37,6 +38,8 @@ def run(request: dict[str, Any]) -> Read:
             "parameters": values,
             "gmsh_warnings": _log(gmsh, "Warning"),
         }
+        doubts = (scaled_doubt(name, values[name], x) for name, x in defaults.items())
+        notes["warnings"] = [*notes["warnings"], *filter(None, doubts)]
         return arrays, notes
 
 
@@ -75,7 +78,7 @@ def _log(gmsh: Any, kind: str) -> list[str]:
     return [line.partition(":")[2].strip() for line in lines[:20]]
 
 
-def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
+def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     if not path.read_bytes().endswith((b"\n", b"\r")):
         raise FileFormatError(
             "the last line does not end, and gmsh would drop it in silence.",
@@ -94,7 +97,8 @@ def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
         # the file was readable with its own values, so the new ones are at fault
         with complaints(gmsh, ConfigError):
             gmsh.open(str(path))
-    return geo_parameters(gmsh)
+    values = geo_parameters(gmsh)
+    return values, {name: known[name] for name in chosen if name in values}
 
 
 def geo_parameters(gmsh: Any) -> dict[str, Any]:
@@ -126,7 +130,7 @@ def _number(name: str, value: Any, path: Path) -> float:
     raise ConfigError(f"parameter {name!r} of {path.name} must be a finite number, got {value!r}.")
 
 
-def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
+def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     with path.open("rb") as stream:
         start = stream.read(512).lstrip()
         stream.seek(max(path.stat().st_size - 512, 0))
@@ -143,7 +147,7 @@ def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
     link = Path(request["folder"], path.name)
     link.symlink_to(path)
     gmsh.merge(str(link))
-    return {}
+    return {}, {}
 
 
 def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:

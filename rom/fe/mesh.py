@@ -81,7 +81,16 @@ def read_mesh(
     if request["reader"] in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
         remarks = [*remarks, *straightened]
+    if request["reader"] == "step" and scale != 1.0:
+        remarks = [*remarks, _scaled_twice(mesh.size, scale)]
     return checked(mesh, remarks)
+
+
+def _scaled_twice(size: float, scale: float) -> str:
+    return (
+        f"a STEP file says its own unit and was read in metres, {size / scale:.4g} m long; "
+        f"scale={scale:g} on top makes it {size:.4g} m. Leave scale out unless the file is wrong."
+    )
 
 
 def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:

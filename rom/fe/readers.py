@@ -12,6 +12,7 @@ from rom.model import Array, Integers
 GEOMETRIES = ("geo", "builder", "step")
 Arrays = dict[str, npt.NDArray[Any]]
 Read = tuple[Arrays, dict[str, Any]]  # arrays and notes
+Made = tuple[dict[str, Any], dict[str, Any]]  # parameters used, defaults of some of them
 
 
 def read(request: dict[str, Any]) -> Read:

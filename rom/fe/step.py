@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
+from rom.fe.readers import Made
 
 FACE = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
 SHELL = re.compile(r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^)]*)\)", re.I)
@@ -22,8 +23,11 @@ EVERY = "every"  # names all faces without a name by their numbers
 TIE = 1e-6  # of the diagonal: two faces nearer than this to the point are equally near
 
 
-def make(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
+def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     """Import the file and name its faces.
+
+    Returns:
+        The element size used, and its default.
 
     Raises:
         FileFormatError: the file is no STEP file.
@@ -43,10 +47,11 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> dict[str, Any]:
     if not gmsh.model.getEntities(3):
         raise MeshError("the STEP file contains no solid.", hint="Export a closed body.")
     _name_faces(gmsh, text)
-    lc = request["parameters"].get("lc", _diagonal(gmsh) / ELEMENTS_ACROSS)
+    default = _diagonal(gmsh) / ELEMENTS_ACROSS
+    lc = request["parameters"].get("lc", default)
     _check_size(gmsh, lc)
     gmsh.option.setNumber("Mesh.MeshSizeMax", lc)
-    return {"lc": lc}
+    return {"lc": lc}, {"lc": default}
 
 
 def _check_size(gmsh: Any, lc: Any) -> None:

@@ -15,6 +15,7 @@ from rom.fe.quality import check_shape
 from rom.fe.solid import SHOWN, SolidMesh, cell_names
 from rom.fe.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
 from rom.model import Mask
+from rom.plausible import SIZE, far_doubt
 
 COINCIDENT = 1e-9  # of the size: nodes closer than this are at the same place
 
@@ -41,7 +42,7 @@ def validate(mesh: SolidMesh) -> list[str]:
     _check_connected(mesh, faces)
     _check_facets(mesh, faces)
     _check_regions(mesh)
-    return [*warnings, *_slits(mesh, faces)]
+    return [*warnings, *_slits(mesh, faces), *_doubts(mesh)]
 
 
 def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -> None:
@@ -164,6 +165,14 @@ def _slits(mesh: SolidMesh, faces: Faces) -> list[str]:
         f"{same} nodes of the surface lie at the same place as another: the body has a slit of no "
         "width there. Merge the nodes if that is not meant."
     ]
+
+
+def _doubts(mesh: SolidMesh) -> list[str]:
+    """Size and place that digits or units speak against."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    distance = float(np.linalg.norm(0.5 * (low + high)))
+    found = (SIZE.doubt(mesh.size, "the mesh"), far_doubt(distance, mesh.size, "the mesh"))
+    return [text for text in found if text]
 
 
 def _check_facets(mesh: SolidMesh, faces: Faces) -> None:
