@@ -40,7 +40,8 @@ class Assembly:
     meshes do not match, a projection couples moments of common functions.
 
     Attributes:
-        bodies: {name: body}, all in one system of coordinates.
+        bodies: {name: body}, all in one system of coordinates; those of other units are
+            converted to SI.
         couplings: ((body, interface), (body, interface)) pairs that move together.
         projection: functions that couple deformable interfaces whose coordinates differ, e.g.
             ``Polynomial(4)``; displacements that they contain pass without error.
@@ -61,6 +62,8 @@ class Assembly:
                 f"projection = {self.projection!r} gives no functions of a surface.",
                 hint="Use for example rom.Polynomial(4).",
             )
+        in_si = {name: body.in_units("SI") for name, body in self.bodies.items()}
+        object.__setattr__(self, "bodies", in_si)
         _ = self._coupled  # refuses couplings that cannot be
 
     @property

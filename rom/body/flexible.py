@@ -15,6 +15,7 @@ from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Modes, Report
 from rom.notebook import listed, shown
+from rom.units import unit_system
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,8 @@ class FlexibleBody:
         omega: (r,) natural frequencies of the elastic coordinates, frame held still [rad/s].
         labels: (r,) what each coordinate is.
         reference: the reference condition.
-        units: declared unit system.
+        units: declared unit system of all its numbers; SI in a mechanism or an assembly, which
+            convert it.
         provenance: how the body was made.
         certificate: evidence that it stands for the full model, or None.
     """
@@ -123,12 +125,15 @@ class FlexibleBody:
     certificate: Report | None = None
 
     def __repr__(self) -> str:
+        kg = self.mass * unit_system(self.units).mass
         return (
-            f"FlexibleBody({self.name!r}: {self.mass:.5g} kg, {self.n_modes} elastic coordinates, "
+            f"FlexibleBody({self.name!r}: {kg:.5g} kg, {self.n_modes} elastic coordinates, "
             f"interfaces {listed(self.markers)}, frame {self.reference})"
         )
 
     def _repr_html_(self) -> str:
+        if self.units != "SI":
+            return self.in_units("SI")._repr_html_()
         evidence = "none" if self.certificate is None else repr(self.certificate)
         centre = ", ".join(f"{x:.5g}" for x in self.first_moment / self.mass)
         lowest = ", ".join(f"{w / (2 * np.pi):.5g}" for w in self.omega[:6])
@@ -164,6 +169,17 @@ class FlexibleBody:
     def interface_names(self) -> tuple[str, ...]:
         """Names of the interfaces."""
         return tuple(self.markers)
+
+    def in_units(self, units: str) -> "FlexibleBody":
+        """The same body with all its numbers in another unit system, e.g. "SI" or "mm-t-s".
+
+        Raises:
+            ConfigError: if a unit system is unknown.
+            ModelError: if an interface has coordinates of unknown dimension.
+        """
+        from rom.body.conversion import converted
+
+        return converted(self, units)
 
     def with_reference(self, reference: Any) -> "FlexibleBody":
         """The same deformations seen from another floating frame; no finite elements involved.
@@ -210,7 +226,7 @@ class FlexibleBody:
         Raises:
             InterfaceError: if an interface is unknown.
         """
-        return self.modes(n, fixed=fixed)[0] / (2 * np.pi)
+        return self.modes(n, fixed=fixed)[0] / (2 * np.pi * unit_system(self.units).time)
 
     def modes(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Modes:
         """Natural modes of the reduced body: omega (m,) [rad/s], shapes (6 + r, m).
@@ -289,7 +305,7 @@ class FlexibleBody:
         Warns:
             RomWarning: if the body has no geometric stiffness, or rotation makes it unstable.
         """
-        return rotating_frequencies(self, speed, axis, fixed=fixed, at=at)
+        return rotating_frequencies(self.in_units("SI"), speed, axis, fixed=fixed, at=at)
 
     def second_order(self) -> SecondOrder:
         """Displacements of second order that say the same as ``K_geo``.

@@ -50,6 +50,7 @@ def _write_abaqus(body: FlexibleBody, path: str | Path) -> Path:
     return write_user_element(matrices, form.dofs, path, nodes=form.points)
 
 
+OWN_UNITS = ("npz", "sid", "sid-pysid", "sid-geisler")  # say the units of the body; others are SI
 FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
     "npz": (".npz", save),
     "vtu": (".vtu", write_vtu),
@@ -72,7 +73,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
 def export(
     body: FlexibleBody, path: str | Path, *, to: str | None = None, held: Sequence[str] = ()
 ) -> Path:
-    """Write a body in the format of another program.
+    """Write a body in the format of another program, in SI where the format names no units.
 
     Args:
         body: the body.
@@ -98,6 +99,7 @@ def export(
     if held and kind not in HOLDING:
         raise ConfigError(f"interfaces are held for {HOLDING[0]} alone, not for {kind}.")
     options = {"held": tuple(held)} if held else {}
+    body = body if kind in OWN_UNITS else body.in_units("SI")
     return FORMATS[kind][1](body, path, **options)
 
 

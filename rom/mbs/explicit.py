@@ -38,7 +38,9 @@ class Equations:
         if packed.signals:
             times = np.array([t])
             table = sample_all(packed.signals, times, settings.span, settings.spacing)
-            good, failure = first_failure(packed.signals, times, table)
+            good, failure = first_failure(
+                packed.signals, times, table, settings.span, settings.spacing
+            )
             if not good:
                 raise failure
             self.W.signal[:] = table[0]

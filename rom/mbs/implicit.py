@@ -69,7 +69,7 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     # at least four times, for which functions are called at once: the same bits in any chunk
     padded = np.append(t, np.repeat(t[-1:], max(0, 4 - count)))
     table = sample_all(packed.signals, padded, settings.span, settings.spacing)[:count]
-    good, failure = first_failure(packed.signals, t, table)
+    good, failure = first_failure(packed.signals, t, table, settings.span, settings.h)
     every = 1 if record.watch else settings.save_every
     out = space(W, T, (done + good) // every - done // every)
     T.count[alpha.BEGAN] = before = T.count[alpha.STEPS]

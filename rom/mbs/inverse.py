@@ -49,7 +49,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
     state = initial_state(packed, times[0], spacing)
     _refuse_free(packed, state)
     signals = sample_all(packed.signals, times, span, spacing)
-    good, failure = first_failure(packed.signals, times, signals)
+    good, failure = first_failure(packed.signals, times, signals, span, spacing)
     if good < times.size:
         raise failure
     W = workspace(packed.system, len(packed.signals))

@@ -19,6 +19,7 @@ from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigi
 from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
 from rom.notebook import listed, shown
+from rom.plausible import DAMPING, GRAVITY, STIFFNESS, warn_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,10 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
     Args:
         gravity: (3,) acceleration of gravity [m/s^2].
+
+    Warns:
+        RomWarning: for numbers legal but strange: gravity beyond that of all planets, an inertia
+            far too large for the markers, stiffness or damping below zero.
     """
 
     gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
@@ -100,6 +105,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
     def __post_init__(self) -> None:
         self.gravity = finite("gravity", self.gravity, (3,))
+        warn_outside(GRAVITY, float(np.linalg.norm(self.gravity)))
         self.ground = ground_part()
 
     def __repr__(self) -> str:
@@ -162,7 +168,8 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
         Args:
             name: name of the body in this mechanism.
-            body: a ``FlexibleBody`` with r elastic coordinates.
+            body: a ``FlexibleBody`` with r elastic coordinates; one of other units is converted
+                to SI, in which a mechanism is.
             at: (3,) origin of its frame at the start, world [m].
             orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
             velocity: (3,) of the origin, world [m/s].
@@ -179,6 +186,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
                 f"body {name!r} is {body!r}; a FlexibleBody is needed.",
                 hint="Make one with rom.reduce, or read one with rom.load.",
             )
+        body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
         r = body.K.shape[0]
         elastic = (
             finite("q", np.zeros(r) if q is None else q, (r,)),
@@ -212,7 +220,9 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         self._check_markers(name, m1, m2)
         gap = self.design_point(m2) - self.design_point(m1)
         free = np.linalg.norm(gap) if free_length is None else number("free_length", free_length)
-        k, c = number("stiffness", stiffness), number("damping", damping)
+        k, c = self._stiffness_and_damping(name, stiffness, damping)
+        if free < 0.0:
+            raise ConfigError(f"free_length of {name!r} = {free:g} m: a length is not negative.")
         self.springs[name] = Spring(m1, m2, k, c, float(free))
 
     def rotational_spring(
@@ -228,7 +238,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         self._check_new(name)
         if self._joint_with_axis(joint, "rotational spring").turn is None:
             raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
-        k, c = number("stiffness", stiffness), number("damping", damping)
+        k, c = self._stiffness_and_damping(name, stiffness, damping)
         self.turns[name] = Turn(joint, k, c, number("free_angle", free_angle))
 
     def force(self, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
@@ -309,6 +319,14 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         function = vector if callable(vector) else None
         constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
         self.loads[name] = Load(marker, kind + (frame == "body"), constant, function)
+
+    def _stiffness_and_damping(
+        self, name: str, stiffness: Any, damping: Any
+    ) -> tuple[float, float]:
+        k, c = number("stiffness", stiffness), number("damping", damping)
+        warn_outside(STIFFNESS, k, repr(name))
+        warn_outside(DAMPING, c, repr(name))
+        return k, c
 
     def _check_new(self, name: str) -> None:
         if not isinstance(name, str) or not name:

@@ -22,6 +22,9 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import GROUND, Marker, Part
 from rom.mbs.signals import Signal, clock_signal, drive_signal, load_signal
 from rom.model import Array
+from rom.plausible import warn
+
+FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     spread, more = spread_loads(mechanism, len(signals) + len(loads), max(p.r for p in parts))
     loads += more
     clock = (clock_signal(),) if mechanism.motors else ()
+    _doubt_place(mechanism, _length(parts))
     moved_by = actions(
         mechanism,
         coordinates,
@@ -148,6 +152,22 @@ def _length(parts: tuple[Part, ...]) -> float:
     for part in parts:
         reach += [np.linalg.norm(part.point(part.marker(name))) for name in part.names]
     return float(max(reach))
+
+
+def _doubt_place(mechanism: Mechanism, length: float) -> None:
+    """Warn if joints lie so far from the origin of the world that their gaps are round-off."""
+    markers = [m for joint in mechanism.joints.values() for m in joint.markers]
+    if not markers:
+        return
+    points = np.array([mechanism.design_point(marker) for marker in markers])
+    size = max(length, float(np.ptp(points, axis=0).max()))
+    distance = float(np.linalg.norm(points.mean(axis=0)))
+    if distance > FAR_JOINTS * size:
+        warn(
+            f"the joints lie {distance:.4g} m from the origin of the world, {distance / size:.3g} "
+            f"times the size {size:.4g} m of the mechanism: {np.log10(distance / size):.0f} of 16 "
+            "digits of every gap are lost, and more of the reactions. Put the origin near them."
+        )
 
 
 def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:

@@ -1,12 +1,13 @@
 """Functions of time that a user prescribes, sampled for compiled code."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, SolverError
+from rom.errors import ConfigError, RomError, SolverError
+from rom.mbs.jumps import examine
 from rom.model import Array
 
 # first and last time a function may be asked for
@@ -27,7 +28,8 @@ class Signal:
         name: drive or load it belongs to.
         function: t -> number (drive) or (3,) vector (load).
         rate, acceleration: its derivatives, or None.
-        width: 1 for a drive, 3 for a load.
+        width: 1 for a drive, 3 for a load, which may jump.
+        ends: {span: time from which on it is no motion, and the error}, as far as looked for.
     """
 
     name: str
@@ -35,6 +37,19 @@ class Signal:
     rate: Callable[[float], Any] | None = None
     acceleration: Callable[[float], Any] | None = None
     width: int = 1
+    ends: dict[Span, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def end(self, span: Span, spacing: float) -> tuple[float, RomError] | None:
+        """Time from which on a drive is no motion, and the error; None if it is one."""
+        if span not in self.ends:
+            f, rate = (
+                None if g is None else (lambda t, g=g: self._values(g, t)[:, 0])
+                for g in (self.function, self.rate)
+            )
+            self.ends[span] = (
+                None if self.width == 3 else examine(self.name, f, rate, span, spacing)
+            )
+        return self.ends[span]
 
     def sample(self, t: Array, span: Span, spacing: float) -> Array:
         """(n, 3) value, rate, acceleration at the times t; or the vectors of a load.
@@ -120,12 +135,31 @@ def sample_all(signals: tuple[Signal, ...], t: Array, span: Span, spacing: float
     return out
 
 
-def first_failure(signals: tuple[Signal, ...], t: Array, table: Array) -> tuple[int, SolverError]:
-    """Number of good instants before the first one that is not finite, and its error."""
+def first_failure(
+    signals: tuple[Signal, ...],
+    t: Array,
+    table: Array,
+    span: Span = (-np.inf, np.inf),
+    spacing: float = 1.0,
+) -> tuple[int, RomError]:
+    """Number of good instants before the first one that is no motion, and its error.
+
+    Args:
+        signals: drives and loads.
+        t: (n,) ascending times.
+        table: (n, s, 3) their samples.
+        span: first and last time of the run; drives are looked through for jumps if it is finite.
+        spacing: of the steps of the run [s].
+    """
     bad = ~np.isfinite(table).all(axis=2)
-    if not bad.any():
-        return t.size, SolverError("")
+    ends = [signal.end(span, spacing) for signal in signals] if np.isfinite(span).all() else []
+    good, failure = t.size, RomError("")
+    for time, error in filter(None, ends):
+        if np.searchsorted(t, time) < good:
+            good, failure = int(np.searchsorted(t, time)), error
     k = int(np.argmax(bad.any(axis=1)))
+    if not bad.any() or good <= k:
+        return good, failure
     name = signals[int(np.argmax(bad[k]))].name
     return k, SolverError(
         f"the function of {name!r} gives {table[k, int(np.argmax(bad[k]))].tolist()} at "

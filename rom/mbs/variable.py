@@ -109,7 +109,7 @@ class _Run:
         self.base[:] = W.base
         times = np.array([t])
         table = sample_all(packed.signals, times, settings.span, settings.spacing)
-        good, failure = first_failure(packed.signals, times, table)
+        good, failure = first_failure(packed.signals, times, table, settings.span, settings.spacing)
         if not good:
             raise failure
         T.count[alpha.BEGAN], rank = T.count[alpha.STEPS], self.record.final.rank

@@ -1,0 +1,142 @@
+"""A flexible body in another system of units.
+
+Shapes are scaled so that the elastic mass matrix keeps its numbers: ``K`` stays diag(omega^2).
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rom.body.recovery import STATES, StressRecovery
+from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR
+from rom.errors import ModelError
+from rom.model import Array
+from rom.units import UnitSystem, unit_system
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody, Marker, Patch
+
+SIX = 6  # coordinates of a rigid or averaged interface: displacement, rotation
+
+
+@dataclass(frozen=True, slots=True)
+class Factors:
+    """Numbers in the new units per number in the old ones.
+
+    Attributes:
+        length, mass, time: of the three dimensions.
+        shape: of a displacement shape, by choice: an elastic coordinate is length / shape.
+    """
+
+    length: float
+    mass: float
+    time: float
+    shape: float
+
+    @classmethod
+    def between(cls, old: UnitSystem, new: UnitSystem) -> "Factors":
+        """From one system to another."""
+        mass = old.mass / new.mass
+        return cls(old.length / new.length, mass, old.time / new.time, mass**-0.5)
+
+    @property
+    def force(self) -> float:
+        """Of a force."""
+        return self.mass * self.length / self.time**2
+
+    @property
+    def pressure(self) -> float:
+        """Of a stress."""
+        return self.force / self.length**2
+
+    def load(self, name: str) -> float:
+        """Of a load by its name in ``K_geo``."""
+        if name in LINEAR:
+            return self.length / self.time**2
+        if name in (*CENTRIFUGAL, *ANGULAR):
+            return self.time**-2
+        turns = name.rpartition(" ")[2].startswith("m_")
+        return self.force * (self.length if turns else 1.0)
+
+
+def converted(body: "FlexibleBody", units: str) -> "FlexibleBody":
+    """The same body with all numbers in another unit system; itself in its own.
+
+    Raises:
+        ConfigError: if a unit system is unknown.
+        ModelError: naming an interface whose coordinates have unknown dimensions.
+    """
+    if units == body.units:
+        return body
+    f = Factors.between(unit_system(body.units), unit_system(units))
+    L, m, t, s = f.length, f.mass, f.time, f.shape
+    surface = body.surface
+    if surface is not None:
+        surface = replace(surface, points=surface.points * L, shape=surface.shape * s)
+    return replace(
+        body,
+        mass=body.mass * m,
+        first_moment=body.first_moment * (m * L),
+        inertia=body.inertia * (m * L**2),
+        S=body.S * (m * s),
+        Ibar_kl=body.Ibar_kl * (m * L * s),
+        S_kl=body.S_kl * (m * s**2),
+        K=body.K * (m * s**2 / t**2),
+        D=body.D * (m * s**2 / t),
+        K_geo={load: A * (m * (s / t) ** 2 / f.load(load)) for load, A in body.K_geo.items()},
+        markers={name: _marker(body, marker, f) for name, marker in body.markers.items()},
+        surface=surface,
+        stress=None if body.stress is None else _stress(body.stress, f),
+        omega=body.omega / t,
+        units=units,
+    )
+
+
+def _marker(body: "FlexibleBody", marker: "Marker", f: Factors) -> "Marker":
+    rows = _coordinates(body, marker, f)[:, None]
+    rigid = np.r_[np.full(3, 1 / f.length), np.ones(3)]
+    hold = marker.hold * rows * np.r_[rigid, np.full(body.n_modes, f.shape / f.length)]
+    return replace(
+        marker,
+        point=marker.point * f.length,
+        translation=marker.translation * f.shape,
+        rotation=marker.rotation * (f.shape / f.length),
+        hold=hold,
+        patch=None if marker.patch is None else _patch(marker.patch, f),
+    )
+
+
+def _coordinates(body: "FlexibleBody", marker: "Marker", f: Factors) -> Array:
+    """(n_c,) factors of the coordinates: displacements, rotations, or functions of unit norm."""
+    n = marker.hold.shape[0]
+    if marker.patch is not None:  # functions q with integral of q^2 = 1 have coefficients in m^2
+        return np.full(n, f.length if marker.patch.shapes is None else f.length**2)
+    if n == SIX:
+        return np.r_[np.full(3, f.length), np.ones(3)]
+    raise ModelError(
+        f"interface {marker.name!r} of body {body.name!r} has {n} coordinates of kind "
+        f"{marker.kind!r}, whose dimensions are not known: it cannot leave {body.units}.",
+        hint="Make the body in SI.",
+    )
+
+
+def _patch(patch: "Patch", f: Factors) -> "Patch":
+    shapes = None if patch.shapes is None else patch.shapes / f.length
+    return replace(
+        patch,
+        points=patch.points * f.length,
+        surface_mass=patch.surface_mass * f.length**2,
+        shapes=shapes,
+    )
+
+
+def _stress(stress: StressRecovery, f: Factors) -> StressRecovery:
+    per_coordinate = f.pressure * f.shape / f.length
+    inertial = stress.inertial
+    if inertial is not None:
+        linear, turning = f.pressure * f.time**2 / f.length, f.pressure * f.time**2
+        columns = np.full(inertial.shape[1], per_coordinate * f.time**2)
+        columns[:STATES] = np.r_[np.full(3, linear), np.full(STATES - 3, turning)]
+        inertial = inertial * columns
+    return StressRecovery(stress.points * f.length, stress.operator * per_coordinate, inertial)

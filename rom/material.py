@@ -1,0 +1,211 @@
+"""Linear elastic solids, and whether one has such numbers."""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import MaterialError
+from rom.plausible import FOAM_SPEED, SOLID_DENSITY, STIFF_DENSITY, WAVE_SPEED, warn
+from rom.units import SYSTEMS, UnitSystem, unit_system
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Isotropic linear elastic solid.
+
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio.
+        rho: density [kg/m^3].
+
+    Raises:
+        MaterialError: for E <= 0, rho <= 0, nu outside (-1, 0.5), or a number that is not finite.
+
+    Warns:
+        RomWarning: if sound would travel in it as in no solid: wrong units.
+    """
+
+    E: float
+    nu: float
+    rho: float
+
+    def __post_init__(self) -> None:
+        for name in ("E", "nu", "rho"):
+            _check_number(name, getattr(self, name))
+        _check_positive("E", self.E, "Pa")
+        _check_positive("rho", self.rho, "kg/m^3")
+        if not -1.0 < self.nu < 0.5:
+            raise MaterialError(
+                f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative.",
+                hint="Metals have 0.27 to 0.35.",
+            )
+        warn(self.doubt)
+
+    @classmethod
+    def from_units(cls, units: str, *, E: float, nu: float, rho: float) -> "Material":
+        """The solid with numbers in another unit system, e.g. "mm-t-s": MPa and t/mm^3.
+
+        Raises:
+            ConfigError: if the unit system is unknown.
+            MaterialError: as for numbers in SI.
+        """
+        unit = unit_system(units)
+        for name, value in (("E", E), ("rho", rho)):
+            _check_number(name, value)
+        return cls(E * unit.pressure, nu, rho * unit.density)
+
+    @property
+    def doubt(self) -> str:
+        """What is unusual about the numbers, in a sentence, or nothing."""
+        return _solid_doubt(self)
+
+    @property
+    def stiffness(self) -> Array:
+        """(6, 6) stiffness [Pa]; rows xx, yy, zz, yz, xz, xy with engineering shear strains."""
+        mu, lam = (
+            self.E / (2 * (1 + self.nu)),
+            self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu)),
+        )
+        C = np.diag([2 * mu] * 3 + [mu] * 3)
+        C[:3, :3] += lam
+        return C
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of a longitudinal wave in a thin bar [m/s]."""
+        return sqrt(self.E / self.rho)
+
+
+@dataclass(frozen=True, slots=True)
+class Orthotropic:
+    """Orthotropic linear elastic solid with principal axes 1, 2, 3.
+
+    Attributes:
+        E: (3,) Young's moduli E1, E2, E3 [Pa].
+        nu: (3,) Poisson's ratios nu12, nu13, nu23; nu_ij = -eps_j / eps_i under stress along i.
+        G: (3,) shear moduli G12, G13, G23 [Pa].
+        rho: density [kg/m^3].
+        axes: (3, 3) rows are the principal axes in the frame of the geometry.
+
+    Raises:
+        MaterialError: if the stiffness is not positive definite or the axes are not orthonormal.
+
+    Warns:
+        RomWarning: if sound would travel in it as in no solid: wrong units.
+    """
+
+    E: tuple[float, float, float]
+    nu: tuple[float, float, float]
+    G: tuple[float, float, float]
+    rho: float
+    axes: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    def __post_init__(self) -> None:
+        for name in ("E", "nu", "G"):
+            if np.shape(getattr(self, name)) != (3,):
+                raise MaterialError(f"{name} needs three numbers, got {getattr(self, name)!r}.")
+            for value in getattr(self, name):
+                _check_number(name, value)
+        for value in (*self.E, *self.G):
+            _check_positive("E or G", value, "Pa")
+        _check_number("rho", self.rho)
+        _check_positive("rho", self.rho, "kg/m^3")
+        axes = np.asarray(self.axes, dtype=float)
+        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
+            raise MaterialError("axes is not a (3, 3) matrix of orthonormal rows.")
+        lowest = np.linalg.eigvalsh(self._compliance()).min()
+        if lowest <= 0:
+            raise MaterialError(
+                f"the orthotropic compliance has the negative eigenvalue {lowest:.3g} 1/Pa: "
+                "some load would release energy.",
+                hint="Check that |nu_ij| < sqrt(E_i / E_j).",
+            )
+        warn(self.doubt)
+
+    @classmethod
+    def from_units(
+        cls, units: str, *, E: Any, nu: Any, G: Any, rho: float, axes: Any = None
+    ) -> "Orthotropic":
+        """The solid with numbers in another unit system, e.g. "mm-t-s": MPa and t/mm^3.
+
+        Raises:
+            ConfigError: if the unit system is unknown.
+            MaterialError: as for numbers in SI.
+        """
+        unit = unit_system(units)
+        for name, value in (("rho", rho), *(("E or G", x) for x in (*E, *G))):
+            _check_number(name, value)
+        moduli = (tuple(x * unit.pressure for x in values) for values in (E, G))
+        turned = {} if axes is None else {"axes": axes}
+        return cls(next(moduli), nu, next(moduli), rho * unit.density, **turned)
+
+    @property
+    def doubt(self) -> str:
+        """What is unusual about the numbers, in a sentence, or nothing."""
+        return _solid_doubt(self)
+
+    def _compliance(self) -> Array:
+        (E1, E2, E3), (n12, n13, n23), (G12, G13, G23) = self.E, self.nu, self.G
+        C = np.diag([1 / E1, 1 / E2, 1 / E3, 1 / G23, 1 / G13, 1 / G12])
+        C[0, 1] = C[1, 0] = -n12 / E1
+        C[0, 2] = C[2, 0] = -n13 / E1
+        C[1, 2] = C[2, 1] = -n23 / E2
+        return C
+
+    @property
+    def stiffness(self) -> Array:
+        """(6, 6) stiffness [Pa] in the geometry frame; order and shear as in `Material`."""
+        T = _strain_rotation(np.asarray(self.axes, dtype=float))
+        return T.T @ np.linalg.inv(self._compliance()) @ T
+
+    @property
+    def wave_speed(self) -> float:
+        """Largest speed of a longitudinal wave in a thin bar [m/s]."""
+        return sqrt(max(self.E) / self.rho)
+
+
+def _solid_doubt(solid: Material | Orthotropic) -> str:
+    """Speed of sound or density that no solid has, and the unit system that may be meant."""
+    numbers = f"the solid with E = {solid.E}, rho = {solid.rho:g}"
+    density = STIFF_DENSITY if solid.wave_speed > FOAM_SPEED else SOLID_DENSITY
+    said = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
+    if not said:
+        return ""
+    meant = [name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)]
+    kind = type(solid).__name__
+    return f"{said} Units of {meant[0]}? {kind}.from_units({meant[0]!r}, …)." if meant else said
+
+
+def _is_stiff(solid: Material | Orthotropic, unit: UnitSystem) -> bool:
+    """Whether the numbers are those of a metal, mineral or wood in a unit system."""
+    speed, rho = solid.wave_speed * unit.length / unit.time, solid.rho * unit.density
+    return speed > FOAM_SPEED and not (WAVE_SPEED.doubt(speed) or STIFF_DENSITY.doubt(rho))
+
+
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy
+
+
+def _strain_rotation(Q: Array) -> Array:
+    """(6, 6) map of engineering strains from the geometry frame to the axes in the rows of Q."""
+    T = np.empty((6, 6))
+    for row, (i, j) in enumerate(PAIRS):
+        for column, (k, m) in enumerate(PAIRS):
+            value = Q[i, k] * Q[j, m] + (Q[i, m] * Q[j, k] if k != m else 0.0)
+            T[row, column] = value * (1.0 if i == j else 2.0) / (1.0 if k == m else 2.0)
+    return T
+
+
+def _check_number(name: str, value: Any) -> None:
+    number = np.isscalar(value) and not isinstance(value, bool | str)
+    if not (number and np.isfinite(value)):
+        raise MaterialError(f"{name} = {value!r} is not a finite number.")
+
+
+def _check_positive(name: str, value: float, unit: str) -> None:
+    if value <= 0:
+        raise MaterialError(f"{name} = {value:g} {unit} must be positive.")
