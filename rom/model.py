@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
 from rom.notebook import shown

@@ -54,6 +54,11 @@ WAVE_SPEED = Range(
     "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
     "Check the units: E in Pa, rho in kg/m^3.",
 )  # fmt: skip
+MATRIX_SPEED = Range(
+    "the speed of sound, estimated from stiffness and mass at the nodes,", 7.0, 3.0e4, "m/s",
+    "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
+    "Check units='...' of the matrices and nodes.",
+)  # fmt: skip
 FOAM_SPEED = 1000.0  # m/s; no foam is faster
 SOLID_DENSITY = Range(
     "the density", 0.1, 3.0e4, "kg/m^3", "solids have 0.1 kg/m^3 (aerogel) to 22600 (osmium)",

@@ -4,7 +4,7 @@ A jump is what halving an interval does not make smaller; fast but smooth motion
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,13 +12,16 @@ from rom.errors import ModelError
 from rom.model import Array
 from rom.plausible import warn
 
-INTERVALS = 4096  # at most, over a run
-FEW_INTERVALS = 64  # at least
-SUSPECTS = 4  # sharpest places of a run that are looked at closely
-CLOSE = 1e-10  # of the run: both sides of a jump of the value
-APART = 1e-8  # of the run: points of a difference quotient, so that round-off stays below 1e-6
-SMALL_JUMP = 1e-6  # of the range of the values, that no reaction shows
-SMALL_KINK = 1e-2  # of the largest rate
+INTERVALS = 4096  # at most, that are looked at in one go
+FEW_INTERVALS = 8  # at least
+SUSPECTS = 4  # sharpest places that are looked at closely
+CLOSE = 1e-9  # of the time looked at: both sides of a jump of the value
+RESOLUTION = 1e-15  # of a time, below which two times are one
+APART = 1e-4  # of an interval: points of a difference quotient
+ROUND_OFF = 2e-12  # of value over rate: they lie further apart than that, or say nothing
+SMALL_JUMP = 1e-6  # of the range of the values so far, that no reaction shows
+NOISE = 1e-12  # of the largest value
+SMALL_KINK = 1e-2  # of the largest rate so far
 CONTRADICTION = 0.05  # of the largest rate, by which a given rate may miss that of the value
 Function = Callable[[Array], Array]
 
@@ -81,48 +84,85 @@ def _halved(f: Function, a: float, b: float, width: float) -> tuple[float, float
     return float(a), float(b)
 
 
-def examine(
-    name: str, function: Function, rate: Function | None, span: tuple[float, float], spacing: float
-) -> tuple[float, ModelError] | None:
-    """Look for jumps of a drive over a run.
+@dataclass
+class Examined:
+    """A drive and what was found in it so far; never asked for times that the run has not reached.
 
-    Args:
+    Attributes:
         name: of the drive.
         function: its values (n,) at times (n,).
         rate: its derivative, if it is given.
-        span: start and end of the run [s].
-        spacing: of its steps [s].
-
-    Returns:
-        The time from which on the drive is no motion, and the error that says so.
-
-    Warns:
-        RomWarning: if its velocity jumps, or is not the one that is given.
+        start: first time of the run [s].
+        until: time up to which it was looked at [s].
+        low, high: least and largest value.
+        top: largest rate.
+        told: whether a doubt was said; one is enough.
+        end: time from which on the drive is no motion, and the error that says so.
     """
-    T = span[1] - span[0]
-    if not np.isfinite(T) or T <= 0.0:
-        return None
-    n = int(np.clip(np.ceil(T / spacing), FEW_INTERVALS, INTERVALS))
-    t = np.linspace(*span, n + 1)
-    values = function(t)
-    if not np.isfinite(values).all():
-        return None  # a message of its own waits at that time
-    jump = largest_jump(function, t, CLOSE * T, SMALL_JUMP * float(np.ptp(values)))
-    if jump is not None:
-        return jump.t, _refusal(name, jump)
-    quotient = _quotient(function, span, APART * T)
-    speed = quotient if rate is None else rate
-    top = float(np.abs(speed(t)).max())
-    kink = largest_jump(speed, t, 4 * APART * T, SMALL_KINK * top)
-    if kink is not None:
-        warn(
-            f"the velocity of drive {name!r} jumps by {kink.size:.4g} at t = {kink.t:.6g} s, from "
-            f"{kink.before:.4g} to {kink.after:.4g}: the reactions there are those of an impact, "
-            "and depend on the time step. Round the corner over several steps."
-        )
-    elif rate is not None:
-        _warn_of_contradiction(name, t, rate(t), quotient(t))
-    return None
+
+    name: str
+    function: Function
+    rate: Function | None
+    start: float
+    until: float = field(init=False)
+    low: float = np.inf
+    high: float = -np.inf
+    top: float = 0.0
+    told: bool = False
+    end: tuple[float, ModelError] | None = None
+
+    def __post_init__(self) -> None:
+        self.until = self.start
+
+    def up_to(self, time: float, spacing: float) -> tuple[float, ModelError] | None:
+        """Look on to a time by intervals of a spacing [s]; returns ``end``.
+
+        Warns:
+            RomWarning: if the velocity jumps, or is not the one that is given.
+        """
+        if self.end is None and time > self.until:
+            first = max(self.start, self.until - spacing)
+            n = int(np.clip(np.ceil((time - first) / spacing), FEW_INTERVALS, INTERVALS))
+            t = np.linspace(first, time, n + 1)
+            values = self.function(t)
+            if np.isfinite(values).all():
+                self.until = time
+                self._look_at(t, values)
+        return self.end
+
+    def _look_at(self, t: Array, values: Array) -> None:
+        self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
+        largest = max(abs(self.low), abs(self.high))
+        small = max(SMALL_JUMP * (self.high - self.low), NOISE * largest)
+        width = max(CLOSE * (t[-1] - t[0]), RESOLUTION * float(np.abs(t).max()))
+        jump = largest_jump(self.function, t, width, small)
+        if jump is not None:
+            self.end = jump.t, _refusal(self.name, jump)
+        elif not self.told:
+            self._look_at_rate(t, largest)
+
+    def _look_at_rate(self, t: Array, largest: float) -> None:
+        interval = t[1] - t[0]
+        quotient = _quotient(self.function, (self.start, t[-1]), APART * interval)
+        speed = quotient if self.rate is None else self.rate
+        values = speed(t)
+        self.top = max(self.top, float(np.abs(values).max()))
+        if not np.isfinite(values).all() or APART * interval * self.top < ROUND_OFF * largest:
+            return
+        kink = largest_jump(speed, t, 4 * APART * interval, SMALL_KINK * self.top)
+        doubt = "" if kink is None else _kink(self.name, kink)
+        if self.rate is not None and not doubt:
+            doubt = _contradiction(self.name, t, values, quotient(t))
+        warn(doubt)
+        self.told = bool(doubt)
+
+
+def _kink(name: str, kink: Jump) -> str:
+    return (
+        f"the velocity of drive {name!r} jumps by {kink.size:.4g} at t = {kink.t:.6g} s, from "
+        f"{kink.before:.4g} to {kink.after:.4g}: the reactions there are those of an impact, "
+        "and depend on the time step. Round the corner over several steps."
+    )
 
 
 def _refusal(name: str, jump: Jump) -> ModelError:
@@ -146,12 +186,13 @@ def _quotient(function: Function, span: tuple[float, float], apart: float) -> Fu
     return rate
 
 
-def _warn_of_contradiction(name: str, t: Array, given: Array, found: Array) -> None:
+def _contradiction(name: str, t: Array, given: Array, found: Array) -> str:
     miss = np.abs(given - found)
     k = int(np.argmax(miss))
-    if miss[k] > CONTRADICTION * np.abs(found).max():
-        warn(
-            f"the rate given for drive {name!r} is {given[k]:.4g} at t = {t[k]:.6g} s, where its "
-            f"value changes by {found[k]:.4g} per second: joint and velocity contradict each "
-            "other. Check signs and units of the rate."
-        )
+    if miss[k] <= CONTRADICTION * max(np.abs(found).max(), np.abs(given).max()):
+        return ""
+    return (
+        f"the rate given for drive {name!r} is {given[k]:.4g} at t = {t[k]:.6g} s, where its "
+        f"value changes by {found[k]:.4g} per second: joint and velocity contradict each "
+        "other. Check signs and units of the rate."
+    )

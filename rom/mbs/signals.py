@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, RomError, SolverError
-from rom.mbs.jumps import examine
+from rom.mbs.jumps import Examined
 from rom.model import Array
 
 # first and last time a function may be asked for
@@ -29,7 +29,7 @@ class Signal:
         function: t -> number (drive) or (3,) vector (load).
         rate, acceleration: its derivatives, or None.
         width: 1 for a drive, 3 for a load, which may jump.
-        ends: {span: time from which on it is no motion, and the error}, as far as looked for.
+        looked: {span of a run: what was found in it so far}.
     """
 
     name: str
@@ -37,19 +37,19 @@ class Signal:
     rate: Callable[[float], Any] | None = None
     acceleration: Callable[[float], Any] | None = None
     width: int = 1
-    ends: dict[Span, Any] = field(default_factory=dict, compare=False, repr=False)
+    looked: dict[Span, Examined] = field(default_factory=dict, compare=False, repr=False)
 
-    def end(self, span: Span, spacing: float) -> tuple[float, RomError] | None:
-        """Time from which on a drive is no motion, and the error; None if it is one."""
-        if span not in self.ends:
-            f, rate = (
-                None if g is None else (lambda t, g=g: self._values(g, t)[:, 0])
-                for g in (self.function, self.rate)
-            )
-            self.ends[span] = (
-                None if self.width == 3 else examine(self.name, f, rate, span, spacing)
-            )
-        return self.ends[span]
+    def end(self, span: Span, time: float, spacing: float) -> tuple[float, RomError] | None:
+        """When a drive stops to be a motion, as far as looked up to a time, and the error."""
+        if self.width == 3:
+            return None
+        if span not in self.looked:
+            rate = None if self.rate is None else self._of_many(self.rate)
+            self.looked[span] = Examined(self.name, self._of_many(self.function), rate, span[0])
+        return self.looked[span].up_to(min(time, span[1]), spacing)
+
+    def _of_many(self, function: Callable[[float], Any]) -> Callable[[Array], Array]:
+        return lambda t: self._values(function, t)[:, 0]
 
     def sample(self, t: Array, span: Span, spacing: float) -> Array:
         """(n, 3) value, rate, acceleration at the times t; or the vectors of a load.
@@ -152,7 +152,8 @@ def first_failure(
         spacing: of the steps of the run [s].
     """
     bad = ~np.isfinite(table).all(axis=2)
-    ends = [signal.end(span, spacing) for signal in signals] if np.isfinite(span).all() else []
+    asked = signals if np.isfinite(span).all() else ()
+    ends = [signal.end(span, float(t[-1]), spacing) for signal in asked]
     good, failure = t.size, RomError("")
     for time, error in filter(None, ends):
         if np.searchsorted(t, time) < good:
