@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen import given_rigid_motions, rigid_motions
@@ -13,6 +14,7 @@ from rom.rows import row
 from rom.scipy_operators import SciPyOperators
 
 
+@typed
 def check(record: Any) -> Report:
     """Check a record against the limits its kind has to meet.
 

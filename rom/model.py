@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
@@ -19,6 +20,7 @@ Integers = npt.NDArray[np.integer[Any]]
 Numbers = TypeVar("Numbers", Array, Index)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Interface:
     """Nodes through which a body touches the rest of the mechanism.
@@ -50,6 +52,7 @@ class Interface:
         return float(self.surface_mass.sum())
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Attachment:
     """A rigid body, or a point mass, carried by an interface.
@@ -70,6 +73,7 @@ class Attachment:
     at: Any = None
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Region:
     """What one region adds to the matrices of a model.
@@ -87,6 +91,7 @@ class Region:
     stretched: "Callable[[int], Layered] | None" = None
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Layered:
     """A region stretched by t along an axis: K(t) = t K_along + K_mixed + K_across / t.
@@ -104,6 +109,7 @@ class Layered:
     K_across: Any
 
 
+@typed
 @dataclass(frozen=True)
 class FEModel:
     """Linear finite element model of one free body, no boundary condition applied.
@@ -156,6 +162,7 @@ class FEModel:
         return self.operators.gram(along_x, self.operators.apply_M(along_x)).item() + carried
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class SurfaceMesh:
     """Triangles of the outer surface, for pictures.
@@ -170,6 +177,7 @@ class SurfaceMesh:
     triangles: Index
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Basis:
     """Columns that span the deformations kept.
@@ -191,6 +199,7 @@ class Basis:
         return 0.5 * (B + B.T)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Modes:
     """Natural modes, lowest first, mass-normalised; ``omega, shapes = modes`` unpacks them.
@@ -247,6 +256,7 @@ class Row:
     ok: bool
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Report:
     """Outcome of a set of checks; prints as a table.

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.io.files import write_whole
@@ -94,6 +95,7 @@ def picture(path: str | Path, caption: str) -> str:
 
 
 @path_came_first(2, 0, 1)
+@typed
 def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: str) -> Path:
     """Write a report.
 

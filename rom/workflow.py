@@ -8,6 +8,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.attachment import added_mass
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
@@ -61,6 +62,7 @@ class MassProperties:
     inertia: Array
 
 
+@typed
 def mass_properties(model: FEModel) -> MassProperties:
     """Mass, mass centre and inertia of a finite element model with all it carries.
 
@@ -78,6 +80,7 @@ def mass_properties(model: FEModel) -> MassProperties:
     return MassProperties(mass, centre, 0.5 * (M[3:, 3:] + M[3:, 3:].T) - steiner)
 
 
+@typed
 def modes(
     model: FEModel,
     m: int,
@@ -143,6 +146,7 @@ def reduce(
 ) -> ReducedSector: ...
 
 
+@typed
 def reduce(  # noqa: PLR0913  one keyword per choice
     model: FEModel | CyclicSector,
     *,
@@ -244,6 +248,7 @@ def _reduced_sector(
     return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC))
 
 
+@typed
 def substructure(model: FEModel, *, n_modes: int, interfaces: dict[str, Any]) -> FreeSubstructure:
     """A free body for coupling by interface forces: MacNeal, Rubin, dual Craig-Bampton.
 

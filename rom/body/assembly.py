@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
+from rom.arguments import typed
 from rom.body.condensed import (
     CondensedAssembly,
     Partition,
@@ -31,6 +32,7 @@ GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
 MISSING = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
 
 
+@typed
 @dataclass(frozen=True)
 class Assembly:
     """Bodies that share interfaces, in the position in which they were modelled.

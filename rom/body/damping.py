@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.plausible import DAMPING_RATIO, check_damping_ratio, refuse_negative, warn_outside
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Rayleigh:
     """D = alpha M + beta K.
@@ -45,6 +47,7 @@ class Rayleigh:
             warn_outside(DAMPING_RATIO, ratio, of)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class ModalDamping:
     """D = diag(2 zeta omega) in the elastic coordinates of the body.

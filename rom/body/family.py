@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody, reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
@@ -42,6 +43,7 @@ class Share:
     fixed: bool = False
 
 
+@typed
 @dataclass(frozen=True)
 class BodyFamily:
     """A flexible body with parameters; `at` gives the body for their values.

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh, null_space
 
+from rom.arguments import typed
 from rom.body.recovery import StressRecovery
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
@@ -73,6 +74,7 @@ class Surface:
     shape: Array
 
 
+@typed
 @dataclass(frozen=True)
 class FlexibleBody:
     """A reduced elastic body in its floating frame.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
 
@@ -17,6 +18,7 @@ Where = Callable[[Array], Any] | str | None
 NEAR = 1e-9  # distance of two points that are the same, relative to the size of the body
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class SpreadLoad:
     """Forces f on points X + sum_k phi_k q_k of a body, for a unit of their amplitude.
@@ -41,6 +43,7 @@ class SpreadLoad:
         return SpreadLoad(factor * self.force, factor * self.first, factor * self.shapes)
 
 
+@typed
 def surface_load(
     body: "FlexibleBody",
     *,
@@ -118,6 +121,7 @@ def _triangles(body: "FlexibleBody", where: Where) -> tuple[Index, Array]:
     return chosen, 0.5 * np.cross(b - a, c - a)
 
 
+@typed
 def mass_load(body: "FlexibleBody", acceleration: npt.ArrayLike) -> SpreadLoad:
     """Force per mass on every particle of a body, such as gravity or a magnetic pull.
 

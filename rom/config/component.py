@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rom.arguments import typed
 from rom.config.component_keys import TABLE
 from rom.config.document import Document, KeyPath, read_document
 from rom.config.keys import Place, Quantity, read_table, shown
@@ -235,6 +236,7 @@ def _si(dimension: tuple[int, ...]) -> str:
     return " ".join(f"{b}^{n}" for b, n in zip(bases, dimension, strict=True) if n) or "1"
 
 
+@typed
 def read_component(
     path: str | Path, changes: Mapping[tuple[str, ...], Any] | None = None
 ) -> Component:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rom.arguments import typed
 from rom.config.component import Located, change, read_component
 from rom.config.document import Document, read_document
 from rom.config.keys import Place, nearest, read_table
@@ -190,7 +191,7 @@ def _add_body(made: "Mechanism", name: str, values: dict[str, Any]) -> None:
 
 def _orientation(value: Any) -> Any:
     from rom import rotation
-    from rom.mbs.arguments import unit_vector
+    from rom.arguments import unit_vector
 
     if not isinstance(value, Mapping):
         return value
@@ -207,7 +208,7 @@ def _add_rigid_from(made: "Mechanism", name: str, file: Path, values: dict[str, 
     """A rigid body with the mass properties and interfaces of a body or a component."""
     import numpy as np
 
-    from rom.mbs.arguments import start_pose
+    from rom.arguments import start_pose
     from rom.rotation import matrix
 
     mass, centre, inertia, points = _mass_of(file)
@@ -294,6 +295,7 @@ ADAPTED = {
 }
 
 
+@typed
 def read_mechanism(
     path: str | Path, changes: Mapping[tuple[str, ...], Any] | None = None
 ) -> MechanismFile:

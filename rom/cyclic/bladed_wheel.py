@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
+from rom.arguments import typed
 from rom.cyclic.blades import ReducedBlade
 from rom.cyclic.certificate import wheel_certificate
 from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
@@ -38,6 +39,7 @@ from rom.plausible import check_damping_ratio
 RIGID = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
 
+@typed
 @dataclass(frozen=True)
 class BladedWheel:
     """A disk without blades, ready for any set of them.

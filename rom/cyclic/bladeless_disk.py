@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
+from rom.arguments import typed
 from rom.cyclic.bladed_wheel import BladedWheel
 from rom.cyclic.modes import real_span
 from rom.cyclic.sector import Complex
@@ -15,6 +16,7 @@ from rom.model import Array
 SPANNED = 1e-6  # share of a rigid motion that coordinates may miss and still have it
 
 
+@typed
 def bladed_wheel(
     sector: SubstructuredSector, n_waves: int, *, n_root: int | None = None
 ) -> BladedWheel:

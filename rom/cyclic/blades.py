@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity
 
+from rom.arguments import typed
 from rom.cyclic.faces import interpolation
 from rom.cyclic.rotation import arms, rotation_matrices
 from rom.cyclic.sector import all_rows, region
@@ -35,6 +36,7 @@ APART = 0.05  # of the size of a root: how far another one may lie, or differ in
 ELSEWHERE = 1e-9  # of the stiffness of a dof: what other regions add to it counts as nothing
 
 
+@typed
 @dataclass(frozen=True)
 class ReducedBlade:
     """One blade in r coordinates of its root, then m cantilever modes.
@@ -106,6 +108,7 @@ class ReducedBlade:
         )
 
 
+@typed
 def reduced_blade(
     sector: "SubstructuredSector",
     model: FEModel,

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rom.arguments import typed
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.cyclic.travelling import travelling_modes
@@ -15,6 +16,7 @@ from rom.model import Array
 SPARE = 4  # waves computed beyond those followed, which may come down from above
 
 
+@typed
 @dataclass(frozen=True)
 class WheelCampbell:
     """Frequencies over the speed, each column one wave.
@@ -50,6 +52,7 @@ class WheelCampbell:
         return self.frequencies[:, self.direction < 0]
 
 
+@typed
 def wheel_campbell(
     sector: CyclicSector, diameter: int, n: int, *, speeds: npt.ArrayLike
 ) -> WheelCampbell:

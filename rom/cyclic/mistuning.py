@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
+from rom.arguments import typed
 from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector
@@ -38,6 +39,7 @@ NEW = 1e-12  # squared share of a mode that is new, below which it is round-off
 AT_ONCE = 1_000_000  # complex numbers held by one batch of wheels
 
 
+@typed
 @dataclass(frozen=True)
 class MistunedWheel:
     """A wheel in the coordinates of its tuned modes, ready for any set of blades.
@@ -215,6 +217,7 @@ class MistunedWheel:
         return largest
 
 
+@typed
 def mistuned_wheel(
     sector: CyclicSector, n: int, *, blade: Any = "blade", speed: float = 0.0
 ) -> MistunedWheel:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import bmat, csr_matrix
 
+from rom.arguments import typed
 from rom.cyclic.rotation import divergence_speed
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
@@ -15,6 +16,7 @@ from rom.scipy_operators import SciPyOperators, negative_count
 SPARE = 2  # modes beyond those asked for, so that no pair is cut
 
 
+@typed
 @dataclass(frozen=True, kw_only=True)
 class CyclicModes(Modes):
     """Modes of a wheel with the same number of nodal diameters.
@@ -42,6 +44,7 @@ class CyclicModes(Modes):
         return self.sector.on_wheel(self.shapes, self.diameter, phase)
 
 
+@typed
 def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 0.0) -> CyclicModes:
     """Lowest modes of a wheel with a number of nodal diameters.
 

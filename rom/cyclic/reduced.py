@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity
 from scipy.spatial import cKDTree
 
+from rom.arguments import typed
 from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, InterfaceError
@@ -52,6 +53,7 @@ class ReducedSector(CyclicSector):
         return self.full.on_wheel(self.expand(shapes), diameter, phase)
 
 
+@typed
 def reduce_sector(
     sector: CyclicSector,
     *,

@@ -17,6 +17,7 @@ from scipy.linalg import LinAlgError, eigh, qr
 from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from rom.arguments import typed
 from rom.cyclic.sector import NONE, CyclicSector
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
@@ -27,6 +28,7 @@ RESIDUAL = 1e-7  # of eigenvectors; the error of eigenvalues apart from others i
 NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender solids
 
 
+@typed
 def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
     """The sector with the matrices of its rotation, for all speeds.
 

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
+from rom.arguments import typed
 from rom.attachment import added_mass
 from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen import rigid_motions
@@ -30,6 +31,7 @@ Complex = npt.NDArray[np.complex128]
 NONE = np.zeros(0, dtype=np.int64)
 
 
+@typed
 @dataclass(frozen=True)
 class CyclicSector:
     """Matrices of one sector and how its faces meet.

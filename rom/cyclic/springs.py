@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_matrix, kron
 
+from rom.arguments import typed
 from rom.cyclic.sector import CyclicSector
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
 
 
+@typed
 def supported_sector(
     sector: CyclicSector, face: Interface, *, across: float = 0.0, along: float = 0.0
 ) -> CyclicSector:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.cyclic.blades import (
     ELSEWHERE,
     ReducedBlade,
@@ -44,6 +45,7 @@ class SubstructuredSector(ReducedSector):
     root_moved: Array | None = None
 
 
+@typed
 def substructured_sector(
     sector: CyclicSector,
     model: FEModel,

@@ -7,6 +7,7 @@ from scipy.linalg import eig
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
+from rom.arguments import typed
 from rom.cyclic.modes import real_form, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.eigen import count_shift
@@ -20,6 +21,7 @@ SPARE = 4  # waves computed beyond those asked for
 SMALL = 40  # dofs up to which all waves are computed at once
 
 
+@typed
 @dataclass(frozen=True, kw_only=True)
 class TravellingModes(Modes):
     """Waves with the same number of nodal diameters on a wheel that turns steadily.
@@ -63,6 +65,7 @@ class TravellingModes(Modes):
         return self.frequencies + turns * self.direction
 
 
+@typed
 def travelling_modes(
     sector: CyclicSector, diameter: int, n: int, *, speed: float
 ) -> TravellingModes:

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagError
 from rom.fe.aij import symmetric
@@ -31,6 +32,7 @@ WHOLE = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
 
 
+@typed
 def model(
     path: str | Path,
     *,
@@ -95,6 +97,7 @@ def model(
     return replace(made, operators=made.operators.solved_by(way), provenance=provenance)
 
 
+@typed
 def assemble(
     mesh: Any,
     cell_tags: Any = None,

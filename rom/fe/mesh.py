@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError, RomWarning
 from rom.fe.child import read_apart
 from rom.fe.quality import straighten
@@ -34,6 +35,7 @@ READERS = {
 }
 
 
+@typed
 def read_mesh(
     path: str | Path,
     *,

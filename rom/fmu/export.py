@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.fmu.server import SETTINGS
@@ -22,6 +23,7 @@ LONGEST = 600  # seconds to build the mechanism, its compilation included
 
 
 @path_came_first(1, 0, suffix=".fmu")
+@typed
 def write_fmu(
     script: str | Path,
     path: str | Path,

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.dmig import write_dmig
@@ -70,6 +71,7 @@ FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer
 }
 
 
+@typed
 def export(
     body: FlexibleBody, path: str | Path, *, to: str | None = None, held: Sequence[str] = ()
 ) -> Path:

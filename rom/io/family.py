@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.family import BodyFamily, Share
 from rom.body.flexible import FlexibleBody
@@ -22,6 +23,7 @@ VERSION = (1, 0)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
 
 
+@typed
 def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
     """Write a flexible body, or a family of them, whole or not at all.
 
@@ -60,6 +62,7 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
     return write_archive(path, manifest, arrays, f"family {body.body.name!r}")
 
 
+@typed
 def load(path: str | Path, *, limit: int = LIMIT) -> Any:
     """Read a flexible body, or a family of them.
 

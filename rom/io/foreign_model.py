@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 from scipy.spatial import cKDTree
 
+from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError, InterfaceError, ModelError, QualityGateError
 from rom.io.dmig import Dofs
 from rom.io.matrix_files import NamedMatrix, read_matrix
@@ -24,6 +25,7 @@ MORE_NODES = 5
 NODE_SPEED = 2.3
 
 
+@typed
 def read_model(
     K: Any,
     M: Any,

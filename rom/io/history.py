@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable, write_whole
 from rom.model import Array
@@ -34,6 +35,7 @@ class Channel:
     values: Array
 
 
+@typed
 def write_history(solution: Any, path: str | Path, *, every: int = 1) -> Path:
     """Write the motion of every body and marker, the reactions and the energies.
 

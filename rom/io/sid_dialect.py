@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError, RomWarning
 from rom.io.sid import BLOCKS, DIALECTS, TENSOR, StandardInput, Taylor, repacked
 from rom.io.sid_reading import RawBlock, RawFile, read_raw, values
@@ -23,6 +24,7 @@ GE = ("antisymmetric", "as_written")
 FLOOR = 1e-4  # share of what a block could be, below which its differences are round-off
 
 
+@typed
 def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
     """Read a flexible body from Standard Input Data, of any program.
 

@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import von_mises
 from rom.errors import ConfigError
@@ -35,6 +36,7 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
     return Path(path)
 
 
+@typed
 def write_stress(
     body: FlexibleBody, q: Array, path: str | Path, *, accelerations: Array | None = None
 ) -> Path:
@@ -60,6 +62,7 @@ def write_stress(
     return Path(path)
 
 
+@typed
 def write_stress_history(solution: Any, body: str, path: str | Path, *, every: int = 1) -> Path:
     """Write stress and displacement of a moving body as a series for ParaView.
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.mbs.arrays import ROLL
 from rom.mbs.solution import Solution
 from rom.mbs.validity import DEFORMATION, deformation, softening
@@ -17,6 +18,7 @@ MOMENTUM = 1e-5  # a method of second order conserves it to the error of its ste
 CORRECTIONS = 8.0
 
 
+@typed
 def audit(solution: Solution) -> Report:
     """Check a motion.
 

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rom.arguments import typed, unit_vector
 from rom.errors import ConfigError
-from rom.mbs.arguments import unit_vector
 from rom.mbs.equilibrium import equilibrium
 from rom.mbs.linearize import Linearization, linearize
 from rom.mbs.mechanism import Mechanism
@@ -60,6 +60,7 @@ class Campbell:
         return tuple(found)
 
 
+@typed
 def campbell(
     mechanism: Mechanism | Callable[[float], Any],
     speeds: npt.ArrayLike,

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError
 from rom.io.archive import LIMIT, Kind, read_archive, write_archive
 from rom.mbs.state import Memory, State
@@ -15,6 +16,7 @@ OPTIONAL = ("algorithmic", "base")
 MEMORY = "memory/"
 
 
+@typed
 def save_state(state: State, path: str | Path) -> Path:
     """Write a state with what its method remembers, whole or not at all.
 
@@ -43,6 +45,7 @@ def save_state(state: State, path: str | Path) -> Path:
     return write_archive(path, manifest, dict(sorted(arrays.items())), "the state")
 
 
+@typed
 def load_state(path: str | Path, *, limit: int = LIMIT) -> State:
     """Read a state to go on from: ``rom.simulate(mechanism, state=..., ...)``.
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import number, positive, typed, unit_vector
 from rom.errors import ConfigError, ModelError
 from rom.mbs import joints
-from rom.mbs.arguments import number, positive, unit_vector
 from rom.mbs.joints import Joint, Row
 from rom.mbs.parts import Marker, Part
 from rom.model import Array
@@ -28,6 +28,7 @@ class Drive:
     acceleration: TimeFunction | None
 
 
+@typed
 class Connections:
     """The joints of a `rom.mbs.mechanism.Mechanism`."""
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from rom import rotation
+from rom.arguments import finite, number, positive, typed, unit_quaternion, unit_vector
 from rom.errors import ConfigError
-from rom.mbs.arguments import finite, number, positive, unit_quaternion, unit_vector
 from rom.mbs.arrays import BORE, CYLINDER, DISC, PLANE, SPHERE
 from rom.mbs.impact import Impact, checked_law
 from rom.mbs.parts import Marker, Part
@@ -59,6 +59,7 @@ class Spread:
     world: int
 
 
+@typed
 class Elements:
     """The bushings, contacts and spread loads of a `rom.mbs.mechanism.Mechanism`."""
 

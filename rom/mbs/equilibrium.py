@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import finite, typed
 from rom.errors import ConfigError, ModelError, RomError, RomWarning, SolverError
-from rom.mbs.arguments import finite
 from rom.mbs.arrays import ROLL
 from rom.mbs.packing import Packed
 from rom.mbs.state import State, assembled, initial_state
@@ -22,6 +22,7 @@ SMALLEST = 1 / 64  # of a load step, before the search is given up
 GOAL, ROUND_OFF = 1e-12, 1e-7  # of the last correction; above, where corrections stop to shrink
 
 
+@typed
 def equilibrium(
     mechanism: Any,
     state: State | None = None,

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from rom.arguments import number, positive
 from rom.errors import ConfigError
-from rom.mbs.arguments import number, positive
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, InterruptedRun, RomError
 from rom.mbs.alpha import advance
 from rom.mbs.arrays import workspace
@@ -26,6 +27,7 @@ METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run
 RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
 
 
+@typed
 def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     mechanism: Mechanism,
     *,

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError, ModelError
 from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.mechanism import Mechanism
@@ -20,6 +21,7 @@ from rom.model import Array
 SPACING = 1e-4  # of the differences of drives without derivatives, relative to the duration
 
 
+@typed
 def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
     """Positions, velocities, accelerations and all loads of a mechanism that is driven entirely.
 

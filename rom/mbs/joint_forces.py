@@ -7,8 +7,8 @@ from typing import Any
 
 import numba
 
+from rom.arguments import number, positive, typed
 from rom.errors import ConfigError
-from rom.mbs.arguments import number, positive
 from rom.mbs.impact import Impact, checked_law
 from rom.mbs.joints import Joint, Row
 
@@ -47,6 +47,7 @@ class Stop:
     law: Impact
 
 
+@typed
 class JointForces:
     """The forces of a `rom.mbs.mechanism.Mechanism` along joint coordinates."""
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
@@ -23,6 +24,7 @@ ZERO, ZERO_BY_DIFFERENCES = 2e-7, 1e-5  # frequency that is round-off, relative 
 DRIFT = 1e-3  # relative change of the matrices in a radian from which they count as periodic
 
 
+@typed
 @dataclass(frozen=True)
 class Linearization:
     """Linear equations M y'' + C y' + K y = f of the motions that the joints allow.
@@ -120,6 +122,7 @@ class Linearization:
         return "\n".join(lines)
 
 
+@typed
 def linearize(
     mechanism: Any, state: State | None = None, *, t: float | None = None, frame: Any = "body"
 ) -> Linearization:

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import finite, matrix33, number, positive, start_pose, typed
 from rom.errors import ConfigError
-from rom.mbs.arguments import finite, matrix33, number, positive, start_pose
 from rom.mbs.connections import Connections, Drive, TimeFunction
 from rom.mbs.elements import Bushing, Contact, Elements, Spread
 from rom.mbs.joint_forces import Friction, JointForces, Motor, Stop
@@ -71,6 +71,7 @@ class Event:
     terminal: bool
 
 
+@typed
 @dataclass
 class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBodies):
     """Rigid and flexible bodies, connected and loaded.

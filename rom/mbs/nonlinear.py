@@ -27,8 +27,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import finite, start_pose, typed
 from rom.errors import ConfigError, ModelError
-from rom.mbs.arguments import finite, start_pose
 from rom.mbs.joints import Joint
 from rom.mbs.parts import Marker, Part
 from rom.model import Array, Index
@@ -92,6 +92,7 @@ class NonlinearBody(Protocol):
         """Pairs of frames with one origin, which turn each for itself."""
 
 
+@typed
 @dataclass(frozen=True)
 class Assembly:
     """A non-linear body in a mechanism: frame k is the body ``name.k``.
@@ -128,6 +129,7 @@ class Assembly:
         return float(sum(np.linalg.norm(b.at - a.at) for a, b in pairwise(self.parts)))
 
 
+@typed
 class NonlinearBodies:
     """The non-linear bodies of a `rom.mbs.mechanism.Mechanism`."""
 

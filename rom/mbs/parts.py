@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import finite, typed
 from rom.errors import ConfigError, ModelError
-from rom.mbs.arguments import finite
 from rom.model import Array
 from rom.plausible import GYRATION, SIZE, warn_outside
 
@@ -31,6 +31,7 @@ class Marker:
     place: str | tuple[float, float, float]
 
 
+@typed
 @dataclass(frozen=True)
 class Part:
     """A body in a mechanism.

@@ -3,12 +3,14 @@
 from dataclasses import replace
 from typing import Any
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import pack
 from rom.mbs.state import State, initial_state
 
 
+@typed
 def release(mechanism: Mechanism, state: State) -> State:
     """State of a mechanism in the position and motion of another one with the same bodies.
 

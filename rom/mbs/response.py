@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.linearize import Linearization, linearize
 from rom.mbs.parts import Marker
@@ -41,6 +42,7 @@ class FrequencyResponse:
         return 2j * np.pi * self.frequencies[:, None, None] * self.mobility
 
 
+@typed
 def frequency_response(
     mechanism: Any,
     state: State | None,
@@ -71,6 +73,7 @@ def frequency_response(
     return FrequencyResponse(f, found)
 
 
+@typed
 def transmissibility(
     mechanism: Any,
     state: State | None,

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import number, positive, typed
 from rom.errors import ConfigError, ModelError
-from rom.mbs.arguments import number, positive
 from rom.mbs.equilibrium import equilibrium
 from rom.mbs.linearize import Linearization, linearize
 from rom.mbs.mechanism import Mechanism
@@ -66,6 +66,7 @@ class _Path:
         return (after - before) / (2 * self.step)
 
 
+@typed
 def equilibrium_sensitivity(
     build: Builder, parameters: Mapping[str, float], output: Output, **options: Any
 ) -> Sensitivity:
@@ -97,6 +98,7 @@ def equilibrium_sensitivity(
     return _collected(values, np.asarray(output(mechanism, state)), slopes)
 
 
+@typed
 def frequency_sensitivity(
     build: Builder, parameters: Mapping[str, float], **options: Any
 ) -> Sensitivity:
@@ -137,6 +139,7 @@ def frequency_sensitivity(
     return _collected(values, linear.eigenvalues, slopes)
 
 
+@typed
 def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, float]) -> Sensitivity:
     """Derivatives of the result of a simulation, by central differences with a chosen step.
 

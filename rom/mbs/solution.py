@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.mbs.arrays import WORK
 from rom.mbs.dense import Point, between
@@ -54,6 +55,7 @@ class Energy:
         return self.total - self.total[0] - supplied
 
 
+@typed
 @dataclass(frozen=True)
 class Solution:
     """Motion of a mechanism.

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ModelError, RomWarning, SolverError
 from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.bordered import factorised, gradient_times, least_motion, mass_diagonal, weigh
@@ -42,6 +43,7 @@ class Memory:
     arrays: dict[str, Array] = field(repr=False)
 
 
+@typed
 @dataclass(frozen=True)
 class State:
     """A mechanism at one instant.

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import RomWarning, SolverError
 from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
@@ -18,6 +19,7 @@ NOISE = 3e-4  # growth that counts as none, relative to the speed; multiple zero
 RANK = 1e-9  # relative singular value of constraints that repeat others
 
 
+@typed
 @dataclass(frozen=True)
 class SteadyMotion:
     """Small deviations from a steady motion: they grow or decay as exp(s t).
@@ -40,6 +42,7 @@ class SteadyMotion:
         return bool(self.eigenvalues.real.max(initial=0.0) <= NOISE * size)
 
 
+@typed
 def steady_motion(
     mechanism: Any, state: State | None = None, *, t: float | None = None, frame: Any = "world"
 ) -> SteadyMotion:

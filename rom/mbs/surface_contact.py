@@ -7,14 +7,15 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import positive, typed, unit_vector
 from rom.errors import ConfigError
-from rom.mbs.arguments import positive, unit_vector
 from rom.mbs.arrays import BORE, CYLINDER, PLANE, SPHERE
 from rom.mbs.elements import Contact
 from rom.mbs.impact import Impact, checked_law
 from rom.mbs.parts import Marker, Part, surface_place
 
 
+@typed
 class SurfaceContacts:
     """The contacts of surfaces of a `rom.mbs.mechanism.Mechanism`.
 

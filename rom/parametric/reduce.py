@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.family import BodyFamily
 from rom.body.projection import canonical_columns, elastic_part, flexible_body
@@ -36,6 +37,7 @@ TRIALS = 2  # points per parameter at which errors are estimated while the basis
 METHOD = 2.0  # times the error of the method at the centre is no reason for another point
 
 
+@typed
 def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     model: FEModel,
     *,

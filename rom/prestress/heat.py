@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array, FEModel
 
 Temperature = float | Mapping[str, float] | npt.ArrayLike | Callable[[Array], Any]
 
 
+@typed
 @dataclass(frozen=True)
 class Heat:
     """Free thermal expansion of a solid, alpha dT in all directions.

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
+from rom.arguments import typed
 from rom.cyclic.faces import unit_axis
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.rotation import rotation_matrices
@@ -18,6 +19,7 @@ from rom.prestress.steady import SteadyRotation
 from rom.prestress.thermal import finite_solid, held_dofs
 
 
+@typed
 def spin_up(
     sector: CyclicSector,
     model: FEModel,
@@ -66,6 +68,7 @@ def spin_up(
     return SpinUp(np.sqrt(squares), lowest, steady, base, steady.T @ np.array(found).T)
 
 
+@typed
 def held_solid(
     model: FEModel,
     *,

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_matrix
 
+from rom.arguments import typed
 from rom.cyclic.modes import CyclicModes, cyclic_modes
 from rom.cyclic.reduced import ReducedSector, projected, reduce_sector
 from rom.cyclic.sector import CyclicSector
@@ -72,6 +73,7 @@ class SpeedTable(ABC):
         return travelling_modes(self.at(speed), diameter, n, speed=speed)
 
 
+@typed
 @dataclass(frozen=True)
 class ReducedSpinUp(SpeedTable):
     """Few coordinates that follow the steady state, `SpinUp.reduced`.
@@ -108,6 +110,7 @@ class ReducedSpinUp(SpeedTable):
         return replace(self.sectors[0], **mean)
 
 
+@typed
 @dataclass(frozen=True)
 class SpinUp(SpeedTable):
     """Steady states of a solid from rest to a speed, `rom.spin_up`.

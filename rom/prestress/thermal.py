@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_matrix, identity
 
+from rom.arguments import typed
 from rom.cyclic.modes import real_form
 from rom.cyclic.rotation import axial_pins, largest_ratio
 from rom.cyclic.sector import CyclicSector
@@ -29,6 +30,7 @@ from rom.scipy_operators import SciPyOperators, negative_count
 DEPENDENT = 1e-9  # of the largest: what is left of a motion that others contain
 
 
+@typed
 def heated(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> FEModel:
     """The model with the stiffness of its thermal stress, for `rom.modes` and `rom.reduce`.
 
@@ -64,6 +66,7 @@ def heated(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> FEMode
     return replace(model, K=K_hot, operators=operators, provenance=model.provenance | note)
 
 
+@typed
 def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSector:
     """The sector with the stiffness of thermal stress, the same in all sectors.
 
@@ -83,6 +86,7 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
     return replace(sector, K=csr_matrix(sector.K + K_geo))
 
 
+@typed
 def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> float:
     """Factor on the temperature at which the solid buckles; infinite if it never does.
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr, solve_continuous_lyapunov, svd
 
+from rom.arguments import typed
 from rom.eigen import Operators
 from rom.errors import ConfigError, ModelError, ResourceError
 from rom.model import Array, Basis, Index
@@ -14,6 +15,7 @@ from rom.reduction.free_interface import check_count, numbered
 DENSE = 600  # coordinates whose Lyapunov equation, twice as large, is solved in seconds
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class BalancedTruncation:
     """Constraint modes, and those combinations of fixed-interface modes that the interfaces know.
@@ -94,6 +96,7 @@ class SecondOrderSystem:
     singular_values: Array
 
 
+@typed
 def second_order_balanced_truncation(
     K: Array, M: Array, D: Array, B: Array, C: Array, r: int
 ) -> SecondOrderSystem:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space, orth
 from scipy.sparse import identity, kron
 
+from rom.arguments import typed
 from rom.eigen import Operators, given_rigid_motions, rigid_motions, whole_clusters
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("rom")
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Characteristic:
     """A method whose full interfaces follow characteristic constraint modes.

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
+from rom.arguments import typed
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index
 from rom.reduction.free_interface import free_modes, residual_flexibility
@@ -36,6 +37,7 @@ SPENT = 1e-11  # residual flexibility, of the whole one, that is none: the modes
 Place = tuple[str, str]  # substructure, interface
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class FreeSubstructure:
     """A free body as its interfaces see it.
@@ -83,6 +85,7 @@ def free_substructure(
     )
 
 
+@typed
 @dataclass(frozen=True)
 class DualAssembly:
     """Free substructures whose interfaces are held together by forces.

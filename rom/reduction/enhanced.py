@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.arguments import typed
 from rom.eigen import Held, Operators
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
@@ -12,6 +13,7 @@ from rom.reduction.fixed_interface import constraint_modes
 from rom.reduction.free_interface import check_count, numbered
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class EnhancedCraigBampton:
     """Craig-Bampton of the same size, its columns corrected to first order in the eigenvalue.

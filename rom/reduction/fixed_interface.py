@@ -5,11 +5,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.eigen import Held, Operators
 from rom.model import Array, Basis
 from rom.scipy_operators import SciPyOperators
 
 
+@typed
 def craig_bampton(K: Any, M: Any, boundary: npt.ArrayLike, n_modes: int) -> Basis:
     """Constraint modes and fixed-interface normal modes.
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
+from rom.arguments import typed
 from rom.eigen import Operators, orthonormal
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index
@@ -14,6 +15,7 @@ ZERO = 1e-12  # eigenvalue, of a rough vector's Rayleigh quotient, that belongs 
 SPENT = 1e-12  # residual flexibility, of the whole one, that is left to nothing but round-off
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Rubin:
     """Free-free modes, and what they leave of the static flexibility of the interfaces.
@@ -54,6 +56,7 @@ class Rubin:
         return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)))
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Herting:
     """Constraint modes, free-free modes with the interfaces brought back, and inertia relief.
@@ -89,6 +92,7 @@ class Herting:
         return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)))
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class FreeFree:
     """Free-free modes alone: modal truncation, for bodies that no joint clamps.

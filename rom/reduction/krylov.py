@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.eigen import Operators
 from rom.errors import ConfigError, SolverError
 from rom.model import Basis, Index
@@ -13,6 +14,7 @@ from rom.reduction.free_interface import check_count, numbered, without_dependen
 RESONANT = 1e-8  # relative distance of a frequency from a mode that counts as none
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class MomentMatching:
     """Constraint modes, and the answers to moving interfaces at chosen frequencies.

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.eigen import Operators
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
@@ -12,6 +13,7 @@ from rom.reduction.free_interface import numbered, without_dependent
 from rom.reduction.method import Method
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class WithLoads:
     """A method whose basis also answers loads that do not come through the interfaces.

@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.eigen import Held, Operators, whole_clusters
 from rom.errors import ConfigError, RomWarning
 from rom.model import Array, Basis, Index
@@ -22,6 +23,7 @@ class Method(Protocol):
         """The basis in interface coordinates; boundary columns first."""
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Guyan:
     """Constraint modes alone: exact statics, mass condensed to the interfaces.
@@ -35,6 +37,7 @@ class Guyan:
         return CraigBampton(n_modes=0).basis(ops, boundary, labels)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class CraigBampton:
     """Constraint modes of the interface coordinates and fixed-interface normal modes.

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
+from rom.arguments import typed
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
 
@@ -23,6 +24,7 @@ ON_AXIS = 1e-6  # distance from an axis, of the size, where the angle about it i
 THIN = 1e-9  # extent of a surface, of its largest one, that counts as none
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Polynomial:
     """All polynomials up to a total degree.
@@ -65,6 +67,7 @@ class Polynomial:
         )
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class FourierLegendre:
     """Harmonics around an axis times Legendre polynomials along it, for cylindrical seats.

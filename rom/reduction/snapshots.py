@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -12,6 +13,7 @@ from rom.model import Array, Interface
 NOISE = 1e-9  # singular value, of the size of the snapshots, that is left to round-off
 
 
+@typed
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshots:
     """Rigid motions, and the proper orthogonal modes of given displacements of the surface.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view import page
@@ -21,6 +22,7 @@ EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
 @path_came_first(1, 2, 0)
+@typed
 def history(
     t: npt.ArrayLike,
     panels: Sequence[tuple[str, dict[str, Any]]],
@@ -70,6 +72,7 @@ def history(
 
 
 @path_came_first(1, 0)
+@typed
 def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> Path:
     """Draw the relative errors of reduced frequencies in several supports.
 
@@ -110,6 +113,7 @@ def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> 
 
 
 @path_came_first(1, 0)
+@typed
 def convergence(
     panels: Sequence[tuple[str, dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]]],
     path: str | Path,
@@ -152,6 +156,7 @@ def convergence(
 
 
 @path_came_first(1, 0)
+@typed
 def campbell(
     diagram: Any,
     path: str | Path,

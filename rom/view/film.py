@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
@@ -23,6 +24,7 @@ METAL = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 SCALES = ((1.0, "m"), (1e3, "mm"), (1e6, "um"), (1e9, "nm"))  # per metre
 
 
+@typed
 def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     mechanism: Any,
     solution: Any,
@@ -66,6 +68,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     return path
 
 
+@typed
 def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     mechanism: Any,
     solution: Any,

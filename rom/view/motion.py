@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.io.gltf import MovingMesh, write_glb
 from rom.io.vtkhdf import write_vtkhdf
@@ -19,6 +20,7 @@ METAL = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bo
 ELASTIC = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.63, 0.51))
 
 
+@typed
 def write_animation(
     solution: Any,
     path: str | Path,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view import page
@@ -18,6 +19,7 @@ GUIDE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
 Line = tuple[npt.ArrayLike, npt.ArrayLike]
 
 
+@typed
 @dataclass(frozen=True)
 class Panel:
     """One diagram.
@@ -44,6 +46,7 @@ class Panel:
 
 
 @path_came_first(1, 0)
+@typed
 def panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str, caption: str) -> Path:
     """Draw rows of diagrams.
 

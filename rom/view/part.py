@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.view import page
@@ -17,6 +18,7 @@ PART, NET = "#c9d1da", "#6b7480"
 MARKED = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")  # one per interface
 
 
+@typed
 def mesh(
     model: FEModel,
     path: str | Path,

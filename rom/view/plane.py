@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
@@ -21,6 +22,7 @@ FILM = (640, 700)  # of the picture in a film [pixel]
 SKIN, NET, GHOST = "#dfe5ec", "#6b7480", "#d1495b"
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Shape:
     """A plane body as it is now.
@@ -45,6 +47,7 @@ class Shape:
 
 
 @path_came_first(1, 2, 0)
+@typed
 def deformed(  # noqa: PLR0913  keywords of one picture
     curves: dict[str, tuple[npt.ArrayLike, npt.ArrayLike]],
     shapes: Sequence[Shape],
@@ -103,6 +106,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
 
 
 @path_came_first(1, 2, 0)
+@typed
 def flow(
     times: Array,
     shapes: Sequence[Shape],

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array
@@ -23,6 +24,7 @@ WIDTH, GAP, BELOW, BAR = (
 STONE, EDGE = "#d9d2c3", "#5c636e"
 
 
+@typed
 @dataclass
 class Drawing:
     """One drawing, from back to front.
@@ -54,6 +56,7 @@ class Drawing:
 
 
 @path_came_first(1, 0)
+@typed
 def plane(
     drawings: Sequence[Drawing],
     path: str | Path,

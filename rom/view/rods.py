@@ -5,10 +5,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.view.solids import Mesh, box
 
 
+@typed
 def sleeves(rod: Any, widths: npt.ArrayLike) -> dict[str, Mesh]:
     """Boxes around the segments of a rod, as ``shapes`` of `animate` and `save_motion`.
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view import page
@@ -16,6 +17,7 @@ PANEL = 740  # width of one mode [pixel]
 AMPLITUDE = 0.08  # largest displacement shown, of the size of the body
 
 
+@typed
 def mode_shapes(
     body: Any,
     path: str | Path,

@@ -3,11 +3,13 @@
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.model import Array, Index
 
 Mesh = tuple[Array, Index]
 
 
+@typed
 def box(size: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
     """Block with faces along the axes.
 
@@ -25,6 +27,7 @@ def box(size: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
     return corners * np.asarray(size, dtype=float) + np.asarray(centre, dtype=float), triangles
 
 
+@typed
 def cylinder(a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, *, sides: int = 48) -> Mesh:
     """Round bar from one point to another, closed at its ends.
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
@@ -19,6 +20,7 @@ DOTS, FAINT = "#8b929c", "#6b7480"
 
 
 @path_came_first(1, 2, 3, 0)
+@typed
 def updating(  # noqa: PLR0913  keywords of one picture
     f: npt.ArrayLike,
     curves: dict[str, npt.ArrayLike],

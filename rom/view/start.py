@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.rotation import matrix
 from rom.view import page
 from rom.view.film import bars, placed
@@ -17,6 +18,7 @@ COLOURS = ("#9aa5b1", "#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#c
 NAMED = 16  # bodies in the legend
 
 
+@typed
 def start(
     mechanism: Any,
     path: str | Path,

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, SurfaceMesh
@@ -18,6 +19,7 @@ SAME = 1e-6  # of the size of the wheel: nodes of neighbours that close are one
 
 
 @path_came_first(1, 2, 0)
+@typed
 def wheel_modes(  # noqa: PLR0913  keywords of one picture
     model: FEModel,
     shapes: Mapping[str, npt.ArrayLike],

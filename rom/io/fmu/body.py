@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.files import check_writable
@@ -30,6 +31,7 @@ ROUND_OFF = 1e-12  # share of the damping of two modes below which they count as
 STEPS = 20  # communication steps that are proposed for the period of the first vibration
 
 
+@typed
 def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ...] = ()) -> Path:
     """Write a body as an FMU for co-simulation (FMI 2.0) that needs nothing where it runs.
 

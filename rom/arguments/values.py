@@ -1,12 +1,63 @@
-"""Checks of what a user hands over: shapes, finite numbers, rotations."""
+"""Checks of values: whole numbers in a range, words of a list, shapes, rotations."""
 
+import operator
+import reprlib
+from collections.abc import Iterable
+from numbers import Integral
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom import rotation
 from rom.errors import ConfigError
-from rom.model import Array
+
+Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
+SHOWN_LENGTH = 60  # letters of a wrong value in a message
+
+
+def shortened(value: Any) -> str:
+    """A value in a message, in one line of bearable length."""
+    if isinstance(value, np.ndarray) and value.size > 1:
+        return f"array of shape {value.shape} and type {value.dtype}"
+    try:
+        text = " ".join(reprlib.repr(value).split())
+    except ValueError:  # an integer of more digits than Python prints
+        text = f"a huge {type(value).__name__}"
+    return text if len(text) <= SHOWN_LENGTH else f"{text[: SHOWN_LENGTH - 3]}..."
+
+
+def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reason: str = "") -> int:
+    """The value as a whole number within a range.
+
+    Args:
+        name: of the argument.
+        value: what was given.
+        low: smallest that is allowed.
+        high: largest that is allowed; None for no limit.
+        reason: why there is such a range, as the rest of a sentence.
+
+    Raises:
+        ConfigError: for anything else; 3.0 is not a whole number.
+    """
+    fits = isinstance(value, Integral) and not isinstance(value, bool)
+    if fits and low <= operator.index(value) and (high is None or operator.index(value) <= high):
+        return operator.index(value)
+    span = f"of {low} or more" if high is None else f"from {low} to {high}"
+    why = f": {reason}" if reason else ""
+    raise ConfigError(f"{name} = {shortened(value)} must be a whole number {span}{why}.")
+
+
+def one_of(name: str, value: Any, words: Iterable[str]) -> str:
+    """The value as one of some words.
+
+    Raises:
+        ConfigError: listing them.
+    """
+    known = list(words)
+    if isinstance(value, str) and value in known:
+        return value
+    raise ConfigError(f"{name} = {shortened(value)} is none of {', '.join(map(repr, known))}.")
 
 
 def finite(name: str, value: Any, shape: tuple[int, ...]) -> Array:
@@ -17,12 +68,14 @@ def finite(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     """
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"{name} = {value!r} is not made of numbers.") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ConfigError(f"{name} = {shortened(value)} is not made of numbers.") from error
+    if np.array(value).dtype.kind not in "iuf" and array.size:
+        raise ConfigError(f"{name} = {shortened(value)} is not made of numbers.")
     if array.shape != shape:
         raise ConfigError(f"{name} has shape {array.shape}, needed is {shape}.")
     if not np.isfinite(array).all():
-        raise ConfigError(f"{name} = {array.tolist()} is not finite.")
+        raise ConfigError(f"{name} = {shortened(array.tolist())} is not finite.")
     return array
 
 

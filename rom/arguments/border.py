@@ -1,0 +1,114 @@
+"""One check for the types of all arguments of public functions: what their annotations say.
+
+Python finds out that an argument is of the wrong type where it is first used, deep inside, in words
+about attributes and subscripts. The border is the public function, and there the user is told.
+"""
+
+import sys
+import types
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from typing import Any, TypeVar
+
+from rom.arguments.kinds import Names, Taken, Unfit, taken_by
+from rom.arguments.values import shortened
+from rom.errors import ConfigError
+
+Public = TypeVar("Public", bound=Callable[..., Any])
+BY_PLACE = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)
+
+
+def typed(public: Public) -> Public:
+    """Check the arguments of a public function, or of all public methods of a class, at each call.
+
+    Booleans are no numbers, numbers are finite, whole numbers fit eight bytes, paths are no
+    numbers and no bytes. What stands for the same thing becomes it: scalars of NumPy, one name
+    where names are wanted, any iterable for a tuple, lists for arrays. Missing and unknown
+    arguments remain a TypeError of Python.
+
+    Annotations are read at the first call. A class that is imported for type checks alone is known
+    by its name: an object of it cannot exist unless somebody else has imported it.
+
+    Raises:
+        ConfigError: at a call, naming function and argument.
+    """
+    if not isinstance(public, type):
+        return _typed_function(public)  # type: ignore[return-value]
+    for name, member in list(vars(public).items()):
+        if name.startswith("_") and name != "__init__":
+            continue
+        if isinstance(member, types.FunctionType):
+            setattr(public, name, _typed_function(member))
+        elif isinstance(member, classmethod | staticmethod):
+            setattr(public, name, type(member)(_typed_function(member.__func__)))
+    return public
+
+
+def _typed_function(function: Callable[..., Any]) -> Callable[..., Any]:
+    border: list[_Border] = []
+
+    @wraps(function)
+    def at_border(*args: Any, **named: Any) -> Any:
+        if not border:
+            border.append(_Border(function))
+        taken, named = border[0].passed(args, named)
+        return function(*taken, **named)
+
+    return at_border
+
+
+class _Border:
+    """What a function takes, by place and by name."""
+
+    def __init__(self, function: Any):
+        self.name, self.method = function.__name__, "." in function.__qualname__
+        known = Names(vars(sys.modules[function.__module__]))
+        parameters = signature(function).parameters.values()
+        takes = {p.name: taken_by(p.annotation, known) for p in parameters}
+        self.more = [takes.pop(p.name) for p in parameters if p.kind is p.VAR_KEYWORD]
+        rest = [(p.name, takes[p.name]) for p in parameters if p.kind is p.VAR_POSITIONAL]
+        self.rest = rest or [("", None)]  # more than Python will let through
+        self.places = [(p.name, takes[p.name]) for p in parameters if p.kind in BY_PLACE]
+        self.takes = takes
+
+    def passed(
+        self, args: tuple[Any, ...], named: dict[str, Any]
+    ) -> tuple[list[Any], dict[str, Any]]:
+        """The arguments as the function gets them.
+
+        Raises:
+            ConfigError: naming the one that it does not take.
+        """
+        given = zip(self._places(len(args)), args, strict=True)
+        try:
+            return (
+                [_taken(name, take, value) for (name, take), value in given],
+                {k: _taken(k, self.takes.get(k, *self.more), x) for k, x in named.items()},
+            )
+        except Unfit as unfit:
+            text = f"{unfit.place} = {shortened(unfit.value)} must be {unfit.wanted}."
+            raise ConfigError(text, where=self._label(args, named)) from unfit.__cause__
+
+    def _places(self, n: int) -> list[tuple[str, Taken | None]]:
+        beyond = n - len(self.places)
+        return self.places[:n] if beyond <= 0 else self.places + self.rest * beyond
+
+    def _label(self, args: tuple[Any, ...], named: dict[str, Any]) -> str:
+        """The function and, where it makes something that has a name, that name."""
+        by_place = dict(zip((name for name, _ in self.places), args, strict=False))
+        made = (by_place | named).get("name")
+        about = f" {shortened(made)}" if isinstance(made, str) else ""
+        if not self.method or not args:
+            return self.name + about
+        owner = args[0].__name__ if isinstance(args[0], type) else type(args[0]).__name__
+        return (owner if self.name == "__init__" else f"{owner}.{self.name}") + about
+
+
+def _taken(name: str, take: Taken | None, value: Any) -> Any:
+    if take is None:
+        return value
+    try:
+        return take(value)
+    except Unfit as unfit:
+        raise Unfit(unfit.value, unfit.wanted, name + unfit.place) from unfit.__cause__

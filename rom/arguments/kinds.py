@@ -1,0 +1,326 @@
+"""What an annotation takes: the words for it, and the value as the function gets it."""
+
+import builtins
+import collections.abc
+import math
+import operator
+import os
+import types
+import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from inspect import Parameter
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments.values import shortened
+
+LARGEST_WHOLE = 2**63 - 1  # that compiled code can count to
+KINDS_OF_NUMBERS = {  # scalar type of an array -> kinds of types that may stand for it
+    np.bool_: "b",
+    np.int64: "iu",
+    np.integer: "iu",
+    np.float64: "iuf",
+    np.complex128: "iufc",
+}
+SOURCES = {  # class -> where its objects come from, for people who have something else in hand
+    "FEModel": "from rom.fe.model or rom.read_model",
+    "FlexibleBody": "from rom.reduce or rom.load",
+    "BodyFamily": "from rom.reduce_parametric or rom.load",
+    "Method": "such as rom.CraigBampton(n_modes=20)",
+    "CyclicSector": "from rom.CyclicSector.from_model",
+    "SubstructuredSector": "from rom.substructured_sector",
+    "ReducedBlade": "from rom.reduced_blade",
+    "Mechanism": "from rom.Mechanism or rom.read_mechanism",
+    "Part": "from Mechanism.add_rigid or add_flexible",
+    "Marker": "from part.marker(place), named when the part is added",
+    "State": "from rom.equilibrium or solution.final",
+    "Solution": "from rom.simulate",
+}
+ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))
+
+
+class Unfit(Exception):
+    """A value is not what is wanted.
+
+    Args:
+        value: the value, or the part of it that is wrong.
+        wanted: what it must be, in words.
+        place: of that part, such as ``['a']``.
+    """
+
+    def __init__(self, value: Any, wanted: str, place: str = ""):
+        super().__init__(value, wanted, place)
+        self.value, self.wanted, self.place = value, wanted, place
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What a function takes for one argument.
+
+    Attributes:
+        words: what that is.
+        take: the value as the function gets it; raises `Unfit`, or whatever the value raises.
+    """
+
+    words: str
+    take: Callable[[Any], Any]
+
+    def __call__(self, value: Any) -> Any:
+        """The value as the function gets it.
+
+        Raises:
+            Unfit: in these words.
+        """
+        try:
+            return self.take(value)
+        except (TypeError, ValueError, OverflowError, AttributeError) as error:
+            raise Unfit(value, self.words) from error
+
+
+class Names(dict[str, Any]):
+    """Names in the annotations of a module; unknown ones are classes known by name only."""
+
+    def __missing__(self, name: str) -> Any:
+        return getattr(builtins, name, None) or _Named(name, (), {})
+
+
+class _Named(type):
+    """A class that is not imported here."""
+
+    def __instancecheck__(cls, value: Any) -> bool:
+        return any(kind.__name__ == cls.__name__ for kind in type(value).__mro__)
+
+
+def taken_by(annotation: Any, known: Names) -> Taken | None:
+    """What an annotation takes; None for anything."""
+    if isinstance(annotation, str):
+        annotation = eval(annotation, {}, known)  # our own source, as Python would
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation in PLAIN:
+        return PLAIN[annotation]
+    if origin is Annotated:
+        return _in_words(inner[1], taken_by(inner[0], known))
+    if origin in (typing.Union, types.UnionType):
+        return _one_of([taken_by(kind, known) for kind in _alternatives(inner)])
+    if origin is np.ndarray:
+        return _array(*typing.get_args(inner[1]))
+    if origin is tuple and inner[-1] is not ...:
+        return _row([taken_by(kind, known) for kind in inner])
+    if origin in (tuple, list, collections.abc.Sequence):
+        return _several(taken_by(inner[0], known), list if origin is list else tuple)
+    if origin in (dict, Mapping):
+        return _mapping(*(taken_by(kind, known) for kind in inner))
+    if origin is collections.abc.Callable:
+        return FUNCTION
+    return _instance(annotation) if isinstance(annotation, type) else None
+
+
+def _alternatives(kinds: Iterable[Any]) -> list[Any]:
+    """Members of a union; those that make up an array-like or a path stand for one thing."""
+    found = list(kinds)
+    if ARRAY_LIKE.issubset(found):
+        found = [*(kind for kind in found if kind not in ARRAY_LIKE), npt.ArrayLike]
+    if Path in found:
+        found.remove(str)
+    return found
+
+
+def _in_words(words: str, taken: Taken | None) -> Taken:
+    def take(value: Any) -> Any:
+        try:
+            return value if taken is None else taken(value)
+        except Unfit as unfit:
+            raise (unfit if unfit.place else Unfit(value, words)) from unfit.__cause__
+
+    return Taken(words, take)
+
+
+def _one_of(several: list[Taken | None]) -> Taken | None:
+    takes = [take for take in several if take is not None and take is not NOTHING]
+    if None in several:
+        return None
+    words = [take.words for take in takes] + ["None"] * (NOTHING in several)
+
+    def take(value: Any) -> Any:
+        if value is None and NOTHING in several:
+            return None
+        deepest = Unfit(value, " or ".join([", ".join(words[:-1]), words[-1]]))
+        for one in takes:
+            try:
+                return one(value)
+            except Unfit as unfit:
+                deepest = unfit if len(unfit.place) > len(deepest.place) else deepest
+        raise deepest
+
+    return Taken(" or ".join(words), take)
+
+
+def _instance(kind: type) -> Taken:
+    verbs = _verbs(kind)
+
+    def take(value: Any) -> Any:
+        fits = (hasattr(type(value), verb) or hasattr(value, verb) for verb in verbs)
+        if not (all(fits) if verbs else isinstance(value, kind)):
+            raise TypeError(kind)
+        return value
+
+    source = SOURCES.get(kind.__name__)
+    return Taken(f"of type {kind.__name__}" + (f" ({source})" if source else ""), take)
+
+
+def _verbs(kind: type) -> set[str]:
+    """What a protocol asks for; nothing for another class."""
+    if not getattr(kind, "_is_protocol", False):
+        return set()
+    names = {*vars(kind), *vars(kind).get("__annotations__", ())}
+    return {name for name in names if name == "__call__" or not name.startswith("_")}
+
+
+def _several(one: Taken | None, kind: type) -> Taken:
+    what = "" if one is None else f", each {one.words}"
+
+    def take(value: Any) -> Any:
+        if isinstance(value, str) and one is TEXT:
+            return kind([value])
+        if isinstance(value, str | bytes | Mapping):
+            raise TypeError(value)
+        return kind(value if one is None else _each(one, enumerate(value)))
+
+    return Taken("names" if one is TEXT else f"a sequence{what}", take)
+
+
+def _row(takes: list[Taken | None]) -> Taken:
+    each = [ANYTHING if take is None else take for take in takes]
+
+    def take(value: Any) -> Any:
+        if isinstance(value, str | bytes | Mapping) or len(value) != len(each):
+            raise TypeError(value)
+        pairs = zip(each, enumerate(value), strict=True)
+        return tuple(x for one, item in pairs for x in _each(one, [item]))
+
+    return Taken(f"a row of {len(each)}: {', '.join(one.words for one in each)}", take)
+
+
+def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
+    for key, x in items:
+        try:
+            yield one(x)
+        except Unfit as unfit:
+            place = f"[{shortened(key)}]{unfit.place}"
+            raise Unfit(unfit.value, unfit.wanted, place) from unfit.__cause__
+
+
+def _mapping(key: Taken | None, one: Taken | None) -> Taken:
+    words = f"a mapping from {(key or ANYTHING).words} to {(one or ANYTHING).words}"
+
+    def take(value: Any) -> Any:
+        if not isinstance(value, Mapping):
+            raise TypeError(value)
+        for name in value:
+            (key or ANYTHING)(name)
+        if one is None:
+            return value
+        return dict(zip(value, _each(one, value.items()), strict=True))
+
+    return Taken(words, take)
+
+
+def _array(scalar: Any) -> Taken | None:
+    """An array that was computed; whoever uses it judges its entries."""
+    scalar = typing.get_origin(scalar) or scalar
+    if scalar not in KINDS_OF_NUMBERS:
+        return None
+    kinds = KINDS_OF_NUMBERS[scalar]
+
+    def take(value: Any) -> Any:
+        found = _numbers(value, kinds)
+        return value if isinstance(value, np.ndarray) else found.astype(scalar)
+
+    words = {"iu": "an array of whole numbers", "b": "an array of True and False"}
+    return Taken(words.get(kinds, "an array of numbers"), take)
+
+
+def _array_like(value: Any) -> Any:
+    found = _numbers(value, "iuf")
+    if found.size and not np.isfinite([found.min(), found.max()]).all():
+        raise ValueError(value)
+    return value
+
+
+def _numbers(value: Any, kinds: str) -> npt.NDArray[Any]:
+    given = isinstance(value, np.ndarray)
+    if not given:  # refuses rows of unequal length, of which NumPy would make objects
+        np.array(value, dtype=complex)
+    array = np.asarray(value)
+    if array.dtype.kind not in kinds and (given or array.size):
+        raise TypeError(array.dtype)
+    return array
+
+
+def _number(value: Any) -> Any:
+    if type(value) is not float:
+        if isinstance(value, np.ndarray) and not value.shape and value.dtype.kind in "iuf":
+            value = value[()]
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise TypeError(value)
+    if not math.isfinite(value):
+        raise ValueError(value)
+    return value
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(value)
+    whole = operator.index(value)
+    if abs(whole) > LARGEST_WHOLE:
+        raise ValueError(value)
+    return whole
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(value)
+    return bool(value)
+
+
+def _path(value: Any) -> Any:
+    text = os.fspath(value)
+    if not isinstance(text, str) or "\0" in text:
+        raise TypeError(value)
+    return value
+
+
+def _function(value: Any) -> Any:
+    if not callable(value):
+        raise TypeError(value)
+    return value
+
+
+def _nothing(value: Any) -> None:
+    if value is not None:
+        raise TypeError(value)
+
+
+ANYTHING = Taken("anything", lambda value: value)
+NOTHING = Taken("None", _nothing)
+TEXT = Taken("a text", _instance(str).take)
+FUNCTION = Taken("a function", _function)
+PLAIN: dict[Any, Taken | None] = {
+    float: Taken("a finite number", _number),
+    int: Taken("a whole number", _whole),
+    bool: Taken("True or False", _truth),
+    str: TEXT,
+    Path: Taken("a path", _path),
+    npt.ArrayLike: Taken("finite numbers", _array_like),
+    type(None): NOTHING,
+    None: NOTHING,
+    object: None,
+    Any: None,
+    Parameter.empty: None,
+    Callable: FUNCTION,
+}
