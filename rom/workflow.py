@@ -8,7 +8,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.attachment import added_mass
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
@@ -102,13 +102,11 @@ def modes(
         ConfigError: if m is not a positive number of modes.
         ModesMissedError: if the inertia count says that a mode was skipped.
     """
-    if isinstance(m, bool) or int(m) != m or m < 1:
-        raise ConfigError(f"m = {m!r} is not a number of modes (1, 2, …).")
-    fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
+    whole("m", m, 1)
     kinds = by_name(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)
-    omega, Phi = connection.ops.modes(held, int(m))
+    omega, Phi = connection.ops.modes(held, m)
     residual = _residual(connection.ops, held, omega, Phi)
     return Modes(omega, connection.ops.expand(Phi), residual)
 

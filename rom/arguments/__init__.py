@@ -1,6 +1,7 @@
 """Checks of what a user hands over: types by annotation, values by name."""
 
 from rom.arguments.border import typed
+from rom.arguments.kinds import AnyBody, AnyMechanism, AnySolution
 from rom.arguments.values import (
     finite,
     matrix33,
@@ -15,6 +16,9 @@ from rom.arguments.values import (
 )
 
 __all__ = [
+    "AnyBody",
+    "AnyMechanism",
+    "AnySolution",
     "finite",
     "matrix33",
     "number",

@@ -96,6 +96,12 @@ class _Named(type):
         return any(kind.__name__ == cls.__name__ for kind in type(value).__mro__)
 
 
+# records that the layers do not let every module import
+AnyBody = Annotated[Any, _Named("FlexibleBody", (), {})]
+AnyMechanism = Annotated[Any, _Named("Mechanism", (), {})]
+AnySolution = Annotated[Any, _Named("Solution", (), {})]
+
+
 def taken_by(annotation: Any, known: Names) -> Taken | None:
     """What an annotation takes; None for anything."""
     if isinstance(annotation, str):
@@ -103,6 +109,8 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in PLAIN:
         return PLAIN[annotation]
+    if origin is Annotated and isinstance(inner[1], type):
+        return _instance(inner[1])
     if origin is Annotated:
         return _in_words(inner[1], taken_by(inner[0], known))
     if origin in (typing.Union, types.UnionType):

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
+from rom.arguments import whole
 from rom.eigen import whole_clusters
-from rom.errors import ConfigError
 from rom.model import Array, Modes, Report
 
 RANK = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
@@ -140,11 +140,7 @@ def check_count(n: int, available: int) -> None:
     Raises:
         ConfigError: naming the value.
     """
-    if isinstance(n, bool) or int(n) != n or not 1 <= n <= available:
-        raise ConfigError(
-            f"n_interface = {n!r}, but the coupled interfaces have {available} coordinates.",
-            hint=f"Ask for 1 to {available} functions.",
-        )
+    whole("n_interface", n, 1, available, reason="coordinates of the coupled interfaces")
 
 
 def system_functions(parts: Partition, n: int) -> Array:

@@ -239,7 +239,6 @@ class FlexibleBody:
             InterfaceError: if an interface is unknown.
             ModelError: if an interface of a basis of free-free modes alone is held.
         """
-        fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
         self.check_support(fixed)
         M, K = self.full_matrices()
         N = self._supported(fixed)

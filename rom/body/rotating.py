@@ -26,7 +26,6 @@ def rotating_frequencies(
     at: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
     """Frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`."""
-    fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
     w, arm = speed * _direction(axis), np.asarray(at, dtype=float)
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.cyclic.travelling import travelling_modes
@@ -95,8 +95,7 @@ def _waves(
     """Circular frequencies, directions and mass-normalised shapes of n waves and a few more."""
     standing, free = sector.standing(diameter), sector.free.size
     most = free if standing else 2 * free
-    if isinstance(n, bool) or int(n) != n or not 1 <= n <= most:
-        raise ConfigError(f"n = {n!r}: the wheel has 1 to {most} waves.")
+    n = whole("n", n, 1, most)
     if speed:
         waves = travelling_modes(sector, diameter, min(n + SPARE, most), speed=speed)
         return waves.omega, waves.direction, waves.shapes

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import bmat, csr_matrix
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.cyclic.rotation import divergence_speed
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, ModelError
@@ -67,8 +67,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     Source:
         Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).
     """
-    if isinstance(n, bool) or int(n) != n or not 1 <= n <= sector.free.size:
-        raise ConfigError(f"n = {n!r}: one can ask for 1 to {sector.free.size} modes.")
+    n = whole("n", n, 1, sector.free.size)
     T = sector.harmonic(sector.checked(diameter))
     if speed:
         _refuse_divergence(sector, diameter, speed)

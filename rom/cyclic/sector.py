@@ -124,7 +124,6 @@ class CyclicSector:
                 the circle, they are no images of each other, or the axis runs through the sector.
             ResourceError: on all ranks, if the sector does not fit on each of them.
         """
-        fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
         for name in (low, high, *fixed):
             if name not in model.interfaces:
                 raise InterfaceError(

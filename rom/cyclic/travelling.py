@@ -7,7 +7,7 @@ from scipy.linalg import eig
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.cyclic.modes import real_form, spinning
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.eigen import count_shift
@@ -87,9 +87,8 @@ def travelling_modes(
     if speed == 0.0 or not np.isfinite(speed):
         raise ConfigError(f"speed = {speed!r}: waves of a wheel at rest are cyclic_modes.")
     standing = sector.standing(diameter)
+    n = whole("n", n, 1, T.shape[1] if standing else 2 * T.shape[1])
     wanted = 2 * n if standing else n
-    if isinstance(n, bool) or int(n) != n or not 1 <= n or wanted > 2 * T.shape[1]:
-        raise ConfigError(f"n = {n!r}: the wheel has 1 to {2 * T.shape[1]} waves.")
     H = T.conj().T
     M, G, K = (csr_matrix(H @ A @ T) for A in (sector.M, speed * sector.coriolis, K))
     lam, U = _lowest(M, G, K, wanted, 0.0 if sector.supported else 0.3 * abs(speed))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import AnySolution, typed, whole
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable, write_whole
 from rom.model import Array
@@ -36,7 +36,7 @@ class Channel:
 
 
 @typed
-def write_history(solution: Any, path: str | Path, *, every: int = 1) -> Path:
+def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) -> Path:
     """Write the motion of every body and marker, the reactions and the energies.
 
     Positions and velocities are of the world, angular velocities of the body frame; a reaction
@@ -55,10 +55,9 @@ def write_history(solution: Any, path: str | Path, *, every: int = 1) -> Path:
     ending = Path(path).suffix.lower()
     if ending not in WRITERS:
         raise ConfigError(f"{path} has the ending {ending!r}; known: {', '.join(sorted(WRITERS))}.")
-    if isinstance(every, bool) or not isinstance(every, int | np.integer) or every < 1:
-        raise ConfigError(f"every = {every!r} is no number of instants.")
+    whole("every", every, 1)
     path = check_writable(path)
-    rows = slice(None, None, int(every))
+    rows = slice(None, None, every)
     found = tuple(
         Channel(c.path, c.unit, c.columns, c.values[rows].reshape(len(solution.t[rows]), -1))
         for c in channels(solution)

@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import AnySolution, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import von_mises
 from rom.errors import ConfigError
@@ -63,7 +63,9 @@ def write_stress(
 
 
 @typed
-def write_stress_history(solution: Any, body: str, path: str | Path, *, every: int = 1) -> Path:
+def write_stress_history(
+    solution: AnySolution, body: str, path: str | Path, *, every: int = 1
+) -> Path:
     """Write stress and displacement of a moving body as a series for ParaView.
 
     In the axes of the body. The series is written last, so that it never names a missing file.

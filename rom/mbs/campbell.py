@@ -108,8 +108,6 @@ def _at(mechanism: Any, speed: float, axis: Array, about: Any, frame: Any) -> Li
     if isinstance(mechanism, Mechanism):
         state = equilibrium(mechanism, spin=speed * axis, about=about)
         return linearize(mechanism, state, frame=frame)
-    if not callable(mechanism):
-        raise ConfigError(f"{mechanism!r} is neither a Mechanism nor a function of the speed.")
     made = mechanism(float(speed))
     one, state = made if isinstance(made, tuple) else (made, None)
     return linearize(one, state, frame=frame)

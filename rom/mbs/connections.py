@@ -191,9 +191,6 @@ class Connections:
         """
         self._check_new(name)
         self._joint_with_axis(joint, "drive")
-        for what, f in (("function", function), ("rate", rate), ("acceleration", acceleration)):
-            if f is not None and not callable(f):
-                raise ConfigError(f"{what} of drive {name!r} is {f!r}, not a function of time.")
         self.drives[name] = Drive(joint, function, rate, acceleration)
 
     def _join(

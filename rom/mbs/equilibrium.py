@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import finite, typed
+from rom.arguments import finite, typed, whole
 from rom.errors import ConfigError, ModelError, RomError, RomWarning, SolverError
 from rom.mbs.arrays import ROLL
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.mbs.state import State, assembled, initial_state
 from rom.mbs.tangent import Tangent, sizes
@@ -24,7 +25,7 @@ GOAL, ROUND_OFF = 1e-12, 1e-7  # of the last correction; above, where correction
 
 @typed
 def equilibrium(
-    mechanism: Any,
+    mechanism: Mechanism,
     state: State | None = None,
     *,
     t: float | None = None,
@@ -62,8 +63,7 @@ def equilibrium(
         Newton's method on the tangent space of the constraints, with the absolute values of the
         negative curvatures: Nocedal and Wright, Numerical Optimization, chapter 3.4.
     """
-    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
-        raise ConfigError(f"steps = {steps!r} must be a whole number of at least one.")
+    whole("steps", steps, 1)
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
     search = _Search(now, _spinning(now, spin), finite("about", about, (3,)))
     found, done, width = search.start(state), 0.0, 1.0 / steps

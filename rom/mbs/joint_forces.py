@@ -86,8 +86,6 @@ class JointForces:
         """
         self._check_new(name)
         row = self._coordinate(joint, coordinate, "motor")
-        if not callable(law):
-            raise ConfigError(f"law of motor {name!r} is {law!r}, not a function.")
         self.motors[name] = Motor(joint, row, law, _compiled(name, law, compiled))
 
     def friction(  # noqa: PLR0913  one keyword per property

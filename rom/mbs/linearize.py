@@ -11,6 +11,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.modes import modes, phases
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
@@ -124,7 +125,7 @@ class Linearization:
 
 @typed
 def linearize(
-    mechanism: Any, state: State | None = None, *, t: float | None = None, frame: Any = "body"
+    mechanism: Mechanism, state: State | None = None, *, t: float | None = None, frame: Any = "body"
 ) -> Linearization:
     """Linearise the equations of motion around a state, at rest or moving.
 

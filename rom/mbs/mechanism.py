@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import finite, matrix33, number, positive, start_pose, typed
+from rom.arguments import AnyBody, finite, matrix33, number, positive, start_pose, typed
 from rom.errors import ConfigError
 from rom.mbs.connections import Connections, Drive, TimeFunction
 from rom.mbs.elements import Bushing, Contact, Elements, Spread
@@ -156,7 +156,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
     def add_flexible(  # noqa: PLR0913  one keyword per property of a body
         self,
         name: str,
-        body: Any,
+        body: AnyBody,
         *,
         at: npt.ArrayLike = (0.0, 0.0, 0.0),
         orientation: npt.ArrayLike | None = None,
@@ -182,11 +182,6 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
             ModelError: if the mass matrix of the body is singular: rigid motions left in it.
         """
-        if not hasattr(body, "S_kl"):
-            raise ConfigError(
-                f"body {name!r} is {body!r}; a FlexibleBody is needed.",
-                hint="Make one with rom.reduce, or read one with rom.load.",
-            )
         body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
         r = body.K.shape[0]
         elastic = (
@@ -261,8 +256,6 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         """
         self._check_new(name)
         self._check_markers(name, m1, *(() if m2 is None else (m2,)))
-        if not callable(function):
-            raise ConfigError(f"user force {name!r} is {function!r}, not a function.")
         self.user_forces[name] = UserForce(function, m1, m2)
 
     def event(
@@ -284,8 +277,6 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             terminal: end the run there.
         """
         self._check_new(name)
-        if not callable(function):
-            raise ConfigError(f"event {name!r} is {function!r}, not a function.")
         if direction not in (-1, 0, 1):
             raise ConfigError(f"direction of event {name!r} is {direction!r}; it is -1, 0 or 1.")
         self.events[name] = Event(function, int(direction), bool(terminal))
@@ -342,8 +333,4 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
     def _check_markers(self, name: str, *markers: Marker) -> None:
         for marker in markers:
-            if not isinstance(marker, Marker):
-                raise ConfigError(
-                    f"{name!r} needs markers, got {marker!r}.", hint="Use part.marker(...)."
-                )
             self.part(marker.body).point(marker)

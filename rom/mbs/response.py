@@ -9,6 +9,7 @@ import numpy.typing as npt
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.linearize import Linearization, linearize
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts import Marker
 from rom.mbs.state import State
 from rom.mbs.variation import instant
@@ -44,7 +45,7 @@ class FrequencyResponse:
 
 @typed
 def frequency_response(
-    mechanism: Any,
+    mechanism: Mechanism,
     state: State | None,
     frequencies: npt.ArrayLike,
     *,
@@ -75,7 +76,7 @@ def frequency_response(
 
 @typed
 def transmissibility(
-    mechanism: Any,
+    mechanism: Mechanism,
     state: State | None,
     frequencies: npt.ArrayLike,
     *,

@@ -10,6 +10,7 @@ from rom.arguments import typed
 from rom.errors import RomWarning, SolverError
 from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
+from rom.mbs.mechanism import Mechanism
 from rom.mbs.state import State, initial_state, with_accelerations
 from rom.mbs.variation import PROBE, Instant, consistent, difference, instant
 from rom.model import Array
@@ -44,7 +45,11 @@ class SteadyMotion:
 
 @typed
 def steady_motion(
-    mechanism: Any, state: State | None = None, *, t: float | None = None, frame: Any = "world"
+    mechanism: Mechanism,
+    state: State | None = None,
+    *,
+    t: float | None = None,
+    frame: Any = "world",
 ) -> SteadyMotion:
     """Linearise a steady motion in which wheels or balls may roll.
 

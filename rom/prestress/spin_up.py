@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
-from rom.arguments import typed
+from rom.arguments import positive, typed, whole
 from rom.cyclic.faces import unit_axis
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.rotation import rotation_matrices
@@ -45,10 +45,8 @@ def spin_up(
         ModelError: if the solid passes an instability on its way; the message says where.
         ParallelError: on several processes.
     """
-    if not np.isfinite(speed) or speed <= 0:
-        raise ConfigError(f"speed = {speed!r}: the highest speed is a positive number of rad/s.")
-    if isinstance(n_states, bool) or int(n_states) != n_states or n_states < 2:
-        raise ConfigError(f"n_states = {n_states!r}: two states or more, rest and the top.")
+    positive("speed", speed)
+    whole("n_states", n_states, 2, reason="rest and the top")
     if model.attachments:
         raise ConfigError(
             f"the model carries {len(model.attachments)} attachments, whose rotation is not known.",
@@ -91,7 +89,6 @@ def held_solid(
         ConfigError: if nothing is held, or the matrices are distributed.
         InterfaceError: if an interface is unknown.
     """
-    fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
     if not fixed:
         raise ConfigError("a solid that turns needs a support: name the interfaces in fixed=(...).")
     if not hasattr(model.K, "tocsr"):

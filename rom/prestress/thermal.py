@@ -150,7 +150,6 @@ def _stressed(
     model: FEModel, heat: Heat, fixed: tuple[str, ...]
 ) -> tuple[Any, csr_matrix, csr_matrix, Index]:
     """The solid, its stiffness, that of its thermal stress, and the dofs held."""
-    fixed = (fixed,) if isinstance(fixed, str) else tuple(fixed)
     solid = finite_solid(model, heat)
     held = held_dofs(model, fixed) if fixed else _six_dofs(model.points)
     K, K_geo = _thermal(solid, identity(model.n_dofs, format="csr"), held, model.M)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr, solve_continuous_lyapunov, svd
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import Operators
 from rom.errors import ConfigError, ModelError, ResourceError
 from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
-from rom.reduction.free_interface import check_count, numbered
+from rom.reduction.free_interface import numbered
 
 DENSE = 600  # coordinates whose Lyapunov equation, twice as large, is solved in seconds
 
@@ -40,9 +40,9 @@ class BalancedTruncation:
     damping_ratio: float = 0.01
 
     def __post_init__(self) -> None:
-        check_count(self.n_modes)
+        whole("n_modes", self.n_modes)
         if self.pool is not None:
-            check_count(self.pool)
+            whole("pool", self.pool)
             if self.pool < self.n_modes:
                 raise ConfigError(f"pool = {self.pool} is less than n_modes = {self.n_modes}.")
         if not 0.0 < self.damping_ratio < 1.0:
@@ -124,7 +124,7 @@ def second_order_balanced_truncation(
         raise ConfigError(
             f"shapes do not fit: K {K.shape}, M {M.shape}, D {D.shape}, B {B.shape}, C {C.shape}."
         )
-    check_count(r)
+    whole("r", r)
     if not 1 <= r <= n:
         raise ConfigError(f"r = {r}, but the system has {n} coordinates.")
     S, R = _gramian_factors(K, M, D, B, C)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space, orth
 from scipy.sparse import identity, kron
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import Operators, given_rigid_motions, rigid_motions, whole_clusters
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -46,10 +46,7 @@ class Characteristic:
     n: int
 
     def __post_init__(self) -> None:
-        if isinstance(self.n, bool) or int(self.n) != self.n or self.n < 6:
-            raise ConfigError(
-                f"n = {self.n!r}: needed is a whole number from 6; the rigid motions count."
-            )
+        whole("n", self.n, 6, reason="the rigid motions count")
 
     def kinds(self, connection: "Connection", interfaces: dict[str, Any]) -> dict[str, Any]:
         """The kinds of all interfaces, functions in the place of "full".

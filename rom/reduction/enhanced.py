@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import Held, Operators
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
-from rom.reduction.free_interface import check_count, numbered
+from rom.reduction.free_interface import numbered
 
 
 @typed
@@ -33,7 +33,7 @@ class EnhancedCraigBampton:
     n_modes: int
 
     def __post_init__(self) -> None:
-        check_count(self.n_modes)
+        whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis; interface columns first.

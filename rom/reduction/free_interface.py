@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import Operators, orthonormal
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index
@@ -36,7 +36,7 @@ class Rubin:
     n_modes: int
 
     def __post_init__(self) -> None:
-        check_count(self.n_modes)
+        whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis; interface columns first, then rigid motions and free-free modes.
@@ -72,7 +72,7 @@ class Herting:
     n_modes: int
 
     def __post_init__(self) -> None:
-        check_count(self.n_modes)
+        whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis; interface columns first.
@@ -112,7 +112,7 @@ class FreeFree:
     n_modes: int
 
     def __post_init__(self) -> None:
-        check_count(self.n_modes)
+        whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: rigid motions, then free-free modes; no interface column.
@@ -210,16 +210,6 @@ def without_dependent(ops: Operators, X: Array) -> tuple[Array, list[int]]:
 def numbered(what: str, n: int) -> list[str]:
     """Labels "what 1" to "what n"."""
     return [f"{what} {k + 1}" for k in range(n)]
-
-
-def check_count(n_modes: int) -> None:
-    """Refuse what is no number of modes.
-
-    Raises:
-        ConfigError: naming the value.
-    """
-    if isinstance(n_modes, bool) or int(n_modes) != n_modes or n_modes < 0:
-        raise ConfigError(f"n_modes = {n_modes!r} is not a number of modes (0, 1, 2, …).")
 
 
 def _check_boundary(boundary: Index) -> None:

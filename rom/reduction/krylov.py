@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import Operators
 from rom.errors import ConfigError, SolverError
 from rom.model import Basis, Index
 from rom.reduction.fixed_interface import unit_motions
-from rom.reduction.free_interface import check_count, numbered, without_dependent
+from rom.reduction.free_interface import numbered, without_dependent
 
 RESONANT = 1e-8  # relative distance of a frequency from a mode that counts as none
 
@@ -37,10 +37,10 @@ class MomentMatching:
     order: int = 1
 
     def __post_init__(self) -> None:
-        check_count(self.order)
+        whole("order", self.order, 1)
         f = np.asarray(self.frequencies, dtype=float)
-        if self.order < 1 or f.ndim != 1 or not f.size:
-            raise ConfigError("MomentMatching needs a frequency and an order of at least one.")
+        if not f.size:
+            raise ConfigError("MomentMatching needs a frequency.")
         if not (np.isfinite(f) & (f >= 0)).all() or np.unique(f).size < f.size:
             raise ConfigError(
                 f"frequencies = {self.frequencies!r}: needed are different numbers from 0 Hz."

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import Held, Operators, whole_clusters
 from rom.errors import ConfigError, RomWarning
 from rom.model import Array, Basis, Index
@@ -59,10 +59,8 @@ class CraigBampton:
     def __post_init__(self) -> None:
         if (self.n_modes is None) == (self.f_max is None):
             raise ConfigError("CraigBampton needs either n_modes or f_max.")
-        if self.n_modes is not None and (
-            isinstance(self.n_modes, bool) or int(self.n_modes) != self.n_modes or self.n_modes < 0
-        ):
-            raise ConfigError(f"n_modes = {self.n_modes!r} is not a number of modes (0, 1, 2, …).")
+        if self.n_modes is not None:
+            whole("n_modes", self.n_modes)
         if self.f_max is not None and not (np.isfinite(self.f_max) and self.f_max > 0):
             raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
         if self.tol is not None and (self.f_max is None or not 0 < self.tol < 1):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
 
@@ -42,7 +42,7 @@ class Polynomial:
 
     def __post_init__(self) -> None:
         if self.order is not None:
-            _check_whole("order", self.order, 1, "a constant alone is a ball joint, not a surface")
+            whole("order", self.order, 1, reason="a constant alone is a ball joint, not a surface")
 
     def functions(self, interface: Interface) -> Array:
         """(k, n) functions at the nodes, from low to high degree; some may depend on others.
@@ -81,8 +81,8 @@ class FourierLegendre:
     order: int
 
     def __post_init__(self) -> None:
-        _check_whole("harmonics", self.harmonics, 1, "a tilted seat needs the first one")
-        _check_whole("order", self.order, 0, "a degree is not negative")
+        whole("harmonics", self.harmonics, 1, reason="a tilted seat needs the first one")
+        whole("order", self.order, 0, reason="a degree is not negative")
 
     def functions(self, interface: Interface) -> Array:
         """(k, n) functions at the nodes; the linear ones first, so that rigid motions are exact."""
@@ -184,11 +184,6 @@ def _local(interface: Interface) -> Array:
     reach = np.abs(x).max(axis=0)
     thin = reach <= THIN * reach.max()
     return np.where(thin, 0.0, x / np.where(thin, 1.0, reach))
-
-
-def _check_whole(name: str, value: int, lowest: int, reason: str) -> None:
-    if isinstance(value, bool) or int(value) != value or value < lowest:
-        raise ConfigError(f"{name} = {value!r}: needed is a whole number from {lowest}; {reason}.")
 
 
 def _norm(S: object, v: Array) -> float:

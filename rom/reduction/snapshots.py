@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -55,10 +55,8 @@ class Snapshots:
             )
         if self.energy is not None and not 0 < self.energy <= 1:
             raise ConfigError(f"energy = {self.energy!r} is not a share between 0 and 1.")
-        if self.n is not None and (isinstance(self.n, bool) or int(self.n) != self.n or self.n < 6):
-            raise ConfigError(
-                f"n = {self.n!r}: needed is a whole number from 6; the rigid motions count."
-            )
+        if self.n is not None:
+            whole("n", self.n, 6, reason="the rigid motions count")
 
     def __repr__(self) -> str:
         """Size instead of numbers, for provenance and labels."""

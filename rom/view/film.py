@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import typed
+from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
@@ -26,8 +26,8 @@ SCALES = ((1.0, "m"), (1e3, "mm"), (1e6, "um"), (1e9, "nm"))  # per metre
 
 @typed
 def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
-    mechanism: Any,
-    solution: Any,
+    mechanism: AnyMechanism,
+    solution: AnySolution,
     path: str | Path,
     *,
     shapes: dict[str, Mesh] | None = None,
@@ -70,8 +70,8 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
 
 @typed
 def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
-    mechanism: Any,
-    solution: Any,
+    mechanism: AnyMechanism,
+    solution: AnySolution,
     path: str | Path,
     *,
     times: npt.ArrayLike,

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import typed
+from rom.arguments import AnySolution, typed
 from rom.errors import ConfigError
 from rom.io.gltf import MovingMesh, write_glb
 from rom.io.vtkhdf import write_vtkhdf
@@ -22,7 +22,7 @@ ELASTIC = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.
 
 @typed
 def write_animation(
-    solution: Any,
+    solution: AnySolution,
     path: str | Path,
     *,
     shapes: dict[str, Mesh] | None = None,

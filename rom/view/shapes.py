@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import AnyBody, typed
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view import page
@@ -19,7 +19,7 @@ AMPLITUDE = 0.08  # largest displacement shown, of the size of the body
 
 @typed
 def mode_shapes(
-    body: Any,
+    body: AnyBody,
     path: str | Path,
     *,
     n: int = 6,

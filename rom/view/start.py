@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import AnyMechanism, typed
 from rom.rotation import matrix
 from rom.view import page
 from rom.view.film import bars, placed
@@ -20,7 +20,7 @@ NAMED = 16  # bodies in the legend
 
 @typed
 def start(
-    mechanism: Any,
+    mechanism: AnyMechanism,
     path: str | Path,
     *,
     title: str = "Mechanism at its start",
