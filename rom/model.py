@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
-from rom.material import PAIRS as PAIRS
-from rom.material import Material as Material
-from rom.material import Orthotropic as Orthotropic
+from rom.errors import InterfaceError, MaterialError
+from rom.material import Material as Material, Orthotropic as Orthotropic, PAIRS as PAIRS
+from rom.names import check_text
 from rom.notebook import shown
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +26,7 @@ class Interface:
     """Nodes through which a body touches the rest of the mechanism.
 
     Attributes:
-        name: name of the gmsh physical surface.
+        name: name of the gmsh physical surface, a text of one line, see `rom.names`.
         nodes: (k,) node numbers, rows of ``FEModel.points``; ordered by coordinates, so that the
             order does not depend on the partition.
         points: (k, 3) coordinates of the nodes [m].
@@ -40,6 +40,9 @@ class Interface:
     points: Array
     surface_mass: Any
     origin: Array
+
+    def __post_init__(self) -> None:
+        check_text(self.name, "an interface", InterfaceError)
 
     @property
     def dofs(self) -> Index:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rom.errors import ParameterError, RomWarning
 from rom.model import Array
+from rom.names import named
 from rom.plausible import FACTOR, warn_outside
 
 FEW = 3  # parameters up to which all corners of their range are visited
@@ -141,7 +142,7 @@ def complete(
     """
     if unknown := sorted(set(values) - set(parameters)):
         raise ParameterError(
-            f"there is no parameter {unknown[0]!r}; the family has {sorted(parameters)}."
+            f"there is no parameter {named(unknown)}; the family has {sorted(parameters)}."
         )
     return {
         name: _checked(name, parameter, values.get(name, 1.0), extrapolate)

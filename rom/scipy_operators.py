@@ -18,6 +18,7 @@ from rom.errors import (
     SolverError,
 )
 from rom.model import Array, Index
+from rom.names import named
 
 SINGULAR = 1e-13  # smallest over largest pivot below which K_ii counts as singular
 ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
@@ -223,10 +224,11 @@ def dof_set(dofs: npt.ArrayLike, n: int) -> Index:
     """
     b = np.asarray(dofs, dtype=np.int64).ravel()
     if b.size and (b.min() < 0 or b.max() >= n):
-        raise ConfigError(f"boundary dof {b[(b < 0) | (b >= n)][0]} is outside 0..{n - 1}.")
+        outside = named(b[(b < 0) | (b >= n)].tolist())
+        raise ConfigError(f"boundary dof {outside} is outside 0..{n - 1}.")
     if np.unique(b).size != b.size:
-        twice = np.flatnonzero(np.bincount(b) > 1)
-        raise ConfigError(f"boundary dof {twice[0]} is listed more than once; remove the repeats.")
+        twice = named(np.flatnonzero(np.bincount(b) > 1).tolist())
+        raise ConfigError(f"boundary dof {twice} is listed more than once; remove the repeats.")
     return b
 
 

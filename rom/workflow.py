@@ -21,6 +21,7 @@ from rom.cyclic.sector import CyclicSector
 from rom.eigen import Operators, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Modes
+from rom.names import check_name
 from rom.reduction.characteristic import Characteristic
 from rom.reduction.dual import FreeSubstructure, free_substructure
 from rom.reduction.interface import connect
@@ -186,6 +187,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         of_bodies = (reference != "mean-axis", damping is not None, stress, stiffening)
         return _reduced_sector(model, method, interfaces or {}, any(of_bodies))
     clock = perf_counter()
+    check_name(name, "a body")
     bare, ops = mesh_operators(model), operators(model)
     interfaces, method = with_orders(ops, model, by_name(interfaces or {}), method)
     connection = connect(ops, model, interfaces)

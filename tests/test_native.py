@@ -114,7 +114,7 @@ def npy(array, **options):
 @pytest.mark.parametrize(
     ("member", "content", "kind", "message"),
     [
-        ("K.npy", None, FileFormatError, "not a complete body file"),
+        ("K.npy", None, FileFormatError, "lacks the array .K. of its manifest"),
         ("manifest.npy", None, FileFormatError, "no manifest"),
         ("manifest.npy", npy(np.zeros(3, np.uint8)), FileFormatError, "manifest cannot be read"),
         ("K.npy", npy(np.array([{}], dtype=object), allow_pickle=True), UnsafeFileError, "type"),

@@ -15,6 +15,7 @@ from rom.body.spread import point_areas
 from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Modes, Report
+from rom.names import check_text, named
 from rom.notebook import listed, shown
 from rom.units import unit_system
 
@@ -83,7 +84,7 @@ class FlexibleBody:
     motion, their reference condition says how the frame follows the body.
 
     Attributes:
-        name: name of the body.
+        name: name of the body, a text of one line, see `rom.names`.
         mass: mass [kg].
         first_moment: (3,) integral of rho X [kg m].
         inertia: (3, 3) inertia about the origin of the body frame [kg m^2].
@@ -125,6 +126,11 @@ class FlexibleBody:
     units: str = "SI"
     provenance: dict[str, Any] = field(default_factory=dict)
     certificate: Report | None = None
+
+    def __post_init__(self) -> None:
+        check_text(self.name, "a body")
+        for name in self.markers:
+            check_text(name, "an interface")
 
     def __repr__(self) -> str:
         kg = self.mass * unit_system(self.units).mass
@@ -251,14 +257,16 @@ class FlexibleBody:
         return Modes(omega[:n], (N @ V)[:, :n])
 
     def check_support(self, fixed: tuple[str, ...]) -> None:
-        """Refuse to hold an interface of a basis of free-free modes alone.
+        """Refuse to hold interfaces that do not exist, or any of a basis of free-free modes alone.
 
         Raises:
+            InterfaceError: if an interface is unknown.
             ModelError: naming the interface.
         """
+        self._refuse_unknown(fixed)
         if fixed and not self.has_static_shapes:
             raise ModelError(
-                f"body {self.name!r} has free-free modes only; with {fixed[0]!r} held its "
+                f"body {self.name!r} has free-free modes only; with {named(fixed)} held its "
                 "frequencies would be tens of per cents too high.",
                 hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
             )
@@ -353,11 +361,15 @@ class FlexibleBody:
         Raises:
             InterfaceError: listing the names that exist.
         """
-        if name not in self.markers:
-            raise InterfaceError(
-                f"body {self.name!r} has no interface {name!r}; it has {sorted(self.markers)}."
-            )
+        self._refuse_unknown((name,))
         return self.markers[name]
+
+    def _refuse_unknown(self, names: tuple[str, ...]) -> None:
+        if unknown := [name for name in names if name not in self.markers]:
+            raise InterfaceError(
+                f"body {self.name!r} has no interface {named(unknown)}; it has "
+                f"{sorted(self.markers)}."
+            )
 
 
 def reference_label(reference: Any) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.options import assignment, unique
 from rom.errors import ConfigError
+from rom.names import named
 
 if TYPE_CHECKING:
     from rom.model import FEModel
@@ -94,11 +95,13 @@ def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
 
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):
-        raise ConfigError(f"--set {unused[0]} is no interface: neither -i nor --fixed names it.")
+        raise ConfigError(
+            f"--set {', '.join(unused)} is no interface: neither -i nor --fixed names it."
+        )
     rest = tuple(name for name in names if name not in found)
     if rest and args.nodes.suffix.lower() != ".inp":
         raise ConfigError(
-            f"which nodes are the interface {rest[0]!r}? {args.nodes} has no node sets.",
+            f"which nodes are the interface {named(rest)}? {args.nodes} has no node sets.",
             hint=f"For example --set {rest[0]}=11-14,20.",
         )
     return found | (read_node_sets(args.nodes, rest) if rest else {})

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from rom.config.document import Document, KeyPath
 from rom.errors import ConfigError
+from rom.names import check_text
 from rom.units import in_si
 
 
@@ -283,8 +284,10 @@ class Named:
             raise place.error(f"{place.name} = {shown(value)}: needed is a {self.said}.")
         found: dict[str, Any] = {}
         for name, item in value.items():
-            if not name or "\0" in name:
-                place.mistakes.append(place.error(f"{place.name} has a name that is empty."))
+            try:
+                check_text(name, self.what)
+            except ConfigError as error:
+                place.mistakes.append(place.error(f"{place.name}: {error.message}", error.hint))
             else:
                 collect(found, name, self.kind, item, place)
         return found

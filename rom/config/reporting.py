@@ -258,7 +258,7 @@ def _record(folder: Path) -> dict[str, Any]:
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise FileFormatError(f"is no record of a run: {error}.", where=str(path)) from None
     if missing:
-        raise FileFormatError(f"the record says nothing of {missing[0]}.", where=str(path))
+        raise FileFormatError(f"the record says nothing of {', '.join(missing)}.", where=str(path))
     return record
 
 

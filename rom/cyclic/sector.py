@@ -26,6 +26,7 @@ from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
+from rom.names import named
 
 Complex = npt.NDArray[np.complex128]
 NONE = np.zeros(0, dtype=np.int64)
@@ -124,11 +125,10 @@ class CyclicSector:
                 the circle, they are no images of each other, or the axis runs through the sector.
             ResourceError: on all ranks, if the sector does not fit on each of them.
         """
-        for name in (low, high, *fixed):
-            if name not in model.interfaces:
-                raise InterfaceError(
-                    f"the sector has no interface {name!r}; it has {sorted(model.interfaces)}."
-                )
+        if unknown := [name for name in (low, high, *fixed) if name not in model.interfaces]:
+            raise InterfaceError(
+                f"the sector has no interface {named(unknown)}; it has {sorted(model.interfaces)}."
+            )
         e, at = unit_axis(axis), np.asarray(at, dtype=float)
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
         refuse_all_around(model.points, e, at)

@@ -10,6 +10,7 @@ from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError
 from rom.fe.readers import Made
+from rom.names import named
 
 
 def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
@@ -59,12 +60,12 @@ def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
     unknown = sorted(set(given) - set(names))
     if unknown and len(names) == len(known):
         raise ConfigError(
-            f"{path.name} has no parameter {unknown[0]!r}; its parameters are {sorted(names)}."
+            f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(names)}."
         )
     defaults = _defaults(build)
     missing = sorted(set(names) - set(defaults) - set(given))
     if missing:
-        raise ConfigError(f"{path.name} needs a value for the parameter {missing[0]!r}.")
+        raise ConfigError(f"{path.name} needs a value for the parameter {named(missing)}.")
     return defaults | given
 
 

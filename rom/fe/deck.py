@@ -8,6 +8,7 @@ from rom.errors import FileFormatError, MeshError
 from rom.fe.elements import CELL_TYPES, CellType
 from rom.fe.topology import faces_of
 from rom.model import Index
+from rom.names import named
 
 QUADRATIC_HEX = 20  # nodes of a serendipity hexahedron; completed to 27 after reading
 # Mid-edge nodes by their corners, in the order of Abaqus and VTK.
@@ -97,10 +98,12 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
     order = np.argsort(ids, kind="stable")
     ordered = ids[order]
     if (twice := ordered[1:][ordered[1:] == ordered[:-1]]).size:
-        raise FileFormatError(f"{what} {twice[0]} is defined twice.")
+        raise FileFormatError(f"{what} {named(np.unique(twice).tolist())} is defined twice.")
     if not ordered.size:
         raise FileFormatError(f"no {what} is defined.")
     place = np.minimum(np.searchsorted(ordered, wanted), ordered.size - 1)
     if (missing := np.asarray(wanted)[ordered[place] != wanted]).size:
-        raise FileFormatError(f"{what} {missing.flat[0]} is used but not defined.")
+        raise FileFormatError(
+            f"{what} {named(np.unique(missing).tolist())} is used but not defined."
+        )
     return order[place]

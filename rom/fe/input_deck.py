@@ -18,6 +18,7 @@ from rom.fe.elements import CELL_TYPES
 from rom.fe.solid import SolidMesh
 from rom.fe.topology import row_ids
 from rom.model import Index, Orthotropic
+from rom.names import named
 
 STEPS = {
     "frequencies": "*FREQUENCY\n{n}",
@@ -61,7 +62,7 @@ def input_deck(
         raise ConfigError(f"the step {step!r} is unknown; known: {', '.join(STEPS)}.")
     if missing := sorted(set(fixed) - set(mesh.facets)):
         raise InterfaceError(
-            f"{missing[0]!r} cannot be held; the interfaces are {sorted(mesh.facets)}."
+            f"{named(missing)} cannot be held; the interfaces are {sorted(mesh.facets)}."
         )
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)

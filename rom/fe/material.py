@@ -11,6 +11,7 @@ from dolfinx import fem
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
 from rom.model import Index, Material, Orthotropic
+from rom.names import named
 from rom.plausible import FOAM_SPEED
 
 Solid = Material | Orthotropic
@@ -32,14 +33,14 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
         raise MaterialError(
             f"material = {material!r} is neither Material, Orthotropic nor a dictionary of them."
         )
+    if unknown := [name for name in material if name not in regions]:
+        raise MaterialError(f"there is no region {named(unknown)}; the mesh has {sorted(regions)}.")
     for name, value in material.items():
-        if name not in regions:
-            raise MaterialError(f"there is no region {name!r}; the mesh has {sorted(regions)}.")
         if not isinstance(value, Solid):
             raise MaterialError(f"the material of region {name!r} is {value!r}.")
     if missing := sorted(set(regions) - set(material)):
         raise TagError(
-            f"the region {missing[0]!r} has no material; materials are given for "
+            f"the region {named(missing)} has no material; materials are given for "
             f"{sorted(material)}.",
             hint="Give every region of the mesh a material.",
         )

@@ -12,6 +12,7 @@ import numpy as np
 
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
 from rom.fe.readers import Made
+from rom.names import named
 
 FACE = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
 SHELL = re.compile(r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^)]*)\)", re.I)
@@ -36,7 +37,7 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     """
     unknown = sorted(set(request["parameters"]) - {"lc"})
     if unknown:
-        raise ConfigError(f"a .step file has no parameter {unknown[0]!r}; there is ['lc'].")
+        raise ConfigError(f"a .step file has no parameter {named(unknown)}; there is ['lc'].")
     text = path.read_bytes().decode("latin-1")
     if not text.lstrip().startswith("ISO-10303-21"):
         raise FileFormatError("is not a STEP file: it does not start with ISO-10303-21.")

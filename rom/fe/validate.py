@@ -15,6 +15,7 @@ from rom.fe.quality import check_shape
 from rom.fe.solid import SHOWN, SolidMesh, cell_names
 from rom.fe.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
 from rom.model import Mask
+from rom.names import check_text, named
 from rom.plausible import SIZE, far_doubt
 
 COINCIDENT = 1e-9  # of the size: nodes closer than this are at the same place
@@ -41,6 +42,7 @@ def validate(mesh: SolidMesh) -> list[str]:
     _check_faces(mesh, faces)
     _check_connected(mesh, faces)
     _check_facets(mesh, faces)
+    _check_names(mesh)
     _check_regions(mesh)
     return [*warnings, *_slits(mesh, faces), *_doubts(mesh)]
 
@@ -189,12 +191,18 @@ def _check_facets(mesh: SolidMesh, faces: Faces) -> None:
             )
 
 
+def _check_names(mesh: SolidMesh) -> None:
+    for what, names in (("a region", mesh.region_names.values()), ("a surface", mesh.facets)):
+        for name in names:
+            check_text(name, what, TagError)
+
+
 def _check_regions(mesh: SolidMesh) -> None:
     used = {int(r) for r in np.unique(mesh.regions)}
     if nameless := sorted(used - mesh.region_names.keys()):
-        raise TagError(f"region {nameless[0]} has cells and no name.")
+        raise TagError(f"there is no name for region {named(nameless)}, which has cells.")
     if unused := sorted(name for tag, name in mesh.region_names.items() if tag not in used):
-        raise TagError(f"region {unused[0]!r} has no cells.")
+        raise TagError(f"region {named(unused)} has no cells.")
     names = list(mesh.region_names.values())
     if double := sorted({name for name in names if names.count(name) > 1}):
-        raise TagError(f"the name {double[0]!r} stands for several regions.")
+        raise TagError(f"the name {named(double)} stands for several regions.")

@@ -18,6 +18,7 @@ from rom.mbs.signals import sample_all
 from rom.mbs.state import State, initial_state, with_accelerations
 from rom.mbs.user import apply_laws, laws
 from rom.model import Array
+from rom.names import named
 
 SAME = 1e-9  # of a step: by how much the caller's time may differ
 
@@ -110,7 +111,9 @@ class Driven:
         count = len(self.variables)
         wrong = [int(ref) for ref in refs if not 0 <= ref < count]
         if wrong:
-            raise ConfigError(f"no variable has the value reference {wrong[0]}; all are < {count}.")
+            raise ConfigError(
+                f"no variable has the value reference {named(wrong)}; all are < {count}."
+            )
         told = self._outputs() if (np.asarray(refs) >= first).any() else np.zeros(count - first)
         every = np.concatenate([self.parameters, self.inputs.values, told])
         found: Array = every[np.asarray(refs, dtype=int)]

@@ -13,6 +13,7 @@ from numpy.lib import format as npy
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import LARGEST, check_readable, write_whole
 from rom.model import Array
+from rom.names import named
 
 LIMIT = 4 * 1024**3  # bytes the arrays may have in memory before reading is refused
 
@@ -85,6 +86,7 @@ def read_archive(
             _refuse_oversize(archive, path, limit)
             manifest = _read_manifest(archive, path, kind)
             names = sorted(_digests(manifest, path, kind))
+            _refuse_missing(archive, names, path)
             arrays = {name: _read(archive, name, path) for name in names}
     except (
         zipfile.BadZipFile,
@@ -118,6 +120,16 @@ def _refuse_oversize(archive: zipfile.ZipFile, path: Path, limit: int) -> None:
             f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
             where=str(path),
             hint="If it is yours, pass a larger limit to load.",
+        )
+
+
+def _refuse_missing(archive: zipfile.ZipFile, names: list[str], path: Path) -> None:
+    there = set(archive.namelist())
+    if missing := [name for name in names if f"{name}.npy" not in there]:
+        raise FileFormatError(
+            f"the file lacks the array {named(missing)} of its manifest.",
+            where=str(path),
+            hint="It may have been changed after writing; write or copy it again.",
         )
 
 
@@ -180,8 +192,12 @@ def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str
 
 def _digests(manifest: dict[str, Any], path: Path, kind: Kind) -> dict[str, str]:
     digests = manifest.get("sha256")
-    if not isinstance(digests, dict) or not set(kind.needed) <= set(digests):
+    if not isinstance(digests, dict):
         raise FileFormatError(
             f"the manifest does not list the arrays of a {kind.what}.", where=str(path)
+        )
+    if missing := [name for name in kind.needed if name not in digests]:
+        raise FileFormatError(
+            f"the manifest of the {kind.what} lists no array {named(missing)}.", where=str(path)
         )
     return digests

@@ -8,6 +8,7 @@ from scipy.linalg import eigh, null_space, solve
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
+from rom.names import named
 
 FIRST_SCALAR = 1001
 MOST_INTERFACES = FIRST_SCALAR - 1
@@ -48,7 +49,7 @@ def interface_form(body: FlexibleBody) -> InterfaceForm:
     names = body.interface_names
     odd = [m.name for m in body.markers.values() if m.hold.shape[0] != 6]
     if not names or len(names) > MOST_INTERFACES or odd:
-        what = f"interface {odd[0]!r} has other coordinates" if odd else f"it has {len(names)}"
+        what = f"interface {named(odd)} has other coordinates" if odd else f"it has {len(names)}"
         raise ConfigError(
             f"body {body.name!r} needs interfaces of six coordinates each: {what}.",
             hint="Reduce it with rbe2 or rbe3 interfaces.",

@@ -15,14 +15,17 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.recovery import STATES, StressRecovery
-from rom.errors import FileFormatError, ParameterError, QualityGateError
+from rom.errors import ConfigError, FileFormatError, QualityGateError
 from rom.io.archive import LIMIT, Kind, read_archive, write_archive
 from rom.model import Array, Report, Row
+from rom.names import named
 from rom.units import SYSTEMS
 
 SCHEMA = "rom-body"
 VERSION = (1, 3)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
+MARKER = ("point", "translation", "rotation", "hold")  # arrays of each
+SURFACE = ("points", "triangles", "shape")
 
 
 def save(body: FlexibleBody, path: str | Path) -> Path:
@@ -79,7 +82,7 @@ def stated(path: Path) -> Iterator[None]:
     """Turn what a wrong manifest causes into an error that names the file."""
     try:
         yield
-    except ParameterError as error:
+    except ConfigError as error:
         raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise FileFormatError(
@@ -94,11 +97,11 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     for name, A in body.K_geo.items():
         arrays[f"K_geo/{name}"] = A
     for i, marker in enumerate(body.markers.values()):
-        for part in ("point", "translation", "rotation", "hold"):
+        for part in MARKER:
             arrays[f"marker/{i}/{part}"] = getattr(marker, part)
         arrays |= {f"marker/{i}/{part}": A for part, A in _patch_arrays(marker.patch).items()}
     if body.surface is not None:
-        for part in ("points", "triangles", "shape"):
+        for part in SURFACE:
             arrays[f"surface/{part}"] = getattr(body.surface, part)
     if body.stress is not None:
         for part in ("points", "operator"):
@@ -147,16 +150,17 @@ def body_manifest(body: FlexibleBody) -> dict[str, Any]:
 
 def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     """The body that a file describes."""
+    _refuse_missing(manifest, arrays)
     markers = {
         m["name"]: Marker(
             name=m["name"],
             kind=m["kind"],
-            **{p: arrays[f"marker/{i}/{p}"] for p in ("point", "translation", "rotation", "hold")},
+            **{part: arrays[f"marker/{i}/{part}"] for part in MARKER},
             patch=_patch(arrays, f"marker/{i}"),
         )
         for i, m in enumerate(manifest["markers"])
     }
-    parts: Any = (arrays[f"surface/{part}"] for part in ("points", "triangles", "shape"))
+    parts: Any = (arrays[f"surface/{part}"] for part in SURFACE)
     surface = Surface(*parts) if manifest["surface"] else None
     stress = None  # bodies whose stress is not recovered have none, and so have older files
     if "stress/points" in arrays:
@@ -180,6 +184,15 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         provenance=manifest["provenance"],
         certificate=report,
     )
+
+
+def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
+    """All arrays that the words of the manifest promise."""
+    needed = [f"marker/{i}/{part}" for i in range(len(manifest["markers"])) for part in MARKER]
+    needed += [f"K_geo/{name}" for name in manifest["geometric_stiffness"]]
+    needed += [f"surface/{part}" for part in SURFACE] if manifest["surface"] else []
+    if missing := [name for name in needed if name not in arrays]:
+        raise ConfigError(f"the file lacks the array {named(missing)}.")
 
 
 def verify(body: FlexibleBody, path: Path) -> None:

@@ -21,6 +21,7 @@ from rom.io.files import write_whole
 from rom.io.interface_form import InterfaceForm, interface_form
 from rom.io.openfast_reading import LOADING, Superelement
 from rom.model import Array
+from rom.names import named
 
 VERSIONS = (4, 5)
 SPAN = 1e5  # s; how long the loads of version 4 are constant
@@ -84,7 +85,7 @@ def superelement(
 def _rows(body: FlexibleBody, form: InterfaceForm, held: Sequence[str]) -> npt.NDArray[np.int64]:
     """Rows of the free interface, then of the modes."""
     if unknown := sorted(set(held) - set(form.names)):
-        raise ConfigError(f"{unknown[0]!r} cannot be held; the interfaces are {form.names}.")
+        raise ConfigError(f"{named(unknown)} cannot be held; the interfaces are {form.names}.")
     free = [name for name in form.names if name not in held]
     if len(free) != 1:
         raise ConfigError(

@@ -99,7 +99,7 @@ def read_raw(path: str | Path) -> RawFile:
     _expect(lines, "end part")
     missing = [name for name in BLOCKS if name not in file.blocks]
     if missing:
-        file.refuse(f"the block {missing[0]} is missing", lines.number)
+        file.refuse(f"the block {', '.join(missing)} is missing", lines.number)
     return file
 
 
@@ -156,7 +156,7 @@ def _frames(file: RawFile, lines: _Lines) -> None:
                 _enter(file, node, line, NODE_BLOCKS, lines)
         missing = [name for name in NODE_BLOCKS[:4] if name not in node]
         if missing:
-            file.refuse(f"node {label!r} has no {missing[0]}", lines.number)
+            file.refuse(f"node {label!r} has no {', '.join(missing)}", lines.number)
 
 
 def _enter(
@@ -196,7 +196,7 @@ def _fill(file: RawFile, block: RawBlock, key: str, index: str, value: float, li
 def _check_sizes(file: RawFile, block: RawBlock) -> None:
     missing = [key for key in SIZES if key not in block.sizes]
     if missing:
-        file.refuse(f"{block.name} has no {missing[0]}", block.line)
+        file.refuse(f"{block.name} has no {', '.join(missing)}", block.line)
     shape = block.sizes["nrow"], block.sizes["ncol"]
     known = [shape_of(block.name, file.n_modes)] + [(6, 1)] * (block.name == "J")
     if shape not in known:

@@ -18,6 +18,7 @@ from rom.mbs.nonlinear import Assembly, NonlinearBodies
 from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
+from rom.names import check_name, check_text
 from rom.notebook import listed, shown
 from rom.plausible import DAMPING, GRAVITY, STIFFNESS, warn_outside
 
@@ -149,7 +150,10 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             ModelError: if mass or inertia are not those of a real body.
         """
         pose = start_pose(at, orientation, velocity, omega)
-        points = {key: finite(f"marker {key}", x, (3,)) for key, x in (markers or {}).items()}
+        points = {
+            check_text(key, "a marker"): finite(f"marker {key}", x, (3,))
+            for key, x in (markers or {}).items()
+        }
         part = rigid_part(name, positive("mass", mass), matrix33("inertia", inertia), pose, points)
         return self._enter(part)
 
@@ -321,8 +325,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         return k, c
 
     def _check_new(self, name: str) -> None:
-        if not isinstance(name, str) or not name:
-            raise ConfigError(f"a name must be a text that is not empty, got {name!r}.")
+        check_name(name, "a part of the mechanism")
         taken = [
             *(GROUND, *self.parts, *self.nonlinear, *self.joints, *self.drives, *self.springs),
             *(*self.turns, *self.loads, *self.user_forces, *self.motors, *self.frictions),

@@ -24,6 +24,7 @@ from rom.cyclic.sector import CyclicSector
 from rom.eigen import dofs_of, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Index
+from rom.names import named
 from rom.prestress.heat import Heat
 from rom.scipy_operators import SciPyOperators, negative_count
 
@@ -127,11 +128,11 @@ def held_dofs(model: FEModel, fixed: tuple[str, ...]) -> Index:
     Raises:
         InterfaceError: if one is unknown.
     """
-    for name in fixed:
-        if name not in model.interfaces:
-            raise InterfaceError(
-                f"there is no interface {name!r} to hold; the model has {sorted(model.interfaces)}."
-            )
+    if unknown := [name for name in fixed if name not in model.interfaces]:
+        raise InterfaceError(
+            f"there is no interface {named(unknown)} to hold; the model has "
+            f"{sorted(model.interfaces)}."
+        )
     return np.unique(np.concatenate([model.interfaces[name].dofs for name in fixed]))
 
 

@@ -4,6 +4,7 @@ Each kind is a sparse map u = T a that is applied to K and M once. Everything af
 modes, certificate) sees an ordinary model whose interface coordinates are dofs of their own.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from rom.eigen import Operators, given_rigid_motions, rigid_motions
 from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
+from rom.names import named
 from rom.reduction.kinds import Tie, tie
 
 
@@ -57,7 +59,7 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
         ConfigError: if a kind is unknown.
         ResourceError: if an averaging interface has too many dofs.
     """
-    chosen = [find(model, name) for name in interfaces]
+    chosen = found(model, interfaces)
     _refuse_shared_nodes(chosen)
     ties = {i.name: tie(i, interfaces[i.name]) for i in chosen}
     if not any(t.removed.size for t in ties.values()):
@@ -65,18 +67,19 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
     return _connection(_transform(ops, chosen, ties), ties, _numbers(ops.n, chosen, ties))
 
 
-def find(model: FEModel, name: str) -> Interface:
-    """The interface of that name.
+def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
+    """The interfaces of these names.
 
     Raises:
-        InterfaceError: listing the names that exist.
+        InterfaceError: listing those that do not exist and those that do.
     """
-    if name not in model.interfaces:
+    names = list(names)
+    if unknown := [name for name in names if name not in model.interfaces]:
         raise InterfaceError(
-            f"there is no interface {name!r}; the model has {sorted(model.interfaces)}.",
+            f"there is no interface {named(unknown)}; the model has {sorted(model.interfaces)}.",
             hint="Interfaces are the named physical surfaces of the geometry.",
         )
-    return model.interfaces[name]
+    return [model.interfaces[name] for name in names]
 
 
 def _refuse_shared_nodes(interfaces: list[Interface]) -> None:

@@ -13,6 +13,7 @@ from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
+from rom.names import named
 from rom.view import page
 from rom.view.offscreen import Image, render, require
 from rom.view.scene import Actor, Camera, aimed, sharp_edges
@@ -118,7 +119,7 @@ def _stage(
     unknown = set(shapes) - set(mechanism.parts)
     if unknown:
         raise ConfigError(
-            f"shapes: no body {sorted(unknown)[0]!r}; there are {sorted(mechanism.parts)}."
+            f"shapes: no body {named(sorted(unknown))}; there are {sorted(mechanism.parts)}."
         )
     actors: list[Actor] = []
     flexible: dict[str, int] = {}

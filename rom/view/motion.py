@@ -12,6 +12,7 @@ from rom.errors import ConfigError
 from rom.io.gltf import MovingMesh, write_glb
 from rom.io.vtkhdf import write_vtkhdf
 from rom.model import Array
+from rom.names import named
 from rom.view.film import bars, placed, shades_of
 from rom.view.page import checked
 from rom.view.solids import Mesh
@@ -54,7 +55,7 @@ def write_animation(
     unknown = set(shapes) - set(solution.mechanism.parts)
     if unknown:
         known = sorted(solution.mechanism.parts)
-        raise ConfigError(f"shapes: no body {sorted(unknown)[0]!r}; there are {known}.")
+        raise ConfigError(f"shapes: no body {named(sorted(unknown))}; there are {known}.")
     if min(frames, solution.t.size) < 2 or (seconds is not None and not 0 < seconds < np.inf):
         raise ConfigError(f"no film has {frames} frames in {seconds} s.")
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)

@@ -1,0 +1,108 @@
+"""Names of bodies, markers, joints and their like, and the file names made from them.
+
+A name is shown in tables, pictures and messages, becomes part of XML, HTML and input decks, and
+may become a file name; so it is one line of text that can be seen and cannot lead elsewhere:
+
+- 1 to 120 characters: letters, digits, marks, punctuation and symbols of any script, and spaces;
+- no control and no invisible characters: line ends, NUL, changes of the direction of writing;
+- where it is given, not where it is read from older files or other programs: no slash and no
+  backslash, no dot, dash or space in front, no space at the end.
+"""
+
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path
+
+from rom.errors import ConfigError, RomError
+
+MAX_CHARACTERS = 120
+MAX_FILE_NAME_BYTES = 255  # of Linux, macOS and Windows; endings and temporary names included
+MAX_NAMED = 20  # names in one message
+TEMPORARY_BYTES = 20  # that a file being written adds to its name
+SEPARATORS = "/\\"
+INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # categories of Unicode
+ALPHABET = (
+    f"A name has 1 to {MAX_CHARACTERS} letters, digits, signs and spaces, no slash and no invisible"
+    " character, and does not begin with a dot, a dash or a space."
+)
+
+
+def check_text(name: object, what: str, error: type[RomError] = ConfigError) -> str:
+    """The name, if it is a text of one line that can be seen.
+
+    Args:
+        name: as read, from whatever file.
+        what: what it names, for the message, e.g. "an interface".
+        error: class of what is raised.
+
+    Raises:
+        RomError: of that class, showing the name.
+    """
+    if not isinstance(name, str) or not name.strip():
+        raise error(f"the name of {what} must be a text that is not empty, got {name!r}.")
+    if len(name) > MAX_CHARACTERS:
+        raise error(
+            f"the name {name[:20]!r}... of {what} has {len(name)} characters; at most "
+            f"{MAX_CHARACTERS} are allowed."
+        )
+    if hidden := {c for c in name if unicodedata.category(c) in INVISIBLE}:
+        codes = ", ".join(sorted(f"U+{ord(c):04X}" for c in hidden))
+        raise error(
+            f"the name {name!a} of {what} has characters that cannot be seen: {codes}.",
+            hint=ALPHABET,
+        )
+    return name
+
+
+def check_name(name: object, what: str, error: type[RomError] = ConfigError) -> str:
+    """The name, if a thing may be given it; arguments and errors as for `check_text`."""
+    name = check_text(name, what, error)
+    reason = ""
+    if found := [c for c in SEPARATORS if c in name]:
+        reason = f"contains {found[0]!r}, which would lead to another folder"
+    elif name[0] in ".- " or name[-1] == " ":
+        reason = f"begins with {name[0]!r}" if name[0] in ".- " else "ends with a space"
+    if reason:
+        raise error(f"the name {name!r} of {what} {reason}.", hint=ALPHABET)
+    return name
+
+
+def file_name(name: str, ending: str = "") -> str:
+    """The name of a file for a thing of this name, without a folder.
+
+    Args:
+        name: of the thing, e.g. of a body.
+        ending: put behind, e.g. ".csv".
+
+    Raises:
+        ConfigError: if no file can have it, or it would lie in another folder.
+    """
+    found = f"{check_name(name, 'a file')}{ending}"
+    size = len(found.encode()) + TEMPORARY_BYTES
+    if size > MAX_FILE_NAME_BYTES:
+        raise ConfigError(
+            f"the file name {found[:20]!r}... takes {size} bytes while it is written; at most "
+            f"{MAX_FILE_NAME_BYTES} are possible.",
+            hint="Give the body a shorter name.",
+        )
+    return found
+
+
+def inside(folder: str | Path, name: str, ending: str = "") -> Path:
+    """Path of a file for a thing of this name, in a folder and nowhere else.
+
+    Raises:
+        ConfigError: as `file_name`.
+    """
+    folder = Path(folder)
+    path = folder / file_name(name, ending)
+    if path.parent.resolve() != folder.resolve():
+        raise ConfigError(f"{path} would lie outside of {folder}.")
+    return path
+
+
+def named(names: Iterable[object]) -> str:
+    """All of the names in quotes, or numbers, with commas; beyond `MAX_NAMED` how many more."""
+    words = [repr(name) for name in names]
+    more = f" and {len(words) - MAX_NAMED} more" if len(words) > MAX_NAMED else ""
+    return ", ".join(words[:MAX_NAMED]) + more
