@@ -15,6 +15,7 @@ from pathlib import Path
 
 from rom.errors import ConfigError, RomError
 
+ORIGIN_MARK = "written by rom"  # stands in every file of a format that has comments
 MAX_CHARACTERS = 120
 MAX_FILE_NAME_BYTES = 255  # of Linux, macOS and Windows; endings and temporary names included
 MAX_NAMED = 20  # names in one message

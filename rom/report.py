@@ -13,6 +13,7 @@ from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Report
+from rom.names import ORIGIN_MARK
 
 STYLE = """
 body { font: 16px/1.5 "DejaVu Sans", "Segoe UI", Arial, sans-serif; color: #20242a;
@@ -119,6 +120,7 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
     name = html.escape(title)
     text = (
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
+        f"<meta name='generator' content='{ORIGIN_MARK}'>"
         f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
         f"<style>{STYLE}</style></head><body><h1>{name}</h1>{body}</body></html>\n"
     )

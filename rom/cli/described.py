@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from rom.config.mechanism import MechanismFile
 
 TOML = ".toml"
-COMMON = {"verb", "file", "run", "output", "json", "quiet", "verbose", "strict", "debug", "version"}
+COMMON = {
+    "verb", "file", "run", "output", "force", "json", "quiet", "verbose", "strict", "debug",
+    "version",
+}  # fmt: skip
 Changes = dict[tuple[str, ...], Any]
 PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "E": ("material", "E"),

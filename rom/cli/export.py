@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rom.cli.answer import Answer
 from rom.cli.options import names
+from rom.cli.output import add_force, checked
 
 SUMMARY = "write a body for another program"
 EXAMPLES = """\
@@ -24,6 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--held", metavar="NAME,...", type=names, default=(), help="interfaces held, for openfast"
     )
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -33,6 +35,7 @@ def run(args: argparse.Namespace) -> Answer:
 
     check_writable(args.output)
     kind = format_of(args.output, args.to)
+    checked(args, args.output, kind)
     body = read_body(args.file)
     data = {"file": str(args.file), "output": str(args.output), "format": kind}
     text = f"{args.output}: body {body.name} as {kind}"

@@ -3,6 +3,7 @@
 import os
 import sys
 import traceback
+from contextlib import ExitStack
 
 from rom.cli.described import TOML
 from rom.cli.parser import build_parser, given
@@ -64,7 +65,7 @@ def run(argv: list[str], manner: Manner) -> int:
     if args.verb is None:
         raise ConfigError("no verb was given.", hint="rom --help lists the verbs.")
     first = ranks()[0] == 0
-    with speaking(manner, aloud=first) as remarks:
+    with speaking(manner, aloud=first) as remarks, ExitStack() as args.claims:
         answer = args.run(args)
         if first and answer.write is not None:
             answer.write()

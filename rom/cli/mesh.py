@@ -15,6 +15,7 @@ from rom.cli.options import (
     unique,
     vector,
 )
+from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "runs it and leaves matrices for rom modes and rom reduce",
     )
     add_solid(parser)
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -71,7 +73,7 @@ def run(args: argparse.Namespace) -> Answer:
         solid, file, how = _solid(args), args.file, reading(args)
         how["faces"] = unique([(name, _point(at)) for name, at in args.face], "--face")
     if args.save:
-        _check_save(args.save)
+        _check_save(args, file)
     if args.faces:
         how["faces"] = how["faces"] | {"face": "every"}
     mesh = read_mesh(file, **how)
@@ -89,12 +91,12 @@ def _point(text: str) -> tuple[float, float, float]:
         raise ConfigError(f"--face: {error}.") from None
 
 
-def _check_save(path: Path) -> None:
-    from rom.io.files import check_writable
-
+def _check_save(args: argparse.Namespace, geometry: Path) -> None:
+    path = args.save
     if path.suffix.lower() not in (".vtu", DECK):
         raise ConfigError(f"--save {path}: a mesh is written as .vtu or .inp only.")
-    check_writable(path)
+    kind = "deck" if path.suffix.lower() == DECK else "vtu"
+    checked(args, path, kind, inputs=[geometry])
 
 
 def _solid(args: argparse.Namespace) -> "Material | None":

@@ -22,9 +22,13 @@ from rom.cli.options import (
     read_model,
     unique,
 )
+from rom.cli.output import add_force, checked, files_in
 from rom.errors import ConfigError
+from rom.names import check_name
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
 
@@ -68,6 +72,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, help="e.g. rod.rom.npz; may be said by a .toml file"
     )
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -79,24 +84,27 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(_data(body, output), _text(body, output), lambda: save(body, output), failed)
 
 
-def _checked(output: Path | None) -> Path:
-    from rom.io.files import check_writable
-
+def _checked(
+    args: argparse.Namespace, output: Path | None, name: str, inputs: "Iterable[Path]" = ()
+) -> Path:
+    """The file to write, before anything is computed for it."""
     if output is None:
         raise ConfigError("the following arguments are required: -o/--output.")
-    return check_writable(output)
+    check_name(name, "a body")
+    return checked(args, output, "npz", inputs=inputs)
 
 
 def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     part = component(args)
-    output = _checked(args.output or part.output)
+    output = _checked(args, args.output or part.output, part.name, files_in(part.values))
     return part.body(), output
 
 
 def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     from rom.workflow import reduce
 
-    output = _checked(args.output)
+    name = args.name or args.file.stem
+    output = _checked(args, args.output, name)
     chosen, damping = method(args), _damping(args)
     kinds = unique(args.interface, "-i")
     if not kinds:
@@ -107,7 +115,7 @@ def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
         interfaces=kinds,
         reference=args.reference[0] if len(args.reference) == 1 else args.reference,
         damping=damping,
-        name=args.name or args.file.stem,
+        name=name,
         stress=args.stress,
         stiffening=args.stiffening,
         certify=not args.no_certificate,

@@ -8,6 +8,7 @@ from pathlib import Path
 from shlex import quote
 
 from rom.cli.answer import Answer
+from rom.cli.output import add_force, checked
 
 SUMMARY = "write a report as one HTML file"
 EXAMPLES = """\
@@ -22,6 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="body file, .toml file, or folder of a run")
     parser.add_argument("-o", "--output", type=Path, required=True, help="report, .html")
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -29,12 +31,11 @@ def run(args: argparse.Namespace) -> Answer:
     from rom import __version__
     from rom.config.reporting import describe
     from rom.errors import ConfigError
-    from rom.io.files import check_writable
     from rom.report import write_report
 
     if args.output.suffix.lower() != ".html":
         raise ConfigError(f"{args.output}: a report is written as .html.")
-    check_writable(args.output)
+    checked(args, args.output)
     command = f"rom {' '.join(map(quote, args.argv))}"
     title, sections = describe(args.file, command=command, version=__version__)
     data = {

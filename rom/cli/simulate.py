@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
 from rom.cli.options import positive, vector
+from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.errors import ConfigError
+from rom.names import inside
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -46,6 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--history", choices=("csv", "h5"), help="every marker, reaction and energy, too"
     )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -55,10 +58,12 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _mechanism(args: argparse.Namespace) -> Answer:
     from rom import __version__
+    from rom.config.run import paths_of
     from rom.config.run import run as move
 
     file = mechanism(args)
-    _check_folder(args.output)
+    for path in paths_of(file, claim(args)):
+        checked(args, path, inputs=files_in(file.values))
     aloud = ranks()[0] == 0 and not args.quiet
     done = move(file, command=_command(args), version=__version__, progress=aloud)
     paths = done.paths(args.output)
@@ -89,12 +94,12 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):
         raise ConfigError("--axis 0,0,0 has no direction.")
-    _check_folder(args.output)
+    folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)
+    path = inside(folder, body.name, ".csv")
+    paths = [checked(args, each) for each in (path, *_more(path, args), folder / RECORD)]
     solution, audit = _swing(body, args)
-    path = args.output / f"{body.name}.csv"
-    paths = [path, *_more(path, args), args.output / RECORD]
 
     def write() -> None:
         _write_all(path, body, solution, args)
@@ -121,14 +126,6 @@ def _swing(body: "FlexibleBody", args: argparse.Namespace) -> tuple[Any, Any]:
     return solution, audit(solution)
 
 
-def _check_folder(folder: Path) -> None:
-    from rom.io.files import check_writable
-
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"{folder} is a file; a folder is needed.")
-    check_writable(folder / "motion.csv" if folder.is_dir() else folder)
-
-
 def _more(path: Path, args: argparse.Namespace) -> list[Path]:
     """The film and the history asked for."""
     found = [path.with_suffix(f".{args.film}")] if args.film else []
@@ -153,13 +150,11 @@ def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:
     import numpy as np
 
     from rom.io.files import write_whole
+    from rom.io.history import table
 
-    path.parent.mkdir(exist_ok=True)
     places = {name: solution.position(body.name, name) for name in body.interface_names}
     names = ["t [s]", *(f"{name} {axis} [m]" for name in places for axis in "xyz")]
     names += [f"q{k + 1}" for k in range(body.n_modes)]
     values = np.column_stack([solution.t, *places.values(), solution.elastic(body.name)])
-    write_whole(
-        path,
-        lambda file: np.savetxt(file, values, "%.10g", ",", header=",".join(names), comments=""),
-    )
+    content = table(names, values, "%.10g")
+    write_whole(path, lambda file: file.write(content))

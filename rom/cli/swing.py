@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.options import add_geometry, count, positive, reading, vector
+from rom.cli.output import add_force, checked, claim
 from rom.errors import ConfigError
+from rom.names import inside
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -58,11 +60,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--film", action="store_true", help="a film, too; half a second a picture")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Mesh, reduce, simulate; files are written at the end."""
-    _check_output(args.output)
+    files = _files(args)
     hinge, faces = hinge_of(args.hinge)
     body = _reduced(args, hinge, faces)
     swing = planned(body, hinge, args.gravity, args.t_end)
@@ -72,8 +75,6 @@ def run(args: argparse.Namespace) -> Answer:
         leave_uncompiled()
     mechanism, solution = _moved(body, hinge, swing)
     magnify = args.magnify or magnification(body, solution.elastic(body.name))
-    kinds = (".rom.npz", ".png", ".gif") if args.film else (".rom.npz", ".png")
-    files = {kind: args.output / f"{body.name}{kind}" for kind in kinds}
     certificate = body.certificate
     data = {
         "files": [str(path) for path in files.values()],
@@ -90,12 +91,11 @@ def run(args: argparse.Namespace) -> Answer:
     )  # fmt: skip
 
 
-def _check_output(folder: Path) -> None:
-    from rom.io.files import check_writable
-
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"{folder} is a file; a folder is needed.")
-    check_writable(folder / "motion.png" if folder.is_dir() else folder)
+def _files(args: argparse.Namespace) -> dict[str, Path]:
+    """What will be written, by its ending; refused before the computation."""
+    folder = claim(args)
+    kinds = (".rom.npz", ".png", ".gif") if args.film else (".rom.npz", ".png")
+    return {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
 
 
 def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
@@ -221,7 +221,6 @@ def _write(
     from rom.io.native import save
     from rom.view import animate, instants
 
-    files[".png"].parent.mkdir(exist_ok=True)
     save(body, files[".rom.npz"])
     times = np.linspace(0, 0.5 * motion[1].t[-1], INSTANTS)
     up = -np.asarray(motion[0].gravity, dtype=float)

@@ -11,6 +11,7 @@ from typing import Any
 from rom.cli.answer import Answer
 from rom.cli.described import component, described, mechanism
 from rom.cli.options import count, names
+from rom.cli.output import add_force, checked
 
 SUMMARY = "look at a body, a component or a mechanism"
 EXAMPLES = """\
@@ -29,12 +30,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--fixed", metavar="NAME,...", type=names, default=(), help="interfaces held, for modes"
     )
     parser.add_argument("-o", "--output", type=Path, help="picture, .png, and no window")
+    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Load; the picture is drawn, or the window opened, at the end."""
     from rom.errors import ConfigError
-    from rom.io.files import check_writable
     from rom.view.window import has_display
 
     window = args.output is None and has_display()
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> Answer:
     if path.suffix.lower() != ".png":
         raise ConfigError(f"{path}: a picture is written as .png only.")
     if not window:
-        check_writable(path)
+        checked(args, path)
     what, draw, scenes = _subject(args)
     data = {"file": str(args.file), "output": None if window else str(path)}
     if window:

@@ -88,12 +88,7 @@ class Run:
 
     def paths(self, folder: Path) -> list[Path]:
         """The files to be written, the table of the motion first."""
-        out = self.file.values["output"]
-        names = [f"motion.{out['history']}"]
-        names += ["instants.png"] if out["picture"] else []
-        names += ["curves.png"] if out["plot"] else []
-        names += [f"motion.{out['film']}"] if "film" in out else []
-        return [folder / name for name in [*names, RECORD]]
+        return paths_of(self.file, folder)
 
     def write(self, folder: Path) -> None:
         """Write them; the folder is made if it is missing."""
@@ -148,6 +143,16 @@ class Run:
             "unit; names as in the table of the motion."
         )
         history(self.solution.t, told, path, title=title, caption=caption)
+
+
+def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
+    """The files that a run of a mechanism file writes, the table of the motion first."""
+    out = file.values["output"]
+    names = [f"motion.{out['history']}"]
+    names += ["instants.png"] if out["picture"] else []
+    names += ["curves.png"] if out["plot"] else []
+    names += [f"motion.{out['film']}"] if "film" in out else []
+    return [folder / name for name in [*names, RECORD]]
 
 
 def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:

@@ -18,7 +18,7 @@ from rom.fe.elements import CELL_TYPES
 from rom.fe.solid import SolidMesh
 from rom.fe.topology import row_ids
 from rom.model import Index, Orthotropic
-from rom.names import named
+from rom.names import ORIGIN_MARK, named
 
 STEPS = {
     "frequencies": "*FREQUENCY\n{n}",
@@ -97,7 +97,7 @@ def _with_edges(mesh: SolidMesh) -> SolidMesh:
 
 
 def _nodes(mesh: SolidMesh) -> Iterator[str]:
-    yield "** lengths in m, forces in N, masses in kg"
+    yield f"** {ORIGIN_MARK}: lengths in m, forces in N, masses in kg"
     yield "*NODE"
     for k, (x, y, z) in enumerate(mesh.points, 1):
         yield f"{k}, {x:.13e}, {y:.13e}, {z:.13e}"

@@ -15,6 +15,7 @@ from scipy.sparse import coo_matrix, csc_matrix
 from rom.errors import FileFormatError
 from rom.io.files import check_last_line, check_readable, write_whole
 from rom.model import Array, Index
+from rom.names import ORIGIN_MARK
 
 BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
@@ -78,7 +79,7 @@ def write_dmig(
     Raises:
         ConfigError: if the place is not writable.
     """
-    lines = list(_points(dofs, nodes)) if nodes else []
+    lines = [f"$ {ORIGIN_MARK}", *_points(dofs, nodes)] if nodes else []
     for name, A in matrices.items():
         lines += _written(name.upper(), csc_matrix(A), dofs)
     text = "\n".join(lines) + "\n"

@@ -30,13 +30,14 @@ from rom.body.reference import skew_tensor
 from rom.errors import RomWarning
 from rom.io.files import write_whole
 from rom.model import Array
+from rom.names import ORIGIN_MARK
 
 STAR = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
 MOVED = 1e-9  # share of what the momentum of a shape could be
 RADIUS = 1e-3  # of the star, of the size of the body
 
 MODULE = '''\
-"""A flexible body for Exudyn, written by rom.
+"""A flexible body for Exudyn, {mark}.
 
     import exudyn as exu
     import {stem}
@@ -136,7 +137,9 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
     np.savez_compressed(memory, **arrays(body))
     names = json.dumps(list(body.markers)).encode()
     stem = path.stem if path.stem.isidentifier() else "body"
-    text = MODULE.format(stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue()))
+    text = MODULE.format(
+        mark=ORIGIN_MARK, stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue())
+    )
     write_whole(path, lambda file: file.write(text.encode()))
     return path
 

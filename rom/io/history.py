@@ -103,9 +103,20 @@ def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
     head = ["t [s]"]
     for c in found:
         head += [f"{' '.join(c.path[1:])} {x}".strip() + f" [{c.unit}]" for x in c.columns]
+    return table(head, np.column_stack([t, *(c.values for c in found)]), "%.17g")
+
+
+def table(head: list[str], values: Array, number: str) -> bytes:
+    """Text of a table, its head with commas and quotes in names as CSV has them.
+
+    Args:
+        head: (c,) names of the columns.
+        values: (n, c) numbers.
+        number: how one is written, e.g. "%.10g".
+    """
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(head)
-    np.savetxt(text, np.column_stack([t, *(c.values for c in found)]), "%.17g", ",")
+    np.savetxt(text, values, number, ",")
     return text.getvalue().encode()
 
 

@@ -25,6 +25,7 @@ from rom.body.stiffening import known_loads
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
+from rom.names import ORIGIN_MARK
 
 
 def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
@@ -71,7 +72,7 @@ def invariants(body: FlexibleBody) -> dict[str, Array]:
 
 def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:
     r, points = body.n_modes, np.array([m.point for m in body.markers.values()])
-    yield "** MBDyn MODAL DATA FILE"
+    yield f"** MBDyn MODAL DATA FILE, {ORIGIN_MARK}"
     yield from _group(1, "HEADER")
     yield "**   REVISION, NODES, NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES"
     yield f"      REV0 {len(labels)} {r} 0 0 0"

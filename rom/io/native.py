@@ -24,8 +24,8 @@ from rom.units import SYSTEMS
 SCHEMA = "rom-body"
 VERSION = (1, 3)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
-MARKER = ("point", "translation", "rotation", "hold")  # arrays of each
-SURFACE = ("points", "triangles", "shape")
+MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
+SURFACE_ARRAYS = ("points", "triangles", "shape")
 
 
 def save(body: FlexibleBody, path: str | Path) -> Path:
@@ -97,11 +97,11 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     for name, A in body.K_geo.items():
         arrays[f"K_geo/{name}"] = A
     for i, marker in enumerate(body.markers.values()):
-        for part in MARKER:
+        for part in MARKER_ARRAYS:
             arrays[f"marker/{i}/{part}"] = getattr(marker, part)
         arrays |= {f"marker/{i}/{part}": A for part, A in _patch_arrays(marker.patch).items()}
     if body.surface is not None:
-        for part in SURFACE:
+        for part in SURFACE_ARRAYS:
             arrays[f"surface/{part}"] = getattr(body.surface, part)
     if body.stress is not None:
         for part in ("points", "operator"):
@@ -155,12 +155,12 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         m["name"]: Marker(
             name=m["name"],
             kind=m["kind"],
-            **{part: arrays[f"marker/{i}/{part}"] for part in MARKER},
+            **{part: arrays[f"marker/{i}/{part}"] for part in MARKER_ARRAYS},
             patch=_patch(arrays, f"marker/{i}"),
         )
         for i, m in enumerate(manifest["markers"])
     }
-    parts: Any = (arrays[f"surface/{part}"] for part in SURFACE)
+    parts: Any = (arrays[f"surface/{part}"] for part in SURFACE_ARRAYS)
     surface = Surface(*parts) if manifest["surface"] else None
     stress = None  # bodies whose stress is not recovered have none, and so have older files
     if "stress/points" in arrays:
@@ -188,9 +188,11 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
 
 def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
     """All arrays that the words of the manifest promise."""
-    needed = [f"marker/{i}/{part}" for i in range(len(manifest["markers"])) for part in MARKER]
+    needed = [
+        f"marker/{i}/{part}" for i in range(len(manifest["markers"])) for part in MARKER_ARRAYS
+    ]
     needed += [f"K_geo/{name}" for name in manifest["geometric_stiffness"]]
-    needed += [f"surface/{part}" for part in SURFACE] if manifest["surface"] else []
+    needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
     if missing := [name for name in needed if name not in arrays]:
         raise ConfigError(f"the file lacks the array {named(missing)}.")
 

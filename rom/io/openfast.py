@@ -21,7 +21,7 @@ from rom.io.files import write_whole
 from rom.io.interface_form import InterfaceForm, interface_form
 from rom.io.openfast_reading import LOADING, Superelement
 from rom.model import Array
-from rom.names import named
+from rom.names import ORIGIN_MARK, named
 
 VERSIONS = (4, 5)
 SPAN = 1e5  # s; how long the loads of version 4 are constant
@@ -54,7 +54,7 @@ def write_openfast(
     if version not in VERSIONS:
         raise ConfigError(f"version {version!r} of OpenFAST is unknown; known: {VERSIONS}.")
     found = superelement(body, held=held, gravity=gravity)
-    lines = [f"! {body.name}", *(_current(found) if version == 5 else _old(found))]
+    lines = [f"! {body.name}, {ORIGIN_MARK}", *(_current(found) if version == 5 else _old(found))]
     write_whole(path, lambda file: file.write(("\n".join(lines) + "\n").encode()))
     return Path(path)
 

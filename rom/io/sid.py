@@ -19,6 +19,7 @@ import numpy as np
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
+from rom.names import ORIGIN_MARK
 
 ZERO, DIAGONAL, SYMMETRIC, GENERAL, UNIT = range(5)
 NODE_BLOCKS = ("origin", "phi", "psi", "AP", "sigma")
@@ -112,7 +113,8 @@ def repacked(A: Array, *, by_axis: bool) -> Array:
 
 
 def _document(record: StandardInput, dialect: str) -> Iterator[str]:
-    yield f"{len(record.nodes)} {record.n_modes} :No. nodes, No. modes: {_line(record.title)}"
+    title = f"{_line(record.title)}; {ORIGIN_MARK}"
+    yield f"{len(record.nodes)} {record.n_modes} :No. nodes, No. modes: {title}"
     yield " part"
     yield f"      new modal = {_line(record.name)}"
     yield _indented(2, "refmod")

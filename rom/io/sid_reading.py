@@ -12,6 +12,7 @@ from rom.errors import FileFormatError, UnsafeFileError
 from rom.io.files import check_readable
 from rom.io.sid import BLOCKS, GENERAL, NODE_BLOCKS, SYMMETRIC, UNIT, shape_of
 from rom.model import Array
+from rom.names import ORIGIN_MARK
 
 LARGEST = 2**28  # bytes of a file that is still read
 MOST_MODES = 1000  # blocks grow with their square
@@ -84,7 +85,7 @@ def read_raw(path: str | Path) -> RawFile:
     """
     file = RawFile(check_readable(path, LARGEST))
     lines = _Lines(file, file.path.read_bytes().decode("ascii", "replace"))
-    file.title = HEAD.sub("", lines.next()).strip()
+    file.title = HEAD.sub("", lines.next()).strip().removesuffix(f"; {ORIGIN_MARK}")
     _expect(lines, "part")
     key, _, file.name = lines.next().partition("=")
     if key.split() != ["new", "modal"]:

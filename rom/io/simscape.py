@@ -14,6 +14,7 @@ from scipy.io import savemat
 from rom.body.flexible import FlexibleBody
 from rom.io.files import write_whole
 from rom.io.interface_form import interface_form
+from rom.names import ORIGIN_MARK
 
 
 def write_simscape(body: FlexibleBody, path: str | Path) -> Path:
@@ -47,6 +48,6 @@ def write_simscape(body: FlexibleBody, path: str | Path) -> Path:
     memory = io.BytesIO()
     savemat(memory, variables)
     # the text at the head of a file has the date, which would make every file a new one
-    content = b"MATLAB 5.0 MAT-file, written by rom".ljust(116) + memory.getvalue()[116:]
+    content = f"MATLAB 5.0 MAT-file, {ORIGIN_MARK}".encode().ljust(116) + memory.getvalue()[116:]
     write_whole(path, lambda file: file.write(content))
     return Path(path)

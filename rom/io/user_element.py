@@ -25,6 +25,7 @@ from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 from rom.io.dmig import Dofs, whole
 from rom.io.files import check_last_line, write_whole
 from rom.model import Array
+from rom.names import ORIGIN_MARK
 
 MOST_NODES = 100_000
 PER_LINE = 4
@@ -171,6 +172,7 @@ def _document(matrices: dict[str, Any], dofs: Dofs, nodes: dict[int, Array]) -> 
     components = {label: dofs[dofs[:, 0] == label, 1].tolist() for label in labels}
     if [label for label in labels for _ in components[label]] != dofs[:, 0].tolist():
         raise ConfigError("the rows of a user element are ordered node by node.")
+    yield f"** {ORIGIN_MARK}"
     yield "*NODE"
     yield from (f"{k}, " + _row(nodes.get(k, np.zeros(3))) for k in labels)
     yield f"*USER ELEMENT, TYPE=U1, NODES={len(labels)}, LINEAR"

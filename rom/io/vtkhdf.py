@@ -12,6 +12,7 @@ import numpy as np
 from rom.errors import ResourceError
 from rom.io.files import write_whole
 from rom.model import Array, Index
+from rom.names import ORIGIN_MARK
 
 TRIANGLE = 5  # VTK's number of this cell
 
@@ -42,6 +43,7 @@ def write_vtkhdf(
     every, zero = n * np.arange(f), np.zeros(f, dtype=np.int64)
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
+        file.attrs["generator"] = ORIGIN_MARK
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = (2, 0)
         root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))

@@ -14,6 +14,7 @@ from rom.body.recovery import von_mises
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array, Index
+from rom.names import ORIGIN_MARK
 
 TRIANGLE = 5  # VTK's number of this cell
 TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
@@ -155,6 +156,7 @@ def grid(
     return "\n".join(
         [
             head,
+            f"<!-- {ORIGIN_MARK} -->",
             f'<UnstructuredGrid><Piece NumberOfPoints="{len(points)}" NumberOfCells="{m}">',
             *_section("Points", {"points": points}),
             *_section("Cells", topology),

@@ -13,7 +13,7 @@ from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
-from rom.names import named
+from rom.names import ORIGIN_MARK, named
 from rom.view import page
 from rom.view.offscreen import Image, render, require
 from rom.view.scene import Actor, Camera, aimed, sharp_edges
@@ -293,5 +293,6 @@ def write_gif(path: Path, pages: Image, duration: float) -> None:
         append_images=frames[1:],
         duration=max(20, round(1000 * duration)),
         loop=0,
+        comment=ORIGIN_MARK.encode(),
     )
     write_whole(path, lambda file: file.write(buffer.getvalue()))

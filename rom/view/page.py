@@ -119,6 +119,6 @@ def pixels(figure: "Figure") -> Image:
 def save(figure: "Figure", path: Path) -> Path:
     """Write the sheet as PNG, whole or not at all."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": "rom"})
     write_whole(path, lambda file: file.write(buffer.getvalue()))
     return path

@@ -15,6 +15,7 @@ from typing import IO
 
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
+from rom.names import ORIGIN_MARK
 
 SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -99,5 +100,6 @@ def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
 
 def _pack(file: IO[bytes], files: dict[str, bytes]) -> None:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.comment = ORIGIN_MARK.encode()
         for name in sorted(files):
             archive.writestr(zipfile.ZipInfo(name, EPOCH), files[name], zipfile.ZIP_DEFLATED)

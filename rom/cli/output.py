@@ -1,0 +1,83 @@
+"""Where a verb may write: over its own earlier files, over others only with --force."""
+
+import argparse
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from rom.cli.ranks import ranks
+
+KINDS = {"hdf5": "h5"}  # endings that are not the name of their kind
+WRITTEN = ("output", "save")  # options that name what is written
+NOT_PATHS = ("argv", "given", "run", "claims", "verb")
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """The option of every verb that writes."""
+    parser.add_argument(
+        "--force", action="store_true", help="replace files that rom has not written itself"
+    )
+
+
+def checked(
+    args: argparse.Namespace, path: Path, kind: str = "", *, inputs: Iterable[Path] = ()
+) -> Path:
+    """The path, if the verb may write it; to be asked before the computation.
+
+    Args:
+        args: the options, whose files are inputs, too.
+        path: file to write.
+        kind: of it, a key of `rom.io.ours.SIGNS`; from its ending if not given.
+        inputs: files that are read and named elsewhere.
+
+    Raises:
+        ConfigError: as `rom.io.ours.check_replaceable`.
+    """
+    from rom.io.ours import check_replaceable
+
+    ending = path.suffix.lower().removeprefix(".")
+    return check_replaceable(
+        path,
+        kind or KINDS.get(ending, ending),
+        inputs=[*inputs, *_inputs(args)],
+        force=args.force,
+    )
+
+
+def claim(args: argparse.Namespace) -> Path:
+    """The folder of ``-o``, kept from other runs until the files of this one are written.
+
+    Raises:
+        ConfigError: if it is no folder, or may not be made or written.
+        ResourceError: if another run is writing into it.
+    """
+    from rom.io.claim import claimed
+
+    folder: Path = args.output
+    if ranks()[0] == 0:
+        args.claims.enter_context(claimed(folder))
+    return folder
+
+
+def files_in(values: Any) -> Iterator[Path]:
+    """The files that a description names, but for those it writes."""
+    if isinstance(values, Path):
+        yield values
+    elif isinstance(values, dict):
+        for key, value in values.items():
+            if key not in WRITTEN:
+                yield from files_in(value)
+    elif isinstance(values, list | tuple):
+        for value in values:
+            yield from files_in(value)
+
+
+def _inputs(args: argparse.Namespace) -> Iterator[Path]:
+    """Files named by options, also as FILE:MATRIX."""
+    for name, value in vars(args).items():
+        if name in (*WRITTEN, *NOT_PATHS):
+            continue
+        for text in (str(value), str(value).rpartition(":")[0]):
+            if isinstance(value, str | Path) and "\0" not in text and os.path.exists(text):
+                yield Path(text)

@@ -1,0 +1,77 @@
+"""One writer at a time in a folder of results."""
+
+import fcntl
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rom.errors import ConfigError, ResourceError
+from rom.io.files import check_writable
+
+LOCK_NAME = ".rom.lock"
+MAX_OWNER_BYTES = 300
+
+
+@contextmanager
+def claimed(folder: str | Path) -> Iterator[None]:
+    """Keep other runs out of a folder, which is made if it is missing.
+
+    The lock is one of the system and ends with the process that holds it, however that ends; a
+    folder that was made and stayed empty is removed. Where a file system has no locks, nothing is
+    kept out.
+
+    Raises:
+        ConfigError: if it is no folder, or may not be made or written.
+        ResourceError: naming the process that has claimed it.
+    """
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"{folder} is a file; a folder is needed.")
+    made = not folder.is_dir()
+    check_writable(folder if made else folder / LOCK_NAME)
+    folder.mkdir(exist_ok=True)
+    handle = None
+    try:
+        handle = _locked(folder)
+        yield
+    finally:
+        if handle is not None:
+            (folder / LOCK_NAME).unlink(missing_ok=True)
+            os.close(handle)
+        if made:
+            with suppress(OSError):  # something is in it, or another run has taken it
+                folder.rmdir()
+
+
+def _locked(folder: Path) -> int | None:
+    """Descriptor of the lock; None where locks do not work."""
+    path = folder / LOCK_NAME
+    while True:
+        handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o666)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = os.pread(handle, MAX_OWNER_BYTES, 0).decode(errors="replace")
+            os.close(handle)
+            raise ResourceError(
+                f"another run is writing into {folder}: {owner or 'it has just begun'}.",
+                hint="Wait for it, or choose another folder.",
+            ) from None
+        except OSError:
+            os.close(handle)
+            return None
+        if _still_there(path, handle):
+            break
+        os.close(handle)  # its owner has removed it in between
+    os.ftruncate(handle, 0)
+    os.pwrite(handle, f"process {os.getpid()} on {platform.node()}".encode(), 0)
+    return handle
+
+
+def _still_there(path: Path, handle: int) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(handle))
+    except FileNotFoundError:
+        return False
