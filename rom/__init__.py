@@ -7,6 +7,8 @@ lives in ``rom.fe`` and is imported when it is first used.
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from rom.launcher import one_thread_each as _one_thread_each
+
 if TYPE_CHECKING:
     from rom.body.assembly import Assembly
     from rom.body.damping import ModalDamping, Rayleigh
@@ -104,6 +106,8 @@ if TYPE_CHECKING:
     from rom.report import write_report
     from rom.view.motion import write_animation
     from rom.workflow import mass_properties, modes, reduce, substructure
+
+_one_thread_each()
 
 __version__ = "0.1.0"
 

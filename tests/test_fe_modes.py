@@ -219,15 +219,3 @@ def test_a_factor_is_refused_after_the_analysis_when_the_law_was_too_kind(monkey
     monkeypatch.setattr(memory, "free_bytes", lambda: 4e6)
     with pytest.raises(ResourceError, match=r"factoring 2940 dofs is predicted to take 0.0\d GiB"):
         model.operators.hold(model.interfaces["x0"].dofs)
-
-
-def test_the_least_limit_counts(tmp_path, monkeypatch):
-    (tmp_path / "memory.max").write_text("1000000\n")
-    (tmp_path / "memory.current").write_text("900000\n")
-    (tmp_path / "memory.stat").write_text("anon 500000\nfile 400000\n")
-    assert memory._control_group(tmp_path) == 500_000.0
-    (tmp_path / "memory.max").write_text("max\n")
-    assert memory._control_group(tmp_path) == memory.UNLIMITED
-    assert memory._control_group(tmp_path / "none") == memory.UNLIMITED
-    monkeypatch.setattr(memory.resource, "getrlimit", lambda _: (memory._machine(), 0))
-    assert memory.free_bytes() < memory._machine()

@@ -1,5 +1,6 @@
 """Runs one verb and turns whatever happens into one exit code, the same on all ranks."""
 
+import math
 import os
 import sys
 import traceback
@@ -17,6 +18,7 @@ from rom.errors import (
     ResourceError,
     RomError,
 )
+from rom.memory import free_bytes
 
 
 class InternalError(RomError):
@@ -81,7 +83,7 @@ def translated(error: BaseException) -> RomError:
     if isinstance(error, KeyboardInterrupt):
         return InterruptedRun("interrupted.", hint="No file was left half written.")
     if isinstance(error, MemoryError):
-        return ResourceError("the memory ran out.", hint="Use larger elements or fewer modes.")
+        return _out_of_memory(error)
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("rom"):
         return ResourceError(
             f"{error.name} is not installed.", hint="rom doctor says what to type."
@@ -91,6 +93,19 @@ def translated(error: BaseException) -> RomError:
     return InternalError(
         f"{type(error).__name__}: {error} ({_place(error)})",
         hint="This is a mistake of ours: please report it with what --debug prints.",
+    )
+
+
+def _out_of_memory(error: MemoryError) -> ResourceError:
+    """What was asked for, as far as NumPy tells, and what there is."""
+    shape, dtype = getattr(error, "shape", None), getattr(error, "dtype", None)
+    asked = ""
+    if shape is not None and dtype is not None:
+        size = math.prod(shape) * dtype.itemsize / 2**30
+        asked = f" for {size:.3g} GiB, {' x '.join(map(str, shape))} numbers"
+    return ResourceError(
+        f"the memory ran out{asked}; this process may take {free_bytes() / 2**30:.3g} GiB more.",
+        hint="Use larger elements or fewer modes.",
     )
 
 

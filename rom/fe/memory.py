@@ -1,17 +1,14 @@
 """How much memory a factorisation will take, asked before it is taken."""
 
 import ctypes
-import os
-import resource
-from pathlib import Path
 
 from mpi4py import MPI
 
 from rom.errors import ResourceError
+from rom.memory import free_bytes
 
 SHARE = 0.85  # of the memory that is free
 THIN = 0.2  # of a block's factor: what a thin-walled body of as many dofs needs
-UNLIMITED = 1 << 60
 
 
 def factor_bytes(n: int) -> float:
@@ -23,15 +20,6 @@ def factor_bytes(n: int) -> float:
     return 71e6 * (n / 16_700) ** 1.37
 
 
-def free_bytes() -> float:
-    """Memory this process may still take [bytes].
-
-    The least of what the machine has free, what its control group leaves, and what its own limit
-    on address space leaves.
-    """
-    return min(_machine(), _control_group(Path("/sys/fs/cgroup")), _address_space())
-
-
 def give_back() -> None:
     """Return freed memory to the machine.
 
@@ -40,20 +28,6 @@ def give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:  # glibc has it
         trim(0)
-
-
-def _machine() -> float:
-    lines = Path("/proc/meminfo").read_text().splitlines()
-    fields = dict(line.split(":", 1) for line in lines)
-    return 1024.0 * float(fields["MemAvailable"].split()[0])
-
-
-def _address_space() -> float:
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit == resource.RLIM_INFINITY:
-        return float(UNLIMITED)
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    return float(limit - pages * os.sysconf("SC_PAGE_SIZE"))
 
 
 def allowed_bytes(comm: MPI.Comm) -> float:
@@ -93,17 +67,3 @@ def too_large(n: int, need: float, there: float) -> ResourceError:
         hint='Use a coarser mesh, more machines, solver="out-of-core" (the factor on disk) or '
         'solver="iterative" (no factor).',
     )
-
-
-def _control_group(folder: Path) -> float:
-    """What the control group leaves; cached files count as free."""
-    try:
-        text = (folder / "memory.max").read_text().strip()
-        if text == "max":
-            return float(UNLIMITED)
-        used = float((folder / "memory.current").read_text())
-        pairs = (line.split() for line in (folder / "memory.stat").read_text().splitlines())
-        cached = float(dict(pairs).get("file", 0))
-    except OSError:
-        return float(UNLIMITED)
-    return max(float(text) - used + cached, 0.0)

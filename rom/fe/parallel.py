@@ -1,6 +1,5 @@
 """What several ranks must agree on: one rank's error is raised on all of them."""
 
-import os
 import sys
 import time
 import traceback
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rom.errors import ParallelError, RomError
+from rom.launcher import ranks
 
 T = TypeVar("T")
 GRACE = 1.0  # seconds the other ranks leave rank 0 to print an error all of them have
@@ -111,7 +111,7 @@ def install_abort_hook(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
 
 def launched_by_mpirun() -> bool:
     """True when this process was started by an MPI launcher with several ranks."""
-    return any(int(os.environ.get(name, "1")) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
+    return ranks()[1] > 1
 
 
 def stop_all_ranks(code: int, complain: Callable[[], None]) -> None:

@@ -1,0 +1,70 @@
+"""How much memory this process may still take."""
+
+import os
+import resource
+from collections.abc import Iterator
+from pathlib import Path
+
+UNLIMITED = 1 << 60
+CONTROL_GROUPS = Path("/sys/fs/cgroup")
+FILES = (  # limit, use, and the line of memory.stat with what is given back when asked for
+    ("memory.max", "memory.current", "file"),
+    ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_cache"),
+)
+
+
+def free_bytes() -> float:
+    """Memory this process may still take [bytes].
+
+    The least of what the machine has free, what its control groups leave, and what its own limit
+    on address space leaves.
+    """
+    return min(machine_bytes(), *map(group_bytes, _groups()), address_bytes())
+
+
+def machine_bytes() -> float:
+    """What the machine has free; where it does not tell, no limit."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+    except OSError:
+        return float(UNLIMITED)
+    fields = dict(line.split(":", 1) for line in lines)
+    return 1024.0 * float(fields["MemAvailable"].split()[0])
+
+
+def address_bytes() -> float:
+    """What the limit on address space leaves."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY:
+        return float(UNLIMITED)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    return float(limit - pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def group_bytes(folder: Path) -> float:
+    """What a control group of either version leaves; cached files count as free."""
+    for limit, use, cache in FILES:
+        try:
+            text = (folder / limit).read_text().strip()
+            used = float((folder / use).read_text())
+            pairs = (line.split() for line in (folder / "memory.stat").read_text().splitlines())
+            cached = float(dict(pairs).get(cache, 0))
+        except (OSError, ValueError):
+            continue
+        return float(UNLIMITED) if text == "max" else max(float(text) - used + cached, 0.0)
+    return float(UNLIMITED)
+
+
+def _groups() -> Iterator[Path]:
+    """Folders of the control groups of this process, and of those around them."""
+    yield from (CONTROL_GROUPS, CONTROL_GROUPS / "memory")
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        root = CONTROL_GROUPS / ("memory" if controllers == "memory" else "")
+        if controllers in ("", "memory"):
+            own = root / path.strip("/")
+            yield from (own, *(above for above in own.parents if above.is_relative_to(root)))
