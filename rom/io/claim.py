@@ -29,36 +29,36 @@ def claimed(folder: str | Path) -> Iterator[None]:
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise ConfigError(f"{folder} is a file; a folder is needed.")
-    made = not folder.is_dir()
-    check_writable(folder if made else folder / LOCK_NAME)
-    folder.mkdir(exist_ok=True)
-    handle = None
+    missing = not folder.exists()
     try:
         handle = _locked(folder)
+    except OSError as error:
+        raise ConfigError(f"the folder {folder} is not writable: {error.strerror}.") from error
+    try:
         yield
     finally:
         if handle is not None:
             (folder / LOCK_NAME).unlink(missing_ok=True)
             os.close(handle)
-        if made:
+        if missing:
             with suppress(OSError):  # something is in it, or another run has taken it
                 folder.rmdir()
 
 
 def _locked(folder: Path) -> int | None:
-    """Descriptor of the lock; None where locks do not work."""
+    """Descriptor of the lock, in a folder that exists then; None where locks do not work."""
     path = folder / LOCK_NAME
     while True:
-        handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o666)
+        try:
+            handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o666)
+        except FileNotFoundError:  # not made yet, or removed by a run that has failed
+            check_writable(folder.parent / LOCK_NAME)
+            folder.mkdir(exist_ok=True)
+            continue
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            owner = os.pread(handle, MAX_OWNER_BYTES, 0).decode(errors="replace")
-            os.close(handle)
-            raise ResourceError(
-                f"another run is writing into {folder}: {owner or 'it has just begun'}.",
-                hint="Wait for it, or choose another folder.",
-            ) from None
+            raise _taken(folder, handle) from None
         except OSError:
             os.close(handle)
             return None
@@ -68,6 +68,15 @@ def _locked(folder: Path) -> int | None:
     os.ftruncate(handle, 0)
     os.pwrite(handle, f"process {os.getpid()} on {platform.node()}".encode(), 0)
     return handle
+
+
+def _taken(folder: Path, handle: int) -> ResourceError:
+    owner = os.pread(handle, MAX_OWNER_BYTES, 0).decode(errors="replace")
+    os.close(handle)
+    return ResourceError(
+        f"another run is writing into {folder}: {owner or 'it has just begun'}.",
+        hint="Wait for it, or choose another folder.",
+    )
 
 
 def _still_there(path: Path, handle: int) -> bool:

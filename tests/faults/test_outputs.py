@@ -1,0 +1,211 @@
+"""What a verb may overwrite: its own earlier files, others with --force, and never an input."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import ROOT
+from solid import block
+
+import rom
+from rom.cli.main import main
+from rom.cli.parser import VERBS, build_parser
+from rom.config import reporting
+from rom.errors import ConfigError
+from rom.io.export import FORMATS
+from rom.io.ours import SAME, SIGNS, check_replaceable, is_ours
+
+BEAM = str(ROOT / "meshes" / "beam.geo")
+STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]
+PENDULUM = ["simulate", "good.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6"]
+NOTES = b"my notes\n1,2\n"
+UNMARKED = {"op4", "radioss"}  # their formats have room for no mark
+WRITERS = {  # case: (what to type, the file it writes)
+    "export to vtu": (["export", "good.npz", "x.vtu"], "x.vtu"),
+    "export to sid": (["export", "good.npz", "x.SID_FEM"], "x.SID_FEM"),
+    "export to another body file": (["export", "good.npz", "x.npz"], "x.npz"),
+    "pendulum": ([*PENDULUM, "-o", "out"], "out/good.csv"),
+    "history": ([*PENDULUM, "--history", "csv", "-o", "out"], "out/good.history.csv"),
+    "film": ([*PENDULUM, "--film", "glb", "-o", "out"], "out/good.glb"),
+    "record": ([*PENDULUM, "-o", "out"], "out/run.json"),
+    "report": (["report", "good.npz", "-o", "x.html"], "x.html"),
+}
+BEFORE_COMPUTING = {  # case: (what to type, the file it would write); nothing of it is there
+    "mesh": (["mesh", "none.geo", "--save", "x.vtu"], "x.vtu"),
+    "deck": (["mesh", "none.geo", "--save", "x.inp"], "x.inp"),
+    "reduce": (["reduce", "none.geo", *STEEL, "-i", "a=rbe2", "-o", "x.npz"], "x.npz"),
+    "view": (["view", "none.npz", "-o", "x.png"], "x.png"),
+    "swing": (["swing", "part.step", "--hinge", "3", "-o", "out"], "out/part.png"),
+    "swing film": (["swing", "part.step", "--hinge", "3", "--film", "-o", "out"], "out/part.gif"),
+}
+
+
+@pytest.fixture(scope="module")
+def body():
+    found = rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), name="good",
+                       interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+    return replace(found, provenance={"reduction": found.provenance["reduction"]})
+
+
+@pytest.fixture
+def folder(body, tmp_path, monkeypatch):
+    rom.save(body, tmp_path / "good.npz")
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("case", WRITERS)
+def test_a_file_of_the_user_is_kept_until_force_is_said(case, folder, capsys, monkeypatch):
+    monkeypatch.setattr(reporting, "drawn", lambda *_: [])  # pictures take seconds
+    words, name = WRITERS[case]
+    Path(name).write_bytes(NOTES)
+    before = sorted(os.listdir("out"))
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert f"{name} is there already" in said and "--force" in said
+    assert Path(name).read_bytes() == NOTES and sorted(os.listdir("out")) == before
+    assert main([*words, "--force"]) in (0, 5)
+    ours = Path(name).read_bytes()
+    assert ours != NOTES
+    assert main(words) in (0, 5), "an earlier file of the same kind is replaced"
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("case", BEFORE_COMPUTING)
+def test_it_is_said_before_anything_is_read(case, folder, capsys):
+    words, name = BEFORE_COMPUTING[case]
+    Path(name).write_bytes(NOTES)
+    assert main(words) == 2
+    assert f"{name} is there already" in capsys.readouterr().err
+    assert Path(name).read_bytes() == NOTES
+
+
+INPUTS = [
+    (["export", "good.npz", "{}", "--to", "npz"], "good.npz"),
+    (["report", "x.html", "-o", "{}"], "x.html"),
+    (["mesh", "x.vtu", "--save", "{}"], "x.vtu"),
+    (["reduce", "k.npz:KAA", "--mass", "m.op4:MAA", "--nodes", "n.inp", "-i", "a=rbe2",
+      "-o", "{}"], "k.npz"),
+    (["reduce", "k.op4", "--mass", "m.npz:MAA", "--nodes", "n.inp", "-i", "a=rbe2",
+      "-o", "{}"], "m.npz"),
+    (["reduce", "part.toml", "-o", "{}"], "geometry.geo"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "source"), INPUTS)
+@pytest.mark.parametrize("alias", ["same", "hard link", "soft link", "roundabout"])
+def test_an_input_is_never_written_whatever_it_is_called(words, source, alias, folder, capsys):
+    if not Path(source).exists():
+        Path(source).write_bytes(NOTES)
+    Path("part.toml").write_text('[geometry]\nfile = "geometry.geo"\n[interfaces]\na = "rbe2"\n'
+                                 '[material]\nE = 1\nnu = 0\nrho = 1\n')  # fmt: skip
+    before = Path(source).read_bytes()
+    name = f"alias{Path(source).suffix}"
+    if alias == "hard link":
+        os.link(source, name)
+    elif alias == "soft link":
+        os.symlink(source, name)
+    else:
+        name = source if alias == "same" else f"out/../{source}"
+    for force in ([], ["--force"]):
+        assert main([word.format(name) for word in words] + force) == 2
+        assert "is read as an input" in capsys.readouterr().err
+    assert Path(source).read_bytes() == before
+
+
+def test_a_link_is_replaced_and_not_followed(folder, capsys):
+    outside = folder / "outside.csv"
+    outside.write_bytes(NOTES)
+    os.symlink(outside, "out/good.csv")
+    assert main([*PENDULUM, "-o", "out"]) == 2
+    assert main([*PENDULUM, "-o", "out", "--force"]) in (0, 5)
+    assert outside.read_bytes() == NOTES and not Path("out/good.csv").is_symlink()
+    os.unlink("out/good.csv")
+    os.symlink(folder / "nowhere.csv", "out/good.csv")  # leads to a file that is not there yet
+    assert main([*PENDULUM, "-o", "out"]) == 2
+    assert main([*PENDULUM, "-o", "out", "--force"]) in (0, 5)
+    assert not (folder / "nowhere.csv").exists()
+    capsys.readouterr()
+
+
+def test_every_verb_that_writes_has_force():
+    """A verb writes when it has an output; completion and the others print."""
+    verbs = {module.__name__.rpartition(".")[2] for module in VERBS}
+    have, write = set(), set()
+    for verb in verbs:
+        (sub,) = [a.choices[verb] for a in build_parser()._actions if verb in (a.choices or ())]
+        options = {a.dest for a in sub._actions}
+        have |= {verb} if "force" in options else set()
+        write |= {verb} if options & {"output", "save"} else set()
+    assert have == write == {"mesh", "reduce", "export", "simulate", "view", "report", "swing"}
+
+
+def exported(body, folder):
+    """One file of every format, by kind."""
+    guyan = rom.reduce(block(cells=(4, 1, 1)), method=rom.Guyan(), certify=False,
+                       interfaces={"root": "rbe2", "tip": "rbe2"})  # fmt: skip
+    found = {}
+    for kind in FORMATS:
+        held = ("root",) if kind.startswith("openfast") else ()
+        if kind != "radioss":  # needs three interfaces, and has no mark
+            found[kind] = rom.export(guyan if kind == "dmig" else body, folder / f"x.{kind}",
+                                     to=kind, held=held)  # fmt: skip
+    return found
+
+
+def test_a_file_is_recognised_as_its_own_kind_and_no_other(body, tmp_path):
+    found = exported(body, tmp_path)
+    assert set(FORMATS) - UNMARKED <= SIGNS.keys() | SAME.keys()
+    for kind, path in found.items():
+        as_kinds = {other for other in (*SIGNS, *SAME) if is_ours(path, other)}
+        wanted = {
+            other for other in (*SIGNS, *SAME) if SAME.get(other, other) == SAME.get(kind, kind)
+        }
+        assert as_kinds == (set() if kind in UNMARKED else wanted), kind
+
+
+def test_pictures_are_recognised_and_those_of_others_are_not(tmp_path):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("PIL")
+    from PIL import Image
+
+    from rom.view import page
+    from rom.view.film import write_gif
+
+    ours = page.save(page.sheet(60, 40), tmp_path / "ours.png")
+    write_gif(tmp_path / "ours.gif", np.zeros((2, 8, 8, 3), np.uint8) + 7, 0.1)
+    assert is_ours(ours, "png") and is_ours(tmp_path / "ours.gif", "gif")
+    for name in ("theirs.png", "theirs.gif"):
+        Image.new("RGB", (60, 40)).save(tmp_path / name)
+        assert not is_ours(tmp_path / name, name[-3:])
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("x.npz", b"PK\x03\x04 some other archive"),
+        ("x.csv", b"t [s],u [V]\n0,1\n"),
+        ("x.json", b'{"schema": "of another program"}'),
+        ("x.html", b"<!DOCTYPE html><html><body>written by rom</body></html>"),
+        ("x.vtu", b'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid">'),
+        ("x.glb", b"glTF"),
+        ("x.h5", b"\x89HDF\r\n\x1a\n"),
+        ("x.csv", b""),
+    ],
+)
+def test_files_of_other_programs_are_not_ours(name, content, tmp_path):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match="is there already"):
+        check_replaceable(path, path.suffix[1:])
+    assert check_replaceable(path, path.suffix[1:], force=True) == path
+
+
+def test_python_functions_replace_as_they_are_told(body, tmp_path):
+    path = tmp_path / "x.npz"
+    path.write_bytes(NOTES)
+    rom.save(body, path)
+    assert rom.save(rom.load(path), path) == path and rom.load(path).name == "good"

@@ -1,0 +1,308 @@
+"""Several processes at once: kernels, forms, files, folders of runs, and threads under mpirun."""
+
+import json
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import environment
+from solid import block
+
+import rom
+from rom.cli.main import main
+from rom.errors import ConfigError, ResourceError
+from rom.io.claim import LOCK_NAME, claimed
+from rom.io.files import write_whole
+from rom.report import paragraph, write_report
+
+FORK = multiprocessing.get_context("fork")
+WRITES = 40
+PENDULUM = ["simulate", "b.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6"]
+
+
+def together(work, *cases):
+    """Run work(case) in a process of its own for each case; yields while any of them runs."""
+    processes = [FORK.Process(target=work, args=(case,)) for case in cases]
+    for process in processes:
+        process.start()
+    while any(process.is_alive() for process in processes):
+        yield
+    assert [process.exitcode for process in processes] == [0] * len(cases)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), name="b",
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+
+
+def test_a_body_file_of_two_writers_is_always_one_of_both(body, tmp_path):
+    path, seen = tmp_path / "b.npz", set()
+    rom.save(replace(body, name="one"), path)
+
+    def work(name):
+        for _ in range(WRITES):
+            rom.save(replace(body, name=name), path)
+
+    for _ in together(work, "one", "two"):
+        seen.add(rom.load(path).name)  # compares all checksums
+    assert seen <= {"one", "two"} and os.listdir(tmp_path) == ["b.npz"]
+
+
+def test_a_report_of_two_writers_is_always_one_of_both(tmp_path):
+    path = tmp_path / "r.html"
+
+    def work(name):
+        for _ in range(WRITES):
+            write_report(path, name, {name: [paragraph(name * 50_000)]})
+
+    work("a")
+    texts = {name: write_report(tmp_path / f"{name}.html", name, {name: [paragraph(name * 50_000)]})
+             .read_text() for name in "ab"}  # fmt: skip
+    for _ in together(work, "a", "b"):
+        assert path.read_text() in texts.values()
+
+
+def test_a_writer_that_is_killed_leaves_the_file_of_the_other(tmp_path):
+    path = tmp_path / "x.bin"
+    path.write_bytes(b"whole")
+
+    def work(_):
+        write_whole(path, lambda file: (file.write(b"half"), file.flush(), time.sleep(60)))
+
+    process = FORK.Process(target=work, args=(0,))
+    process.start()
+    wait_until(lambda: len(os.listdir(tmp_path)) > 1)
+    os.kill(process.pid, signal.SIGKILL)
+    process.join()
+    assert path.read_bytes() == b"whole"
+
+
+def wait_until(true, seconds=20):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def hold(folder):
+    with claimed(folder):
+        time.sleep(60)
+
+
+@pytest.fixture
+def held(tmp_path):
+    """A folder that another process has claimed, and that process."""
+    folder = tmp_path / "out"
+    process = FORK.Process(target=hold, args=(folder,))
+    process.start()
+    lock = folder / LOCK_NAME
+    wait_until(lambda: lock.exists() and f"process {process.pid} on" in lock.read_text())
+    yield folder, process
+    process.kill()
+    process.join()
+
+
+def test_a_folder_that_is_written_names_who_does_it(held, body, capsys, monkeypatch):
+    folder, process = held
+    with pytest.raises(ResourceError, match=f"process {process.pid} on"), claimed(folder):
+        pass
+    rom.save(body, folder.parent / "b.npz")
+    monkeypatch.chdir(folder.parent)
+    assert main([*PENDULUM, "-o", "out"]) == 6
+    assert f"process {process.pid} on" in capsys.readouterr().err
+    assert os.listdir(folder) == [LOCK_NAME]
+
+
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGTERM])
+def test_the_claim_of_a_process_that_is_gone_is_taken_over(held, ending):
+    folder, process = held
+    os.kill(process.pid, ending)
+    process.join()
+    with claimed(folder):
+        assert f"process {os.getpid()} on" in (folder / LOCK_NAME).read_text()
+    assert not (folder / LOCK_NAME).exists()
+
+
+def test_a_lock_left_by_a_crash_of_the_machine_is_taken_over(tmp_path):
+    (tmp_path / LOCK_NAME).write_text("process 1 on elsewhere")
+    with claimed(tmp_path):
+        pass
+    assert not os.listdir(tmp_path)
+
+
+def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
+    (tmp_path / "mine").write_text("text")
+    (tmp_path / "out").mkdir()
+    os.symlink(tmp_path / "mine", tmp_path / "out" / LOCK_NAME)
+    with pytest.raises(ConfigError, match="is not writable"), claimed(tmp_path / "out"):
+        pass
+    assert (tmp_path / "mine").read_text() == "text"
+
+
+@pytest.mark.parametrize("made_before", [True, False])
+def test_a_claim_leaves_a_folder_as_it_was(made_before, tmp_path):
+    folder = tmp_path / "out"
+    if made_before:
+        folder.mkdir()
+    with pytest.raises(ZeroDivisionError), claimed(folder):
+        assert folder.is_dir()
+        raise ZeroDivisionError
+    assert folder.exists() == made_before
+    with claimed(folder):
+        (folder / "x").touch()
+    assert os.listdir(folder) == ["x"]
+
+
+def test_one_at_a_time_has_the_folder_however_many_want_it(tmp_path):
+    """A counter that is read and written without a lock of its own would lose some."""
+    folder, counter = tmp_path / "out", tmp_path / "counter"
+    counter.write_text("0")
+
+    def work(_):
+        for _ in range(WRITES):
+            while True:
+                try:
+                    with claimed(folder):
+                        counter.write_text(str(int(counter.read_text()) + 1))
+                except ResourceError:
+                    continue
+                break
+
+    for _ in together(work, 1, 2, 3):
+        time.sleep(0.01)
+    assert counter.read_text() == str(3 * WRITES)
+
+
+def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeypatch, capsys):
+    """Each either has the folder for itself or is told who has it."""
+    monkeypatch.chdir(tmp_path)
+    rom.save(body, "b.npz")
+    assert main([*PENDULUM, "-o", "warm"]) in (0, 5)
+
+    def work(t_end):
+        os._exit(main([*PENDULUM[:-3], t_end, *PENDULUM[-2:], "-o", "out"]))
+
+    processes = [FORK.Process(target=work, args=(t_end,)) for t_end in ("3e-5", "4e-5")]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join()
+    codes = {process.exitcode for process in processes}
+    assert codes <= {0, 5, 6} and codes & {0, 5}
+    steps = json.loads(Path("out/run.json").read_text())["steps"]
+    table = np.loadtxt("out/b.csv", delimiter=",", skiprows=1)
+    assert len(table) == steps + 1 and steps in (30, 40)
+    assert sorted(os.listdir("out")) == ["b.csv", "run.json"]
+    capsys.readouterr()
+
+
+KERNELS = """
+import sys
+from pathlib import Path
+from rom.mbs.compiled import drop_stale_cache
+folder = Path(__file__).parent
+for _ in range({drops}):
+    drop_stale_cache(folder, folder / "__pycache__" / "stamp")
+import toy
+assert toy.outer(3) == 12 and toy.outer(3.0) == 12.0
+print(sum(toy.outer.stats.cache_hits.values()))
+"""
+TOY = """
+from numba import njit
+
+@njit(cache=True)
+def inner(x):
+    return 2 * x
+
+@njit(cache=True)  # as in rom.mbs.compiled import kernel
+def outer(x):
+    return 2 * inner(x)
+"""
+
+
+def test_kernels_compiled_by_several_processes_at_once_work_and_are_kept(tmp_path):
+    """Also where one drops the cache while another one fills it."""
+    (tmp_path / "toy.py").write_text(TOY)
+    for name, drops in (("a.py", 1), ("b.py", 1), ("c.py", 2000)):
+        (tmp_path / name).write_text(KERNELS.format(drops=drops))
+    run = [subprocess.Popen([sys.executable, tmp_path / name], env=environment(), text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+           for name in ("a.py", "b.py", "c.py")]  # fmt: skip
+    said = [process.communicate(timeout=60) for process in run]
+    assert [process.returncode for process in run] == [0, 0, 0], said
+    last = subprocess.run([sys.executable, tmp_path / "a.py"], env=environment(), text=True,
+                          capture_output=True, timeout=60, check=True)  # fmt: skip
+    assert last.stdout.strip() == "2", "the last one has nothing to compile"
+
+
+FORM = """
+import ufl
+from mpi4py import MPI
+from boxes import box
+from rom.fe import jit
+from rom.fe.compat import assemble_matrix, lagrange
+mesh, _ = box(cells=(1, 1, 1))
+with jit.compiling(MPI.COMM_SELF):
+    V = lagrange(mesh, 1)
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    print(round(assemble_matrix(3.0 * u[1] * v[2] * ufl.dx).norm(), 12))
+"""
+
+
+@pytest.mark.fenicsx
+def test_forms_compiled_by_two_processes_at_once_are_the_same(tmp_path):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    (tmp_path / "fenics").mkdir()
+    (tmp_path / "fenics" / "rom.lock").write_text("")  # of a process that is gone
+    env = environment(XDG_CACHE_HOME=str(tmp_path))
+    env["PYTHONPATH"] += f"{os.pathsep}{Path(__file__).parents[1]}"
+    run = [subprocess.Popen([sys.executable, "-c", FORM], env=env, text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+           for _ in range(2)]  # fmt: skip
+    said = [process.communicate(timeout=120) for process in run]
+    assert [process.returncode for process in run] == [0, 0], said
+    assert said[0][0] == said[1][0] != ""
+    assert list((tmp_path / "fenics").glob("libffcx_forms_*.so"))
+
+
+THREADS = """
+import sys
+if sys.argv[1] == "late":
+    import numpy
+import rom, numpy, ctypes
+found = set()
+for file in {line.split()[-1] for line in open("/proc/self/maps") if "openblas" in line}:
+    library = ctypes.CDLL(file)
+    for name in ("openblas_get_num_threads", "openblas_get_num_threads64_",
+                 "scipy_openblas_get_num_threads64_"):
+        if hasattr(library, name):
+            found.add(getattr(library, name)())
+print(*found)
+"""
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("numpy_comes", ["early", "late"])
+@pytest.mark.parametrize("chosen", [None, "2"])
+def test_a_rank_has_one_thread_unless_the_user_chooses(numpy_comes, chosen):
+    if not shutil.which("mpirun") or len(os.sched_getaffinity(0)) < 2:
+        pytest.skip("needs mpirun and two cores")
+    env = {k: v for k, v in environment().items() if not k.endswith("_NUM_THREADS")}
+    env |= {} if chosen is None else {"OMP_NUM_THREADS": chosen}
+    line = [sys.executable, "-c", THREADS, numpy_comes]
+    alone = subprocess.run(line, env=env, capture_output=True, text=True, timeout=60, check=True)
+    if alone.stdout.strip() != "2" and not (alone.stdout.strip() and chosen is None):
+        pytest.skip("this NumPy has another BLAS than OpenBLAS")
+    # the environment tells a rank what it is; mpirun itself would bind it to one core
+    rank = env | {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2"}
+    done = subprocess.run(line, env=rank, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == (chosen or "1")
