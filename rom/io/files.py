@@ -1,6 +1,7 @@
 """Files are written whole or not at all, and looked at before they are read."""
 
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import IO
 
 from rom.errors import ConfigError, FileFormatError, ResourceError, UnsafeFileError
+from rom.names import MAX_FILE_NAME_BYTES, TEMPORARY_BYTES
 
 LARGEST = 2**32  # bytes of a file that is still read
 
@@ -36,8 +38,10 @@ def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
         os.replace(name, path)
         _sync_folder(path.parent)
     except OSError as error:
+        free = shutil.disk_usage(path.parent).free / 2**20
         raise ResourceError(
-            f"{path} was not written: {error.strerror}.", hint="Nothing was left behind."
+            f"{path} was not written: {error.strerror}; {free:.4g} MiB are free there.",
+            hint="Nothing was left behind.",
         ) from error
     finally:
         Path(name).unlink(missing_ok=True)
@@ -50,6 +54,7 @@ def check_writable(path: str | Path) -> Path:
         ConfigError: if the folder does not exist or may not be written, or the name is a folder.
     """
     path = Path(path)
+    _check_possible(path)
     if path.is_dir():
         raise ConfigError(f"{path} is a folder; a file name is needed.")
     if not path.parent.is_dir():
@@ -57,6 +62,19 @@ def check_writable(path: str | Path) -> Path:
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise ConfigError(f"the folder {path.parent} is not writable.")
     return path
+
+
+def _check_possible(path: Path) -> None:
+    """Whether a file of that name, and the temporary one before it, can exist at all."""
+    try:
+        size = len(os.fsencode(path.name)) + TEMPORARY_BYTES
+    except UnicodeEncodeError:
+        size = MAX_FILE_NAME_BYTES + 1
+    if "\0" in str(path) or size > MAX_FILE_NAME_BYTES:
+        raise ConfigError(
+            f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
+            hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
+        )
 
 
 def check_readable(path: str | Path, largest: int = LARGEST) -> Path:

@@ -204,6 +204,16 @@ def test_files_of_other_programs_are_not_ours(name, content, tmp_path):
     assert check_replaceable(path, path.suffix[1:], force=True) == path
 
 
+@pytest.mark.parametrize("name", ["a\0b.npz", "x" * 300 + ".npz", "\ud800.npz"])
+def test_a_name_no_file_can_have_is_refused_before_the_computation(name, body, folder, capsys):
+    before = sorted(os.listdir())
+    with pytest.raises(ConfigError, match="no file can have the name"):
+        rom.save(body, name)
+    assert main(["reduce", "none.geo", *STEEL, "-i", "a=rbe2", "-o", name]) == 2
+    assert "no file can have the name" in capsys.readouterr().err
+    assert sorted(os.listdir()) == before
+
+
 def test_python_functions_replace_as_they_are_told(body, tmp_path):
     path = tmp_path / "x.npz"
     path.write_bytes(NOTES)
