@@ -307,6 +307,13 @@ FAULTS = {
     "region without cells": (
         lambda m: replace(m, region_names={1: "body", 2: "liner"}), TagError, "'liner' has no",
     ),
+    "region with a name of two lines": (
+        lambda m: replace(m, region_names={1: "a\nb"}), TagError, "U+000A",
+    ),
+    "surface with a name that turns the line": (
+        lambda m: replace(m, facets={"\u202enip": f for f in m.facets.values()}),
+        TagError, "U+202E",
+    ),
     "two regions of one name": (
         lambda m: replace(m, regions=1 + np.arange(72) % 2, region_names={1: "a", 2: "a"}),
         TagError, "'a' stands for several regions",
