@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
-from rom.errors import InterfaceError, MaterialError
-from rom.material import Material as Material, Orthotropic as Orthotropic, PAIRS as PAIRS
+from rom.errors import InterfaceError
+from rom.material import PAIRS as PAIRS
+from rom.material import Material as Material
+from rom.material import Orthotropic as Orthotropic
 from rom.names import check_text
 from rom.notebook import shown
 

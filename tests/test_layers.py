@@ -25,7 +25,16 @@ ANYTHING = {
     "peers",
 }  # they stand in front
 # what every part stands on, none of it above another
-GROUND = {"arguments", "child", "deprecated", "interruption", "launcher", "memory", "names", "plausible"}
+GROUND = {
+    "arguments",
+    "child",
+    "deprecated",
+    "interruption",
+    "launcher",
+    "memory",
+    "names",
+    "plausible",
+}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"errors", "interruption", "model", "rotation"} for part in GROUND},
     "errors": set(),
