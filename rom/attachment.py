@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 from rom.eigen import mean_motion, rigid_motions
 from rom.errors import InterfaceError, MaterialError
 from rom.model import Array, Attachment, FEModel
+from rom.plausible import REACH, warn_outside
 
 
 def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
@@ -51,6 +52,8 @@ def carried_displacements(attachment: Attachment, model: FEModel) -> tuple[Array
         )
     interface = model.interfaces[attachment.interface]
     points, masses = point_masses(attachment, interface.origin)
+    reach, size = np.abs(points - interface.origin).max(), np.ptp(model.points, axis=0).max()
+    warn_outside(REACH, float(reach / size), f"the attachment on {interface.name!r}")
     return points, masses, rigid_motions(points - interface.origin) @ mean_motion(interface)
 
 

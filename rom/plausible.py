@@ -96,6 +96,19 @@ GYRATION = Range(
     "a body reaches as far as its mass",
     "Check the unit of the inertia: kg m^2.",
 )  # fmt: skip
+FRICTION = Range(
+    "the coefficient of friction", None, 3.0, "", "rubber on rock reaches 2",
+    "Thirty per cent are 0.3.",
+)  # fmt: skip
+SPEED = Range(
+    "the speed at the start", None, 1e5, "m/s", "spacecraft reach 70000 m/s",
+    "Check the unit: m/s.",
+)  # fmt: skip
+REACH = Range(
+    "the reach of its mass over the size of the model", None, 100.0, "",
+    "what an interface carries is not so much larger",
+    "Check the units: kg m^2 for the inertia, m for at.",
+)  # fmt: skip
 STIFFNESS = Range(
     "the stiffness", 0.0, None, "", "below zero it pushes away from its position without force",
     "Check the sign.",

@@ -18,6 +18,7 @@ from rom.errors import ConfigError, ModelError, RomWarning
 from rom.fe.mesh import checked
 from rom.io.native import body_arrays
 from rom.io.op4 import write_op4
+from rom.mbs.impact import Impact
 from rom.mbs.jumps import Examined
 from rom.plausible import far_doubt, scaled_doubt
 
@@ -225,6 +226,42 @@ def test_a_spring_that_pushes_away_or_feeds_the_motion_is_doubted(way, numbers, 
     found = said(lambda: SPRINGS[way](mech, **numbers))
     assert len(found) == bool(words)
     assert all(text.startswith(words.strip()) for text in found)
+
+
+MU = {
+    "stop": lambda mu: Impact(stiffness=1e5, mu=mu),
+    "friction": lambda mu: pendulum().friction(
+        "rub", "pin", mu=mu, radius=0.01, transition_speed=0.01
+    ),
+}
+
+
+@pytest.mark.parametrize("way", MU)
+@pytest.mark.parametrize(("mu", "n"), [(0.0, 0), (0.3, 0), (2.0, 0), (30.0, 1)])
+def test_friction_in_per_cent_is_doubted(way, mu, n):
+    found = said(lambda: MU[way](mu))
+    assert len(found) == n and all("friction" in text and "is 30;" in text for text in found)
+
+
+@pytest.mark.parametrize(("speed", "n"), [(0.0, 0), (7.8e3, 0), (7e4, 0), (3e6, 1)])
+def test_no_machine_starts_faster_than_spacecraft(speed, n):
+    def add():
+        pose = {"at": (0, 0, 0), "velocity": (speed, 0, 0)}
+        rom.Mechanism().add_rigid("probe", mass=1.0, inertia=(1, 1, 1), **pose)
+
+    found = said(add)
+    assert len(found) == n and all("'probe' is 3e+06 m/s" in text for text in found)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "at", "n"),
+    [(0.1, None, 0), (0.1, (2.0, 0, 0), 0), (1e5, None, 1), (0.1, (1500.0, 0, 0), 1)],
+)
+def test_what_hangs_on_an_interface_is_not_far_larger_than_the_model(inertia, at, n):
+    carried = rom.Attachment("tip", 1.0, inertia * np.eye(3), at)
+    model = replace(block(cells=(2, 1, 1)), attachments=(carried,))
+    found = set(said(lambda: rom.mass_properties(model)))
+    assert len(found) == n and all("the attachment on 'tip'" in text for text in found)
 
 
 def test_a_negative_length_is_refused_with_its_spring():

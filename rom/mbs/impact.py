@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 from rom.arguments import number, positive
 from rom.errors import ConfigError
+from rom.mbs.arguments import number, positive
+from rom.plausible import FRICTION, warn_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,7 @@ class Impact:
         for name in ("damping", "mu"):
             if number(name, getattr(self, name)) < 0.0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
+        warn_outside(FRICTION, self.mu)
         if self.exponent < 1.0:
             raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
         if (self.restitution is None) != (self.impact_speed is None):

@@ -11,6 +11,7 @@ from rom.arguments import number, positive, typed
 from rom.errors import ConfigError
 from rom.mbs.impact import Impact, checked_law
 from rom.mbs.joints import Joint, Row
+from rom.plausible import FRICTION, warn_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +130,7 @@ class JointForces:
         for what, value in (("coulomb", coulomb), ("mu", mu), ("viscous", viscous)):
             if number(what, value) < 0.0:
                 raise ConfigError(f"{what} of friction {name!r} is {value:g}: it must not drive.")
+        warn_outside(FRICTION, mu, repr(name))
         turns = row is self.joints[joint].turn
         if mu and turns and radius is None:
             raise ConfigError(f"friction {name!r} with mu on an angle needs the radius of the pin.")

@@ -20,7 +20,7 @@ from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
 from rom.names import check_name, check_text
 from rom.notebook import listed, shown
-from rom.plausible import DAMPING, GRAVITY, STIFFNESS, warn_outside
+from rom.plausible import DAMPING, GRAVITY, SPEED, STIFFNESS, warn_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,6 +304,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
     def _enter(self, part: Part) -> Part:
         self._check_new(part.name)
+        warn_outside(SPEED, float(np.linalg.norm(part.velocity)), f"body {part.name!r}")
         self.parts[part.name] = part
         return part
 
