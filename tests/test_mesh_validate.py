@@ -311,7 +311,7 @@ FAULTS = {
         lambda m: replace(m, region_names={1: "a\nb"}), TagError, "U+000A",
     ),
     "surface with a name that turns the line": (
-        lambda m: replace(m, facets=dict.fromkeys(["\u202enip"], *m.facets.values())),
+        lambda m: replace(m, facets=m.facets | {"\u202enip": np.array([[0, 1, 2]])}),
         TagError, "U+202E",
     ),
     "two regions of one name": (

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from rom.cli.ranks import ranks
+from rom.cli.ranks import on_first_rank
 
 KINDS = {"hdf5": "h5"}  # endings that are not the name of their kind
 WRITTEN = ("output", "save")  # options that name what is written
@@ -25,6 +25,8 @@ def checked(
 ) -> Path:
     """The path, if the verb may write it; to be asked before the computation.
 
+    One rank writes, and looks for all.
+
     Args:
         args: the options, whose files are inputs, too.
         path: file to write.
@@ -37,12 +39,9 @@ def checked(
     from rom.io.ours import check_replaceable
 
     ending = path.suffix.lower().removeprefix(".")
-    return check_replaceable(
-        path,
-        kind or KINDS.get(ending, ending),
-        inputs=[*inputs, *_inputs(args)],
-        force=args.force,
-    )
+    kind = kind or KINDS.get(ending, ending)
+    sources = [*inputs, *_inputs(args)]
+    return on_first_rank(lambda: check_replaceable(path, kind, inputs=sources, force=args.force))
 
 
 def claim(args: argparse.Namespace) -> Path:
@@ -55,8 +54,7 @@ def claim(args: argparse.Namespace) -> Path:
     from rom.io.claim import claimed
 
     folder: Path = args.output
-    if ranks()[0] == 0:
-        args.claims.enter_context(claimed(folder))
+    on_first_rank(lambda: args.claims.enter_context(claimed(folder)))
     return folder
 
 

@@ -41,6 +41,11 @@ def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named
     return comm.bcast(value) if comm.size > 1 else value
 
 
+def on_first_rank(function: Callable[[], T]) -> T:
+    """As `on_root` with all ranks there are."""
+    return on_root(MPI.COMM_WORLD, function)
+
+
 @contextmanager
 def collective(comm: MPI.Comm) -> Iterator[None]:
     """Raise on all ranks what any rank raised inside; the lowest rank's error is shown.

@@ -35,14 +35,13 @@ def validate(mesh: SolidMesh) -> list[str]:
             overlapping cells, several bodies, parts that meet only in an edge or a point.
         TagError: a surface whose facets are not faces of the cells, a region without cells.
     """
-    for check in (_check_tables, _check_numbers, _check_cells):
+    for check in (_check_names, _check_tables, _check_numbers, _check_cells):
         check(mesh)
     warnings = check_shape(mesh)
     faces = faces_of(mesh.cells, mesh.kind, mesh.points.shape[0])
     _check_faces(mesh, faces)
     _check_connected(mesh, faces)
     _check_facets(mesh, faces)
-    _check_names(mesh)
     _check_regions(mesh)
     return [*warnings, *_slits(mesh, faces), *_doubts(mesh)]
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import environment
+from command import rom as command
 from solid import block
 
 import rom
@@ -306,3 +307,17 @@ def test_a_rank_has_one_thread_unless_the_user_chooses(numpy_comes, chosen):
     rank = env | {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2"}
     done = subprocess.run(line, env=rank, capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == (chosen or "1")
+
+
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+def test_two_ranks_are_one_writer(body, tmp_path):
+    """Neither keeps the other out of their folder, and both end with what the first one finds."""
+    pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+    rom.save(body, tmp_path / "b.npz")
+    assert command(*PENDULUM, "-o", "out", n=2, cwd=tmp_path).returncode in (0, 5)
+    (tmp_path / "out" / "b.csv").write_text("my notes\n")
+    done = command(*PENDULUM, "-o", "out", n=2, cwd=tmp_path)
+    assert done.returncode == 2 and done.stderr.count("error: ") == 1, done.stderr
+    assert (tmp_path / "out" / "b.csv").read_text() == "my notes\n"
+    assert sorted(os.listdir(tmp_path / "out")) == ["b.csv", "run.json"]
