@@ -75,8 +75,13 @@ def check_replaceable(
                 f"{path} is read as an input; it would be lost.", hint="Choose another name."
             )
     if os.path.lexists(path) and not force and not is_ours(path, kind):
+        what = (
+            f"is no file of the kind {kind} that rom has written"
+            if SAME.get(kind, kind) in SIGNS
+            else f"files of the kind {kind} do not tell who has written them"
+        )
         raise ConfigError(
-            f"{path} is there already, and is no file of the kind {kind} that rom has written.",
+            f"{path} is there already, and {what}.",
             hint="Choose another name, or replace it with --force.",
         )
     return path

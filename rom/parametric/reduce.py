@@ -13,6 +13,7 @@ from rom.body.family import BodyFamily
 from rom.body.projection import canonical_columns, elastic_part, flexible_body
 from rom.errors import ConfigError, ParameterError
 from rom.model import FEModel
+from rom.names import check_name
 from rom.parameters import (
     Parameter,
     Point,
@@ -79,6 +80,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         InterfaceError, ConfigError: for a wrong interface, kind, method, reference or tolerance.
         ModesMissedError: if the inertia count says that a mode was skipped.
     """
+    check_name(name, "a body")
     clock = perf_counter()
     if isinstance(tol, bool) or not 0 < tol < 1:
         raise ConfigError(f"tol = {tol!r} is not a relative error between 0 and 1.")

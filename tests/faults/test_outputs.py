@@ -28,6 +28,8 @@ WRITERS = {  # case: (what to type, the file it writes)
     "export to another body file": (["export", "good.npz", "x.npz"], "x.npz"),
     "pendulum": ([*PENDULUM, "-o", "out"], "out/good.csv"),
     "history": ([*PENDULUM, "--history", "csv", "-o", "out"], "out/good.history.csv"),
+    "tree": ([*PENDULUM, "--history", "h5", "-o", "out"], "out/good.history.h5"),
+    "film for ParaView": ([*PENDULUM, "--film", "vtkhdf", "-o", "out"], "out/good.vtkhdf"),
     "film": ([*PENDULUM, "--film", "glb", "-o", "out"], "out/good.glb"),
     "record": ([*PENDULUM, "-o", "out"], "out/run.json"),
     "report": (["report", "good.npz", "-o", "x.html"], "x.html"),
@@ -59,6 +61,8 @@ def folder(body, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("case", WRITERS)
 def test_a_file_of_the_user_is_kept_until_force_is_said(case, folder, capsys, monkeypatch):
+    if {"h5", "vtkhdf"} & set(WRITERS[case][0]):
+        pytest.importorskip("h5py", reason="h5py is not installed")
     monkeypatch.setattr(reporting, "drawn", lambda *_: [])  # pictures take seconds
     words, name = WRITERS[case]
     Path(name).write_bytes(NOTES)
@@ -81,6 +85,18 @@ def test_it_is_said_before_anything_is_read(case, folder, capsys):
     assert main(words) == 2
     assert f"{name} is there already" in capsys.readouterr().err
     assert Path(name).read_bytes() == NOTES
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("name", ["x.vtu", "x.inp"])
+def test_a_mesh_is_replaced_by_another_one_of_its_kind(name, folder, capsys):
+    pytest.importorskip("gmsh", reason="gmsh is not installed")
+    for coarse in ("0.2", "0.3"):
+        assert main(["mesh", BEAM, "-p", f"lc={coarse}", "--save", name]) == 0
+    rom.export(rom.load("good.npz"), "good.inp", to="abaqus")
+    os.replace("good.inp", "x.inp")  # written by rom, but no mesh
+    assert main(["mesh", BEAM, "--save", "x.inp"]) == 2
+    assert "kind deck" in capsys.readouterr().err
 
 
 INPUTS = [
@@ -165,6 +181,12 @@ def test_a_file_is_recognised_as_its_own_kind_and_no_other(body, tmp_path):
             other for other in (*SIGNS, *SAME) if SAME.get(other, other) == SAME.get(kind, kind)
         }
         assert as_kinds == (set() if kind in UNMARKED else wanted), kind
+
+
+def test_a_format_without_room_for_a_mark_says_so(tmp_path):
+    (tmp_path / "x.op4").touch()
+    with pytest.raises(ConfigError, match="do not tell who has written them"):
+        check_replaceable(tmp_path / "x.op4", "op4")
 
 
 def test_pictures_are_recognised_and_those_of_others_are_not(tmp_path):

@@ -15,7 +15,7 @@ from typing import IO
 
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
-from rom.names import ORIGIN_MARK
+from rom.names import ORIGIN_MARK, check_text
 
 SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -48,6 +48,7 @@ def write_archive(path: Path, content: Content) -> Path:
         ConfigError: if there is no C compiler, or the place is not writable.
         ResourceError: if the compiler fails.
     """
+    check_text(content.name, "a model")
     identifier = re.sub(r"\W", "_", content.name, flags=re.ASCII)
     identifier = identifier if identifier[:1].isalpha() else f"m{identifier}"
     names = ("fmi2.c", content.core)
