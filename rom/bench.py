@@ -130,7 +130,7 @@ def peers(meshes: tuple[float, ...] = (0.0047, 0.00257)) -> Iterator[Figure]:
     """The same reduction by Exudyn and by SciPy with SuperLU and CHOLMOD; two processes too.
 
     A connecting rod, two bores, 20 modes, one thread per process. The programs are installed from
-    the package index into an environment of their own, ``.venv-peers``.
+    the package index into an environment of their own, ``~/.cache/rom/peers``.
 
     Args:
         meshes: element sizes [m]; about 29 000 and 105 000 dofs.

@@ -2,12 +2,12 @@
 
 import csv
 import json
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom import report
+from rom.child import scratch
 from rom.config.document import read_document
 from rom.config.run import RECORD, versions
 from rom.errors import FileFormatError, RomError
@@ -289,8 +289,8 @@ def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
 
 def drawn(draw: Callable[[Path], object], caption: str) -> list[str]:
     """A picture; or, where none can be made, a sentence that says why."""
-    with tempfile.TemporaryDirectory(prefix="rom-report-") as folder:
-        path = Path(folder) / "picture.png"
+    with scratch("report") as folder:
+        path = folder / "picture.png"
         try:
             draw(path)
             return [report.picture(path, caption)]

@@ -183,6 +183,11 @@ def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict
 
 def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
     tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
+    if min(tags, default=1) < 1:
+        raise TagError(
+            f"volume {volume} is in the physical group {min(tags)}: numbers of groups start at 1.",
+            hint="A volume has no other side; write both numbers without a minus.",
+        )
     names = [groups[3, tag] for tag in tags]
     if len(tags) > 1:
         raise TagError(

@@ -8,8 +8,10 @@ from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
 from rom.fe import builder, step
+from rom.fe.confinement import confine
 from rom.fe.gmsh_groups import check_declared, collect, version
 from rom.fe.readers import Made, Read
+from rom.fe.script import check_script
 from rom.plausible import scaled_doubt
 
 HXT = 10  # Mesh.Algorithm3D whose meshes differ from run to run
@@ -23,6 +25,8 @@ def run(request: dict[str, Any]) -> Read:
 
     path, reader = Path(request["path"]), request["reader"]
     with session(gmsh):
+        if reader != "builder":  # that is a program of its own, and trusted
+            confine(Path(request["folder"]))
         declared = Path(request["folder"], "declared.msh")
         with complaints(gmsh):
             values, defaults = MAKERS[reader](gmsh, path, request)
@@ -84,6 +88,7 @@ def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
             "the last line does not end, and gmsh would drop it in silence.",
             hint="Add a newline at the end of the file.",
         )
+    check_script(path)
     gmsh.open(str(path))
     known = geo_parameters(gmsh)
     chosen = {_full_name(name, known, path): v for name, v in request["parameters"].items()}
@@ -132,7 +137,7 @@ def _number(name: str, value: Any, path: Path) -> float:
 
 def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     with path.open("rb") as stream:
-        start = stream.read(512).lstrip()
+        start = stream.read(512)
         stream.seek(max(path.stat().st_size - 512, 0))
         end = stream.read().rstrip()
     if not start.startswith(MSH_START):

@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.errors import ConfigError, FileFormatError, ResourceError, RomError, RomWarning
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    ResourceError,
+    RomError,
+    RomWarning,
+    UnsafeFileError,
+)
 from rom.fe.child import read_apart
 from rom.fe.quality import straighten
 from rom.fe.readers import GEOMETRIES, Arrays
@@ -43,13 +50,18 @@ def read_mesh(
     faces: Mapping[str, Any] | None = None,
     scale: float = 1.0,
     order: int | None = None,
+    trust: bool = False,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
 ) -> SolidMesh:
     """Read or make a mesh and check it.
 
+    A ``.geo`` is a program; one that starts processes or writes files is refused. A ``.py`` can do
+    what its reader can do, and is run only with ``trust``.
+
     Args:
         path: ``.geo`` gmsh geometry; ``.py`` file with ``build(gmsh, **parameters)``; ``.step``;
-            ``.msh`` 2.2 or 4.1; Abaqus ``.inp``; Nastran ``.bdf``. The first two are programs:
-            run only those you trust.
+            ``.msh`` 2.2 or 4.1; Abaqus ``.inp``; Nastran ``.bdf``.
         parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
             ``build``, or ``lc`` (element size [m]) for ``.step``.
         faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
@@ -57,6 +69,9 @@ def read_mesh(
             without a name "face 1", "face 2", ...
         scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
         order: degree of the geometry, 1 or 2, when the mesh is made here; None for the default.
+        trust: run a ``.py`` file.
+        time_limit: of meshing a geometry [s]; by default half an hour, 0 for none.
+        memory_limit: of meshing a geometry [bytes]; by default 80 % of the machine's, 0 for none.
 
     Returns:
         A mesh that passed `rom.fe.validate.validate`. Its warnings are also issued as `RomWarning`.
@@ -64,8 +79,10 @@ def read_mesh(
     Raises:
         ConfigError: unknown suffix or parameter.
         FileFormatError: the file is missing, cut, or not what its name promises.
+        UnsafeFileError: a geometry would do more than make a mesh, or is a ``.py`` not trusted.
         MeshError: the cells do not form one solid.
         TagError: a physical group is missing, doubled or ambiguous.
+        ResourceError: meshing exceeds its limit of time or memory.
     """
     path = Path(path)
     request = {
@@ -76,8 +93,12 @@ def read_mesh(
         "order": order,
     }
     _check_request(path, request, scale)
+    _check_trust(path, request["reader"], trust)
     digest = _digest(path)
-    arrays, notes = read_apart(request, where=str(path), size=path.stat().st_size)
+    arrays, notes = read_apart(
+        request, where=str(path), size=path.stat().st_size,
+        time_limit=time_limit, memory_limit=memory_limit,
+    )  # fmt: skip
     provenance = {"path": str(path), "sha256": digest, "scale": scale, **notes["provenance"]}
     mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
     if request["reader"] in GEOMETRIES:
@@ -188,6 +209,15 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
         )
     if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):
         raise ConfigError(f"scale={scale!r} must be a positive number.", where=str(path))
+
+
+def _check_trust(path: Path, reader: str, trust: bool) -> None:
+    if reader == "builder" and trust is not True:
+        raise UnsafeFileError(
+            "is a Python program, which can do to this machine whatever you can.",
+            where=str(path),
+            hint="Read it; if you trust it, run it with --trust or trust=True.",
+        )
 
 
 def _digest(path: Path) -> str:

@@ -1,15 +1,12 @@
 """Write the FMU of a mechanism."""
 
 import json
-import os
-import subprocess
-import sys
-import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rom.arguments import typed
+from rom.child import Limits, python, run, scratch
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.fmu.server import SETTINGS
@@ -85,26 +82,19 @@ def _read(path: Path) -> bytes:
 
 def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
     """The variables as the FMU itself will find them, in a process and folder of its own."""
-    with tempfile.TemporaryDirectory() as folder:
-        place, empty, out = Path(folder, "resources"), Path(folder, "empty"), Path(folder, "out")
+    with scratch("fmu") as folder:
+        place, empty, out = (folder / name for name in ("resources", "empty", "out"))
         for name, data in resources.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_bytes(data)
         empty.mkdir()
-        known = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
-        done = subprocess.run(
-            [sys.executable, "-P", "-m", "rom.fmu", str(place), str(out)],
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, known))},
-            cwd=empty,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=LONGEST,
-        )
+        command = python("rom.fmu", str(place), str(out))
+        done = run(command, folder=empty, limits=Limits(seconds=LONGEST))
         if not out.exists():
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1].replace(folder, "")
+            last = f"no end within {LONGEST} s" if done.overtime else done.last
             raise ConfigError(
-                f"{script.name} fails in a folder that holds only it and the files named: {last}",
+                f"{script.name} fails in a folder that holds only it and the files named: "
+                f"{last.replace(str(folder), '')}",
                 hint="Name all files it needs, and let it look for them beside itself.",
             )
         found = json.loads(out.read_text())

@@ -5,20 +5,20 @@ Processor time, which a busy machine changes little; one process against two by 
 
 import json
 import os
-import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rom import child
 from rom.errors import ResourceError
 
 # scikit-sparse builds on the CHOLMOD of Debian 12, and for NumPy 1
 PACKAGES = ("exudyn==1.13.6", "scikit-sparse<0.4.13", "scipy<1.14", "numpy<2")
-ENVIRONMENT = Path(".venv-peers")
+# not in the working folder, whose programs somebody else may have put there
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rom"
+ENVIRONMENT = CACHE / "peers"
 N_MODES = 20
 RBE3_DOFS = 40_000  # beyond, Exudyn's rbe3 runs out of memory
 SAME = 1e-6  # relative difference of frequencies that are the same model's
@@ -32,9 +32,9 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
         ResourceError: if a program cannot be installed, or fails.
     """
     python = interpreter()
-    with tempfile.TemporaryDirectory() as folder:
-        file = str(Path(folder) / "matrices.npz")
-        rod = [sys.executable, "-m", "rom.peers.ours", str(lc)]
+    with child.scratch("peers") as folder:
+        file = str(folder / "matrices.npz")
+        rod = child.python("rom.peers.ours", str(lc))
         ours = answer_of([*rod, "rbe2", str(N_MODES), file])
         case = f"{ours['dofs']} dofs, rbe2"
         yield case, "rom, one process", ours["processor"], "s of the processor", ""
@@ -68,14 +68,13 @@ def interpreter(environment: Path | None = None, packages: tuple[str, ...] = ())
     done = environment / "complete"
     if not done.exists():
         for command in (
-            [sys.executable, "-m", "venv", "--clear", str(environment)],
+            child.python("venv", "--clear", str(environment)),
             [str(python), "-m", "pip", "install", "--quiet", *packages],
         ):
-            made = subprocess.run(command, capture_output=True, text=True, check=False)
-            if made.returncode:
+            made = child.run(command)
+            if made.code:
                 raise ResourceError(
-                    f"the environment {environment} could not be made: "
-                    f"{made.stderr.strip().splitlines()[-1]}",
+                    f"the environment {environment} could not be made: {made.last}.",
                     hint="It needs the package index and, for CHOLMOD, apt-get install "
                     "libsuitesparse-dev.",
                 )
@@ -91,11 +90,8 @@ def answer_of(command: list[str]) -> dict[str, Any]:
     """
     one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     allow = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, env=os.environ | one | allow
-    )
-    if done.returncode:
-        last = (done.stderr.strip() or "no message").splitlines()[-1]
-        raise ResourceError(f"{' '.join(command[:4])} ended with {done.returncode}: {last}")
-    answer: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
+    done = child.run(command, variables=one | allow)
+    if done.code:
+        raise ResourceError(f"{' '.join(command[:4])} ended with {done.code}: {done.last}.")
+    answer: dict[str, Any] = json.loads(done.out.strip().splitlines()[-1])
     return answer

@@ -24,11 +24,11 @@ from rom.components.journal_bearing import (
 )
 from rom.components.transmission import Disc, Rotor, Shaft, Transmission, sweep
 from rom.model import Array
-from rom.peers.compare import answer_of, interpreter
+from rom.peers.compare import CACHE, answer_of, interpreter
 
 # of a wheel of charts that newer drawing libraries lack
 PACKAGES = ("ross-rotordynamics==2.3.0", "plotly<6")
-ENVIRONMENT = Path(".venv-ross")
+ENVIRONMENT = CACHE / "ross"
 SCRIPT = Path(__file__).with_name("ross_films.py")
 STIFFNESS = np.array([[2.67, 3.70], [-0.78, 1.75]])  # c/W, x along the load
 DAMPING = np.array([[6.96, 1.94], [1.94, 2.40]])  # c speed/W

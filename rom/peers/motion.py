@@ -6,7 +6,6 @@ axis: Exudyn lets gravity turn a body about its undeformed mass centre, which on
 """
 
 import json
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from rom.bench import KINDS, geometry
 from rom.bench_models import STEEL
 from rom.body.flexible import FlexibleBody
+from rom.child import scratch
 from rom.errors import ConfigError
 from rom.io.native import save
 from rom.mbs.integrate import simulate
@@ -89,8 +89,8 @@ def with_all_nodes(model: FEModel) -> FEModel:
 
 def by_exudyn(model: FEModel, body: FlexibleBody, runs: list[Run]) -> list[Moved]:
     """Runs in Exudyn; the body made of ``with_all_nodes(model)``."""
-    with tempfile.TemporaryDirectory() as folder:
-        files = [str(Path(folder) / name) for name in ("body.rom.npz", "M.npz", "runs.json")]
+    with scratch("peers") as folder:
+        files = [str(folder / name) for name in ("body.rom.npz", "M.npz", "runs.json")]
         save(body, files[0])
         save_for_exudyn(model, files[1])
         Path(files[2]).write_text(json.dumps([run.described for run in runs]))

@@ -5,7 +5,6 @@ Processor time, one thread, without set-up.
 """
 
 import json
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from time import process_time
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
+from rom.child import scratch
 from rom.components.cosserat import Rod, body
 from rom.components.wind_turbine import BLADES, RATED, VISCOSITY, blade, ramp, run_up, stations
 from rom.mbs.integrate import simulate
@@ -77,8 +77,8 @@ def by_exudyn(segments: int) -> tuple[float, Array, str]:
         "final": RATED, "rise": RISE, "t_end": RISE, "steps": round(RISE / DT),
         "samples": SAMPLES, "rho_inf": RHO,
     }  # fmt: skip
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "rotor.json"
+    with scratch("peers") as folder:
+        file = folder / "rotor.json"
         file.write_text(json.dumps(described))
         found = answer_of([interpreter(), str(SCRIPT), str(file)])
     tip = np.array(found["tips"])[:, 0]

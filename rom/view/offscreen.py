@@ -1,10 +1,6 @@
 """Draws scenes in a child process, because VTK does not live together with dolfinx."""
 
 import json
-import os
-import subprocess
-import sys
-import tempfile
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.child import Ended, python, run, scratch
 from rom.errors import ConfigError
 from rom.view.scene import Actor, Camera
 
@@ -38,17 +35,11 @@ def render(
         ConfigError: if pyvista is missing or cannot draw on this machine.
     """
     require("pyvista")
-    with tempfile.TemporaryDirectory(prefix="rom-view-") as folder:
-        write_scene(Path(folder), actors, camera, limits)
-        done = subprocess.run(
-            [sys.executable, "-m", "rom.view.draw", folder],
-            env=child_environment(),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-        )
-        pictures = Path(folder, "pictures.npy")
-        if done.returncode or not pictures.exists():
+    with scratch("view") as folder:
+        write_scene(folder, actors, camera, limits)
+        done = run(python("rom.view.draw", str(folder)))
+        pictures = folder / "pictures.npy"
+        if done.code or not pictures.exists():
             raise child_failure(done)
         return np.load(pictures, allow_pickle=False)
 
@@ -82,18 +73,10 @@ def write_scene(
     (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOURS}))
 
 
-def child_environment() -> dict[str, str]:
-    """Variables of a child process, which finds rom where this one has found it."""
-    root = str(Path(__file__).resolve().parents[2])
-    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
-    return os.environ | {"PYTHONPATH": path}
-
-
-def child_failure(done: subprocess.CompletedProcess[bytes]) -> ConfigError:
+def child_failure(done: Ended) -> ConfigError:
     """What a child process that did not end well has said."""
-    said = done.stderr.decode(errors="replace").strip().splitlines()
-    how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
+    how = f"signal {-done.code}" if done.code < 0 else f"code {done.code}"
     return ConfigError(
-        f"the process that draws ended with {how}: {said[-1] if said else 'it said nothing'}.",
+        f"the process that draws ended with {how}: {done.last}.",
         hint="`rom doctor` tests drawing without a screen and says what to install.",
     )

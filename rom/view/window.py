@@ -6,9 +6,7 @@ arrow keys go from one to the next, the mouse turns them, q closes the window.
 
 import json
 import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from rom.child import python, run, scratch
 from rom.errors import ConfigError
 from rom.view.draw import add, aim
-from rom.view.offscreen import child_environment, child_failure, require, write_scene
+from rom.view.offscreen import child_failure, require, write_scene
 from rom.view.scene import Actor, aimed, sharp_edges
 from rom.view.shapes import AMPLITUDE, displacement
 
@@ -73,13 +72,10 @@ def show(scenes: Sequence[Scene]) -> None:
         ConfigError: if pyvista is missing, or no window opens here.
     """
     require("pyvista")
-    with tempfile.TemporaryDirectory(prefix="rom-view-") as folder:
-        leave(scenes, Path(folder))
-        done = subprocess.run(
-            [sys.executable, "-m", "rom.view.window", folder],
-            env=child_environment(), stdin=subprocess.DEVNULL, capture_output=True, check=False,
-        )  # fmt: skip
-        if done.returncode:
+    with scratch("view") as folder:
+        leave(scenes, folder)
+        done = run(python("rom.view.window", str(folder)))
+        if done.code:
             raise child_failure(done)
 
 

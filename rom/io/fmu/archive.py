@@ -4,8 +4,6 @@ import hashlib
 import platform
 import re
 import shutil
-import subprocess
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Callable
@@ -13,12 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
+from rom.child import Limits, run, scratch
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK, check_text
 
 SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
+LONGEST = 600.0  # seconds to compile
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
 
 
@@ -84,19 +84,18 @@ def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         raise ConfigError("an FMU needs a C compiler.", hint="Install gcc.")
-    with tempfile.TemporaryDirectory() as folder:
+    with scratch("compile") as folder:
         for name, data in sources.items():
-            (Path(folder) / name).write_bytes(data)
-        done = subprocess.run(
-            [compiler, *OPTIONS, *names, "-lm", "-o", "out.so"],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode:
-            raise ResourceError(f"{compiler} cannot compile the FMU: {done.stderr.strip()}")
-        return (Path(folder) / "out.so").read_bytes()
+            (folder / name).write_bytes(data)
+        command = [compiler, *OPTIONS, *names, "-lm", "-o", "out.so"]
+        # what the compiler puts aside goes when the folder goes
+        variables = {"TMPDIR": str(folder)}
+        done = run(command, folder=folder, limits=Limits(seconds=LONGEST), variables=variables)
+        if done.overtime:
+            raise ResourceError(f"{compiler} has not compiled the FMU within {LONGEST:g} s.")
+        if done.code:
+            raise ResourceError(f"{compiler} cannot compile the FMU: {done.err.strip()}")
+        return (folder / "out.so").read_bytes()
 
 
 def _pack(file: IO[bytes], files: dict[str, bytes]) -> None:

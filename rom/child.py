@@ -1,0 +1,232 @@
+"""How every process of rom is started, limited and ended, and where it keeps its files.
+
+A child finds modules where this process has found them and never in the folder it is started in,
+belongs to a session of its own, ends with its parent whatever ends that one, and leaves no folder
+behind: those of processes killed by SIGKILL are removed by the next one.
+"""
+
+import fcntl
+import os
+import shutil
+import signal
+import stat
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from rom.interruption import terminable, uninterrupted
+
+ENTRY = Path(__file__).with_name("child_entry.py")
+ROOT = str(Path(__file__).resolve().parents[1])
+INSTALLED = ("site-packages", "dist-packages")  # on the path of every child anyway
+PREFIX, SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
+GRACE = 1.0  # seconds between SIGTERM and SIGKILL
+# The launcher of MPI recognises its processes by these; a child is none of them.
+MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
+# empty is the default; it wins over a file of settings in the working folder, by which Numba
+# would load compiled code from wherever that file says
+SHUT = {"NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a child may take; 0 for no limit.
+
+    Attributes:
+        seconds: time by the clock [s].
+        processor: time of the processor [s].
+        memory: address space [bytes].
+    """
+
+    seconds: float = 0.0
+    processor: int = 0
+    memory: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a child ended and what it said.
+
+    Attributes:
+        code: its exit code; below zero the number of the signal that ended it.
+        out: its standard output.
+        err: its standard error.
+        overtime: whether it was ended because its time by the clock was over.
+    """
+
+    code: int
+    out: str = ""
+    err: str = ""
+    overtime: bool = False
+
+    @property
+    def last(self) -> str:
+        """The last line on standard error."""
+        return (self.err.strip().splitlines() or ["it said nothing"])[-1]
+
+    @property
+    def signal(self) -> str:
+        """Name of the signal that ended it, or nothing."""
+        return signal.Signals(-self.code).name if self.code < 0 else ""
+
+
+def python(module: str, *arguments: str) -> list[str]:
+    """The command that runs a module of this Python."""
+    return [sys.executable, "-P", "-m", module, *arguments]
+
+
+def run(
+    command: Sequence[str],
+    *,
+    folder: Path | None = None,
+    limits: Limits | None = None,
+    variables: Mapping[str, str] | None = None,
+) -> Ended:
+    """Run a command to its end; whatever interrupts this process ends the child with all its own.
+
+    Args:
+        command: program and arguments; see `python`.
+        folder: where it runs; here by default.
+        limits: what it may take.
+        variables: of its environment, beside those of this process.
+
+    Raises:
+        OSError: if there is no such program.
+    """
+    limits = limits or Limits()
+    with terminable():
+        process = start(command, folder=folder, limits=limits, variables=variables)
+        return finish(process, limits.seconds)
+
+
+def start(
+    command: Sequence[str],
+    *,
+    folder: Path | None = None,
+    limits: Limits | None = None,
+    variables: Mapping[str, str] | None = None,
+) -> subprocess.Popen[bytes]:
+    """Start a command beside this process; arguments as in `run`, `finish` waits for it."""
+    limits = limits or Limits()
+    entry = [sys.executable, "-P", str(ENTRY), str(os.getpid())]
+    entry += [str(limits.processor), str(limits.memory)]
+    own = sys.executable in command
+    with uninterrupted():
+        return subprocess.Popen(
+            [*entry, *command],
+            cwd=folder,
+            env=environment(own=own) | dict(variables or {}),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+
+
+def finish(process: subprocess.Popen[bytes], seconds: float = 0.0) -> Ended:
+    """Wait until a child has ended; end it after so many seconds, or when this is interrupted."""
+    overtime = False
+    try:
+        try:
+            out, err = process.communicate(timeout=seconds or None)
+        except subprocess.TimeoutExpired:
+            overtime = True
+            _end(process)
+            out, err = process.communicate()
+    except BaseException:
+        with uninterrupted():
+            _end(process)
+        raise
+    words = (text.decode(errors="replace") for text in (out, err))
+    return Ended(process.returncode, *words, overtime)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a child and everything in its session."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
+
+
+def environment(*, own: bool = True) -> dict[str, str]:
+    """Variables of a child.
+
+    Args:
+        own: whether it runs modules of rom; other programs are not shown where rom lies.
+    """
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(MPI_VARIABLES)}
+    given = [p for p in kept.pop("PYTHONPATH", "").split(os.pathsep) if os.path.isabs(p)]
+    if own and os.path.basename(ROOT) not in INSTALLED:
+        given.insert(0, ROOT)
+    path = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(given))} if given else {}
+    return SHUT | kept | path | {"PYTHONSAFEPATH": "1"}
+
+
+@contextmanager
+def scratch(kind: str) -> Iterator[Path]:
+    """A folder for the files of a child, removed whatever happens.
+
+    Args:
+        kind: one word of its name.
+    """
+    made: tuple[Path, int] | None = None
+    with terminable():
+        try:
+            with uninterrupted():
+                sweep()
+                made = _locked(kind)
+            yield made[0]
+        finally:
+            with uninterrupted():
+                if made is not None:
+                    shutil.rmtree(made[0], ignore_errors=True)
+                    os.close(made[1])
+
+
+def _locked(kind: str) -> tuple[Path, int]:
+    """A new folder, and the descriptor whose lock says that its maker lives."""
+    while True:
+        path = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{kind}-", suffix=SUFFIX))
+        descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        with suppress(OSError):  # no locks here, or a sweep that was faster
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if path.is_dir():
+            return path, descriptor
+        os.close(descriptor)
+
+
+def sweep() -> None:
+    """Remove the scratch folders of this user whose makers no longer live."""
+    for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*{SUFFIX}"):
+        with suppress(OSError):
+            _remove_abandoned(path)
+
+
+def _remove_abandoned(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        if _ours(descriptor):
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # held as long as the maker lives
+            shutil.rmtree(path)
+    finally:
+        os.close(descriptor)
+
+
+def _ours(descriptor: int) -> bool:
+    """Whether a folder belongs to this user and nobody else may enter it, as mkdtemp makes it."""
+    about = os.fstat(descriptor)
+    return about.st_uid == os.geteuid() and stat.S_IMODE(about.st_mode) == stat.S_IRWXU
+
+
+def machine_bytes() -> int:
+    """Memory of this machine, or of the control group this process belongs to [bytes]."""
+    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    with suppress(OSError, ValueError):  # "max", or no such file
+        total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return total
