@@ -4,12 +4,16 @@ Importing ``rom`` needs NumPy, SciPy and Numba only. Everything that needs dolfi
 lives in ``rom.fe`` and is imported when it is first used.
 """
 
+# Nothing is imported here that Python has not loaded itself: `python -m rom` comes by before
+# `rom.__main__` can take the working folder off the path, and a typing.py may lie in it.
 import importlib
-from typing import TYPE_CHECKING, Any
 
 from rom.launcher import one_thread_each as _one_thread_each
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from rom.body.assembly import Assembly
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.family import BodyFamily
@@ -357,7 +361,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     """Import packages, and the modules of public names, on first use."""
     if name in PACKAGES:
         return importlib.import_module(f"rom.{name}")

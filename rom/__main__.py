@@ -1,8 +1,31 @@
 """Entry of ``rom …`` and ``python -m rom …``."""
 
+import os
 import sys
 
-from rom.cli.main import main
+
+def leave_working_folder() -> None:
+    """Take the working folder off the path of modules, unless PYTHONPATH names it in full.
+
+    ``python -m`` puts it first, and an empty or relative entry of PYTHONPATH stands for it; a file
+    that happens to lie there, such as numpy.py, would be run. rom itself is found already.
+    """
+    if not sys.flags.safe_path and sys.path[0] == os.getcwd():
+        del sys.path[0]
+    given = os.environ.get("PYTHONPATH")
+    for entry in given.split(os.pathsep) if given else ():
+        path = os.path.abspath(entry)
+        if not os.path.isabs(entry) and path in sys.path:
+            sys.path.remove(path)
+
+
+leave_working_folder()
+
+from rom.child import SHUT  # noqa: E402
+from rom.cli.main import main  # noqa: E402
+
+for variable, nothing in SHUT.items():
+    os.environ.setdefault(variable, nothing)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -5,6 +5,7 @@ belongs to a session of its own, ends with its parent whatever ends that one, an
 behind: those of processes killed by SIGKILL are removed by the next one.
 """
 
+import atexit
 import fcntl
 import os
 import shutil
@@ -189,6 +190,13 @@ def scratch(kind: str) -> Iterator[Path]:
                     os.close(made[1])
 
 
+def lasting_scratch(kind: str) -> Path:
+    """The same for as long as this process lives."""
+    path, _ = _locked(kind)
+    atexit.register(shutil.rmtree, path, ignore_errors=True)
+    return path
+
+
 def _locked(kind: str) -> tuple[Path, int]:
     """A new folder, and the descriptor whose lock says that its maker lives."""
     while True:
@@ -212,7 +220,7 @@ def _remove_abandoned(path: Path) -> None:
     descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         if _ours(descriptor):
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # held as long as the maker lives
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # held while the maker lives
             shutil.rmtree(path)
     finally:
         os.close(descriptor)

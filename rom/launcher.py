@@ -5,17 +5,14 @@ threads. It reads its variables when it is loaded, so that this runs before NumP
 came first is told by a call.
 """
 
-import ctypes
+# Of what Python has not loaded itself nothing is imported here, for the reason in `rom`.
 import os
-import re
 import sys
-from contextlib import suppress
-from pathlib import Path
 
 RANK_AND_SIZE = (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"))
 THREADS_VARIABLE = "OMP_NUM_THREADS"
 OTHER_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
-OPENBLAS_FILE = re.compile(r"/\S*openblas\S*\.so\S*$")
+OPENBLAS_FILE = r"/\S*openblas\S*\.so\S*$"
 OPENBLAS_CALLS = (  # each build has one of them
     "openblas_set_num_threads",
     "openblas_set_num_threads64_",
@@ -43,10 +40,16 @@ def one_thread_each() -> None:
 
 
 def _tell_openblas() -> None:
-    with suppress(OSError):  # there are other systems than Linux
-        lines = Path("/proc/self/maps").read_text().splitlines()
-        for file in {found[0] for line in lines if (found := OPENBLAS_FILE.search(line))}:
-            library = ctypes.CDLL(file)
+    import ctypes
+    import re
+
+    try:
+        with open("/proc/self/maps") as file:
+            lines = file.read().splitlines()
+        for path in {found[0] for line in lines if (found := re.search(OPENBLAS_FILE, line))}:
+            library = ctypes.CDLL(path)
             for name in OPENBLAS_CALLS:
                 if hasattr(library, name):
                     getattr(library, name)(1)
+    except OSError:  # there are other systems than Linux
+        return

@@ -4,6 +4,7 @@ import os
 import time
 
 import pytest
+from command import environment
 
 from rom.errors import RomWarning
 
@@ -59,12 +60,26 @@ def test_a_form_whose_compilation_was_killed_is_compiled_again(tmp_path, monkeyp
         assert assemble_matrix(u[2] * v[2] * ufl.dx).norm() == first
 
 
-def test_planted_options_are_announced(tmp_path, monkeypatch):
-    (tmp_path / "dolfinx_jit_parameters.json").write_text('{"cffi_extra_compile_args": ["-O0"]}')
-    monkeypatch.chdir(tmp_path)
-    with pytest.warns(RomWarning, match="gives options to the form compiler"):
-        with jit.compiling(MPI.COMM_SELF):
-            pass
+@pytest.mark.parametrize(
+    "name", ["dolfinx_jit_parameters.json", "dolfinx_jit_options.json", "ffcx_parameters.json",
+             "ffcx_options.json"],
+)  # fmt: skip
+def test_option_files_of_the_working_folder_are_not_read(tmp_path, name):
+    """Not even as JSON; in a process of its own, for dolfinx keeps what it has read once."""
+    import subprocess
+    import sys
+
+    (tmp_path / name).write_text("no JSON")
+    code = (
+        "from rom.fe import jit; import dolfinx.jit, ffcx\n"
+        "from mpi4py import MPI\n"
+        "with jit.compiling(MPI.COMM_SELF): pass\n"
+        "for module in (dolfinx.jit, ffcx):\n"
+        "    for get in ('get_parameters', 'get_options'): getattr(module, get, dict)()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment(),
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_cache_that_cannot_be_written_is_replaced(tmp_path, monkeypatch):

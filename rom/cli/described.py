@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.options import number_or_text, unique, vector
+from rom.cli.options import meshing, number_or_text, unique, vector
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ COMMON = {
     "verb", "file", "run", "output", "force", "json", "quiet", "verbose", "strict", "debug",
     "version",
 }  # fmt: skip
+COMMON |= {"trust", "time_limit", "memory_limit"}  # no file may say them
 Changes = dict[tuple[str, ...], Any]
 PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "E": ("material", "E"),
@@ -67,7 +68,7 @@ def component(args: argparse.Namespace, *extra: str) -> "Component":
     """
     from rom.config.component import read_component
 
-    return read_component(args.file, changes(args.given, PLACES, extra))
+    return read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
 
 
 def mechanism(args: argparse.Namespace) -> "MechanismFile":
@@ -78,7 +79,7 @@ def mechanism(args: argparse.Namespace) -> "MechanismFile":
     """
     from rom.config.mechanism import read_mechanism
 
-    return read_mechanism(args.file, changes(args.given, MOTION, ()))
+    return read_mechanism(args.file, changes(args.given, MOTION, ()), **meshing(args))
 
 
 def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:

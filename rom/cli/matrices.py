@@ -19,6 +19,9 @@ GEOMETRY: dict[str, Any] = {  # options of a geometry, and what they are when no
     "solver": "direct",
     "parameter": [],
     "scale": 1.0,
+    "trust": False,
+    "time_limit": None,
+    "memory_limit": None,
 }
 MOST_NODES = 10_000_000  # in a range
 
@@ -68,7 +71,11 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
     """
     from rom.io.foreign_model import read_model
 
-    odd = [f"--{name}" for name, default in GEOMETRY.items() if getattr(args, name) != default]
+    odd = [
+        f"--{name.replace('_', '-')}"
+        for name, default in GEOMETRY.items()
+        if getattr(args, name) != default
+    ]
     if odd:
         raise ConfigError(f"{odd[0]} is for geometries, and --mass for matrices: give one of them.")
     if args.nodes is None:

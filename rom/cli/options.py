@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from rom.model import FEModel, Material
 
 
+GIGABYTE = 1e9
+
+
 def number(text: str) -> float:
     """A finite number."""
     try:
@@ -28,6 +31,14 @@ def positive(text: str) -> float:
     value = number(text)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"{text} is not positive")
+    return value
+
+
+def limit(text: str) -> float:
+    """A number from zero on, or inf."""
+    value = float("inf") if text == "inf" else number(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is negative")
     return value
 
 
@@ -98,6 +109,24 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scale", type=positive, default=1.0, help="factor on coordinates; 1e-3 for mm (default 1)"
     )
+    add_meshing(parser)
+
+
+def add_meshing(parser: argparse.ArgumentParser) -> None:
+    """What a geometry, which is a program, may do and take."""
+    group = parser.add_argument_group(
+        "geometries are programs",
+        "A .geo or .step is run in a process of its own, which can neither start others nor write "
+        "files; a .geo that says it would is refused. A .py can do what you can.",
+    )
+    group.add_argument("--trust", action="store_true", help="run a .py geometry; read it first")
+    group.add_argument(
+        "--time-limit", metavar="SECONDS", type=limit, help="of meshing (default 1800, 0 for none)"
+    )
+    group.add_argument(
+        "--memory-limit", metavar="GIGABYTES", type=limit,
+        help="of meshing (default 80 %% of the machine's, 0 for none)",
+    )  # fmt: skip
 
 
 def add_solid(parser: argparse.ArgumentParser) -> None:
@@ -138,7 +167,13 @@ def add_interfaces(parser: argparse.ArgumentParser) -> None:
 def reading(args: argparse.Namespace) -> dict[str, Any]:
     """Keyword arguments of `rom.fe.mesh.read_mesh`."""
     pairs = [number_or_text(pair) for pair in args.parameter]
-    return {"parameters": unique(pairs, "-p"), "scale": args.scale}
+    return {"parameters": unique(pairs, "-p"), "scale": args.scale, **meshing(args)}
+
+
+def meshing(args: argparse.Namespace) -> dict[str, Any]:
+    """Those of them that `add_meshing` asks for."""
+    memory = None if args.memory_limit is None else GIGABYTE * args.memory_limit
+    return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
 
 
 def read_model(args: argparse.Namespace) -> "FEModel":

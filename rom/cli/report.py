@@ -8,6 +8,7 @@ from pathlib import Path
 from shlex import quote
 
 from rom.cli.answer import Answer
+from rom.cli.options import add_meshing, meshing
 from rom.cli.output import add_force, checked
 
 SUMMARY = "write a report as one HTML file"
@@ -24,6 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="body file, .toml file, or folder of a run")
     parser.add_argument("-o", "--output", type=Path, required=True, help="report, .html")
     add_force(parser)
+    add_meshing(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -37,7 +39,7 @@ def run(args: argparse.Namespace) -> Answer:
         raise ConfigError(f"{args.output}: a report is written as .html.")
     checked(args, args.output)
     command = f"rom {' '.join(map(quote, args.argv))}"
-    title, sections = describe(args.file, command=command, version=__version__)
+    title, sections = describe(args.file, command=command, version=__version__, **meshing(args))
     data = {
         "file": str(args.file),
         "output": str(args.output),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
-from rom.cli.options import positive, vector
+from rom.cli.options import add_meshing, positive, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.errors import ConfigError
@@ -49,6 +49,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
     add_force(parser)
+    add_meshing(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:

@@ -1,7 +1,7 @@
 """The component file: a geometry, its material, and how it becomes a flexible body."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +26,12 @@ class Component:
     Attributes:
         document: the file.
         values: its values in SI, by the keys of `rom.config.component_keys.TABLE`.
+        meshing: ``trust`` and limits of `rom.fe.mesh.read_mesh`, which no file can say.
     """
 
     document: Document
     values: dict[str, Any]
+    meshing: dict[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -76,7 +78,7 @@ class Component:
             for name, value in geometry.get("parameters", {}).items()
         }
         keywords = {"parameters": parameters, "faces": geometry.get("faces", {}), "scale": scale}
-        return geometry["file"], keywords
+        return geometry["file"], keywords | self.meshing
 
     def model(self) -> "FEModel":
         """The finite element model; a geometry needs FEniCSx.
@@ -238,13 +240,21 @@ def _si(dimension: tuple[int, ...]) -> str:
 
 @typed
 def read_component(
-    path: str | Path, changes: Mapping[tuple[str, ...], Any] | None = None
+    path: str | Path,
+    changes: Mapping[tuple[str, ...], Any] | None = None,
+    *,
+    trust: bool = False,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
 ) -> Component:
     """A component file.
 
     Args:
         path: ``.toml``; its keys are listed on the page about files.
         changes: {("material", "E"): "70 GPa", ...} in place of what the file says; None removes.
+        trust: run a geometry written in Python.
+        time_limit: of meshing [s]; see `rom.fe.model`.
+        memory_limit: of meshing [bytes].
 
     Raises:
         FileFormatError: if there is no such file.
@@ -258,7 +268,8 @@ def read_component(
         )  # fmt: skip
     for key, value in (changes or {}).items():
         change(document.data, key, value)
-    return Component(document, read_table(TABLE, document))
+    meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}
+    return Component(document, read_table(TABLE, document), meshing)
 
 
 def change(data: dict[str, Any], key: tuple[str, ...], value: Any) -> None:

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ APART = (
     1e-2  # of the size of the mechanism; bores of a mesh are polygons, so that a little is normal
 )
 JOINT_KEYS = ("joint", "joint1", "joint2")
+MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +46,12 @@ class MechanismFile:
     Attributes:
         document: the file.
         values: its values in SI, by the keys of `rom.config.mechanism_keys.TABLE`.
+        meshing: keywords of `rom.read_component` for component files in it.
     """
 
     document: Document
     values: dict[str, Any]
+    meshing: dict[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -66,7 +69,7 @@ class MechanismFile:
         made = Mechanism(gravity=self.values["gravity"])
         for name, values in self.values["bodies"].items():
             with self.at("bodies", name):
-                _add_body(made, name, dict(values))
+                _add_body(made, name, dict(values), self.meshing)
         for section, name, values in self._connections():
             with self.at(section, name):
                 self._connect(made, section, name, dict(values))
@@ -170,7 +173,9 @@ def _turns(made: "Mechanism", joint: str, coordinate: str | None) -> bool:
     return found.coordinate is None or found.coordinate is found.turn
 
 
-def _add_body(made: "Mechanism", name: str, values: dict[str, Any]) -> None:
+def _add_body(
+    made: "Mechanism", name: str, values: dict[str, Any], meshing: dict[str, Any]
+) -> None:
     if "." in name or name == GROUND:
         raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
     if "orientation" in values:
@@ -181,9 +186,9 @@ def _add_body(made: "Mechanism", name: str, values: dict[str, Any]) -> None:
     file, rigid = values.pop("file"), values.pop("rigid")
     reference = values.pop("reference", None)
     if rigid:
-        _add_rigid_from(made, name, file, values)
+        _add_rigid_from(made, name, _mass_of(file, meshing), values)
         return
-    body = _body_of(file)
+    body = _body_of(file, meshing)
     if reference is not None:
         body = body.with_reference(reference[0] if len(reference) == 1 else reference)
     made.add_flexible(name, body, **values)
@@ -198,20 +203,22 @@ def _orientation(value: Any) -> Any:
     return rotation.exp(value["angle"] * unit_vector("axis", value["axis"]))
 
 
-def _body_of(file: Path) -> Any:
+def _body_of(file: Path, meshing: dict[str, Any]) -> Any:
     from rom.io.native import load
 
-    return read_component(file).body() if file.suffix == ".toml" else load(file)
+    return read_component(file, **meshing).body() if file.suffix == ".toml" else load(file)
 
 
-def _add_rigid_from(made: "Mechanism", name: str, file: Path, values: dict[str, Any]) -> None:
+def _add_rigid_from(
+    made: "Mechanism", name: str, known: MassProperties, values: dict[str, Any]
+) -> None:
     """A rigid body with the mass properties and interfaces of a body or a component."""
     import numpy as np
 
     from rom.arguments import start_pose
     from rom.rotation import matrix
 
-    mass, centre, inertia, points = _mass_of(file)
+    mass, centre, inertia, points = known
     pose = (values.get(key) for key in ("orientation", "velocity", "omega"))
     at, p, velocity, omega = start_pose(values["at"], *pose)
     A = matrix(p)
@@ -227,7 +234,7 @@ def _add_rigid_from(made: "Mechanism", name: str, file: Path, values: dict[str, 
     )
 
 
-def _mass_of(file: Path) -> tuple[float, Any, Any, dict[str, Any]]:
+def _mass_of(file: Path, meshing: dict[str, Any]) -> MassProperties:
     """Mass, centre (3,), inertia (3, 3) about it, and interface points by name."""
     import numpy as np
 
@@ -236,7 +243,7 @@ def _mass_of(file: Path) -> tuple[float, Any, Any, dict[str, Any]]:
     if file.suffix == ".toml":
         from rom.workflow import mass_properties
 
-        model = read_component(file).model()
+        model = read_component(file, **meshing).model()
         found = mass_properties(model)
         points = {key: interface.origin for key, interface in model.interfaces.items()}
         return found.mass, found.centre, found.inertia, points
@@ -297,13 +304,21 @@ ADAPTED = {
 
 @typed
 def read_mechanism(
-    path: str | Path, changes: Mapping[tuple[str, ...], Any] | None = None
+    path: str | Path,
+    changes: Mapping[tuple[str, ...], Any] | None = None,
+    *,
+    trust: bool = False,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
 ) -> MechanismFile:
     """A mechanism file.
 
     Args:
         path: ``.toml``; its keys are listed on the page about files.
         changes: {("simulation", "t_end"): "1 s", ...} in place of what the file says; None removes.
+        trust: run geometries written in Python.
+        time_limit: of meshing a body [s]; see `rom.fe.model`.
+        memory_limit: of meshing a body [bytes].
 
     Raises:
         FileFormatError: if there is no such file.
@@ -317,4 +332,5 @@ def read_mechanism(
         )  # fmt: skip
     for key, value in (changes or {}).items():
         change(document.data, key, value)
-    return MechanismFile(document, read_table(TABLE, document))
+    meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}
+    return MechanismFile(document, read_table(TABLE, document), meshing)

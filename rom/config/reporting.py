@@ -24,13 +24,16 @@ BODY = ("body", "mass [kg]", "elastic coordinates", "markers")
 ENERGIES = ("kinetic", "strain", "potential", "total")
 
 
-def describe(source: Path, *, command: str = "", version: str = "") -> tuple[str, Sections]:
+def describe(
+    source: Path, *, command: str = "", version: str = "", **meshing: Any
+) -> tuple[str, Sections]:
     """Title and sections of a report, for `rom.report.write_report`.
 
     Args:
         source: a body file, a component or mechanism file, or the folder of a run.
         command: what was typed, for the record.
         version: of rom, for the record.
+        meshing: ``trust``, ``time_limit``, ``memory_limit`` of `rom.read_component`.
 
     Raises:
         RomError: if the source is none of these; what cannot be drawn is said in the report.
@@ -42,10 +45,10 @@ def describe(source: Path, *, command: str = "", version: str = "") -> tuple[str
         if "bodies" in read_document(source).data:
             from rom.config.mechanism import read_mechanism
 
-            return of_mechanism(read_mechanism(source), how(command, made))
+            return of_mechanism(read_mechanism(source, **meshing), how(command, made))
         from rom.config.component import read_component
 
-        component = read_component(source)
+        component = read_component(source, **meshing)
         written = report.source(source.read_text(encoding="utf-8"))
         title, sections = of_body(component.body(), how(command, made))
         return title, sections | {"The file": [written]}

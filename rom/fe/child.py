@@ -114,9 +114,7 @@ def _limits(
             memory=int(_chosen("memory_limit", memory_limit, SHARE * child.machine_bytes())),
         )
     # measured: 0.08 s per megabyte and 10 bytes per byte; the rest is reserve
-    return child.Limits(
-        processor=10 + 3 * size // MEGABYTE, memory=2048 * MEGABYTE + 100 * size
-    )
+    return child.Limits(processor=10 + 3 * size // MEGABYTE, memory=2048 * MEGABYTE + 100 * size)
 
 
 def _chosen(name: str, value: float | None, default: float) -> float:

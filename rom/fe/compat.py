@@ -81,7 +81,7 @@ def assemble_vector(form: ufl.Form) -> Array:
 
 
 def compiled(form: ufl.Form) -> Any:
-    """Form ready to assemble; our options win over option files found in the working folder."""
+    """Form ready to assemble, with our options."""
     name = "jit_options" if hasattr(fem, "functionspace") else "jit_params"
     return fem.form(form, **{name: dict(JIT_OPTIONS)})
 

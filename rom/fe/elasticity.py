@@ -58,7 +58,8 @@ def model(
             factor on disk; "low-rank+out-of-core"; "iterative": multigrid, with little memory
             and without the count that proves no mode missed.
         comm: the ranks that share the model.
-        mesh_options: ``scale``, ``faces``, ``order`` of `rom.fe.mesh.read_mesh`.
+        mesh_options: ``scale``, ``faces``, ``order``, ``trust``, ``time_limit`` and
+            ``memory_limit`` of `rom.fe.mesh.read_mesh`.
 
     Returns:
         FEModel, free-free. On one process K and M are SciPy matrices, under mpirun PETSc
@@ -67,6 +68,9 @@ def model(
     Raises:
         ConfigError, FileFormatError, MeshError, TagError: for a file that is no valid solid, or
             an unknown solver.
+        UnsafeFileError: for a geometry that would do more than make a mesh, or is Python without
+            ``trust``.
+        ResourceError: if meshing exceeds its limit of time or memory.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
     """

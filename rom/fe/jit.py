@@ -1,9 +1,9 @@
-"""The cache of compiled forms: its lock, its stale files, and option files planted beside it."""
+"""The cache of compiled forms: its lock, its stale files, and option files, which are not read."""
 
 import fcntl
 import logging
 import os
-import tempfile
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -15,12 +15,14 @@ from mpi4py import MPI
 
 import dolfinx.jit
 
+from rom.child import lasting_scratch
 from rom.errors import RomWarning
 from rom.fe.parallel import on_root
 
 JIT_OPTIONS = {"cffi_extra_compile_args": ["-O2", "-g0"], "cffi_libraries": None, "timeout": 60}
-PLANTED = ("dolfinx_jit_parameters.json", "dolfinx_jit_options.json",
-           "ffcx_parameters.json", "ffcx_options.json")  # fmt: skip
+# what dolfinx and FFCx call the function that reads option files, from version to version
+READERS = ("_load_parameters", "_load_options")
+OPTIONS_OF_FFCX = ("ffcx.parameters", "ffcx.options")
 STALE_AFTER = 30.0  # seconds after which nobody can still be compiling one of our forms
 
 
@@ -29,13 +31,12 @@ def compiling(comm: MPI.Comm) -> Iterator[None]:
     """Around everything that may compile a form: one job at a time, no stale file in the way.
 
     A compilation that was killed leaves a source file without a library; every later run waits
-    for the library and gives up. Such files are removed here. Warns of option files in the
-    working folder, from which dolfinx would take compiler flags.
+    for the library and gives up. Such files are removed here. Option files are not read: from one
+    in the working folder dolfinx would take compiler flags, which can run any code.
     """
+    _ignore_option_files()
     lock = on_root_lock(comm)
     on_root(comm, clear_stale_cache)
-    if comm.rank == 0:
-        _warn_of_planted_options(Path.cwd())
     previous = logging.root.manager.disable
     logging.disable(max(previous, logging.INFO))  # the compiler's command lines
     try:
@@ -77,7 +78,7 @@ def usable_cache() -> Path:
     warnings.warn(
         RomWarning(f"{path} cannot be written; forms are compiled anew for this run."), stacklevel=2
     )
-    return Path(tempfile.mkdtemp(prefix="rom-jit-"))
+    return lasting_scratch("jit")
 
 
 def clear_stale_cache(directory: Path | None = None, age: float = STALE_AFTER) -> list[Path]:
@@ -117,19 +118,14 @@ def _defaults() -> dict[str, Any]:
     raise AttributeError("dolfinx.jit has no table of default options")
 
 
+def _ignore_option_files() -> None:
+    for module in (dolfinx.jit, *filter(None, map(sys.modules.get, OPTIONS_OF_FFCX))):
+        for name in READERS:
+            if hasattr(module, name):
+                setattr(module, name, lambda: ({}, {}))
+
+
 def _set_cache(path: Path) -> None:
     """Coordinate maps are compiled inside dolfinx, where no options can be passed."""
     defaults = _defaults()
     defaults["cache_dir"] = (path, *defaults["cache_dir"][1:])
-
-
-def _warn_of_planted_options(folder: Path) -> None:
-    for name in PLANTED:
-        if (folder / name).exists():
-            warnings.warn(
-                RomWarning(
-                    f"{folder / name} gives options to the form compiler. "
-                    "Remove it unless you put it there: it can run any compiler flag."
-                ),
-                stacklevel=2,
-            )
