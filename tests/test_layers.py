@@ -20,6 +20,7 @@ ANYTHING = {
     "bench_loops",
     "bench_models",
     "bench_wheel",
+    "child_entry",
     "cli",
     "doctor",
     "peers",

@@ -260,7 +260,6 @@ def test_vtk_stays_in_the_process_that_draws():
 
 
 def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
-    monkeypatch.setattr("rom.view.offscreen.child_environment", lambda: {"PYTHONPATH": ""})
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(ConfigError, match="ended with code 1"):

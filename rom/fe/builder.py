@@ -32,7 +32,7 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     values = _arguments(build, request["parameters"], path)
     try:
         build(gmsh, **values)
-    except RomError:
+    except (RomError, MemoryError):
         raise
     except Exception as error:
         raise MeshError(f"build failed at {_place(error, path)}: {error}") from error
@@ -46,6 +46,8 @@ def _load(path: Path) -> ModuleType:
     module = ModuleType(path.stem)
     try:
         loader.exec_module(module)
+    except MemoryError:
+        raise
     except Exception as error:
         where = f"line {error.lineno}" if isinstance(error, SyntaxError) else _place(error, path)
         raise FileFormatError(

@@ -19,6 +19,7 @@ from rom.errors import (
     ConfigError,
     FileFormatError,
     MeshError,
+    ResourceError,
     RomError,
     RomWarning,
     TagError,
@@ -128,6 +129,10 @@ FILES = {
     "zip renamed to msh": ("box.msh", zipped, UnsafeFileError, "b'PK"),
     "script renamed to msh": ("box.msh", text('SystemCall "touch pwned";\n'), UnsafeFileError,
                               "SystemCall"),
+    "script behind an empty line": (
+        "box.msh", text('\n$MeshFormat;\nSystemCall "touch pwned";\n$End\n'), UnsafeFileError,
+        "$MeshFormat",
+    ),
     "not UTF-8": ("box.msh", text(b"\xff\xfe$\x00M\x00"), UnsafeFileError, "xff"),
     "bytes after the header": ("box.msh", text(b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n\xff\xfe\n"),
                                FileFormatError, "cut"),
@@ -154,7 +159,7 @@ FILES = {
     "builder that needs a value": ("box.py", text("def build(gmsh, lc):\n    pass\n"), ConfigError,
                                    "'lc'"),
     "builder that dies": ("box.py", text("import os\ndef build(gmsh):\n    os.abort()\n"),
-                          FileFormatError, "SIGABRT"),
+                          MeshError, "SIGABRT"),
     "geo syntax error": ("box.geo", text(GEO + "Box(2) = {0, 0, 0\n"), FileFormatError, "line 6"),
     "geo unknown variable": ("box.geo", text(GEO + "Box(2) = {q, 0, 0, 1, 1, 1};\n"),
                              FileFormatError, "'q'"),
@@ -256,7 +261,7 @@ def test_bad_file_is_a_clear_error_within_seconds(case, tmp_path, monkeypatch, c
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RomWarning)
         with pytest.raises(error) as caught:
-            read_mesh(name)
+            read_mesh(name, trust=True)
     assert time.perf_counter() - start < SECONDS
     assert culprit in str(caught.value)
     assert str(caught.value).startswith(name)
@@ -352,29 +357,22 @@ def test_damaged_files_never_crash_or_hang(tmp_path):
 
 
 def test_a_reader_that_dies_is_a_typed_error(monkeypatch, tmp_path):
-    """Signals of the child: crash, out of time, killed, Ctrl-C."""
-    import subprocess
+    """Signals of the child: crash, out of time, killed, Ctrl-C; a geometry is no damaged file."""
+    from rom import child
 
-    from rom.errors import ResourceError
-    from rom.fe import child
-
-    for signal, error in ((11, FileFormatError), (24, FileFormatError), (9, ResourceError)):
-        done = subprocess.CompletedProcess([], -signal, b"", b"")
-        monkeypatch.setattr(child.subprocess, "run", lambda *a, done=done, **k: done)
-        path = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
-        with pytest.raises(error, match=r"box\.msh"):
-            read_mesh(path)
-    done = subprocess.CompletedProcess([], -2, b"", b"")
-    monkeypatch.setattr(child.subprocess, "run", lambda *a, **k: done)
-    with pytest.raises(KeyboardInterrupt):
-        read_mesh(path)
-
-
-def test_endless_reading_is_stopped_by_the_time_limit(monkeypatch, tmp_path):
-    """The CPU limit of the child, here one second."""
-    from rom.fe import child
-
-    (tmp_path / "box.py").write_text("def build(gmsh):\n    while True:\n        pass\n")
-    monkeypatch.setattr(child, "_limits", lambda *a: {"seconds": 1, "bytes": 2**33})
-    with pytest.raises(FileFormatError, match="did not end within the time"):
-        read_mesh(tmp_path / "box.py")
+    mesh = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
+    geometry = tmp_path / "box.geo"
+    geometry.write_text(GEO)
+    for signal, of_mesh, of_geometry in (
+        (11, FileFormatError, MeshError),
+        (24, FileFormatError, ResourceError),
+        (9, ResourceError, ResourceError),
+        (31, UnsafeFileError, UnsafeFileError),
+        (2, KeyboardInterrupt, KeyboardInterrupt),
+    ):
+        monkeypatch.setattr(child, "run", lambda *a, n=signal, **k: child.Ended(-n))
+        for path, error in ((mesh, of_mesh), (geometry, of_geometry)):
+            with pytest.raises(error) as caught:
+                read_mesh(path)
+            assert error is KeyboardInterrupt or str(caught.value).startswith(str(path))
+            assert path is mesh or "damaged" not in str(caught.value)
