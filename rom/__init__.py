@@ -7,6 +7,12 @@ lives in ``rom.fe`` and is imported when it is first used.
 # Nothing is imported here that Python has not loaded itself: `python -m rom` comes by before
 # `rom.__main__` can take the working folder off the path, and a typing.py may lie in it.
 import importlib
+import os
+
+# Empty is the default; it wins over a .numba_config.yaml in the working folder, by which Numba
+# would load compiled code from wherever that file says.
+for _name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
+    os.environ.setdefault(_name, "")
 
 from rom.launcher import one_thread_each as _one_thread_each
 

@@ -21,11 +21,7 @@ def leave_working_folder() -> None:
 
 leave_working_folder()
 
-from rom.child import SHUT  # noqa: E402
 from rom.cli.main import main  # noqa: E402
-
-for variable, nothing in SHUT.items():
-    os.environ.setdefault(variable, nothing)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -28,9 +28,6 @@ PREFIX, SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use bo
 GRACE = 1.0  # seconds between SIGTERM and SIGKILL
 # The launcher of MPI recognises its processes by these; a child is none of them.
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
-# empty is the default; it wins over a file of settings in the working folder, by which Numba
-# would load compiled code from wherever that file says
-SHUT = {"NUMBA_CACHE_DIR": "", "NUMBA_CACHE_LOCATOR_CLASSES": ""}
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +139,8 @@ def finish(process: subprocess.Popen[bytes], seconds: float = 0.0) -> Ended:
         with uninterrupted():
             _end(process)
         raise
-    words = (text.decode(errors="replace") for text in (out, err))
-    return Ended(process.returncode, *words, overtime)
+    said, complained = (text.decode(errors="replace") for text in (out, err))
+    return Ended(process.returncode, said, complained, overtime)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -166,7 +163,7 @@ def environment(*, own: bool = True) -> dict[str, str]:
     if own and os.path.basename(ROOT) not in INSTALLED:
         given.insert(0, ROOT)
     path = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(given))} if given else {}
-    return SHUT | kept | path | {"PYTHONSAFEPATH": "1"}
+    return kept | path | {"PYTHONSAFEPATH": "1"}
 
 
 @contextmanager

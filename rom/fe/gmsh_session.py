@@ -15,6 +15,7 @@ from rom.fe.script import check_script
 from rom.plausible import scaled_doubt
 
 HXT = 10  # Mesh.Algorithm3D whose meshes differ from run to run
+NO_MEMORY = re.compile("Out of memory|bad_alloc")
 # gmsh hands a file without this start to its script parser, which can run shell commands
 MSH_START = (b"$MeshFormat", b"$Comments")
 
@@ -72,6 +73,8 @@ def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[No
         raise
     except Exception as error:  # gmsh raises bare Exception
         said = _log(gmsh, "Error") or [str(error)]
+        if NO_MEMORY.search(said[0]):
+            raise MemoryError from error
         text = re.sub(r"'[^']*/([^'/]*)'", r"'\1'", said[0]).rstrip(".")
         text = f"gmsh says: {text}." if text else "gmsh cannot read it: the file is damaged."
         raise kind(text, hint="Open the file in gmsh to see more.") from error

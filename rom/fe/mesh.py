@@ -43,7 +43,7 @@ READERS = {
 
 
 @typed
-def read_mesh(
+def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     path: str | Path,
     *,
     parameters: Mapping[str, Any] | None = None,
@@ -85,15 +85,16 @@ def read_mesh(
         ResourceError: meshing exceeds its limit of time or memory.
     """
     path = Path(path)
+    reader = _reader(path)
     request = {
         "path": str(path.absolute()),
-        "reader": _reader(path),
+        "reader": reader,
         "parameters": dict(parameters or {}),
         "faces": dict(faces or {}),
         "order": order,
     }
     _check_request(path, request, scale)
-    _check_trust(path, request["reader"], trust)
+    _check_trust(path, reader, trust)
     digest = _digest(path)
     arrays, notes = read_apart(
         request, where=str(path), size=path.stat().st_size,

@@ -231,7 +231,7 @@ def test_without_fenicsx_a_finite_element_verb_says_what_is_missing(folder):
 
 @pytest.mark.fenicsx
 def test_ctrl_c_ends_with_code_7_and_leaves_nothing(folder):
-    """While gmsh is at work in its own process; the child, in a session of its own, does not hear Ctrl-C."""
+    """While gmsh is at work in a process of its own, which does not hear Ctrl-C itself."""
     pytest.importorskip("gmsh", reason="gmsh is not installed")
     source = folder / "slow.py"
     source.write_text("import time\ndef build(gmsh):\n    open('begun', 'w')\n    time.sleep(60)\n")

@@ -1,0 +1,145 @@
+"""Signals at any instant: no process is left behind, and no folder but by SIGKILL, for one run.
+
+Three seeded instants of each kind; ten with ROM_LONG=1 in the environment.
+"""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from command import environment
+
+from rom import child
+
+pytestmark = [
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc"),
+    pytest.mark.fenicsx,
+]
+INSTANTS = 10 if os.environ.get("ROM_LONG") else 3
+PATIENCE = 2.0  # seconds in which everything must be gone
+SLOW = """SetFactory("OpenCASCADE");
+Box(1) = {0, 0, 0, 1, 1, 1};
+Physical Volume("body", 1) = {1};
+Physical Surface("root", 11) = {1};
+Mesh.MeshSizeMin = 0.05; Mesh.MeshSizeMax = 0.05;
+Sleep 20;
+"""
+FILM = """
+import sys, numpy as np, rom
+from rom.view.offscreen import render
+from rom.view.scene import Actor, Camera
+rng = np.random.default_rng(0)
+camera = Camera(np.zeros(3), np.eye(3)[2], np.eye(3)[1], 2.0, (400, 300))
+render([Actor(rng.random((400, 300, 3)), rng.integers(0, 300, (4000, 3)))], camera)
+open("film", "w").close()
+"""
+STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
+WORK = {  # command, and seconds within which it is hit
+    "mesh": (["-m", "rom", "mesh", "slow.geo", "--save", "x.vtu"], 2.0),
+    "reduce": (["-m", "rom", "reduce", "slow.geo", *STEEL, "-i", "root=rbe2", "-o", "x.rom.npz"],
+               3.0),
+    "film": (["-P", "-c", FILM], 3.0),
+}  # fmt: skip
+NEEDS = {"mesh": "gmsh", "reduce": "dolfinx", "film": "pyvista"}
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+
+
+def processes(mark):
+    """Numbers of living processes that have the mark in their environment."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            living = (path / "stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+            if living and mark in (path / "environ").read_bytes():
+                found.append(int(path.name))
+        except OSError:
+            pass
+    return found
+
+
+def gone(mark):
+    end = time.monotonic() + PATIENCE
+    while left := processes(mark):
+        if time.monotonic() > end:
+            return left
+        time.sleep(0.05)
+    return []
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda n: n.name)
+@pytest.mark.parametrize("work", WORK)
+def test_a_signal_at_any_instant_leaves_nothing(work, number, tmp_path):
+    if find_spec(NEEDS[work]) is None:
+        pytest.skip(f"{NEEDS[work]} is not installed")
+    rng = random.Random(f"{work} {number}")
+    command, longest = WORK[work]
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    (tmp_path / "slow.geo").write_text(SLOW)
+    for k in range(INSTANTS):
+        mark = f"{tmp_path.name}-{k}"
+        env = environment(TMPDIR=str(temporary), ROM_TEST_MARK=mark, PYTHONDONTWRITEBYTECODE="1")
+        before = set(tmp_path.iterdir())
+        # Python itself has its handler of Ctrl-C after its first tenth of a second
+        wait = rng.uniform(0.3, longest)
+        process = subprocess.Popen([sys.executable, *command], env=env, cwd=tmp_path,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)  # fmt: skip
+        time.sleep(wait)
+        process.send_signal(number)
+        process.communicate(timeout=20)
+        assert gone(mark.encode()) == [], f"after {wait:.2f} s"
+        if number != signal.SIGKILL:
+            assert not list(temporary.glob("rom-*")), f"after {wait:.2f} s"
+        assert len(list(temporary.glob("rom-*"))) <= 1, "the run before is not swept"
+        assert process.returncode in (-number, 7, 0, 1)
+        assert set(tmp_path.iterdir()) - {tmp_path / "film"} <= before
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda n: n.name)
+def test_a_signal_while_the_mesher_works_is_survived_by_nobody(number, tmp_path):
+    """At the instant that matters: the child is at work, its folder is there."""
+    if find_spec("gmsh") is None:
+        pytest.skip("gmsh is not installed")
+    (tmp_path / "slow.geo").write_text(SLOW)
+    mark = tmp_path.name
+    env = environment(TMPDIR=str(tmp_path), ROM_TEST_MARK=mark)
+    command = [sys.executable, "-m", "rom", "mesh", "slow.geo"]
+    process = subprocess.Popen(command, env=env, cwd=tmp_path, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE)  # fmt: skip
+    end = time.monotonic() + 30
+    while len(processes(mark.encode())) < 2 or not list(tmp_path.glob("rom-*/request.json")):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    process.send_signal(number)
+    process.communicate(timeout=20)
+    assert gone(mark.encode()) == []
+    assert len(list(tmp_path.glob("rom-mesh-*"))) == (number == signal.SIGKILL)
+    (tmp_path / "slow.geo").write_text(SLOW.replace("Sleep 20;", ""))
+    assert subprocess.run(command, env=env, cwd=tmp_path, capture_output=True).returncode == 0
+    assert not list(tmp_path.glob("rom-*"))
+
+
+def test_ctrl_c_in_a_film_of_the_library_leaves_nothing(tmp_path, monkeypatch):
+    """In this process, by an alarm: what interrupts the wait ends the child."""
+    monkeypatch.setenv("ROM_TEST_MARK", mark := f"{tmp_path.name}-alarm")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.7)
+        with pytest.raises(KeyboardInterrupt), child.scratch("test"):
+            child.run([sys.executable, "-c", "import time; time.sleep(30)"])
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+    assert [pid for pid in gone(mark.encode()) if pid != os.getpid()] == []
+    assert not list(tmp_path.glob("rom-*"))

@@ -1,0 +1,277 @@
+"""What lies in the folder one stands in is never run, by whatever name; children start one way.
+
+The folder is full of modules and option files that leave a mark when they are read as a program.
+"""
+
+import ast
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import ROOT, environment
+from solid import block
+
+import rom
+from rom import child
+
+MODULES = (
+    "gmsh numpy pyvista vtk vtkmodules meshio matplotlib json typing subprocess h5py sitecustomize "
+    "usercustomize scipy numba yaml re os io abc argparse tempfile dataclasses ctypes runpy "
+    "pkgutil functools resource struct warnings collections enum contextlib pathlib signal "
+    "threading dolfinx petsc4py slepc4py mpi4py ufl ffcx basix cffi pip venv imageio PIL __main__"
+).split()
+GEOMETRY = """SetFactory("OpenCASCADE");
+Box(1) = {0, 0, 0, 1, 1, 1};
+Physical Volume("body", 1) = {1};
+Physical Surface("root", 11) = {1};
+Mesh.MeshSizeMin = 1; Mesh.MeshSizeMax = 1;
+"""
+STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
+REDUCE = ("box.geo", *STEEL, "-i", "root=rbe2", "-m", "4", "--reference", "root")
+VERBS = {  # verb: a line that does what the verb is for
+    "doctor": (),
+    "mesh": ("box.geo", "--save", "box.vtu"),
+    "modes": ("box.geo", *STEEL, "-n", "4"),
+    "reduce": (*REDUCE, "-o", "box.rom.npz"),
+    "check": ("bar.rom.npz",),
+    "export": ("bar.rom.npz", "bar.SID_FEM"),
+    "simulate": ("bar.rom.npz", "--hinge", "root", "--t-end", "1e-5", "--dt", "1e-5", "-o", "out"),
+    "view": ("bar.rom.npz", "-o", "bar.png"),
+    "report": ("bar.rom.npz", "-o", "bar.html"),
+    "swing": ("box.geo", "--hinge", "root", "-m", "4", "--t-end", "1e-4", "-o", "swing"),
+    "bench": ("--help",),
+    "completion": ("bash",),
+}
+NEED_FE = ("mesh", "modes", "reduce", "swing")
+MAY_FAIL = ("doctor", "reduce", "view", "report")  # by what this machine lacks, by a certificate
+HAS_FE = find_spec("dolfinx") is not None  # imported here it would meet the traps
+FORMS = {
+    "python -m rom": [sys.executable, "-m", "rom"],
+    "rom": [sys.executable, "-P", "-c", "import sys; from rom.__main__ import main; "
+            "sys.exit(main())"],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory):
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    made = rom.reduce(block(), method=rom.CraigBampton(4), interfaces=kinds, reference="root",
+                      certify=False)  # fmt: skip
+    return rom.save(made, tmp_path_factory.mktemp("body") / "bar.rom.npz")
+
+
+@pytest.fixture
+def planted(tmp_path, monkeypatch, body):
+    """A folder in which everything is a trap; what was run has left its name in `marks`."""
+    folder, marks = tmp_path / "here", tmp_path / "marks"
+    folder.mkdir()
+    marks.mkdir()
+    for name in MODULES:
+        trap = f"open({str(marks / name)!r}, 'w').close()\nraise SystemExit('trapped by {name}')\n"
+        (folder / f"{name}.py").write_text(trap)
+    for name in (".petscrc", "petscrc"):
+        (folder / name).write_text("-dll_append ./planted.so\n-planted 1\n")
+    for name in ("dolfinx_jit_parameters.json", "ffcx_parameters.json"):
+        (folder / name).write_text("trapped")
+    (folder / ".numba_config.yaml").write_text(f"cache_dir: {marks}\n")
+    (folder / "box.geo").write_text(GEOMETRY)
+    shutil.copy(body, folder / "bar.rom.npz")
+    monkeypatch.chdir(folder)
+    return marks
+
+
+def left(marks):
+    return sorted(path.name for path in marks.iterdir())
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("verb", VERBS)
+def test_no_verb_runs_what_lies_in_the_folder(verb, form, planted):
+    if verb in NEED_FE and not HAS_FE:
+        pytest.skip("dolfinx is not installed")
+    # rom itself comes from its folder, named in full; the installed form needs no such thing
+    done = subprocess.run([*FORMS[form], verb, *VERBS[verb]], env=environment(), timeout=180,
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert left(planted) == []
+    assert "trapped" not in done.stdout + done.stderr
+    assert done.returncode == 0 or verb in MAY_FAIL, done.stderr
+
+
+def test_the_traps_work(planted):
+    subprocess.run([sys.executable, "-c", "import gmsh"], check=False, capture_output=True)
+    assert left(planted) == ["gmsh"]
+
+
+STARTERS = {
+    "mesh": "import rom.fe.mesh as m; m.read_mesh('box.geo')",
+    "film": "import rom; b = rom.load('bar.rom.npz'); from rom.view import mode_shapes; "
+    "mode_shapes(b, 'modes.png', n=1)",
+    "window": "import rom; b = rom.load('bar.rom.npz'); from rom.view.window import *; "
+    "show(mode_scenes(b, 1))",
+    "body FMU": "import rom; rom.write_body_fmu(rom.load('bar.rom.npz'), 'bar.fmu')",
+    "FMU": "import rom; open('empty.py', 'w').write('import rom\\ndef mechanism():\\n"
+    "    return rom.Mechanism()\\n'); rom.write_fmu('m.fmu', 'empty.py', dt=1e-3)",
+    "probes": "from rom.doctor.probes import start; print(start('rom.doctor.drawing').answer())",
+    "peers": "from rom import child; from rom.peers.compare import answer_of; "
+    "answer_of(child.python('rom.peers.ours', '1'))",
+}
+
+
+@pytest.mark.parametrize("function", STARTERS)
+def test_no_function_that_starts_a_process_runs_what_lies_in_the_folder(function, planted):
+    """Whether it succeeds on this machine is not asked."""
+    if function == "mesh" and not HAS_FE:
+        pytest.skip("gmsh is not installed")
+    subprocess.run([sys.executable, "-P", "-c", STARTERS[function]], env=environment(), check=False,
+                   timeout=120, capture_output=True)  # fmt: skip
+    assert left(planted) == []
+
+
+@pytest.mark.fenicsx
+def test_petsc_reads_no_option_file_of_the_folder_but_its_variable(planted):
+    if not HAS_FE:
+        pytest.skip("dolfinx is not installed")
+    code = "import rom.fe.jit; from petsc4py import PETSc; print(sorted(PETSc.Options().getAll()))"
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True,
+                          env=environment(PETSC_OPTIONS="-mine 1"), check=True)  # fmt: skip
+    assert done.stdout.strip() == "['mine', 'skip_petscrc']"
+
+
+def test_a_child_is_told_no_path_but_full_ones(monkeypatch, tmp_path):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", ".", "lib", str(tmp_path)]))
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    code = (
+        "import json, os, sys; print(json.dumps([sys.path, sys.flags.safe_path, dict(os.environ)]))"
+    )
+    done = child.run([sys.executable, "-c", code], folder=tmp_path)
+    path, safe, variables = json.loads(done.out)
+    assert safe and variables["PYTHONSAFEPATH"] == "1"
+    assert path[:2] == [str(ROOT), str(tmp_path)]
+    assert {entry for entry in path if not os.path.isabs(entry)} <= {
+        p for p in sys.path if "hook" in p
+    }
+    assert "OMPI_COMM_WORLD_SIZE" not in variables
+    foreign = child.environment(own=False)
+    assert foreign["PYTHONPATH"] == str(tmp_path)
+
+
+def test_limits_of_a_child_hold():
+    spin = [sys.executable, "-c", "while True: pass"]
+    began = time.monotonic()
+    done = child.run(spin, limits=child.Limits(seconds=0.5))
+    assert done.overtime and done.signal == "SIGTERM"
+    assert child.run(spin, limits=child.Limits(processor=1)).signal in ("SIGXCPU", "SIGKILL")
+    hoard = [sys.executable, "-c", "x = bytearray(2**30)"]
+    assert "MemoryError" in child.run(hoard, limits=child.Limits(memory=2**29)).err
+    assert child.run(hoard).code == 0
+    assert time.monotonic() - began < 20
+
+
+def test_a_child_that_ignores_the_polite_signal_ends_with_its_own_children(tmp_path):
+    code = (
+        "import os, signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); os.fork(); "
+        f"open(os.path.join({str(tmp_path)!r}, str(os.getpid())), 'w').close(); time.sleep(60)"
+    )
+    assert child.run([sys.executable, "-c", code], limits=child.Limits(seconds=1.0)).overtime
+    pids = [int(path.name) for path in tmp_path.iterdir()]
+    time.sleep(0.2)
+    assert len(pids) == 2 and not any(map(alive, pids))
+
+
+def alive(pid):
+    """Whether a process runs; one that only waits to be collected does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def test_only_abandoned_folders_of_our_own_are_swept(tmp_path, monkeypatch):
+    """By what a process killed by SIGKILL leaves, what lives, what others own, and links."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    code = "from rom import child; import os, signal\n"
+    code += (
+        "with child.scratch('dead') as f: (f / 'x').touch(); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    env = environment(TMPDIR=str(tmp_path))
+    done = subprocess.run([sys.executable, "-c", code], env=env, check=False)
+    assert done.returncode == -signal.SIGKILL
+    (dead,) = tmp_path.glob("rom-dead-*")
+    other = tmp_path / "rom-results"
+    wide, kept = tmp_path / "rom-wide.scratch", tmp_path / "kept"
+    for path, mode in ((other, 0o700), (wide, 0o755), (kept, 0o700)):
+        path.mkdir(mode=mode)
+        (path / "x").touch()
+    link = tmp_path / "rom-link.scratch"
+    link.symlink_to(kept)
+    with child.scratch("live") as outer, child.scratch("live") as inner:
+        child.sweep()
+        assert not dead.exists()
+        assert all(path.exists() for path in (outer, inner, other, wide, link, kept / "x"))
+        if os.geteuid() == 0:
+            os.chown(wide, 12345, -1)
+            wide.chmod(0o700)
+            child.sweep()
+            assert wide.exists()
+    assert not outer.exists() and not inner.exists()
+
+
+def test_numba_loads_nothing_from_where_the_folder_says(planted):
+    code = "import rom, numba.core.config as c; print(repr(c.CACHE_DIR))"
+    done = subprocess.run([sys.executable, "-P", "-c", code], env=environment(), check=True,
+                          capture_output=True, text=True)  # fmt: skip
+    assert done.stdout.strip() == "''"
+    assert np.array_equal(left(planted), [])
+
+
+DIRECT = {"Popen", "call", "check_call", "check_output", "run", "getoutput", "getstatusoutput"}
+IN_OS = ("system", "popen", "exec", "spawn", "posix_spawn", "fork")
+EXCEPTIONS = {
+    "child.py": "the one way",
+    "child_entry.py": "becomes the command",
+}
+
+
+def starts(tree):
+    """Lines that start a process without `rom.child`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module in ("subprocess", "multiprocessing"):
+            yield node.lineno
+        if isinstance(node, ast.Import):
+            if {alias.name for alias in node.names} & {"multiprocessing", "pty"}:
+                yield node.lineno
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            module, name = node.value.id, node.attr
+            if (module == "subprocess" and name in DIRECT - {"Popen"}) or (
+                module == "os" and name.startswith(IN_OS)
+            ):
+                yield node.lineno
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            if node.func.attr == "Popen":
+                yield node.lineno
+
+
+def test_processes_are_started_in_one_place():
+    found = {
+        str(path.relative_to(ROOT / "rom")): list(starts(ast.parse(path.read_text())))
+        for path in (ROOT / "rom").rglob("*.py")
+    }
+    assert {name for name, lines in found.items() if lines} == set(EXCEPTIONS)
+
+
+@pytest.mark.parametrize(
+    "text", ["import subprocess\nsubprocess.run([])", "import os\nos.system('')", "from subprocess "
+             "import run", "import subprocess as s\ns.Popen([])", "import os\nos.execvp('a', [])",
+             "import multiprocessing"],
+)  # fmt: skip
+def test_a_process_started_elsewhere_would_be_seen(text):
+    assert list(starts(ast.parse(text)))
