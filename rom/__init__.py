@@ -9,12 +9,12 @@ lives in ``rom.fe`` and is imported when it is first used.
 import importlib
 import os
 
+from rom.launcher import one_thread_each as _one_thread_each
+
 # Empty is the default; it wins over a .numba_config.yaml in the working folder, by which Numba
 # would load compiled code from wherever that file says.
 for _name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
     os.environ.setdefault(_name, "")
-
-from rom.launcher import one_thread_each as _one_thread_each
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 
 from rom.arguments import number, positive
 from rom.errors import ConfigError
-from rom.mbs.arguments import number, positive
 from rom.plausible import FRICTION, warn_outside
 
 
