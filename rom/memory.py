@@ -7,7 +7,7 @@ from pathlib import Path
 
 UNLIMITED = 1 << 60
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
-FILES = (  # limit, use, and the line of memory.stat with what is given back when asked for
+GROUP_FILES = (  # limit, use, and the line of memory.stat with what is given back when asked for
     ("memory.max", "memory.current", "file"),
     ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_cache"),
 )
@@ -43,7 +43,7 @@ def address_bytes() -> float:
 
 def group_bytes(folder: Path) -> float:
     """What a control group of either version leaves; cached files count as free."""
-    for limit, use, cache in FILES:
+    for limit, use, cache in GROUP_FILES:
         try:
             text = (folder / limit).read_text().strip()
             used = float((folder / use).read_text())

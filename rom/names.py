@@ -20,9 +20,9 @@ MAX_CHARACTERS = 120
 MAX_FILE_NAME_BYTES = 255  # of Linux, macOS and Windows; endings and temporary names included
 MAX_NAMED = 20  # names in one message
 TEMPORARY_BYTES = 20  # that a file being written adds to its name
-SEPARATORS = "/\\"
-INVISIBLE = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # categories of Unicode
-ALPHABET = (
+FOLDER_SEPARATORS = "/\\"
+INVISIBLE_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # categories of Unicode
+NAME_ALPHABET = (
     f"A name has 1 to {MAX_CHARACTERS} letters, digits, signs and spaces, no slash and no invisible"
     " character, and does not begin with a dot, a dash or a space."
 )
@@ -46,11 +46,11 @@ def check_text(name: object, what: str, error: type[RomError] = ConfigError) -> 
             f"the name {name[:20]!r}... of {what} has {len(name)} characters; at most "
             f"{MAX_CHARACTERS} are allowed."
         )
-    if hidden := {c for c in name if unicodedata.category(c) in INVISIBLE}:
+    if hidden := {c for c in name if unicodedata.category(c) in INVISIBLE_CATEGORIES}:
         codes = ", ".join(sorted(f"U+{ord(c):04X}" for c in hidden))
         raise error(
             f"the name {name!a} of {what} has characters that cannot be seen: {codes}.",
-            hint=ALPHABET,
+            hint=NAME_ALPHABET,
         )
     return name
 
@@ -59,12 +59,12 @@ def check_name(name: object, what: str, error: type[RomError] = ConfigError) -> 
     """The name, if a thing may be given it; arguments and errors as for `check_text`."""
     name = check_text(name, what, error)
     reason = ""
-    if found := [c for c in SEPARATORS if c in name]:
+    if found := [c for c in FOLDER_SEPARATORS if c in name]:
         reason = f"contains {found[0]!r}, which would lead to another folder"
     elif name[0] in ".- " or name[-1] == " ":
         reason = f"begins with {name[0]!r}" if name[0] in ".- " else "ends with a space"
     if reason:
-        raise error(f"the name {name!r} of {what} {reason}.", hint=ALPHABET)
+        raise error(f"the name {name!r} of {what} {reason}.", hint=NAME_ALPHABET)
     return name
 
 

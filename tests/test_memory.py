@@ -8,7 +8,7 @@ from rom.cli.main import translated
 from rom.errors import ResourceError
 
 
-@pytest.mark.parametrize(("limit", "use", "cache"), memory.FILES)
+@pytest.mark.parametrize(("limit", "use", "cache"), memory.GROUP_FILES)
 def test_a_control_group_of_either_version_leaves_its_rest(tmp_path, limit, use, cache):
     assert memory.group_bytes(tmp_path / "none") == memory.UNLIMITED
     (tmp_path / limit).write_text("1000000\n")

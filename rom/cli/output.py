@@ -8,9 +8,9 @@ from typing import Any
 
 from rom.cli.ranks import on_first_rank
 
-KINDS = {"hdf5": "h5"}  # endings that are not the name of their kind
-WRITTEN = ("output", "save")  # options that name what is written
-NOT_PATHS = ("argv", "given", "run", "claims", "verb")
+KIND_OF_ENDING = {"hdf5": "h5"}  # endings that are not the name of their kind
+OUTPUT_OPTIONS = ("output", "save")  # options that name what is written
+OTHER_OPTIONS = ("argv", "given", "run", "claims", "verb")
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def checked(
     Args:
         args: the options, whose files are inputs, too.
         path: file to write.
-        kind: of it, a key of `rom.io.ours.SIGNS`; from its ending if not given.
+        kind: of it, a key of `rom.io.ours.FILE_SIGNS`; from its ending if not given.
         inputs: files that are read and named elsewhere.
 
     Raises:
@@ -39,7 +39,7 @@ def checked(
     from rom.io.ours import check_replaceable
 
     ending = path.suffix.lower().removeprefix(".")
-    kind = kind or KINDS.get(ending, ending)
+    kind = kind or KIND_OF_ENDING.get(ending, ending)
     sources = [*inputs, *_inputs(args)]
     return on_first_rank(lambda: check_replaceable(path, kind, inputs=sources, force=args.force))
 
@@ -64,7 +64,7 @@ def files_in(values: Any) -> Iterator[Path]:
         yield values
     elif isinstance(values, dict):
         for key, value in values.items():
-            if key not in WRITTEN:
+            if key not in OUTPUT_OPTIONS:
                 yield from files_in(value)
     elif isinstance(values, list | tuple):
         for value in values:
@@ -74,7 +74,7 @@ def files_in(values: Any) -> Iterator[Path]:
 def _inputs(args: argparse.Namespace) -> Iterator[Path]:
     """Files named by options, also as FILE:MATRIX."""
     for name, value in vars(args).items():
-        if name in (*WRITTEN, *NOT_PATHS):
+        if name in (*OUTPUT_OPTIONS, *OTHER_OPTIONS):
             continue
         for text in (str(value), str(value).rpartition(":")[0]):
             if isinstance(value, str | Path) and "\0" not in text and os.path.exists(text):

@@ -12,6 +12,7 @@ import numpy as np
 from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.finding import Finding
 from rom.fe.probe import mapped_files
+from rom.memory import free_bytes
 
 BLAS_FILE = re.compile(r"/lib(blas|openblas|scipy_openblas|mkl_rt|blis|flexiblas|cblas)[^/]*\.so")
 FAST = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)
@@ -60,11 +61,11 @@ def _gigaflops(n: int = 400) -> float:
 
 def machine() -> list[Finding]:
     """Memory and cores."""
-    page = os.sysconf("SC_PAGE_SIZE")
-    total, free = (page * os.sysconf(f"SC_{k}_PAGES") / 2**30 for k in ("PHYS", "AVPHYS"))
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    free = free_bytes() / 2**30
     cores = len(os.sched_getaffinity(0))
     threads = os.environ.get("OMP_NUM_THREADS", "not set")
     return [
-        Finding("machine", "memory", f"{total:.1f} GiB, {free:.1f} GiB unused"),
+        Finding("machine", "memory", f"{total:.1f} GiB, of which {free:.1f} GiB may be taken"),
         Finding("machine", "cores", f"{cores}, OMP_NUM_THREADS {threads}"),
     ]

@@ -14,37 +14,31 @@ from rom.io.files import check_writable
 from rom.names import ORIGIN_MARK
 
 HEAD_BYTES, TAIL_BYTES = 2**20, 64  # that are looked at
-MARKED = ORIGIN_MARK.encode()
-COMMENT = rb".{0,200}" + MARKED  # in the first lines
-NAMED_X = rb'(t \[s\]),("[^"\r\n]* x \[m\]"|[^",\r\n]* x \[m\]),[^\r\n]* y \[m\]'
-
-
-def _archive(schema: str) -> bytes:
-    return rb'PK\x03\x04.{0,60}manifest\.npy.*"schema": "' + schema.encode() + rb'"'
-
-
-SIGNS = {  # kind of file: how each that rom writes begins
-    "npz": _archive("rom-body"),
-    "vtu": rb"<VTKFile " + COMMENT,
-    "sid": rb"\d+ \d+ :No\. nodes, No\. modes: [^\n]*; " + MARKED + rb"\n",
-    "dmig": rb"\$ " + MARKED,
-    "abaqus": rb"\*\* " + MARKED + rb"\n",
-    "deck": rb"\*\* " + MARKED + rb": lengths",
-    "exudyn": rb'"""A flexible body for Exudyn, ' + MARKED,
-    "mbdyn": rb"\*\* MBDyn MODAL DATA FILE, " + MARKED,
-    "simscape": rb"MATLAB 5\.0 MAT-file, " + MARKED,
-    "fmu": rb"PK\x03\x04.*" + MARKED + rb"\Z",
-    "openfast": rb"! [^\n]*, " + MARKED + rb"\n",
+MARK_BYTES = ORIGIN_MARK.encode()
+MARK_IN_COMMENT = rb".{0,200}" + MARK_BYTES  # in the first lines
+TABLE_HEAD = rb'(t \[s\]),("[^"\r\n]* x \[m\]"|[^",\r\n]* x \[m\]),[^\r\n]* y \[m\]'
+FILE_SIGNS = {  # kind of file: how each that rom writes begins
+    "npz": rb'PK\x03\x04.{0,60}manifest\.npy.*"schema": "rom-body"',
+    "vtu": rb"<VTKFile " + MARK_IN_COMMENT,
+    "sid": rb"\d+ \d+ :No\. nodes, No\. modes: [^\n]*; " + MARK_BYTES + rb"\n",
+    "dmig": rb"\$ " + MARK_BYTES,
+    "abaqus": rb"\*\* " + MARK_BYTES + rb"\n",
+    "deck": rb"\*\* " + MARK_BYTES + rb": lengths",
+    "exudyn": rb'"""A flexible body for Exudyn, ' + MARK_BYTES,
+    "mbdyn": rb"\*\* MBDyn MODAL DATA FILE, " + MARK_BYTES,
+    "simscape": rb"MATLAB 5\.0 MAT-file, " + MARK_BYTES,
+    "fmu": rb"PK\x03\x04.*" + MARK_BYTES + rb"\Z",
+    "openfast": rb"! [^\n]*, " + MARK_BYTES + rb"\n",
     "png": rb"\x89PNG\r\n\x1a\n.{0,200}tEXtSoftware\x00rom.{4}\x00",
-    "gif": rb"GIF8.*\x21\xfe." + MARKED,
-    "html": rb"<!DOCTYPE html>.*<meta name='generator' content='" + MARKED,
-    "csv": NAMED_X + rb"[^\r\n]*\r?\n[0-9eE+.-]+,[0-9eE+.,-]*\r?\n",
+    "gif": rb"GIF8.*\x21\xfe." + MARK_BYTES,
+    "html": rb"<!DOCTYPE html>.*<meta name='generator' content='" + MARK_BYTES,
+    "csv": TABLE_HEAD + rb"[^\r\n]*\r?\n[0-9eE+.-]+,[0-9eE+.,-]*\r?\n",
     "h5": rb"\x89HDF\r\n.*rom-history",
     "glb": rb'glTF.{0,40}"asset": ?\{[^}]*"generator": ?"fenicsx-rom"',
-    "vtkhdf": rb"\x89HDF\r\n.*" + MARKED,
+    "vtkhdf": rb"\x89HDF\r\n.*" + MARK_BYTES,
     "json": rb'\{\s*"schema": "rom-run"',
 }
-SAME = {
+SAME_KIND = {
     "sid-pysid": "sid",
     "sid-geisler": "sid",
     "openfast-4": "openfast",
@@ -60,7 +54,7 @@ def check_replaceable(
 
     Args:
         path: file to write.
-        kind: of what will be written: a key of `SIGNS`, or the name of a format of `rom.export`.
+        kind: of what will be written: a key of `FILE_SIGNS`, or a format of `rom.export`.
         inputs: files that are read; these are never written.
         force: replace whatever else is there.
 
@@ -77,7 +71,7 @@ def check_replaceable(
     if os.path.lexists(path) and not force and not is_ours(path, kind):
         what = (
             f"is no file of the kind {kind} that rom has written"
-            if SAME.get(kind, kind) in SIGNS
+            if SAME_KIND.get(kind, kind) in FILE_SIGNS
             else f"files of the kind {kind} do not tell who has written them"
         )
         raise ConfigError(
@@ -89,7 +83,7 @@ def check_replaceable(
 
 def is_ours(path: Path, kind: str) -> bool:
     """Whether rom has written a file as one of a kind."""
-    sign = SIGNS.get(SAME.get(kind, kind))
+    sign = FILE_SIGNS.get(SAME_KIND.get(kind, kind))
     if sign is None or not path.is_file():
         return False
     try:

@@ -15,7 +15,7 @@ from rom.cli.parser import VERBS, build_parser
 from rom.config import reporting
 from rom.errors import ConfigError
 from rom.io.export import FORMATS
-from rom.io.ours import SAME, SIGNS, check_replaceable, is_ours
+from rom.io.ours import FILE_SIGNS, SAME_KIND, check_replaceable, is_ours
 
 BEAM = str(ROOT / "meshes" / "beam.geo")
 STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]
@@ -174,11 +174,13 @@ def exported(body, folder):
 
 def test_a_file_is_recognised_as_its_own_kind_and_no_other(body, tmp_path):
     found = exported(body, tmp_path)
-    assert set(FORMATS) - UNMARKED <= SIGNS.keys() | SAME.keys()
+    assert set(FORMATS) - UNMARKED <= FILE_SIGNS.keys() | SAME_KIND.keys()
     for kind, path in found.items():
-        as_kinds = {other for other in (*SIGNS, *SAME) if is_ours(path, other)}
+        as_kinds = {other for other in (*FILE_SIGNS, *SAME_KIND) if is_ours(path, other)}
         wanted = {
-            other for other in (*SIGNS, *SAME) if SAME.get(other, other) == SAME.get(kind, kind)
+            other
+            for other in (*FILE_SIGNS, *SAME_KIND)
+            if SAME_KIND.get(other, other) == SAME_KIND.get(kind, kind)
         }
         assert as_kinds == (set() if kind in UNMARKED else wanted), kind
 
