@@ -151,7 +151,7 @@ def _tokens(path: Path, where: str) -> Iterator[Token]:
 def _refusals(tokens: list[Token]) -> Iterator[tuple[int, str]]:
     """Lines that do more than make a geometry, and what they do."""
     printing, depth = False, 0
-    for token, after in zip(tokens, [*tokens[1:], END], strict=True):
+    for token, after in zip(tokens, [*tokens[1:], END][: len(tokens)], strict=True):
         if token.kind == "sign":
             depth += (token.value == "(") - (token.value == ")")
             if token.value in (">", ">>") and printing and depth <= 0:
