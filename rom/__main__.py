@@ -21,6 +21,10 @@ def leave_working_folder() -> None:
 
 leave_working_folder()
 
+from rom.interruption import heed_lost_signals  # noqa: E402
+
+heed_lost_signals()
+
 from rom.cli.main import main  # noqa: E402
 
 if __name__ == "__main__":

@@ -6,10 +6,14 @@ at once: folders stay, child processes stay, and a motion that was computed is l
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+
+AGAIN = 0.05  # seconds after which a signal that was lost is sent again
 
 
 class Terminated(KeyboardInterrupt):
@@ -64,3 +68,23 @@ def uninterrupted() -> Iterator[None]:
             signal.signal(number, handler)
         if came:
             signal.raise_signal(came[0])
+
+
+def heed_lost_signals() -> None:
+    """Send a signal again whose exception Python has dropped, for the rest of this process.
+
+    Python raises where it happens to be; in a callback, such as those of its import machinery, it
+    only prints that an exception was ignored, and goes on.
+    """
+    usual = sys.unraisablehook
+
+    def hook(lost: "sys.UnraisableHookArgs") -> None:
+        if not isinstance(lost.exc_value, KeyboardInterrupt):
+            usual(lost)
+            return
+        number = signal.SIGTERM if isinstance(lost.exc_value, Terminated) else signal.SIGINT
+        again = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = hook

@@ -63,3 +63,17 @@ def test_the_process_cleans_up_and_ends_by_sigterm():
     done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
                           text=True, timeout=60, check=False)  # fmt: skip
     assert (done.returncode, done.stdout) == (-signal.SIGTERM, "clean\n"), done.stderr
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_a_signal_dropped_in_a_callback_comes_again(number):
+    code = (
+        "import os, signal, time\nfrom rom.interruption import heed_lost_signals, terminable\n"
+        "heed_lost_signals()\n"
+        "class Last:\n"
+        f"    def __del__(self): os.kill(os.getpid(), signal.{number}); time.sleep(0.01)\n"
+        "with terminable():\n    x = Last(); del x\n    time.sleep(20)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
+                          text=True, timeout=15, check=False)  # fmt: skip
+    assert done.returncode == -getattr(signal, number), done.stderr

@@ -31,7 +31,9 @@ Mesh.MeshSizeMin = 0.05; Mesh.MeshSizeMax = 0.05;
 Sleep 20;
 """
 FILM = """
-import sys, numpy as np, rom
+from rom.interruption import heed_lost_signals
+heed_lost_signals()
+import numpy as np
 from rom.view.offscreen import render
 from rom.view.scene import Actor, Camera
 rng = np.random.default_rng(0)
