@@ -1,5 +1,6 @@
 """Linear elastic solids, and whether one has such numbers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import finite, is_number, shortened
 from rom.errors import MaterialError
 from rom.plausible import FOAM_SPEED, SOLID_DENSITY, STIFF_DENSITY, WAVE_SPEED, warn
 from rom.units import SYSTEMS, UnitSystem, unit_system
@@ -107,15 +109,16 @@ class Orthotropic:
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "G"):
-            if np.shape(getattr(self, name)) != (3,):
-                raise MaterialError(f"{name} needs three numbers, got {getattr(self, name)!r}.")
-            for value in getattr(self, name):
+            given = getattr(self, name)
+            if not isinstance(given, Sequence | np.ndarray) or len(given) != 3:
+                raise MaterialError(f"{name} needs three numbers, got {shortened(given)}.")
+            for value in given:
                 _check_number(name, value)
         for value in (*self.E, *self.G):
             _check_positive("E or G", value, "Pa")
         _check_number("rho", self.rho)
         _check_positive("rho", self.rho, "kg/m^3")
-        axes = np.asarray(self.axes, dtype=float)
+        axes = finite("axes", self.axes, None)
         if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
             raise MaterialError("axes is not a (3, 3) matrix of orthonormal rows.")
         lowest = np.linalg.eigvalsh(self._compliance()).min()
@@ -201,9 +204,8 @@ def _strain_rotation(Q: Array) -> Array:
 
 
 def _check_number(name: str, value: Any) -> None:
-    number = np.isscalar(value) and not isinstance(value, bool | str)
-    if not (number and np.isfinite(value)):
-        raise MaterialError(f"{name} = {value!r} is not a finite number.")
+    if not is_number(value):
+        raise MaterialError(f"{name} = {shortened(value)} is not a finite number.")
 
 
 def _check_positive(name: str, value: float, unit: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import matrix, typed
 from rom.errors import InterfaceError
 from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
@@ -200,7 +200,8 @@ class Basis:
 
     def project(self, A: Any) -> Array:
         """(r, r) symmetric projection Psi^T A Psi; on one process."""
-        B = self.Psi.T @ (A @ self.Psi)
+        n = len(self.Psi)
+        B = self.Psi.T @ (matrix("A", A, (n, n)) @ self.Psi)
         return 0.5 * (B + B.T)
 
 

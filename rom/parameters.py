@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import is_number, shortened, typed
 from rom.errors import ParameterError, RomWarning
 from rom.model import Array
 from rom.names import named
@@ -44,8 +45,9 @@ class Parameter:
     def __post_init__(self) -> None:
         for name in ("low", "high"):
             value = getattr(self, name)
-            if isinstance(value, bool | str) or np.ndim(value) or not np.isfinite(value):
-                raise ParameterError(f"{name} = {value!r} is not a finite factor.", where=str(self))
+            if not is_number(value):
+                said = f"{name} = {shortened(value)} is not a finite factor."
+                raise ParameterError(said, where=str(self))
         if not 0.0 < self.low <= self.high:
             raise ParameterError(
                 f"the range {self.low:g} to {self.high:g} of {self} is not one of positive factors."
@@ -56,8 +58,11 @@ class Parameter:
     def __str__(self) -> str:
         return f"{type(self).__name__} of {self.region or 'the whole body'}"
 
+    @typed
     def inside(self, share: float) -> float:
         """The factor at a share (0 to 1) of the range, in equal ratios."""
+        if not 0.0 <= share <= 1.0:
+            raise ParameterError(f"share = {share:g} is not within 0 and 1.", where=str(self))
         return float(self.low * (self.high / self.low) ** share)
 
 

@@ -8,6 +8,7 @@ from scipy.linalg import LinAlgError, eigh, eigvalsh
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
+from rom.arguments import matrix
 from rom.eigen import Weighted, canonical_signs, count_shift, orthonormal
 from rom.errors import (
     ConfigError,
@@ -233,7 +234,7 @@ def dof_set(dofs: npt.ArrayLike, n: int) -> Index:
 
 
 def _symmetric(name: str, A: Any) -> csr_matrix:
-    A = csr_matrix(A, dtype=float)
+    A = csr_matrix(matrix(name, A), dtype=float)
     if A.shape[0] != A.shape[1]:
         raise ConfigError(f"{name} has the shape {A.shape}; it must be square.")
     wrong = np.flatnonzero(~np.isfinite(A.data))

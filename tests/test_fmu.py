@@ -15,7 +15,7 @@ from mbs_cases import random_body, simulate_quietly, slider_crank
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
-from rom.errors import ConfigError, RomWarning
+from rom.errors import ConfigError, ResourceError, RomWarning
 from rom.fmu.driven import Driven
 from rom.io.fmu.variables import structured
 from rom.mbs.mechanism import Mechanism
@@ -399,7 +399,7 @@ def test_an_fmu_ends_in_fmu_and_needs_a_compiler(tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match=r"does not end in \.fmu"):
         rom.write_fmu("m.py", tmp_path / "m.zip", dt=1.0)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ConfigError, match="needs a C compiler"):
+    with pytest.raises(ResourceError, match="needs a C compiler"):
         written(tmp_path, CRANK)
 
 

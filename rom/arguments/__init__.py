@@ -4,14 +4,18 @@ from rom.arguments.border import typed
 from rom.arguments.kinds import AnyBody, AnyMechanism, AnySolution
 from rom.arguments.values import (
     finite,
+    is_number,
+    matrix,
     matrix33,
     number,
     one_of,
     positive,
+    rows_at,
     shortened,
     start_pose,
     unit_quaternion,
     unit_vector,
+    vector,
     whole,
 )
 
@@ -20,14 +24,18 @@ __all__ = [
     "AnyMechanism",
     "AnySolution",
     "finite",
+    "is_number",
+    "matrix",
     "matrix33",
     "number",
     "one_of",
     "positive",
+    "rows_at",
     "shortened",
     "start_pose",
     "typed",
     "unit_quaternion",
     "unit_vector",
+    "vector",
     "whole",
 ]

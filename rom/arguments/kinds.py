@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from rom.arguments.values import shortened
 
+LARGEST = 1e150  # of a number; the square of it is still one
 LARGEST_WHOLE = 2**63 - 1  # that compiled code can count to
 KINDS_OF_NUMBERS = {  # scalar type of an array -> kinds of types that may stand for it
     np.bool_: "b",
@@ -255,8 +256,8 @@ def _array(scalar: Any) -> Taken | None:
 
 def _array_like(value: Any) -> Any:
     found = _numbers(value, "iuf")
-    if found.size and not np.isfinite([found.min(), found.max()]).all():
-        raise ValueError(value)
+    for entry in (found.min(), found.max()) if found.size else ():
+        _number(entry)
     return value
 
 
@@ -278,6 +279,8 @@ def _number(value: Any) -> Any:
             raise TypeError(value)
     if not math.isfinite(value):
         raise ValueError(value)
+    if abs(value) > LARGEST:
+        raise Unfit(value, f"a number of at most {LARGEST:g}")
     return value
 
 

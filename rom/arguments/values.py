@@ -1,9 +1,10 @@
 """Checks of values: whole numbers in a range, words of a list, shapes, rotations."""
 
+import math
 import operator
 import reprlib
 from collections.abc import Iterable
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,59 @@ def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reaso
     raise ConfigError(f"{name} = {shortened(value)} must be a whole number {span}{why}.")
 
 
+def vector(name: str, value: Any, n: int | None = None) -> Array:
+    """The value as (n,) finite numbers; without n as any number of them, one number alone too.
+
+    Raises:
+        ConfigError: for another shape, or entries that are not finite numbers.
+    """
+    array = finite(name, [value] if n is None and np.isscalar(value) else value, None)
+    if array.ndim != 1 or not array.size or n not in (None, array.size):
+        needed = "at least one number" if n is None else f"{n} numbers"
+        raise ConfigError(f"{name} has shape {array.shape}, needed is a row of {needed}.")
+    return array
+
+
+def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, None)) -> Any:
+    """The value as a matrix, sparse or dense, of this shape; None for any length.
+
+    Raises:
+        ConfigError: for anything else.
+    """
+    given = hasattr(value, "dot") and hasattr(value, "dtype")
+    found = value if given else finite(name, value, None)
+    if len(found.shape) != 2 or found.dtype.kind not in "iuf":
+        raise ConfigError(f"{name} = {shortened(value)} must be a matrix of numbers.")
+    if any(n not in (None, size) for n, size in zip(shape, found.shape, strict=True)):
+        raise ConfigError(f"{name} has shape {found.shape}, needed is {shape}.")
+    return found
+
+
+def rows_at(name: str, at: Any, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """(p, k) rows of A (n, k): at places (p,) that count from 0, or combined by (p, n) numbers.
+
+    Raises:
+        ConfigError: for places beyond the rows, or numbers that do not fit them.
+    """
+    wanted, n = finite(name, at, None), A.shape[0]
+    if wanted.ndim == 2 and wanted.shape[1] == n and wanted.size:
+        return np.asarray(wanted @ A)
+    whole_numbers = wanted.ndim == 1 and wanted.size and not (wanted % 1).any()
+    if not whole_numbers or wanted.min() < 0 or wanted.max() >= n:
+        raise ConfigError(
+            f"{name} = {shortened(at)} must be places from 0 to {n - 1}, or rows of {n} numbers."
+        )
+    return A[wanted.astype(np.int64)]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is one finite real number; True and False are none."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
+
+
 def one_of(name: str, value: Any, words: Iterable[str]) -> str:
     """The value as one of some words.
 
@@ -60,8 +114,8 @@ def one_of(name: str, value: Any, words: Iterable[str]) -> str:
     raise ConfigError(f"{name} = {shortened(value)} is none of {', '.join(map(repr, known))}.")
 
 
-def finite(name: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """The value as a float array of this shape.
+def finite(name: str, value: Any, shape: tuple[int, ...] | None) -> Array:
+    """The value as a float array of this shape; None for any.
 
     Raises:
         ConfigError: for another shape, or entries that are not finite numbers.
@@ -72,7 +126,7 @@ def finite(name: str, value: Any, shape: tuple[int, ...]) -> Array:
         raise ConfigError(f"{name} = {shortened(value)} is not made of numbers.") from error
     if np.array(value).dtype.kind not in "iuf" and array.size:
         raise ConfigError(f"{name} = {shortened(value)} is not made of numbers.")
-    if array.shape != shape:
+    if shape is not None and array.shape != shape:
         raise ConfigError(f"{name} has shape {array.shape}, needed is {shape}.")
     if not np.isfinite(array).all():
         raise ConfigError(f"{name} = {shortened(array.tolist())} is not finite.")

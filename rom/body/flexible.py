@@ -11,7 +11,7 @@ from rom.arguments import typed
 from rom.body.recovery import StressRecovery
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
-from rom.body.spread import point_areas
+from rom.body.spread import Where, point_areas
 from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Modes, Report
@@ -212,7 +212,7 @@ class FlexibleBody:
         omega, V = _normal_modes(body.K, body.M)
         return _recombined(body, V, omega, reference_label(reference))
 
-    def surface_areas(self, where: Any = None) -> Array:
+    def surface_areas(self, where: Where = None) -> Array:
         """(s,) area that belongs to each point of the surface, undeformed [m^2].
 
         Args:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigvals, null_space
 
+from rom.arguments import finite, unit_vector
 from rom.body.stiffening import SecondOrder
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.model import Array
@@ -26,7 +27,7 @@ def rotating_frequencies(
     at: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
     """Frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`."""
-    w, arm = speed * _direction(axis), np.asarray(at, dtype=float)
+    w, arm = speed * unit_vector("axis", axis), finite("at", at, (3,))
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
     body.check_support(fixed)
@@ -116,10 +117,3 @@ def _frequencies(M: Array, K: Array, G: Array, culprit: str) -> Array:
             stacklevel=4,
         )
     return np.sort(np.abs(lam.imag))[::2] / (2 * np.pi)
-
-
-def _direction(axis: npt.ArrayLike) -> Array:
-    e = np.asarray(axis, dtype=float)
-    if e.shape != (3,) or not np.isfinite(e).all() or not e.any():
-        raise ConfigError(f"axis = {axis!r} is no direction.")
-    return e / np.linalg.norm(e)

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import typed
+from rom.arguments import matrix, rows_at, typed, vector
 from rom.cyclic.blades import ReducedBlade
 from rom.cyclic.certificate import wheel_certificate
 from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
@@ -126,6 +126,8 @@ class BladedWheel:
 
     def of_blades(self, blades: Sequence[ReducedBlade], Phi: Array) -> list[Array]:
         """(r + m, k) per blade: root and cantilever coordinates in k motions Phi (n, k)."""
+        self._check(blades)
+        Phi = matrix("Phi", Phi, (len(self.K) + sum(blade.n_modes for blade in blades), None))
         c = self.roots.shape[2]
         ends = len(self.K) + np.cumsum([blade.n_modes for blade in blades])
         return [
@@ -239,7 +241,7 @@ class BladedWheel:
                 f"damping = {damping!r} must be a positive share of critical damping, below 1."
             )
         check_damping_ratio(damping, "the wheel")
-        N, sweep = self.sector.n_sectors, np.atleast_1d(np.asarray(omega, dtype=float))
+        N, sweep = self.sector.n_sectors, vector("omega", omega)
         if speed:
             Phi, motions = self._gyroscopic(blades, speed)
         else:
@@ -287,7 +289,7 @@ def _each(what: Any, N: int) -> list[Any]:
     Raises:
         ConfigError: if a list has another length.
     """
-    if not isinstance(what, list) or np.ndim(what[0]) == 0:
+    if not isinstance(what, list) or not what or np.ndim(what[0]) == 0:
         return [what] * N
     if len(what) != N:
         raise ConfigError(f"a list of {len(what)} forces or places: give {N}, one for each blade.")
@@ -308,8 +310,7 @@ def _on(blade: ReducedBlade, force: npt.ArrayLike, j: int) -> Array:
 
 def _rows(blade: ReducedBlade, at: npt.ArrayLike, j: int) -> Array:
     """(p, r + m) displacements wanted of the coordinates of a blade."""
-    rows = np.asarray(at)
-    found = np.asarray(rows @ blade.Psi) if rows.ndim == 2 else blade.Psi[rows.astype(np.int64)]
+    found = rows_at("at", at, blade.Psi)
     if not found.any(axis=1).all():
         raise ConfigError(f"some displacements wanted are not those of blade {j}.")
     return found

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity
 
-from rom.arguments import typed
+from rom.arguments import typed, vector
 from rom.cyclic.faces import interpolation
 from rom.cyclic.rotation import arms, rotation_matrices
 from rom.cyclic.sector import all_rows, region
@@ -86,11 +86,11 @@ class ReducedBlade:
         Raises:
             ConfigError: for a deviation not above -1, or of a mode the blade does not have.
         """
-        delta = np.atleast_1d(np.asarray(cantilever, dtype=float))
+        delta = vector("cantilever", cantilever) if np.size(cantilever) else np.zeros(0)
         all_of_them = np.r_[stiffness, density, delta]
-        if not np.isfinite(all_of_them).all() or all_of_them.min() <= -1.0:
+        if all_of_them.min() <= -1.0:
             raise ConfigError(f"deviations {all_of_them}: each must be a number above -1.")
-        if delta.ndim != 1 or delta.size > self.n_modes:
+        if delta.size > self.n_modes:
             raise ConfigError(
                 f"{delta.size} deviations of cantilever frequencies; the blade has {self.n_modes} "
                 "cantilever modes."

@@ -7,7 +7,8 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from rom.errors import ConfigError, InterfaceError
+from rom.arguments import unit_vector
+from rom.errors import InterfaceError
 from rom.model import Array, Interface
 
 SAME = 1e-6  # of the size of a face: nodes that close are one
@@ -52,10 +53,7 @@ def unit_axis(axis: npt.ArrayLike) -> Array:
     Raises:
         ConfigError: if it has no direction.
     """
-    e = np.asarray(axis, dtype=float)
-    if e.shape != (3,) or not np.isfinite(e).all() or not e.any():
-        raise ConfigError(f"axis = {axis!r} is no direction.")
-    return e / np.linalg.norm(e)
+    return unit_vector("axis", axis)
 
 
 def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:

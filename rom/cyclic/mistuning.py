@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import typed
+from rom.arguments import matrix, rows_at, typed, vector
 from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector
@@ -134,7 +134,7 @@ class MistunedWheel:
         drive = self._drive(force, engine_order)
         rows = self._rows(at)
         lam, V = self.modes(deviations)
-        q = self._modal(lam, V, drive, np.atleast_1d(omega), damping)  # (w, r)
+        q = self._modal(lam, V, drive, vector("omega", omega), damping)  # (w, r)
         return self._seen(q @ V.T, rows)
 
     def amplification(
@@ -161,7 +161,7 @@ class MistunedWheel:
             (s,) amplification factors.
         """
         many = np.atleast_2d(np.asarray(deviations, dtype=float))
-        N, sweep = self.sector.n_sectors, np.atleast_1d(np.asarray(omega, dtype=float))
+        N, sweep = self.sector.n_sectors, vector("omega", omega)
         drive, rows = self._drive(force, engine_order), self._rows(at)
         tuned = self._peaks(np.zeros((1, N)), drive, sweep, damping, rows)[0]
         if not tuned > 0.0:
@@ -185,10 +185,7 @@ class MistunedWheel:
 
     def _rows(self, at: npt.ArrayLike) -> Complex:
         """(p, r) displacements wanted of each wave, on sector 0."""
-        rows = np.asarray(at)
-        if rows.ndim == 2:
-            return np.asarray(rows @ self.shapes)
-        return self.shapes[rows.astype(np.int64)]
+        return rows_at("at", at, self.shapes)
 
     def _modal(self, w: Array, V: Complex, drive: Complex, sweep: Array, zeta: float) -> Complex:
         """(..., w, r) modal amplitudes."""
@@ -238,7 +235,8 @@ def mistuned_wheel(
             f"the sector has no region {blade!r}; it has {sorted(sector.regions)}.",
             hint="Name the volume of the blade in the geometry.",
         )
-    K_blade = sector.regions[blade] if isinstance(blade, str) else blade
+    given = sector.regions[blade] if isinstance(blade, str) else blade
+    K_blade = matrix("blade", given, (sector.n, sector.n))
     N = sector.n_sectors
     harmonics: list[int] = []
     omega, shapes = [], []

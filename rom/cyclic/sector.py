@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
-from rom.arguments import typed
+from rom.arguments import finite, matrix, typed, whole
 from rom.attachment import added_mass
 from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen import rigid_motions
@@ -80,11 +80,10 @@ class CyclicSector:
     sprung: bool = False
 
     def __post_init__(self) -> None:
-        if int(self.n_sectors) != self.n_sectors or self.n_sectors < 2:
-            raise ConfigError(f"n_sectors = {self.n_sectors!r}: a wheel has 2 sectors or more.")
+        whole("n_sectors", self.n_sectors, 2)
         if np.intersect1d(self.slave, self.master).size:
             raise InterfaceError("a dof is on both cyclic faces; sectors would be without width.")
-        if self.coupling.shape != (self.slave.size, self.master.size):
+        if matrix("coupling", self.coupling).shape != (self.slave.size, self.master.size):
             raise ConfigError(
                 f"the coupling of {self.slave.size} slave to {self.master.size} master dofs has "
                 f"the shape {self.coupling.shape}."
@@ -129,7 +128,7 @@ class CyclicSector:
             raise InterfaceError(
                 f"the sector has no interface {named(unknown)}; it has {sorted(model.interfaces)}."
             )
-        e, at = unit_axis(axis), np.asarray(at, dtype=float)
+        e, at = unit_axis(axis), finite("at", at, (3,))
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
         refuse_all_around(model.points, e, at)
         M, dM = all_rows(model, model.M), added_mass(model, 0, model.n_dofs)

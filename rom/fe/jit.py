@@ -4,6 +4,9 @@ import fcntl
 import logging
 import os
 import sys
+import shutil
+import sysconfig
+import tempfile
 import time
 import warnings
 from collections.abc import Iterator
@@ -16,7 +19,7 @@ from mpi4py import MPI
 import dolfinx.jit
 
 from rom.child import lasting_scratch
-from rom.errors import RomWarning
+from rom.errors import ResourceError, RomError, RomWarning
 from rom.fe.parallel import on_root
 
 JIT_OPTIONS = {"cffi_extra_compile_args": ["-O2", "-g0"], "cffi_libraries": None, "timeout": 60}
@@ -41,10 +44,23 @@ def compiling(comm: MPI.Comm) -> Iterator[None]:
     logging.disable(max(previous, logging.INFO))  # the compiler's command lines
     try:
         yield
+    except Exception as error:
+        if isinstance(error, RomError) or shutil.which(compiler()):
+            raise
+        raise ResourceError(
+            f"forms are compiled by a C compiler, and {compiler()} is not here.",
+            hint="On Debian: apt-get install gcc libc6-dev.",
+        ) from error
     finally:
         logging.disable(previous)
         if lock is not None:
             os.close(lock)
+
+
+def compiler() -> str:
+    """The C compiler that Python calls for extensions."""
+    named = os.environ.get("CC") or sysconfig.get_config_var("CC") or "gcc"
+    return str(named).split()[0]
 
 
 def on_root_lock(comm: MPI.Comm) -> int | None:

@@ -57,8 +57,8 @@ def write_fmu(
 
     Raises:
         ConfigError: for an unknown input or output, a file that is missing, a mechanism that
-            cannot be built from these files alone, no C compiler, or a place not writable.
-        ResourceError: if the compiler fails or the disk is full.
+            cannot be built from these files alone, or a place not writable.
+        ResourceError: if there is no C compiler, it fails, or the disk is full.
     """
     path, script = check_writable(path), Path(script)
     if path.suffix != ".fmu":

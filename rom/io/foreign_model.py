@@ -27,10 +27,10 @@ NODE_SPEED = 2.3
 
 @typed
 def read_model(
-    K: Any,
-    M: Any,
+    K: str | Path | tuple[str | Path, str],
+    M: str | Path | tuple[str | Path, str],
     *,
-    nodes: Any,
+    nodes: str | Path | tuple[npt.ArrayLike, npt.ArrayLike],
     interfaces: Mapping[str, npt.ArrayLike] | Sequence[str],
     units: str = "SI",
 ) -> FEModel:

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any
 
 import numpy as np
 
-from rom.arguments import number, positive, typed
+from rom.arguments import positive, shortened, typed
 from rom.errors import ConfigError, ModelError
 from rom.mbs.equilibrium import equilibrium
 from rom.mbs.linearize import Linearization, linearize
@@ -91,11 +92,14 @@ def equilibrium_sensitivity(
         ConfigError: for wrong parameters, or mechanisms of different size.
         ModelError: if the equilibrium spins, or is not unique.
     """
-    values = _checked(parameters)
+    values = _checked(parameters, build=build)
     mechanism, state = _rest(build, values, options)
+    value = np.asarray(output(mechanism, state))
+    if value.dtype.kind not in "iufc":
+        raise ConfigError(f"output gives {shortened(value)}; a number or an array is needed.")
     paths = [_path(build, values, name, state) for name in values]
     slopes = [path.slope(lambda mech, _, at: output(mech, at)) for path in paths]
-    return _collected(values, np.asarray(output(mechanism, state)), slopes)
+    return _collected(values, value, slopes)
 
 
 @typed
@@ -127,7 +131,7 @@ def frequency_sensitivity(
         Murthy and Haftka, Derivatives of eigenvalues and eigenvectors of a general complex matrix,
         Int. J. Numer. Meth. Engng. 26 (1988) 293.
     """
-    values = _checked(parameters)
+    values = _checked(parameters, build=build)
     mechanism, state = _rest(build, values, options)
     now, linear = instant(mechanism, state.t), linearize(mechanism, state)
     here = _matrices(mechanism, now, state)
@@ -157,17 +161,27 @@ def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, floa
     Source:
         Ridders, Accurate computation of F'(x) and F'(x)F''(x), Adv. Eng. Software 4 (1982) 75.
     """
-    values = _checked(parameters)
+    values = _checked(parameters, result=result)
     found = [_ridders(result, values, name) for name in values]
     value = np.asarray(result(**values), dtype=float)
     whole = _collected(values, value, [slope for slope, _ in found])
     return replace(whole, error=np.array([error for _, error in found]))
 
 
-def _checked(parameters: Mapping[str, float]) -> dict[str, float]:
-    if not isinstance(parameters, Mapping) or not parameters:
+def _checked(parameters: Mapping[str, float], **called: Callable[..., Any]) -> dict[str, float]:
+    """The parameters, if there are some and a function takes them by name."""
+    if not parameters:
         raise ConfigError(f"parameters = {parameters!r} is no {{name: value}}.")
-    return {name: number(name, value) for name, value in parameters.items()}
+    for name, function in called.items():
+        try:
+            signature(function).bind(**parameters)
+        except TypeError as error:
+            raise ConfigError(
+                f"{name} does not take the parameters {sorted(parameters)}: {error}."
+            ) from error
+        except ValueError:  # written in C, without a signature
+            continue
+    return dict(parameters)
 
 
 def _collected(values: dict[str, float], value: Array, slopes: list[Array]) -> Sensitivity:

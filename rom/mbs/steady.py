@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.errors import RomWarning, SolverError
@@ -33,7 +34,7 @@ class SteadyMotion:
     """
 
     state: State
-    eigenvalues: Array
+    eigenvalues: npt.NDArray[np.complex128]
     rate: float
 
     @property

@@ -13,6 +13,9 @@ from rom.mbs.arrays import BORE, CYLINDER, PLANE, SPHERE
 from rom.mbs.elements import Contact
 from rom.mbs.impact import Impact, checked_law
 from rom.mbs.parts import Marker, Part, surface_place
+from rom.model import Array
+
+Where = Callable[[Array], Any] | str | None  # as rom.surface_load takes it
 
 
 @typed
@@ -42,7 +45,7 @@ class SurfaceContacts:
         law: Impact,
         *,
         normal: npt.ArrayLike,
-        where: Any = None,
+        where: Where = None,
     ) -> None:
         """Surface of a flexible body against the plane through m1.
 
@@ -61,7 +64,7 @@ class SurfaceContacts:
         self._cover(name, PLANE, m1, part, (law, normal, 0.0, where))
 
     def surface_on_sphere(
-        self, name: str, m1: Marker, part: Part, law: Impact, *, radius: float, where: Any = None
+        self, name: str, m1: Marker, part: Part, law: Impact, *, radius: float, where: Where = None
     ) -> None:
         """Surface of a flexible body against a sphere of ``radius`` [m] about m1."""
         self._cover(name, SPHERE, m1, part, (law, None, positive("radius", radius), where))
@@ -76,7 +79,7 @@ class SurfaceContacts:
         axis: npt.ArrayLike,
         radius: float,
         inside: bool = False,
-        where: Any = None,
+        where: Where = None,
     ) -> None:
         """Surface of a flexible body against an endless cylinder about m1, or inside its bore."""
         kind = BORE if inside else CYLINDER

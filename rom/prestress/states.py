@@ -30,6 +30,7 @@ MORE = 2  # times as many modes, among which those of the neighbour are looked f
 COARSE = 1e-3  # relative frequency error that is worth a warning
 
 
+@typed
 @dataclass(frozen=True)
 class SpeedTable(ABC):
     """Speeds between which something is interpolated.

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed, whole
+from rom.arguments import finite, typed, whole
 from rom.eigen import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -37,16 +37,13 @@ class Snapshots:
     n: int | None = None
 
     def __post_init__(self) -> None:
-        X = np.asarray(self.values, dtype=float)
+        X = finite("values", self.values, None)
         object.__setattr__(self, "values", X)
         if X.ndim != 2 or X.shape[0] % 3 or not X.size:
             raise ConfigError(
                 f"snapshots of shape {X.shape} are not displacements of nodes, (3 k, s).",
                 hint="One column per snapshot, x y z node by node.",
             )
-        if not np.isfinite(X).all():
-            column = int(np.argmin(np.isfinite(X).all(axis=0)))
-            raise ConfigError(f"snapshot {column} holds a number that is not finite.")
         if not X.any():
             raise ConfigError(f"all {X.shape[1]} snapshots are zero: they show no motion.")
         if (self.energy is None) == (self.n is None):

@@ -45,8 +45,8 @@ def write_archive(path: Path, content: Content) -> Path:
     """Compile and pack, whole or not at all.
 
     Raises:
-        ConfigError: if there is no C compiler, or the place is not writable.
-        ResourceError: if the compiler fails.
+        ConfigError: if the place is not writable.
+        ResourceError: if there is no C compiler, or it fails.
     """
     check_text(content.name, "a model")
     identifier = re.sub(r"\W", "_", content.name, flags=re.ASCII)
@@ -83,7 +83,10 @@ def _platform() -> str:
 def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
-        raise ConfigError("an FMU needs a C compiler.", hint="Install gcc.")
+        raise ResourceError(
+            "an FMU needs a C compiler, and neither gcc nor cc is here.",
+            hint="On Debian: apt-get install gcc libc6-dev.",
+        )
     with scratch("compile") as folder:
         for name, data in sources.items():
             (folder / name).write_bytes(data)

@@ -50,11 +50,10 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
         fixed: interfaces that are held; they take loads too, which do not move them.
 
     Raises:
-        ConfigError: if the body has no interface or other units, there is no C compiler, or the
-            place is not writable.
+        ConfigError: if the body has no interface or other units, or the place is not writable.
         InterfaceError: if a fixed interface is unknown.
         ModelError: if an interface of a basis of free-free modes alone is held.
-        ResourceError: if the compiler fails or the disk is full.
+        ResourceError: if there is no C compiler, it fails, or the disk is full.
     """
     path = check_writable(path)
     if not body.markers or body.units != "SI":
