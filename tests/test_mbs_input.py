@@ -61,7 +61,7 @@ WRONG = {
     "joint with itself": (lambda m, box, bar: m.spherical(
         "j", box.marker("a"), box.marker("b")), ConfigError, "with itself"),
     "joint without marker": (lambda m, box, bar: m.spherical("j", box, bar), ConfigError,
-                             "needs markers"),
+                             "must be of type Marker"),
     "axes not perpendicular": (lambda m, box, bar: m.universal(
         "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 1, 1)), ConfigError,
         "not perpendicular"),
@@ -70,7 +70,7 @@ WRONG = {
     "drive of nothing": (lambda m, *_: m.drive("d", "hunge", lambda t: t), ConfigError,
                          "no joint 'hunge'"),
     "drive by a number": (lambda m, *_: m.drive("d", "hinge", 3.0), ConfigError,
-                          "not a function of time"),
+                          "function = 3.0 must be a function"),
     "stiffness of text": (lambda m, box, bar: m.spring_damper(
         "s", box.marker("a"), bar.marker("a"), stiffness="hard"), ConfigError, "stiffness"),
     "coil on a slide": (lambda m, box, bar: (
@@ -81,7 +81,7 @@ WRONG = {
     "force in no frame": (lambda m, box, bar: m.force(
         "f", box.marker("a"), (1, 2, 3), frame="local"), ConfigError, "'local'"),
     "law of a number": (lambda m, box, bar: m.user_force("u", 1.0, box.marker("a")), ConfigError,
-                        "not a function"),
+                        "function = 1.0 must be a function"),
 }  # fmt: skip
 
 
@@ -133,11 +133,11 @@ def test_a_state_of_another_mechanism_is_refused():
 
 
 def test_what_is_no_body_and_no_mechanism_is_refused():
-    with pytest.raises(ConfigError, match="body 'x' is None; a FlexibleBody is needed"):
+    with pytest.raises(ConfigError, match="'x': body = None must be of type FlexibleBody"):
         Mechanism().add_flexible("x", None)
-    with pytest.raises(ConfigError, match="'x' is no Mechanism"):
+    with pytest.raises(ConfigError, match="mechanism = 'x' must be of type Mechanism"):
         simulate("x", **GOOD)
-    with pytest.raises(ConfigError, match="no method"):
+    with pytest.raises(ConfigError, match=r"method = .* must be a text"):
         simulate(slider_crank(), **GOOD, method=["dop853"])
 
 

@@ -33,15 +33,15 @@ def parts():
     ("wrong", "words"),
     [
         ({"mass": NAN}, "mass = nan"),
-        ({"mass": [1, 2]}, "mass has shape (2,)"),
-        ({"inertia": (1, 1, INF)}, "inertia = [1.0, 1.0, inf]"),
+        ({"mass": [1, 2]}, "mass = [1, 2] must be a finite number"),
+        ({"inertia": (1, 1, INF)}, "inertia = (1, 1, inf) must be finite"),
         ({"inertia": (1, 2)}, "inertia has shape (2,)"),
-        ({"at": (0, NAN, 0)}, "at = [0.0, nan, 0.0]"),
+        ({"at": (0, NAN, 0)}, "at = (0, nan, 0) must be finite"),
         ({"at": (0, 0)}, "at has shape (2,)"),
-        ({"velocity": (INF, 0, 0)}, "velocity = [inf"),
-        ({"omega": (0, 0, NAN)}, "omega = [0.0, 0.0, nan]"),
-        ({"orientation": (NAN, 0, 0, 1)}, "orientation = [nan"),
-        ({"markers": {"tip": (0, 0, NAN)}}, "marker tip = [0.0, 0.0, nan]"),
+        ({"velocity": (INF, 0, 0)}, "velocity = (inf"),
+        ({"omega": (0, 0, NAN)}, "omega = (0, 0, nan)"),
+        ({"orientation": (NAN, 0, 0, 1)}, "orientation = (nan"),
+        ({"markers": {"tip": (0, 0, NAN)}}, "markers['tip'] = (0, 0, nan)"),
         ({"markers": {"tip": (0, 0)}}, "marker tip has shape (2,)"),
     ],
 )
@@ -54,10 +54,10 @@ def test_numbers_of_a_rigid_body_are_named(wrong, words):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"q": (NAN, 0, 0, 0)}, "q = [nan"),
+        ({"q": (NAN, 0, 0, 0)}, "q = (nan"),
         ({"qd": (0, 0, 0)}, "qd has shape (3,), needed is (4,)"),
         ({"omega": (0, 0)}, "omega has shape (2,)"),
-        ({"at": (0, 0, INF)}, "at = [0.0, 0.0, inf]"),
+        ({"at": (0, 0, INF)}, "at = (0, 0, inf)"),
     ],
 )
 def test_numbers_of_a_flexible_body_are_named(wrong, words):
@@ -67,7 +67,8 @@ def test_numbers_of_a_flexible_body_are_named(wrong, words):
 
 
 WRONG = {
-    "axis not finite": (lambda m, a, b: m.revolute("j", a, b, axis=(0, 0, NAN)), "axis of j"),
+    "axis not finite": (lambda m, a, b: m.revolute("j", a, b, axis=(0, 0, NAN)),
+                        "'j': axis = (0, 0, nan)"),
     "axis of two": (lambda m, a, b: m.prismatic("j", a, b, axis=(0, 1)), "axis of j"),
     "cross without arm": (lambda m, a, b: m.universal("j", a, b, axis1=Z, axis2=(0, 0, 0)),
                           "axis of j has length zero"),
@@ -81,16 +82,17 @@ WRONG = {
     "length of nan": (lambda m, a, b: m.spring_damper("s", a, b, stiffness=1, free_length=NAN),
                       "free_length = nan"),
     "spring with one end": (lambda m, a, b: m.spring_damper("s", a, None, stiffness=1),
-                            "'s' needs markers, got None"),
+                            "'s': m2 = None must be of type Marker"),
     "coil of nan": (lambda m, a, b: m.rotational_spring("c", "hinge", stiffness=NAN),
                     "stiffness = nan"),
     "coil on a ball": (lambda m, a, b: m.rotational_spring("c", "ball", stiffness=1.0),
                        "'ball' is spherical"),
     "rate by a number": (lambda m, a, b: m.drive("d", "hinge", np.sin, rate=1.0),
-                         "rate of drive 'd' is 1.0"),
+                         "'d': rate = 1.0 must be a function"),
     "force of nan": (lambda m, a, b: m.force("f", a, (0, 0, NAN)), "vector of f"),
     "torque of text": (lambda m, a, b: m.torque("f", a, "up"), "vector of f = 'up'"),
-    "law on nothing": (lambda m, a, b: m.user_force("u", lambda t, x: 0, None), "'u' needs"),
+    "law on nothing": (lambda m, a, b: m.user_force("u", lambda t, x: 0, None),
+                       "'u': m1 = None must be"),
 }  # fmt: skip
 
 

@@ -116,6 +116,8 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
         return _in_words(inner[1], taken_by(inner[0], known))
     if origin in (typing.Union, types.UnionType):
         return _one_of([taken_by(kind, known) for kind in _alternatives(inner)])
+    if origin is typing.Literal:
+        return _word_of(inner)
     if origin is np.ndarray:
         return _array(*typing.get_args(inner[1]))
     if origin is tuple and inner[-1] is not ...:
@@ -153,12 +155,12 @@ def _one_of(several: list[Taken | None]) -> Taken | None:
     takes = [take for take in several if take is not None and take is not NOTHING]
     if None in several:
         return None
-    words = [take.words for take in takes] + ["None"] * (NOTHING in several)
+    words = _either([take.words for take in takes] + ["None"] * (NOTHING in several))
 
     def take(value: Any) -> Any:
         if value is None and NOTHING in several:
             return None
-        deepest = Unfit(value, " or ".join([", ".join(words[:-1]), words[-1]]))
+        deepest = Unfit(value, words)
         for one in takes:
             try:
                 return one(value)
@@ -166,7 +168,15 @@ def _one_of(several: list[Taken | None]) -> Taken | None:
                 deepest = unfit if len(unfit.place) > len(deepest.place) else deepest
         raise deepest
 
-    return Taken(" or ".join(words), take)
+    return Taken(words, take)
+
+
+def _either(words: list[str]) -> str:
+    return " or ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+
+
+def _word_of(known: tuple[Any, ...]) -> Taken:
+    return Taken(_either(list(map(repr, known))), lambda value: known[known.index(value)])
 
 
 def _instance(kind: type) -> Taken:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh, null_space
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.body.recovery import StressRecovery
 from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
@@ -248,6 +248,8 @@ class FlexibleBody:
         self.check_support(fixed)
         M, K = self.full_matrices()
         N = self._supported(fixed)
+        if n is not None:
+            whole("n", n, 0, 6 + self.n_modes, reason="rigid and elastic coordinates")
         if not N.size:  # everything is held
             return Modes(np.zeros(0), N)
         lam, V = eigh(N.T @ K @ N, N.T @ M @ N)

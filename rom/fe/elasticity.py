@@ -1,7 +1,7 @@
 """Stiffness and mass of a three-dimensional elastic body on a dolfinx mesh."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from rom.fe.region import Regions, aij, forms
 from rom.fe.solid import SolidMesh
 from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
-from rom.model import Array, Attachment, FEModel, Index
+from rom.model import Array, Attachment, FEModel, Index, Material, Orthotropic
 
 WHOLE = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
@@ -36,7 +36,7 @@ DEGREES = (1, 2, 3)
 def model(
     path: str | Path,
     *,
-    material: Any,
+    material: Material | Orthotropic | Mapping[str, Material | Orthotropic],
     degree: int = 2,
     parameters: dict[str, float] | None = None,
     attachments: Sequence[Attachment] = (),
@@ -107,7 +107,7 @@ def assemble(
     cell_tags: Any = None,
     facet_tags: dict[str, Any] | None = None,
     *,
-    material: Any,
+    material: Material | Orthotropic | Mapping[str, Material | Orthotropic],
     degree: int = 2,
     regions: dict[str, int] | None = None,
     attachments: Sequence[Attachment] = (),

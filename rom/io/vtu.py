@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from rom.arguments import AnySolution, typed
+from rom.arguments import AnySolution, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import von_mises
 from rom.errors import ConfigError
@@ -80,6 +80,7 @@ def write_stress_history(
     Raises:
         ConfigError: if the stress of the body cannot be recovered, or the place is not writable.
     """
+    whole("every", every, 1)
     path = Path(path)
     if path.suffix != ".pvd":
         raise ConfigError(f"{path} does not end in .pvd.")

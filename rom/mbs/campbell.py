@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rom.arguments import typed, unit_vector
+from rom.arguments import typed, unit_vector, whole
 from rom.errors import ConfigError
 from rom.mbs.equilibrium import equilibrium
 from rom.mbs.linearize import Linearization, linearize
@@ -92,6 +92,8 @@ def campbell(
     if speeds.ndim != 1 or speeds.size < 2 or not np.all(np.diff(speeds) > 0):
         raise ConfigError(f"speeds = {speeds.tolist()} must be at least two growing numbers.")
     axis = unit_vector("axis", axis)
+    if n is not None:
+        whole("n", n, 1)
     found = [_at(mechanism, speed, axis, about, frame) for speed in speeds]
     orders: list[Any] = [np.arange(found[0].eigenvalues.size)]
     likeness = []

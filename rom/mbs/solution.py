@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import typed, vector
 from rom.errors import ConfigError
 from rom.mbs.arrays import WORK
 from rom.mbs.dense import Point, between
@@ -126,7 +126,7 @@ class Solution:
         Raises:
             ConfigError: for a time outside of it.
         """
-        t = np.atleast_1d(np.asarray(t, dtype=float))
+        t = vector("t", t)
         outside = ~((t >= self.t[0]) & (t <= self.t[-1]))
         if outside.any():
             raise ConfigError(

@@ -45,7 +45,7 @@ class Rubin:
             ConfigError: without an interface, or for more modes than there are dofs.
             InterfaceError: if the interfaces depend on each other or on the modes kept.
         """
-        _check_boundary(boundary)
+        _check_boundary(boundary, ops.n)
         R, omega, Phi = free_modes(ops, self.n_modes)
         G = residual_flexibility(ops, boundary, R, omega, Phi)
         Psi_b = _attached(ops, boundary, G)
@@ -81,7 +81,7 @@ class Herting:
             ConfigError: without an interface, or for more modes than there are dofs.
             InterfaceError: if the interfaces leave a rigid motion free.
         """
-        _check_boundary(boundary)
+        _check_boundary(boundary, ops.n)
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         R, omega, Phi = free_modes(ops, self.n_modes)
@@ -212,9 +212,11 @@ def numbered(what: str, n: int) -> list[str]:
     return [f"{what} {k + 1}" for k in range(n)]
 
 
-def _check_boundary(boundary: Index) -> None:
+def _check_boundary(boundary: Index, n: int) -> None:
     if boundary.size == 0:
         raise ConfigError(
             "the method needs interfaces, and none is given.",
             hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
         )
+    if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
+        raise ConfigError(f"boundary holds no row of numbers from 0 to {n - 1}.")
