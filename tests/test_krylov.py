@@ -118,7 +118,7 @@ def test_a_resonance_is_refused(connection):
         (((-1.0,), 1), "different numbers from 0 Hz"),
         (((5.0, 5.0), 1), "different numbers from 0 Hz"),
         (((np.nan,), 1), "different numbers from 0 Hz"),
-        (((0.0,), 1.5), "is not a number of modes"),
+        (((0.0,), 1.5), "order = 1.5 must be a whole number"),
     ],
 )
 def test_messages_for_wrong_numbers(arguments, words):

@@ -303,7 +303,7 @@ def test_states_that_do_not_fit_are_named():
         rom.linearize(mech, good, frame={"bib": "world"})
     with pytest.raises(ConfigError, match="it is 'body' or 'world'"):
         rom.linearize(mech, good, frame="hub")
-    with pytest.raises(ConfigError, match="is no Mechanism"):
+    with pytest.raises(ConfigError, match="must be of type Mechanism"):
         rom.linearize(good)
     with pytest.raises(ConfigError, match="is not a marker"):
         rom.linearize(mech, good).motion(mech.parts["bob"].marker((1, 2, 3)))

@@ -187,7 +187,7 @@ def test_wrong_speeds_and_mechanisms_are_named():
     for what, speeds, message in (
         (rotor, [1.0], "at least two growing"),
         (rotor, [2.0, 1.0], "at least two growing"),
-        ("rotor", [1.0, 2.0], "neither a Mechanism nor a function"),
+        ("rotor", [1.0, 2.0], "must be of type Mechanism .* or a function"),
     ):
         with pytest.raises(ConfigError, match=message):
             rom.campbell(what, speeds)

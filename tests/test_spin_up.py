@@ -250,9 +250,9 @@ def test_a_shaft_beyond_its_critical_speed_is_refused():
 
 def test_wrong_arguments_are_named(bent, blade, run_up):
     for wrong, match in (
-        ({"speed": 0.0}, "highest speed is a positive number"),
-        ({"speed": np.nan}, "highest speed is a positive number"),
-        ({"speed": 1.0, "n_states": 1}, "n_states = 1: two states or more"),
+        ({"speed": 0.0}, "speed = 0 must be positive"),
+        ({"speed": np.nan}, "speed = nan must be a finite number"),
+        ({"speed": 1.0, "n_states": 1}, "n_states = 1 must be a whole number of 2 or more"),
     ):
         with pytest.raises(ConfigError, match=match):
             rom.spin_up(blade, bent, **wrong)

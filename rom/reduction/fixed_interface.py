@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import rows_at, typed
+from rom.arguments import typed
 from rom.eigen import Held, Operators
 from rom.model import Array, Basis
 from rom.scipy_operators import SciPyOperators
@@ -44,10 +44,7 @@ def craig_bampton(K: Any, M: Any, boundary: npt.ArrayLike, n_modes: int) -> Basi
 
 def fixed_interface(ops: Operators, boundary: npt.ArrayLike, n_modes: int) -> Basis:
     """`craig_bampton` on operators; K_ii is factored once for both kinds of columns."""
-    b = np.ravel(boundary)
-    if b.size:
-        b = rows_at("boundary", b, np.arange(ops.n))
-    b = b.astype(np.int64)
+    b = np.asarray(boundary, dtype=np.int64).ravel()
     held = ops.hold(b)
     Psi_b = constraint_modes(ops, held, b)
     omega, Phi = ops.modes(held, n_modes)
