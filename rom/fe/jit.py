@@ -3,10 +3,9 @@
 import fcntl
 import logging
 import os
-import sys
 import shutil
+import sys
 import sysconfig
-import tempfile
 import time
 import warnings
 from collections.abc import Iterator

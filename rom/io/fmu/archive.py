@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from rom.child import Limits, run, scratch
-from rom.errors import ConfigError, ResourceError
+from rom.errors import ResourceError
 from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK, check_text
 
