@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from rom.mbs.equilibrium import equilibrium
     from rom.mbs.integrate import simulate
     from rom.mbs.inverse import inverse_dynamics
+    from rom.mbs.keeping import Keeping
     from rom.mbs.linearize import linearize
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.release import release
@@ -148,6 +149,7 @@ __all__ = [
     "Interface",
     "InterfaceError",
     "InterruptedRun",
+    "Keeping",
     "Layered",
     "Material",
     "MaterialError",
@@ -272,6 +274,7 @@ MODULES = {  # imported when a name is first used: asking for help must not load
     "Interface": "model",
     "InterfaceError": "errors",
     "InterruptedRun": "errors",
+    "Keeping": "mbs.keeping",
     "Layered": "model",
     "Material": "model",
     "MaterialError": "errors",

@@ -31,6 +31,11 @@ def save_state(state: State, path: str | Path) -> Path:
     """
     if not isinstance(state, State):
         raise ConfigError(f"{state!r} is no State; save sol.final.")
+    return write_archive(path, *packed_state(state), "the state")
+
+
+def packed_state(state: State) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Manifest and arrays of a state."""
     arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED}
     given = {name: getattr(state, name) for name in OPTIONAL}
     arrays |= {name: A for name, A in given.items() if A is not None}
@@ -42,7 +47,7 @@ def save_state(state: State, path: str | Path) -> Path:
         arrays |= {MEMORY + name: A for name, A in m.arrays.items()}
         steps = {"h": float(m.h).hex(), "origin": float(m.origin).hex(), "taken": m.taken}
         manifest["memory"] = {"method": m.method, **steps}
-    return write_archive(path, manifest, dict(sorted(arrays.items())), "the state")
+    return manifest, dict(sorted(arrays.items()))
 
 
 @typed
@@ -57,7 +62,15 @@ def load_state(path: str | Path, *, limit: int = LIMIT) -> State:
         FileFormatError: if the file is missing, cut, changed, or no state file.
         UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
     """
-    manifest, arrays = read_archive(path, KIND, limit)
+    return unpacked_state(*read_archive(path, KIND, limit), path)
+
+
+def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str | Path) -> State:
+    """The state of a manifest and its arrays.
+
+    Raises:
+        FileFormatError: if something is missing.
+    """
     try:
         fields: dict[str, Any] = {name: arrays[name] for name in NEEDED}
         fields |= {name: arrays.get(name) for name in OPTIONAL}

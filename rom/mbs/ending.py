@@ -33,7 +33,7 @@ def kept_before_the_end(
         saved: (k,) steps to be kept.
 
     Raises:
-        RomError: if an event function fails; what came before is kept.
+        RomError, KeyboardInterrupt: of an event function; what came before is kept.
     """
     first = _row(record)
     k, failure = _look(record, first, t, out)
@@ -69,8 +69,9 @@ def projected(record: Record, W: Work, ends: tuple[Point, Point], t: float) -> t
 
 def _look(
     record: Record, first: tuple, t: Array, out: tuple[Array, ...]
-) -> tuple[int, RomError | None]:
+) -> tuple[int, BaseException | None]:
     """Number of steps before the one that an event ends, or that an event function refuses."""
+    # not the memory of the steps: its factorisation must stay
     left, base, W = Point(*first[:4]), first[6], record.watch.instant.W
     for k in range(t.size):
         right = Point(t[k], *(x[k] for x in out[:3]))
@@ -85,7 +86,7 @@ def _look(
         try:
             if record.watch.step(left.t, right.t, motion, exact):
                 return k, None
-        except RomError as failure:
+        except (RomError, KeyboardInterrupt) as failure:
             return k, failure
         left, base = right, out[5][k]
     return t.size, None

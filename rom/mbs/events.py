@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
-from rom.errors import ConfigError, SolverError
+from rom.errors import ConfigError
 from rom.mbs.arrays import workspace
+from rom.mbs.foreign import ask, numbers
 from rom.mbs.mechanism import Event, Mechanism
 from rom.mbs.motion import evaluate
 from rom.mbs.packing import Packed
@@ -112,6 +113,17 @@ class Occurrences:
     v: Array
 
 
+class Noted(NamedTuple):
+    """What a watch knows at one time: last signs, and how often each event happened.
+
+    ``found`` holds what happened if the watch that noted it is gone.
+    """
+
+    signs: dict[str, float]
+    counts: dict[str, int]
+    found: dict[str, list[tuple[float, Array, Array]]]
+
+
 @dataclass
 class Watch:
     """The events of one run: the last signs of their functions, and what was found.
@@ -138,25 +150,14 @@ class Watch:
         """The function of an event.
 
         Raises:
-            ConfigError: if it returns no number.
-            SolverError: if the number is not finite.
+            RomError: as `rom.mbs.foreign.ask` and `rom.mbs.foreign.numbers`.
         """
-        answer = self.events[name].function(t, self.instant.set(t, q, v))
-        try:
-            value = float(answer)
-        except (TypeError, ValueError) as error:
-            raise ConfigError(
-                f"the function of event {name!r} returned {answer!r}; needed is a number."
-            ) from error
-        if not np.isfinite(value):
-            raise SolverError(
-                f"the function of event {name!r} gives {value} at t = {t:.9g} s.",
-                hint="The motion up to there is kept in error.solution.",
-            )
-        return value
+        what = f"the function of event {name!r}"
+        answer = ask(what, t, self.events[name].function, t, self.instant.set(t, q, v))
+        return float(numbers(what, t, answer, (), "a number"))
 
     def step(self, t0: float, t1: float, motion: Motion, exact: Motion | None = None) -> bool:
-        """Look for zeros in one step; True when one of them ends the run.
+        """Look for zeros in one step, wholly or not at all; True when one of them ends the run.
 
         Args:
             t0: beginning of the step [s].
@@ -164,7 +165,24 @@ class Watch:
             motion: coordinates and velocities at a time in between.
             exact: the same, corrected to satisfy the constraints; None if motion does.
         """
-        exact = exact or motion
+        before = self.noted()
+        try:
+            return self._look(t0, t1, motion, exact or motion)
+        except BaseException:
+            self.recall(before)
+            raise
+
+    def noted(self) -> Noted:
+        """What it knows now."""
+        counts = {name: len(items) for name, items in self.found.items()}
+        return Noted(dict(self.signs), counts, self.found)
+
+    def recall(self, noted: Noted) -> None:
+        """Go back to what it knew."""
+        self.signs, self.stop = dict(noted.signs), None
+        self.found = {name: items[: noted.counts[name]] for name, items in noted.found.items()}
+
+    def _look(self, t0: float, t1: float, motion: Motion, exact: Motion) -> bool:
         crossed = []
         for name, event in self.events.items():
             before, after = self.signs[name], np.sign(self.value(name, t1, *motion(t1)))

@@ -3,6 +3,7 @@
 Constraints enter on acceleration level; their drift stays at the tolerance of the integrator.
 """
 
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -11,9 +12,9 @@ from scipy.integrate import DOP853
 from rom.errors import SolverError
 from rom.mbs.arrays import Work
 from rom.mbs.motion import evaluate, rates
-from rom.mbs.record import Record
-from rom.mbs.signals import first_failure, sample_all
-from rom.mbs.state import State
+from rom.mbs.record import OF, Record, standing_at
+from rom.mbs.signals import sampled
+from rom.mbs.state import Memory, State
 from rom.mbs.user import apply_laws, laws
 from rom.model import Array
 
@@ -37,11 +38,8 @@ class Equations:
         packed, settings = self.record.packed, self.record.settings
         if packed.signals:
             times = np.array([t])
-            table = sample_all(packed.signals, times, settings.span, settings.spacing)
-            good, failure = first_failure(
-                packed.signals, times, table, settings.span, settings.spacing
-            )
-            if not good:
+            table, failure = sampled(packed.signals, times, settings.span, settings.spacing, settings.spacing)
+            if failure is not None:
                 raise failure
             self.W.signal[:] = table[0]
         if self.forces:
@@ -60,31 +58,76 @@ def run_explicit(record: Record, W: Work, state: State) -> None:
     """Fill the record by DOP853 of SciPy."""
     settings = record.settings
     W.base[:] = state.base
-    equations = Equations(record, W, state)
+    equations, goes_on = Equations(record, W, state), settings.begun > 0
     y = np.concatenate([state.q, state.v, np.zeros(3)])
-    equations(state.t, y, accepted=True)
-    record.start(_state_of(equations, state.t, y))
-    if record.watch:
-        record.watch.begin(state.q, state.v)
+    if not goes_on:
+        equations(state.t, y, accepted=True)
+        state = _state_of(equations, state.t, y)
+    work = state.memory.arrays["y"][-3:] if goes_on else np.zeros(3)
+    record.start(state, work)
     record.clock, record.compiled = perf_counter(), 0.0
-    solver = DOP853(equations, state.t, y, settings.t_end, rtol=settings.rtol, atol=settings.atol)
-    due, steps = 1, 0
+    solver, due, steps = _solver(equations, state if goes_on else replace(state, memory=None))
     while solver.status == "running" and not record.stopped:
-        message = solver.step()
-        if solver.status == "failed":
-            raise SolverError(
-                f"dop853 failed at t = {solver.t:.9g} s: {message}",
-                hint="The motion is too stiff for it: use generalized-alpha.",
-            )
-        steps += 1
-        stop = _first_event(record, equations, solver)
-        due = _output(record, equations, solver, due)
-        if stop is not None:
-            _save(record, equations, stop, solver.dense_output()(stop))
-        elif solver.t > record.t:
-            equations(solver.t, solver.y, accepted=True)
-        record.counts = {"steps": steps, "evaluations": solver.nfev}
-        record.show()
+        before = record.final if steps else record.given
+        with standing_at(record, before):
+            due = _step(record, equations, solver, due)
+            steps += 1
+            record.counts = {"steps": steps, "evaluations": solver.nfev}
+            if not record.stopped:
+                memory = _memory(record, equations, solver, due)
+                record.reach(_state_of(equations, solver.t, _unit(record, solver.y.copy()), memory))
+        record.pause()
+    record.reach(replace(record.final, memory=None))
+
+
+def _solver(equations: Equations, state: State) -> tuple[DOP853, int, int]:
+    """The solver, the first output due, and the number of steps taken."""
+    record, settings = equations.record, equations.record.settings
+    options = {"rtol": settings.rtol, "atol": settings.atol}
+    if state.memory is None:
+        y = np.concatenate([state.q, state.v, np.zeros(3)])
+        return DOP853(equations, state.t, y, settings.t_end, **options), 1, 0
+    arrays, base = state.memory.arrays, equations.W.base.copy()
+    step = float(arrays["step"][0])
+    left = settings.t_end - state.t
+    options["first_step"] = min(step, left)
+    solver = DOP853(equations, state.t, arrays["y"].copy(), settings.t_end, **options)
+    solver.f, solver.h_abs = arrays["f"].copy(), step
+    solver.nfev, steps, due = (int(x) for x in arrays["counts"])
+    equations.W.base[:] = base
+    record.t = state.t
+    return solver, due, steps
+
+
+def _memory(record: Record, equations: Equations, solver: DOP853, due: int) -> Memory:
+    """All that the next step depends on and the state does not tell."""
+    settings, steps = record.settings, record.counts["steps"]
+    arrays = {
+        "y": solver.y.copy(),
+        "f": solver.f.copy(),
+        "step": np.array([solver.h_abs]),
+        "counts": np.array([solver.nfev, steps, due]),
+    }
+    y = _unit(record, solver.y.copy())
+    arrays[OF] = np.concatenate([[solver.t], y[: equations.n_q + equations.n]])
+    return Memory(settings.kind, settings.h, settings.t_start, steps, arrays)
+
+
+def _step(record: Record, equations: Equations, solver: DOP853, due: int) -> int:
+    """Take one step and save what it has passed; returns the next output due."""
+    message = solver.step()
+    if solver.status == "failed":
+        raise SolverError(
+            f"dop853 failed at t = {solver.t:.9g} s: {message}",
+            hint="The motion is too stiff for it: use generalized-alpha.",
+        )
+    stop = _first_event(record, equations, solver)
+    due = _output(record, equations, solver, due)
+    if stop is not None:
+        _save(record, equations, stop, solver.dense_output()(stop))
+    elif solver.t > record.t:
+        equations(solver.t, solver.y, accepted=True)
+    return due
 
 
 def _first_event(record: Record, equations: Equations, solver: DOP853) -> float | None:
@@ -132,7 +175,7 @@ def _save(record: Record, equations: Equations, t: float, y: Array) -> None:
     record.keep(t, *(x[None].copy() for x in (f.q, f.v, f.a, f.lam, y[-3:], f.base)))
 
 
-def _state_of(equations: Equations, t: float, y: Array) -> State:
+def _state_of(equations: Equations, t: float, y: Array, memory: Memory | None = None) -> State:
     q, v = y[: equations.n_q], y[equations.n_q : equations.n_q + equations.n]
     copies = (x.copy() for x in (q, v, equations.a, equations.lam))
-    return State(t, *copies, equations.rank, None, equations.W.base.copy())
+    return State(t, *copies, equations.rank, None, equations.W.base.copy(), memory)

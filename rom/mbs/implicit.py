@@ -1,18 +1,20 @@
 """Implicit methods with steps of one length: compiled steps in chunks, or around Python forces."""
 
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
-from rom.errors import SolverError
+from rom.errors import RomError, SolverError
 from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import Work
 from rom.mbs.ending import kept_before_the_end
+from rom.mbs.events import Noted
 from rom.mbs.first_steps import first_steps
-from rom.mbs.record import Record
-from rom.mbs.signals import first_failure, sample_all
-from rom.mbs.starting import begin, remember
+from rom.mbs.record import Record, standing_at
+from rom.mbs.signals import padded, sampled
+from rom.mbs.starting import begin, copied, recall, remember
 from rom.mbs.state import State
 from rom.mbs.user import Law, apply_laws, laws
 from rom.model import Array
@@ -24,25 +26,24 @@ LARGEST_CHUNK = 4096
 
 def run_implicit(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha or BDF with steps of one length."""
-    forces = laws(record.mechanism, record.packed)
-    T, state = begin(record, W, state, forces, record.settings.h)
+    forces, settings = laws(record.mechanism, record.packed), record.settings
+    T, state = begin(record, W, state, forces, settings.h)
     none = np.zeros((0, len(record.packed.signals), 3))
     alpha.advance(record.packed.system, W, T, state.rank, none, 1, space(W, T, 1))
-    record.start(state)
-    if record.watch:
-        record.watch.begin(state.q, state.v)
+    record.start(state, T.work)
     record.clock = perf_counter()
-    done, chunk, n = 0, 16, record.settings.steps
+    done, chunk, n = settings.begun, 16, settings.steps
     if T.bdf.size != 3 and not T.count[alpha.FRESH]:
-        done = _first(record, W, T, forces)
+        with standing_at(record, record.given):
+            done = _first(record, W, T, forces)
     while done < n and not record.stopped:
         clock = perf_counter()
         taken = _chunk(record, W, T, forces, done, min(chunk, n - done))
         done += taken
         spent = max(perf_counter() - clock, 1e-6)
         chunk = int(np.clip(CHUNK / spent * taken, 1, LARGEST_CHUNK))
-        record.show()
-    if n % record.settings.save_every and not record.stopped:
+        record.pause()
+    if n % settings.save_every and not record.stopped:
         record.keep(record.t, *(x[None].copy() for x in (T.q, T.v, T.vd, T.lam, T.work, W.base)))
 
 
@@ -66,25 +67,63 @@ def _chunk(record: Record, W: Work, T: Step, forces: tuple[Law, ...], done: int,
     """Take up to ``count`` steps and keep what is to be saved; returns how many were taken."""
     packed, settings = record.packed, record.settings
     t = settings.time(np.arange(done + 1, done + count + 1))
-    # at least four times, for which functions are called at once: the same bits in any chunk
-    padded = np.append(t, np.repeat(t[-1:], max(0, 4 - count)))
-    table = sample_all(packed.signals, padded, settings.span, settings.spacing)[:count]
-    good, failure = first_failure(packed.signals, t, table, settings.span, settings.h)
+    table, failure = sampled(packed.signals, padded(t), settings.span, settings.spacing, settings.h)
+    good = min(len(table), count)
     every = 1 if record.watch else settings.save_every
     out = space(W, T, (done + good) // every - done // every)
     T.count[alpha.BEGAN] = before = T.count[alpha.STEPS]
+    mark = Mark(copied(T), record.final, record.noted)
     try:
-        answer = _advance(record, W, T, forces, (t, table[:good], out))
-    finally:
-        taken = int(T.count[alpha.STEPS] - before)
-        _note(record, W, T, forces, t[:taken], out)
-    if record.stopped:
-        return taken
-    if answer != alpha.CONVERGED:
-        raise failed_step(record, W, T, answer, t[taken])
-    if good < count:
+        try:
+            answer = _advance(record, W, T, forces, (t, table[:good], out))
+        finally:
+            taken = int(T.count[alpha.STEPS] - before)
+            _note(record, W, T, forces, t[:taken], out)
+        if record.stopped:
+            return taken
+        if answer != alpha.CONVERGED:
+            raise failed_step(record, W, T, answer, t[taken])
+    except BaseException:
+        _retrace(record, W, mark, forces, (t, table[:good], out))
+        raise
+    if failure is not None and good < count:
         raise failure
     return taken
+
+
+class Mark(NamedTuple):
+    """Where a chunk began: step memory, state and events there."""
+
+    T: Step
+    state: State
+    noted: Noted | None
+
+
+def _retrace(
+    record: Record, W: Work, mark: Mark, forces: tuple[Law, ...], chunk: tuple[Array, ...]
+) -> None:
+    """Repeat the good steps of a chunk that failed, to stand behind the last as if it ended there.
+
+    The step that failed has changed the factorisation and more of what the next one starts from.
+    Laws that answer differently the second time leave the run where the chunk began.
+    """
+    times, table, out = chunk
+    k, T, begin = int(np.searchsorted(times, record.t, side="right")), mark.T, mark.state
+    noted = record.watch.noted() if record.watch else None
+    record.reach(record.given if begin.memory is None else begin, mark.noted)
+    if not k:
+        return
+    W.base[:] = begin.base
+    if begin.memory is not None:
+        recall(begin.memory, W, T)
+    try:
+        spare = tuple(np.empty_like(x) for x in out)
+        answer = _advance(record, W, T, forces, (times, table[:k], spare))
+    except (RomError, KeyboardInterrupt):
+        return
+    if answer == alpha.CONVERGED:
+        record.counts = counts(T)
+        record.reach(_state(record, W, T), noted)
 
 
 def _advance(record: Record, W: Work, T: Step, forces: tuple[Law, ...], chunk: tuple) -> int:
@@ -123,10 +162,15 @@ def _note(
         record.keep(t[saved], *(x[: t.size][chosen] for x in out))
     if t.size:
         record.t = float(t[-1])
+    record.reach(_state(record, W, T))
+
+
+def _state(record: Record, W: Work, T: Step) -> State:
+    """The last state with all that the next step depends on."""
     arrays = (x.copy() for x in (T.q, T.v, T.vd, T.lam))
-    memory = remember(record.settings, W, T, done + t.size)
+    memory = remember(record.settings, W, T, int(T.count[alpha.STEPS]))
     before = None if record.settings.method == "bdf" else T.a.copy()
-    record.final = State(record.t, *arrays, record.final.rank, before, W.base.copy(), memory)
+    return State(record.t, *arrays, record.final.rank, before, W.base.copy(), memory)
 
 
 def failed_step(record: Record, W: Work, T: Step, answer: int, t: float) -> SolverError:

@@ -1,19 +1,23 @@
 """Simulate a mechanism in time."""
 
 import sys
+from contextlib import suppress
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import typed
-from rom.errors import ConfigError, InterruptedRun, RomError
+from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, RomWarning
+from rom.interruption import terminable
+from rom.mbs import compiled
 from rom.mbs.alpha import advance
 from rom.mbs.arrays import workspace
-from rom.mbs.compiled import compiled_before
 from rom.mbs.events import watch_of
 from rom.mbs.explicit import run_explicit
 from rom.mbs.implicit import run_implicit
+from rom.mbs.keeping import Keeping, digests_of
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed, pack
 from rom.mbs.record import Record, Settings
@@ -44,6 +48,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     state: State | None = None,
     order: int = 2,
     stabilised: bool = False,
+    keep: Keeping | None = None,
 ) -> Solution:
     """Move the mechanism from the start to ``t_end``.
 
@@ -76,16 +81,24 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             which it else leaves to its truncation error: multipliers of their own close the gaps
             of the positions (index 2, after Gear, Gupta and Leimkuhler). BDF of an order other
             than two always does.
+        keep: folder in which the motion is kept while it is computed, every second or so, and
+            from which a run that was ended by anything goes on to the same bits:
+            ``keep=rom.Keeping("run.parts")``, then ``rom.Keeping("run.parts", resume=True)``. With
+            ``t_end`` before the time reached this reads the motion without moving on.
 
     Returns:
         The motion, start and end included.
 
     Raises:
-        ConfigError: for a wrong argument.
+        ConfigError: for a wrong argument, or a function that takes or gives the wrong thing.
         ModelError: if joints contradict each other.
-        SolverError: naming time and culprit; ``error.solution`` holds the motion up to there, None
-            if it never started.
-        InterruptedRun: after Ctrl-C; ``error.solution`` holds the motion up to there.
+        SolverError: naming time and culprit, a function of the user too, whatever it raised.
+        ResourceError: if what would be kept exceeds the memory, or the memory ran out.
+        InterruptedRun: after Ctrl-C or SIGTERM; the caller decides what then.
+
+        Every error that ends the motion, also one that is not ours, has ``error.solution``: the
+        motion up to there, None if it never started. ``error.solution.final`` is the state to go
+        on from.
 
     Warns:
         RomWarning: if a body left the range of small elastic deformation, or turned faster than
@@ -95,43 +108,104 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         raise ConfigError(f"{mechanism!r} is no Mechanism.")
     if not isinstance(method, str) or method not in METHODS:
         raise ConfigError(f"no method {method!r}; there are {sorted(METHODS)}.")
+    if not isinstance(state, State | None):
+        raise ConfigError(f"state = {state!r} is no State.", hint="Take sol.final, or load_state.")
+    if not isinstance(keep, Keeping | None):
+        raise ConfigError(f"keep = {keep!r} is no Keeping.", hint="Write rom.Keeping(folder).")
     if t_start is None:
         t_start = 0.0 if state is None else state.t
     rtol = RTOL[method] if rtol is None else rtol
     numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
     settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
-    settings = settings.after(None if state is None else state.memory)
-    packed = pack(mechanism)
-    if progress and not compiled_before(advance):
+    settings, packed = settings.after(state), pack(mechanism)
+    settings.check_room(packed)
+    if progress and not compiled.compiled_before(advance):
         sys.stderr.write("compile the integrator, once on this machine: one or two minutes\n")
-    W = workspace(packed.system, len(packed.signals))
-    record = Record(mechanism, packed, settings, perf_counter())
-    status = f"Reached t = {t_end:g} s."
-    try:
-        if state is None:
-            state = initial_state(packed, t_start, settings.spacing)
-        _check_fit(state, packed)
-        if packed.by_blocks and state.rank < state.lam.size:
-            record.packed = packed = packed.whole()
-            W = workspace(packed.system, len(packed.signals))
-        record.watch = watch_of(mechanism, packed, t_start)
-        run = run_variable if dt is None else METHODS[method]
-        run(record, W, state)
-    except RomError as error:
-        error.solution = record.solution(f"Stopped: {error}") if record.blocks else None
-        if record.blocks:
-            warn_of_limits(error.solution)
-        raise
-    except KeyboardInterrupt:
-        interrupted = InterruptedRun(
-            f"interrupted at t = {record.t:.6g} s of {t_end:g} s.",
+    record = Record(mechanism, packed, settings, perf_counter(), given=state, keeping=keep)
+    with terminable():
+        try:
+            return _moved(record, t_start)
+        except BaseException as raised:
+            error = _translated(raised, record)
+            error.solution = _rescued(error, record)
+            if error is raised:
+                raise
+            raise error from raised
+
+
+def _moved(record: Record, t_start: float) -> Solution:
+    """The motion of a record that stands at its start."""
+    if record.keeping is not None:
+        _go_on(record, record.keeping)
+    settings, packed = record.settings, record.packed
+    if record.given is None:
+        record.given = initial_state(packed, t_start, settings.spacing)
+    state = record.given
+    _check_fit(state, packed)
+    if packed.by_blocks and state.rank < state.lam.size:
+        record.packed = packed = packed.whole()
+    record.watch = watch_of(record.mechanism, packed, t_start)
+    run = run_variable if settings.dt is None else METHODS[settings.method]
+    if record.blocks and state.t >= settings.t_end:
+        record.stand_still(state)
+    else:
+        run(record, workspace(packed.system, len(packed.signals)), state)
+    stopped = "" if record.watch is None else record.watch.sentence
+    solution = record.solution(stopped or f"Reached t = {settings.t_end:g} s.")
+    warn_of_limits(solution)
+    return solution
+
+
+def _go_on(record: Record, keeping: Keeping) -> None:
+    """Let the record stand where an interrupted run left what it kept.
+
+    Raises:
+        ConfigError: if that was another run, or another end would change its steps.
+    """
+    settings = record.settings
+    digests = digests_of(record.packed, settings.arguments)
+    keeping.begin(settings.origin, settings.taken, digests)
+    if not keeping.resume:
+        return
+    kept = keeping.read()
+    memory, begun = kept.memory, kept.memory.taken - kept.taken
+    if settings.dt is not None and kept.state.t < settings.t_end and memory.h != settings.h:
+        raise ConfigError(
+            f"t_end = {settings.t_end:g} s would change the steps of the interrupted run from "
+            f"{memory.h:.9g} s to {settings.h:.9g} s: it cannot go on.",
+            hint=f"Take its own t_end, or a multiple of {memory.h:.9g} s.",
+        )
+    record.settings = replace(settings, origin=kept.origin, taken=kept.taken, begun=begun)
+    record.given, record.blocks, record.noted = kept.state, kept.blocks, kept.noted
+
+
+def _translated(raised: BaseException, record: Record) -> Any:
+    """The error by which a run ends."""
+    if isinstance(raised, KeyboardInterrupt):
+        return InterruptedRun(
+            f"interrupted at t = {record.t:.6g} s of {record.settings.t_end:g} s.",
             hint="The motion up to there is kept in error.solution.",
         )
-        interrupted.solution = record.solution(str(interrupted)) if record.blocks else None
-        raise interrupted from None
-    stopped = "" if record.watch is None else record.watch.sentence
-    solution = record.solution(stopped or status)
-    warn_of_limits(solution)
+    if isinstance(raised, MemoryError):
+        return ResourceError(
+            f"the memory ran out at t = {record.t:.6g} s.",
+            hint="Keep fewer instants (save_every). The motion up to there is kept in "
+            "error.solution.",
+        )
+    return raised
+
+
+def _rescued(error: BaseException, record: Record) -> Solution | None:
+    """The motion up to an error, which is written too if it is to be kept."""
+    if not record.blocks or record.final is None:
+        return None
+    with suppress(RomError):  # for one, because the disk is full: the first error counts
+        if record.keeping is not None:
+            record.keeping.write(record.blocks, record.final, record.noted)
+    interrupted = isinstance(error, InterruptedRun)
+    solution = record.solution(f"{'' if interrupted else 'Stopped: '}{error}", failed=True)
+    with suppress(RomError, RomWarning):
+        warn_of_limits(solution)
     return solution
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, RomError, SolverError
+from rom.errors import RomError, SolverError
+from rom.mbs.foreign import KEPT, ask, real
 from rom.mbs.jumps import Examined
 from rom.model import Array
 
@@ -18,6 +19,7 @@ FORWARD = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [35.0, -104.0, 114.0, -56.
 BACKWARD = np.array([[3.0, -16.0, 36.0, -48.0, 25.0], [11.0, -56.0, 114.0, -104.0, 35.0]])
 # weights of f(t - 2 s), ... f(t + 2 s), fourth order
 CENTRAL = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
+NONE = np.zeros((0, 0, 3))
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,12 @@ class Signal:
         if self.width == 3:
             return self._values(self.function, t)
         value = self._values(self.function, t)[:, 0]
-        steps = ((self.rate, 0, spacing), (self.acceleration, 1, spacing**2))
+        steps = (("rate", 0, spacing), ("acceleration", 1, spacing**2))
         given = [
-            self._values(f, t)[:, 0] if f else self._difference(t, span, order, spacing) / scale
-            for f, order, scale in steps
+            self._values(f, t, name)[:, 0]
+            if (f := getattr(self, name))
+            else self._difference(t, span, order, spacing) / scale
+            for name, order, scale in steps
         ]
         return np.column_stack([value, *given])
 
@@ -80,21 +84,16 @@ class Signal:
         # differences to one value first, so that a constant has the derivative zero exactly
         return ((values - values[:, :1]) * weights).sum(axis=1) / 12
 
-    def _values(self, function: Callable[[float], Any], t: Array) -> Array:
+    def _values(self, function: Callable[[float], Any], t: Array, which: str = "function") -> Array:
+        """(n, width) values; one that is not finite is left for `first_failure` to tell."""
         many = _at_once(function, t, self.width)
         if many is not None:
             return many
-        try:
-            values = [np.asarray(function(float(x)), dtype=float).ravel() for x in t]
-        except (TypeError, ValueError) as error:
-            raise ConfigError(f"the function of {self.name!r} failed: {error}") from error
-        for value in values:
-            if value.shape != (self.width,):
-                raise ConfigError(
-                    f"the function of {self.name!r} returns {value.size} numbers, "
-                    f"needed are {self.width}."
-                )
-        return np.array(values).reshape(-1, self.width)
+        what, width = f"the {which} of {self.name!r}", self.width
+        needed = "a number" if width == 1 else f"a vector of {width} numbers"
+        times = map(float, t)
+        values = [real(what, x, ask(what, x, function, x), (width,), needed) for x in times]
+        return np.array(values).reshape(-1, width)
 
 
 def _at_once(function: Callable[[Any], Any], t: Array, width: int) -> Array | None:
@@ -104,7 +103,9 @@ def _at_once(function: Callable[[Any], Any], t: Array, width: int) -> Array | No
     try:
         many = np.asarray(function(t), dtype=float)
         probe = [float(function(float(t[k]))) for k in (0, t.size // 2, -1)]
-    except Exception:  # whatever a function of one number does with an array
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # whatever a function of one number does with an array
         return None
     # to round-off, not to the bit: powers of arrays and of numbers differ in the last one
     if many.shape != t.shape or not np.allclose(many[[0, t.size // 2, -1]], probe, 1e-13, 1e-300):
@@ -133,6 +134,47 @@ def sample_all(signals: tuple[Signal, ...], t: Array, span: Span, spacing: float
     for k, signal in enumerate(signals):
         out[:, k] = signal.sample(t, span, spacing)
     return out
+
+
+def sampled(
+    signals: tuple[Signal, ...], t: Array, span: Span, spacing: float, step: float
+) -> tuple[Array, RomError | None]:
+    """(k, s, 3) all signals at the times before the first one at which one of them fails.
+
+    Args:
+        signals: drives and loads.
+        t: (n,) ascending times.
+        span: first and last time of the run.
+        spacing: of finite differences [s].
+        step: of the run [s], for jumps of drives.
+
+    Returns:
+        Their values, and the error of the failure; None if k is the number of times.
+    """
+    try:
+        table = sample_all(signals, t, span, spacing)
+    except RomError as failure:
+        return _before(signals, t, (span, spacing, step), failure)
+    good, lack = first_failure(signals, t, table, span, step)
+    return table[:good], None if good == t.size else lack
+
+
+def _before(
+    signals: tuple[Signal, ...], t: Array, how: tuple[Span, float, float], failure: RomError
+) -> tuple[Array, RomError]:
+    """What can be sampled before a failure, and the first failure."""
+    for k in range(t.size):
+        try:
+            sample_all(signals, t[k : k + 1], *how[:2])
+        except RomError as first:
+            table, earlier = sampled(signals, padded(t[:k]), *how) if k else (NONE, None)
+            return table[:k].reshape(-1, len(signals), 3), earlier or first
+    return NONE.reshape(0, len(signals), 3), failure  # of a function that changes its mind
+
+
+def padded(t: Array) -> Array:
+    """At least four times, for which functions are called at once: the same bits in any chunk."""
+    return np.append(t, np.repeat(t[-1:], max(0, 4 - t.size)))
 
 
 def first_failure(
@@ -165,5 +207,5 @@ def first_failure(
     return k, SolverError(
         f"the function of {name!r} gives {table[k, int(np.argmax(bad[k]))].tolist()} at "
         f"t = {t[k]:.9g} s.",
-        hint="The motion up to there is kept in error.solution.",
+        hint=KEPT,
     )

@@ -19,6 +19,8 @@ from rom.model import Array
 
 # what belongs to the factorised iteration matrix, by blocks or whole
 FACTOR = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
+# counts of a whole run
+SINCE = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
 
 
 def begin(
@@ -65,7 +67,10 @@ def begin(
     T = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
     if goes_on:
         recall(state.memory, W, T)
-    return T, state
+    if goes_on and settings.begun:
+        W.base[:] = state.base
+        go_on(state.memory, T)
+    return T, state if goes_on else replace(state, memory=None)
 
 
 def _method(settings: Settings, h: float) -> tuple[Array, Array]:
@@ -122,8 +127,10 @@ def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
     arrays["method"], arrays["bdf"] = T.method.copy(), T.bdf.copy()
     arrays["before"], arrays["psi"], arrays["past"] = T.a.copy(), T.psi.copy(), T.past.copy()
     arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
+    arrays["work"], arrays["lost"] = T.work.copy(), T.lost.copy()
+    arrays["counts"] = T.count[list(SINCE)]
     origin = settings.t_start if settings.origin is None else settings.origin
-    return Memory(settings.method, settings.h, origin, settings.taken + steps, arrays)
+    return Memory(settings.kind, settings.h, origin, settings.taken + steps, arrays)
 
 
 def recall(memory: Memory, W: Work, T: Step) -> None:
@@ -133,6 +140,17 @@ def recall(memory: Memory, W: Work, T: Step) -> None:
     for name in (*FACTOR, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
     T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
+
+
+def go_on(memory: Memory, T: Step) -> None:
+    """Count steps and works on from those of a run that was interrupted."""
+    T.work[:], T.lost[:] = memory.arrays["work"], memory.arrays["lost"]
+    T.count[list(SINCE)] = memory.arrays["counts"]
+
+
+def copied(T: Step) -> Step:
+    """A step memory of its own with the same content."""
+    return Step(*(x.copy() for x in T))
 
 
 def fits(memory: Memory | None, method: Array, weights: Array) -> bool:

@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, SolverError
 from rom.mbs.arrays import Work
+from rom.mbs.foreign import ask, numbers
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.model import Array
 
+PAIR = "two vectors of three numbers: force and moment"
 
 @dataclass(frozen=True, slots=True)
 class MarkerMotion:
@@ -42,7 +43,9 @@ class Law:
         """Add force and reaction to the wrenches of the user."""
         a = motion_of(W, self.i)
         others = () if self.j < 0 else (motion_of(W, self.j),)
-        force, moment = _checked(self, t, self.function(t, a, *others))
+        what = f"user force {self.name!r}"
+        answer = ask(what, t, self.function, t, a, *others)
+        force, moment = numbers(what, t, answer, (2, 3), PAIR)
         W.user[self.i, :3] += force
         W.user[self.i, 3:] += moment
         for other in others:
@@ -62,18 +65,9 @@ class MotorLaw:
 
     def apply(self, W: Work, t: float) -> None:
         """Set the force of the motor."""
-        value = self.function(t, float(W.x[self.at]), float(W.xd[self.at]))
-        try:
-            W.motor[self.k] = float(value)
-        except (TypeError, ValueError) as error:
-            raise ConfigError(
-                f"the law of motor {self.name!r} returned {value!r}; needed is a number."
-            ) from error
-        if not np.isfinite(W.motor[self.k]):
-            raise SolverError(
-                f"the law of motor {self.name!r} gives {W.motor[self.k]} at t = {t:.9g} s.",
-                hint="The motion up to the last good step is kept in error.solution.",
-            )
+        what = f"the law of motor {self.name!r}"
+        answer = ask(what, t, self.function, t, float(W.x[self.at]), float(W.xd[self.at]))
+        W.motor[self.k] = numbers(what, t, answer, (), "a number")
 
 
 def laws(mechanism: Mechanism, packed: Packed) -> tuple[Law | MotorLaw, ...]:
@@ -100,25 +94,8 @@ def apply_laws(forces: tuple[Law | MotorLaw, ...], W: Work, t: float) -> None:
     """Call all laws and set the wrenches of the user.
 
     Raises:
-        SolverError: naming time and force if a value is not finite.
+        RomError: naming time and force if it fails, or a value is not finite.
     """
     W.user[:] = 0.0
     for law in forces:
         law.apply(W, t)
-
-
-def _checked(law: Law, t: float, value: Any) -> tuple[Array, Array]:
-    try:
-        force, moment = (np.asarray(x, dtype=float).reshape(3) for x in value)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(
-            f"user force {law.name!r} returned {value!r}; needed are two vectors of three "
-            "numbers: force and moment."
-        ) from error
-    if not (np.isfinite(force).all() and np.isfinite(moment).all()):
-        raise SolverError(
-            f"user force {law.name!r} gives force {force.tolist()} and moment "
-            f"{moment.tolist()} at t = {t:.9g} s.",
-            hint="The motion up to the last good step is kept in error.solution.",
-        )
-    return force, moment

@@ -14,13 +14,22 @@ import numpy as np
 
 from rom.errors import SolverError
 from rom.mbs import alpha
+from rom.mbs.alpha import Step
 from rom.mbs.arrays import Work, workspace
 from rom.mbs.ending import kept_before_the_end
 from rom.mbs.implicit import counts, failed_step, space
-from rom.mbs.record import Record
-from rom.mbs.signals import first_failure, sample_all
-from rom.mbs.starting import accelerated, across, begin, shift_ahead, signals_at
-from rom.mbs.state import State, fitting_velocity
+from rom.mbs.record import FIRST, OF, Record, of, standing_at
+from rom.mbs.signals import sampled
+from rom.mbs.starting import (
+    accelerated,
+    across,
+    begin,
+    recall,
+    remember,
+    shift_ahead,
+    signals_at,
+)
+from rom.mbs.state import Memory, State, fitting_velocity
 from rom.mbs.user import apply_laws, laws
 from rom.model import Array
 
@@ -30,10 +39,13 @@ LONGER, SHORTER, AIM = 2.0, 0.2, 0.8
 MARGIN = 3.0
 # a longer step is worth a new factorisation from here on
 WORTH = 1.3
-# first and smallest step relative to the duration
-FIRST, SMALLEST = 1e-4, 1e-12
+# smallest step relative to the duration
+SMALLEST = 1e-12
 # what a step changes and a rejected one gives back
 CHANGED = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
+# what a run remembers beside its step memory, whose arrays have this in front of their names
+NUMBERS = ("h", "before", "fastest", "shortest", "longest", "rejected", "uneven")
+STEP = "step."
 
 
 def increment(turns: Any, h: float, left: tuple[Array, Array], right: tuple[Array, Array]) -> Array:
@@ -50,10 +62,14 @@ def increment(turns: Any, h: float, left: tuple[Array, Array], right: tuple[Arra
 
 def run_variable(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha or BDF with steps that meet a tolerance."""
-    run = _Run(record, W, replace(state, algorithmic=None, memory=None))
+    goes_on = record.settings.begun > 0
+    run = _Run(record, W, state if goes_on else replace(state, algorithmic=None, memory=None))
     while record.t < record.settings.t_end and not record.stopped:
-        run.step()
-        record.show()
+        before = record.final if run.T.count[alpha.STEPS] else record.given
+        with standing_at(record, before):
+            run.step()
+        record.pause()
+    record.reach(replace(record.final, memory=None))
     if not record.stopped and record.blocks[-1][0][-1] < record.t:
         run.keep()
 
@@ -66,16 +82,40 @@ class _Run:
         self.duration = record.settings.t_end - record.settings.t_start
         self.beside = workspace(record.packed.system, len(record.packed.signals))
         self.state, self.bdf, self.uneven = state, record.settings.method == "bdf", False
-        self.T, start = begin(record, W, state, self.forces, FIRST * self.duration)
+        bare = replace(state, memory=None)
+        self.T, start = begin(record, W, bare, self.forces, FIRST * self.duration)
         self.old = self.T._replace(**{name: getattr(self.T, name).copy() for name in CHANGED})
         self.out, self.base = space(W, self.T, 1), W.base.copy()
         self.h = self.before = FIRST * self.duration
-        self.fastest, self.rejected, self.steps = record.packed.length / self.duration, 0, []
+        self.fastest, self.rejected = record.packed.length / self.duration, 0
+        self.shortest, self.longest = np.inf, 0.0
         self.jerk, self.next = np.zeros_like(state.v), start
-        record.start(start)
-        if record.watch:
-            record.watch.begin(start.q, start.v)
+        if record.settings.begun:
+            self.recall(state)
+        record.start(self.next, self.T.work)
         record.clock = perf_counter()
+
+    def remembered(self) -> Memory:
+        """All that the next step depends on and the state does not tell."""
+        record, memory = self.record, remember(self.record.settings, self.W, self.T, 0)
+        steps = {STEP + name: x.copy() for name, x in self.T._asdict().items()}
+        arrays = memory.arrays | steps
+        arrays["numbers"] = np.array([getattr(self, name) for name in NUMBERS], dtype=float)
+        arrays["jerk"], arrays[OF] = self.jerk.copy(), of(record.final)
+        taken = int(self.T.count[alpha.STEPS])
+        return replace(memory, h=self.h, origin=record.settings.t_start, taken=taken, arrays=arrays)
+
+    def recall(self, state: State) -> None:
+        """Go on where `remembered` was asked."""
+        arrays = state.memory.arrays
+        recall(state.memory, self.W, self.T)
+        for name in Step._fields:
+            getattr(self.T, name)[:] = arrays[STEP + name]
+        for name, x in zip(NUMBERS, arrays["numbers"], strict=True):
+            setattr(self, name, float(x))
+        self.rejected, self.uneven = int(self.rejected), bool(self.uneven)
+        self.W.base[:] = state.base
+        self.jerk, self.next = arrays["jerk"].copy(), state
 
     def step(self) -> None:
         """Take one step that meets the tolerance: shorten it until it does."""
@@ -100,6 +140,7 @@ class _Run:
             self.prepare(factor * self.h)
         elif self.bdf and self.uneven:
             self.prepare(self.h)
+        self.record.reach(replace(self.record.final, memory=self.remembered()))
 
     def attempt(self, t: float) -> int:
         """Take the step to a time; says how it went."""
@@ -108,9 +149,8 @@ class _Run:
             getattr(self.old, name)[:] = getattr(T, name)
         self.base[:] = W.base
         times = np.array([t])
-        table = sample_all(packed.signals, times, settings.span, settings.spacing)
-        good, failure = first_failure(packed.signals, times, table, settings.span, settings.spacing)
-        if not good:
+        table, failure = sampled(packed.signals, times, settings.span, settings.spacing, settings.spacing)
+        if failure is not None:
             raise failure
         T.count[alpha.BEGAN], rank = T.count[alpha.STEPS], self.record.final.rank
         answer = alpha.ASK
@@ -203,9 +243,9 @@ class _Run:
         """Go on from the new instant."""
         record, T, state = self.record, self.T, self.next
         self.jerk, self.before = (state.a - record.final.a) / self.h, self.h
-        self.steps.append(self.h)
+        self.shortest, self.longest = min(self.shortest, self.h), max(self.longest, self.h)
         record.counts = counts(T) | {"rejected": self.rejected}
-        record.counts |= {"shortest": min(self.steps), "longest": max(self.steps)}
+        record.counts |= {"shortest": self.shortest, "longest": self.longest}
         saved = np.array([T.count[alpha.STEPS] % record.settings.save_every == 0])
         row = (state.q, state.v, state.a, state.lam, T.work.copy(), state.base)
         out = tuple(x[None] for x in row)

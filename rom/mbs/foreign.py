@@ -1,0 +1,107 @@
+"""Functions that users hand over: forces, motor laws, drives, loads, events.
+
+Whatever leaves such a function, an exception or a value that is none, becomes one error that names
+the function, the time, and the line of the user's code.
+"""
+
+import math
+import traceback
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, RomError, SolverError
+from rom.model import Array
+
+KEPT = "The motion up to there is kept in error.solution."
+
+
+def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function of the user answers.
+
+    Args:
+        what: its name in the mechanism, e.g. ``user force 'drag'``.
+        t: time it is asked for [s].
+        function: to be called.
+        arguments: of the function.
+
+    Raises:
+        ConfigError: if it does not take these arguments.
+        SolverError: if it raised anything else; also for SystemExit and a lack of memory.
+        KeyboardInterrupt: if it was interrupted, or raised this itself.
+        RomError: its own, with the function in front.
+    """
+    try:
+        return function(*arguments)
+    except KeyboardInterrupt:
+        raise
+    except RomError as error:
+        error.where = error.where or f"{what} at t = {t:.9g} s"
+        raise
+    except BaseException as error:
+        raise _failure(what, t, error) from error
+
+
+def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
+    """The answer as finite numbers.
+
+    Args:
+        what: name of the function.
+        t: time of the answer [s].
+        value: the answer.
+        shape: it must have.
+        needed: what that is in words.
+
+    Raises:
+        ConfigError: if it is made of something else, or has another shape.
+        SolverError: if a number is not finite.
+    """
+    A = real(what, t, value, shape, needed)
+    if not np.isfinite(A).all():
+        raise SolverError(f"{what} gives {A.tolist()} at t = {t:.9g} s.", hint=KEPT)
+    return A
+
+
+def real(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
+    """The same, finite or not."""
+    A = _floats(value)
+    if A is None or A.size != math.prod(shape) or (len(shape) > 1 and A.shape[0] != shape[0]):
+        raise ConfigError(
+            f"{what} returned {_short(value)} at t = {t:.9g} s; needed is {needed}.", hint=KEPT
+        )
+    return A.reshape(shape)
+
+
+def _floats(value: Any) -> Array | None:
+    """A float array of real numbers; None of texts, None and complex numbers."""
+    try:
+        A = np.asarray(value)
+        if A.dtype.kind == "O":  # numbers of other libraries, arrays of unequal lengths
+            A = np.array([float(x) for x in A.ravel()]).reshape(A.shape)
+        return A.astype(float) if A.dtype.kind in "biuf" else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _short(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _failure(what: str, t: float, error: BaseException) -> RomError:
+    trace = error.__traceback__.tb_next if error.__traceback__ else None
+    said = f"{type(error).__name__}: {error}".strip().removesuffix(":").rstrip(".")
+    if trace is None and isinstance(error, TypeError):  # it was not even entered
+        return ConfigError(f"{what} cannot be called at t = {t:.9g} s: {said}.", hint=KEPT)
+    return SolverError(f"{what} failed at t = {t:.9g} s: {said}{_place(trace)}.", hint=KEPT)
+
+
+def _place(trace: TracebackType | None) -> str:
+    """File and line in the user's function, not in what it called in other files."""
+    frames = traceback.extract_tb(trace)
+    if not frames:
+        return ""
+    own = [frame for frame in frames if frame.filename == frames[0].filename]
+    return f" ({own[-1].filename}, line {own[-1].lineno})"
