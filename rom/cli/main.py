@@ -18,6 +18,7 @@ from rom.errors import (
     ResourceError,
     RomError,
 )
+from rom.interruption import terminable
 from rom.memory import free_bytes
 
 
@@ -37,7 +38,12 @@ def main(argv: list[str] | None = None) -> int:
         The exit code.
     """
     argv = sys.argv[1:] if argv is None else argv
-    manner = manner_of(argv)
+    with terminable():
+        return _run(argv, manner_of(argv))
+
+
+def _run(argv: list[str], manner: Manner) -> int:
+    """The exit code; SIGTERM ends in the same way as Ctrl-C."""
     try:
         return run(argv, manner)
     except SystemExit:  # argparse has printed the help

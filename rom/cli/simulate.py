@@ -4,6 +4,8 @@ The motion is written as a table, with pictures and films when they are asked fo
 """
 
 import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -13,13 +15,15 @@ from rom.cli.described import described, mechanism
 from rom.cli.options import add_meshing, positive, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
-from rom.errors import ConfigError
+from rom.errors import ConfigError, RomError
 from rom.names import inside
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
+    from rom.mbs.keeping import Keeping
     from rom.model import Report
 
+PARTS = "motion.parts"  # where the motion is kept while the run lasts
 SUMMARY = "move a mechanism, or let a body swing as a pendulum"
 EXAMPLES = """\
   rom simulate demos/slider_crank.toml -o out/
@@ -27,6 +31,10 @@ EXAMPLES = """\
   rom simulate rod.rom.npz --hinge pin_a --gravity 0,-9.81,0 --t-end 1 --dt 1e-3 -o out/
   rom simulate rod.rom.npz --hinge pin_a --axis=-1,0,0 --t-end 0.2 --dt 1e-4 -o out/
   rom simulate rod.rom.npz --hinge pin_a --t-end 1 --dt 1e-3 --film glb --history h5 -o out/
+  rom simulate demos/slider_crank.toml -o out/ --resume   # after anything that ended it
+While a long run lasts, its motion is kept in motion.parts in the output folder. Add --resume to the
+command of a run that was ended, by Ctrl-C, an error or a kill, to go on to the same bits; with a
+--t-end before the time it had reached, the files of the motion up to there are written.
 Mechanisms of several bodies are described in a file, or built in Python, see demos/.
 """
 
@@ -50,6 +58,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
     add_force(parser)
     add_meshing(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the run that ended early in this folder"
+    )
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -59,16 +70,75 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _mechanism(args: argparse.Namespace) -> Answer:
     from rom import __version__
-    from rom.config.run import paths_of
+    from rom.config.run import Run, made_from, paths_of
     from rom.config.run import run as move
 
     file = mechanism(args)
     for path in paths_of(file, claim(args)):
         checked(args, path, inputs=files_in(file.values))
-    aloud = ranks()[0] == 0 and not args.quiet
-    done = move(file, command=_command(args), version=__version__, progress=aloud)
-    paths = done.paths(args.output)
-    return _answer(done.solution, done.audit, paths, lambda: done.write(args.output))
+    keep = _keeping(args, made_from(file))
+    told = {"command": _command(args), "version": __version__}
+
+    def rescue(solution: Any, audit: "Report") -> Path:
+        motion, *_, record = Run(file, solution, audit, **told).paths(args.output)
+        Run(file, solution, audit, **told).write_motion([motion, record])
+        return motion
+
+    with _rescuing(args, keep, rescue):
+        done = move(file, **told, progress=_aloud(args), keep=keep)
+
+    def write() -> None:
+        done.write(args.output)
+        _finish(keep)
+
+    return _answer(done.solution, done.audit, done.paths(args.output), write)
+
+
+def _aloud(args: argparse.Namespace) -> bool:
+    return ranks()[0] == 0 and not args.quiet
+
+
+def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | None":
+    """The folder of the motion under way; one rank writes it."""
+    from rom.mbs.keeping import Keeping
+
+    keep = Keeping(args.output / PARTS, args.resume, made_from)
+    if args.resume and not keep.state.exists() and (args.output / "run.json").exists():
+        raise ConfigError(
+            f"there is nothing to resume: the run in {args.output} came to its end.",
+            hint="Leave out --resume to run it anew.",
+        )
+    keep.check()
+    return keep if ranks()[0] == 0 else None
+
+
+def _finish(keep: "Keeping | None") -> None:
+    if keep is not None:
+        keep.remove()
+
+
+@contextmanager
+def _rescuing(
+    args: argparse.Namespace, keep: "Keeping | None", write: Callable[[Any, "Report"], Path]
+) -> Iterator[None]:
+    """Write the motion up to whatever ends it inside, and say how to go on."""
+    try:
+        yield
+    except BaseException as error:
+        solution = getattr(error, "solution", None)
+        if solution is None or keep is None:
+            raise
+        from rom.mbs.audit import audit
+        from rom.mbs.foreign import KEPT
+
+        path = write(solution, audit(solution))
+        if isinstance(error, RomError):
+            hints = [error.hint.replace(KEPT, "").strip(), f"The motion up to there is in {path}."]
+            if keep.state.exists():
+                resume = "" if args.resume else " --resume"
+                hints.append(f"To go on: {_command(args)}{resume}.")
+            error.hint = " ".join(hint for hint in hints if hint)
+        raise
 
 
 def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
@@ -85,7 +155,7 @@ def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> An
 
 def _pendulum(args: argparse.Namespace) -> Answer:
     from rom import __version__
-    from rom.config.run import RECORD, Record
+    from rom.config.run import RECORD, Record, file_digest
     from rom.io.native import load
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
@@ -99,12 +169,27 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     body = load(args.file)
     body.marker(args.hinge)
     path = inside(folder, body.name, ".csv")
-    paths = [checked(args, each) for each in (path, *_more(path, args), folder / RECORD)]
-    solution, audit = _swing(body, args)
+    films = [path.with_suffix(f".{args.film}")] if args.film else []
+    tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
+    paths = [checked(args, each) for each in (path, *films, *tables, folder / RECORD)]
+    hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
+    made_from = {f"--{name}": repr(value) for name, value in hung.items()}
+    keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
+    record = Record(body.name, _command(args), __version__)
+
+    def rescue(solution: Any, audit: "Report") -> Path:
+        _write_motion(path, tables, body, solution)
+        record.write([path, *tables, args.output / RECORD], solution, audit)
+        return path
+
+    with _rescuing(args, keep, rescue):
+        solution, audit = _swing(body, args, keep)
 
     def write() -> None:
-        _write_all(path, body, solution, args)
-        Record(body.name, _command(args), __version__).write(paths, solution, audit)
+        _write_motion(path, tables, body, solution)
+        record.write(paths, solution, audit)
+        _write_films(films, solution)
+        _finish(keep)
 
     return _answer(solution, audit, paths, write)
 
@@ -113,37 +198,35 @@ def _command(args: argparse.Namespace) -> str:
     return f"rom {' '.join(map(quote, args.argv))}"
 
 
-def _swing(body: "FlexibleBody", args: argparse.Namespace) -> tuple[Any, Any]:
+def _swing(
+    body: "FlexibleBody", args: argparse.Namespace, keep: "Keeping | None"
+) -> tuple[Any, Any]:
     from rom.mbs.audit import audit
     from rom.mbs.integrate import simulate
     from rom.mbs.mechanism import Mechanism
 
-    aloud = ranks()[0] == 0 and not args.quiet
     mechanism = Mechanism(gravity=args.gravity)
     part = mechanism.add_flexible(body.name, body, at=(0.0, 0.0, 0.0))
     hinge = mechanism.ground.marker(tuple(body.marker(args.hinge).point))
     mechanism.revolute("hinge", hinge, part.marker(args.hinge), axis=args.axis)
-    solution = simulate(mechanism, t_end=args.t_end, dt=args.dt, progress=aloud)
+    steps = {"t_end": args.t_end, "dt": args.dt}
+    solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
     return solution, audit(solution)
 
 
-def _more(path: Path, args: argparse.Namespace) -> list[Path]:
-    """The film and the history asked for."""
-    found = [path.with_suffix(f".{args.film}")] if args.film else []
-    return found + ([path.with_suffix(f".history.{args.history}")] if args.history else [])
+def _write_motion(path: Path, tables: list[Path], body: "FlexibleBody", solution: Any) -> None:
+    from rom.io.history import write_history
 
-
-def _write_all(path: Path, body: "FlexibleBody", solution: Any, args: argparse.Namespace) -> None:
     _write(path, body, solution)
-    for also in _more(path, args):
-        if also.suffix in (".glb", ".vtkhdf"):
-            from rom.view.motion import write_animation
+    for table in tables:
+        write_history(solution, table)
 
-            write_animation(solution, also)
-        else:
-            from rom.io.history import write_history
 
-            write_history(solution, also)
+def _write_films(films: list[Path], solution: Any) -> None:
+    from rom.view.motion import write_animation
+
+    for film in films:
+        write_animation(solution, film)
 
 
 def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:

@@ -15,6 +15,7 @@ from rom.config.mechanism_keys import IMPACT, SECTIONS, TABLE
 from rom.errors import ConfigError, RomWarning
 
 if TYPE_CHECKING:
+    from rom.mbs.keeping import Keeping
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.solution import Solution
 
@@ -77,12 +78,19 @@ class MechanismFile:
             self._warn_if_apart(made, name)
         return made
 
-    def simulate(self, made: "Mechanism | None" = None, *, progress: bool = False) -> "Solution":
+    def simulate(
+        self,
+        made: "Mechanism | None" = None,
+        *,
+        progress: bool = False,
+        keep: "Keeping | None" = None,
+    ) -> "Solution":
         """Move it as ``[simulation]`` says.
 
         Args:
             made: the mechanism, if it has been built already.
             progress: report on stderr.
+            keep: folder that is written while the run lasts.
 
         Raises:
             RomError: as `mechanism` and `rom.simulate`.
@@ -91,7 +99,7 @@ class MechanismFile:
 
         made = self.mechanism() if made is None else made
         with self.at("simulation"):
-            return simulate(made, progress=progress, **self.values["simulation"])
+            return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
 
     def at(self, *path: str) -> Located:
         """Context that tells the line of a key in errors raised below it."""

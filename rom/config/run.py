@@ -1,5 +1,6 @@
 """A run of a mechanism file: the motion, and the folder it is kept in."""
 
+import hashlib
 import json
 import platform
 import sys
@@ -11,6 +12,7 @@ from rom.config.keys import Place, nearest
 from rom.config.mechanism import MechanismFile
 
 if TYPE_CHECKING:
+    from rom.mbs.keeping import Keeping
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.solution import Solution
     from rom.model import Report
@@ -91,13 +93,20 @@ class Run:
         return paths_of(self.file, folder)
 
     def write(self, folder: Path) -> None:
-        """Write them; the folder is made if it is missing."""
+        """Write them; the folder is made if it is missing.
+
+        Pictures come last, so that the motion is there whatever becomes of them.
+        """
+        paths = self.paths(folder)
+        self.write_motion(paths)
+        self._draw(paths)
+
+    def write_motion(self, paths: list[Path]) -> None:
+        """Write the table of the motion, then the record, the last of the paths."""
         from rom.io.history import write_history
 
-        folder.mkdir(exist_ok=True)
-        paths = self.paths(folder)
+        paths[0].parent.mkdir(exist_ok=True)
         write_history(self.solution, paths[0])
-        self._draw(paths)
         record = Record(
             self.file.name, self.command, self.version,
             self.file.document.path.read_text(encoding="utf-8"),
@@ -167,7 +176,12 @@ def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:
 
 
 def run(
-    file: MechanismFile, *, command: str = "", version: str = "", progress: bool = False
+    file: MechanismFile,
+    *,
+    command: str = "",
+    version: str = "",
+    progress: bool = False,
+    keep: "Keeping | None" = None,
 ) -> Run:
     """Move the mechanism of a file.
 
@@ -176,6 +190,7 @@ def run(
         command: what was typed, for the record.
         version: of rom, for the record.
         progress: report on stderr.
+        keep: folder that is written while the run lasts, see `made_from`.
 
     Raises:
         RomError: as `MechanismFile.simulate`; for an unknown column to plot before the run.
@@ -185,8 +200,32 @@ def run(
     made = file.mechanism()
     if file.values["output"]["plot"]:
         _check_plot(file, made)
-    solution = file.simulate(made, progress=progress)
+    solution = file.simulate(made, progress=progress, keep=keep)
     return Run(file, solution, audit(solution), command, version)
+
+
+def made_from(file: MechanismFile) -> dict[str, str]:
+    """What the motion of a file depends on, by name: its entries, and the files of its bodies.
+
+    Not its end, which may be another one when an interrupted run goes on.
+    """
+    found = {}
+    for section, entries in file.document.data.items():
+        if section in ("name", "output", "simulation"):
+            continue
+        named = entries.items() if isinstance(entries, dict) else [("", entries)]
+        found |= {f"{section} {name!r}" if name else section: repr(x) for name, x in named}
+    for name, values in file.values["bodies"].items():
+        if "file" in values:
+            found[f"file of body {name!r}"] = file_digest(values["file"])
+    return found
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of the content of a file."""
+    from rom.io.files import check_readable
+
+    return hashlib.sha256(check_readable(path).read_bytes()).hexdigest()
 
 
 def _check_plot(file: MechanismFile, made: "Mechanism") -> None:

@@ -38,7 +38,8 @@ class Equations:
         packed, settings = self.record.packed, self.record.settings
         if packed.signals:
             times = np.array([t])
-            table, failure = sampled(packed.signals, times, settings.span, settings.spacing, settings.spacing)
+            h = settings.spacing
+            table, failure = sampled(packed.signals, times, settings.span, h, h)
             if failure is not None:
                 raise failure
             self.W.signal[:] = table[0]

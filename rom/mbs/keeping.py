@@ -75,6 +75,24 @@ class Keeping:
         """The file to go on from."""
         return self.folder / NAME
 
+    def check(self) -> None:
+        """Refuse to write over a motion, or to go on with none; to be asked early.
+
+        Raises:
+            ConfigError: saying which.
+        """
+        if self.state.exists() and not self.resume:
+            raise ConfigError(
+                f"{self.folder} holds the motion of a run that did not come to its end.",
+                hint="Go on with it by --resume (resume=True), or remove the folder.",
+            )
+        if self.resume and not self.state.exists():
+            raise ConfigError(
+                f"there is nothing to resume: {self.folder} holds no motion.",
+                hint="A run that came to its end leaves none, nor does one that ended within its "
+                "first steps. Leave out --resume.",
+            )
+
     def begin(self, origin: float | None, taken: int, digests: Mapping[str, str]) -> None:
         """Tell what the run is; to be called before `read` and `write`.
 
@@ -84,13 +102,9 @@ class Keeping:
             digests: of arguments and mechanism by name.
 
         Raises:
-            ConfigError: if the folder holds a motion and is not to go on.
+            ConfigError: as `check`.
         """
-        if self.state.exists() and not self.resume:
-            raise ConfigError(
-                f"{self.folder} holds the motion of a run that did not come to its end.",
-                hint="Go on with it by --resume (resume=True), or remove the folder.",
-            )
+        self.check()
         counted = [None if origin is None else float(origin).hex(), taken]
         self._manifest = {"counted": counted, "digests": {**self.made_from, **digests}}
         self._first = perf_counter()
@@ -100,15 +114,9 @@ class Keeping:
         """What is there.
 
         Raises:
-            ConfigError: if there is nothing, or it is of another run.
+            ConfigError: if it is of another run.
             FileFormatError: if a file is damaged.
         """
-        if not self.state.exists():
-            raise ConfigError(
-                f"there is nothing to resume: {self.folder} holds no motion.",
-                hint="A run that came to its end leaves none, nor does one that ended within its "
-                "first steps. Leave out --resume.",
-            )
         manifest, arrays = read_archive(self.state, STATE)
         try:
             digests, (origin, taken) = manifest["digests"], manifest["counted"]
@@ -188,7 +196,8 @@ class Keeping:
     def remove(self) -> None:
         """Remove what was kept, once the motion is written elsewhere."""
         self.state.unlink(missing_ok=True)
-        for path in self.folder.glob("part-*.npz"):
+        # and what a kill in the middle of writing has left of them
+        for path in (*self.folder.glob("part-*.npz"), *self.folder.glob(".*.npz.*.part")):
             path.unlink()
         if self.folder.is_dir() and not any(self.folder.iterdir()):
             self.folder.rmdir()

@@ -137,7 +137,7 @@ def sample_all(signals: tuple[Signal, ...], t: Array, span: Span, spacing: float
 
 
 def sampled(
-    signals: tuple[Signal, ...], t: Array, span: Span, spacing: float, step: float
+    signals: tuple[Signal, ...], t: Array, span: Span, spacing: float, step: float | None = None
 ) -> tuple[Array, RomError | None]:
     """(k, s, 3) all signals at the times before the first one at which one of them fails.
 
@@ -146,7 +146,7 @@ def sampled(
         t: (n,) ascending times.
         span: first and last time of the run.
         spacing: of finite differences [s].
-        step: of the run [s], for jumps of drives.
+        step: of the run [s], to look through drives for jumps; None where that has been done.
 
     Returns:
         Their values, and the error of the failure; None if k is the number of times.
@@ -155,12 +155,13 @@ def sampled(
         table = sample_all(signals, t, span, spacing)
     except RomError as failure:
         return _before(signals, t, (span, spacing, step), failure)
-    good, lack = first_failure(signals, t, table, span, step)
+    looked = () if step is None else (span, step)
+    good, lack = first_failure(signals, t, table, *looked)
     return table[:good], None if good == t.size else lack
 
 
 def _before(
-    signals: tuple[Signal, ...], t: Array, how: tuple[Span, float, float], failure: RomError
+    signals: tuple[Signal, ...], t: Array, how: tuple[Span, float, float | None], failure: RomError
 ) -> tuple[Array, RomError]:
     """What can be sampled before a failure, and the first failure."""
     for k in range(t.size):

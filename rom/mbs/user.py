@@ -13,6 +13,7 @@ from rom.model import Array
 
 PAIR = "two vectors of three numbers: force and moment"
 
+
 @dataclass(frozen=True, slots=True)
 class MarkerMotion:
     """How a marker moves.

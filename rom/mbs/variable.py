@@ -149,7 +149,8 @@ class _Run:
             getattr(self.old, name)[:] = getattr(T, name)
         self.base[:] = W.base
         times = np.array([t])
-        table, failure = sampled(packed.signals, times, settings.span, settings.spacing, settings.spacing)
+        h = settings.spacing
+        table, failure = sampled(packed.signals, times, settings.span, h, h)
         if failure is not None:
             raise failure
         T.count[alpha.BEGAN], rank = T.count[alpha.STEPS], self.record.final.rank
