@@ -209,7 +209,7 @@ def made_from(file: MechanismFile) -> dict[str, str]:
 
     Not its end, which may be another one when an interrupted run goes on.
     """
-    found = {}
+    found: dict[str, str] = {}
     for section, entries in file.document.data.items():
         if section in ("name", "output", "simulation"):
             continue

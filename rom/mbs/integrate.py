@@ -74,7 +74,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         save_every: keep every so many steps.
         t_start: start time [s]; None for 0, or for the time of ``state``.
         state: state of an earlier run of the same mechanism to go on from, e.g. ``sol.final``.
-            Generalised-alpha with the same dt then gives the same bits as a run without a stop.
+            The same method then gives the same bits as a run without a stop, unless it needs
+            derivatives of drives that have none; ``keep`` gives them always.
         order: of bdf, 1 to 5, with steps dt. Above two, vibrations of little damping that the
             step resolves poorly can grow. Its first ``order - 1`` steps are Radau's.
         stabilised: let an implicit method keep the constraints of the velocities to round-off,

@@ -75,6 +75,12 @@ class Settings:
 
     def _check_steps(self) -> None:
         """Steps must be told apart by the clock, and come to an end."""
+        if self.dt is not None and not (self.t_end - self.t_start) / self.dt <= MAX_STEPS:
+            raise ConfigError(
+                f"dt = {self.dt:g} s takes {(self.t_end - self.t_start) / self.dt:.3g} steps to "
+                f"t_end = {self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
+                hint="Take longer steps. They need to resolve what moves, not more.",
+            )
         end = max(abs(self.t_start), abs(self.t_end))
         step = FIRST * (self.t_end - self.t_start) if self.dt is None else self.dt
         if end + step == end or not np.isfinite(self.t_end - self.t_start):
@@ -82,12 +88,6 @@ class Settings:
             raise ConfigError(
                 f"{what} = {step:g} s is lost beside t = {end:g} s: numbers have sixteen digits.",
                 hint="Take longer steps, or count the time from the start of the run.",
-            )
-        if self.dt is not None and not (self.t_end - self.t_start) / self.dt <= MAX_STEPS:
-            raise ConfigError(
-                f"dt = {self.dt:g} s takes {(self.t_end - self.t_start) / self.dt:.3g} steps to "
-                f"t_end = {self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
-                hint="Take longer steps. They need to resolve what moves, not more.",
             )
 
     @property
