@@ -132,7 +132,9 @@ def test_a_function_that_breaks_is_named_and_the_repaired_run_has_the_same_bits(
             at = 0.85 * T_END
         error = failed(where, method, fault, at, tmp_path / fault)
         assert at / 5 < error.solution.final.t <= at >= error.solution.t[-1]
-        assert_array_equal(error.solution.q, reference.q[: error.solution.t.size])
+        known = np.isin(error.solution.t, reference.t)  # the last one may lie between
+        assert known[:-1].all()
+        assert_array_equal(error.solution.q[known], reference.q[: known.sum()])
         keep = rom.Keeping(tmp_path / fault, resume=True)
         same(run(where, Broken(), METHODS[method], keep=keep), reference)
         state = rom.load_state(rom.save_state(error.solution.final, tmp_path / "state.npz"))
@@ -179,7 +181,7 @@ def test_a_function_that_takes_other_arguments_is_a_mistake_of_its_writer():
     mech = mechanism("force", Broken())
     mech.user_force("short", lambda t: None, mech.parts["1"].marker("b"))
     with pytest.raises(
-        ConfigError, match="'short' cannot be called at t = 0 s: TypeError: .*<lambda>"
+        ConfigError, match=r"'short' cannot be called at t = 0 s: TypeError: .*<lambda>"
     ):
         rom.simulate(mech, t_end=0.1, dt=1e-3)
 
@@ -220,7 +222,7 @@ def falling():
             ResourceError,
             r"keeping 1e\+11 instants takes .* GiB are free.*save_every",
         ),
-        ({"dt": 1e-3, "t_start": 1e17, "t_end": 2e17}, ConfigError, "is lost beside t = 2e"),
+        ({"dt": 1.0, "t_start": 1e17, "t_end": 1e17 + 64}, ConfigError, "is lost beside t = 1e"),
         ({"dt": 1e-9, "t_start": 1e9 - 1, "t_end": 1e9}, ConfigError, "is lost beside t = 1e"),
     ],
 )
@@ -254,11 +256,8 @@ def test_a_short_run_leaves_no_folder_and_a_long_one_writes_parts(tmp_path, monk
     monkeypatch.setattr(keeping, "PATIENCE", 0.0)
     keep = rom.Keeping(tmp_path / "long")
     whole = run("force", Broken(), METHODS["alpha"], keep=keep)
-    assert sorted(path.name for path in (tmp_path / "long").iterdir()) == [
-        "part-000001.npz",
-        "part-000002.npz",
-        "state.npz",
-    ]
+    names = sorted(path.name for path in (tmp_path / "long").iterdir())
+    assert names[:2] == ["part-000001.npz", "part-000002.npz"] and names[-1] == "state.npz"
     with pytest.raises(ConfigError, match="did not come to its end"):
         run("force", Broken(), METHODS["alpha"], keep=rom.Keeping(tmp_path / "long"))
     resumed = rom.Keeping(tmp_path / "long", resume=True)

@@ -203,6 +203,7 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
     with suppress(RomError):  # for one, because the disk is full: the first error counts
         if record.keeping is not None:
             record.keeping.write(record.blocks, record.final, record.noted)
+    record.keep_last()
     interrupted = isinstance(error, InterruptedRun)
     solution = record.solution(f"{'' if interrupted else 'Stopped: '}{error}", failed=True)
     with suppress(RomError, RomWarning):

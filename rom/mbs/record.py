@@ -25,6 +25,8 @@ from rom.model import Array
 
 # a million steps a second, as the fastest mechanisms take, for eleven days
 MAX_STEPS = 10**12
+# of a time that was written in decimals
+ROUND_OFF = 1e-12
 # first step of chosen length, relative to the duration
 FIRST = 1e-4
 # place of the works in a block, behind the time; the array by which a memory knows its state
@@ -275,6 +277,7 @@ class Record:
     def stand_still(self, state: State) -> None:
         """Let the motion kept before be all of it, up to the end that is asked for."""
         end = self.settings.t_end
+        end += ROUND_OFF * abs(end)
         self.blocks = [until(block, end) for block in self.blocks]
         self.final = state
         if self.watch and self.noted:
@@ -286,6 +289,15 @@ class Record:
         """Note the last state, from which a run could go on, and the events up to there."""
         self.final = state
         self.noted = noted or (self.watch.noted() if self.watch else None)
+
+    def keep_last(self) -> None:
+        """Save the last state of a run that ends early, if it lies behind what was saved."""
+        f = self.final
+        if f.memory is None or not f.t > self.blocks[-1][0][-1]:
+            return
+        arrays = f.memory.arrays
+        work = arrays["y"][-3:] if "y" in arrays else arrays["work"]
+        self.keep(np.array([f.t]), *(x[None].copy() for x in (f.q, f.v, f.a, f.lam, work, f.base)))
 
     @property
     def stopped(self) -> float | None:

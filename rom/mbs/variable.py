@@ -101,7 +101,9 @@ class _Run:
         steps = {STEP + name: x.copy() for name, x in self.T._asdict().items()}
         arrays = memory.arrays | steps
         arrays["numbers"] = np.array([getattr(self, name) for name in NUMBERS], dtype=float)
-        arrays["jerk"], arrays[OF] = self.jerk.copy(), of(record.final)
+        # joint coordinates are followed apart from those of the saved instants
+        arrays["jerk"], arrays["base"] = self.jerk.copy(), self.W.base.copy()
+        arrays[OF] = of(record.final)
         taken = int(self.T.count[alpha.STEPS])
         return replace(memory, h=self.h, origin=record.settings.t_start, taken=taken, arrays=arrays)
 
@@ -114,7 +116,7 @@ class _Run:
         for name, x in zip(NUMBERS, arrays["numbers"], strict=True):
             setattr(self, name, float(x))
         self.rejected, self.uneven = int(self.rejected), bool(self.uneven)
-        self.W.base[:] = state.base
+        self.W.base[:] = arrays["base"]
         self.jerk, self.next = arrays["jerk"].copy(), state
 
     def step(self) -> None:
