@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 import rom
-from rom import memory as limits
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, ResourceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
