@@ -260,7 +260,7 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
     pivots = np.abs(lu.U.diagonal())
     ratio = pivots.min() / pivots.max()
     if ratio < SINGULAR:
-        raise InterfaceError(f"{advice} (pivot ratio {ratio:.1e})", hint=cure)
+        raise InterfaceError(f"{advice[:-1]} (pivot ratio {ratio:.1e}).", hint=cure)
     n_negative = int(np.count_nonzero(lu.U.diagonal() < 0))
     if n_negative and np.array_equal(lu.perm_r, lu.perm_c):
         raise _indefinite("K", n_negative, "with the boundary held, deformation would give energy")

@@ -11,7 +11,7 @@ from rom.errors import ConfigError, FileFormatError
 from rom.io.files import check_readable
 
 LARGEST = 1_000_000  # bytes
-DEEPEST = 40  # brackets inside each other: more is an accident, and costs the stack
+DEEPEST = 40  # brackets or tables inside each other: more is an accident, and costs the stack
 STRING = r'"""(?:\\.|[^\\])*?"""' + r"|'''.*?'''" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'"
 TOKEN = re.compile(STRING + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
 WORD = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'|[A-Za-z0-9_-]+')
@@ -65,6 +65,10 @@ def parsed(text: str, path: Path) -> Document:
     """
     found = list(statements(text))
     _check_depth(text, path)
+    for key, line in found:
+        if len(key) > DEEPEST:
+            where = f"{path}:{line}"
+            raise ConfigError(f"a key is deeper than {DEEPEST} tables.", where=where)
     try:
         data = tomllib.loads(text)
     except ValueError as error:

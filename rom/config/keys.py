@@ -12,6 +12,8 @@ from rom.errors import ConfigError
 from rom.names import check_text
 from rom.units import in_si
 
+MOST_TOLD = 20  # mistakes in one message
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -381,6 +383,7 @@ def raise_mistakes(place: Place) -> None:
     if len(found) == 1:
         raise found[0]
     if found:
+        count, found = len(found), found[:MOST_TOLD]
         file = str(place.document.path)
         by_line = sorted(
             ((int("0" + e.where.removeprefix(file).strip(":")), e) for e in found),
@@ -388,4 +391,5 @@ def raise_mistakes(place: Place) -> None:
         )
         told = [f"line {line}: {e.message}" if line else e.message for line, e in by_line]
         hint = by_line[0][1].hint
-        raise ConfigError(f"{len(found)} mistakes. {' '.join(told)}", where=file, hint=hint)
+        more = f" And {count - len(found)} more." if count > len(found) else ""
+        raise ConfigError(f"{count} mistakes. {' '.join(told)}{more}", where=file, hint=hint)

@@ -29,6 +29,7 @@ from rom.fe.repair import repair
 from rom.fe.solid import SolidMesh
 from rom.fe.validate import validate
 
+LARGEST_FILE = 2**32  # bytes; some ten million nodes
 READERS = {
     ".geo": "geo",
     ".py": "builder",
@@ -180,6 +181,8 @@ def _reader(path: Path) -> str:
         raise FileFormatError(
             "there is no such file.", where=str(path), hint="Relative paths start where you are."
         )
+    if path.stat().st_size > LARGEST_FILE:
+        raise UnsafeFileError(f"has more than {LARGEST_FILE / 2**30:g} GiB.", where=str(path))
     try:
         return READERS[path.suffix.lower()]
     except KeyError:

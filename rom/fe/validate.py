@@ -18,6 +18,7 @@ from rom.model import Mask
 from rom.names import check_text, named
 from rom.plausible import SIZE, far_doubt
 
+SIZE_LIMITS = (1e-60, 1e60)  # m; beyond, volumes times stiffness leave the range of numbers
 COINCIDENT = 1e-9  # of the size: nodes closer than this are at the same place
 
 
@@ -88,6 +89,9 @@ def _check_numbers(mesh: SolidMesh) -> None:
             f"{bad.sum()} nodes have coordinates that are not finite, the first {where.tolist()}; "
             f"they belong to cells {cell_names(mesh, cells)}."
         )
+    size = np.ptp(mesh.points, axis=0).max()
+    if not SIZE_LIMITS[0] < size < SIZE_LIMITS[1]:
+        raise MeshError(f"the body has a size of {size:.3g} m.", hint="Check the scale.")
     for name, rows in mesh.facets.items():
         if rows.min() < 0 or rows.max() >= n:
             raise TagError(f"surface {name!r} names nodes outside 0 to {n - 1}.")

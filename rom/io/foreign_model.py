@@ -23,6 +23,7 @@ MORE_NODES = 5
 # sqrt(K_ii / M_ii) times the distance of the next node over sqrt(E/rho); 1.6 to 3.3 for blocks,
 # beams, rods and phalanges of bricks and tetrahedra of either degree
 NODE_SPEED = 2.3
+MOST_SHOWN = 60  # characters of a wrong value
 
 
 @typed
@@ -151,7 +152,12 @@ def _completed(found: NamedMatrix) -> csr_matrix:
 
 
 def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -> Interface:
-    own = np.unique(np.asarray(wanted, dtype=np.int64))
+    try:
+        own = np.unique(np.asarray(wanted, dtype=np.int64))
+    except (TypeError, ValueError, OverflowError):
+        raise InterfaceError(
+            f"interface {name!r}: {repr(wanted)[:MOST_SHOWN]} are no labels of nodes."
+        ) from None
     node = np.searchsorted(labels, own)
     known = labels[np.minimum(node, labels.size - 1)] == own
     if not own.size or not known.all():

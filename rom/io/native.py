@@ -151,6 +151,7 @@ def body_manifest(body: FlexibleBody) -> dict[str, Any]:
 def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     """The body that a file describes."""
     _refuse_missing(manifest, arrays)
+    _check_words(manifest, arrays["K"].shape[-1])
     markers = {
         m["name"]: Marker(
             name=m["name"],
@@ -195,6 +196,16 @@ def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
     needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
     if missing := [name for name in needed if name not in arrays]:
         raise ConfigError(f"the file lacks the array {named(missing)}.")
+
+
+def _check_words(manifest: dict[str, Any], r: int) -> None:
+    """Types of what the manifest says in words, r labels among them; see `stated`."""
+    wanted = {"name": str, "reference": str, "labels": list, "surface": bool}
+    wrong = [name for name, kind in wanted.items() if not isinstance(manifest[name], kind)]
+    labels = manifest["labels"]
+    if wrong or len(labels) != r or not all(isinstance(label, str) for label in labels):
+        name = (wrong or ["labels"])[0]
+        raise ValueError(f"{name} = {manifest[name]!r}")
 
 
 def verify(body: FlexibleBody, path: Path) -> None:

@@ -36,8 +36,8 @@ def read_nodes(nodes: Any) -> tuple[Index, Array]:
         raise FileFormatError(f"{labels.size} labels and positions {points.shape}.", where=where)
     order = np.argsort(labels)
     labels = labels[order].astype(np.int64)
-    if (np.diff(labels) == 0).any():
-        raise FileFormatError("a label of a node occurs twice.", where=where)
+    if (same := labels[1:] == labels[:-1]).any():
+        raise FileFormatError(f"the node {labels[1:][same][0]} occurs twice.", where=where)
     return labels, points[order].astype(float)
 
 

@@ -19,6 +19,7 @@ from rom.mbs.variation import Instant, instant
 from rom.model import Array
 
 MAX_PASSES = 60
+MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
 SMALLEST = 1 / 64  # of a load step, before the search is given up
 GOAL, ROUND_OFF = 1e-12, 1e-7  # of the last correction; above, where corrections stop to shrink
 
@@ -63,7 +64,7 @@ def equilibrium(
         Newton's method on the tangent space of the constraints, with the absolute values of the
         negative curvatures: Nocedal and Wright, Numerical Optimization, chapter 3.4.
     """
-    whole("steps", steps, 1)
+    whole("steps", steps, 1, MOST_STEPS)
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
     search = _Search(now, _spinning(now, spin), finite("about", about, (3,)))
     found, done, width = search.start(state), 0.0, 1.0 / steps

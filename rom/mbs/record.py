@@ -31,6 +31,7 @@ ROUND_OFF = 1e-12
 FIRST = 1e-4
 # place of the works in a block, behind the time; the array by which a memory knows its state
 WORKS, OF = 4, "of"
+TOLERANCES = (1e-14, 1e-2)  # of the Newton iteration: round-off, and no solution at all
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +69,10 @@ class Settings:
         for name in ("dt", "tolerance", "rtol", "atol"):
             if getattr(self, name) is not None and getattr(self, name) <= 0.0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must be positive.")
+        if not TOLERANCES[0] <= self.tolerance <= TOLERANCES[1]:
+            raise ConfigError(
+                f"tolerance = {self.tolerance:g} is outside {TOLERANCES[0]:g} to {TOLERANCES[1]:g}."
+            )
         if not 0.0 <= self.rho_inf <= 1.0:
             raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
         if int(self.save_every) != self.save_every or self.save_every < 1:

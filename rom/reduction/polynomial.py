@@ -22,6 +22,7 @@ from rom.model import Array, Interface
 DEPENDENT = 1e-9  # share of a function that is new, below which it is dropped
 ON_AXIS = 1e-6  # distance from an axis, of the size, where the angle about it is round-off
 THIN = 1e-9  # extent of a surface, of its largest one, that counts as none
+MOST_VALUES = 10**8  # of all functions at all nodes: 0.8 GB
 
 
 @typed
@@ -48,13 +49,15 @@ class Polynomial:
         """(k, n) functions at the nodes, from low to high degree; some may depend on others.
 
         Raises:
-            ConfigError: if the order is still open.
+            ConfigError: if the order is still open, or far beyond what the nodes can tell apart.
         """
         if self.order is None:
             raise ConfigError(
                 f"the order of the polynomials on {interface.name!r} is open.",
                 hint="Give one: only rom.reduce with CraigBampton(f_max=…, tol=…) can choose it.",
             )
+        p = self.order
+        _refuse_many((p + 1) * (p + 2) * (p + 3) // 6, interface, f"order {p}")
         x = _local(interface)
         values = [legvander(column, self.order) for column in x.T]
         degrees = sorted(
@@ -85,7 +88,13 @@ class FourierLegendre:
         whole("order", self.order, 0, reason="a degree is not negative")
 
     def functions(self, interface: Interface) -> Array:
-        """(k, n) functions at the nodes; the linear ones first, so that rigid motions are exact."""
+        """(k, n) functions at the nodes; the linear ones first, so that rigid motions are exact.
+
+        Raises:
+            ConfigError: if there are far more of them than the nodes can tell apart.
+        """
+        asked = f"{self.harmonics} harmonics and order {self.order}"
+        _refuse_many((2 * self.harmonics + 1) * (self.order + 1), interface, asked)
         theta, zeta = cylinder_coordinates(interface)
         around = [np.ones_like(theta)]
         for n in range(1, self.harmonics + 1):
@@ -184,6 +193,16 @@ def _local(interface: Interface) -> Array:
     reach = np.abs(x).max(axis=0)
     thin = reach <= THIN * reach.max()
     return np.where(thin, 0.0, x / np.where(thin, 1.0, reach))
+
+
+def _refuse_many(n: int, interface: Interface, asked: str) -> None:
+    """More functions than nodes are dropped in the end, but all are evaluated before."""
+    if n * interface.nodes.size > MOST_VALUES:
+        raise ConfigError(
+            f"{asked} on interface {interface.name!r} mean {n:.3g} functions for its "
+            f"{interface.nodes.size} nodes.",
+            hint="Orders above ten add nothing to most surfaces.",
+        )
 
 
 def _norm(S: object, v: Array) -> float:

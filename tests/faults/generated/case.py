@@ -1,0 +1,88 @@
+"""One fault: what is done, what may come of it, and the words that name the culprit."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+SECONDS = 20.0  # a case may take
+
+
+class Works:
+    """The fault does no harm: the call returns, and what the case itself requires holds."""
+
+
+class Warned:
+    """The call returns, with a `RomWarning` that has the words."""
+
+
+class Silent:
+    """The call returns, and warns of nothing."""
+
+
+class Wrong(Exception):
+    """The call returned something it must not."""
+
+
+def require(holds: object, what: str) -> None:
+    """Refuse a result."""
+    if not holds:
+        raise Wrong(what)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault.
+
+    Attributes:
+        name: what is wrong, unique in its class.
+        act: a command line behind ``rom``, or a function of the working folder.
+        accept: error classes, `Works`, `Warned` or `Silent`.
+        words: all must stand in the message; of a tuple one will do.
+        given: functions of the folder that prepare it.
+        fe: whether it needs FEniCSx.
+        leaves: whether files may stay although an error is raised.
+        seconds: it may take.
+    """
+
+    name: str
+    act: str | Callable[[Path], Any]
+    accept: tuple[type, ...]
+    words: tuple[str | tuple[str, ...], ...] = ()
+    given: tuple[Callable[[Path], object], ...] = field(default=(), repr=False)
+    fe: bool = False
+    leaves: bool = False
+    seconds: float = SECONDS
+
+
+def case(name: str, act: Any, accept: Any, *words: Any, given: Any = (), **options: Any) -> Case:
+    """A case; single outcomes and preparations need no tuple."""
+    accept = accept if isinstance(accept, tuple) else (accept,)
+    given = (given,) if callable(given) else tuple(given)
+    return Case(name, act, accept, words, given, **options)
+
+
+def edit(name: str, old: str, new: str) -> Callable[[Path], object]:
+    """Replaces a text in a file, which must be there."""
+
+    def prepare(folder: Path) -> None:
+        content = (folder / name).read_text()
+        assert old in content, f"{name} has no {old!r}"
+        (folder / name).write_text(content.replace(old, new, 1))
+
+    return prepare
+
+
+def write(name: str, content: str | bytes) -> Callable[[Path], object]:
+    """Writes a file."""
+    data = content if isinstance(content, bytes) else content.encode()
+    return lambda folder: (folder / name).write_bytes(data)
+
+
+def by_id(letter: str, cases: Iterable[Case]) -> dict[str, Case]:
+    """The cases of a class by "class:name"."""
+    found = {}
+    for one in cases:
+        assert f"{letter}:{one.name}" not in found, f"{letter}:{one.name} is there twice"
+        found[f"{letter}:{one.name}"] = one
+    return found

@@ -1,0 +1,173 @@
+"""Sizes beyond all bounds are refused at once, before memory or time are spent."""
+
+import io
+import zipfile
+
+import numpy as np
+
+import rom
+from generated.case import Silent, Warned, Works, case, edit, write
+from generated.stock import MATRICES, STEEL, body, model, pendulum
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    InterfaceError,
+    MeshError,
+    ModelError,
+    ResourceError,
+    UnsafeFileError,
+)
+
+HUGE = 10**12
+SIZES = (ConfigError, ResourceError, ModelError)
+LINES = {
+    "modes": (f"reduce {MATRICES} -o a.npz".replace("-m 4", f"-m {HUGE}"), "1000000000000"),
+    "modes of forty digits": (
+        f"reduce {MATRICES} -o a.npz".replace("-m 4", "-m " + 40 * "9"),
+        "999",
+    ),
+    "modes of five thousand digits": (
+        f"reduce {MATRICES} -o a.npz".replace("-m 4", "-m " + 5000 * "9"),
+        "999",
+    ),
+    "nodes in a set": (f"reduce {MATRICES} --set root=1-{HUGE} -o a.npz", f"1-{HUGE}"),
+    "labels beyond integers": (f"reduce {MATRICES} --set root={10**30} -o a.npz", "1000000"),
+    "characteristic modes": (
+        f"reduce {MATRICES} --characteristic {HUGE} -o a.npz".replace("rbe2", "full"),
+        "1000000000000",
+    ),
+    "polynomials": (
+        f"reduce {MATRICES} -o a.npz".replace("rbe2", f"polynomial:{HUGE}"),
+        "polynomial",
+    ),
+    "harmonics": (f"reduce {MATRICES} -o a.npz".replace("rbe2", f"fourier:{HUGE},1"), "fourier"),
+    "steps": ("simulate pendulum.toml --t-end 1e9 --dt 1e-9 -o out", "1e+18"),
+    "an end beyond numbers": ("simulate pendulum.toml --t-end 1e308 -o out", "t_end"),
+}
+CALLS = {
+    "modes": (lambda: rom.modes(model(), HUGE), "1000000000000"),
+    "modes of a method": (lambda: body(method=rom.CraigBampton(HUGE)), "1000000000000"),
+    "modes of free-free": (lambda: body(method=rom.FreeFree(HUGE)), "1000000000000"),
+    "modes of Rubin": (lambda: body(method=rom.Rubin(HUGE)), "1000000000000"),
+    "dofs of a boundary": (
+        lambda: rom.craig_bampton(model().K, model().M, [HUGE], 1),
+        "1000000000000",
+    ),
+    "orders of a polynomial": (
+        lambda: body(interfaces={"root": rom.Polynomial(10**6), "tip": "rbe2"}),
+        "1000000",
+    ),
+    "frames": (
+        lambda: rom.write_animation(
+            rom.simulate(pendulum(), t_end=0.02, dt=0.01), "a.glb", frames=0
+        ),
+        "0",
+    ),
+    "load steps": (lambda: rom.equilibrium(pendulum(), steps=HUGE), "steps"),
+    "mass": (
+        lambda: rom.simulate(pendulum(mass=1e308), t_end=0.1, dt=0.01),
+        ("bob", "mass", "t = "),
+    ),
+    "distances": (
+        lambda: rom.simulate(pendulum(at=(1e200, 0, 0)), t_end=0.1, dt=0.01),
+        ("bob", "hinge"),
+    ),
+    "speeds": (
+        lambda: rom.simulate(pendulum(omega=(0, 0, 1e200)), t_end=0.1, dt=0.01),
+        ("t = ", "omega"),
+    ),
+    "gravity": (lambda: falling(1e300), ("gravity", "t = ")),
+    "whole numbers": (lambda: rom.simulate(pendulum(), t_end=10**400, dt=0.01), "t_end"),
+    "whole numbers of modes": (lambda: rom.modes(model(), 10**400), "modes"),
+}
+HEADER = "%%MatrixMarket matrix coordinate real general\n"
+TEXTS = {
+    "rows": (HEADER + f"{HUGE} {HUGE} 1\n1 1 1.0\n", "K.mtx"),
+    "entries": (HEADER + f"36 36 {HUGE}\n1 1 1.0\n", "K.mtx"),
+    "a dense matrix": (
+        f"%%MatrixMarket matrix array real general\n{10**6} {10**6}\n1.0\n",
+        "K.mtx",
+    ),
+    "a line": (HEADER + "9" * 10**6 + "\n", "K.mtx"),
+}
+
+
+def falling(g):
+    """A stone that falls, faster than numbers go."""
+    mech = rom.Mechanism(gravity=(0, 0, -g))
+    mech.add_rigid("stone", mass=1e10, inertia=(1.0,) * 3, at=(0, 0, 0))
+    return rom.simulate(mech, t_end=0.1, dt=0.01)
+
+
+def claiming(shape):
+    """A body whose stiffness claims a shape and has eight numbers."""
+
+    def prepare(folder):
+        header = io.BytesIO()
+        np.lib.format.write_array_header_1_0(
+            header, {"descr": "<f8", "fortran_order": False, "shape": shape}
+        )
+        with zipfile.ZipFile(folder / "good.npz", "w") as archive:
+            archive.writestr("K.npy", header.getvalue() + np.zeros(8).tobytes())
+
+    return prepare
+
+
+def bomb(folder):
+    """Four gigabytes of zeros in four megabytes."""
+    with zipfile.ZipFile(folder / "good.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive, \
+            archive.open("K.npy", "w", force_zip64=True) as file:  # fmt: skip
+        np.lib.format.write_array_header_1_0(
+            file, {"descr": "<f8", "fortran_order": False, "shape": (2**29 // 4,)}
+        )
+        zeros = bytes(2**24)
+        for _ in range(2**6):
+            file.write(zeros)
+
+
+def members(folder):
+    """A body of a hundred thousand arrays."""
+    with zipfile.ZipFile(folder / "good.npz", "w") as archive:
+        for k in range(20_000):
+            archive.writestr(f"a{k}.npy", b"")
+
+
+def sparse(name):
+    """A file of ten gigabytes that takes no place."""
+
+    def prepare(folder):
+        with (folder / name).open("wb") as file:
+            file.truncate(10**10)
+
+    return prepare
+
+
+REFUSED = (FileFormatError, UnsafeFileError, ConfigError, MeshError, ResourceError)
+CASES = [
+    *(case(f"{name} on a line", line, (*SIZES, InterfaceError, FileFormatError), *words)
+      for name, (line, *words) in LINES.items()),
+    *(case(f"{name} in a call", lambda folder, f=f: f(), (*SIZES, InterfaceError, rom.errors.SolverError), *words)
+      for name, (f, *words) in CALLS.items()),
+    *(case(f"{name} in a matrix file", f"reduce {MATRICES} -o a.npz", REFUSED, *words,
+           given=write("K.mtx", text)) for name, (text, *words) in TEXTS.items()),
+    *(case(f"a stiffness of shape {shape}", "check good.npz", REFUSED, "good.npz", given=claiming(shape))
+      for shape in ((3 * 10**9,), (10**9, 10**9), (2**40, 2**40, 2**40), (-1,), (0,))),
+    case("a body that unpacks to a gigabyte", "check good.npz", REFUSED, "good.npz", given=bomb),
+    case("a body of many arrays", "check good.npz", REFUSED, "good.npz", given=members),
+    *(case(f"ten gigabytes as {name}", line, REFUSED, name, given=sparse(name), fe="mesh" in line)
+      for name, line in {"good.npz": "check good.npz", "good.SID_FEM": "check good.SID_FEM",
+                         "pendulum.toml": "simulate pendulum.toml -o out",
+                         "K.mtx": f"reduce {MATRICES} -o a.npz", "box.msh": "mesh box.msh",
+                         "deck.inp": f"reduce {MATRICES} -o a.npz"}.items()),
+    *(case(f"a scale of {x}", f"modes box.msh {STEEL} --degree 1 --scale {x} -n 7",
+           (Works, Warned, ConfigError, MeshError), ("scale", "0 m", "size", "locks"), fe=True)
+      for x in ("1e-9", "1e6", "1e-300", "1e300")),
+    *(case(f"{name} of {x}", f"modes box.msh --degree 1 -n 7 --E {E} --nu 0.3 --rho {rho}",
+           (Warned, ConfigError, rom.errors.MaterialError, rom.errors.SolverError), ("m/s", "E", "rho"), fe=True)
+      for name, x, E, rho in (("E", "1e300", "1e300", "7850"), ("E", "1e-300", "1e-300", "7850"),
+                              ("rho", "1e300", "210e9", "1e300"), ("rho", "1e-300", "210e9", "1e-300"))),
+    case("a time without a step", "simulate pendulum.toml --t-end 1e-300 --dt 1e-301 -o out",
+         (*SIZES, rom.errors.SolverError, Silent, Warned), ("dt", "t_end", "e-30")),
+    case("a mass without unit prefix", "simulate pendulum.toml -o out", (*SIZES, FileFormatError), "mass",
+         given=edit("pendulum.toml", "mass = 1.0", 'mass = "1e400 kg"')),
+]  # fmt: skip

@@ -1,0 +1,252 @@
+"""Without the libraries one lacks, in circumstances one does not choose, and beside others."""
+
+import os
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+import rom
+from generated.case import Silent, Works, case, require
+from generated.stock import KINDS, STEEL, body, model, pendulum
+from rom.cli.main import main
+from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
+
+MISSING = {  # a library, a command that needs it, and a word of the refusal
+    "dolfinx": f"modes box.msh {STEEL}",
+    "petsc4py": f"modes box.msh {STEEL}",
+    "gmsh": "mesh box.geo",
+    "meshio": "mesh box.inp",
+    "h5py": "simulate pendulum.toml --history h5 -o out",
+    "pyvista": "view good.npz -o a.png",
+    "matplotlib": "view good.npz -o a.png",
+}
+LIGHT = {
+    "check": ["check", "good.npz"],
+    "export": ["export", "good.npz", "a.vtu"],
+    "simulate": ["simulate", "pendulum.toml", "-o", "out", "-q"],
+    "reduce": ["reduce", "part.toml", "-o", "a.npz"],
+}
+CIRCUMSTANCES = {  # of the environment: none of them changes what is computed
+    "no HOME": {"HOME": None},
+    "a HOME that is not there": {"HOME": "/nowhere"},
+    "a German locale": {"LC_ALL": "de_DE.UTF-8", "LANG": "de_DE.UTF-8"},
+    "the locale C": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
+    "a TMPDIR that is not there": {"TMPDIR": "/nowhere"},
+    "no PATH": {"PATH": ""},
+    "warnings as errors": {"PYTHONWARNINGS": "error"},
+    "optimised": {"PYTHONOPTIMIZE": "2"},
+    "an odd hash": {"PYTHONHASHSEED": "7", "TZ": "Asia/Kathmandu"},
+}
+
+
+def started(*words, **environment):
+    """A finished process of rom, with some variables changed or taken away."""
+    env = {k: v for k, v in (os.environ | environment).items() if v is not None}
+    return subprocess.run([sys.executable, "-m", "rom", *words], env=env, capture_output=True,
+                          timeout=60, check=False, stdin=subprocess.DEVNULL)  # fmt: skip
+
+
+def beginning(*words):
+    return subprocess.Popen([sys.executable, "-m", "rom", *words], stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE)  # fmt: skip
+
+
+def without(library, words):
+    """A command where a library is not installed, although it is here."""
+
+    def act(folder):
+        code = (
+            f"import sys; sys.modules[{library!r}] = None; from rom.cli.main import main; "
+            f"sys.exit(main({words.split()!r}))"
+        )
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False
+        )
+        require("Traceback" not in done.stderr, done.stderr[-500:])
+        require(done.returncode == 6, f"exit code {done.returncode}: {done.stderr[-300:]}")
+        raise ResourceError(done.stderr)
+
+    return act
+
+
+def in_circumstances(environment, words):
+    def act(folder):
+        done = started(*words, **environment)
+        require(done.returncode == 0, f"exit code {done.returncode}: {done.stderr[-500:]!r}")
+
+    return act
+
+
+def several(n, words, output):
+    """The same command at the same time: each ends well, or says what is in its way."""
+
+    def act(folder):
+        runs = [beginning(*words) for _ in range(n)]
+        ended = [(*run.communicate(timeout=60), run.returncode) for run in runs]
+        codes = [code for *_, code in ended]
+        require(set(codes) <= {0, 2, 6} and 0 in codes, f"{codes}: {ended[0][1][-300:]!r}")
+        require(not [err for _, err, _ in ended if b"Traceback" in err], "a traceback")
+        output(folder)
+
+    return act
+
+
+def threads(work, n=4):
+    """The same call in several threads."""
+
+    def act(folder):
+        with ThreadPoolExecutor(n) as pool:
+            found = list(pool.map(lambda k: work(folder, k), range(n)))
+        require(all(np.array_equal(found[0], x) for x in found), "threads disagree")
+
+    return act
+
+
+def motion(folder, k):
+    return rom.simulate(pendulum(), t_end=0.05, dt=0.01).q
+
+
+def frequencies(folder, k):
+    return body().frequencies(8)
+
+
+def written(folder, k):
+    rom.save(body(), folder / "same.npz")
+    return rom.load(folder / "same.npz").K
+
+
+def gone(folder):
+    """The working folder is deleted while one works in it."""
+    inner = folder / "inner"
+    inner.mkdir()
+    os.chdir(inner)
+    inner.rmdir()
+    try:
+        code = main(["check", str(folder / "good.npz"), "-q"])
+    finally:
+        os.chdir(folder)
+    require(code == 0, f"exit code {code}")
+
+
+def gone_output(folder):
+    inner = folder / "inner"
+    inner.mkdir()
+    os.chdir(inner)
+    inner.rmdir()
+    try:
+        rom.save(body(), "a.npz")
+    finally:
+        os.chdir(folder)
+
+
+def closed(folder):
+    """The reader of the answer has seen enough."""
+    run = subprocess.run(
+        f"{sys.executable} -m rom check good.npz | head -c 1",
+        shell=True,
+        capture_output=True,
+        check=False,
+    )
+    require(b"Traceback" not in run.stderr and b"BrokenPipe" not in run.stderr, run.stderr[-500:])
+
+
+def link(folder):
+    """A link as output: what it points to is not lost."""
+    (folder / "target.npz").write_text("mine")
+    (folder / "a.npz").symlink_to("target.npz")
+
+
+def ranks(words, code):
+    """On two ranks: one code, within seconds."""
+
+    def act(folder):
+        run = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-m", "rom", *words.split()],
+                             capture_output=True, timeout=30, check=False)  # fmt: skip
+        require(run.returncode == code, f"exit code {run.returncode}: {run.stderr[-500:]!r}")
+
+    return act
+
+
+def same_bits(folder):
+    """Two processes of different hash seeds compute the same bits."""
+    for name, seed in (("a", "1"), ("b", "2")):
+        done = started("simulate", "pendulum.toml", "-o", name, "-q", PYTHONHASHSEED=seed)
+        require(done.returncode == 0, done.stderr[-300:])
+    require(
+        (folder / "a/motion.csv").read_bytes() == (folder / "b/motion.csv").read_bytes(), "bits"
+    )
+
+
+def again(folder):
+    """An error in one call leaves the next one alone."""
+    for _ in range(3):
+        try:
+            rom.reduce(model(), method=rom.CraigBampton(99), interfaces=KINDS)
+        except RomError:
+            pass
+    require(np.isfinite(body().frequencies(8)).all(), "no frequencies")
+
+
+def unloaded(folder):
+    """A body is loaded in a thread while another one is."""
+    errors = []
+
+    def load():
+        try:
+            rom.load(folder / "good.npz")
+        except BaseException as error:
+            errors.append(error)
+
+    pool = [threading.Thread(target=load) for _ in range(8)]
+    for thread in pool:
+        thread.start()
+    for thread in pool:
+        thread.join()
+    require(not errors, errors)
+
+
+def whole(name):
+    return lambda folder: rom.load(folder / name)
+
+
+def tabled(folder):
+    require((folder / "out/motion.csv").read_text().count("\n") == 7, "a torn table")
+
+
+CASES = [
+    *(case(f"without {name}", without(name, words), ResourceError, name, fe=name in ("petsc4py", "gmsh", "meshio"))
+      for name, words in MISSING.items()),
+    *(case(f"{what} with {name}", in_circumstances(environment, LIGHT[what]), Works)
+      for name, environment in CIRCUMSTANCES.items()
+      for what in (("simulate",) if name in ("no HOME", "the locale C") else ("check",))),
+    case("a German locale and a geometry", in_circumstances(CIRCUMSTANCES["a German locale"], ["mesh", "box.geo"]),
+         Works, fe=True),
+    case("four exports at once", several(4, ["export", "good.npz", "same.npz"], whole("same.npz")), Works),
+    case("three motions in one folder at once",
+         several(3, ["simulate", "pendulum.toml", "-o", "out", "-q"], tabled), Works),
+    case("three meshes at once", several(3, ["mesh", "box.geo"], lambda folder: None), Works, fe=True),
+    case("motions in threads", threads(motion), Works),
+    case("reductions in threads", threads(frequencies), Works),
+    case("one file from several threads", threads(written), Works),
+    case("one file read by several threads", unloaded, Works),
+    case("a folder that is gone", gone, Works),
+    case("a folder that is gone as output", gone_output, (ConfigError, ResourceError), ("a.npz", "folder")),
+    case("a reader that has seen enough", closed, Works),
+    case("a link as output", "export good.npz a.npz", (ConfigError, Works), "a.npz", given=link),
+    case("two processes, the same bits", same_bits, Works),
+    case("a call after an error", again, Works),
+    case("two ranks and no mesh", ranks("mesh nope.msh", 3), Works, fe=True),
+    case("two ranks and a wrong number", ranks("modes box.msh --E 1e9 --nu 0.7 --rho 1e3", 4), Works, fe=True),
+    case("two ranks and no verb", ranks("modess", 2), Works, fe=True),
+    case("a read-only folder", "export good.npz locked/a.vtu", (ConfigError, Works), "locked",
+         given=lambda folder: (folder / "locked").mkdir(mode=0o555)),
+    case("a folder instead of a motion", "report out -o a.html", (FileFormatError, ConfigError), "out",
+         given=lambda folder: (folder / "out").mkdir()),
+    case("a motion without its table", "report out -o a.html", (FileFormatError, ConfigError), "out",
+         given=lambda folder: main(["simulate", "pendulum.toml", "-o", "out", "-q"])
+         or (folder / "out/run.json").write_text("{}")),
+    case("a rank that is alone", lambda folder: motion(folder, 0), Silent),
+]  # fmt: skip

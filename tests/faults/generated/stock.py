@@ -1,0 +1,183 @@
+"""The valid files that cases damage, and small models in memory."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cells import blocks_of, solid, write_msh
+from scipy.io import mmwrite
+from solid import block
+
+import rom
+from rom.io.dmig import write_dmig
+from rom.io.op4 import write_op4
+
+PLANTED = "pwned"  # part of the name of every file that planted code makes
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+STEEL = "--E 210e9 --nu 0.3 --rho 7850"
+MATRICES = "K.mtx --mass M.mtx --nodes deck.inp -i root=rbe2 -i tip=rbe2 --no-certificate -m 4"
+GEO = """SetFactory("OpenCASCADE");
+DefineConstant[ lc = {1, Name "lc"} ];
+Box(1) = {0, 0, 0, 1, 1, 1};
+Physical Volume("body", 1) = {1};
+Physical Surface("root", 11) = {1};
+Mesh.MeshSizeMin = lc;
+Mesh.MeshSizeMax = lc;
+"""
+BUILDER = """def build(gmsh, lc=1.0):
+    gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.addPhysicalGroup(3, [1], 1)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", lc)
+"""
+PART = """name = "part"
+[matrices]
+stiffness = "K.mtx"
+mass = "M.mtx"
+nodes = "deck.inp"
+[interfaces]
+root = "rbe2"
+tip = "rbe2"
+[reduction]
+modes = 4
+reference = "root"
+certificate = false
+[damping]
+ratio = 0.01
+"""
+SOLID = """name = "solid"
+[geometry]
+file = "box.msh"
+degree = 1
+[material]
+E = "210 GPa"
+nu = 0.3
+rho = 7850.0
+[interfaces]
+root = "rbe2"
+tip = "rbe2"
+[reduction]
+modes = 4
+certificate = false
+"""
+PENDULUM = """name = "pendulum"
+gravity = [0, -9.81, 0]
+[bodies.bob]
+mass = 1.0
+inertia = [1e-3, 1e-3, 1e-3]
+at = [0.2, 0, 0]
+markers.pin = [-0.2, 0, 0]
+[joints.hinge]
+kind = "revolute"
+between = [{ ground = [0, 0, 0] }, "bob.pin"]
+axis = [0, 0, 1]
+[simulation]
+t_end = 0.05
+dt = 0.01
+"""
+LOCK = """gravity = [0, 0, 0]
+[bodies.a]
+mass = 1.0
+inertia = [1e-3, 1e-3, 1e-3]
+at = [0.1, 0, 0]
+markers.c = [0, 0, 0]
+[bodies.b]
+mass = 1.0
+inertia = [1e-3, 1e-3, 1e-3]
+at = [0, 0.2, 0]
+markers.c = [0, 0, 0]
+[joints.x]
+kind = "prismatic"
+between = [{ ground = [0, 0, 0] }, "a.c"]
+axis = [1, 0, 0]
+[joints.y]
+kind = "prismatic"
+between = [{ ground = [0, 0, 0] }, "b.c"]
+axis = [0, 1, 0]
+[joints.rod]
+kind = "distance"
+between = ["a.c", "b.c"]
+[drives.push]
+joint = "x"
+law = { kind = "run-up", rate = 1.0, duration = 0.05 }
+[simulation]
+t_end = 1.0
+dt = 0.005
+"""
+
+
+def fill(folder: Path) -> None:
+    """Write the stock."""
+    folder.mkdir()
+    texts = {"box.geo": GEO, "build.py": BUILDER, "part.toml": PART, "solid.toml": SOLID,
+             "pendulum.toml": PENDULUM, "lock.toml": LOCK}  # fmt: skip
+    for name, content in texts.items():
+        (folder / name).write_text(content)
+    box = solid()
+    write_msh(folder / "box.msh", box.points, *blocks_of(box))
+    deck(folder / "box.inp", box)
+    rom.save(body(), folder / "good.npz")
+    rom.export(body(), folder / "good.SID_FEM")
+    matrices(folder)
+    rom.save_state(rom.simulate(pendulum(), t_end=0.02, dt=0.01).final, folder / "good.state.npz")
+    rom.save(family(), folder / "family.npz")
+
+
+def model(cells: Any = (2, 1, 1)) -> Any:
+    """A block of bricks with the interfaces root and tip, without FEniCSx."""
+    return block(cells=cells)
+
+
+def body(**options: Any) -> Any:
+    """The block, reduced."""
+    keywords = {"method": rom.CraigBampton(4), "interfaces": KINDS, "certify": False} | options
+    return rom.reduce(model((4, 1, 1)), **keywords)
+
+
+def family() -> Any:
+    """The block with a density that may change."""
+    return rom.reduce_parametric(
+        model(), parameters={"rho": rom.Density(None, 0.5, 2.0)}, tol=0.5, interfaces=KINDS,
+        method=rom.CraigBampton(1), damping=rom.Rayleigh(0.0, 1e-6),
+    )  # fmt: skip
+
+
+def pendulum(**bob: Any) -> Any:
+    """A rigid bob on a hinge."""
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    numbers = {"mass": 1.0, "inertia": (1e-3,) * 3, "at": (0.2, 0, 0)}
+    part = mech.add_rigid("bob", **(numbers | {"markers": {"pin": (-0.2, 0, 0)}} | bob))
+    mech.revolute("hinge", origin(mech), part.marker("pin"), axis=(0, 0, 1))
+    return mech
+
+
+def origin(mech: Any) -> Any:
+    """The origin, on the ground."""
+    return mech.ground.marker((0, 0, 0))
+
+
+def matrices(folder: Path) -> None:
+    """Stiffness and mass of the block in three formats, and its nodes in two."""
+    made = model()
+    labels = np.arange(1, len(made.points) + 1)
+    dofs = np.column_stack([np.repeat(labels, 3), np.tile([1, 2, 3], labels.size)])
+    pair = {"KAA": made.K.toarray(), "MAA": made.M.toarray()}
+    mmwrite(str(folder / "K.mtx"), made.K, symmetry="symmetric")
+    mmwrite(str(folder / "M.mtx"), made.M, symmetry="symmetric")
+    write_op4(pair, folder / "both.op4")
+    write_dmig(pair, dofs, folder / "both.dmig")
+    rows = [f"{n}, " + ", ".join(map(repr, map(float, x))) for n, x in enumerate(made.points, 1)]
+    (folder / "nodes.csv").write_text("\n".join(["# label, x, y, z", *rows]) + "\n")
+    sets = [
+        f"*NSET, NSET={name}\n" + ", ".join(map(str, interface.nodes + 1))
+        for name, interface in made.interfaces.items()
+    ]
+    (folder / "deck.inp").write_text("\n".join(["*NODE", *rows, *sets]) + "\n")
+
+
+def deck(path: Path, box: Any) -> None:
+    """The box as an Abaqus deck with one element set."""
+    nodes = [f"{n}, {x}, {y}, {z}" for n, (x, y, z) in enumerate(box.points, 1)]
+    cells = [f"{n}, " + ", ".join(map(str, row + 1)) for n, row in enumerate(box.cells, 1)]
+    lines = ["*NODE", *nodes, "*ELEMENT, TYPE=C3D4, ELSET=body", *cells]
+    path.write_text("\n".join(lines) + "\n")
