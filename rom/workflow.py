@@ -2,6 +2,8 @@
 
 import logging
 import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, overload
@@ -19,7 +21,7 @@ from rom.certificate import certify_body
 from rom.cyclic.reduced import ReducedSector, reduce_sector
 from rom.cyclic.sector import CyclicSector
 from rom.eigen import Operators, rigid_motions
-from rom.errors import ConfigError
+from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Modes
 from rom.names import check_name
 from rom.reduction.characteristic import Characteristic
@@ -198,7 +200,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         connection = connect(ops, model, method.kinds(connection, interfaces))
         method = method.method
         say("full interfaces follow %d coordinates", connection.boundary.size)
-    basis = method.basis(connection.ops, connection.boundary, connection.labels)
+    with _on_interfaces(interfaces):
+        basis = method.basis(connection.ops, connection.boundary, connection.labels)
     Psi = connection.ops.expand(basis.Psi)
     elastic = elastic_part(ops, Psi)
 
@@ -246,6 +249,16 @@ def _reduced_sector(
             hint=f"Write interfaces={{{CYCLIC!r}: rom.Polynomial(4)}}.",
         )
     return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC))
+
+
+@contextmanager
+def _on_interfaces(names: Iterable[str]) -> Iterator[None]:
+    """Say which interfaces an error of the reduction is about, which knows of dofs alone."""
+    try:
+        yield
+    except InterfaceError as error:
+        error.where = error.where or f"interfaces {', '.join(names)}"
+        raise
 
 
 @typed

@@ -42,11 +42,11 @@ def reported(*words):
 
 
 def without_pictures(monkeypatch):
-    from rom.errors import ConfigError
+    from rom.errors import ResourceError
     from rom.view import offscreen, page
 
     def refuse(package):
-        raise ConfigError(f"pictures need {package}, which is not installed.")
+        raise ResourceError(f"pictures need {package}, which is not installed.")
 
     monkeypatch.setattr(page, "require", refuse)
     monkeypatch.setattr(offscreen, "require", refuse)

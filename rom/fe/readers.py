@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.errors import ConfigError, FileFormatError, RomError
+from rom.errors import FileFormatError, ResourceError, RomError
 from rom.model import Array, Integers
 
 GEOMETRIES = ("geo", "builder", "step")
@@ -27,9 +27,9 @@ def read(request: dict[str, Any]) -> Read:
     except (RomError, MemoryError):
         raise
     except ModuleNotFoundError as error:
-        raise ConfigError(
+        raise ResourceError(
             f"reading this file needs {error.name}, which is not installed.",
-            hint=f"On Debian: apt-get install python3-{error.name}",
+            hint=f"On Debian: apt-get install python3-{error.name}.",
         ) from error
     # parsers raise whatever the broken line provokes, and meshio leaves the process
     except (Exception, SystemExit) as error:

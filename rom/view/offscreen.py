@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.child import Ended, python, run, scratch
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ResourceError
 from rom.view.scene import Actor, Camera
 
 Image = npt.NDArray[np.uint8]
@@ -32,7 +32,8 @@ def render(
         (f, height, width, 3) pixels.
 
     Raises:
-        ConfigError: if pyvista is missing or cannot draw on this machine.
+        ResourceError: if pyvista is missing.
+        ConfigError: if it cannot draw on this machine.
     """
     require("pyvista")
     with scratch("view") as folder:
@@ -48,10 +49,10 @@ def require(package: str) -> None:
     """Make sure that a package for pictures is there.
 
     Raises:
-        ConfigError: naming it.
+        ResourceError: naming it.
     """
     if find_spec(package) is None:
-        raise ConfigError(f"pictures need {package}, which is not installed.", hint=f"{INSTALL}.")
+        raise ResourceError(f"pictures need {package}, which is not installed.", hint=f"{INSTALL}.")
 
 
 def write_scene(

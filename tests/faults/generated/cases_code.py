@@ -144,7 +144,7 @@ CASES = [
     *(case(f"a pickle as {member}", "check good.npz", UnsafeFileError, "good.npz",
            given=pickled(member)) for member in ("K", "mass", "manifest", "extra")),
     *(case(f"a member named {member}", "check good.npz", OPENED, "good.npz",
-           given=renamed(member)) for member in ("../pwned.npy", "/tmp/pwned.npy", "a\\b.npy")),
+           given=renamed(member)) for member in ("../pwned.npy", "/nowhere/pwned.npy", "a\\b.npy")),
     case("a script as a body", "check build.py", FileFormatError, "build.py"),
     case("a script as a component", "reduce build.toml -o a.npz", (ConfigError, FileFormatError),
          "build.toml", given=lambda folder: (folder / "build.py").rename(folder / "build.toml")),

@@ -11,7 +11,7 @@ from rom.report import paragraph
 
 HOSTILE = {
     "a path upwards": "../pwned",
-    "an absolute path": "/tmp/pwned",
+    "an absolute path": "/nowhere/pwned",
     "a folder": "a/b",
     "a path of Windows": "a\\..\\b",
     "two points": "..",
@@ -113,7 +113,7 @@ def reported(name):
     """A report shows the name, and does not run it."""
 
     def act(folder):
-        rom.write_report(folder / "a.html", name, {name: [paragraph(name)]})
+        rom.write_report({name: [paragraph(name)]}, folder / "a.html", name)
         require("<script>alert" not in (folder / "a.html").read_text(), "the name became a tag")
 
     return act
