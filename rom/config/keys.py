@@ -259,7 +259,9 @@ class Table:
             elif key.default is ...:
                 inside = f" in [{place.name}]" if place.path else ""
                 place.mistakes.append(
-                    place.error(f"{key.name} is missing{inside}.", f"{key.about} ({key.kind.said})")
+                    place.error(
+                        f"{key.name} is missing{inside}.", f"{key.about[:-1]}: {key.kind.said}."
+                    )
                 )
             elif key.default == {}:  # a table of its own defaults
                 collect(found, key.name, key.kind, {}, place)

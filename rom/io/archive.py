@@ -84,6 +84,7 @@ def read_archive(
     try:
         with zipfile.ZipFile(path) as archive:
             _refuse_oversize(archive, path, limit)
+            _refuse_paths(archive, path)
             manifest = _read_manifest(archive, path, kind)
             names = sorted(_digests(manifest, path, kind))
             _refuse_missing(archive, names, path)
@@ -111,6 +112,13 @@ def digest(A: Array) -> str:
     """SHA-256 of type, shape and content."""
     A = np.ascontiguousarray(A)
     return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
+
+
+def _refuse_paths(archive: zipfile.ZipFile, path: Path) -> None:
+    """Whoever unpacks such a file by other means would write elsewhere."""
+    for name in archive.namelist():
+        if name.startswith("/") or "\\" in name or ".." in name.split("/"):
+            raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.", where=str(path))
 
 
 def _refuse_oversize(archive: zipfile.ZipFile, path: Path, limit: int) -> None:

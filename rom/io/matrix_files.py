@@ -53,7 +53,7 @@ def read_matrix(source: Any) -> NamedMatrix:
     found = _all(path)
     if name is None and len(found) > 1:
         raise ConfigError(
-            f"{path} holds {sorted(found)}; which?",
+            f"{path} holds {sorted(found)}; name one.",
             hint="Give (file, name), on the command line FILE:NAME.",
         )
     key = next(iter(found)) if name is None else name.upper()

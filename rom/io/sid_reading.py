@@ -19,6 +19,7 @@ MOST_MODES = 1000  # blocks grow with their square
 ASSIGNMENT = re.compile(r"([A-Za-z]\w*(?:\s+\w+)?)\s*(?:\(([^)]*)\))?\s*=\s*(.*)")
 HEAD = re.compile(r"^\d+\s+\d+\s*:No\. nodes, No\. modes:")
 SIZES = ("order", "nrow", "ncol", "nq", "nqn", "structure")
+LONGEST_MESSAGE = 200  # characters that quote a damaged file
 
 
 @dataclass(slots=True)
@@ -57,7 +58,10 @@ class RawFile:
     def refuse(self, message: str, line: int) -> NoReturn:
         """Raise an error that names file and line."""
         hint = "It may have been cut or edited; write it again."
-        raise FileFormatError(message, where=f"{self.path}, line {line}", hint=hint)
+        message = message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]}..."
+        raise FileFormatError(
+            f"{message.rstrip('.')}.", where=f"{self.path}, line {line}", hint=hint
+        )
 
 
 class _Lines:

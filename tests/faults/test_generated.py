@@ -6,7 +6,9 @@ from importlib.util import find_spec
 import pytest
 from generated.classes import all_cases, planted
 from generated.judge import figures, verdicts
-from generated.stock import fill
+from generated.stock import fill, pendulum
+
+import rom
 
 LEAST_CASES = 400
 LEAST_NAMED = 0.98
@@ -18,6 +20,7 @@ RUN = [name for name, one in CASES.items() if not one.fe or find_spec("dolfinx")
 def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("faults")
     fill(folder / "stock")
+    rom.simulate(pendulum(), t_end=0.02, dt=0.01)  # compiles, where nothing is compiled yet
     return verdicts(folder, RUN)
 
 
