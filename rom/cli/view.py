@@ -10,7 +10,7 @@ from typing import Any
 
 from rom.cli.answer import Answer
 from rom.cli.described import component, described, mechanism
-from rom.cli.options import count, names
+from rom.cli.options import add_meshing, count, names
 from rom.cli.output import add_force, checked
 
 SUMMARY = "look at a body, a component or a mechanism"
@@ -30,6 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--fixed", metavar="NAME,...", type=names, default=(), help="interfaces held, for modes"
     )
     parser.add_argument("-o", "--output", type=Path, help="picture, .png, and no window")
+    add_meshing(parser)
     add_force(parser)
 
 
