@@ -111,7 +111,7 @@ def test_messages(arguments, error, words):
     [
         ((5, 3), "pool = 3 is less"),
         ((5, 9, 0.0), "not between 0 and 1"),
-        ((-1,), "number of modes"),
+        ((-1,), "n_modes = -1 must be"),
     ],
 )
 def test_messages_for_wrong_numbers(arguments, words):

@@ -188,7 +188,7 @@ def test_wrong_arguments_are_named():
     ):
         with pytest.raises(ConfigError, match=message):
             rom.equilibrium(mech, **options)
-    with pytest.raises(ConfigError, match="is no Mechanism"):
+    with pytest.raises(ConfigError, match="must be of type Mechanism"):
         rom.equilibrium("crane")
 
 
