@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from border_calls import body, calls, model
+from border_calls import body, calls, mistuned, model
 
 import rom
 import rom.view
@@ -255,6 +255,13 @@ def test_what_does_not_is_refused_in_words(given, words):
     with pytest.raises(rom.ConfigError) as caught:
         taken(**given)
     assert words in str(caught.value)
+
+
+def test_forces_with_a_phase_are_numbers():
+    force = np.array([0.0, 1j, 0.0])
+    sweep = {"engine_order": 1, "omega": [5e3], "damping": 1e-3, "at": [1]}
+    turned, plain = (mistuned().response(np.zeros(4), f, **sweep) for f in (force, abs(force)))
+    np.testing.assert_allclose(turned, 1j * plain, rtol=1e-12)
 
 
 def test_further_places_are_looked_at_and_long_values_shortened():

@@ -104,7 +104,7 @@ class MistunedWheel:
     def response(
         self,
         deviations: npt.ArrayLike,
-        force: npt.ArrayLike,
+        force: npt.ArrayLike | Complex,
         *,
         engine_order: int,
         omega: npt.ArrayLike,
@@ -140,7 +140,7 @@ class MistunedWheel:
     def amplification(
         self,
         deviations: npt.ArrayLike,
-        force: npt.ArrayLike,
+        force: npt.ArrayLike | Complex,
         *,
         engine_order: int,
         omega: npt.ArrayLike,
@@ -171,7 +171,7 @@ class MistunedWheel:
                  for first in range(0, len(many), batch)]  # fmt: skip
         return np.concatenate(peaks) / tuned
 
-    def _drive(self, force: npt.ArrayLike, engine_order: int) -> Complex:
+    def _drive(self, force: npt.ArrayLike | Complex, engine_order: int) -> Complex:
         """(r,) force on each wave: N times that on its sector, if the harmonics agree."""
         f = np.asarray(force)
         if f.shape != (self.sector.n,):

@@ -23,7 +23,7 @@ DOTS, FAINT = "#8b929c", "#6b7480"
 @typed
 def updating(  # noqa: PLR0913  keywords of one picture
     f: npt.ArrayLike,
-    curves: dict[str, npt.ArrayLike],
+    curves: dict[str, npt.ArrayLike | npt.NDArray[np.complex128]],
     changes: dict[str, tuple[float, float, float]],
     path: str | Path,
     *,
@@ -68,7 +68,9 @@ def updating(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def _responses(axes: Any, f: Array, curves: dict[str, npt.ArrayLike], label: str) -> None:
+def _responses(
+    axes: Any, f: Array, curves: dict[str, npt.ArrayLike | npt.NDArray[np.complex128]], label: str
+) -> None:
     looks: tuple[dict[str, Any], ...] = (
         {"ls": "", "marker": ".", "ms": 5, "color": DOTS},
         {"ls": "--", "lw": 1.3, "color": LINES[2]},
