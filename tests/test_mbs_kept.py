@@ -270,3 +270,18 @@ def test_a_short_run_leaves_no_folder_and_a_long_one_writes_parts(tmp_path, monk
     assert not (tmp_path / "long").exists()
     with pytest.raises(ConfigError, match="there is nothing to resume"):
         run("force", Broken(), METHODS["alpha"], keep=rom.Keeping(tmp_path / "long", resume=True))
+
+
+def test_an_event_in_the_very_step_in_which_another_one_breaks_is_found_once(tmp_path, monkeypatch):
+    def timed(**more):
+        mech = falling()
+        mech.event("first", lambda t, x: t - 0.0305)
+        mech.event("second", lambda t, x: Broken()(t, 1.0))
+        return rom.simulate(mech, t_end=0.06, dt=3e-3, **more)
+
+    monkeypatch.setattr(Broken, "fault", staticmethod(FAULTS["exception"][0]))
+    with monkeypatch.context() as patch, pytest.raises(SolverError, match="'second' failed"):
+        patch.setattr(Broken, "at", 0.031)
+        timed(keep=rom.Keeping(tmp_path / "kept"))
+    again = timed(keep=rom.Keeping(tmp_path / "kept", resume=True))
+    assert_allclose(again.events["first"].t, [0.0305], rtol=1e-12)
