@@ -109,11 +109,7 @@ class Orthotropic:
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "G"):
-            given = getattr(self, name)
-            if not isinstance(given, Sequence | np.ndarray) or len(given) != 3:
-                raise MaterialError(f"{name} needs three numbers, got {shortened(given)}.")
-            for value in given:
-                _check_number(name, value)
+            _check_three(name, getattr(self, name))
         for value in (*self.E, *self.G):
             _check_positive("E or G", value, "Pa")
         _check_number("rho", self.rho)
@@ -141,8 +137,9 @@ class Orthotropic:
             MaterialError: as for numbers in SI.
         """
         unit = unit_system(units)
-        for name, value in (("rho", rho), *(("E or G", x) for x in (*E, *G))):
-            _check_number(name, value)
+        _check_number("rho", rho)
+        for name, values in (("E", E), ("G", G)):
+            _check_three(name, values)
         moduli = (tuple(x * unit.pressure for x in values) for values in (E, G))
         turned = {} if axes is None else {"axes": axes}
         return cls(next(moduli), nu, next(moduli), rho * unit.density, **turned)
@@ -206,6 +203,13 @@ def _strain_rotation(Q: Array) -> Array:
 def _check_number(name: str, value: Any) -> None:
     if not is_number(value):
         raise MaterialError(f"{name} = {shortened(value)} is not a finite number.")
+
+
+def _check_three(name: str, values: Any) -> None:
+    if not isinstance(values, Sequence | np.ndarray) or len(values) != 3:
+        raise MaterialError(f"{name} needs three numbers, got {shortened(values)}.")
+    for value in values:
+        _check_number(name, value)
 
 
 def _check_positive(name: str, value: float, unit: str) -> None:

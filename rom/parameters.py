@@ -13,7 +13,7 @@ import numpy as np
 from rom.arguments import is_number, shortened, typed
 from rom.errors import ParameterError, RomWarning
 from rom.model import Array
-from rom.names import named
+from rom.names import check_text, named
 from rom.plausible import FACTOR, warn_outside
 
 FEW = 3  # parameters up to which all corners of their range are visited
@@ -43,6 +43,8 @@ class Parameter:
     high: float
 
     def __post_init__(self) -> None:
+        if self.region is not None:
+            check_text(self.region, "a region")
         for name in ("low", "high"):
             value = getattr(self, name)
             if not is_number(value):

@@ -58,7 +58,7 @@ def unit_system(name: str) -> UnitSystem:
     Raises:
         ConfigError: listing the names that exist.
     """
-    if name not in SYSTEMS:
+    if not isinstance(name, str) or name not in SYSTEMS:
         raise ConfigError(f"the unit system {name!r} is unknown; known: {sorted(SYSTEMS)}.")
     return SYSTEMS[name]
 

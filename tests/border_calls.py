@@ -33,6 +33,8 @@ ALSO = {"Solution": Solution, "State": State}
 KEPT = {"RomError", "RomWarning"} | {
     name for name in rom.__all__ if rom.MODULES[name] == "errors"
 }  # what is raised takes anything
+# of a public class, for `rom.simulate` alone, which fills the folder of a motion by them
+INNER = {"Keeping.begin", "Keeping.due", "Keeping.write"}
 # (callable, argument) -> wrong values that would be legal and cost time
 SKIPPED = {
     ("equilibrium", "steps"): {"million"},
@@ -330,6 +332,14 @@ GIVEN = {  # callable -> legal values of its own
     "FlexibleBody.with_reference": {"reference": lambda: "root"},
     "FlexibleBody.rotating_frequencies": {"speed": lambda: 1.0, "axis": lambda: Z},
     "FlexibleBody.marker": {"name": lambda: "root"},
+    "FlexibleBody.in_units": {"units": lambda: "mm-t-s"},
+    "Material.from_units": {
+        "units": lambda: "mm-t-s", "E": lambda: 210e3, "nu": lambda: 0.3, "rho": lambda: 7.85e-9
+    },
+    "Orthotropic.from_units": {
+        "units": lambda: "mm-t-s", "E": lambda: (1e3,) * 3, "nu": lambda: (0.3,) * 3,
+        "G": lambda: (4e2,) * 3, "rho": lambda: 1e-9,
+    },
     "FourierLegendre.functions": {"interface": lambda: model().interfaces["root"]},
     "Polynomial.functions": {"interface": lambda: model().interfaces["root"]},
     "Heat.on": WHEEL,
@@ -381,6 +391,7 @@ OBJECTS = {  # class -> an object of it: legal arguments of the class, and owner
     "Heat": lambda: rom.Heat(1e-5, 1.0),
     "Herting": lambda: rom.Herting(1),
     "Interface": lambda: model().interfaces["root"],
+    "Keeping": lambda: rom.Keeping("kept"),
     "Layered": lambda: rom.Layered(((0.0, 1.0),), model().K, model().K, model().K),
     "Material": lambda: STEEL,
     "MistunedWheel": mistuned,
@@ -536,6 +547,8 @@ def calls():
         if parameters(thing):
             found[name] = (thing, of_class(name, thing))
         for method in methods(thing):
+            if f"{name}.{method}" in INNER:
+                continue
             made = of_mechanism(method) if name == "Mechanism" else of_method(f"{name}.{method}")
             found[f"{name}.{method}"] = (getattr(thing, method), made)
     return {

@@ -113,7 +113,7 @@ def test_messages_for_couplings_that_cannot_be():
         rom.Assembly(bodies, ((("middle", "tip"), ("right", "root")),))
     with pytest.raises(InterfaceError, match="no interface 'top'"):
         rom.Assembly(bodies, ((("left", "top"), ("right", "root")),))
-    with pytest.raises(ConfigError, match="is not a pair"):
+    with pytest.raises(ConfigError, match=r"couplings\[0\] = .* must be a row of 2"):
         rom.Assembly(bodies, (("left", "tip", "right", "root"),))
     with pytest.raises(InterfaceError, match=r"full with 27 .* polynomial:1 with 9: they"):
         rom.Assembly(bodies | {"right": half("right", "polynomial:1")}, COUPLED)

@@ -155,7 +155,7 @@ def test_wrong_arguments_are_named():
         replace(ring, slave=np.array([0]))
     with pytest.raises(ConfigError, match="coupling of 1 slave to 1 master dofs has"):
         replace(ring, coupling=identity(2))
-    with pytest.raises(InterfaceError, match="no interface 'cyclic_low'; it has"):
+    with pytest.raises(InterfaceError, match="no interface 'cyclic_low', 'cyclic_high'; it has"):
         rom.CyclicSector.from_model(model)
     with pytest.raises(ConfigError, match="no direction"):
         rom.CyclicSector.from_model(model, low="root", high="tip", axis=(0, 0, 0))

@@ -68,7 +68,7 @@ def test_a_sector_is_reduced_like_a_body():
         ({"interfaces": {"root": "rbe2"}}, "one interface, 'cyclic', not"),
         ({"stress": True}, "belong to bodies in motion"),
         ({"method": rom.CraigBampton(f_max=10.0)}, "a number of fixed-interface modes, not by"),
-        ({"method": rom.Rubin(3)}, "not by Rubin"),
+        ({"method": rom.Rubin(3)}, r"method = Rubin\(n_modes=3\) must be of type CraigBampton"),
     ):
         with pytest.raises(ConfigError, match=words):
             rom.reduce(bar, **({"method": rom.CraigBampton(8)} | options))

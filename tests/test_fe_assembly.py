@@ -206,7 +206,8 @@ def test_regions_without_material_and_materials_without_region_are_named():
         assemble(mesh, None, tags, material=HARD, regions=names)
     with pytest.raises(TagError, match="cells belong to none of the regions"):
         assemble(mesh, regions_of(mesh), tags, material=HARD, regions={"pad": 4, "rest": 5})
-    with pytest.raises(MaterialError, match="neither Material, Orthotropic nor a dictionary"):
+    wanted = "of type Material, of type Orthotropic or a dictionary whose values are"
+    with pytest.raises(ConfigError, match=wanted):
         assemble(mesh, material="steel")
 
 

@@ -262,7 +262,7 @@ def test_what_does_not_fit_is_named(brick, tmp_path):
         given = {"K": K, "M": M, "nodes": nodes, "interfaces": SIDES} | other
         return read_model(given.pop("K"), given.pop("M"), **given)
 
-    with pytest.raises(ConfigError, match=r"holds \['KAA', 'MAA'\]; which"):
+    with pytest.raises(ConfigError, match=r"holds \['KAA', 'MAA'\]; name one"):
         read(K=HERE / "dense.op4")
     with pytest.raises(ConfigError, match="has no matrix 'KGG'"):
         read(K=(HERE / "dense.op4", "KGG"))

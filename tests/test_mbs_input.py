@@ -170,8 +170,9 @@ def test_a_law_that_returns_nonsense_ends_the_run(value):
 def test_an_error_inside_a_law_is_not_swallowed():
     mech, box, _ = mechanism()
     mech.user_force("law", lambda t, a: 1 / 0, box.marker("a"))
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(SolverError, match="'law' failed at t = 0 s: ZeroDivisionError") as caught:
         simulate(mech, **GOOD)
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
 
 
 def test_ctrl_c_keeps_the_motion_so_far():

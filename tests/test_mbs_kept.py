@@ -236,11 +236,11 @@ def test_more_than_can_be_computed_or_kept_is_refused_before_it_is_tried(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"state": "x"}, "state = 'x' is no State"),
-        ({"keep": "out"}, "keep = 'out' is no Keeping"),
-        ({"t_end": "1"}, "t_end = '1' is not a finite number"),
-        ({"t_end": 10**400}, "is not a finite number"),
-        ({"progress": 3}, "progress = 3 is neither True nor False"),
+        ({"state": "x"}, "state = 'x' must be of type State"),
+        ({"keep": "out"}, "keep = 'out' must be of type Keeping"),
+        ({"t_end": "1"}, "t_end = '1' must be a finite number"),
+        ({"t_end": 10**400}, "t_end = 1.* must be a finite number"),
+        ({"progress": 3}, "progress = 3 must be True or False"),
     ],
 )
 def test_wrong_arguments_are_named(options, words):

@@ -179,14 +179,14 @@ def test_a_wedge_in_nastran_is_refused(tmp_path):
 
 
 def test_a_missing_library_is_named(tmp_path, monkeypatch):
-    from rom.errors import ConfigError
+    from rom.errors import ResourceError
     from rom.fe import readers
 
     def reader(name):
         raise ModuleNotFoundError("No module named 'meshio'", name="meshio")
 
     monkeypatch.setattr(readers, "_reader", reader)
-    with pytest.raises(ConfigError, match=r"needs meshio.*python3-meshio"):
+    with pytest.raises(ResourceError, match=r"needs meshio.*python3-meshio"):
         readers.read({"reader": "nastran", "path": "x"})
 
 

@@ -109,8 +109,8 @@ def test_a_factor_that_is_the_number_itself_is_doubted(kind, high, n):
 DAMPING = {
     "beyond one": (2.0, ConfigError, "2 per cent write 0.02"),
     "negative": (-0.01, ConfigError, "-0.01 is negative"),
-    "no number": (float("nan"), ConfigError, "nan is not a finite number"),
-    "infinite": (float("inf"), ConfigError, "inf is not a finite number"),
+    "no number": (float("nan"), ConfigError, "must be finite numbers"),
+    "infinite": (float("inf"), ConfigError, "must be finite numbers"),
     "strong": (0.5, None, "0.5"),
 }
 
@@ -121,7 +121,7 @@ def test_damping_that_no_structure_has_is_refused_or_doubted(case, many):
     ratio, error, words = case
     given = [0.01, ratio] if many else ratio
     if error:
-        with pytest.raises(error, match="damping ratio") as caught:
+        with pytest.raises(error, match="ratio = ") as caught:
             rom.ModalDamping(given)
         assert words in str(caught.value)
     else:
@@ -136,7 +136,7 @@ def test_damping_of_structures_and_critical_damping_on_purpose_are_silent(ratio)
 @pytest.mark.parametrize("name", ["alpha", "beta"])
 @pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), "1"])
 def test_factors_of_rayleigh_are_finite_and_not_negative(name, value):
-    with pytest.raises(ConfigError, match=f"damping {name} = "):
+    with pytest.raises(ConfigError, match=f"{name} = "):
         rom.Rayleigh(**{name: value})
 
 
@@ -323,7 +323,7 @@ def test_geometries_compare_parameters_with_their_defaults(name, text, L, n, tmp
 
     path = tmp_path / name
     path.write_text(text)
-    found = said(lambda: read_mesh(path, parameters={"L": L}))
+    found = said(lambda: read_mesh(path, parameters={"L": L}, trust=path.suffix == ".py"))
     assert len([text for text in found if "L = 20 is 200 times its default 0.1" in text]) == n
 
 

@@ -222,7 +222,7 @@ def _row(takes: list[Taken | None]) -> Taken:
         pairs = zip(each, enumerate(value), strict=True)
         return tuple(x for one, item in pairs for x in _each(one, [item]))
 
-    return Taken(f"a row of {len(each)}: {', '.join(one.words for one in each)}", take)
+    return Taken(f"a row of {len(each)} ({', '.join(one.words for one in each)})", take)
 
 
 def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
@@ -235,7 +235,7 @@ def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
 
 
 def _mapping(key: Taken | None, one: Taken | None) -> Taken:
-    words = f"a mapping from {(key or ANYTHING).words} to {(one or ANYTHING).words}"
+    words = f"a dictionary whose values are {(one or ANYTHING).words}"
 
     def take(value: Any) -> Any:
         if not isinstance(value, Mapping):

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError
 from rom.io.archive import Kind, digest, read_archive, write_archive
 from rom.mbs.checkpoint import KIND as STATE
@@ -49,6 +50,7 @@ class Kept(NamedTuple):
     noted: Noted | None
 
 
+@typed
 @dataclass
 class Keeping:
     """The folder of one run.

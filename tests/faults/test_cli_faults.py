@@ -114,7 +114,7 @@ PHYSICS = {
     "poisson": (4, ["modes", BEAM, *steel(nu="0.6")], "nu = 0.6"),
     "massless": (4, ["modes", BEAM, *steel(rho="0")], "rho = 0"),
     "negative stiffness": (4, ["modes", BEAM, *steel(E="-1")], "E = -1"),
-    "units": (5, ["modes", BEAM, *steel(E="210"), "--strict"], "0.164 m/s"),
+    "units": (5, ["modes", BEAM, *steel(E="210"), "--strict"], "0.1636 m/s"),
     "degree": (2, ["modes", BEAM, *STEEL, "--degree", "7"], "degree = 7"),
     "no modes": (2, ["modes", BEAM, *STEEL, "-n", "0"], "m = 0"),
     "interface misspelt": (4, ["modes", BEAM, *STEEL, "--fixed", "rot"], "'rot'; the model has"),
@@ -268,7 +268,7 @@ def wait_for(path, seconds=20):
         (["modes", BEAM, *STEEL, "--degre", "1"], 2, "unknown option"),
         (["modes", "nope.geo", *STEEL], 3, "nope.geo: there is no such file"),
         (["modes", BEAM, *STEEL, "--fixed", "rot"], 4, "no interface 'rot'"),
-        (["modes", BEAM, *steel(E="210"), "--strict"], 5, "0.164 m/s"),
+        (["modes", BEAM, *steel(E="210"), "--strict"], 5, "0.1636 m/s"),
         (["check", "text.npz"], 3, "text.npz"),
     ],
 )
