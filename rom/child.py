@@ -24,7 +24,7 @@ from rom.interruption import terminable, uninterrupted
 ENTRY = Path(__file__).with_name("child_entry.py")
 ROOT = str(Path(__file__).resolve().parents[1])
 INSTALLED = ("site-packages", "dist-packages")  # on the path of every child anyway
-PREFIX, SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
+FOLDER_PREFIX, FOLDER_SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
 GRACE = 1.0  # seconds between SIGTERM and SIGKILL
 # The launcher of MPI recognises its processes by these; a child is none of them.
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
@@ -197,7 +197,7 @@ def lasting_scratch(kind: str) -> Path:
 def _locked(kind: str) -> tuple[Path, int]:
     """A new folder, and the descriptor whose lock says that its maker lives."""
     while True:
-        path = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{kind}-", suffix=SUFFIX))
+        path = Path(tempfile.mkdtemp(prefix=f"{FOLDER_PREFIX}{kind}-", suffix=FOLDER_SUFFIX))
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
         with suppress(OSError):  # no locks here, or a sweep that was faster
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -208,7 +208,7 @@ def _locked(kind: str) -> tuple[Path, int]:
 
 def sweep() -> None:
     """Remove the scratch folders of this user whose makers no longer live."""
-    for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*{SUFFIX}"):
+    for path in Path(tempfile.gettempdir()).glob(f"{FOLDER_PREFIX}*{FOLDER_SUFFIX}"):
         with suppress(OSError):
             _remove_abandoned(path)
 

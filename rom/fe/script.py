@@ -17,7 +17,7 @@ STARTS |= {"ExternalProcess", "CommandLine"}  # a field of mesh sizes by another
 COMMANDS = {"System", "Print", "Save", "CreateDir"}  # words one may also call a variable by
 PLUGINS_THAT_WRITE = {"Bubbles", "NearToFarField", "VoroMetal"}
 NAMES_FROM_TEXT = {"StringToName", "S2N"}  # with which a command can be spelt
-INCLUDE, MERGES = "Include", ("Merge", "MergeWithBoundingBox")
+INCLUDE_COMMAND, MERGE_COMMANDS = "Include", ("Merge", "MergeWithBoundingBox")
 # endings, in these letters only, of files that gmsh gives to readers which run nothing
 SHAPES = (".step", ".STEP", ".stp", ".STP", ".iges", ".IGES", ".igs", ".IGS", ".brep", ".brp",
           ".stl", ".STL")  # fmt: skip
@@ -86,7 +86,7 @@ def _check(path: Path, around: tuple[Path, ...], seen: list[Path]) -> None:
         )
     for command, name in _read_files(tokens, where):
         _check_read(path.parent / name, command, (*around, real), seen)
-    _check_read(Path(f"{path}.opt"), INCLUDE, (*around, real), seen)  # gmsh runs it as well
+    _check_read(Path(f"{path}.opt"), INCLUDE_COMMAND, (*around, real), seen)  # gmsh runs it as well
 
 
 def _where(path: Path, around: tuple[Path, ...]) -> str:
@@ -103,14 +103,14 @@ def _check_read(path: Path, command: str, around: tuple[Path, ...], seen: list[P
     """A file that a script reads, by the way gmsh would read it; gmsh says when there is none."""
     if not path.is_file():
         return
-    if command == INCLUDE:
+    if command == INCLUDE_COMMAND:
         _check(path, around, seen)
         return
     finished = path.suffix in MESHES and _start(path).startswith(MESH_STARTS)
     if not finished and path.suffix in SCRIPTS:
         _check(path, around, seen)
     elif finished or path.suffix in SHAPES:
-        _check_read(Path(f"{path}.opt"), INCLUDE, around, seen)
+        _check_read(Path(f"{path}.opt"), INCLUDE_COMMAND, around, seen)
     else:
         raise UnsafeFileError(
             f"merges {path.name}, and what gmsh would do with that depends on what is in it.",
@@ -178,7 +178,7 @@ def _commands(after: Token) -> bool:
 def _read_files(tokens: list[Token], where: str) -> Iterator[tuple[str, str]]:
     """Commands that read files, with the names of these."""
     for k, token in enumerate(tokens):
-        if token.kind != "word" or token.value not in (INCLUDE, *MERGES):
+        if token.kind != "word" or token.value not in (INCLUDE_COMMAND, *MERGE_COMMANDS):
             continue
         end = next((j for j in range(k, len(tokens)) if tokens[j].value == ";"), len(tokens))
         name = _named(tokens[k + 1 : end])

@@ -63,7 +63,7 @@ class Server:
         self.build, self.model = build, build()
         self.states: dict[int, Any] = {}
         self.count = 0
-        self.told: set[str] = set()
+        self.reported: set[str] = set()
         self.verbs: dict[int, Callable[[Index, Array], Array]] = {
             1: self._set,
             2: lambda refs, values: self.model.get(refs),
@@ -88,8 +88,8 @@ class Server:
                 return ERROR, NONE, str(error)
             except Exception as error:  # whatever the user's own functions raise
                 return ERROR, NONE, f"{type(error).__name__}: {error}"
-        new = {str(w.message) for w in caught if issubclass(w.category, RomWarning)} - self.told
-        self.told |= new
+        new = {str(w.message) for w in caught if issubclass(w.category, RomWarning)} - self.reported
+        self.reported |= new
         return OK, found, " ".join(sorted(new))
 
     def _set(self, refs: Index, values: Array) -> Array:

@@ -96,7 +96,7 @@ class Examined:
         until: time up to which it was looked at [s].
         low, high: least and largest value.
         top: largest rate.
-        told: whether a doubt was said; one is enough.
+        doubted: whether a doubt was said; one is enough.
         end: time from which on the drive is no motion, and the error that says so.
     """
 
@@ -108,7 +108,7 @@ class Examined:
     low: float = np.inf
     high: float = -np.inf
     top: float = 0.0
-    told: bool = False
+    doubted: bool = False
     end: tuple[float, ModelError] | None = None
 
     def __post_init__(self) -> None:
@@ -138,7 +138,7 @@ class Examined:
         jump = largest_jump(self.function, t, width, small)
         if jump is not None:
             self.end = jump.t, _refusal(self.name, jump)
-        elif not self.told:
+        elif not self.doubted:
             self._look_at_rate(t, largest)
 
     def _look_at_rate(self, t: Array, largest: float) -> None:
@@ -154,7 +154,7 @@ class Examined:
         if self.rate is not None and not doubt:
             doubt = _contradiction(self.name, t, values, quotient(t))
         warn(doubt)
-        self.told = bool(doubt)
+        self.doubted = bool(doubt)
 
 
 def _kink(name: str, kink: Jump) -> str:
