@@ -70,7 +70,7 @@ def test_wrong_arguments_are_named():
     for call in (rom.travelling_modes, rom.cyclic_modes):
         with pytest.raises(ConfigError, match="speed = nan"):
             call(ring, 2, 2, speed=np.nan)
-    with pytest.raises(ConfigError, match="1 to 24 waves"):
+    with pytest.raises(ConfigError, match="n = 49 must be a whole number from 1 to 24"):
         rom.travelling_modes(ring, 2, 49, speed=1.0)
     with pytest.raises(ConfigError, match="no matrices of rotation"):
         rom.travelling_modes(mass_ring(6), 2, 1, speed=1.0)

@@ -105,7 +105,7 @@ def test_a_state_file_says_what_is_wrong_with_it(tmp_path):
         rom.load(path)
     with pytest.raises(QualityGateError, match="v of the state is not finite"):
         rom.save_state(replace(state, v=state.v * np.nan), path)
-    with pytest.raises(ConfigError, match="is no State"):
+    with pytest.raises(ConfigError, match="state = 3 must be of type State"):
         rom.save_state(3, path)
     assert path.read_bytes() == data
     assert sorted(p.name for p in tmp_path.iterdir()) == [

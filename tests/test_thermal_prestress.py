@@ -174,11 +174,12 @@ def test_wrong_heat_is_named(bar):
         (rom.Heat({"blade": 1e-5}, 20.0), r"expansion names the region 'blade'; .*\['body'\]"),
         (rom.Heat(1e-5, {"rim": 20.0}), "temperature names the region 'rim'"),
         (rom.Heat(1e-5, np.ones(7)), r"shape \(7,\)"),
-        (rom.Heat(1e-5, np.nan), "nan, not a finite number"),
         (rom.Heat(1e-5, lambda x: x), "one finite number each"),
     ):
         with pytest.raises(ConfigError, match=match):
             rom.heated(bar, wrong)
+    with pytest.raises(ConfigError, match="Heat: temperature = nan must be .* a finite number"):
+        rom.Heat(1e-5, np.nan)
     with pytest.raises(InterfaceError, match="no interface 'rim' to hold"):
         rom.heated(bar, rom.Heat(1e-5, 20.0), fixed="rim")
     with pytest.raises(ConfigError, match="no finite elements"):

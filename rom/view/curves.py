@@ -115,7 +115,7 @@ def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> 
 @path_came_first(1, 0)
 @typed
 def convergence(
-    panels: Sequence[tuple[str, dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]]],
+    panels: Sequence[tuple[str, dict[str, tuple[Any, Any]]]],
     path: str | Path,
     *,
     xlabel: str,

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.deprecated import path_came_first
@@ -16,7 +15,7 @@ from rom.view.curves import LINES, WIDTH, finish
 
 HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 370, 95, 30, 55, 75  # pixel, of a diagram and around it
 GUIDE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
-Line = tuple[npt.ArrayLike, npt.ArrayLike]
+Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
 
 
 @typed

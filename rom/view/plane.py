@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.deprecated import path_came_first
@@ -49,7 +48,7 @@ class Shape:
 @path_came_first(1, 2, 0)
 @typed
 def deformed(  # noqa: PLR0913  keywords of one picture
-    curves: dict[str, tuple[npt.ArrayLike, npt.ArrayLike]],
+    curves: dict[str, tuple[Any, Any]],
     shapes: Sequence[Shape],
     path: str | Path,
     *,
