@@ -178,7 +178,7 @@ def test_wrong_heat_is_named(bar):
     ):
         with pytest.raises(ConfigError, match=match):
             rom.heated(bar, wrong)
-    with pytest.raises(ConfigError, match="Heat: temperature = nan must be .* a finite number"):
+    with pytest.raises(ConfigError, match=r"temperature = nan must be .* a finite number"):
         rom.Heat(1e-5, np.nan)
     with pytest.raises(InterfaceError, match="no interface 'rim' to hold"):
         rom.heated(bar, rom.Heat(1e-5, 20.0), fixed="rim")
