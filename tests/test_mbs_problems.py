@@ -82,14 +82,16 @@ def four_bars(n, speed=1.0):
     return mech
 
 
-@pytest.mark.parametrize("n", [2, 4])
-def test_four_bars_in_a_row_pass_their_singular_positions(n):
+# 1.9 ms: with 2 ms a step of four ends so near to the singular position that Newton's iteration is
+# left without a direction on some processors, whose round-off differs
+@pytest.mark.parametrize(("n", "dt"), [(2, 2e-3), (4, 1.9e-3)])
+def test_four_bars_in_a_row_pass_their_singular_positions(n, dt):
     def points(q):
         up = np.array([np.sin(q[0]), np.cos(q[0])])
         return np.concatenate([rod_points(0 * up, up)] * (n + 1) + [up] * n)
 
     weight = potential_force(lambda q: g * np.cos(q[0]) * ((n + 1) / 2 + n))
-    sol = simulate_quietly(four_bars(n), t_end=4.0, dt=2e-3, rho_inf=1.0)
+    sol = simulate_quietly(four_bars(n), t_end=4.0, dt=dt, rho_inf=1.0)
     angle = lagrange(points, weight, np.zeros(1), np.ones(1), sol.t)[0]
     assert angle[-1] > 3 * np.pi  # the horizontal is passed three times
     path = np.column_stack([np.sin(angle), np.cos(angle)])
