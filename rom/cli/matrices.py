@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.options import assignment, unique
+from rom.cli.options import assignment, require, unique
 from rom.errors import ConfigError
 from rom.names import named
 
@@ -55,11 +55,14 @@ def check_geometry(args: argparse.Namespace) -> None:
     given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
     if given:
         raise ConfigError(f"{given[0]} goes with --mass, which is not given.")
-    if missing := [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is None]:
-        raise ConfigError(
-            f"the following arguments are required: {', '.join(missing)}.",
-            hint="For matrices of another program give --mass and --nodes instead.",
-        )
+    hint = "For matrices of another program give --mass and --nodes instead."
+    require(solid_options(args), hint)
+
+
+def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
+    """What a geometry needs and matrices do not, by option."""
+    names = ("E", "nu", "rho") if args.mass is None else ()
+    return {f"--{name}": getattr(args, name) for name in names}
 
 
 def read_matrices(args: argparse.Namespace) -> "FEModel":

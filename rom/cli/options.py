@@ -1,6 +1,7 @@
 """Options several verbs share, and the forms their values may take."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
 
 
 GIGABYTE = 1e9
+OUTPUT = "-o/--output"
 
 
 def number(text: str) -> float:
@@ -61,6 +63,16 @@ def vector(text: str) -> tuple[float, float, float]:
 def names(text: str) -> tuple[str, ...]:
     """Names with commas."""
     return tuple(filter(None, (part.strip() for part in text.split(","))))
+
+
+def require(needed: Mapping[str, Any], hint: str = "") -> None:
+    """Name at once all options that a verb needs and nobody gave.
+
+    Raises:
+        ConfigError: if there are any.
+    """
+    if missing := [name for name, value in needed.items() if value is None or value == []]:
+        raise ConfigError(f"the following arguments are required: {', '.join(missing)}.", hint=hint)
 
 
 def assignment(text: str) -> tuple[str, str]:

@@ -46,6 +46,7 @@ exit codes:
   6  not enough memory or disk, or a library is missing
   7  interrupted; what was finished before is kept
 """
+LONGEST_MESSAGE = 500  # letters of what the parser says
 EXAMPLES = """\
 examples:
   rom doctor
@@ -76,6 +77,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing the usage and leaving."""
         hint = f"{self.prog} --help lists what there is."
+        if len(message) > LONGEST_MESSAGE:  # it quotes what was typed
+            message = f"{message[:LONGEST_MESSAGE]}..."
         if "expected one argument" in message:
             option = message.split()[1].rstrip(":")
             hint = f"Write {option}=-1 where the value begins with a minus. {hint}"

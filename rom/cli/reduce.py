@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import component, described
-from rom.cli.matrices import add_matrices
+from rom.cli.matrices import add_matrices, solid_options
 from rom.cli.method import add_method, method
 from rom.cli.options import (
+    OUTPUT,
     add_geometry,
     add_interfaces,
     add_material,
     names,
     number,
     read_model,
+    require,
     unique,
 )
 from rom.cli.output import add_force, checked, files_in
@@ -88,8 +90,7 @@ def _checked(
     args: argparse.Namespace, output: Path | None, name: str, inputs: "Iterable[Path]" = ()
 ) -> Path:
     """The file to write, before anything is computed for it."""
-    if output is None:
-        raise ConfigError("the following arguments are required: -o/--output.")
+    require({OUTPUT: output})
     check_name(name, "a body")
     return checked(args, output, "npz", inputs=inputs)
 
@@ -103,16 +104,15 @@ def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
 def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     from rom.workflow import reduce
 
+    needed = solid_options(args) | {"-i/--interface": args.interface, OUTPUT: args.output}
+    require(needed, "A body needs an interface, for example -i pin_a=rbe2.")
     name = args.name or args.file.stem
     output = _checked(args, args.output, name)
     chosen, damping = method(args), _damping(args)
-    kinds = unique(args.interface, "-i")
-    if not kinds:
-        raise ConfigError("a body needs an interface.", hint="For example -i pin_a=rbe2.")
     body = reduce(
         read_model(args),
         method=chosen,
-        interfaces=kinds,
+        interfaces=unique(args.interface, "-i"),
         reference=args.reference[0] if len(args.reference) == 1 else args.reference,
         damping=damping,
         name=name,

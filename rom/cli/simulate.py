@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
-from rom.cli.options import add_meshing, positive, vector
+from rom.cli.options import OUTPUT, add_meshing, positive, require, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.errors import ConfigError, RomError
@@ -55,7 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--history", choices=("csv", "h5"), help="every marker, reaction and energy, too"
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
+    parser.add_argument("-o", "--output", type=Path, help="folder, made if missing")
     add_force(parser)
     add_meshing(parser)
     parser.add_argument(
@@ -73,6 +73,7 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     from rom.config.run import Run, made_from, paths_of
     from rom.config.run import run as move
 
+    require({OUTPUT: args.output})
     file = mechanism(args)
     for path in paths_of(file, claim(args)):
         checked(args, path, inputs=files_in(file.values))
@@ -159,8 +160,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     from rom.io.native import load
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
-    if missing := [name for name, value in needed.items() if value is None]:
-        raise ConfigError(f"the following arguments are required: {', '.join(missing)}.")
+    require(needed | {OUTPUT: args.output})
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rom.arguments import typed
 from rom.config.component import Located, change, read_component
 from rom.config.document import Document, read_document
-from rom.config.keys import Place, nearest, read_table
+from rom.config.keys import Place, nearest, raise_mistakes, read_table
 from rom.config.laws import Pending, law_of
 from rom.config.mechanism_keys import IMPACT, SECTIONS, TABLE
 from rom.errors import ConfigError, RomWarning
@@ -36,6 +36,7 @@ ONE_POINT = ("revolute", "spherical", "universal", "fixed")
 APART = (
     1e-2  # of the size of the mechanism; bores of a mesh are polygons, so that a little is normal
 )
+MARKER_KEYS = ("between", "marker")
 JOINT_KEYS = ("joint", "joint1", "joint2")
 MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
 
@@ -71,6 +72,7 @@ class MechanismFile:
         for name, values in self.values["bodies"].items():
             with self.at("bodies", name):
                 _add_body(made, name, dict(values), self.meshing)
+        self._refuse_unknown_markers(made)
         for section, name, values in self._connections():
             with self.at(section, name):
                 self._connect(made, section, name, dict(values))
@@ -117,10 +119,8 @@ class MechanismFile:
         method = METHODS.get(section) or values.pop("kind")
         place = Place(self.document, (section, name))
         first: list[Any] = []
-        for key in ("between", "marker"):
-            found = values.pop(key, [])
-            markers = [found] if isinstance(found, tuple) else found
-            first += [self._marker(made, marker, place.at(key)) for marker in markers]
+        for key in MARKER_KEYS:
+            first += [self._marker(made, marker) for marker in _markers(values.pop(key, []))]
         for key in (key for key in JOINT_KEYS if key in values):
             joint = values.pop(key)
             if joint not in made.joints:
@@ -155,22 +155,38 @@ class MechanismFile:
                 stacklevel=2,
             )
 
-    def _marker(self, made: "Mechanism", marker: tuple[str, Any], place: Place) -> Any:
+    def _marker(self, made: "Mechanism", marker: tuple[str, Any]) -> Any:
         body, where = marker
         if body == GROUND:
-            if not isinstance(where, str):
-                return made.ground.marker(where)
             points = self.values["ground"]
-            if where not in points:
-                raise place.error(f"the ground has no point {where!r}.", nearest(where, points))
-            return made.ground.marker(points[where])
-        if body not in made.parts:
-            raise place.error(f"there is no body {body!r}.", nearest(body, [GROUND, *made.parts]))
-        part = made.parts[body]
-        if isinstance(where, str) and where not in part.names:
-            hint = nearest(where, part.names)
-            raise place.error(f"body {body!r} has no marker {where!r}.", hint)
-        return part.marker(where)
+            return made.ground.marker(points[where] if isinstance(where, str) else where)
+        return made.parts[body].marker(where)
+
+    def _refuse_unknown_markers(self, made: "Mechanism") -> None:
+        """All of them at once, in whatever joint or force they stand."""
+        top = Place(self.document)
+        for section, name, values in self._connections():
+            for key in MARKER_KEYS:
+                place = top.at(section).at(name).at(key)
+                for marker in _markers(values.get(key, [])):
+                    self._note_unknown(made, marker, place)
+        raise_mistakes(top)
+
+    def _note_unknown(self, made: "Mechanism", marker: tuple[str, Any], place: Place) -> None:
+        body, where = marker
+        bodies = [GROUND, *made.parts]
+        points = self.values["ground"] if body == GROUND else {}
+        known = made.parts[body].names if body in made.parts else points
+        if body not in bodies:
+            place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, bodies)))
+        elif isinstance(where, str) and where not in known:
+            what = "the ground has no point" if body == GROUND else f"body {body!r} has no marker"
+            place.mistakes.append(place.error(f"{what} {where!r}.", nearest(where, known)))
+
+
+def _markers(found: Any) -> list[Any]:
+    """One marker or several of an entry, as a list."""
+    return [found] if isinstance(found, tuple) else list(found)
 
 
 def _turns(made: "Mechanism", joint: str, coordinate: str | None) -> bool:
@@ -341,4 +357,13 @@ def read_mechanism(
     for key, value in (changes or {}).items():
         change(document.data, key, value)
     meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}
-    return MechanismFile(document, read_table(TABLE, document), meshing)
+    file = MechanismFile(document, read_table(TABLE, document), meshing)
+    with file.at("simulation", "dt"):
+        _check_step(file.values["simulation"])
+    return file
+
+
+def _check_step(simulation: dict[str, Any]) -> None:
+    t_end, dt = simulation["t_end"], simulation.get("dt")
+    if dt is not None and dt > t_end:
+        raise ConfigError(f"dt = {dt:g} s is longer than t_end = {t_end:g} s.")

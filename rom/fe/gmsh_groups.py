@@ -38,8 +38,8 @@ def check_declared(gmsh: Any, declared: Path) -> None:
         if dim >= 2 and (dim, tag) not in present:
             raise TagError(
                 f"the physical {DIMENSIONS[dim]} {name!r} is empty.",
-                hint="Does the selection, e.g. its bounding box, still find it with these "
-                "parameters?",
+                hint="Check that it names surfaces or volumes that exist, and that the selection, "
+                "e.g. its bounding box, finds them with these parameters.",
             )
 
 

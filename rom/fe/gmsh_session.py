@@ -14,6 +14,7 @@ from rom.fe.readers import Made, Read
 from rom.fe.script import check_script
 from rom.plausible import scaled_doubt
 
+HIGHEST_ORDER = 2  # of cells, see `rom.fe.gmsh_groups.SOLIDS`
 HXT = 10  # Mesh.Algorithm3D whose meshes differ from run to run
 NO_MEMORY = re.compile("Out of memory|bad_alloc")
 # gmsh hands a file without this start to its script parser, which can run shell commands
@@ -96,7 +97,7 @@ def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     known = geo_parameters(gmsh)
     chosen = {_full_name(name, known, path): v for name, v in request["parameters"].items()}
     for name, value in chosen.items():
-        if isinstance(value, str):
+        if isinstance(known[name], str) and isinstance(value, str):
             gmsh.onelab.setString(name, [value])
         else:
             gmsh.onelab.setNumber(name, [_number(name, value, path)])
@@ -167,11 +168,21 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
         gmsh.option.setNumber("Mesh.Algorithm3D", 1)
     if request["order"]:
         gmsh.option.setNumber("Mesh.ElementOrder", request["order"])
+    _check_order(gmsh.option.getNumber("Mesh.ElementOrder"))
     gmsh.write(str(declared))
     check_declared(gmsh, declared)
     if not any(len(tags) for tags in gmsh.model.mesh.getElements(3)[1]):
         with complaints(gmsh, MeshError):
             gmsh.model.mesh.generate(3)
+
+
+def _check_order(order: float) -> None:
+    """Cells of high order take minutes to make, and no element here has them."""
+    if order > HIGHEST_ORDER:
+        raise MeshError(
+            f"Mesh.ElementOrder = {order:g}: cells have first or second order.",
+            hint="Leave the order out, or write Mesh.ElementOrder = 2.",
+        )
 
 
 MAKERS = {"geo": _geo, "builder": builder.make, "step": step.make, "msh": _msh}

@@ -41,15 +41,15 @@ class Connections:
 
     def revolute(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
         """Hinge about ``axis`` (3,), world at the start; five constraints."""
-        self._join(name, m1, m2, joints.revolute, axis)
+        self._join(name, m1, m2, joints.revolute, axis=axis)
 
     def cylindrical(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
         """Rotation about and sliding along ``axis`` (3,), world at the start; four constraints."""
-        self._join(name, m1, m2, joints.cylindrical, axis)
+        self._join(name, m1, m2, joints.cylindrical, axis=axis)
 
     def prismatic(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
         """Sliding along ``axis`` (3,), world at the start; five constraints."""
-        self._join(name, m1, m2, joints.prismatic, axis)
+        self._join(name, m1, m2, joints.prismatic, axis=axis)
 
     def spherical(self, name: str, m1: Marker, m2: Marker) -> None:
         """Ball joint; three constraints."""
@@ -63,7 +63,7 @@ class Connections:
         Raises:
             ConfigError: if the axes are not perpendicular at the start.
         """
-        self._join(name, m1, m2, joints.universal, axis1, axis2)
+        self._join(name, m1, m2, joints.universal, axis1=axis1, axis2=axis2)
 
     def fixed(self, name: str, m1: Marker, m2: Marker) -> None:
         """Weld; six constraints."""
@@ -71,7 +71,7 @@ class Connections:
 
     def planar(self, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike) -> None:
         """Sliding in a plane of ``normal`` (3,) through m1, turning about it; three constraints."""
-        self._join(name, m1, m2, joints.planar, normal)
+        self._join(name, m1, m2, joints.planar, normal=normal)
 
     def screw(
         self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike, pitch: float
@@ -81,15 +81,15 @@ class Connections:
         A positive pitch is a right-hand thread: a right-hand turn about ``axis`` advances along it.
         """
         kind = partial(joints.screw, pitch=_not_zero("pitch", pitch))
-        self._join(name, m1, m2, kind, axis)
+        self._join(name, m1, m2, kind, axis=axis)
 
     def point_on_line(self, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
         """The point m2 slides on a line along ``axis`` (3,) through m1; two constraints."""
-        self._join(name, m1, m2, joints.point_on_line, axis)
+        self._join(name, m1, m2, joints.point_on_line, axis=axis)
 
     def point_on_plane(self, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike) -> None:
         """The point m2 slides in the plane of ``normal`` (3,) through m1; one constraint."""
-        self._join(name, m1, m2, joints.point_on_plane, normal)
+        self._join(name, m1, m2, joints.point_on_plane, normal=normal)
 
     def distance(self, name: str, m1: Marker, m2: Marker, *, length: float | None = None) -> None:
         """Massless rod between two points; one constraint.
@@ -133,7 +133,7 @@ class Connections:
             ConfigError: if the wheel lies flat on the plane.
         """
         kind = partial(joints.rolling, radius=positive("radius", radius))
-        self._join(name, m1, m2, kind, normal, *(() if axis is None else (axis,)))
+        self._join(name, m1, m2, kind, normal=normal, **({} if axis is None else {"axis": axis}))
 
     def gear(
         self,
@@ -194,7 +194,7 @@ class Connections:
         self.drives[name] = Drive(joint, function, rate, acceleration)
 
     def _join(
-        self, name: str, m1: Marker, m2: Marker, kind: Callable[..., Joint], *axes: Any
+        self, name: str, m1: Marker, m2: Marker, kind: Callable[..., Joint], **axes: Any
     ) -> None:
         self._check_new(name)
         self._check_markers(name, m1, m2)
@@ -202,7 +202,7 @@ class Connections:
             raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself.")
         A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
         gap = self.design_point(m2) - self.design_point(m1)
-        directions = [unit_vector(f"axis of {name}", axis) for axis in axes]
+        directions = [unit_vector(f"{what} of {name}", axis) for what, axis in axes.items()]
         joint = kind(name, (m1, m2), (A1, A2), gap, *directions)
         self._refuse_free_free(joint)
         self.joints[name] = joint

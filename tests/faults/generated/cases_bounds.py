@@ -38,9 +38,9 @@ LINES = {
     ),
     "polynomials": (
         f"reduce {MATRICES} -o a.npz".replace("rbe2", f"polynomial:{HUGE}"),
-        "polynomial",
+        "order 1000000000000 on interface 'root'",
     ),
-    "harmonics": (f"reduce {MATRICES} -o a.npz".replace("rbe2", f"fourier:{HUGE},1"), "fourier"),
+    "harmonics": (f"reduce {MATRICES} -o a.npz".replace("rbe2", f"fourier:{HUGE},1"), "1000000000000 harmonics"),
     "steps": ("simulate pendulum.toml --t-end 1e9 --dt 1e-9 -o out", "1e+18"),
     "an end beyond numbers": ("simulate pendulum.toml --t-end 1e308 -o out", "t_end"),
 }
@@ -167,7 +167,8 @@ CASES = [
       for name, x, E, rho in (("E", "1e300", "1e300", "7850"), ("E", "1e-300", "1e-300", "7850"),
                               ("rho", "1e300", "210e9", "1e300"), ("rho", "1e-300", "210e9", "1e-300"))),
     case("a time without a step", "simulate pendulum.toml --t-end 1e-300 --dt 1e-301 -o out",
-         (*SIZES, rom.errors.SolverError, Silent, Warned), ("dt", "t_end", "e-30")),
+         (*SIZES, rom.errors.SolverError, Silent, Warned), ("dt", "t_end", "e-30"),
+         leaves=True),
     case("a mass without unit prefix", "simulate pendulum.toml -o out", (*SIZES, FileFormatError), "mass",
          given=edit("pendulum.toml", "mass = 1.0", 'mass = "1e400 kg"')),
 ]  # fmt: skip

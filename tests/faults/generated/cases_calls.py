@@ -44,6 +44,13 @@ def stone():
     return mech, rom.simulate(mech, t_end=0.05, dt=0.01)
 
 
+def two_stones():
+    mech = rom.Mechanism()
+    for name in ("a", "b"):
+        mech.add_rigid(name, mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, 0))
+    return mech
+
+
 @cache
 def beam():
     return body()
@@ -314,6 +321,6 @@ CASES = [
     case("matrices that do not fit", lambda folder: craig_bampton(M=identity(3, format="csr")), GATES,
          "36"),
     case("a state of another mechanism",
-         lambda folder: rom.simulate(rom.Mechanism(), state=stone()[1].final, t_end=1.0, dt=0.1),
+         lambda folder: rom.simulate(two_stones(), state=stone()[1].final, t_end=1.0, dt=0.1),
          BLAMED, "state"),
 ]  # fmt: skip

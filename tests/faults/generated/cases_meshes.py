@@ -14,6 +14,7 @@ from rom.fe.mesh import read_mesh
 BOX = solid()
 BLOCKS, NAMES = blocks_of(BOX)
 CELLS = BOX.cells
+BELOW = next(k for k, row in enumerate(CELLS) if set(BLOCKS[1][3][0]) <= set(row))
 FILE = (FileFormatError, MeshError, TagError, UnsafeFileError)
 MUTANTS = 8  # of each format
 TEXTS = {  # text of the mesh of the stock, another one, and what it is
@@ -33,7 +34,7 @@ ROWS = {  # cells in place of those of the box
     "a node twice in a cell": (np.vstack([CELLS, [[0, 1, 1, 9]]]), "73"),
     "a node beyond the end": (np.vstack([CELLS, [[0, 1, 2, 5000]]]), "5001"),
     "a negative node": (np.vstack([CELLS, [[0, 1, 2, -7]]]), "-6"),
-    "one cell less": (CELLS[1:], "box.msh"),
+    "one cell less, below a named facet": (np.delete(CELLS, BELOW, axis=0), "root"),
     "an inverted cell": (np.vstack([CELLS[:-1], CELLS[-1:, [1, 0, 2, 3]]]), "box.msh"),
 }
 

@@ -41,7 +41,7 @@ SPOILT = {  # what a law in Python may do in the middle of a motion
 STEPS = {
     "a step of 1e-18 s": ({"dt": 1e-18}, (ConfigError, ResourceError), "1e-18"),
     "a step of 5e-324 s": ({"dt": 5e-324}, (ConfigError, ResourceError), "dt"),
-    "a million million steps": ({"dt": 1e-13}, (ConfigError, ResourceError), "1e-13"),
+    "a million million steps": ({"dt": 1e-13}, (ConfigError, ResourceError), ("1e-13", "1e+12")),
     "no step": ({"dt": 0.0}, ConfigError, "dt"),
     "a step back": ({"dt": -0.01}, ConfigError, "dt"),
     "an end before the start": ({"dt": 0.01, "t_start": 1.0}, ConfigError, "t_end"),

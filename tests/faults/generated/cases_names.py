@@ -178,6 +178,6 @@ CASES = [
     case("two keys that are not there", "simulate pendulum.toml -o out", ConfigError, "masss", "atx",
          given=(edit("pendulum.toml", "mass =", "masss ="), edit("pendulum.toml", "at =", "atx ="))),
     case("two markers that are not there", "simulate pendulum.toml -o out", (ConfigError, ModelError),
-         "bob.pn", given=edit("pendulum.toml", "bob.pin", "bob.pn")),
+         "'pm'", "'pn'", given=edit("pendulum.toml", '{ ground = [0, 0, 0] }, "bob.pin"', '"bob.pm", "bob.pn"')),
     case("a parent that is a file", "export good.npz good.npz/x.vtu", ConfigError, "good.npz"),
 ]  # fmt: skip

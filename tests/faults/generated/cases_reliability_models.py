@@ -266,7 +266,7 @@ CASES = [
     case("D13 scalar", "simulate pendulum.toml -o out", ConfigError, "gravity",
          given=edit("pendulum.toml", "[0, -9.81, 0]", "9.81")),
     case("D13 millimetres", "simulate pendulum.toml -o out", (Warned, ConfigError), ("9810", "gravity"), leaves=True,
-         given=edit("pendulum.toml", "-9.81", "-9810")),
+         given=(edit("pendulum.toml", "-9.81", "-9810"), edit("pendulum.toml", "dt = 0.01", "dt = 1e-4"))),
     case("E01", lambda folder: rom.reduce(model(), method=rom.Guyan(), interfaces={"rot": "rbe2"}),
          InterfaceError, "rot", "root"),
     case("E03", interface(None, "full"), (Silent, Warned), "interior"),
