@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _checked(
-    args: argparse.Namespace, output: Path | None, name: str, inputs: "Iterable[Path]" = ()
+    args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
 ) -> Path:
     """The file to write, before anything is computed for it."""
     require({OUTPUT: output})

@@ -217,7 +217,7 @@ class _Path:
 
     def rates(self) -> tuple[Array, Array]:
         """First and second time derivative of the free motions."""
-        if self.rate == 0.0:
+        if self.rate == 0.0 or not self.Z.size:
             return 0 * self.Z, 0 * self.Z
         h = TURN / self.rate
         _, before = self.at(-h)

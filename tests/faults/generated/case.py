@@ -1,11 +1,24 @@
-"""One fault: what is done, what may come of it, and the words that name the culprit."""
+"""One fault: what is done, what may come of it, what names the culprit; and all faults by class."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 SECONDS = 60.0  # a case may take, on a machine that does other things too
+
+CLASSES = {  # number of the class: what it is about, and its modules
+    "1": ("code from the working folder", ("cases_code",)),
+    "2": ("names as paths", ("cases_names",)),
+    "3": ("geometries as programs", ("cases_geometry",)),
+    "4": ("motion lost", ("cases_motion",)),
+    "5": ("silent wrong physics", ("cases_physics",)),
+    "6": ("blame", ("cases_calls", "cases_files")),
+    "7": ("bounds", ("cases_bounds",)),
+    "8": ("alone and together", ("cases_together",)),
+    "R": ("odd cases of the reliability table", ("cases_reliability", "cases_reliability_models")),
+}
 
 
 class Works:
@@ -86,3 +99,17 @@ def by_id(letter: str, cases: Iterable[Case]) -> dict[str, Case]:
         assert f"{letter}:{one.name}" not in found, f"{letter}:{one.name} is there twice"
         found[f"{letter}:{one.name}"] = one
     return found
+
+
+def all_cases() -> dict[str, Case]:
+    """{id: case}, in order."""
+    found: dict[str, Case] = {}
+    for letter, (_, modules) in CLASSES.items():
+        cases = [one for m in modules for one in import_module(f"generated.{m}").CASES]
+        found |= by_id(letter, cases)
+    return found
+
+
+def planted() -> dict[str, Case]:
+    """Cases whose verdict is known, for the test of the judge."""
+    return by_id("J", import_module("generated.judge").MISTAKES)

@@ -40,7 +40,10 @@ LINES = {
         f"reduce {MATRICES} -o a.npz".replace("rbe2", f"polynomial:{HUGE}"),
         "order 1000000000000 on interface 'root'",
     ),
-    "harmonics": (f"reduce {MATRICES} -o a.npz".replace("rbe2", f"fourier:{HUGE},1"), "1000000000000 harmonics"),
+    "harmonics": (
+        f"reduce {MATRICES} -o a.npz".replace("rbe2", f"fourier:{HUGE},1"),
+        "1000000000000 harmonics",
+    ),
     "steps": ("simulate pendulum.toml --t-end 1e9 --dt 1e-9 -o out", "1e+18"),
     "an end beyond numbers": ("simulate pendulum.toml --t-end 1e308 -o out", "t_end"),
 }

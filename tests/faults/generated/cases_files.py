@@ -1,4 +1,4 @@
-"""Body, state, family, matrix and SID files: damaged by hand, by table and at random."""
+"""Command lines and files of all kinds: wrong by hand, by table and at random."""
 
 import json
 
@@ -7,10 +7,12 @@ from damage import HOSTILE, WAYS
 
 import rom
 from generated.case import Silent, Warned, case, edit, write
+from generated.stock import MATRICES, STEEL
 from rom.errors import (
     ConfigError,
     FileFormatError,
     InterfaceError,
+    MaterialError,
     ModelError,
     QualityGateError,
     UnsafeFileError,
@@ -45,7 +47,7 @@ ARRAYS = {  # what is done to an array of a body
 READERS = {  # a file, how it is read, and how it is damaged
     BODY: rom.load, STATE: rom.load_state, FAMILY: rom.load, SID: read_sid,
 }  # fmt: skip
-MATRICES = {  # the line of the market file that is changed
+MARKET = {  # the line of the market file that is changed
     "another banner": ("%%MatrixMarket", "%%MatrixShop"),
     "a complex field": ("real", "complex"),
     "an unknown symmetry": ("symmetric", "diagonal"),
@@ -86,6 +88,160 @@ NASTRAN = (
 )
 LINE = "reduce K.mtx --mass M.mtx --nodes deck.inp -i root=rbe2 -i tip=rbe2 --no-certificate -m 4 -o a.npz"
 FOREIGN = (*READ, ConfigError, InterfaceError)
+CONFIG = (ConfigError,)
+MECHANISM = {  # what stands in pendulum.toml, what instead, and what is named
+    "an unknown key": ("mass =", "masss =", "masss"),
+    "an unknown table": ("[simulation]", "[simulations]", "simulations"),
+    "a key in the wrong place": ("[simulation]", "[simulation]\nmass = 1", "mass"),
+    "a key twice": ("dt = 0.01", "dt = 0.01\ndt = 0.02", "dt"),
+    "a table twice": ("[simulation]", "[simulation]\n[simulation]", "simulation"),
+    "a missing key": ("mass = 1.0\n", "", "mass"),
+    "a missing table": ("[simulation]\nt_end = 0.05\ndt = 0.01\n", "", "simulation"),
+    "text for a number": ("mass = 1.0", 'mass = "heavy"', "mass"),
+    "a number as text": ("mass = 1.0", 'mass = "1.0"', "mass"),
+    "a list for a number": ("mass = 1.0", "mass = [1.0]", "mass"),
+    "a table for a number": ("mass = 1.0", "mass = { kg = 1 }", "mass"),
+    "a truth for a number": ("mass = 1.0", "mass = true", "mass"),
+    "a date for a number": ("mass = 1.0", "mass = 2020-01-01", "mass"),
+    "nan": ("mass = 1.0", "mass = nan", "mass"),
+    "infinity": ("mass = 1.0", "mass = inf", "mass"),
+    "zero": ("mass = 1.0", "mass = 0", "mass"),
+    "a negative mass": ("mass = 1.0", "mass = -1.0", "mass"),
+    "a huge whole number": ("mass = 1.0", "mass = 1" + 400 * "0", "mass"),
+    "another dimension": ("mass = 1.0", 'mass = "1 m"', "mass"),
+    "an unknown unit": ("mass = 1.0", 'mass = "1 stone"', "stone"),
+    "a unit without number": ("mass = 1.0", 'mass = "kg"', "mass"),
+    "two numbers": ("mass = 1.0", 'mass = "1 2 kg"', "mass"),
+    "a decimal comma": ("mass = 1.0", "mass = 1,0", "pendulum.toml:4"),
+    "a decimal comma in a text": ("mass = 1.0", 'mass = "1,0 kg"', "mass"),
+    "no quotes": ("mass = 1.0", "mass = 1 kg", "pendulum.toml:4"),
+    "an open quote": ('kind = "revolute"', 'kind = "revolute', "pendulum.toml:9"),
+    "an open bracket": ("axis = [0, 0, 1]", "axis = [0, 0, 1", "pendulum.toml"),
+    "two numbers for three": ("axis = [0, 0, 1]", "axis = [0, 1]", "axis"),
+    "four numbers for three": ("axis = [0, 0, 1]", "axis = [0, 0, 0, 1]", "axis"),
+    "numbers and text": ("axis = [0, 0, 1]", 'axis = [0, "a", 1]', "axis"),
+    "an unknown kind": ('"revolute"', '"revolut"', "revolut"),
+    "no kind": ('kind = "revolute"\n', "", "kind"),
+    "one marker": (', "bob.pin"]', "]", "between"),
+    "a marker without a point": ('"bob.pin"', '"bobpin"', "bobpin"),
+    "an unknown body": ('"bob.pin"', '"ball.pin"', "ball"),
+    "an unknown marker": ('"bob.pin"', '"bob.pn"', "pn"),
+    "a body twice in a joint": ("{ ground = [0, 0, 0] }", '"bob.pin"', ("bob", "hinge")),
+    "no direction": ("axis = [0, 0, 1]", "axis = [0, 0, 0]", "axis"),
+    "inertia of no body": ("[1e-3, 1e-3, 1e-3]", "[1e-3, 1e-3, 3e-3]", "inertia"),
+    "negative inertia": ("[1e-3, 1e-3, 1e-3]", "[1e-3, 1e-3, -1e-3]", "inertia"),
+    "no time": ("t_end = 0.05", "t_end = 0", "t_end"),
+    "time backwards": ("t_end = 0.05", "t_end = -1", "t_end"),
+    "a step longer than the run": ("dt = 0.01", "dt = 1", "dt"),
+    "an unknown method": ("dt = 0.01", 'dt = 0.01\nmethod = "newmark"', "newmark"),
+    "a spectral radius of 2": ("dt = 0.01", "dt = 0.01\nrho_inf = 2", "rho_inf"),
+    "half an order": ("dt = 0.01", 'dt = 0.01\nmethod = "bdf"\norder = 2.5', "order"),
+    "an order of nine": ("dt = 0.01", 'dt = 0.01\nmethod = "bdf"\norder = 9', "order"),
+    "a truth as text": ("dt = 0.01", 'dt = 0.01\nstabilised = "yes"', "stabilised"),
+    "a column that is not there": ("[simulation]", '[output]\nplot = ["bob heat"]\n[simulation]', "bob heat"),
+    "a drive of no joint": ("[simulation]", '[drives.m]\njoint = "hing"\nlaw = 1\n[simulation]', "hing"),
+    "an unknown law": ("[simulation]", '[drives.m]\njoint = "hinge"\nlaw = { kind = "sine" }\n[simulation]', "sine"),
+    "a table of one point": ("[simulation]", '[drives.m]\njoint = "hinge"\nlaw = { kind = "table", t = [0], values = [0] }\n[simulation]', ("law", "drives.m")),
+    "times that fall": ("[simulation]", '[drives.m]\njoint = "hinge"\nlaw = { kind = "table", t = [0, 2, 1], values = [0, 0, 0] }\n[simulation]', "drives.m"),
+    "a table that ends early": ("[simulation]", '[drives.m]\njoint = "hinge"\nlaw = { kind = "table", t = [0, 0.01, 0.02], values = [0, 0, 0] }\n[simulation]', "drives.m"),
+    "a spring of a wrong unit": ("[simulation]", '[springs.s]\nbetween = [{ ground = [0, 0, 0] }, "bob.pin"]\nstiffness = "1 N m"\n[simulation]', "stiffness"),
+    "a body file that is not there": ("[simulation]", '[bodies.rod]\nfile = "nope.npz"\n[simulation]', "nope.npz"),
+}  # fmt: skip
+COMPONENT = {  # the same of part.toml
+    "an unknown key": ("stiffness =", "stifness =", "stifness"),
+    "a stiffness that is not there": ('"K.mtx"', '"nope.mtx"', "nope.mtx"),
+    "a mass that is not there": ('"M.mtx"', '"nope.mtx"', "nope.mtx"),
+    "nodes that are not there": ('"deck.inp"', '"nope.inp"', "nope.inp"),
+    "the mass for the nodes": ('"deck.inp"', '"M.mtx"', ("M.mtx", ".mtx")),
+    "no mass": ('mass = "M.mtx"\n', "", "mass"),
+    "an interface without nodes": ('root = "rbe2"', 'rot = "rbe2"', "rot"),
+    "an unknown kind of interface": ('root = "rbe2"', 'root = "rbe4"', "rbe4"),
+    "no interface": ('root = "rbe2"\ntip = "rbe2"\n', "", "interface"),
+    "more modes than dofs": ("modes = 4", "modes = 400", ("400", "modes")),
+    "half a mode": ("modes = 4", "modes = 4.5", "modes"),
+    "negative modes": ("modes = 4", "modes = -4", "modes"),
+    "an unknown frame": ('reference = "root"', 'reference = "rot"', "rot"),
+    "an unknown method": ("modes = 4", 'method = "craig"', "craig"),
+    "two ways to choose modes": ("modes = 4", "modes = 4\nf_max = 100.0", "f_max"),
+    "a tolerance alone": ("modes = 4", "tol = 0.1", "tol"),
+    "two dampings": ("ratio = 0.01", "ratio = 0.01\nalpha = 1", ("ratio", "damping")),
+    "a negative ratio": ("ratio = 0.01", "ratio = -0.01", "ratio"),
+    "a ratio with a unit": ("ratio = 0.01", 'ratio = "1 Hz"', "ratio"),
+    "an unknown unit system": ('nodes = "deck.inp"', 'nodes = "deck.inp"\nunits = "inch"', "inch"),
+    "a folder for a matrix": ('"K.mtx"', '"."', "."),
+    "a geometry too": ("[interfaces]", '[geometry]\nfile = "box.msh"\n[interfaces]', "geometry"),
+    "a name that is no text": ('"part"', "7", "name"),
+}
+LINES = {  # command lines of which one thing is wrong
+    "nothing": ("", "verb"),
+    "an unknown verb": ("redcue x.msh", "redcue"),
+    "an unknown option": (f"modes box.msh {STEEL} --degre=1", "--degre"),
+    "a file too many": ("check good.npz other.npz", "other.npz"),
+    "an option without value": ("modes box.msh --E", "--E"),
+    "text for a number": ("modes box.msh --E steel", "steel"),
+    "a decimal comma": (f"modes box.msh {STEEL} --scale 0,3", "0,3"),
+    "nan": (f"modes box.msh {STEEL} --scale nan", "nan"),
+    "a number too large": (f"modes box.msh {STEEL} --scale 1e999", "1e999"),
+    "half a mode": (f"modes box.msh {STEEL} -n 1.5", "1.5"),
+    "a negative count": (f"modes box.msh {STEEL} -n=-1", "-1"),
+    "an interface without kind": (f"modes box.msh {STEEL} -i root", "root"),
+    "an interface of an empty kind": (f"modes box.msh {STEEL} -i root=", "root="),
+    "an interface twice": (f"reduce {MATRICES} -i root=full -o a.npz", "root"),
+    "polynomials of no order": (
+        f"reduce {MATRICES} -o a.npz".replace("rbe2", "polynomial:x", 1),
+        "polynomial",
+    ),
+    "an unknown method": (f"reduce {MATRICES} --method craig -o a.npz", "craig"),
+    "an unknown unit system": (f"reduce {MATRICES} --units inch -o a.npz", "inch"),
+    "an unknown format": ("export good.npz a.vtu --to fbx", "fbx"),
+    "an unknown ending": ("export good.npz a.fbx", ".fbx"),
+    "no ending": ("export good.npz a", "a"),
+    "a missing folder": ("export good.npz no/a.vtu", "no"),
+    "a folder as output": ("export good.npz .", "."),
+    "an axis of two numbers": (
+        "simulate good.npz --hinge root --axis 0,1 --t-end 1 --dt 1e-3 -o out",
+        "0,1",
+    ),
+    "an axis of zeros": (
+        "simulate good.npz --hinge root --axis 0,0,0 --t-end 1 --dt 1e-3 -o out",
+        "axis",
+    ),
+    "an unknown film": ("simulate pendulum.toml --film mp4 -o out", "mp4"),
+    "an option of bodies for a mechanism": (
+        "simulate pendulum.toml --hinge root -o out",
+        "--hinge",
+    ),
+    "an option of geometries for matrices": (f"reduce {MATRICES} --E 1 -o a.npz", "--E"),
+    "a mass for a mesh": (f"modes box.msh {STEEL} --nodes deck.inp", "--nodes"),
+    "a set of no label": (f"reduce {MATRICES} --set root=one -o a.npz", "one"),
+    "a set backwards": (f"reduce {MATRICES} --set root=4-1 -o a.npz", "4-1"),
+    "one number of Rayleigh": (f"reduce {MATRICES} --rayleigh 0.1 -o a.npz", "--rayleigh"),
+    "Rayleigh's nan": (f"reduce {MATRICES} --rayleigh nan,0 -o a.npz", ("rayleigh", "alpha")),
+    "a degree of seven": (f"modes box.msh {STEEL} --degree 7", "7"),
+    "an unknown solver": (f"modes box.msh {STEEL} --solver fast", "fast"),
+    "no modes": (f"modes box.msh {STEEL} -n 0", "0"),
+    "a face of a mesh": ("mesh box.msh --face pin=0,0,0", "face"),
+    "an unknown material": ("swing box.msh --hinge root --material wood -o out", "wood"),
+    "an unknown shell": ("completion cmd", "cmd"),
+    "an unknown benchmark": ("bench reducton", "reducton"),
+}
+WANTS_FE = ("degree of seven", "unknown solver", "no modes", "face of a mesh")
+ANY = (ConfigError, ModelError, InterfaceError, FileFormatError, MaterialError)
+BYTES = {  # whole documents
+    "empty": (b"", "bodies"),
+    "a blank line": (b"\n", "bodies"),
+    "zeros": (b"\0" * 100, "pendulum.toml"),
+    "not UTF-8": (b"name = '\xff'", "pendulum.toml"),
+    "UTF-16": ("name = 'a'".encode("utf-16"), "pendulum.toml"),
+    "JSON": (b'{"bodies": {}}', "pendulum.toml"),
+    "a mark of the byte order": (b"\xef\xbb\xbfname = 1", ("pendulum.toml", "name")),
+    "a zip": (b"PK\3\4" + bytes(range(256)), "pendulum.toml"),
+    "deep brackets": (b"a = " + b"[" * 10000 + b"]" * 10000, "brackets"),
+    "deep keys": (b"a" + b".a" * 400_000 + b" = 1", ("pendulum.toml", "a.a")),
+    "a line of a megabyte": (b"name = '" + b"x" * 999_000 + b"'", ("bodies", "name")),
+    "more than a megabyte": (b"#" * 50_000_000, "bytes"),
+    "ten thousand bodies": (b"".join(b"[bodies.a%d]\n" % k for k in range(10_000)), "mass"),
+}
 
 
 def cut(name, share):
@@ -156,6 +312,17 @@ def numbered(name, old, value):
 
 
 CASES = [
+    *(case(f"a mechanism: {name}", "simulate pendulum.toml -o out", ANY, *words,
+           given=edit("pendulum.toml", old, new)) for name, (old, new, *words) in MECHANISM.items()),
+    *(case(f"a component: {name}", "reduce part.toml -o a.npz", ANY, *words,
+           given=edit("part.toml", old, new)) for name, (old, new, *words) in COMPONENT.items()),
+    *(case(f"a line: {name}", line, CONFIG, *words, fe=any(x in name for x in WANTS_FE))
+      for name, (line, *words) in LINES.items()),
+    *(case(f"a document: {name}", "simulate pendulum.toml -o out",
+           (ConfigError, FileFormatError, UnsafeFileError), *words, given=write("pendulum.toml", data))
+      for name, (data, *words) in BYTES.items()),
+    case("a warning with --strict", f"modes box.msh --strict -n 7 {STEEL} --degree 1", QualityGateError,
+         "linear tetrahedra", fe=True),
     *(case(f"{name} instead of another: {k}", reading(name), READ, name, given=write(name, data))
       for name in READERS for k, data in {"nothing": b"", "text": b"hello\n", "zeros": b"\0" * 99}.items()),
     *(case(f"{share:.0%} of {name}", reading(name), READ, name, given=cut(name, share))
@@ -173,7 +340,7 @@ CASES = [
            given=array(name, ARRAYS[what])) for what in ("longer", "shorter", "asymmetric")
       for name in ("K", "inertia")),
     *(case(f"a matrix: {name}", LINE, FOREIGN, "K.mtx", given=edit("K.mtx", *texts))
-      for name, texts in MATRICES.items()),
+      for name, texts in MARKET.items()),
     *(case(f"a deck: {name}", LINE, FOREIGN, word, given=edit("deck.inp", old, new))
       for name, (old, new, word) in DECKS.items()),
     *(case(f"{form}: {name}", NASTRAN.format(form), FOREIGN, *words, given=given)

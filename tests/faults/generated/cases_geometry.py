@@ -1,7 +1,13 @@
-"""Geometries are programs: they end, within time and memory, or are stopped by name."""
+"""Geometries are programs: they end, or are stopped by name; and damaged meshes crash nothing."""
+
+import zipfile
+
+import numpy as np
+from cells import blocks_of, solid, write_msh
+from damage import WAYS
 
 from generated.case import Silent, Warned, Works, case, edit, require, write
-from generated.stock import GEO
+from generated.stock import GEO, deck
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -46,7 +52,11 @@ STATEMENTS = {  # one statement more, and what is told
         "'a'",
     ),
     "an empty surface": ('Physical Surface("pin", 12) = {};', (TagError, FileFormatError), "pin"),
-    "a name twice": ('Physical Surface("root", 12) = {2};', (TagError, FileFormatError), ("root", "surface 11")),
+    "a name twice": (
+        'Physical Surface("root", 12) = {2};',
+        (TagError, FileFormatError),
+        ("root", "surface 11"),
+    ),
     "a volume in two groups": ('Physical Volume("liner", 2) = {1};', (TagError,), "liner"),
     "a file that is not there": ('Include "nope.geo";', (FileFormatError,), "nope.geo"),
     "a merged file that is not there": (
@@ -102,12 +112,120 @@ def again(folder):
         require(len(read_mesh(folder / "box.geo").cells) == 24, "another mesh")
 
 
+BOX = solid()
+BLOCKS, NAMES = blocks_of(BOX)
+CELLS = BOX.cells
+BELOW = next(k for k, row in enumerate(CELLS) if set(BLOCKS[1][3][0]) <= set(row))
+FILE = (FileFormatError, MeshError, TagError, UnsafeFileError)
+MUTANTS = 4  # of each format
+TEXTS = {  # text of the mesh of the stock, another one, and what it is
+    "no format": ("$MeshFormat", "$MshFormat"),
+    "version 9": ("2.2 0 8", "9.9 0 8"),
+    "no end": ("$EndElements", ""),
+    "no nodes": ("$Nodes", "$Notes"),
+    "a node too many": ("$Nodes\n36", "$Nodes\n37"),
+    "nodes without number": ("$Nodes\n36", "$Nodes\nmany"),
+    "a negative number of nodes": ("$Nodes\n36", "$Nodes\n-36"),
+    "a huge number of nodes": ("$Nodes\n36", "$Nodes\n999999999999"),
+    "a word for a coordinate": ("1 0.0 0.0 0.0", "1 0.0 zero 0.0"),
+    "a decimal comma": ("1 0.0 0.0 0.0", "1 0,0 0,0 0,0"),
+}
+ROWS = {  # cells in place of those of the box
+    "a cell twice": (np.vstack([CELLS, CELLS[:1]]), "73"),
+    "a node twice in a cell": (np.vstack([CELLS, [[0, 1, 1, 9]]]), "73"),
+    "a node beyond the end": (np.vstack([CELLS, [[0, 1, 2, 5000]]]), "5001"),
+    "a negative node": (np.vstack([CELLS, [[0, 1, 2, -7]]]), "-6"),
+    "one cell less, below a named facet": (np.delete(CELLS, BELOW, axis=0), "root"),
+    "an inverted cell": (np.vstack([CELLS[:-1], CELLS[-1:, [1, 0, 2, 3]]]), "box.msh"),
+}
+
+
+def msh(points=BOX.points, blocks=BLOCKS, names=NAMES):
+    return lambda folder: write_msh(folder / "box.msh", points, blocks, names)
+
+
+def cells(rows):
+    return msh(blocks=[("tet4", 1, 1, rows), *BLOCKS[1:]])
+
+
+def moved(node, x):
+    points = BOX.points.copy()
+    points[node] = x
+    return msh(points)
+
+
+def mutated(name, way, seed):
+    """A file of the stock, damaged at random."""
+
+    def prepare(folder):
+        data = (folder / name).read_bytes()
+        (folder / name).write_bytes(way(data, np.random.default_rng(seed)))
+
+    return prepare
+
+
+def cut(name, share):
+    """A file of which only this share is there."""
+
+    def prepare(folder):
+        data = (folder / name).read_bytes()
+        (folder / name).write_bytes(data[: int(share * len(data))])
+
+    return prepare
+
+
+def rewritten(version, binary):
+    """The mesh of the stock in another form of the format, as mutant.msh."""
+
+    def prepare(folder):
+        import gmsh
+
+        gmsh.initialize([], False)
+        try:
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.merge(str(folder / "box.msh"))
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.write(str(folder / "mutant.msh"))
+        finally:
+            gmsh.finalize()
+
+    return prepare
+
+
+def zipped(folder):
+    with zipfile.ZipFile(folder / "box.msh", "w") as archive:
+        archive.writestr("box.msh", "$MeshFormat")
+
+
+def same(name):
+    """The box, whatever the form."""
+
+    def act(folder):
+        mesh = read_mesh(folder / name)
+        require(len(mesh.cells) == 72 and sorted(mesh.facets) == ["root", "tip"], "another mesh")
+
+    return act
+
+
+def valid(name):
+    """A mesh that is read is one of finite numbers."""
+
+    def act(folder):
+        mesh = read_mesh(folder / name)
+        require(np.isfinite(mesh.points).all() and len(mesh.cells), "no mesh")
+
+    return act
+
+
+FORMS = {"2.2 in ASCII": (2.2, 0), "2.2 binary": (2.2, 1), "4.1 in ASCII": (4.1, 0),
+         "4.1 binary": (4.1, 1)}  # fmt: skip
 CASES = [
-    *(case(name, "mesh box.geo --time-limit 2", (ResourceError, FileFormatError), "box.geo", fe=True,
+    *(case(name, "mesh box.geo --time-limit 1", (ResourceError, FileFormatError), "box.geo", fe=True,
            given=geometry(line)) for name, line in ENDLESS.items()),
-    *(case(f"{name} within time", "mesh box.geo --time-limit 2", (ResourceError, FileFormatError),
+    *(case(f"{name} within time", "mesh box.geo --time-limit 1", (ResourceError, FileFormatError),
            "box.geo", fe=True, given=geometry(line)) for name, line in LARGE.items()),
-    *(case(f"{name} within memory", "mesh box.geo --memory-limit 0.7 --time-limit 5",
+    *(case(f"{name} within memory", "mesh box.geo --memory-limit 0.7 --time-limit 2",
            (ResourceError, FileFormatError), "box.geo", fe=True, given=geometry(line))
       for name, line in LARGE.items()),
     *(case(name, "mesh box.geo", accept, word, fe=True, given=geometry(line))
@@ -130,4 +248,29 @@ CASES = [
          given=write("box.geo", b"\0" * 1000)),
     case("an empty geometry", "mesh box.geo", (FileFormatError, MeshError), "box.geo", fe=True,
          given=write("box.geo", "")),
+    *(case(name, "mesh box.msh", FILE, "box.msh", given=edit("box.msh", *texts), fe=True)
+      for name, texts in TEXTS.items()),
+    *(case(name, "mesh box.msh", (MeshError, FileFormatError, TagError), word, given=cells(rows),
+           fe=True) for name, (rows, word) in ROWS.items() if name != "an inverted cell"),
+    case("an inverted cell", "mesh box.msh", (MeshError, Silent, Warned), "box.msh",
+         given=cells(ROWS["an inverted cell"][0]), fe=True),
+    *(case(f"a coordinate of {x}", "mesh box.msh", FILE, "box.msh", given=moved(9, [x, 0, 0]), fe=True)
+      for x in (np.nan, np.inf, 1e308)),
+    *(case(f"read as it is: {name}", same("mutant.msh"), Silent, given=rewritten(*form), fe=True)
+      for name, form in FORMS.items()),
+    *(case(f"damaged {name}, {k}", valid("mutant.msh"), (*FILE, Silent, Warned), "mutant.msh", fe=True,
+           given=(rewritten(*form), mutated("mutant.msh", WAYS[k % 3], 10 * n + k)))
+      for n, (name, form) in enumerate(FORMS.items()) for k in range(MUTANTS)),
+    *(case(f"damaged deck, {k}", valid("box.inp"), (*FILE, Silent, Warned, ConfigError), "box.inp",
+           given=mutated("box.inp", WAYS[k % 5], k), fe=True) for k in range(MUTANTS)),
+    *(case(f"{share:.0%} of a mesh", "mesh box.msh", FILE, "box.msh", given=cut("box.msh", share),
+           fe=True) for share in (0.0, 0.01, 0.3, 0.8, 0.99)),
+    case("a zip as a mesh", "mesh box.msh", FILE, "box.msh", given=zipped, fe=True),
+    case("a deck as a mesh", "mesh box.msh", FILE, "box.msh", fe=True,
+         given=lambda folder: deck(folder / "box.msh", BOX)),
+    case("text as a step", "mesh a.step", FILE, "a.step", given=write("a.step", "hello\n"), fe=True),
+    case("a folder as a mesh", "mesh a.msh", FILE, "a.msh", fe=True,
+         given=lambda folder: (folder / "a.msh").mkdir()),
+    case("a mesh of another suffix", "mesh box.obj", ConfigError, ".obj", fe=True,
+         given=write("box.obj", "v 0 0 0\n")),
 ]  # fmt: skip

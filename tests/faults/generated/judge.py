@@ -5,13 +5,14 @@ import os
 import select
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from generated.case import Case, Silent, Warned, Works
-from generated.classes import CLASSES, all_cases, planted
+from generated.case import CLASSES, Case, Silent, Warned, Works, all_cases, case, planted, require
+from rom.errors import ConfigError, MeshError
 
 MOST_CHARACTERS = 5000  # of a message that somebody still reads
 GRACE = 10.0  # s, beyond the time of a case, until its process is stopped
@@ -150,3 +151,41 @@ def figures(found: list[Verdict]) -> str:
             f"{sum(v.right for v in own):8}{named:>12}"
         )
     return "\n".join(rows)
+
+
+def endless(folder):
+    while True:
+        time.sleep(0.01)
+
+
+def foreign(folder):
+    raise ValueError("not one of ours")
+
+
+def leaving(folder):
+    (folder / "half").write_text("")
+    raise ConfigError("no such option: --lc.")
+
+
+def outside(folder):
+    (folder.parent / "elsewhere").write_text("")
+
+
+def refused(folder):
+    raise ConfigError("no such option: --lc.")
+
+
+# mistakes whose verdict is known, for the test of the judge; they count in no figure
+MISTAKES = [
+    case("a crash", lambda folder: os.abort(), Works),
+    case("an exit", lambda folder: os._exit(0), Works),
+    case("a hang", endless, Works, seconds=0.5),
+    case("another exception", foreign, (Works, ConfigError)),
+    case("a file that is left", leaving, ConfigError),
+    case("a file elsewhere", outside, Works),
+    case("another class", refused, MeshError),
+    case("another word", refused, ConfigError, "--hex"),
+    case("no warning", refused, Silent),
+    case("a wrong value", lambda folder: require(False, "2 instead of 3"), Works),
+    case("nothing wrong", refused, ConfigError, "--lc"),
+]

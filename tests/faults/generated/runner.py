@@ -19,8 +19,7 @@ from typing import Any
 from unittest import mock
 
 import rom.cli.main as command_line
-from generated.case import Case, Wrong
-from generated.classes import all_cases, planted
+from generated.case import Case, Wrong, all_cases, planted
 from generated.stock import PLANTED
 from rom.errors import QualityGateError, RomError, RomWarning
 

@@ -159,6 +159,18 @@ def pendulum(**bob: Any) -> Any:
     return mech
 
 
+def compile_kernels() -> None:
+    """Compile what cases call, where nothing is compiled yet: that is no hang."""
+    mech = pendulum()
+    mech.drive("motor", "hinge", lambda t: 0.0 * t)
+    still = rom.equilibrium(pendulum())
+    for method in ("generalized-alpha", "bdf", "dop853"):
+        rom.simulate(pendulum(), t_end=0.02, dt=0.01, method=method)
+    rom.simulate(mech, t_end=0.02, dt=0.01)
+    rom.linearize(pendulum(), still)
+    rom.transmissibility(mech, None, [1.0], drive="motor", motion=mech.part("bob").marker("pin"))
+
+
 def origin(mech: Any) -> Any:
     """The origin, on the ground."""
     return mech.ground.marker((0, 0, 0))
