@@ -13,7 +13,7 @@ from solid import block
 
 import rom
 from generated.case import Silent, Warned, Works, case, edit, require
-from generated.stock import KINDS, STEEL, body, model, origin, pendulum
+from generated.stock import KINDS, STEEL, body, model, on_ranks, origin, pendulum
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -234,8 +234,7 @@ def spoilt_force(folder):
 
 def one_thread(n):
     def act(folder):
-        run = subprocess.run(["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-m", "rom", *MODES.split(), "--json"],
-                             capture_output=True, timeout=60, check=False)  # fmt: skip
+        run = on_ranks(n, f"{MODES} --json")
         require(run.returncode == 0, run.stderr[-500:])
         found = json.loads(run.stdout)["frequencies"][6:]
         with warnings.catch_warnings():

@@ -10,7 +10,7 @@ import numpy as np
 
 import rom
 from generated.case import Silent, Works, case, require
-from generated.stock import KINDS, STEEL, body, model, pendulum
+from generated.stock import KINDS, STEEL, body, model, on_ranks, pendulum
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
 
@@ -161,8 +161,7 @@ def ranks(words, code):
     """On two ranks: one code, within seconds."""
 
     def act(folder):
-        run = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-m", "rom", *words.split()],
-                             capture_output=True, timeout=30, check=False)  # fmt: skip
+        run = on_ranks(2, words)
         require(run.returncode == code, f"exit code {run.returncode}: {run.stderr[-500:]!r}")
 
     return act
