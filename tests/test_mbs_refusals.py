@@ -71,7 +71,7 @@ WRONG = {
                         "'j': axis = (0, 0, nan)"),
     "axis of two": (lambda m, a, b: m.prismatic("j", a, b, axis=(0, 1)), "axis of j"),
     "cross without arm": (lambda m, a, b: m.universal("j", a, b, axis1=Z, axis2=(0, 0, 0)),
-                          "axis of j has length zero"),
+                          "axis2 of j has length zero"),
     "joint twice": (lambda m, a, b: m.revolute("hinge", a, b, axis=Z), "'hinge' is used twice"),
     "joint like a body": (lambda m, a, b: m.fixed("box", a, b), "'box' is used twice"),
     "load like a joint": (lambda m, a, b: m.force("ball", a, Z), "'ball' is used twice"),
