@@ -103,12 +103,10 @@ def compiled(folder):
 
 TRUST = ("trust",)
 CASES = [
+    *(case(f"{len(names)} modules beside {name}", f"mesh {name}", Silent, given=planted(*names), fe=True)
+      for name, names in {"box.msh": MESHING, "box.inp": (*MESHING, "meshio"), "box.geo": MESHING}.items()),
     *(case(f"{name}.py beside a mesh", "mesh box.msh", Silent, given=planted(name), fe=True)
-      for name in MESHING),
-    *(case(f"{name}.py beside a deck", "mesh box.inp", Silent, given=planted(name), fe=True)
-      for name in ("numpy", "meshio", "json")),
-    *(case(f"{name}.py beside a geometry", "mesh box.geo", Silent, given=planted(name), fe=True)
-      for name in ("numpy", "gmsh")),
+      for name in ("numpy", "gmsh", "rom", "sitecustomize")),
     case("all of them beside a picture", "view good.npz -o a.png", Silent,
          given=planted(*DRAWING), seconds=40),
     case("all of them beside a report", "report good.npz -o a.html", Silent,

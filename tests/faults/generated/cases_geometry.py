@@ -1,7 +1,5 @@
 """Geometries are programs: they end, or are stopped by name; and damaged meshes crash nothing."""
 
-import zipfile
-
 import numpy as np
 from cells import blocks_of, solid, write_msh
 from damage import WAYS
@@ -32,9 +30,7 @@ LARGE = {
 }
 STATEMENTS = {  # one statement more, and what is told
     "no brace": ("Box(2) = {0, 0, 0;", (FileFormatError,), "box.geo"),
-    "no semicolon": ("x = 1", (FileFormatError,), "box.geo"),
     "an unknown variable": ("x = yy + 1;", (FileFormatError,), "yy"),
-    "an unknown function": ("x = Foo(1);", (FileFormatError,), "Foo"),
     "a box twice": ("Box(1) = {0, 0, 0, 1, 1, 1};", (FileFormatError, MeshError), "box.geo"),
     "a box without volume": (
         "Box(2) = {0, 0, 0, 0, 1, 1};",
@@ -57,7 +53,6 @@ STATEMENTS = {  # one statement more, and what is told
         (TagError, FileFormatError),
         ("root", "surface 11"),
     ),
-    "a volume in two groups": ('Physical Volume("liner", 2) = {1};', (TagError,), "liner"),
     "a file that is not there": ('Include "nope.geo";', (FileFormatError,), "nope.geo"),
     "a merged file that is not there": (
         'Merge "nope.step";',
@@ -66,7 +61,6 @@ STATEMENTS = {  # one statement more, and what is told
     ),
     "an error of its own": ('Error("too thin");', (FileFormatError,), "too thin"),
     "the end": ("Exit;", (FileFormatError, MeshError, TagError, Silent, Warned), "box.geo"),
-    "abort": ("Abort;", (FileFormatError, MeshError, TagError, Silent, Warned), "box.geo"),
     "a division by zero": (
         "x = 1/0; Box(2) = {5, 0, 0, x, 1, 1};",
         (FileFormatError, MeshError),
@@ -117,7 +111,7 @@ BLOCKS, NAMES = blocks_of(BOX)
 CELLS = BOX.cells
 BELOW = next(k for k, row in enumerate(CELLS) if set(BLOCKS[1][3][0]) <= set(row))
 FILE = (FileFormatError, MeshError, TagError, UnsafeFileError)
-MUTANTS = 4  # of each format
+MUTANTS = 3  # of each format
 TEXTS = {  # text of the mesh of the stock, another one, and what it is
     "no format": ("$MeshFormat", "$MshFormat"),
     "version 9": ("2.2 0 8", "9.9 0 8"),
@@ -131,10 +125,7 @@ TEXTS = {  # text of the mesh of the stock, another one, and what it is
     "a decimal comma": ("1 0.0 0.0 0.0", "1 0,0 0,0 0,0"),
 }
 ROWS = {  # cells in place of those of the box
-    "a cell twice": (np.vstack([CELLS, CELLS[:1]]), "73"),
     "a node twice in a cell": (np.vstack([CELLS, [[0, 1, 1, 9]]]), "73"),
-    "a node beyond the end": (np.vstack([CELLS, [[0, 1, 2, 5000]]]), "5001"),
-    "a negative node": (np.vstack([CELLS, [[0, 1, 2, -7]]]), "-6"),
     "one cell less, below a named facet": (np.delete(CELLS, BELOW, axis=0), "root"),
     "an inverted cell": (np.vstack([CELLS[:-1], CELLS[-1:, [1, 0, 2, 3]]]), "box.msh"),
 }
@@ -193,11 +184,6 @@ def rewritten(version, binary):
     return prepare
 
 
-def zipped(folder):
-    with zipfile.ZipFile(folder / "box.msh", "w") as archive:
-        archive.writestr("box.msh", "$MeshFormat")
-
-
 def same(name):
     """The box, whatever the form."""
 
@@ -225,9 +211,8 @@ CASES = [
            given=geometry(line)) for name, line in ENDLESS.items()),
     *(case(f"{name} within time", "mesh box.geo --time-limit 1", (ResourceError, FileFormatError),
            "box.geo", fe=True, given=geometry(line)) for name, line in LARGE.items()),
-    *(case(f"{name} within memory", "mesh box.geo --memory-limit 0.7 --time-limit 2",
-           (ResourceError, FileFormatError), "box.geo", fe=True, given=geometry(line))
-      for name, line in LARGE.items()),
+    case("a huge list within memory", "mesh box.geo --memory-limit 0.7 --time-limit 5",
+         (ResourceError, FileFormatError), "box.geo", fe=True, given=geometry(LARGE["a huge list"])),
     *(case(name, "mesh box.geo", accept, word, fe=True, given=geometry(line))
       for name, (line, accept, word) in STATEMENTS.items()),
     *(case(f"a parameter: {name}", f"mesh box.geo {words} --time-limit 5", accept, word, fe=True)
@@ -264,8 +249,7 @@ CASES = [
     *(case(f"damaged deck, {k}", valid("box.inp"), (*FILE, Silent, Warned, ConfigError), "box.inp",
            given=mutated("box.inp", WAYS[k % 5], k), fe=True) for k in range(MUTANTS)),
     *(case(f"{share:.0%} of a mesh", "mesh box.msh", FILE, "box.msh", given=cut("box.msh", share),
-           fe=True) for share in (0.0, 0.01, 0.3, 0.8, 0.99)),
-    case("a zip as a mesh", "mesh box.msh", FILE, "box.msh", given=zipped, fe=True),
+           fe=True) for share in (0.0, 0.3, 0.99)),
     case("a deck as a mesh", "mesh box.msh", FILE, "box.msh", fe=True,
          given=lambda folder: deck(folder / "box.msh", BOX)),
     case("text as a step", "mesh a.step", FILE, "a.step", given=write("a.step", "hello\n"), fe=True),

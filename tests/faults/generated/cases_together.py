@@ -218,12 +218,12 @@ CASES = [
       for name, words in MISSING.items()),
     *(case(f"{what} with {name}", in_circumstances(environment, LIGHT[what]), Works)
       for name, environment in CIRCUMSTANCES.items()
-      for what in (("simulate",) if name in ("no HOME", "the locale C") else ("check",))),
+      for what in (("simulate",) if name in ("no HOME",) else ("check",))),
     case("a German locale and a geometry", in_circumstances(CIRCUMSTANCES["a German locale"], ["mesh", "box.geo"]),
          Works, fe=True),
     case("four exports at once", several(4, ["export", "good.npz", "same.npz"], whole("same.npz")), Works),
-    case("three motions in one folder at once",
-         several(3, ["simulate", "pendulum.toml", "-o", "out", "-q"], tabled), Works),
+    case("two motions in one folder at once",
+         several(2, ["simulate", "pendulum.toml", "-o", "out", "-q"], tabled), Works),
     case("three meshes at once", several(3, ["mesh", "box.geo"], lambda folder: None), Works, fe=True),
     case("motions in threads", threads(motion), Works),
     case("reductions in threads", threads(frequencies), Works),
