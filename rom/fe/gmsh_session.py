@@ -97,8 +97,8 @@ def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     known = geo_parameters(gmsh)
     chosen = {_full_name(name, known, path): v for name, v in request["parameters"].items()}
     for name, value in chosen.items():
-        if isinstance(known[name], str) and isinstance(value, str):
-            gmsh.onelab.setString(name, [value])
+        if isinstance(known[name], str):
+            gmsh.onelab.setString(name, [_text(name, value, path)])
         else:
             gmsh.onelab.setNumber(name, [_number(name, value, path)])
     if chosen:
@@ -137,6 +137,12 @@ def _number(name: str, value: Any, path: Path) -> float:
     if isinstance(value, bool | int | float) and value - value == 0:
         return float(value)
     raise ConfigError(f"parameter {name!r} of {path.name} must be a finite number, got {value!r}.")
+
+
+def _text(name: str, value: Any, path: Path) -> str:
+    if isinstance(value, str):
+        return value
+    raise ConfigError(f"parameter {name!r} of {path.name} must be a text, got {value!r}.")
 
 
 def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:

@@ -217,6 +217,10 @@ CASES = [
       for name, (line, accept, word) in STATEMENTS.items()),
     *(case(f"a parameter: {name}", f"mesh box.geo {words} --time-limit 5", accept, word, fe=True)
       for name, (words, accept, word) in PARAMETERS.items()),
+    case("a parameter: a number for a text", "mesh box.geo -p word=7", ConfigError, "word", fe=True,
+         given=geometry('DefineConstant[ w = {"a", Name "word"} ];')),
+    case("a parameter: a text for a text", "mesh box.geo -p word=b", Silent, fe=True,
+         given=geometry('DefineConstant[ w = {"a", Name "word"} ];')),
     case("a time limit in Python", within(time_limit=1.0, parameters={"lc": 1e-4}), ResourceError,
          "box.geo", fe=True),
     case("a memory limit in Python", within(memory_limit=7e8), ResourceError, "box.geo", fe=True,
