@@ -363,7 +363,7 @@ def test_bad_bodies_are_named():
     pair.elements[0].frames[0, 1] = 1
     part = mech.add_nonlinear("pair", pair)
     for place in ("near", True, 2, 1.0):
-        with pytest.raises(ConfigError, match="pair|place = "):
+        with pytest.raises(ConfigError, match=r"pair|place = "):
             part.marker(place)
     with pytest.raises(ConfigError, match="used twice"):
         mech.add_rigid("pair", mass=1.0, inertia=(1, 1, 1), at=ORIGIN)
