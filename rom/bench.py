@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import identity, kron
 
-from rom.bench_models import SPEED, STEEL, TITANIUM, bar, chain_of, slider_crank
+from rom.bench_models import CRANK_SPEED, STEEL, TITANIUM, bar, chain_of, slider_crank
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.reduction.interface import connect
@@ -90,7 +90,7 @@ def integrator(turns: int = 40) -> Iterator[Figure]:
     beam = bar((0.16, 0.02, 0.012), (16, 2, 1))
     method, kinds = CraigBampton(20), dict(KINDS)
     rod = reduce(beam, method=method, interfaces=kinds, reference=tuple(kinds), certify=False)
-    mechanism, turn = slider_crank(rod), 2 * pi / SPEED
+    mechanism, turn = slider_crank(rod), 2 * pi / CRANK_SPEED
     warm = simulate(mechanism, t_end=turn, dt=turn / 1000)
     run = simulate(mechanism, t_end=(turns + 1) * turn, dt=turn / 1000, state=warm.final)
     case = f"{rod.n_modes} elastic coordinates, {run.statistics['steps']} steps"

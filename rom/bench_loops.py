@@ -13,7 +13,7 @@ from rom.components.masonry_limits import arch
 from rom.components.two_dof_linkages import FiveBar, rod
 
 COPPER = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
-LENGTH, RADIUS, SPEED = 32.4e-3, 3.2e-3, 227.0  # of Taylor's bar [m, m, m/s]
+BAR_LENGTH, BAR_RADIUS, IMPACT_SPEED = 32.4e-3, 3.2e-3, 227.0  # of Taylor's bar [m, m, m/s]
 
 
 def measured(
@@ -50,12 +50,12 @@ def _still(stones: Any, steps: int) -> Motion:
 
 
 def _struck(height: int, t_end: float) -> Flight:
-    corners = [(0, 0), (RADIUS, 0), (RADIUS, LENGTH), (0, LENGTH)]
+    corners = [(0, 0), (BAR_RADIUS, 0), (BAR_RADIUS, BAR_LENGTH), (0, BAR_LENGTH)]
     X, T = rectangle((5, height), corners)
     body = sheet(X, T, element="F1", state="axisymmetric")
     axis, wall = (2 * np.flatnonzero(X[:, k] < 1e-9) + k for k in (0, 1))
     v = np.zeros_like(X)
-    v[:, 1] = -SPEED
+    v[:, 1] = -IMPACT_SPEED
     return fly(body, COPPER, v, np.concatenate([axis, wall]), t_end)
 
 

@@ -9,7 +9,7 @@ from rom.model import FEModel, Interface, Material
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 TITANIUM = Material(E=114e9, nu=0.33, rho=4430.0)
-SPEED = 300.0  # of the crank [rad/s]
+CRANK_SPEED = 300.0  # [rad/s]
 
 
 def bar(size: tuple[float, ...], cells: tuple[int, ...], material: Material = STEEL) -> FEModel:
@@ -71,13 +71,13 @@ def slider_crank(rod: Any) -> Any:
 
     mech, radius = Mechanism(gravity=(0, -9.81, 0)), 0.04
     a, b = rod.marker("root").point, rod.marker("tip").point
-    moving = {"velocity": (0, SPEED * radius, 0)}
+    moving = {"velocity": (0, CRANK_SPEED * radius, 0)}
     crank = mech.add_rigid(
         "crank",
         mass=1.0,
         inertia=(6e-4, 9e-4, 6e-4),
         at=(0, 0, 0),
-        omega=(0, 0, SPEED),
+        omega=(0, 0, CRANK_SPEED),
         markers={"pin": (radius, 0, 0)},
     )
     bar = mech.add_flexible("rod", rod, at=np.array([radius, 0, 0]) - a, **moving)
@@ -88,7 +88,7 @@ def slider_crank(rod: Any) -> Any:
     mech.revolute("crank pin", crank.marker("pin"), bar.marker("root"), axis=z)
     mech.revolute("wrist pin", bar.marker("tip"), slider.marker(origin), axis=z)
     mech.prismatic("guide", mech.ground.marker(end), slider.marker(origin), axis=(1, 0, 0))
-    mech.drive("motor", "main", lambda t: SPEED * t)
+    mech.drive("motor", "main", lambda t: CRANK_SPEED * t)
     return mech
 
 

@@ -45,9 +45,9 @@ def measured(
         "sector": lambda: _waves(sector, families),
         "wheel": lambda: _whole(sector, families * N),
     }
-    for name, way in ways.items():
+    for name, compute in ways.items():
         start = process_time()
-        f[name] = way()
+        f[name] = compute()
         taken[name] = process_time() - start
         yield case, f"{name}: processor time", taken[name], "s", ""
         yield case, f"{name}: peak memory so far", _peak(), "GiB", ""

@@ -16,11 +16,11 @@ from rom.rows import FREQUENCY_RTOL, frequency_rows, row
 N_COMPARED = 6  # elastic modes compared in each support
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
 # rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
-ASYMMETRY = 1e-6
-JUDGED = 1e-6  # frequency error above which an estimate must be right
-CREDIBLE = 2.0  # factor by which a frequency error may exceed its estimate
+ASYMMETRY_RTOL = 1e-6
+MIN_JUDGED_ERROR = 1e-6  # frequency error above which the estimate is compared with it
+MAX_ERROR_RATIO = 2.0  # frequency error over its estimate
 ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
-CLUSTER = 1e-3  # modes closer than this (relative) are compared as one subspace
+CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
 
 
 def certify_body(
@@ -111,7 +111,7 @@ def _cluster_mac(table: Array, full: Array, reduced: Array) -> Array:
     Modes of nearly one frequency may rotate among themselves; they count together.
     """
     best = reduced[np.argmax(table, axis=1)]
-    near = np.abs(reduced[None, :] - best[:, None]) <= CLUSTER * best[:, None]
+    near = np.abs(reduced[None, :] - best[:, None]) <= CLUSTER_RTOL * best[:, None]
     return np.minimum((table * near).sum(axis=1), 1.0)
 
 
@@ -128,8 +128,8 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     if not table["full"]:
         return [worst]
     error = np.array(table["reduced"]) / np.array(table["full"]) - 1
-    ratio = (error / np.maximum(estimate, JUDGED)).max()
-    return [worst, row(f"{support}: largest error over its estimate", ratio, CREDIBLE)]
+    ratio = (error / np.maximum(estimate, MIN_JUDGED_ERROR)).max()
+    return [worst, row(f"{support}: largest error over its estimate", ratio, MAX_ERROR_RATIO)]
 
 
 def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:
@@ -189,7 +189,7 @@ def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> li
     lam = np.linalg.eigvalsh(scale[:, None] * (0.5 * (M + M.T)) * scale)
     return [
         *_coupling_row(connection, basis, K, stiff),
-        row("asymmetry of projected K and M", asymmetry, ASYMMETRY),
+        row("asymmetry of projected K and M", asymmetry, ASYMMETRY_RTOL),
         row("smallest eigenvalue of the scaled mass", lam[0], 1e-13, above=True),
         row("condition of the scaled mass", lam[-1] / max(lam[0], 1e-300), 1e13),
         row("mass-normalised shapes", np.abs(body.M - np.eye(body.n_modes)).max(initial=0.0), 1e-8),

@@ -25,7 +25,7 @@ ENTRY = Path(__file__).with_name("child_entry.py")
 ROOT = str(Path(__file__).resolve().parents[1])
 INSTALLED = ("site-packages", "dist-packages")  # on the path of every child anyway
 FOLDER_PREFIX, FOLDER_SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
-GRACE = 1.0  # seconds between SIGTERM and SIGKILL
+GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL
 # The launcher of MPI recognises its processes by these; a child is none of them.
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
 
@@ -139,8 +139,8 @@ def finish(process: subprocess.Popen[bytes], seconds: float = 0.0) -> Ended:
         with uninterrupted():
             _end(process)
         raise
-    said, complained = (text.decode(errors="replace") for text in (out, err))
-    return Ended(process.returncode, said, complained, overtime)
+    message, complained = (text.decode(errors="replace") for text in (out, err))
+    return Ended(process.returncode, message, complained, overtime)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -149,7 +149,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, number)
         with suppress(subprocess.TimeoutExpired):
-            process.wait(GRACE)
+            process.wait(GRACE_PERIOD)
 
 
 def environment(*, own: bool = True) -> dict[str, str]:

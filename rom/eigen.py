@@ -14,7 +14,7 @@ from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Interface
 
 Weighted = tuple[float, list[tuple[float, Any]]]
-CLUSTER = 1e-5  # eigenvalues closer than this (relative) belong to one space
+CLUSTER_RTOL = 1e-5  # relative distance of eigenvalues that belong to one space
 ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
 
 
@@ -166,7 +166,7 @@ def whole_clusters(lam: Array, m: int) -> int:
         lam: (k,) ascending eigenvalues.
         m: number of modes wanted, 1 <= m <= k.
     """
-    while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER * lam[m]:
+    while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER_RTOL * lam[m]:
         m += 1
     return m
 
@@ -269,10 +269,10 @@ def residual_errors(
     """
     KX, MX = ops.apply_K(X), ops.apply_M(X)
     energy = np.diag(ops.gram(X, KX))
-    rest = KX - MX * (energy / np.diag(ops.gram(X, MX)))
+    residual = KX - MX * (energy / np.diag(ops.gram(X, MX)))
     if seen_in is not None:
-        ops, rest = seen_in, seen_in.restrict(rest)
-    return np.diag(ops.gram(rest, inverse(rest))) / (2 * energy)
+        ops, residual = seen_in, seen_in.restrict(residual)
+    return np.diag(ops.gram(residual, inverse(residual))) / (2 * energy)
 
 
 def _squares(ops: Operators, Phi: Array) -> Array:

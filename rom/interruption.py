@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-AGAIN = 0.05  # seconds after which a signal that was lost is sent again
+RESEND_DELAY = 0.05  # [s] after which a signal that was lost is sent again
 
 
 class Terminated(KeyboardInterrupt):
@@ -82,7 +82,7 @@ def heed_lost_signals() -> None:
             usual(lost)
             return
         number = signal.SIGTERM if isinstance(lost.exc_value, Terminated) else signal.SIGINT
-        again = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
+        again = threading.Timer(RESEND_DELAY, os.kill, (os.getpid(), number))
         again.daemon = True
         again.start()
 

@@ -173,12 +173,14 @@ def _solid_doubt(solid: Material | Orthotropic) -> str:
     """Speed of sound or density that no solid has, and the unit system that may be meant."""
     numbers = f"the solid with E = {solid.E}, rho = {solid.rho:g}"
     density = STIFF_DENSITY if solid.wave_speed > FOAM_SPEED else SOLID_DENSITY
-    said = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
-    if not said:
+    message = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
+    if not message:
         return ""
     meant = [name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)]
     kind = type(solid).__name__
-    return f"{said} Units of {meant[0]}? {kind}.from_units({meant[0]!r}, …)." if meant else said
+    return (
+        f"{message} Units of {meant[0]}? {kind}.from_units({meant[0]!r}, …)." if meant else message
+    )
 
 
 def _is_stiff(solid: Material | Orthotropic, unit: UnitSystem) -> bool:

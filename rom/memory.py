@@ -5,7 +5,7 @@ import resource
 from collections.abc import Iterator
 from pathlib import Path
 
-UNLIMITED = 1 << 60
+NO_LIMIT = 1 << 60
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 GROUP_FILES = (  # limit, use, and the line of memory.stat with what is given back when asked for
     ("memory.max", "memory.current", "file"),
@@ -27,7 +27,7 @@ def machine_bytes() -> float:
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
     except OSError:
-        return float(UNLIMITED)
+        return float(NO_LIMIT)
     fields = dict(line.split(":", 1) for line in lines)
     return 1024.0 * float(fields["MemAvailable"].split()[0])
 
@@ -36,7 +36,7 @@ def address_bytes() -> float:
     """What the limit on address space leaves."""
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
-        return float(UNLIMITED)
+        return float(NO_LIMIT)
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     return float(limit - pages * os.sysconf("SC_PAGE_SIZE"))
 
@@ -51,8 +51,8 @@ def group_bytes(folder: Path) -> float:
             cached = float(dict(pairs).get(cache, 0))
         except (OSError, ValueError):
             continue
-        return float(UNLIMITED) if text == "max" else max(float(text) - used + cached, 0.0)
-    return float(UNLIMITED)
+        return float(NO_LIMIT) if text == "max" else max(float(text) - used + cached, 0.0)
+    return float(NO_LIMIT)
 
 
 def _groups() -> Iterator[Path]:

@@ -13,7 +13,7 @@ from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
 from rom.names import check_text
-from rom.notebook import shown
+from rom.notebook import html_table
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -249,7 +249,7 @@ class Modes:
         if self.residual is not None:
             columns, names = [*columns, self.residual], [*names, "residual"]
         rows = zip(range(1, self.omega.size + 1), *columns, strict=True)
-        return shown(f"Modes: {self._said}", ("mode", *names), rows)
+        return html_table(f"Modes: {self._said}", ("mode", *names), rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,4 +304,6 @@ class Report:
     def _repr_html_(self) -> str:
         ordered = (*self.failures, *(row for row in self.rows if row.ok))
         rows = ((r.quantity, r.value, r.limit, "ok" if r.ok else "FAILED") for r in ordered)
-        return shown(f"{self.title}: {self._verdict}", ("quantity", "value", "limit", ""), rows)
+        return html_table(
+            f"{self.title}: {self._verdict}", ("quantity", "value", "limit", ""), rows
+        )

@@ -4,11 +4,11 @@ import html
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-MOST = 20  # rows shown
+MAX_ROWS = 20  # rows shown
 
 
-def shown(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A title and a table in HTML; beyond `MOST` rows it says how many there are.
+def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A title and a table in HTML; beyond `MAX_ROWS` rows it says how many there are.
 
     Args:
         title: one line of text.
@@ -16,9 +16,9 @@ def shown(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> s
         rows: texts and numbers, which are written with five digits.
     """
     listed = list(rows)
-    lines = [_line("td", row) for row in listed[:MOST]]
-    if len(listed) > MOST:
-        more = f"and {len(listed) - MOST} more"
+    lines = [_line("td", row) for row in listed[:MAX_ROWS]]
+    if len(listed) > MAX_ROWS:
+        more = f"and {len(listed) - MAX_ROWS} more"
         lines.append(f"<tr><td colspan='{len(header)}'>{more}</td></tr>")
     head = f"<thead>{_line('th', header)}</thead>" if any(header) else ""
     return (

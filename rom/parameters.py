@@ -16,9 +16,9 @@ from rom.model import Array
 from rom.names import check_text, named
 from rom.plausible import FACTOR, warn_outside
 
-FEW = 3  # parameters up to which all corners of their range are visited
+MAX_CORNER_PARAMETERS = 3  # all corners of the range are visited up to here
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
-SLACK = 1e-12  # relative, by which round-off may leave a range
+RANGE_RTOL = 1e-12  # round-off by which a value may leave its range
 Point = dict[str, float]
 
 
@@ -48,8 +48,8 @@ class Parameter:
         for name in ("low", "high"):
             value = getattr(self, name)
             if not is_number(value):
-                said = f"{name} = {shortened(value)} is not a finite factor."
-                raise ParameterError(said, where=str(self))
+                message = f"{name} = {shortened(value)} is not a finite factor."
+                raise ParameterError(message, where=str(self))
         if not 0.0 < self.low <= self.high:
             raise ParameterError(
                 f"the range {self.low:g} to {self.high:g} of {self} is not one of positive factors."
@@ -162,12 +162,12 @@ def _checked(name: str, parameter: Parameter, value: Any, extrapolate: bool) -> 
     if not (number and np.isfinite(value) and value > 0):
         raise ParameterError(f"{name} = {value!r} is not a positive factor.")
     low, high = parameter.low, parameter.high
-    if not low * (1 - SLACK) <= value <= high * (1 + SLACK):
-        said = f"{name} = {value:g} is outside {low:g} to {high:g}, where the basis was made."
+    if not low * (1 - RANGE_RTOL) <= value <= high * (1 + RANGE_RTOL):
+        message = f"{name} = {value:g} is outside {low:g} to {high:g}, where the basis was made."
         if not extrapolate:
             cure = "Reduce again with a wider range, or ask with extrapolate=True."
-            raise ParameterError(said, hint=cure)
-        warnings.warn(RomWarning(f"{said} Errors there are unknown."), stacklevel=5)
+            raise ParameterError(message, hint=cure)
+        warnings.warn(RomWarning(f"{message} Errors there are unknown."), stacklevel=5)
     return float(value)
 
 
@@ -179,7 +179,7 @@ def centre(parameters: dict[str, Parameter]) -> Point:
 def corners(parameters: dict[str, Parameter], moving: list[str]) -> list[Point]:
     """Ends of the ranges of some parameters: all corners of a few, one at a time of many."""
     middle, ends = centre(parameters), {n: (parameters[n].low, parameters[n].high) for n in moving}
-    if len(moving) <= FEW:
+    if len(moving) <= MAX_CORNER_PARAMETERS:
         found = [dict(zip(moving, c, strict=True)) for c in itertools.product(*ends.values())]
     else:
         found = [{name: end} for name, both in ends.items() for end in both]

@@ -118,13 +118,13 @@ DAMPING = Range(
 )  # fmt: skip
 
 
-FAR = 100.0  # sizes from the origin: four of sixteen digits of an inertia cancel
-SCALED = 100.0  # times a default, from where a value is another unit
+MAX_ORIGIN_RATIO = 100.0  # sizes from the origin: four of sixteen digits of an inertia cancel
+SCALED_RATIO = 100.0  # times a default, from where a value has another unit
 
 
 def far_doubt(distance: float, size: float, of: str) -> str:
     """A sentence if a body lies so far from the origin that digits cancel, else nothing."""
-    if distance <= FAR * size:
+    if distance <= MAX_ORIGIN_RATIO * size:
         return ""
     ratio = distance / size if size > 0.0 else math.inf
     lost = min(2 * math.log10(ratio), 16.0)
@@ -138,7 +138,7 @@ def far_doubt(distance: float, size: float, of: str) -> str:
 def scaled_doubt(name: str, value: Any, default: Any) -> str:
     """A sentence if a length or count is out of all proportion to its default, else nothing."""
     usual = all(isinstance(x, Real) and not isinstance(x, bool) and x for x in (value, default))
-    if not usual or 1 / SCALED <= abs(value / default) <= SCALED:
+    if not usual or 1 / SCALED_RATIO <= abs(value / default) <= SCALED_RATIO:
         return ""
     return (
         f"parameter {name} = {value:g} is {abs(value / default):.3g} times its default "

@@ -15,7 +15,7 @@ from rom.io.files import write_whole
 from rom.model import Report
 from rom.names import ORIGIN_MARK
 
-STYLE = """
+PAGE_STYLE = """
 body { font: 16px/1.5 "DejaVu Sans", "Segoe UI", Arial, sans-serif; color: #20242a;
        max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.7rem; } h2 { font-size: 1.2rem; margin-top: 2.5rem; }
@@ -29,7 +29,7 @@ figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
 figcaption, caption { font-size: 0.9rem; color: #4a515b; text-align: left; caption-side: bottom; }
 """
 KINDS = {".png": "image/png", ".gif": "image/gif"}
-LARGEST = 20_000_000  # bytes of one picture: more makes a report nobody can open
+MAX_PICTURE_BYTES = 20_000_000  # more makes a report that browsers cannot open
 
 
 def paragraph(text: str) -> str:
@@ -85,8 +85,10 @@ def picture(path: str | Path, caption: str) -> str:
     if path.suffix.lower() not in KINDS or not path.is_file():
         raise ConfigError(f"{path} is no picture of the kinds {', '.join(KINDS)}.")
     data = path.read_bytes()
-    if len(data) > LARGEST:
-        raise ConfigError(f"{path} has {len(data)} bytes; pictures up to {LARGEST} are embedded.")
+    if len(data) > MAX_PICTURE_BYTES:
+        raise ConfigError(
+            f"{path} has {len(data)} bytes; pictures up to {MAX_PICTURE_BYTES} are embedded."
+        )
     code = base64.b64encode(data).decode("ascii")
     words = html.escape(caption, quote=True)
     return (
@@ -122,7 +124,7 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
         f"<meta name='generator' content='{ORIGIN_MARK}'>"
         f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
-        f"<style>{STYLE}</style></head><body><h1>{name}</h1>{body}</body></html>\n"
+        f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{body}</body></html>\n"
     )
     write_whole(path, lambda file: file.write(text.encode("utf-8")))
     return path

@@ -33,6 +33,6 @@ def frequency_rows(
         row(f"{support}: reduced never below full", error.min(), -BELOW_FULL_RTOL, above=True),
     ]
     if table.get("mac"):
-        said = f"{support}: lowest MAC of {n} shapes"
-        rows.append(row(said, min(table["mac"]), MIN_MAC, above=True))
+        message = f"{support}: lowest MAC of {n} shapes"
+        rows.append(row(message, min(table["mac"]), MIN_MAC, above=True))
     return rows

@@ -21,11 +21,11 @@ from rom.errors import (
 from rom.model import Array, Index
 from rom.names import named
 
-SINGULAR = 1e-13  # smallest over largest pivot below which K_ii counts as singular
-ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
+PIVOT_RTOL = 1e-13  # smallest over largest pivot below which K_ii counts as singular
+RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
 SYMMETRIC = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
-DENSE = 300  # dofs up to which all eigenvalues are computed at once
-SPARE = 3  # modes computed beyond the ones asked for, so that a gap for counting is found
+MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
+N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
 
 
 class HeldSciPy:
@@ -156,7 +156,7 @@ class SciPyOperators:
             raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
         R = self._zero_modes()
         n_elastic = max(m - R.shape[1], 0)
-        if self.n <= DENSE:
+        if self.n <= MAX_DENSE_DOFS:
             lam, Phi = _dense_modes(self.K, self.M, self.n)
             lam, Phi = lam[R.shape[1] :][:n_elastic], Phi[:, R.shape[1] :][:, :n_elastic]
         else:
@@ -182,7 +182,7 @@ class SciPyOperators:
             y = lu.solve(x - MR @ (R.T @ x))
             return y - R @ (MR.T @ y)
 
-        k = min(m + SPARE, self.n - R.shape[1] - 1)
+        k = min(m + N_SPARE_MODES, self.n - R.shape[1] - 1)
         start = np.sin(1.0 + np.arange(self.n))
         operator = LinearOperator(self.K.shape, matvec=inverse)
         lam, Phi = eigsh(
@@ -190,7 +190,7 @@ class SciPyOperators:
         )
         order = np.argsort(lam)
         lam, Phi = lam[order], Phi[:, order]
-        lam[np.abs(lam) < ZERO * self._largest()] = 0.0
+        lam[np.abs(lam) < RIGID_RTOL * self._largest()] = 0.0
         if R.shape[1] and lam[0] == 0.0:
             raise ModelError(
                 f"at least {np.count_nonzero(lam == 0.0)} more motions without stiffness than the "
@@ -210,7 +210,9 @@ class SciPyOperators:
             X = np.linalg.qr(X)[0]
         X -= R @ (R.T @ (self.M @ X))
         lam = eigh(X.T @ (self.K @ X), X.T @ (self.M @ X), eigvals_only=True)
-        return float(max(lam[np.argmax(lam > ZERO * self._largest())], ZERO * self._largest()))
+        return float(
+            max(lam[np.argmax(lam > RIGID_RTOL * self._largest())], RIGID_RTOL * self._largest())
+        )
 
     def _largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals."""
@@ -259,7 +261,7 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
         raise InterfaceError(advice, hint=cure) from error
     pivots = np.abs(lu.U.diagonal())
     ratio = pivots.min() / pivots.max()
-    if ratio < SINGULAR:
+    if ratio < PIVOT_RTOL:
         raise InterfaceError(f"{advice[:-1]} (pivot ratio {ratio:.1e}).", hint=cure)
     n_negative = int(np.count_nonzero(lu.U.diagonal() < 0))
     if n_negative and np.array_equal(lu.perm_r, lu.perm_c):
@@ -304,11 +306,11 @@ def _lowest(K: csr_matrix, M: csr_matrix, lu: SuperLU, m: int) -> tuple[Array, A
     n = K.shape[0]
     if m == 0:
         return np.zeros(0), np.zeros((n, 0))
-    if n <= DENSE or m + SPARE >= n:  # Lanczos cannot return all modes
+    if n <= MAX_DENSE_DOFS or m + N_SPARE_MODES >= n:  # Lanczos cannot return all modes
         return _dense_modes(K, M, m)
     inverse = LinearOperator(K.shape, matvec=lu.solve)
     start = np.sin(1.0 + np.arange(n))
-    lam, Phi = eigsh(K, m + SPARE, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
+    lam, Phi = eigsh(K, m + N_SPARE_MODES, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
     order = np.argsort(lam)
     lam, Phi = lam[order], Phi[:, order]
     _verify_count(K, M, lam, m)

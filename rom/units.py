@@ -108,7 +108,7 @@ UNITS = {
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
 FACTOR = re.compile(r"([A-Za-z\u03bc°%]+|1)(?:(?:\^|\*\*)?([+-]?[1-9]))?")
 SUPERSCRIPTS = str.maketrans("²³⁴⁻¹", "234-1")
-LONGEST = 80  # letters of a quantity
+MAX_LETTERS = 80  # of a quantity
 
 
 def unit(text: str) -> Unit:
@@ -162,19 +162,19 @@ def in_si(text: str, wanted: str) -> float:
     Raises:
         ConfigError: if it is no quantity, or one of another dimension.
     """
-    match = NUMBER.match(text.strip()) if len(text) <= LONGEST else None
+    match = NUMBER.match(text.strip()) if len(text) <= MAX_LETTERS else None
     if not match:
-        raise ConfigError(f"{text[:LONGEST]!r} does not begin with a number.")
-    rest = text.strip()[match.end() :].strip()
-    if rest.startswith(","):
+        raise ConfigError(f"{text[:MAX_LETTERS]!r} does not begin with a number.")
+    symbol = text.strip()[match.end() :].strip()
+    if symbol.startswith(","):
         raise ConfigError(f"{text!r}: a decimal point is needed, not a comma.")
     goal = unit(wanted)
-    if not rest and goal.dimension != NONE:
+    if not symbol and goal.dimension != NONE:
         raise ConfigError(
             f"{text!r} has no unit; {wanted} is wanted.",
             hint=f'Write "{match[0]} {wanted}", or the number without quotes for {wanted}.',
         )
-    found = unit(rest) if rest else goal
+    found = unit(symbol) if symbol else goal
     if not fits(found.dimension, goal.dimension):
         raise ConfigError(f"{text!r} is {dimension_name(found.dimension)}; {_wanted(wanted)}.")
     try:

@@ -33,7 +33,7 @@ from rom.reduction.order import with_orders
 from rom.scipy_operators import SciPyOperators
 
 log = logging.getLogger("rom")
-CYCLIC = "cyclic"  # what the faces are called where sectors of a wheel meet
+CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
 
 def mesh_operators(model: FEModel) -> Operators:
@@ -118,11 +118,11 @@ def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
     """norm(K phi - lambda M phi) / (lambda norm(M phi)) on the free dofs."""
     free = ~np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
     inertia = ops.apply_M(Phi)
-    rest = (ops.apply_K(Phi) - inertia * omega**2) * free[:, None]
+    residual = (ops.apply_K(Phi) - inertia * omega**2) * free[:, None]
     inertia = inertia * free[:, None]
     scale = np.maximum(omega, omega[omega > 0].min(initial=np.inf)) ** 2
     scale[~np.isfinite(scale)] = 1.0
-    norms = [np.sqrt(np.diag(ops.gram(X, X))) for X in (rest, inertia)]
+    norms = [np.sqrt(np.diag(ops.gram(X, X))) for X in (residual, inertia)]
     return norms[0] / (scale * norms[1])
 
 
@@ -243,12 +243,12 @@ def _reduced_sector(
             "none of them.",
             hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
         )
-    if set(interfaces) - {CYCLIC}:
+    if set(interfaces) - {CYCLIC_FACES}:
         raise ConfigError(
-            f"a sector has one interface, {CYCLIC!r}, not {sorted(interfaces)}.",
-            hint=f"Write interfaces={{{CYCLIC!r}: rom.Polynomial(4)}}.",
+            f"a sector has one interface, {CYCLIC_FACES!r}, not {sorted(interfaces)}.",
+            hint=f"Write interfaces={{{CYCLIC_FACES!r}: rom.Polynomial(4)}}.",
         )
-    return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC))
+    return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC_FACES))
 
 
 @contextmanager

@@ -8,12 +8,20 @@ from numpy.testing import assert_allclose
 import rom
 from rom import rotation
 from rom.components import cosserat
-from rom.components.blade_element import CHORD, DRAG, RADIUS, SLOPE, ZERO_LIFT, in_wind, strips
-from rom.components.whole_turbine import BLADES, turbine
+from rom.components.blade_element import (
+    CHORD,
+    DRAG_COEFFICIENT,
+    LIFT_SLOPE,
+    RADIUS,
+    ZERO_LIFT,
+    in_wind,
+    strips,
+)
+from rom.components.whole_turbine import N_BLADES, turbine
 from rom.components.wind_turbine import RATED, blade
 from rom.errors import ConfigError
 from rom.mbs.arrays import workspace
-from rom.mbs.motion import moved
+from rom.mbs.motion import retract
 from rom.mbs.packing import pack
 
 WIND = 11.4
@@ -57,8 +65,8 @@ def test_a_strip_has_lift_across_and_drag_along_the_wind(resting):
     angle = np.arctan2(u[0], u[1])
     area = strips(a_blade())[0][b]
     q = 0.5 * 1.225 * area * (u @ u)
-    lift = q * SLOPE * np.sin(angle - ZERO_LIFT) * np.array([np.cos(angle), -np.sin(angle)])
-    drag = q * DRAG * u / np.linalg.norm(u)
+    lift = q * LIFT_SLOPE * np.sin(angle - ZERO_LIFT) * np.array([np.cos(angle), -np.sin(angle)])
+    drag = q * DRAG_COEFFICIENT * u / np.linalg.norm(u)
     assert_allclose(found, R @ np.append(lift + drag, 0.0), rtol=1e-12)
     assert found[0] > 0  # thrust
     assert found[1] < 0  # which drives the rotor: blades move against the second axis
@@ -70,7 +78,7 @@ def test_tangents_of_the_wind_are_derivatives(resting):
     rng = np.random.default_rng(9)
     n = packed.v.size
     q = packed.q.copy()
-    moved(packed.system, packed.q, 0.2 * rng.normal(size=n), q)
+    retract(packed.system, packed.q, 0.2 * rng.normal(size=n), q)
     v, a, lam = 20 * rng.normal(size=n), np.zeros(n), np.zeros(3)
 
     def difference(d, turn):
@@ -78,7 +86,7 @@ def test_tangents_of_the_wind_are_derivatives(resting):
         for sign in (1, -1):
             there, speed = q.copy(), v + (0 if turn else sign * 1e-5) * d
             if turn:
-                moved(packed.system, q, sign * 1e-6 * d, there)
+                retract(packed.system, q, sign * 1e-6 * d, there)
             residual_at(packed.system, W, there, speed, a, lam)
             out.append(W.residual.copy())
         return (out[0] - out[1]) / (2e-6 if turn else 2e-5)
@@ -120,12 +128,12 @@ def test_a_stiff_rotor_takes_the_power_of_its_strips():
     u = np.column_stack([np.full(n + 1, 2 / 3 * WIND), RATED * r])
     flow = np.arctan2(u[:, 0], u[:, 1])
     q = 0.5 * 1.225 * area * (u**2).sum(axis=1)
-    lift = np.where(lifting, SLOPE * np.sin(flow - twist - ZERO_LIFT), 0.0)
-    drag = np.where(lifting, DRAG, 0.5)
+    lift = np.where(lifting, LIFT_SLOPE * np.sin(flow - twist - ZERO_LIFT), 0.0)
+    drag = np.where(lifting, DRAG_COEFFICIENT, 0.5)
     assert_allclose(torque, (q * r) @ (lift * np.sin(flow) - drag * np.cos(flow)), rtol=5e-3)
     thrust = sol.reaction("shaft")[late][:, 0].mean()
     assert_allclose(abs(thrust), q @ (lift * np.cos(flow) + drag * np.sin(flow)), rtol=5e-3)
-    share = BLADES * torque * RATED / (0.5 * 1.225 * np.pi * 63**2 * WIND**3)
+    share = N_BLADES * torque * RATED / (0.5 * 1.225 * np.pi * 63**2 * WIND**3)
     assert 0.38 < share < 16 / 27
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.cable import Hole, Tendon
-from rom.components.compliant_hand import RIGID, Finger, close, hand, rest
+from rom.components.compliant_hand import PHALANX_RIGIDITY_RATIO, Finger, close, hand, rest
 from rom.components.cosserat import Shape, elastic_energy, linearised, reference, straight
 from rom.components.grasp import Bar, grasp
 from rom.components.helical_spring import HelicalSpring, plate_compliance, spring_rod
@@ -110,10 +110,12 @@ def test_compliance_of_the_tip():
         move = np.eye(6)
         move[:3, 3:] = -rotation.skew([0, 0, away])
         total += move @ joint @ move.T
-        total[:3, :3] += link / (RIGID * finger.springs[0].axial) * np.eye(3)
+        total[:3, :3] += link / (PHALANX_RIGIDITY_RATIO * finger.springs[0].axial) * np.eye(3)
         away += 8 * MM
     # between the last phalanx and the plate at the tip lies half of it, as stiff as phalanges are
-    total[3:, 3:] += finger.phalanges[-1] / 2 / (RIGID * finger.springs[-1].bending) * np.eye(3)
+    total[3:, 3:] += (
+        finger.phalanges[-1] / 2 / (PHALANX_RIGIDITY_RATIO * finger.springs[-1].bending) * np.eye(3)
+    )
     size = np.sqrt(np.outer(total.diagonal(), total.diagonal()))
     assert_allclose(C / size, total / size, atol=1e-8)
 

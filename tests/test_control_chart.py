@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.components.control_chart import COUPLING, GROUPS, REST, Chart, envelope, muscle
+from rom.components.control_chart import COUPLING, GROUPS, NO_GROUP, Chart, envelope, muscle
 from rom.errors import ConfigError
 
 DT = 1e-2
@@ -20,10 +20,10 @@ def ray(angle, effort, n=100):
 def test_the_square_is_covered_once():
     x, y = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201))
     groups = Chart().group(x, y)
-    assert set(np.unique(groups)) == {REST, 0, 1, 2, 3, 4}
-    assert ((groups == REST) == (np.maximum(x, y) < 0.12)).all()
+    assert set(np.unique(groups)) == {NO_GROUP, 0, 1, 2, 3, 4}
+    assert ((groups == NO_GROUP) == (np.maximum(x, y) < 0.12)).all()
     borders = np.degrees(np.arctan2(y, x))
-    moving = groups != REST
+    moving = groups != NO_GROUP
     assert (groups == np.clip(borders // 18.0000001, 0, 4))[moving].mean() > 0.99
 
 

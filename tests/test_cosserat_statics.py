@@ -22,7 +22,7 @@ from rom.components.cosserat import (
     strain,
 )
 from rom.components.cosserat.band import solve
-from rom.components.cosserat.elements import REACH, WIDTH
+from rom.components.cosserat.elements import BAND_WIDTH, HALF_BANDWIDTH
 from rom.errors import ConfigError, ModelError, SolverError
 
 STIFF = 1e6  # against bending rigidities of one: neither shear nor stretch
@@ -91,22 +91,22 @@ def test_a_rigid_motion_changes_nothing():
 def test_elimination_along_the_rod_is_a_dense_solution_at_linear_cost():
     rng = np.random.default_rng(3)
     n = 57
-    reach = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= REACH
+    reach = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= HALF_BANDWIDTH
     K, b = np.where(reach, rng.normal(size=(n, n)), 0.0), rng.normal(size=(n, 2))
-    A = np.zeros((n, WIDTH))
+    A = np.zeros((n, BAND_WIDTH))
     for i, j in np.argwhere(reach):
-        A[i, j - i + REACH] = K[i, j]
+        A[i, j - i + HALF_BANDWIDTH] = K[i, j]
     x = b.copy()
     assert solve(A, x) > 0
     assert_allclose(x, np.linalg.solve(K, b), rtol=1e-9, atol=1e-9)
     count = []
     for size in (2000, 4000, 8000):
-        A = rng.normal(size=(size, WIDTH))
-        A[:, 2 * REACH + 1 :] = 0.0
+        A = rng.normal(size=(size, BAND_WIDTH))
+        A[:, 2 * HALF_BANDWIDTH + 1 :] = 0.0
         count.append(solve(A, rng.normal(size=(size, 1))))
     assert count[2] - count[1] == 2 * (count[1] - count[0])
-    assert count[0] < 2000 * (REACH * (2 * REACH + 2) + 2 * REACH + 1)
-    assert solve(np.zeros((5, WIDTH)), np.ones((5, 1))) == 0
+    assert count[0] < 2000 * (HALF_BANDWIDTH * (2 * HALF_BANDWIDTH + 2) + 2 * HALF_BANDWIDTH + 1)
+    assert solve(np.zeros((5, BAND_WIDTH)), np.ones((5, 1))) == 0
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.cosserat import modes, reference, simulate
-from rom.components.drivetrain import GENERATOR, HUB, STIFFNESS, rotor
+from rom.components.drivetrain import GENERATOR, HUB, SHAFT_STIFFNESS, rotor
 from rom.components.wind_turbine import blade
 
 TORQUE, RISE = 2e6, 2.0  # N m, reached after so many seconds
@@ -29,7 +29,7 @@ def test_a_locked_generator_leaves_the_shaft_to_twist():
     locked[2] = False
     f = modes(model.rod, reference(model.rod), 1, free=locked).frequencies[0]
     inertia = inertia_of_blades(one) + HUB
-    assert_allclose(2 * np.pi * f, np.sqrt(STIFFNESS / inertia), rtol=5e-3)
+    assert_allclose(2 * np.pi * f, np.sqrt(SHAFT_STIFFNESS / inertia), rtol=5e-3)
 
 
 @pytest.fixture(scope="module")
@@ -68,4 +68,4 @@ def test_the_shaft_twists_as_the_rotor_needs(run):
     turned = [rotation.log(rotation.multiply(p[0] * [1, -1, -1, -1], p[2])) for p in motion.p]
     inertia = inertia_of_blades(blade(16)) + HUB
     share = inertia / (inertia + GENERATOR)
-    assert_allclose(-np.array(turned)[-400:, 2].mean(), share * TORQUE / STIFFNESS, rtol=0.05)
+    assert_allclose(-np.array(turned)[-400:, 2].mean(), share * TORQUE / SHAFT_STIFFNESS, rtol=0.05)

@@ -36,7 +36,7 @@ def exact(small):
 @pytest.mark.parametrize("shift", [-1e4, -1e6, -2.6e7, -1e8])
 def test_the_297_dof_beam_keeps_its_six_rigid_motions(small, exact, shift, monkeypatch):
     """Without deflation Krylov-Schur finds 5, 3 or 2 of the six at these shifts, and is content."""
-    monkeypatch.setattr(petsc, "DENSE", 0)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
     assert small.n_dofs == 297
     omega, _ = small.operators.modes((), 8, sigma=shift)
     assert_allclose(omega[:6], 0.0, atol=0.0)
@@ -51,7 +51,7 @@ def test_inertia_counts_the_modes_below_a_shift(small, exact, sigma, count):
 
 
 def test_free_modes_are_those_of_the_dense_solver_and_clean(monkeypatch):
-    monkeypatch.setattr(petsc, "DENSE", 0)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
     model = beam((12, 3, 2))
     lam = eigh(model.K.toarray(), model.M.toarray(), eigvals_only=True)
     omega, Phi = model.operators.modes((), 20)
@@ -64,9 +64,9 @@ def test_free_modes_are_those_of_the_dense_solver_and_clean(monkeypatch):
 def test_a_restart_of_the_krylov_space_loses_nothing(monkeypatch):
     model = beam((14, 4, 3))
     held = model.operators.hold(model.interfaces["x0"].dofs)
-    monkeypatch.setattr(petsc, "DENSE", 0)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
     expected, _ = model.operators.modes(held, 30)
-    monkeypatch.setattr(lanczos, "ROOM", 6)
+    monkeypatch.setattr(lanczos, "MAX_EXTRA_BLOCKS", 6)
     found, _ = model.operators.modes(held, 30)
     assert_allclose(found, expected, rtol=1e-10)
 
@@ -77,7 +77,7 @@ def test_slepc_and_our_block_lanczos_find_the_same_modes(monkeypatch):
     for name in ("krylov_schur", "BlockLanczos"):
         real = getattr(petsc, name)
         monkeypatch.setattr(petsc, name, lambda *a, _n=name, _r=real: called.append(_n) or _r(*a))
-    monkeypatch.setattr(petsc, "DENSE", 0)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
     dofs = model.interfaces["x0"].dofs
     omega, Phi = model.operators.modes(dofs, 25)
     block_omega, block_Phi = model.operators.modes(model.operators.hold(dofs), 25)
@@ -88,7 +88,7 @@ def test_slepc_and_our_block_lanczos_find_the_same_modes(monkeypatch):
 
 def test_counting_in_the_place_of_the_factor_leaves_the_stiffness_as_it_was(monkeypatch):
     model = beam((10, 3, 3))
-    monkeypatch.setattr(petsc, "DENSE", 0)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
     held = model.operators.hold(model.interfaces["x0"].dofs)
     before = held.inner.K.norm()
     first, _ = model.operators.modes(held, 12, finished=True)
@@ -112,7 +112,7 @@ def diagonal_operators(lam):
 
 def test_a_krylov_space_that_closes_early_is_left_for_another():
     """Two eigenvalues: a block finds as many vectors of each as it has, and then nothing new."""
-    m = 2 * lanczos.BLOCK
+    m = 2 * lanczos.BLOCK_SIZE
     lam = np.repeat([1.0, 4.0], [m, 700 - m])
     ops = diagonal_operators(lam)
     omega, Phi = ops.modes(ops.hold([699]), m)
@@ -124,7 +124,7 @@ def test_more_equal_modes_than_a_block_has_columns_are_noticed():
     lam = np.repeat([1.0, 4.0], 350)
     ops = diagonal_operators(lam)
     with pytest.raises(ModesMissedError, match=r"inertia of K - sigma M counts [36]"):
-        ops.modes(ops.hold([699]), 2 * lanczos.BLOCK + 1)
+        ops.modes(ops.hold([699]), 2 * lanczos.BLOCK_SIZE + 1)
 
 
 def test_the_shift_comes_from_the_model(small, exact):
@@ -189,7 +189,7 @@ def test_everything_held_leaves_the_identity(small):
 
 def test_a_forgotten_mode_is_missed(monkeypatch):
     model = beam((14, 4, 3))
-    monkeypatch.setattr(petsc, "DENSE", 0)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
     whole = petsc.krylov_schur
 
     def forgetful(*arguments):

@@ -71,7 +71,7 @@ def test_a_missed_mode_is_found_by_the_second_search(monkeypatch):
 def test_iteration_without_success_is_an_error(monkeypatch):
     from rom.fe import iterative
 
-    monkeypatch.setattr(iterative, "ITERATIONS", 3)
+    monkeypatch.setattr(iterative, "MAX_ITERATIONS", 3)
     with pytest.raises(SolverError, match="6 of 6 static solutions did not converge in 3"):
         reduced(beam("iterative"))
 

@@ -101,7 +101,7 @@ def test_less_friction_asks_for_a_thicker_arch_of_moving_stones(ratio, rests):
 def test_contacts_that_pull_would_hold_up_an_impossible_arch(monkeypatch):
     """The tolerance of the opening is a force: 2e-7 of half the size as a gap is 2e5 N here."""
     assert final_speed(10, 0.09)[-1] > 1e-3
-    monkeypatch.setattr(module, "TENSION", 15.0)
+    monkeypatch.setattr(module, "TENSION_RTOL", 15.0)
     assert final_speed(10, 0.09)[-1] < 1e-6
 
 

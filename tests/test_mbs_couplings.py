@@ -11,7 +11,7 @@ from rom.mbs.arrays import ROLL
 from rom.mbs.audit import audit
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, linearise
+from rom.mbs.motion import evaluate, linearize_constraints
 
 X, Y, Z = np.eye(3)
 AXIS, ACROSS = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
@@ -51,14 +51,14 @@ def test_gradient_and_convective_term_are_derivatives(seed):
         return W.value.copy()
 
     def rate(time):
-        linearise(s, W, shifted(packed, q, time * v), v)
+        linearize_constraints(s, W, shifted(packed, q, time * v), v)
         return W.G @ v
 
     evaluate(s, W, q, v)
     W.base[:] = W.x
     G = difference(value, v.size)
     convective = difference(lambda x: rate(x[0]), 1)[:, 0]
-    linearise(s, W, q, v)
+    linearize_constraints(s, W, q, v)
     assert_allclose(W.G[~rolls], G[~rolls], atol=2e-8 * np.abs(G).max())
     assert_allclose(W.value[rolls], (W.G @ v)[rolls], atol=1e-12 * np.abs(v).max())
     assert_allclose(W.gamma, convective, atol=1e-7 * np.abs(convective).max())

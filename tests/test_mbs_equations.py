@@ -18,7 +18,7 @@ from scipy.linalg import null_space
 from rom import rotation
 from rom.body.rotating import rotating_matrices
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, linearise, moved, rates
+from rom.mbs.motion import evaluate, linearize_constraints, rates, retract
 from rom.mbs.state import initial_state
 
 GRAVITY = np.array([0.3, -9.0, 2.0])
@@ -103,7 +103,7 @@ def difference(f, n, step=1e-6):
 
 def shifted(packed, q, delta):
     out = np.empty_like(q)
-    moved(packed.system, q, delta, out)
+    retract(packed.system, q, delta, out)
     return out
 
 
@@ -120,12 +120,12 @@ def test_constraint_gradient_and_convective_term_are_derivatives_of_the_residual
         return W.value.copy()
 
     def rate(time):
-        linearise(s, W, shifted(packed, q, time * v + 0.0), v)
+        linearize_constraints(s, W, shifted(packed, q, time * v + 0.0), v)
         return W.G @ v
 
     G = difference(value, n)
     convective = difference(lambda x: rate(x[0]), 1)[:, 0]
-    linearise(s, W, q, v)
+    linearize_constraints(s, W, q, v)
     assert_allclose(W.G, G, atol=2e-8 * np.abs(G).max())
     assert_allclose(W.gamma, convective, atol=1e-7 * np.abs(convective).max())
 
@@ -193,7 +193,7 @@ def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     packed.system.markers.bend[:, 3:] *= 1e-3
     start = initial_state(packed)
     W.signal[:, 0] = 0.4
-    linearise(packed.system, W, start.q, start.v)
+    linearize_constraints(packed.system, W, start.q, start.v)
     motions = null_space(W.G[:5])
     _, v, a, lam = random_state(rng, packed)
     check_tangents(packed, W, (start.q, v, a, lam), motions, 1e-6)

@@ -249,11 +249,11 @@ def test_wrong_arguments_are_named(options, words):
 
 
 def test_a_short_run_leaves_no_folder_and_a_long_one_writes_parts(tmp_path, monkeypatch):
-    monkeypatch.setattr(keeping, "INTERVAL", 60.0)
+    monkeypatch.setattr(keeping, "MIN_INTERVAL", 60.0)
     run("force", Broken(), METHODS["alpha"], keep=rom.Keeping(tmp_path / "short"))
     assert not (tmp_path / "short").exists()
-    monkeypatch.setattr(keeping, "INTERVAL", 0.0)
-    monkeypatch.setattr(keeping, "PATIENCE", 0.0)
+    monkeypatch.setattr(keeping, "MIN_INTERVAL", 0.0)
+    monkeypatch.setattr(keeping, "WRITE_TIME_FACTOR", 0.0)
     keep = rom.Keeping(tmp_path / "long")
     whole = run("force", Broken(), METHODS["alpha"], keep=keep)
     names = sorted(path.name for path in (tmp_path / "long").iterdir())

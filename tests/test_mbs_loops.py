@@ -10,7 +10,7 @@ from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.audit import audit
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import linearise
+from rom.mbs.motion import linearize_constraints
 
 X, Y, Z = np.eye(3)
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]
@@ -107,7 +107,7 @@ def test_multipliers_stay_those_of_least_norm_while_the_hinges_tumble(method):
     sol = simulate_quietly(mech, t_end=1.0, dt=2e-3, method=method, save_every=50)
     packed, W = prepared(mech)
     for q, v, lam in zip(sol.q, sol.v, sol.lam, strict=True):
-        linearise(packed.system, W, q, v)
+        linearize_constraints(packed.system, W, q, v)
         among = null_space(W.G.T, rcond=1e-8)
         assert among.shape[1] == 5
         assert np.abs(among.T @ lam).max() < 1e-6 * np.abs(lam).max()

@@ -171,7 +171,7 @@ def solved(monkeypatch):
     """A run by blocks or with whole matrices, whatever is quicker."""
 
     def run(mechanism, *, blocks, **options):
-        monkeypatch.setattr(graph, "WORTH", 1e-12 if blocks else np.inf)
+        monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12 if blocks else np.inf)
         assert pack(mechanism).by_blocks == blocks
         return simulate(mechanism, **options)
 
@@ -314,7 +314,7 @@ def test_motions_across_the_constraints_are_those_of_whole_matrices(case, monkey
     """The part of a velocity, or of three, that opens the joints, with the least kinetic energy."""
     found = []
     for worth in (1e-12, np.inf):
-        monkeypatch.setattr(graph, "WORTH", worth)
+        monkeypatch.setattr(graph, "BLOCK_GAIN", worth)
         packed = pack(made(case))
         shift = np.random.default_rng(4).normal(size=(packed.v.size, 3))
         run = SimpleNamespace(packed=packed), workspace(packed.system, 0), initial_state(packed)
@@ -350,7 +350,7 @@ def test_joints_that_repeat_others_are_found_in_a_long_chain(solved):
 
 
 def test_a_chain_that_cannot_be_closed_is_refused(monkeypatch):
-    monkeypatch.setattr(graph, "WORTH", 1e-12)
+    monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12)
     mech = chain(5)
     mech.distance("rope", mech.ground.marker((9, 0.1, 0)), mech.parts["link 4"].marker("b"),
                   length=1.0)  # fmt: skip
@@ -362,7 +362,7 @@ def test_gaps_are_closed_by_the_least_motion_of_whole_matrices(monkeypatch):
     """A chain given with gaps and wrong velocities: assembled the same way both ways."""
     starts = []
     for worth in (1e-12, np.inf):
-        monkeypatch.setattr(graph, "WORTH", worth)
+        monkeypatch.setattr(graph, "BLOCK_GAIN", worth)
         packed = pack(chain(6))
         rng = np.random.default_rng(2)
         q, v = packed.q.copy(), rng.normal(size=packed.v.size)
@@ -386,7 +386,7 @@ def random_blocks(case, monkeypatch, weak=()):
 
     Bodies in ``weak`` have three motions without any mass or stiffness.
     """
-    monkeypatch.setattr(graph, "WORTH", 1e-12)
+    monkeypatch.setattr(graph, "BLOCK_GAIN", 1e-12)
     packed, rng = pack(made(case)), np.random.default_rng(1)
     s, n, m = packed.system, packed.v.size, packed.system.rows.kind.size
     W, Y, size = workspace(s, len(packed.signals)), s.graph, 6 + s.bodies.r

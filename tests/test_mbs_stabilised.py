@@ -13,7 +13,7 @@ import rom
 from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.arrays import workspace
-from rom.mbs.motion import linearise
+from rom.mbs.motion import linearize_constraints
 from rom.mbs.multistep import joined, multistep_coefficients
 
 BDF = [{"method": "bdf", "order": k} for k in (1, 3, 4, 5)]
@@ -32,7 +32,7 @@ def velocity_gap(sol):
     signal, largest = packed.system.rows.signal, 0.0
     for k in range(1, sol.t.size):
         W.signal[:] = sol.signals[k]
-        linearise(packed.system, W, sol.q[k], sol.v[k])
+        linearize_constraints(packed.system, W, sol.q[k], sol.v[k])
         wanted = np.where(signal >= 0, W.signal[signal, 1], 0.0) if len(W.signal) else 0.0
         largest = max(largest, np.abs(W.G @ sol.v[k] - wanted).max())
     return largest

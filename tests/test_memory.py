@@ -10,13 +10,13 @@ from rom.errors import ResourceError
 
 @pytest.mark.parametrize(("limit", "use", "cache"), memory.GROUP_FILES)
 def test_a_control_group_of_either_version_leaves_its_rest(tmp_path, limit, use, cache):
-    assert memory.group_bytes(tmp_path / "none") == memory.UNLIMITED
+    assert memory.group_bytes(tmp_path / "none") == memory.NO_LIMIT
     (tmp_path / limit).write_text("1000000\n")
     (tmp_path / use).write_text("900000\n")
     (tmp_path / "memory.stat").write_text(f"anon 500000\n{cache} 400000\n")
     assert memory.group_bytes(tmp_path) == 500_000.0
     (tmp_path / limit).write_text("max\n")
-    assert memory.group_bytes(tmp_path) == memory.UNLIMITED
+    assert memory.group_bytes(tmp_path) == memory.NO_LIMIT
 
 
 def test_the_least_limit_counts(monkeypatch):

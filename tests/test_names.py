@@ -18,7 +18,7 @@ from rom.cli.main import main
 from rom.config.keys import Named, Quantity
 from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
 from rom.io.archive import Kind, read_archive, write_archive
-from rom.io.native import FIELDS, SCHEMA, VERSION, body_arrays, body_manifest
+from rom.io.native import FIELDS, SCHEMA_NAME, VERSION, body_arrays, body_manifest
 from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside, named
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -278,5 +278,5 @@ def test_members_that_the_manifest_promises_are_named_when_they_are_gone(body, t
             if name not in ("K.npy", "D.npy"):
                 new.writestr(name, old.read(name))
     with pytest.raises(FileFormatError, match="'D', 'K'"):
-        read_archive(other, Kind({SCHEMA: VERSION}, "body file", FIELDS))
+        read_archive(other, Kind({SCHEMA_NAME: VERSION}, "body file", FIELDS))
     assert np.isfinite(rom.load(path).mass)

@@ -8,7 +8,7 @@ from solid import block
 
 import rom
 from rom.model import Modes, Report, Row
-from rom.notebook import MOST, listed, shown
+from rom.notebook import MAX_ROWS, html_table, listed
 
 
 class Cells(HTMLParser):
@@ -53,14 +53,14 @@ def motion():
 
 
 def test_texts_are_escaped_and_numbers_short():
-    text = shown("a < b", ("x", "y"), [("<script>", 1.23456789), (3, np.float64(2e-9))])
+    text = html_table("a < b", ("x", "y"), [("<script>", 1.23456789), (3, np.float64(2e-9))])
     assert "<script>" not in text and text.startswith("<div><b>a &lt; b</b>")
     assert Cells(text).rows == [["x", "y"], ["<script>", "1.2346"], ["3", "2e-09"]]
 
 
 def test_long_tables_say_how_long_they_are():
-    rows = Cells(shown("", ("k",), [(k,) for k in range(MOST + 7)])).rows
-    assert len(rows) == MOST + 2 and rows[-1] == ["and 7 more"]
+    rows = Cells(html_table("", ("k",), [(k,) for k in range(MAX_ROWS + 7)])).rows
+    assert len(rows) == MAX_ROWS + 2 and rows[-1] == ["and 7 more"]
     assert listed("abcdefghij") == "a, b, c, d, e, f, g, h, and 2 more" and listed(()) == "none"
 
 

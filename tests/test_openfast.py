@@ -11,7 +11,7 @@ from solid import block
 import rom
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.openfast import SPAN, superelement, write_openfast
+from rom.io.openfast import LOAD_DURATION, superelement, write_openfast
 from rom.io.openfast_reading import read_openfast
 
 HERE = Path(__file__).parent / "reference" / "foreign"
@@ -96,7 +96,7 @@ def test_a_floating_body_is_free_and_has_its_weight(model, tmp_path):
     assert_allclose(K_W[:, 5], 0.0, **near)
     old = read_openfast(rom.export(body, tmp_path / "old.dat", to="openfast-4"))
     assert_allclose(old.loads, [W, W], **near)
-    assert_array_equal(old.t, [0.0, SPAN])
+    assert_array_equal(old.t, [0.0, LOAD_DURATION])
     assert_array_equal(old.elevation, [0.0, 0.0])
     still = read_openfast(write_openfast(body, tmp_path / "0.dat", gravity=(0, 0, 0)))
     assert_array_equal(still.weight, 0.0)

@@ -67,7 +67,7 @@ def test_the_file_for_other_programs_averages_nodes_to_the_markers(mesh, tmp_pat
 
 def test_figures_say_rates_ratio_and_difference(monkeypatch):
     """With our own runs in the place of Exudyn's: no difference, and an aim for each ratio."""
-    monkeypatch.setattr(peer, "TIMED", 1)
+    monkeypatch.setattr(peer, "N_TIMED_STEPS", 1)
     monkeypatch.setattr(peer, "rod", lambda lc: bar((0.3, 0.02, 0.012), (7, 1, 1)))
     monkeypatch.setattr(
         peer, "by_exudyn", lambda model, body, runs: [peer.by_rom(body, run) for run in runs]

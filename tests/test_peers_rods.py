@@ -40,13 +40,13 @@ def test_beams_have_the_sections_of_the_blade():
 
 
 def test_the_rotor_here_is_the_run_up_of_its_blades(monkeypatch):
-    monkeypatch.setattr(rods, "RISE", 4.0)
+    monkeypatch.setattr(rods, "RISE_TIME", 4.0)
     seconds, tip = rods.by_rom(8)
     one = blade(8, damped=True)
     one = one._replace(inertia=body(one).frames.inertia)  # plates have some in a mechanism
-    alone = run_up(one, t_end=4.0, dt=rods.DT, rise=4.0)
+    alone = run_up(one, t_end=4.0, dt=rods.TIME_STEP, rise=4.0)
     assert seconds > 0
-    every = round(4.0 / rods.DT) // rods.SAMPLES
+    every = round(4.0 / rods.TIME_STEP) // rods.N_SAMPLES
     assert_allclose(tip[:, 0], alone.tip[::every, 0], atol=1e-5)
     assert_allclose(tip[:, 1], alone.tip[::every, 1], atol=1e-5)
     assert np.abs(tip[:, 1]).max() > 0.03

@@ -16,7 +16,7 @@ from rom.components import cosserat
 from rom.components.cosserat import body, shape_of
 from rom.errors import ConfigError, ModelError
 from rom.mbs.arrays import workspace
-from rom.mbs.motion import moved
+from rom.mbs.motion import retract
 from rom.mbs.nonlinear import Elements, Frames
 from rom.mbs.packing import pack
 from rom.mbs.state import initial_state
@@ -105,7 +105,7 @@ def test_tangents_of_a_bent_and_moving_rod():
             for sign in (1, -1):
                 q, w = packed.q.copy(), v
                 if what == "q":
-                    moved(packed.system, packed.q, sign * 1e-6 * direction, q)
+                    retract(packed.system, packed.q, sign * 1e-6 * direction, q)
                 else:
                     w = v + sign * 1e-6 * direction
                 residual_at(packed.system, W, q, w, a, lam)
@@ -127,7 +127,7 @@ def bent_rod(rng, viscosity):
     mech, _ = clamped(rod)
     packed = pack(mech, whole=True)
     q = packed.q.copy()
-    moved(packed.system, packed.q, 0.3 * rng.normal(size=packed.v.size), q)
+    retract(packed.system, packed.q, 0.3 * rng.normal(size=packed.v.size), q)
     packed.q[:] = q
     return packed, workspace(packed.system, 0)
 
@@ -287,7 +287,7 @@ def test_elimination_along_the_rod_is_the_dense_solution():
     q = whole.q.copy()
     d = 0.2 * rng.normal(size=n) * free
     d[-6:-3] = d[-12:-9]
-    moved(whole.system, whole.q, d, q)
+    retract(whole.system, whole.q, d, q)
     v = rng.normal(size=n) * free
     v[-6:-3] = v[-12:-9]
     one, two = (initial_state(replace(p, q=q.copy(), v=v.copy())) for p in (by_blocks, whole))

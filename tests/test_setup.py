@@ -13,7 +13,7 @@ import pytest
 import rom
 from rom.doctor.libraries import PACKAGES
 from rom.doctor.machine import SLOW_ADVICE
-from rom.doctor.pictures import SYSTEM
+from rom.doctor.pictures import SYSTEM_COMMAND
 
 ROOT = Path(__file__).parents[1]
 SETUP = ROOT / ".ci" / "setup.sh"
@@ -89,7 +89,9 @@ def test_make_test_covers_style_types_and_both_environments():
 
 
 def test_the_doctor_advises_packages_the_setup_installs():
-    advised = {word for text in (SYSTEM, SLOW_ADVICE) for word in text.split() if word[:3] == "lib"}
+    advised = {
+        word for text in (SYSTEM_COMMAND, SLOW_ADVICE) for word in text.split() if word[:3] == "lib"
+    }
     known = {*packages(), "python3-mpi4py"}  # comes with petsc4py
     assert advised and advised | set(PACKAGES.values()) <= known
 

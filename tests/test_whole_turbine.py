@@ -6,10 +6,10 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom.components.whole_turbine import (
-    BLADES,
-    GEAR,
+    GEAR_RATIO,
     GENERATOR_INERTIA,
     HUB_INERTIA,
+    N_BLADES,
     WHEEL_INERTIA,
     turbine,
 )
@@ -45,7 +45,7 @@ def test_geometry_and_yaw_are_those_of_the_definition():
     extra = 2000.0 * 1.9**2  # of wheel and generator, which are drawn elsewhere on the shaft
     assert_allclose(own + nacelle.mass * nacelle.at[0] ** 2 + extra, 2_607_890, rtol=1e-9)
     fast = turbine(4, speed=RATED).mechanism.parts
-    assert_allclose(fast["generator"].omega, GEAR * RATED * whole.axis)
+    assert_allclose(fast["generator"].omega, GEAR_RATIO * RATED * whole.axis)
     assert_allclose(fast["blade 2.3"].velocity, RATED * np.cross(
         whole.axis, fast["blade 2.3"].at - whole.hub), atol=1e-12)  # fmt: skip
 
@@ -56,7 +56,7 @@ def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
                     shaft=(1e14, 1e11))  # fmt: skip
     whole.turn_by(ANGLE, SPEED)
     sol = rom.simulate(whole.mechanism, t_end=22.0, dt=0.02, rho_inf=0.9)
-    tips = [whole.tip(sol, k) for k in range(BLADES)]
+    tips = [whole.tip(sol, k) for k in range(N_BLADES)]
     alone = run_up(blade(48), t_end=22.0, dt=0.02)
     for tip in tips:
         assert_allclose(tip, alone.tip, atol=1e-6)
@@ -97,10 +97,10 @@ def test_momentum_is_the_impulse_of_the_torque(driven):
     """About the shaft; the generator stores its own times the ratio of the gear."""
     _, sol = driven
     one = blade(16)
-    blades = BLADES * (one.mass @ one.x[:, 2] ** 2 + one.inertia[:, :2].sum() / 2)
-    still = HUB_INERTIA + WHEEL_INERTIA + GEAR**2 * GENERATOR_INERTIA
+    blades = N_BLADES * (one.mass @ one.x[:, 2] ** 2 + one.inertia[:, :2].sum() / 2)
+    still = HUB_INERTIA + WHEEL_INERTIA + GEAR_RATIO**2 * GENERATOR_INERTIA
     speed = sol.omega("wheel")[:, 0]
-    assert_allclose(sol.omega("generator")[:, 0], GEAR * speed, rtol=1e-7, atol=1e-7)
+    assert_allclose(sol.omega("generator")[:, 0], GEAR_RATIO * speed, rtol=1e-7, atol=1e-7)
     late = sol.t > 6.0
     slope = np.polyfit(sol.t[late], speed[late], 1)[0]
     assert_allclose(slope, 2e6 / (blades + still), rtol=5e-3)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom.components.cosserat import equilibrium, loads, modes, reference
-from rom.components.wind_turbine import BLADE, RATED, blade, ramp, run_up, stations, tower
+from rom.components.wind_turbine import BLADE_LENGTH, RATED, blade, ramp, run_up, stations, tower
 
 RPM = np.pi / 30
 
@@ -20,7 +20,7 @@ def test_mass_of_the_blade():
     """16 845 kg before the factor; 17 740 kg is the definition."""
     table = stations()
     assert len(table["eta"]) == 49
-    plain = (table["mass"][1:] + table["mass"][:-1]) @ np.diff(table["eta"]) / 2 * BLADE
+    plain = (table["mass"][1:] + table["mass"][:-1]) @ np.diff(table["eta"]) / 2 * BLADE_LENGTH
     assert_allclose(plain, 16844.75, rtol=1e-6)
     assert_allclose(blade(192).mass.sum(), 17608.8, rtol=1e-4)
     assert_allclose(blade(192).mass.sum(), 17740, rtol=0.01)

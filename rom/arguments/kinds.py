@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from rom.arguments.values import shortened
 
-LARGEST = 1e150  # of a number; the square of it is still one
+MAX_NUMBER = 1e150  # the square of it is still a finite number
 LARGEST_WHOLE = 2**63 - 1  # that compiled code can count to
 KINDS_OF_NUMBERS = {  # scalar type of an array -> kinds of types that may stand for it
     np.bool_: "b",
@@ -289,8 +289,8 @@ def _number(value: Any) -> Any:
             raise TypeError(value)
     if not math.isfinite(value):
         raise ValueError(value)
-    if abs(value) > LARGEST:
-        raise Unfit(value, f"a number of at most {LARGEST:g}")
+    if abs(value) > MAX_NUMBER:
+        raise Unfit(value, f"a number of at most {MAX_NUMBER:g}")
     return value
 
 

@@ -23,8 +23,8 @@ from rom.arguments import whole
 from rom.eigen import whole_clusters
 from rom.model import Array, Modes, Report
 
-RANK = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
-RIGID = 1e-13  # eigenvalue, of the largest one, of a motion without stiffness
+RANK_RTOL = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
+RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
 log = logging.getLogger("rom")
 
 
@@ -113,12 +113,12 @@ def partition(M: Array, K: Array, N: Array, H: Array, n_rigid: int) -> Partition
     rows = H @ N
     rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
     _, spectrum, Vt = np.linalg.svd(rows)
-    c = int(np.count_nonzero(spectrum > RANK * spectrum[0]))
+    c = int(np.count_nonzero(spectrum > RANK_RTOL * spectrum[0]))
     C, F = N @ Vt[:c].T, N @ Vt[c:].T
     if F.shape[1]:
         lam, Phi = eigh(F.T @ K @ F, F.T @ M @ F)
         F = F @ Phi
-        stiff = lam > RIGID * lam[-1]
+        stiff = lam > RIGID_RTOL * lam[-1]
         C = C - F[:, stiff] @ ((F[:, stiff].T @ K @ C) / lam[stiff, None])
     lam, chi = eigh(C.T @ K @ C, C.T @ M @ C)
     lam[:n_rigid] = 0.0
@@ -168,7 +168,7 @@ def local_traces(parts: Partition, n: int, rows: list[Array], where: str) -> lis
     scaled = []
     for T in traces:
         size = np.linalg.norm(T, axis=0)
-        moves = size > RANK * largest
+        moves = size > RANK_RTOL * largest
         scaled.append(T[:, moves] / size[moves])
     return scaled
 
@@ -186,13 +186,13 @@ def joint_functions(moved: Array, traces: list[list[Array]]) -> Array:
     unions = []
     for both in traces:
         U, spectrum, _ = np.linalg.svd(np.hstack(both), full_matrices=False)
-        unions.append(U[:, spectrum > RANK * spectrum[0]])
-    X = np.linalg.lstsq(moved, block_diag(*unions), rcond=RANK)[0]
+        unions.append(U[:, spectrum > RANK_RTOL * spectrum[0]])
+    X = np.linalg.lstsq(moved, block_diag(*unions), rcond=RANK_RTOL)[0]
     Q, spectrum, _ = np.linalg.svd(X, full_matrices=False)
-    return Q[:, spectrum > RANK * spectrum[0]]
+    return Q[:, spectrum > RANK_RTOL * spectrum[0]]
 
 
 def supported(rows: Array) -> Array:
     """(n, m) motions for which all rows vanish."""
     rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    return null_space(rows, rcond=RANK) if rows.size else np.eye(rows.shape[1])
+    return null_space(rows, rcond=RANK_RTOL) if rows.size else np.eye(rows.shape[1])

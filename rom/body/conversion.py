@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rom.body.recovery import STATES, StressRecovery
+from rom.body.recovery import N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR
 from rom.errors import ModelError
 from rom.model import Array
@@ -17,7 +17,7 @@ from rom.units import UnitSystem, unit_system
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody, Marker, Patch
 
-SIX = 6  # coordinates of a rigid or averaged interface: displacement, rotation
+N_INTERFACE_COORDINATES = 6  # coordinates of a rigid or averaged interface: displacement, rotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def _coordinates(body: "FlexibleBody", marker: "Marker", f: Factors) -> Array:
     n = marker.hold.shape[0]
     if marker.patch is not None:  # functions q with integral of q^2 = 1 have coefficients in m^2
         return np.full(n, f.length if marker.patch.shapes is None else f.length**2)
-    if n == SIX:
+    if n == N_INTERFACE_COORDINATES:
         return np.r_[np.full(3, f.length), np.ones(3)]
     raise ModelError(
         f"interface {marker.name!r} of body {body.name!r} has {n} coordinates of kind "
@@ -137,6 +137,6 @@ def _stress(stress: StressRecovery, f: Factors) -> StressRecovery:
     if inertial is not None:
         linear, turning = f.pressure * f.time**2 / f.length, f.pressure * f.time**2
         columns = np.full(inertial.shape[1], per_coordinate * f.time**2)
-        columns[:STATES] = np.r_[np.full(3, linear), np.full(STATES - 3, turning)]
+        columns[:N_FRAME_LOADS] = np.r_[np.full(3, linear), np.full(N_FRAME_LOADS - 3, turning)]
         inertial = inertial * columns
     return StressRecovery(stress.points * f.length, stress.operator * per_coordinate, inertial)

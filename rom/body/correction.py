@@ -8,7 +8,7 @@ from rom.body.prestress import centrifugal
 from rom.eigen import Operators
 from rom.model import Array, Basis
 
-UNCOUPLED = 1e-7  # stiffness between constraint modes and inner columns that is round-off
+COUPLING_RTOL = 1e-7  # round-off of the stiffness between constraint modes and inner columns
 
 
 def residual_motion(
@@ -35,7 +35,7 @@ def residual_motion(
         return None
     K = inner.gram(basis.Psi, inner.apply_K(basis.Psi))
     size = np.sqrt(np.diag(K))
-    if np.abs(K[:n_b, n_b:] / np.outer(size[:n_b], size[n_b:])).max(initial=0.0) > UNCOUPLED:
+    if np.abs(K[:n_b, n_b:] / np.outer(size[:n_b], size[n_b:])).max(initial=0.0) > COUPLING_RTOL:
         return None
     r = next(iter(holds.values())).shape[1] - 6
     motion = np.zeros((n_b, 6 + r))

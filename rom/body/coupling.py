@@ -13,8 +13,8 @@ from rom.model import Array, Index, Interface
 SAME_PLACE = 1e-6  # distance of two nodes or interfaces, of the size of the bodies, that still meet
 SAME_SURFACE = (0.05, 0.25)  # gap of centroids over extent, and of areas, of two faceted surfaces
 SAME_FUNCTIONS = 1e-6  # difference of functions at equal nodes, of the largest value
-DEPENDENT = 1e-9  # share of a function that is new, below which it is dropped
-SEEN = 0.5  # share of a function that one mesh sees, of what the other sees, to be common to both
+DEPENDENT_RTOL = 1e-9  # share of a function that is new, below which it is dropped
+MIN_COMMON_RATIO = 0.5  # norm of a function on one mesh, of that on the other, to be common to both
 
 
 def coupled_rows(
@@ -98,7 +98,7 @@ def _common_functions(a: Patch, b: Patch, projection: Any) -> tuple[Array, ...]:
     for j in range(V_a.shape[1]):
         q_a, new_a = _new_part(Q_a, a.surface_mass, V_a[:, j])
         q_b, new_b = _new_part(Q_b, b.surface_mass, V_b[:, j])
-        if min(new_a, new_b) > max(DEPENDENT, SEEN * max(new_a, new_b)):
+        if min(new_a, new_b) > max(DEPENDENT_RTOL, MIN_COMMON_RATIO * max(new_a, new_b)):
             Q_a, Q_b, kept = np.column_stack([Q_a, q_a]), np.column_stack([Q_b, q_b]), [*kept, j]
     return V_a[:, kept], V_b[:, kept], Q_a, Q_b
 
@@ -109,7 +109,7 @@ def _new_part(Q: Array, S: Any, v: Array) -> tuple[Array, float]:
     for _ in range(3):
         v = v - Q @ (Q.T @ (S @ v))
     after = np.sqrt(v @ (S @ v))
-    return (v / after, float(after / before)) if after > DEPENDENT * before else (v, 0.0)
+    return (v / after, float(after / before)) if after > DEPENDENT_RTOL * before else (v, 0.0)
 
 
 def _same_nodes(a: Patch, b: Patch, tolerance: float) -> Index | None:

@@ -16,7 +16,7 @@ from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Modes, Report
 from rom.names import check_text, named
-from rom.notebook import listed, shown
+from rom.notebook import html_table, listed
 from rom.units import unit_system
 
 
@@ -156,7 +156,7 @@ class FlexibleBody:
             *((f"interface {m.name}", f"{m.kind} at {m.point.tolist()}")
               for m in self.markers.values()),
         ]  # fmt: skip
-        return shown(f"Flexible body {self.name}", ("", ""), rows)
+        return html_table(f"Flexible body {self.name}", ("", ""), rows)
 
     @property
     def M(self) -> Array:

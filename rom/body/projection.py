@@ -24,7 +24,7 @@ from rom.eigen import (
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Interface
 
-BUCKLED = 1e-9  # of the largest eigenvalue of K, below zero, that is no round-off
+NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
 
 
@@ -72,10 +72,11 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
         )
     Z = null_space(B.T @ M)
     lam, Y = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
-    if lam.size and lam[0] < -BUCKLED * lam[-1]:
+    if lam.size and lam[0] < -NEGATIVE_STIFFNESS_RTOL * lam[-1]:
         raise ModelError(
-            f"{np.count_nonzero(lam < -BUCKLED * lam[-1])} shapes of the free body have negative "
-            "stiffness: without its supports it would buckle under the stress it carries.",
+            f"{np.count_nonzero(lam < -NEGATIVE_STIFFNESS_RTOL * lam[-1])} shapes of the free body "
+            "have negative stiffness: without its supports it would buckle under the stress it "
+            "carries.",
             hint="Heat it less; rom.modes takes it with its supports held.",
         )
     V = scale[:, None] * (Z @ Y)

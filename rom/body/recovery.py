@@ -8,7 +8,7 @@ from rom.body.stiffening import PRODUCTS
 from rom.errors import ConfigError
 from rom.model import Array
 
-STATES = 12  # acceleration and angular acceleration of the frame, products of angular velocities
+N_FRAME_LOADS = 12  # acceleration, angular acceleration, products of angular velocities
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,14 +81,14 @@ class StressRecovery:
         if self.inertial is None:
             return self
         A = self.inertial.copy()
-        A[:, STATES:] -= A[:, :6] @ X
+        A[:, N_FRAME_LOADS:] -= A[:, :6] @ X
         return StressRecovery(self.points, self.operator, A)
 
     def recombined(self, V: Array) -> "StressRecovery":
         """For elastic coordinates q = V q_new."""
         A = self.inertial
         if A is not None:
-            A = np.hstack([A[:, :STATES], A[:, STATES:] @ V])
+            A = np.hstack([A[:, :N_FRAME_LOADS], A[:, N_FRAME_LOADS:] @ V])
         return StressRecovery(self.points, self.operator @ V, A)
 
 

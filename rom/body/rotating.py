@@ -15,7 +15,7 @@ from rom.model import Array
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
 
-UNSTABLE = 1e-6  # growth rate, relative to the largest frequency, of a motion that diverges
+GROWTH_RATE_RTOL = 1e-6  # growth rate of an unstable motion, of the largest frequency
 
 
 def rotating_frequencies(
@@ -69,10 +69,10 @@ def rotating_matrices(
         supports: interfaces held besides the frame; they pull with the force they carry at rest.
     """
     psi = SecondOrder.of(body)
-    lift = -np.cross(w, np.cross(w, at))  # acceleration of the body origin
-    K = body.K + np.einsum("a,akl->kl", lift, psi.S)
+    a_origin = -np.cross(w, np.cross(w, at))  # acceleration of the body origin
+    K = body.K + np.einsum("a,akl->kl", a_origin, psi.S)
     K = K + _centrifugal(psi.Ibar, w) + _centrifugal(body.S_kl, w)
-    load = lift @ body.S + _centrifugal(body.Ibar_kl, w)
+    load = a_origin @ body.S + _centrifugal(body.Ibar_kl, w)
     for name, wrench in _reactions(body, load, supports).items():
         K -= np.einsum("p,pkl->kl", wrench, psi.markers[name])
     S = body.S_kl
@@ -109,7 +109,7 @@ def _frequencies(M: Array, K: Array, G: Array, culprit: str) -> Array:
     lam = eigvals(np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]))
     if not np.isfinite(lam).all():
         raise ModelError(f"{culprit} has no vibrations: its mass is singular.")
-    if lam.real.max(initial=0.0) > UNSTABLE * np.abs(lam).max(initial=0.0):
+    if lam.real.max(initial=0.0) > GROWTH_RATE_RTOL * np.abs(lam).max(initial=0.0):
         warnings.warn(
             f"{culprit} is unstable: rotation has used up its stiffness; motions that run away "
             "count with their imaginary part, zero if they do not oscillate.",

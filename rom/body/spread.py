@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
 
 Where = Callable[[Array], Any] | str | None
-NEAR = 1e-9  # distance of two points that are the same, relative to the size of the body
+COINCIDENT_RTOL = 1e-9  # of the body's size
 
 
 @typed
@@ -171,7 +171,7 @@ def _on_interface(body: "FlexibleBody", name: str) -> Any:
             hint="Choose the place by a function of points.",
         )
     surface: Any = body.surface
-    grid = NEAR * max(float(np.ptp(surface.points, axis=0).max()), 1e-300)
+    grid = COINCIDENT_RTOL * max(float(np.ptp(surface.points, axis=0).max()), 1e-300)
     known = {tuple(x) for x in np.round(patch.points / grid / 100).astype(int)}
     return np.array([tuple(x) in known for x in np.round(surface.points / grid / 100).astype(int)])
 

@@ -33,19 +33,20 @@ from rom.model import Array
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody, Marker
 
-AXES = "xyz"
+AXIS_NAMES = "xyz"
 ROUND_OFF = 1e-11  # of the largest displacement of second order
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 CENTRIFUGAL = tuple(
-    f"omega_{AXES[i]}^2" if i == j else f"omega_{AXES[i]} omega_{AXES[j]}" for i, j in PRODUCTS
+    f"omega_{AXIS_NAMES[i]}^2" if i == j else f"omega_{AXIS_NAMES[i]} omega_{AXIS_NAMES[j]}"
+    for i, j in PRODUCTS
 )
-ANGULAR = tuple(f"domega_{axis}" for axis in AXES)
-LINEAR = tuple(f"a_{axis}" for axis in AXES)
+ANGULAR = tuple(f"domega_{axis}" for axis in AXIS_NAMES)
+LINEAR = tuple(f"a_{axis}" for axis in AXIS_NAMES)
 
 
 def interface_loads(name: str) -> tuple[str, ...]:
     """Names of the six unit loads of an interface: force, then moment."""
-    return tuple(f"{name} {kind}_{axis}" for kind in "fm" for axis in AXES)
+    return tuple(f"{name} {kind}_{axis}" for kind in "fm" for axis in AXIS_NAMES)
 
 
 def known_loads(body: "FlexibleBody") -> tuple[str, ...]:

@@ -9,7 +9,7 @@ EXAMPLES = """\
   rom completion bash   # in ~/.bashrc: source <(rom completion bash)
   rom completion zsh    # in ~/.zshrc: source <(rom completion zsh)
 """
-BASH = """\
+BASH_SCRIPT = """\
 _rom() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" verb="" k
     for ((k = 1; k < COMP_CWORD; k++)); do
@@ -23,7 +23,7 @@ _rom() {{
 }}
 complete -o default -F _rom rom
 """
-ZSH = "autoload -U +X bashcompinit && bashcompinit\n"
+ZSH_SCRIPT = "autoload -U +X bashcompinit && bashcompinit\n"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +42,6 @@ def run(args: argparse.Namespace) -> Answer:
         f'"{" ".join(options_of(parser, name))}" -- "$word")) || COMPREPLY=() ;;'
         for name in names
     )
-    text = BASH.format(verbs=" ".join([*names, *options_of(parser, None)]), cases=cases)
-    text = (ZSH if args.shell == "zsh" else "") + text.rstrip("\n")
+    text = BASH_SCRIPT.format(verbs=" ".join([*names, *options_of(parser, None)]), cases=cases)
+    text = (ZSH_SCRIPT if args.shell == "zsh" else "") + text.rstrip("\n")
     return Answer({"shell": args.shell, "text": text}, text)

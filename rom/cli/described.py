@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rom.config.component import Component
     from rom.config.mechanism import MechanismFile
 
-TOML = ".toml"
+TOML_SUFFIX = ".toml"
 COMMON = {
     "verb", "file", "run", "output", "force", "json", "quiet", "verbose", "strict", "debug",
     "version", "resume",
@@ -53,7 +53,7 @@ WITHOUT = {  # an option takes the place of what contradicts it
 
 def described(args: argparse.Namespace) -> bool:
     """Whether the file of the verb is a description."""
-    return bool(args.file.suffix.lower() == TOML)
+    return bool(args.file.suffix.lower() == TOML_SUFFIX)
 
 
 def component(args: argparse.Namespace, *extra: str) -> "Component":
@@ -95,7 +95,9 @@ def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: An
             found |= SPECIAL[option](value)
         else:
             name = "--" + option.replace("_", "-")
-            raise ConfigError(f"{name} does not go with a {TOML} file.", hint="Write it there.")
+            raise ConfigError(
+                f"{name} does not go with a {TOML_SUFFIX} file.", hint="Write it there."
+            )
     return found
 
 

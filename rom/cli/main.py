@@ -6,10 +6,10 @@ import sys
 import traceback
 from contextlib import ExitStack
 
-from rom.cli.described import TOML
+from rom.cli.described import TOML_SUFFIX
 from rom.cli.parser import build_parser, given
 from rom.cli.ranks import ranks, stop_all
-from rom.cli.speech import Manner, complain, manner_of, present, say, speaking
+from rom.cli.speech import OutputOptions, output_options, present, print_error, say, speaking
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -39,30 +39,30 @@ def main(argv: list[str] | None = None) -> int:
     """
     argv = sys.argv[1:] if argv is None else argv
     with terminable():
-        return _run(argv, manner_of(argv))
+        return _run(argv, output_options(argv))
 
 
-def _run(argv: list[str], manner: Manner) -> int:
+def _run(argv: list[str], options: OutputOptions) -> int:
     """The exit code; SIGTERM ends in the same way as Ctrl-C."""
     try:
-        return run(argv, manner)
+        return run(argv, options)
     except SystemExit:  # argparse has printed the help
         raise
     except BrokenPipeError:  # the reader, for example head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except BaseException as raised:
-        if manner.debug:
+        if options.debug:
             traceback.print_exception(raised)
         error = translated(raised)
-        stop_all(error.exit_code, lambda: complain(error, manner, ranks()[0]))
+        stop_all(error.exit_code, lambda: print_error(error, options, ranks()[0]))
         return error.exit_code
 
 
-def run(argv: list[str], manner: Manner) -> int:
+def run(argv: list[str], options: OutputOptions) -> int:
     """Parse, run the verb, write its files, print its answer."""
     args = build_parser().parse_args(argv)
-    if str(getattr(args, "file", "")).endswith(TOML):
+    if str(getattr(args, "file", "")).endswith(TOML_SUFFIX):
         args.given = given(argv)
     args.argv = argv
     if args.version:
@@ -73,12 +73,12 @@ def run(argv: list[str], manner: Manner) -> int:
     if args.verb is None:
         raise ConfigError("no verb was given.", hint="rom --help lists the verbs.")
     first = ranks()[0] == 0
-    with speaking(manner, aloud=first) as remarks, ExitStack() as args.claims:
+    with speaking(options, verbose=first) as remarks, ExitStack() as args.claims:
         answer = args.run(args)
         if first and answer.write is not None:
             answer.write()
     if first:
-        present(answer, remarks, manner)
+        present(answer, remarks, options)
     return QualityGateError.exit_code if answer.failed else 0
 
 

@@ -108,13 +108,13 @@ def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
         raise ConfigError(
             f"--set {', '.join(unused)} is no interface: neither -i nor --fixed names it."
         )
-    rest = tuple(name for name in names if name not in found)
-    if rest and args.nodes.suffix.lower() != ".inp":
+    remaining = tuple(name for name in names if name not in found)
+    if remaining and args.nodes.suffix.lower() != ".inp":
         raise ConfigError(
-            f"which nodes are the interface {named(rest)}? {args.nodes} has no node sets.",
-            hint=f"For example --set {rest[0]}=11-14,20.",
+            f"which nodes are the interface {named(remaining)}? {args.nodes} has no node sets.",
+            hint=f"For example --set {remaining[0]}=11-14,20.",
         )
-    return found | (read_node_sets(args.nodes, rest) if rest else {})
+    return found | (read_node_sets(args.nodes, remaining) if remaining else {})
 
 
 def labels(text: str) -> list[int]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rom.fe.solid import SolidMesh
     from rom.model import Material
 
-DECK = ".inp"
+DECK_SUFFIX = ".inp"
 SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> Answer:
     if described(args):
         part = component(args, "save", "faces")
         file, how = part.mesh
-        deck = args.save is not None and args.save.suffix.lower() == DECK
+        deck = args.save is not None and args.save.suffix.lower() == DECK_SUFFIX
         solid = part.material() if deck else None
     else:
         solid, file, how = _solid(args), args.file, reading(args)
@@ -93,9 +93,9 @@ def _point(text: str) -> tuple[float, float, float]:
 
 def _check_save(args: argparse.Namespace, geometry: Path) -> None:
     path = args.save
-    if path.suffix.lower() not in (".vtu", DECK):
+    if path.suffix.lower() not in (".vtu", DECK_SUFFIX):
         raise ConfigError(f"--save {path}: a mesh is written as .vtu or .inp only.")
-    kind = "deck" if path.suffix.lower() == DECK else "vtu"
+    kind = "deck" if path.suffix.lower() == DECK_SUFFIX else "vtu"
     checked(args, path, kind, inputs=[geometry])
 
 
@@ -104,7 +104,7 @@ def _solid(args: argparse.Namespace) -> "Material | None":
     given = [f"--{name}" for name in ("E", "nu", "rho") if getattr(args, name) is not None]
     if not given:
         return None
-    if args.save is None or args.save.suffix.lower() != DECK:
+    if args.save is None or args.save.suffix.lower() != DECK_SUFFIX:
         raise ConfigError(f"{given[0]} goes with --save FILE.inp.")
     if len(given) < 3:
         raise ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
@@ -117,7 +117,7 @@ def _save(mesh: "SolidMesh", path: Path, solid: "Material | None") -> None:
     from rom.io.files import write_whole
     from rom.io.vtu import grid
 
-    if path.suffix.lower() == DECK:
+    if path.suffix.lower() == DECK_SUFFIX:
         text = input_deck(mesh, material=solid, step="matrices")
     else:
         text = grid(mesh.points, *vtk_cells(mesh), at_cells={"region": mesh.regions})

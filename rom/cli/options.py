@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rom.model import FEModel, Material
 
 
-GIGABYTE = 1e9
+BYTES_PER_GIGABYTE = 1e9
 OUTPUT = "-o/--output"
 
 
@@ -184,7 +184,7 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
 
 def meshing(args: argparse.Namespace) -> dict[str, Any]:
     """Those of them that `add_meshing` asks for."""
-    memory = None if args.memory_limit is None else GIGABYTE * args.memory_limit
+    memory = None if args.memory_limit is None else BYTES_PER_GIGABYTE * args.memory_limit
     return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
 
 

@@ -88,11 +88,11 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> Any:
         """Parse, and suggest a spelling for an option that does not exist."""
-        found, rest = self.parse_known_args(args, namespace)
-        if rest:
+        found, unknown = self.parse_known_args(args, namespace)
+        if unknown:
             known = options_of(self, getattr(found, "verb", None))
             raise ConfigError(
-                f"unknown option or argument {rest[0]!r}.", hint=suggestion(rest[0], known)
+                f"unknown option or argument {unknown[0]!r}.", hint=suggestion(unknown[0], known)
             )
         return found
 

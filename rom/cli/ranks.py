@@ -18,11 +18,11 @@ def on_first_rank(look: Callable[[], T]) -> T:
     return on_first(look)
 
 
-def stop_all(code: int, complain: Callable[[], None]) -> None:
+def stop_all(code: int, print_error: Callable[[], None]) -> None:
     """Complain once and end every rank with the same exit code; returns on one process."""
     if ranks()[1] == 1:
-        complain()
+        print_error()
         return
     from rom.fe.parallel import stop_all_ranks
 
-    stop_all_ranks(code, complain)
+    stop_all_ranks(code, print_error)

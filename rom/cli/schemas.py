@@ -7,7 +7,7 @@ version. Numbers that are not finite are null.
 from typing import Any
 
 Schema = dict[str, Any]
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
+SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def text(about: str) -> Schema:
@@ -217,4 +217,4 @@ def schema(verb: str) -> Schema:
         },
         "required": ["ok", *own["required"], "warnings"],
     }
-    return {"$schema": DRAFT, "title": f"rom {verb} --json", "anyOf": [answer, ERROR]}
+    return {"$schema": SCHEMA_DIALECT, "title": f"rom {verb} --json", "anyOf": [answer, ERROR]}

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rom.mbs.keeping import Keeping
     from rom.model import Report
 
-PARTS = "motion.parts"  # where the motion is kept while the run lasts
+PARTS_FOLDER = "motion.parts"  # where the motion is kept while the run lasts
 SUMMARY = "move a mechanism, or let a body swing as a pendulum"
 EXAMPLES = """\
   rom simulate demos/slider_crank.toml -o out/
@@ -78,15 +78,15 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     for path in paths_of(file, claim(args)):
         checked(args, path, inputs=files_in(file.values))
     keep = _keeping(args, made_from(file))
-    told = {"command": _command(args), "version": __version__}
+    origin = {"command": _command(args), "version": __version__}
 
     def rescue(solution: Any, audit: "Report") -> Path:
-        motion, *_, record = Run(file, solution, audit, **told).paths(args.output)
-        Run(file, solution, audit, **told).write_motion([motion, record])
+        motion, *_, record = Run(file, solution, audit, **origin).paths(args.output)
+        Run(file, solution, audit, **origin).write_motion([motion, record])
         return motion
 
     with _rescuing(args, keep, rescue):
-        done = move(file, **told, progress=_aloud(args), keep=keep)
+        done = move(file, **origin, progress=_aloud(args), keep=keep)
 
     def write() -> None:
         done.write(args.output)
@@ -103,7 +103,7 @@ def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | 
     """The folder of the motion under way; one rank writes it."""
     from rom.mbs.keeping import Keeping
 
-    keep = Keeping(args.output / PARTS, args.resume, made_from)
+    keep = Keeping(args.output / PARTS_FOLDER, args.resume, made_from)
     if args.resume and not keep.state.exists() and (args.output / "run.json").exists():
         raise ConfigError(
             f"there is nothing to resume: the run in {args.output} came to its end.",
@@ -130,11 +130,14 @@ def _rescuing(
         if solution is None or keep is None:
             raise
         from rom.mbs.audit import audit
-        from rom.mbs.foreign import KEPT
+        from rom.mbs.foreign import KEPT_HINT
 
         path = write(solution, audit(solution))
         if isinstance(error, RomError):
-            hints = [error.hint.replace(KEPT, "").strip(), f"The motion up to there is in {path}."]
+            hints = [
+                error.hint.replace(KEPT_HINT, "").strip(),
+                f"The motion up to there is in {path}.",
+            ]
             if keep.state.exists():
                 resume = "" if args.resume else " --resume"
                 hints.append(f"To go on: {_command(args)}{resume}.")
@@ -156,7 +159,7 @@ def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> An
 
 def _pendulum(args: argparse.Namespace) -> Answer:
     from rom import __version__
-    from rom.config.run import RECORD, Record, file_digest
+    from rom.config.run import RECORD_FILE, Record, file_digest
     from rom.io.native import load
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
@@ -171,7 +174,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     path = inside(folder, body.name, ".csv")
     films = [path.with_suffix(f".{args.film}")] if args.film else []
     tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
-    paths = [checked(args, each) for each in (path, *films, *tables, folder / RECORD)]
+    paths = [checked(args, each) for each in (path, *films, *tables, folder / RECORD_FILE)]
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
@@ -179,7 +182,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
 
     def rescue(solution: Any, audit: "Report") -> Path:
         _write_motion(path, tables, body, solution)
-        record.write([path, *tables, args.output / RECORD], solution, audit)
+        record.write([path, *tables, args.output / RECORD_FILE], solution, audit)
         return path
 
     with _rescuing(args, keep, rescue):

@@ -13,7 +13,7 @@ from rom.errors import QualityGateError, RomError, RomWarning
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class OutputOptions:
     """How to speak; the options of the same names."""
 
     json: bool = False
@@ -23,10 +23,10 @@ class Manner:
     debug: bool = False
 
 
-def manner_of(argv: list[str]) -> Manner:
+def output_options(argv: list[str]) -> OutputOptions:
     """The common options, read before the grammar: a usage error speaks the same way."""
     letters = {a[1:] for a in argv if a[:1] == "-" and a[1:2] != "-"}
-    return Manner(
+    return OutputOptions(
         json="--json" in argv,
         quiet="--quiet" in argv or "q" in letters,
         verbose="--verbose" in argv or "v" in letters,
@@ -35,23 +35,23 @@ def manner_of(argv: list[str]) -> Manner:
     )
 
 
-def present(answer: Answer, remarks: list[str], manner: Manner) -> None:
+def present(answer: Answer, remarks: list[str], options: OutputOptions) -> None:
     """Print an answer, and what failed."""
-    if manner.json:
+    if options.json:
         whole = {"ok": not answer.failed, **answer.data, "warnings": remarks}
         say(to_json(whole | ({"failed": answer.failed} if answer.failed else {})))
     elif answer.text:
         say(answer.text)
     if answer.failed:
         more = f", and {len(answer.failed) - 1} more" if len(answer.failed) > 1 else ""
-        tell(f"error: {answer.failed[0]}{more}.")
+        print_to_stderr(f"error: {answer.failed[0]}{more}.")
 
 
-def complain(error: RomError, manner: Manner, rank: int = 0) -> None:
+def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
     """One line of cause and one line of hint; a rank that is alone with its error says so."""
     where = f"{error.where}: " if error.where else ""
     cause = " ".join(f"{where}{error.message}".split())
-    if manner.json:
+    if options.json:
         say(
             to_json(
                 {
@@ -63,18 +63,18 @@ def complain(error: RomError, manner: Manner, rank: int = 0) -> None:
                 }
             )
         )
-    tell("error: " + (f"rank {rank}: " if rank else "") + cause)
+    print_to_stderr("error: " + (f"rank {rank}: " if rank else "") + cause)
     if error.hint:
-        tell(f"hint: {' '.join(error.hint.split())}")
+        print_to_stderr(f"hint: {' '.join(error.hint.split())}")
 
 
 @contextmanager
-def speaking(manner: Manner, *, aloud: bool) -> Iterator[list[str]]:
+def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
     """Progress and warnings on stderr; with ``--strict`` the first warning is an error.
 
     Args:
-        manner: how.
-        aloud: False on ranks that keep silent.
+        options: how.
+        verbose: False on ranks that keep silent.
 
     Yields:
         The list that collects the warnings.
@@ -85,14 +85,14 @@ def speaking(manner: Manner, *, aloud: bool) -> Iterator[list[str]]:
         text = " ".join(str(message).split())
         if not issubclass(category, RomWarning) or text in remarks:
             return
-        if manner.strict:
+        if options.strict:
             raise QualityGateError(text, hint="Without --strict this is a warning.")
         remarks.append(text)
-        if aloud and not manner.quiet:
-            tell(f"warning: {text}")
+        if verbose and not options.quiet:
+            print_to_stderr(f"warning: {text}")
 
     log, handler = logging.getLogger("rom"), logging.StreamHandler()
-    log.setLevel(_level(manner) if aloud else logging.CRITICAL)
+    log.setLevel(_level(options) if verbose else logging.CRITICAL)
     log.addHandler(handler)
     log.propagate = False  # ffcx gives the root logger a handler of its own
     try:
@@ -105,10 +105,10 @@ def speaking(manner: Manner, *, aloud: bool) -> Iterator[list[str]]:
         log.propagate = True
 
 
-def _level(manner: Manner) -> int:
-    if manner.quiet:
+def _level(options: OutputOptions) -> int:
+    if options.quiet:
         return logging.ERROR
-    return logging.DEBUG if manner.verbose else logging.INFO
+    return logging.DEBUG if options.verbose else logging.INFO
 
 
 def say(text: str) -> None:
@@ -117,7 +117,7 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def tell(text: str) -> None:
+def print_to_stderr(text: str) -> None:
     """A line on stderr."""
     sys.stderr.write(text + "\n")
     sys.stderr.flush()

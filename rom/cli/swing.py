@@ -35,9 +35,9 @@ MATERIALS = {  # E [Pa], nu, rho [kg/m^3]; handbook values
     "steel": (210e9, 0.3, 7850.0),
     "titanium": (114e9, 0.34, 4430.0),
 }
-STEPS, INSTANTS = 240, 4  # of the motion; shown in the picture
+N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
-SHOWN = 0.05  # of the size: the largest deformation as it is drawn
+DRAWN_DEFORMATION_RATIO = 0.05  # largest deformation as drawn, of the body's size
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -194,7 +194,7 @@ def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> tuple[Any, Any]:
     part = mechanism.add_flexible(body.name, body)
     place = mechanism.ground.marker(tuple(body.marker(hinge).point))
     mechanism.revolute("hinge", place, part.marker(hinge), axis=swing.axis)
-    return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / STEPS, rho_inf=0.5)
+    return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / N_STEPS, rho_inf=0.5)
 
 
 def magnification(body: "FlexibleBody", q: Any) -> float:
@@ -208,7 +208,7 @@ def magnification(body: "FlexibleBody", q: Any) -> float:
 
     shape = body.surface.shape
     largest = max(float(np.linalg.norm((shape @ x).reshape(-1, 3), axis=1).max()) for x in q)
-    wanted = SHOWN * body.size / max(largest, 1e-12 * body.size)
+    wanted = DRAWN_DEFORMATION_RATIO * body.size / max(largest, 1e-12 * body.size)
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(max(1.0, power * max(d for d in (1, 2, 5) if d * power <= wanted)))
 
@@ -222,7 +222,7 @@ def _write(
     from rom.view import animate, instants
 
     save(body, files[".rom.npz"])
-    times = np.linspace(0, 0.5 * motion[1].t[-1], INSTANTS)
+    times = np.linspace(0, 0.5 * motion[1].t[-1], N_INSTANTS)
     up = -np.asarray(motion[0].gravity, dtype=float)
     instants(*motion, files[".png"], times=times, magnify=magnify, up=up)
     if ".gif" in files:

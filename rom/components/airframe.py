@@ -199,7 +199,7 @@ def _summed(
 
 
 # local dofs: u v w and rotations about x y z of both ends; x along the beam, y along the broad side
-AXIAL, TWIST = [0, 6], [3, 9]
+AXIAL_DOFS, TWIST_DOFS = [0, 6], [3, 9]
 IN_Y, IN_Z = [1, 5, 7, 11], [2, 4, 8, 10]  # deflection and slope; w' is minus the rotation
 TURNED = np.array([1.0, -1.0, 1.0, -1.0])
 BAR_K, BAR_M = np.array([[1.0, -1], [-1, 1]]), np.array([[2.0, 1], [1, 2]]) / 6
@@ -210,10 +210,10 @@ def _stiffness(L: float, part: Part, material: Material, kind: str) -> Array:
     (a, b), E = part.size, material.E
     K = np.zeros((12, 12))
     if kind == "axial":
-        K[np.ix_(AXIAL, AXIAL)] = E * a * b / L * BAR_K
+        K[np.ix_(AXIAL_DOFS, AXIAL_DOFS)] = E * a * b / L * BAR_K
     elif kind == "torsion":
         GJ = E / (2 * (1 + material.nu)) * torsion_constant(a, b)
-        K[np.ix_(TWIST, TWIST)] = GJ / L * BAR_K
+        K[np.ix_(TWIST_DOFS, TWIST_DOFS)] = GJ / L * BAR_K
     else:
         scale = np.array([1, L, 1, L])
         k = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
@@ -231,8 +231,8 @@ def _mass(L: float, part: Part, material: Material) -> Array:
     h = np.array(
         [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
     ) * np.outer(scale, scale) * (m / 420)  # fmt: skip
-    M[np.ix_(AXIAL, AXIAL)] = m * BAR_M
-    M[np.ix_(TWIST, TWIST)] = m * (a**2 + b**2) / 12 * BAR_M
+    M[np.ix_(AXIAL_DOFS, AXIAL_DOFS)] = m * BAR_M
+    M[np.ix_(TWIST_DOFS, TWIST_DOFS)] = m * (a**2 + b**2) / 12 * BAR_M
     M[np.ix_(IN_Y, IN_Y)] = h
     M[np.ix_(IN_Z, IN_Z)] = h * np.outer(TURNED, TURNED)
     return M

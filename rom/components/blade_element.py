@@ -23,7 +23,7 @@ from numba import carray
 from rom.components.compiled import elements, law
 from rom.components.cosserat import RodBody
 from rom.components.cosserat.elements import rotation_of
-from rom.components.wind_turbine import BLADE, HUB_RADIUS
+from rom.components.wind_turbine import BLADE_LENGTH, HUB_RADIUS
 from rom.errors import ConfigError
 from rom.model import Array, Mask
 
@@ -31,11 +31,12 @@ RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 
           52.75, 56.1667, 58.9, 61.6333)  # m from the axis of the rotor  # fmt: skip
 CHORD = (3.542, 3.854, 4.167, 4.557, 4.652, 4.458, 4.249, 4.007, 3.748, 3.502, 3.256, 3.010, 2.764,
          2.518, 2.313, 2.086, 1.419)  # m  # fmt: skip
-ROUND = 9.7  # m from the axis: inside of it sections are circles, without lift
-DENSITY, BETZ = 1.225, 1 / 3  # kg/m^3; induction of the best rotor
+CIRCULAR_RADIUS = 9.7  # distance from the axis [m]: sections inside are circles, without lift
+AIR_DENSITY = 1.225  # [kg/m^3]
+BETZ_INDUCTION = 1 / 3  # of the best rotor
 # one profile for the whole blade, ours: thin plate with the camber of the outer sections
-SLOPE, ZERO_LIFT = 2 * math.pi, np.radians(-4.0)
-DRAG, DRAG_OF_CIRCLES = 0.01, 0.5
+LIFT_SLOPE, ZERO_LIFT = 2 * math.pi, np.radians(-4.0)
+DRAG_COEFFICIENT, CIRCLE_DRAG_COEFFICIENT = 0.01, 0.5
 
 
 def strip(numbers, pose, wanted, answer, space):
@@ -91,8 +92,8 @@ def in_wind(
     blade: RodBody,
     wind: npt.ArrayLike,
     *,
-    induction: float = BETZ,
-    density: float = DENSITY,
+    induction: float = BETZ_INDUCTION,
+    density: float = AIR_DENSITY,
 ) -> RodBody:
     """A blade of the NREL 5 MW turbine in the wind, for `rom.Mechanism.add_nonlinear`.
 
@@ -116,8 +117,8 @@ def in_wind(
                           hint="The induction lies between 0 and 1.")  # fmt: skip
     area, lifting = strips(blade)
     n = area.size
-    lift = SLOPE * np.array([np.cos(ZERO_LIFT), -np.sin(ZERO_LIFT)]) * lifting[:, None]
-    drag = np.where(lifting, DRAG, DRAG_OF_CIRCLES)
+    lift = LIFT_SLOPE * np.array([np.cos(ZERO_LIFT), -np.sin(ZERO_LIFT)]) * lifting[:, None]
+    drag = np.where(lifting, DRAG_COEFFICIENT, CIRCLE_DRAG_COEFFICIENT)
     slowed = np.tile((1.0 - induction) * wind, (n, 1))
     numbers = np.column_stack([0.5 * density * area, slowed, lift, drag])
     blown = elements(compiled_strip(), np.arange(n)[:, None], numbers)
@@ -126,8 +127,8 @@ def in_wind(
 
 def strips(blade: RodBody) -> tuple[Array, Mask]:
     """(N + 1,) areas of the strips of the vertices [m^2], and whether they make lift."""
-    radius = HUB_RADIUS + BLADE * np.linspace(0.0, 1.0, blade.rod.h.size + 1)
+    radius = HUB_RADIUS + BLADE_LENGTH * np.linspace(0.0, 1.0, blade.rod.h.size + 1)
     wide = np.zeros_like(radius)
     wide[:-1] += blade.rod.h / 2
     wide[1:] += blade.rod.h / 2
-    return wide * np.interp(radius, RADIUS, CHORD), radius > ROUND
+    return wide * np.interp(radius, RADIUS, CHORD), radius > CIRCULAR_RADIUS

@@ -17,7 +17,8 @@ HERE = Path(__file__).parent
 drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span two modules
 OPEN, SLIDES, STICKS = 0, 1, 2
 ADMITTED = -math.sin(math.radians(3.0))  # edges of a corner may dive so far below an edge it meets
-BEYOND = 1e-4  # of the length of an edge: corners so far beyond its end still touch it
+# of the edge's length: distance beyond its end at which corners still touch
+EDGE_OVERHANG_RTOL = 1e-4
 
 
 class Blocks(NamedTuple):
@@ -158,7 +159,7 @@ def nearest_edge(B, P, i, a, j, reach):
         l = math.hypot(x, y)
         px, py = P[a, 0] - P[c, 0], P[a, 1] - P[c, 1]
         w, g = (px * x + py * y) / (l * l), (px * y - py * x) / l
-        if abs(g) >= reach or g <= gap or w < -BEYOND or w > 1 + BEYOND:
+        if abs(g) >= reach or g <= gap or w < -EDGE_OVERHANG_RTOL or w > 1 + EDGE_OVERHANG_RTOL:
             continue
         if faces(B, P, i, a, y / l, -x / l):
             found, gap, way, nx, ny = c, g, w, y / l, -x / l

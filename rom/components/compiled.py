@@ -5,7 +5,7 @@ from typing import Any
 from numba import cfunc, njit
 
 from rom.mbs.compiled import OPTIONS, drop_stale_cache
-from rom.mbs.nonlinear import SIGNATURE, Elements
+from rom.mbs.nonlinear import LAW_SIGNATURE, Elements
 from rom.model import Array, Index
 
 __all__ = ["drop_stale_cache", "elements", "inner", "kernel", "law"]
@@ -16,7 +16,7 @@ kernel = njit(**_OPTIONS)
 # callable from other kernels only
 inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 # of the elements of non-linear bodies, see `rom.mbs.nonlinear`
-law = cfunc(SIGNATURE, **_OPTIONS)
+law = cfunc(LAW_SIGNATURE, **_OPTIONS)
 
 
 def elements(compiled: Any, frames: Index, numbers: Array) -> Elements:

@@ -24,10 +24,12 @@ from rom.components.helical_spring import HelicalSpring
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Mask
 
-RIGID = 1e5  # rigidity of a phalanx over that of the springs
-STOP = 50.0  # stiffness of touching coils over that of the spring
-CAP, CONVERGED, ITERATIONS = 0.2, 1e-9, 80
-HALVINGS = 8
+PHALANX_RIGIDITY_RATIO = 1e5  # rigidity of a phalanx over that of the springs
+STOP_STIFFNESS_RATIO = 50.0  # stiffness of touching coils over that of the spring
+MAX_ROTATION = 0.2  # of an iteration [rad]
+INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
+MAX_ITERATIONS = 80
+MAX_HALVINGS = 8  # of the load step
 SPRING = HelicalSpring(0.7e-3, 7e-3, 5, 8e-3)
 INDEX = (18e-3, 12e-3, 10e-3)  # m
 LENGTHS = {  # m, of whole fingers
@@ -93,9 +95,9 @@ class Finger:
             bends += [True] * self.n
             if link > 0:
                 h, bends = [*h, link], [*bends, False]
-                stretch.append(np.full(3, RIGID * spring.axial))
+                stretch.append(np.full(3, PHALANX_RIGIDITY_RATIO * spring.axial))
         if self.phalanges[-1] > 0:
-            cells.append(np.full(3, RIGID * self.springs[-1].bending))
+            cells.append(np.full(3, PHALANX_RIGIDITY_RATIO * self.springs[-1].bending))
         x = np.zeros((len(h) + 1, 3))
         x[1:, 2] = np.cumsum(h)
         still = np.tile([1.0, 0, 0, 0], (len(h) + 2, 1))
@@ -137,8 +139,8 @@ class Finger:
             arm = (spring.diameter + spring.wire) / 2 * _angle(shape, f, k)[1]
             g[6 * f : 6 * f + 3] += arm
             g[6 * k : 6 * k + 3] -= arm
-            r += STOP * spring.stiffness * gap * g
-            K += STOP * spring.stiffness * np.outer(g, g)
+            r += STOP_STIFFNESS_RATIO * spring.stiffness * gap * g
+            K += STOP_STIFFNESS_RATIO * spring.stiffness * np.outer(g, g)
         return r, K
 
 
@@ -245,7 +247,7 @@ def close(
         found = _balance(finger, here, now, drawn, way, extra)
         if found is not None:
             share, here = min(share + part, 1.0), found
-        elif part > 0.5**HALVINGS:
+        elif part > 0.5**MAX_HALVINGS:
             part /= 2
         else:
             error = SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
@@ -263,7 +265,7 @@ def _balance(finger: Finger, start: Posture, goal: Array, drawn: bool, way: floa
     load, length = loads(one, tip=goal[:3]), cable.length(reference(one))
     shape, tension = start.shape, start.tension if drawn else float(goal[3])
     straight = replace(cable, friction=0.0)
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         r, K = linearised(one, shape, load)
         g, H = cable.forces(one, shape, way)
         for more, stiffness in (finger.stops(shape), *((extra(shape),) if extra else ())):
@@ -282,10 +284,10 @@ def _balance(finger: Finger, start: Posture, goal: Array, drawn: bool, way: floa
         turned = np.abs(rows[:, :3]).max()
         if not np.isfinite(turned):
             return None
-        factor = min(1.0, CAP / max(turned, CAP))
+        factor = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION))
         shape = _moved(shape, factor * rows)
         tension += factor * change
-        if max(turned, np.abs(rows[:-1, 3:]).max() / one.x[-1, 2]) < CONVERGED:
+        if max(turned, np.abs(rows[:-1, 3:]).max() / one.x[-1, 2]) < INCREMENT_RTOL:
             pull = length - cable.length(shape)
             return Posture(finger, shape, tension, pull, tuple(goal[:3]))
     return None

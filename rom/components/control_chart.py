@@ -22,7 +22,7 @@ COUPLING = np.array(  # (5 fingers, 5 groups): which fingers a group draws
     [[1, 0, 0, 0, 1], [0, 1, 0, 0, 1], [0, 0, 1, 0, 1], [0, 0, 0, 1, 1], [0, 0, 0, 1, 1]],
     dtype=float,
 )
-REST = -1
+NO_GROUP = -1
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,10 @@ class Chart:
     pull: float = 14e-3
 
     def group(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Index:
-        """Which group points of the square belong to, `REST` for none; no memory."""
+        """Which group points of the square belong to, `NO_GROUP` for none; no memory."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         sector = np.minimum((np.arctan2(y, x) / (np.pi / 2) * len(GROUPS)).astype(int), 4)
-        return np.where(np.maximum(x, y) < self.threshold, REST, sector)
+        return np.where(np.maximum(x, y) < self.threshold, NO_GROUP, sector)
 
     def command(self, effort: npt.ArrayLike) -> Array:
         """Pull for an effort [m]."""
@@ -79,19 +79,19 @@ class Chart:
         n = flexor.size
         groups, pulls = np.empty(n, dtype=np.int64), np.empty((n, len(GROUPS)))
         opening = np.empty(n, dtype=np.bool_)
-        group, waited, both, opens, armed = REST, 0.0, 0.0, False, True
+        group, waited, both, opens, armed = NO_GROUP, 0.0, 0.0, False, True
         pull = np.zeros(len(GROUPS))
         for k, (a, b) in enumerate(zip(flexor, extensor, strict=True)):
             now = int(self.group(a, b))
-            waited = 0.0 if now in (REST, group) or self._near(a, b, group) else waited + dt
-            if group == REST or waited > self.dwell:
+            waited = 0.0 if now in (NO_GROUP, group) or self._near(a, b, group) else waited + dt
+            if group == NO_GROUP or waited > self.dwell:
                 group, waited = now, 0.0
             strong = min(a, b) > self.together[0] and self._both(a, b)
             both = both + dt if strong else 0.0
             armed = armed or not strong
             if armed and both > self.together[1]:
                 opens, armed = not opens, False
-            if now != REST and not strong and waited == 0.0:
+            if now != NO_GROUP and not strong and waited == 0.0:
                 goal = 0.0 if opens else float(self.command(max(a, b)))
                 change = np.clip(goal - pull[group], -self.rate * dt, self.rate * dt)
                 if opens or change > 0:  # closing never gives way
@@ -103,7 +103,7 @@ class Chart:
         """Whether a point is in a group or within the margin of it."""
         width = np.pi / 2 / len(GROUPS)
         away = np.arctan2(y, x) - width * group
-        return group != REST and -self.margin < away < width + self.margin
+        return group != NO_GROUP and -self.margin < away < width + self.margin
 
     def _both(self, x: float, y: float) -> bool:
         return abs(np.arctan2(y, x) - np.pi / 4) < self.middle
@@ -114,7 +114,7 @@ class Commands:
     """What the chart said.
 
     Attributes:
-        groups: (n,) selected group, `REST` before the first one.
+        groups: (n,) selected group, `NO_GROUP` before the first one.
         pulls: (n, 5) pull of each group [m].
         opening: (n,) whether effort opens.
     """

@@ -21,8 +21,8 @@ from rom.components.compiled import inner, kernel
 from rom.model import Array, Index
 
 STATE_CHANGES = 12  # open-close iterations before the step is cut
-SOLUTIONS = 60  # of one step, while friction follows the normal forces
-CUT, LEAST_STEP = 3.0, 3.0**-8
+MAX_SOLUTIONS = 60  # solutions of one step, while friction follows the normal forces
+STEP_FACTOR, MIN_STEP_RATIO = 3.0, 3.0**-8
 FRICTION_TOLERANCE = 1e-9  # of the largest normal force
 
 
@@ -141,14 +141,14 @@ def right_hand_side(B, law, C, h, W):
     for k in range(C.used[0]):
         if C.state[k] == OPEN:
             continue
-        push = -law.normal * C.gap[k]
+        normal_force = -law.normal * C.gap[k]
         drag = -law.shear * C.slip[k]
         if C.state[k] == SLIDES:
             drag = -C.way[k] * law.friction * C.force[k]
         for one in range(2):
             b = C.who[k, 2 * one]
             for p in range(B.size[b] if B.equation[b] >= 0 else 0):
-                W.rhs[B.equation[b] + p] += push * C.n[k, one, p] + drag * C.t[k, one, p]
+                W.rhs[B.equation[b] + p] += normal_force * C.n[k, one, p] + drag * C.t[k, one, p]
 
 
 @inner
@@ -174,12 +174,12 @@ def review(B, law, C, d):
             state = OPEN
         elif abs(trial) > law.friction * force + law.tension:
             state = SLIDES
-        way, pressed = math.copysign(1.0, trial), max(force, 0.0)
-        if state != C.state[k] or (state == SLIDES and way != C.way[k]):
+        direction, pressed = math.copysign(1.0, trial), max(force, 0.0)
+        if state != C.state[k] or (state == SLIDES and direction != C.way[k]):
             changed += 1
         if state == SLIDES:
             error = max(error, abs(pressed - C.force[k]))
-        C.state[k], C.way[k], C.force[k] = state, way, pressed
+        C.state[k], C.way[k], C.force[k] = state, direction, pressed
         largest = max(largest, force)
     return changed, error > FRICTION_TOLERANCE * largest
 
@@ -188,7 +188,7 @@ def review(B, law, C, d):
 def step(B, law, C, h, W):
     """Open-close iteration for the increments W.d over h; False if it does not settle."""
     changes, factored = 0, False
-    for _ in range(SOLUTIONS):
+    for _ in range(MAX_SOLUTIONS):
         if not factored:
             assemble(B, law, C, h, W)
             if not factorise(W.A, W.left):
@@ -201,10 +201,10 @@ def step(B, law, C, h, W):
                 W.d[b, p] = W.rhs[B.equation[b] + p]
             for a in range(B.first[b], B.first[b + 1]):
                 for axis in range(2):
-                    way = 0.0
+                    displacement = 0.0
                     for p in range(B.size[b]):
-                        way += W.T[a, axis, p] * W.d[b, p]
-                    farthest = max(farthest, abs(way))
+                        displacement += W.T[a, axis, p] * W.d[b, p]
+                    farthest = max(farthest, abs(displacement))
         changed, unsettled = review(B, law, C, W.d)
         if not changed and not unsettled:
             return farthest < 0.5 * law.reach
@@ -271,12 +271,12 @@ def advance(B, law, C, old, W, h, n_steps, keep, cuts):  # noqa: PLR0913  all th
             remember(C, old)
             find_contacts(B, law, W.q, old, C, W.P, W.T)
             while not step(B, law, C, part, W):
-                part /= CUT
+                part /= STEP_FACTOR
                 cuts[0] += 1
-                if part < LEAST_STEP * h:
+                if part < MIN_STEP_RATIO * h:
                     return math.nan
                 find_contacts(B, law, W.q, old, C, W.P, W.T)
             accept(B, law, C, part, keep ** (part / h), W)
             done += part
-            part *= CUT
+            part *= STEP_FACTOR
     return energy(B, law, C, W)

@@ -13,20 +13,20 @@ import numpy.typing as npt
 from rom import rotation
 from rom.components.cosserat import Motion, Rod, rod
 from rom.components.wind_turbine import (
-    BLADES,
-    DAMPING,
-    GEAR,
+    GEAR_RATIO,
     GENERATOR_INERTIA,
     HUB_INERTIA,
-    OVERHANG,
-    STIFFNESS,
+    HUB_OVERHANG,
+    N_BLADES,
+    SHAFT_DAMPING,
+    SHAFT_STIFFNESS,
     blade,
 )
 from rom.model import Array
 
 HUB = HUB_INERTIA
-GENERATOR = GENERATOR_INERTIA * GEAR**2  # kg m^2, on the slow side of the gear
-RIGID = 1e12  # N and N m^2, of what does not bend; the root of a blade has 2e10
+GENERATOR = GENERATOR_INERTIA * GEAR_RATIO**2  # kg m^2, on the slow side of the gear
+RIGID_STIFFNESS = 1e12  # [N], [N m^2] of what does not bend; the root of a blade has 2e10
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Rotor:
     def torque(self, total: float) -> tuple[Array, Array]:
         """Loads of a torque of the whole rotor on the generator [N m]."""
         moment = np.zeros((len(self.rod.p), 3))
-        moment[0, 0] = total / BLADES
+        moment[0, 0] = total / N_BLADES
         return np.zeros_like(self.rod.x), moment
 
     def speeds(self, motion: Motion) -> Array:
@@ -61,7 +61,7 @@ class Rotor:
         orbital = (mass * (x[:, :, 1] * u[:, :, 2] - x[:, :, 2] * u[:, :, 1])).sum(axis=1)
         own = self.rod.inertia * v[:, :, :3]
         first = [[rotation.matrix(p)[0] for p in row] for row in motion.p]
-        return BLADES * (orbital + np.einsum("tkc,tkc->t", np.array(first), own))
+        return N_BLADES * (orbital + np.einsum("tkc,tkc->t", np.array(first), own))
 
 
 def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
@@ -74,20 +74,22 @@ def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
     one = blade(n) if blade_rod is None else blade_rod
     n = one.h.size
     along = rotation.quaternion(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]))  # third axis: x
-    x = np.concatenate([[[-OVERHANG, 0, 0], [-OVERHANG / 2, 0, 0], [0, 0, 0]], one.x])
+    x = np.concatenate([[[-HUB_OVERHANG, 0, 0], [-HUB_OVERHANG / 2, 0, 0], [0, 0, 0]], one.x])
     p = np.concatenate([[along] * 3, one.p[:1], one.p[1:]])
-    twist = 0.75 * OVERHANG * STIFFNESS / BLADES  # of the half and the whole segment that twist
-    stiff = [RIGID] * 3
+    twist = (
+        0.75 * HUB_OVERHANG * SHAFT_STIFFNESS / N_BLADES
+    )  # of the half and the whole segment that twist
+    stiff = [RIGID_STIFFNESS] * 3
     whole = rod(
         x, p, stretch=np.concatenate([[stiff] * 3, one.stretch]),
-        bend=np.concatenate([[[RIGID, RIGID, twist]] * 2, [stiff], one.bend]),
+        bend=np.concatenate([[[RIGID_STIFFNESS, RIGID_STIFFNESS, twist]] * 2, [stiff], one.bend]),
         bends=[True, True, False] + [True] * n,
     )  # fmt: skip
     inertia = np.concatenate([np.zeros((4, 3)), one.inertia[1:]])
-    inertia[0, 2] = GENERATOR / BLADES
-    inertia[3, :2] = HUB / BLADES  # both, since the sections of the root are turned
+    inertia[0, 2] = GENERATOR / N_BLADES
+    inertia[3, :2] = HUB / N_BLADES  # both, since the sections of the root are turned
     viscous = np.concatenate([np.zeros((3, 3)), one.viscous_bend])
-    viscous[:2, 2] = twist * DAMPING / STIFFNESS
+    viscous[:2, 2] = twist * SHAFT_DAMPING / SHAFT_STIFFNESS
     stretched = np.concatenate([np.zeros((3, 3)), one.viscous_stretch])
     whole = whole._replace(
         mass=np.concatenate([np.zeros(3), one.mass]), inertia=inertia,

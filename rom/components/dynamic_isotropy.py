@@ -23,10 +23,10 @@ from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
 Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
-STEP = 1e-5  # of central differences [rad]
+DIFFERENCE_STEP = 1e-5  # of central differences [rad]
 # least Jacobian of the normalised equations for an isotropic point that stands alone
-ISOLATED = 1e-6
-SINGULAR = 1e-12  # share of the squared trace by which round-off may lower a determinant
+MIN_JACOBIAN = 1e-6
+DETERMINANT_RTOL = 1e-12  # of the squared trace: round-off by which a determinant is negative
 
 
 def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
@@ -54,9 +54,9 @@ def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
     All are zero where the mechanism is dynamically uniform. By central differences.
     """
     q1, q2 = np.asarray(q, dtype=float)
-    step = STEP * np.array([1.0, -1.0])
+    step = DIFFERENCE_STEP * np.array([1.0, -1.0])
     D = np.stack([inertia(q1 + step, q2 + 0 * step), inertia(q1 + 0 * step, q2 + step)])
-    D = (D[:, 0] - D[:, 1]) / (2 * STEP)  # D[k] = dA / dq_k
+    D = (D[:, 0] - D[:, 1]) / (2 * DIFFERENCE_STEP)  # D[k] = dA / dq_k
     return 0.5 * (np.einsum("kij->ijk", D) + np.einsum("jik->ijk", D) - D)
 
 
@@ -106,7 +106,7 @@ def isotropic_configurations(inertia: Inertia, *, n: int = 400) -> Isotropic:
         q = q + step / np.maximum(np.abs(step).max(axis=1, initial=0.0) / 0.1, 1.0)[:, None]
     q = _distinct(q[np.abs(_anisotropy(inertia, *q.T)).max(axis=1, initial=0.0) < 1e-11])
     turn = np.linalg.det(_gradient(inertia, q))
-    winding = np.where(np.abs(turn) > ISOLATED, np.sign(turn), 0).astype(int)
+    winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
     if winding.all() and winding.sum():
         raise SolverError(
             f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0: "
@@ -129,7 +129,7 @@ def _positive(A: Array) -> Array:
         raise ModelError(f"an inertia of two motors has the shape (..., 2, 2), not {np.shape(A)}.")
     trace = A[..., 0, 0] + A[..., 1, 1]
     determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
-    if not ((trace > 0) & (determinant > -SINGULAR * trace**2)).all():
+    if not ((trace > 0) & (determinant > -DETERMINANT_RTOL * trace**2)).all():
         raise ModelError("the inertia is not positive: some motion would have no kinetic energy.")
     return A
 
@@ -138,9 +138,9 @@ def _gradient(inertia: Inertia, q: Array) -> Array:
     """(k, 2, 2) derivatives of both equations at angles (k, 2)."""
     columns = [
         _anisotropy(inertia, *(q + e).T) - _anisotropy(inertia, *(q - e).T)
-        for e in STEP * np.eye(2)
+        for e in DIFFERENCE_STEP * np.eye(2)
     ]
-    return np.stack(columns, axis=-1) / (2 * STEP)
+    return np.stack(columns, axis=-1) / (2 * DIFFERENCE_STEP)
 
 
 def _suspects(f: Array) -> Index:
@@ -226,5 +226,5 @@ def _crossings(index: Array, level: float, names: Index) -> Array:
     up, node = np.divmod(names, n * n)
     i, j = np.divmod(node, n)
     here, there = index[i, j], index[(i + 1 - up) % n, (j + up) % n]
-    way = (level - here) / (there - here)
-    return 2 * np.pi / n * np.column_stack([i + way * (1 - up), j + way * up])
+    share = (level - here) / (there - here)
+    return 2 * np.pi / n * np.column_stack([i + share * (1 - up), j + share * up])

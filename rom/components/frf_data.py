@@ -7,7 +7,7 @@ from rom.errors import ConfigError
 from rom.model import Array
 
 Complex = npt.NDArray[np.complex128]
-PERFECT = 1e-6  # coherence is not believed to be closer to 0 or 1
+COHERENCE_ATOL = 1e-6  # distance of the coherence from 0 and 1, which no measurement reaches
 
 
 def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
@@ -60,7 +60,7 @@ def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
 
 def weights(coherence: npt.ArrayLike, n_averages: int) -> Array:
     """1 / random error, one in the mean square; the shape of the coherence."""
-    w = 1.0 / random_error(np.clip(coherence, PERFECT, 1 - PERFECT), n_averages)
+    w = 1.0 / random_error(np.clip(coherence, COHERENCE_ATOL, 1 - COHERENCE_ATOL), n_averages)
     return w / np.sqrt((w**2).mean())
 
 

@@ -13,7 +13,7 @@ from rom.components.cosserat import Rod, Shape, clamped, linearised, reference, 
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
 
-CONVERGED, ITERATIONS = 1e-12, 500
+INCREMENT_RTOL, MAX_ITERATIONS = 1e-12, 500
 
 
 def cut(whole: Rod, k: int) -> list[Rod]:
@@ -56,7 +56,7 @@ def bend_in_pieces(whole: Rod, k: int, force: Array) -> Array:
                    for one in pieces for free in [clamped(one)]]  # fmt: skip
     ends = np.cumsum([0, *(one.h.size for one in pieces)])
     x, turns = whole.x.copy(), [np.eye(3)] * (k + 1)  # of the pieces, from where they started
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         new, turn, at = [whole.x[:1]], [np.eye(3)], whole.x[0]
         for j, (one, C) in enumerate(zip(pieces, flexibility, strict=True)):
             a, b = ends[j], ends[j + 1]
@@ -74,7 +74,7 @@ def bend_in_pieces(whole: Rod, k: int, force: Array) -> Array:
             at, turn = new[-1][-1], [*turn, turn[-1] @ bent]
         step = np.abs(np.concatenate(new) - x).max()
         x, turns = np.concatenate(new), turn
-        if step < CONVERGED * whole.h.sum():
+        if step < INCREMENT_RTOL * whole.h.sum():
             return x
         if not step < 10 * whole.h.sum():
             break

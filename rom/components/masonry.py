@@ -30,9 +30,10 @@ from rom.components.discontinuous_deformation import advance, work
 from rom.errors import ConfigError, MaterialError, ModelError, SolverError
 from rom.model import Array
 
-NEAR = 0.05  # of the shortest edge: how near a corner must be to an edge to be watched
-SHEAR = 1 / 2.5  # stiffness of contacts along the edge over that across it
-TENSION = 1e-7  # of the mean weight: forces below are round-off; much more would glue arches
+# distance of corner and edge from which they are watched, of the shortest edge
+CONTACT_REACH_RATIO = 0.05
+SHEAR_STIFFNESS_RATIO = 1 / 2.5  # stiffness of contacts along the edge over that across it
+TENSION_RTOL = 1e-7  # round-off of forces, of the mean weight; much more would glue arches
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,9 +190,11 @@ class Masonry:
         edges = [np.linalg.norm(s.outline - np.roll(s.outline, 1, axis=0), axis=1).min()
                  for s in self.stones]  # fmt: skip
         weight = np.mean([s.M[0, 0] for s in self.stones]) * np.linalg.norm(self.gravity)
-        reach = NEAR * min(edges) if self.reach is None else self.reach
+        reach = CONTACT_REACH_RATIO * min(edges) if self.reach is None else self.reach
         p = float(self.stiffness)
-        return Law(p, SHEAR * p, float(self.friction), TENSION * weight, float(reach))
+        return Law(
+            p, SHEAR_STIFFNESS_RATIO * p, float(self.friction), TENSION_RTOL * weight, float(reach)
+        )
 
     def start(self) -> Array:
         """(B, 3 + R) coordinates at the start: mass centre, angle zero, no deformation."""

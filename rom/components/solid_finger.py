@@ -20,11 +20,11 @@ from rom.mbs.linearize import linearize
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
-STEEL = 7850.0  # density of the wire [kg/m^3]
+STEEL_DENSITY = 7850.0  # [kg/m^3]
 ENDS = ("proximal", "distal")
 
 
-def heavy_spring(spring: HelicalSpring, n: int = 16, density: float = STEEL) -> Rod:
+def heavy_spring(spring: HelicalSpring, n: int = 16, density: float = STEEL_DENSITY) -> Rod:
     """The spring as a rod with the mass of its wire; statics as of `spring_rod`.
 
     Args:
@@ -49,7 +49,7 @@ def solid_finger(
     ends: tuple[str, str] = ENDS,
     orientation: npt.ArrayLike | None = None,
     n: int = 16,
-    density: float = STEEL,
+    density: float = STEEL_DENSITY,
     gravity: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Mechanism:
     """Springs and reduced phalanges in turn, the first spring clamped to the ground at the origin.
@@ -144,22 +144,22 @@ def parts_of_compliance(
     _check(bodies, springs)
     A = np.eye(3) if orientation is None else np.asarray(orientation, dtype=float)
     turn = np.kron(np.eye(2), A)
-    joints, links, way = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(3)
+    joints, links, arm = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(3)
     for solid, spring in zip(reversed(bodies), reversed(springs), strict=True):
-        X = _moved(way)
+        X = _moved(arm)
         links += X @ turn @ link_compliance(solid, ends) @ turn.T @ X.T
-        way = way + A @ (solid.marker(ends[1]).point - solid.marker(ends[0]).point)
-        X = _moved(way)
+        arm = arm + A @ (solid.marker(ends[1]).point - solid.marker(ends[0]).point)
+        X = _moved(arm)
         rod = spring_rod(spring, n)
         joints += X @ plate_compliance(rod, rod.x[-1]) @ X.T
-        way = way + np.array([0.0, 0.0, spring.length])
+        arm = arm + np.array([0.0, 0.0, spring.length])
     return joints, links
 
 
-def _moved(way: Array) -> Array:
+def _moved(arm: Array) -> Array:
     """(6, 6) motion at a point the way beyond another, of one solid."""
     X = np.eye(6)
-    X[:3, 3:] = -rotation.skew(way)
+    X[:3, 3:] = -rotation.skew(arm)
     return X
 
 

@@ -18,13 +18,13 @@ from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ModelError
 from rom.mbs.arrays import workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import linearise
+from rom.mbs.motion import linearize_constraints
 from rom.mbs.packing import pack
 from rom.mbs.state import assembled
 from rom.model import Array
 
 Elastic = Literal["held", "free"]
-CHUNK = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
+CHUNK_SIZE = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,12 +308,12 @@ def _in_chunks(of_all_rates: Callable[[Array, Array], Array], q1: Any, q2: Any) 
     """Inertia of the two motors, for angles of any shape, from that of all rates."""
     q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
     x, y, out = q1.ravel(), q2.ravel(), np.empty((q1.size, 2, 2))
-    for k in range(0, q1.size, CHUNK):
-        A = of_all_rates(x[k : k + CHUNK], y[k : k + CHUNK])
+    for k in range(0, q1.size, CHUNK_SIZE):
+        A = of_all_rates(x[k : k + CHUNK_SIZE], y[k : k + CHUNK_SIZE])
         freed = (
             A[:, :2, 2:] @ np.linalg.solve(A[:, 2:, 2:], A[:, 2:, :2]) if A.shape[1] > 2 else 0.0
         )
-        out[k : k + CHUNK] = A[:, :2, :2] - freed
+        out[k : k + CHUNK_SIZE] = A[:, :2, :2] - freed
     return out.reshape(*q1.shape, 2, 2)
 
 
@@ -346,7 +346,7 @@ def mechanism_inertia(
     W, s = workspace(packed.system, len(packed.signals)), packed.system
     W.signal[s.rows.signal[rows], 0] = np.asarray(angles, dtype=float)
     q = assembled(packed, W, packed.q)
-    linearise(s, W, q, np.zeros(packed.v.size))
+    linearize_constraints(s, W, q, np.zeros(packed.v.size))
     size = np.sqrt(np.diag(W.S))
     held = np.zeros((0, size.size))
     if elastic == "held":

@@ -19,14 +19,14 @@ from rom import rotation
 from rom.components.blade_element import in_wind
 from rom.components.cosserat import body
 from rom.components.wind_turbine import (
-    BLADES,
-    DAMPING,
-    GEAR,
+    GEAR_RATIO,
     GENERATOR_INERTIA,
     HUB_INERTIA,
-    OVERHANG,
-    STIFFNESS,
-    TOWER,
+    HUB_OVERHANG,
+    N_BLADES,
+    SHAFT_DAMPING,
+    SHAFT_STIFFNESS,
+    TOWER_HEIGHT,
     blade,
     tower,
 )
@@ -37,8 +37,9 @@ from rom.mbs.parts import Marker, Part
 from rom.mbs.solution import Solution
 from rom.model import Array
 
-RISE = 1.96256  # m, from the top of the tower to the shaft
-TILT, CONE = np.radians(5.0), np.radians(2.5)  # noses up and blades upwind, away from the tower
+SHAFT_HEIGHT = 1.96256  # from the top of the tower [m]
+SHAFT_TILT = np.radians(5.0)  # nose up [rad]
+CONE_ANGLE = np.radians(2.5)  # blades upwind, away from the tower [rad]
 HUB_MASS = 56_780.0  # kg
 NACELLE_MASS, NACELLE_CENTRE = 240_000.0, (1.9, 0.0, 1.75)  # kg, m from the top of the tower
 NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
@@ -96,12 +97,12 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     *,
     tower_segments: int = 16,
     gravity: float = 9.80665,
-    tilt: float = TILT,
-    cone: float = CONE,
+    tilt: float = SHAFT_TILT,
+    cone: float = CONE_ANGLE,
     damped: bool = True,
     wind: float | None = None,
     speed: float = 0.0,
-    shaft: tuple[float, float] = (STIFFNESS, DAMPING),
+    shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
 ) -> Turbine:
     """The turbine, its first blade up.
 
@@ -125,20 +126,20 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     mech = Mechanism(gravity=(0.0, 0.0, -gravity))
     top, standing = _tower(mech, tower_segments)
     lean = rotation.matrix(rotation.exp([0.0, tilt, 0.0]))
-    axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER + RISE])
-    hub = hub - OVERHANG * axis
+    axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER_HEIGHT + SHAFT_HEIGHT])
+    hub = hub - HUB_OVERHANG * axis
     nacelle = _nacelle(mech, top)
     turning = _train(mech, nacelle, (lean, hub, axis), shaft, speed)
     one = body(blade(segments, damped=damped))
     one = one if wind is None else in_wind(one, (wind, 0.0, 0.0))
-    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(BLADES))
+    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(N_BLADES))
     return Turbine(mech, blades, standing, axis, hub)
 
 
 def _tower(mech: Mechanism, segments: int) -> tuple[Marker, Assembly | None]:
     """The marker on top of the tower, and the tower."""
     if segments == 0:
-        return mech.ground.marker((0.0, 0.0, TOWER)), None
+        return mech.ground.marker((0.0, 0.0, TOWER_HEIGHT)), None
     standing = mech.add_nonlinear("tower", body(tower(segments)))
     mech.fixed("foot", mech.ground.marker(STILL), standing.marker("start"))
     return standing.marker("end"), standing
@@ -150,7 +151,7 @@ def _nacelle(mech: Mechanism, top: Marker) -> Part:
     Of its inertia only that about the tower is published; the others are the least a body can have.
     """
     mass = NACELLE_MASS - WHEEL_MASS - GENERATOR_MASS
-    at = np.array([0.0, 0.0, TOWER]) + NACELLE_CENTRE
+    at = np.array([0.0, 0.0, TOWER_HEIGHT]) + NACELLE_CENTRE
     yaw = NACELLE_YAW - NACELLE_MASS * (NACELLE_CENTRE[0] ** 2 + NACELLE_CENTRE[1] ** 2)
     part = mech.add_rigid("nacelle", mass=mass, inertia=(yaw / 2, yaw / 2, yaw), at=at)
     mech.fixed("yaw", top, part.marker(-np.array(NACELLE_CENTRE)))
@@ -169,7 +170,7 @@ def _train(
     behind = nacelle.at
     bearing = nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
     at = mech.design_point(bearing)
-    slow, fast = speed * axis, GEAR * speed * axis
+    slow, fast = speed * axis, GEAR_RATIO * speed * axis
     wheel = mech.add_rigid(
         "wheel", mass=WHEEL_MASS, inertia=(WHEEL_INERTIA,) * 3, at=at, omega=slow
     )
@@ -182,7 +183,7 @@ def _train(
     )  # fmt: skip
     mech.revolute("slow", bearing, wheel.marker(STILL), axis=axis)
     mech.revolute("fast", bearing, generator.marker(STILL), axis=axis)
-    mech.gear("gear", "slow", "fast", ratio=GEAR)
+    mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
     mech.revolute("shaft", wheel.marker(hub - at), turning.marker(STILL), axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
     return turning
@@ -191,7 +192,7 @@ def _train(
 def _blade(mech: Mechanism, k: int, one: Any, hub: Part, place: Any) -> Assembly:
     """Blade k on the hub."""
     lean, centre, cone, speed = place
-    round_ = rotation.matrix(rotation.exp([2 * np.pi / BLADES * k, 0.0, 0.0]))
+    round_ = rotation.matrix(rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0]))
     A = lean @ round_ @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
     turning = A.T @ lean @ [speed, 0.0, 0.0]
     added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)

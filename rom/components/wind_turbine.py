@@ -25,17 +25,18 @@ COLUMNS = (
     "eta", "twist_deg", "mass", "EI_flap", "EI_edge", "GJ", "EA", "kGA", "inertia_edge",
     "inertia_flap",
 )  # fmt: skip
-BLADE, HUB_RADIUS = 61.5, 1.5  # m
+BLADE_LENGTH, HUB_RADIUS = 61.5, 1.5  # m
 MASS_FACTOR = 1.04536  # brings the mass to that of the definition; inertias stay as they are
 VISCOSITY = (1e-3, 1e-3, 1e-3, 1.4e-3, 2.2e-3, 2.2e-3)  # s, as in the files of BeamDyn
 RATED = 12.1 * np.pi / 30  # rad/s
-TOWER, HUB_HEIGHT = 87.6, 90.0  # m
+TOWER_HEIGHT, HUB_HEIGHT = 87.6, 90.0  # m
 TUBE = {"diameter": (6.0, 3.87), "wall": (0.0351, 0.0247)}  # m, at foot and top
-BLADES = 3
-OVERHANG = 5.0191  # m, from the axis of the tower to the hub
+N_BLADES = 3
+HUB_OVERHANG = 5.0191  # from the axis of the tower to the hub [m]
 HUB_INERTIA = 115_926.0  # kg m^2, about the rotor axis
-GEAR, GENERATOR_INERTIA = 97.0, 534.116  # kg m^2 about the fast shaft
-STIFFNESS, DAMPING = 8.67637e8, 6.215e6  # N m/rad and N m s/rad, of the slow shaft
+GEAR_RATIO = 97.0
+GENERATOR_INERTIA = 534.116  # about the fast shaft [kg m^2]
+SHAFT_STIFFNESS, SHAFT_DAMPING = 8.67637e8, 6.215e6  # N m/rad and N m s/rad, of the slow shaft
 STEEL = {"E": 210e9, "G": 80.8e9, "rho": 8500.0}  # with paint, bolts and flanges
 
 
@@ -64,7 +65,7 @@ def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: flo
 
     def place(s: float) -> tuple[Array, Array]:
         twist = float(np.radians(at("twist_deg", s)))  # leading edge into the wind
-        return turn @ [0, 0, HUB_RADIUS + BLADE * s], turn @ rotation.matrix(
+        return turn @ [0, 0, HUB_RADIUS + BLADE_LENGTH * s], turn @ rotation.matrix(
             rotation.exp([0, 0, -twist])
         )
 
@@ -94,7 +95,7 @@ def tower(n: int = 40, *, top: float = 0.0) -> Rod:
     (A, I), (_, bent) = tube(middles), tube(cells)
     GA, EI = STEEL["G"] * A / 2, STEEL["E"] * bent
     rod = along(
-        lambda at: (np.array([0, 0, TOWER * at]), np.eye(3)),
+        lambda at: (np.array([0, 0, TOWER_HEIGHT * at]), np.eye(3)),
         s,
         stretch=np.column_stack([GA, GA, STEEL["E"] * A]),
         bend=np.column_stack([EI, EI, 2 * STEEL["G"] * bent]),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rom.arguments import typed
 from rom.config.component_keys import TABLE
 from rom.config.document import Document, KeyPath, read_document
-from rom.config.keys import Place, Quantity, read_table, shown
+from rom.config.keys import Place, Quantity, as_text, read_table
 from rom.config.methods import chosen
 from rom.errors import ConfigError, RomError
 from rom.units import LENGTH, in_si, unit
@@ -53,10 +53,10 @@ class Component:
         records = {"polynomial": Polynomial, "fourier": FourierLegendre}
         found = {}
         for name, value in self.values.get("interfaces", {}).items():
-            rest = dict(value) if isinstance(value, dict) else {"kind": value}
-            kind = rest.pop("kind")
+            options = dict(value) if isinstance(value, dict) else {"kind": value}
+            kind = options.pop("kind")
             with self.at("interfaces", name):
-                found[name] = records[kind](**rest) if rest else parsed(name, kind)
+                found[name] = records[kind](**options) if options else parsed(name, kind)
         return found
 
     @property
@@ -198,8 +198,8 @@ class Component:
         sets: dict[str, Any] = {
             name: [int(x) for x in labels] for name, labels in m.get("sets", {}).items()
         }
-        rest = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
-        sets |= read_node_sets(m["nodes"], rest) if rest else {}
+        remaining = tuple(name for name in self.values.get("interfaces", {}) if name not in sets)
+        sets |= read_node_sets(m["nodes"], remaining) if remaining else {}
         sources = (self._source(m[name]) for name in ("stiffness", "mass"))
         model = read_model(*sources, nodes=m["nodes"], interfaces=sets, units=m["units"])
         return replace(model, attachments=tuple(self._attachments()))
@@ -277,7 +277,7 @@ def change(data: dict[str, Any], key: tuple[str, ...], value: Any) -> None:
     for name in key[:-1]:
         inner = data.setdefault(name, {})
         if not isinstance(inner, dict):
-            raise ConfigError(f"{name} = {shown(inner)} is no table.")
+            raise ConfigError(f"{name} = {as_text(inner)} is no table.")
         data = inner
     if value is None:
         data.pop(key[-1], None)

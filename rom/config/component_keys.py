@@ -42,7 +42,7 @@ class Solids:
     """One material, or a table of them by region."""
 
     parts: ClassVar[dict[str, Table]] = {"isotropic": ISOTROPIC, "orthotropic": ORTHOTROPIC}
-    said: str = "isotropic or orthotropic table, or a table of them by region"
+    summary: str = "isotropic or orthotropic table, or a table of them by region"
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
         """Values of the material, or of each region under "regions"."""
@@ -57,7 +57,7 @@ class Solids:
 
 @dataclass(frozen=True, slots=True)
 class _Solid:
-    said: str = "material"
+    summary: str = "material"
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
         """Values of one material."""

@@ -10,10 +10,10 @@ from typing import Any
 from rom.errors import ConfigError, FileFormatError
 from rom.io.files import check_readable
 
-LARGEST = 1_000_000  # bytes
-DEEPEST = 40  # brackets or tables inside each other: more is an accident, and costs the stack
-STRING = r'"""(?:\\.|[^\\])*?"""' + r"|'''.*?'''" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'"
-TOKEN = re.compile(STRING + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
+MAX_BYTES = 1_000_000  # bytes
+MAX_DEPTH = 40  # brackets or tables inside each other: more is an accident, and costs the stack
+STRING_PATTERN = r'"""(?:\\.|[^\\])*?"""' + r"|'''.*?'''" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'"
+TOKEN = re.compile(STRING_PATTERN + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
 WORD = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'|[A-Za-z0-9_-]+')
 KeyPath = tuple[str, ...]
 
@@ -48,8 +48,8 @@ def read_document(path: str | Path) -> Document:
         ConfigError: naming the line that is no TOML, or the key that is given twice.
     """
     path = check_readable(path)
-    if path.stat().st_size > LARGEST:
-        raise FileFormatError(f"more than {LARGEST} bytes are no description.", where=str(path))
+    if path.stat().st_size > MAX_BYTES:
+        raise FileFormatError(f"more than {MAX_BYTES} bytes are no description.", where=str(path))
     try:
         text = path.read_bytes().decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
@@ -66,9 +66,9 @@ def parsed(text: str, path: Path) -> Document:
     found = list(statements(text))
     _check_depth(text, path)
     for key, line in found:
-        if len(key) > DEEPEST:
+        if len(key) > MAX_DEPTH:
             where = f"{path}:{line}"
-            raise ConfigError(f"a key is deeper than {DEEPEST} tables.", where=where)
+            raise ConfigError(f"a key is deeper than {MAX_DEPTH} tables.", where=where)
     try:
         data = tomllib.loads(text)
     except ValueError as error:
@@ -84,13 +84,13 @@ def _check_depth(text: str, path: Path) -> None:
     depth = 0
     for token in TOKEN.finditer(text):
         depth += (token[0] in ("[", "{")) - (token[0] in ("]", "}"))
-        if depth > DEEPEST:
-            raise ConfigError(f"has more than {DEEPEST} brackets in each other.", where=str(path))
+        if depth > MAX_DEPTH:
+            raise ConfigError(f"has more than {MAX_DEPTH} brackets in each other.", where=str(path))
 
 
-def _refusal(said: str, found: list[tuple[KeyPath, int]], path: Path) -> ConfigError:
+def _refusal(message: str, found: list[tuple[KeyPath, int]], path: Path) -> ConfigError:
     """What the parser says, with file and line; for a key given twice both lines."""
-    if said.startswith("Cannot"):
+    if message.startswith("Cannot"):
         seen: dict[KeyPath, int] = {}
         for key, line in found:
             if key in seen:
@@ -100,9 +100,9 @@ def _refusal(said: str, found: list[tuple[KeyPath, int]], path: Path) -> ConfigE
                     hint="Keep one of them.",
                 )
             seen[key] = line
-    place = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", said)
+    place = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", message)
     line_number = f":{place[1]}" if place and place[1] else ""
-    reason = re.sub(r" \(at [^)]*\)", "", said).rstrip(".")
+    reason = re.sub(r" \(at [^)]*\)", "", message).rstrip(".")
     return ConfigError(
         f"this is no TOML: {reason[0].lower()}{reason[1:]}.",
         where=f"{path}{line_number}",

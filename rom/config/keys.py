@@ -41,7 +41,7 @@ class Kind(Protocol):
     """How the value of a key is written."""
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """In a few words, for the documentation."""
 
     def read(self, value: Any, place: Place) -> Any:
@@ -67,7 +67,7 @@ class Quantity:
     positive: bool = False
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Number, vector or matrix, and unit."""
         forms = {0: "number", 1: "list", 2: "matrix"}
         sizes = ["x".join("n" if n is None else str(n) for n in s) for s in self.shapes]
@@ -80,7 +80,7 @@ class Quantity:
         """Number or nested lists of numbers in SI."""
         found = _shape(value)
         if not any(_matches(found, shape) for shape in self.shapes):
-            raise place.error(f"{place.name} = {shown(value)}: needed is a {self.said}.")
+            raise place.error(f"{place.name} = {as_text(value)}: needed is a {self.summary}.")
         return self._number(value, place)
 
     def _number(self, value: Any, place: Place) -> Any:
@@ -94,10 +94,10 @@ class Quantity:
         elif isinstance(value, int | float) and not isinstance(value, bool):
             x = float(value) if abs(value) <= 1e300 else math.inf
         else:
-            raise place.error(f"{place.name} = {shown(value)} is not a {self.said}.")
+            raise place.error(f"{place.name} = {as_text(value)} is not a {self.summary}.")
         if not math.isfinite(x) or (self.positive and x <= 0):
             what = "is not positive" if math.isfinite(x) else "is not a finite number"
-            raise place.error(f"{place.name} = {shown(value)} {what}.")
+            raise place.error(f"{place.name} = {as_text(value)} {what}.")
         return x
 
 
@@ -126,16 +126,16 @@ class Whole:
     most: int = 10**9
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Whole number from the least one on."""
         return f"whole number from {self.least}"
 
     def read(self, value: Any, place: Place) -> int:
         """The number."""
         if isinstance(value, bool) or not isinstance(value, int):
-            raise place.error(f"{place.name} = {shown(value)} is not a {self.said}.")
+            raise place.error(f"{place.name} = {as_text(value)} is not a {self.summary}.")
         if not self.least <= value <= self.most:
-            raise place.error(f"{place.name} = {shown(value)} is not a {self.said}.")
+            raise place.error(f"{place.name} = {as_text(value)} is not a {self.summary}.")
         return value
 
 
@@ -143,12 +143,12 @@ class Whole:
 class Flag:
     """true or false."""
 
-    said: str = "true or false"
+    summary: str = "true or false"
 
     def read(self, value: Any, place: Place) -> bool:
         """The value."""
         if not isinstance(value, bool):
-            raise place.error(f"{place.name} = {shown(value)} is not true or false.")
+            raise place.error(f"{place.name} = {as_text(value)} is not true or false.")
         return value
 
 
@@ -159,14 +159,14 @@ class Text:
     choices: tuple[str, ...] = ()
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Text, or the choices."""
         return ", ".join(f'"{c}"' for c in self.choices) or "text"
 
     def read(self, value: Any, place: Place) -> str:
         """The text."""
         if not isinstance(value, str) or not value or "\0" in value:
-            raise place.error(f"{place.name} = {shown(value)} is not a text.")
+            raise place.error(f"{place.name} = {as_text(value)} is not a text.")
         if self.choices and value not in self.choices:
             hint = nearest(value, self.choices)
             raise place.error(f"{place.name} = {value!r} does not exist.", hint)
@@ -177,7 +177,7 @@ class Text:
 class Words:
     """A text or a list of texts."""
 
-    said: str = "text, or list of texts"
+    summary: str = "text, or list of texts"
 
     def read(self, value: Any, place: Place) -> tuple[str, ...]:
         """The texts."""
@@ -189,7 +189,7 @@ class Words:
 class FilePath:
     """A file, relative to the folder of the document."""
 
-    said: str = "file"
+    summary: str = "file"
 
     def read(self, value: Any, place: Place) -> Path:
         """The path."""
@@ -200,13 +200,13 @@ class FilePath:
 class Anything:
     """Left to whoever uses it."""
 
-    said: str
+    summary: str
 
     def read(self, value: Any, place: Place) -> Any:
         """The value as it is."""
         if isinstance(value, int | float | str | list | dict):
             return value
-        raise place.error(f"{place.name} = {shown(value)} is no {self.said}.")
+        raise place.error(f"{place.name} = {as_text(value)} is no {self.summary}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,14 +240,14 @@ class Table:
     keys: tuple[Key, ...]
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Called a table."""
         return "table"
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
         """Values by key: those given, and defaults that are values."""
         if not isinstance(value, Mapping):
-            raise place.error(f"{place.name} = {shown(value)}: needed is a table [{place.name}].")
+            raise place.error(f"{place.name} = {as_text(value)}: needed is a table [{place.name}].")
         known = {key.name: key for key in self.keys}
         for name in value:
             if name not in known:
@@ -260,7 +260,7 @@ class Table:
                 inside = f" in [{place.name}]" if place.path else ""
                 place.mistakes.append(
                     place.error(
-                        f"{key.name} is missing{inside}.", f"{key.about[:-1]}: {key.kind.said}."
+                        f"{key.name} is missing{inside}.", f"{key.about[:-1]}: {key.kind.summary}."
                     )
                 )
             elif key.default == {}:  # a table of its own defaults
@@ -278,14 +278,14 @@ class Named:
     what: str
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Called a table by name."""
         return f"table of {self.what} by name"
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
         """Values by name."""
         if not isinstance(value, Mapping):
-            raise place.error(f"{place.name} = {shown(value)}: needed is a {self.said}.")
+            raise place.error(f"{place.name} = {as_text(value)}: needed is a {self.summary}.")
         found: dict[str, Any] = {}
         for name, item in value.items():
             try:
@@ -304,19 +304,19 @@ class Variants:
     tables: Mapping[str, Table]
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """The kinds."""
         return "table with a kind: " + ", ".join(self.tables)
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
         """Values by key, ``kind`` among them."""
         if not isinstance(value, Mapping):
-            raise place.error(f"{place.name} = {shown(value)}: needed is a table [{place.name}].")
+            raise place.error(f"{place.name} = {as_text(value)}: needed is a table [{place.name}].")
         if "kind" not in value:
             raise place.error(f"kind is missing in [{place.name}].", nearest("", self.tables))
         kind = Text(tuple(self.tables)).read(value["kind"], place.at("kind"))
-        rest = {key: item for key, item in value.items() if key != "kind"}
-        return {"kind": kind} | self.tables[kind].read(rest, place)
+        remaining = {key: item for key, item in value.items() if key != "kind"}
+        return {"kind": kind} | self.tables[kind].read(remaining, place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,9 +327,9 @@ class Either:
     table: Kind
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Both forms."""
-        return f"{self.short.said}; or {self.table.said}"
+        return f"{self.short.summary}; or {self.table.summary}"
 
     def read(self, value: Any, place: Place) -> Any:
         """Either form."""
@@ -357,7 +357,7 @@ def nearest(word: str, known: Any) -> str:
     return (f"Did you mean {near[0]}? " if near else "") + f"Known: {', '.join(words)}."
 
 
-def shown(value: Any) -> str:
+def as_text(value: Any) -> str:
     """A value, not longer than a line."""
     text = repr(value) if not isinstance(value, int) or abs(value) < 10**18 else "a huge number"
     return text if len(text) <= 60 else text[:57] + "..."
@@ -391,7 +391,7 @@ def raise_mistakes(place: Place) -> None:
             ((int("0" + e.where.removeprefix(file).strip(":")), e) for e in found),
             key=lambda pair: pair[0],
         )
-        told = [f"line {line}: {e.message}" if line else e.message for line, e in by_line]
+        messages = [f"line {line}: {e.message}" if line else e.message for line, e in by_line]
         hint = by_line[0][1].hint
         more = f" And {count - len(found)} more." if count > len(found) else ""
-        raise ConfigError(f"{count} mistakes. {' '.join(told)}{more}", where=file, hint=hint)
+        raise ConfigError(f"{count} mistakes. {' '.join(messages)}{more}", where=file, hint=hint)

@@ -86,9 +86,9 @@ class ByCoordinate:
     sliding: Kind
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Both kinds."""
-        return f"{self.turning.said}; of a joint that slides {self.sliding.said}"
+        return f"{self.turning.summary}; of a joint that slides {self.sliding.summary}"
 
     def read(self, value: Any, place: Place) -> Pending:
         """The value, which fits at least one of them."""

@@ -33,9 +33,8 @@ METHODS = {  # section: method of a mechanism; in the others the kind of the ent
 }
 ON_JOINTS = ("drives", "motors", "frictions", "stops")
 ONE_POINT = ("revolute", "spherical", "universal", "fixed")
-APART = (
-    1e-2  # of the size of the mechanism; bores of a mesh are polygons, so that a little is normal
-)
+# of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
+GAP_RTOL = 1e-2
 MARKER_KEYS = ("between", "marker")
 JOINT_KEYS = ("joint", "joint1", "joint2")
 MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
@@ -146,7 +145,7 @@ class MechanismFile:
         ends = [made.design_point(marker) for marker in joint.markers]
         placed = [part.at for part in made.parts.values()] + ends
         gap = float(np.linalg.norm(ends[0] - ends[1]))
-        if gap > APART * max(float(np.ptp(placed, axis=0).max()), 1e-300):
+        if gap > GAP_RTOL * max(float(np.ptp(placed, axis=0).max()), 1e-300):
             where = self.document.where(("joints", name))
             warnings.warn(
                 f"{where}: the markers of joint {name!r} are {gap:.3g} m apart as the bodies are "
@@ -283,23 +282,23 @@ def _drive(first: list[Any], values: dict[str, Any], place: Place, t_end: float)
 
 
 def _motor(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
-    rest = {key: value for key, value in values.items() if key != "law"}
+    remaining = {key: value for key, value in values.items() if key != "law"}
     if not isinstance(values["law"], Mapping):
         constant = values["law"]
-        return [*first, lambda t, x, rate: constant], rest
+        return [*first, lambda t, x, rate: constant], remaining
     value = law_of(values["law"], place.at("law"), t_end=t_end).value
-    return [*first, lambda t, x, rate: float(value(t))], rest | {"compiled": False}
+    return [*first, lambda t, x, rate: float(value(t))], remaining | {"compiled": False}
 
 
 def _load(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
     import numpy as np
 
     vector = np.array(values["vector"])
-    rest = {"frame": values["frame"]}
+    remaining = {"frame": values["frame"]}
     if "factor" not in values:
-        return [*first, vector], rest
+        return [*first, vector], remaining
     factor = law_of(values["factor"], place.at("factor"), t_end=t_end).value
-    return [*first, lambda t: float(factor(t)) * vector], rest
+    return [*first, lambda t: float(factor(t)) * vector], remaining
 
 
 def _bushing(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:

@@ -18,7 +18,7 @@ from rom.config.keys import (
     Variants,
     Whole,
     Words,
-    shown,
+    as_text,
 )
 from rom.config.laws import ByCoordinate, law_kind
 
@@ -29,7 +29,9 @@ POINT, DIRECTION = Quantity("m", ((3,),)), Quantity("1", ((3,),))
 class MarkerName:
     """A marker: "body.marker", or a point of a rigid body or the ground."""
 
-    said: str = '"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body'
+    summary: str = (
+        '"body.marker", or { body = [x, y, z] } for a point of the ground or a rigid body'
+    )
 
     def read(self, value: Any, place: Place) -> tuple[str, Any]:
         """Name of the body, and name or coordinates of the marker."""
@@ -40,7 +42,7 @@ class MarkerName:
             body, _, marker = value.partition(".")
             return body, marker
         raise place.error(
-            f"{place.name} = {shown(value)} is no marker.",
+            f"{place.name} = {as_text(value)} is no marker.",
             'Write "body.marker", or { ground = [x, y, z] }.',
         )
 
@@ -49,12 +51,12 @@ class MarkerName:
 class Two:
     """Two markers of different bodies."""
 
-    said: str = 'list of two markers, each "body.marker" or { body = [x, y, z] }'
+    summary: str = 'list of two markers, each "body.marker" or { body = [x, y, z] }'
 
     def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
         """The two."""
         if not isinstance(value, list) or len(value) != 2:
-            raise place.error(f"{place.name} = {shown(value)}: two markers are needed.")
+            raise place.error(f"{place.name} = {as_text(value)}: two markers are needed.")
         return [MarkerName().read(item, place) for item in value]
 
 
@@ -87,7 +89,7 @@ class Body:
     """A body: rigid by its numbers, or from a file."""
 
     parts: ClassVar[dict[str, Table]] = {"rigid": RIGID, "from a file": FROM_FILE}
-    said: str = "table with a file, or with mass and inertia"
+    summary: str = "table with a file, or with mass and inertia"
 
     def read(self, value: Any, place: Place) -> dict[str, Any]:
         """Its values."""
@@ -98,7 +100,7 @@ class Body:
 BETWEEN = Key("between", Two(), "Its markers; forces and coordinates are those of the second.", ...)
 AXIS = Key("axis", DIRECTION, "In the world at the start.", ...)
 NORMAL = Key("normal", DIRECTION, "In the world at the start.", ...)
-SIDE = ("angle", "way")
+COORDINATES = ("angle", "displacement", "way")  # the last is the earlier name of the second
 JOINTS = {
     "revolute": Table("A hinge.", (BETWEEN, AXIS)),
     "cylindrical": Table("Turns about and slides along an axis.", (BETWEEN, AXIS)),
@@ -129,12 +131,12 @@ JOINTS = {
         Key("joint1", Text(), "Driving joint.", ...),
         Key("joint2", Text(), "Driven joint.", ...),
         Key("ratio", Quantity(), "Coordinate 2 over coordinate 1 [rad/rad, m/rad, ...].", ...),
-        Key("coordinate1", Text(SIDE), "Which, where a joint has two."),
-        Key("coordinate2", Text(SIDE), "Likewise."),
+        Key("coordinate1", Text(COORDINATES), "Which, where a joint has two."),
+        Key("coordinate2", Text(COORDINATES), "Likewise."),
     )),
 }  # fmt: skip
 JOINT = Key("joint", Text(), "Name of the joint.", ...)
-WHICH = Key("coordinate", Text(SIDE), "Which, where the joint has two.")
+WHICH = Key("coordinate", Text(COORDINATES), "Which, where the joint has two.")
 LEVEL = ByCoordinate(Quantity("N m"), Quantity("N"))
 SPEED = ByCoordinate(Quantity("rad/s", positive=True), Quantity("m/s", positive=True))
 WAY = ByCoordinate(Quantity("rad"), Quantity("m"))

@@ -9,7 +9,7 @@ from rom.config.laws import law_kind
 from rom.config.mechanism_keys import TABLE as MECHANISM
 from rom.units import UNITS, Dimension, dimension_name
 
-HEAD = """\
+PAGE_HEADER = """\
 # Component and mechanism files
 
 A component file says what a part is made of and how it is reduced; a mechanism file says how parts
@@ -30,21 +30,21 @@ def page(component: str, mechanism: str) -> str:
         component: text of a component file that serves as example.
         mechanism: text of a mechanism file.
     """
-    parts = [HEAD, "## A component", f"```toml\n{component.strip()}\n```"]
+    parts = [PAGE_HEADER, "## A component", f"```toml\n{component.strip()}\n```"]
     parts += list(_sections(COMPONENT))
     parts += ["## A mechanism", f"```toml\n{mechanism.strip()}\n```"]
     parts += list(_sections(MECHANISM))
-    parts += ["## Laws", LAWS]
+    parts += ["## Laws", LAWS_SECTION]
     parts += [f"**{name}.** {t.about}\n\n{keys(t)}" for name, t in tables(law_kind("1"))]
     parts += ["## Units", "Products with a blank, powers with `^`, and each `/` belongs to the one"
               " unit behind it: `kg/m^3`, `N m/rad`, `m s^-2`.", _units()]  # fmt: skip
     return "\n\n".join(parts) + "\n"
 
 
-LAWS = (
+LAWS_SECTION = (
     "Functions of time, where a key says so: a plain value is constant, a table has a kind. Values "
-    "have the unit of what they prescribe: an angle or a way for drives, a torque or a force for "
-    "motors, none for factors."
+    "have the unit of what they prescribe: an angle or a displacement for drives, a torque or a "
+    "force for motors, none for factors."
 )
 
 
@@ -96,7 +96,7 @@ def keys(table: Table) -> str:
     """The keys of a table as a table in Markdown."""
     rows = ["| key | written as | default | meaning |", "|---|---|---|---|"]
     rows += [
-        f"| `{k.name}` | {_cell(k.kind.said)} | {_default(k)} | {_cell(k.about)} |"
+        f"| `{k.name}` | {_cell(k.kind.summary)} | {_default(k)} | {_cell(k.about)} |"
         for k in table.keys
     ]
     return "\n".join(rows)

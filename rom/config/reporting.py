@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rom import report
 from rom.child import scratch
 from rom.config.document import read_document
-from rom.config.run import RECORD, versions
+from rom.config.run import RECORD_FILE, versions
 from rom.errors import FileFormatError, RomError
 from rom.model import Report, Row
 
@@ -246,7 +246,7 @@ def of_run(folder: Path) -> tuple[str, Sections]:
 
 
 def _record(folder: Path) -> dict[str, Any]:
-    path = folder / RECORD
+    path = folder / RECORD_FILE
     try:
         record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         if record["schema"] != "rom-run" or record["version"][0] != 1:
@@ -255,7 +255,7 @@ def _record(folder: Path) -> dict[str, Any]:
         missing = [k for k in (*wanted, "command", "versions", "source") if k not in record]
     except FileNotFoundError:
         raise FileFormatError(
-            f"there is no {RECORD}: this is not the folder of a run.", where=str(folder),
+            f"there is no {RECORD_FILE}: this is not the folder of a run.", where=str(folder),
             hint="rom simulate FILE.toml -o FOLDER makes one.",
         ) from None  # fmt: skip
     except (ValueError, KeyError, TypeError, IndexError) as error:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from rom.mbs.solution import Solution
     from rom.model import Report
 
-RECORD = "run.json"
-INSTANTS = 4  # in the picture
+RECORD_FILE = "run.json"
+N_INSTANTS = 4  # in the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ class Run:
 
             from rom.view.film import instants
 
-            times = np.linspace(solution.t[0], solution.t[-1], INSTANTS)
+            times = np.linspace(solution.t[0], solution.t[-1], N_INSTANTS)
             how = look | {"times": times, "magnify": out["magnify"]}
             instants(solution.mechanism, solution, names["instants.png"], **how)
         if "motion.gif" in names:
@@ -146,12 +146,12 @@ class Run:
             unit, values = found[name]
             panels.setdefault(unit, {})[name] = values
         title = f"Motion of {self.file.name}"
-        told = [(f"[{unit}]", curves) for unit, curves in panels.items()]
+        groups = [(f"[{unit}]", curves) for unit, curves in panels.items()]
         caption = (
             f"Histories of {self.file.name} over {self.solution.t[-1]:g} s, one panel for each "
             "unit; names as in the table of the motion."
         )
-        history(self.solution.t, told, path, title=title, caption=caption)
+        history(self.solution.t, groups, path, title=title, caption=caption)
 
 
 def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
@@ -161,7 +161,7 @@ def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
     names += ["instants.png"] if out["picture"] else []
     names += ["curves.png"] if out["plot"] else []
     names += [f"motion.{out['film']}"] if "film" in out else []
-    return [folder / name for name in [*names, RECORD]]
+    return [folder / name for name in [*names, RECORD_FILE]]
 
 
 def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:

@@ -36,7 +36,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
 from rom.plausible import check_damping_ratio
 
-RIGID = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
+RIGID_RTOL = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
 
 
 @typed
@@ -158,7 +158,7 @@ class BladedWheel:
             )
         K, M = self.matrices(blades, speed=speed)
         lam, Phi = _apart(K, M, self.rigid)
-        if lam[0] < -RIGID * lam[-1] or (speed and lam[0] <= 0.0):
+        if lam[0] < -RIGID_RTOL * lam[-1] or (speed and lam[0] <= 0.0):
             raise ModelError(
                 f"at {speed:g} rad/s the wheel with these blades is above its instability: spin "
                 "softening has used up its stiffness."

@@ -13,7 +13,7 @@ from rom.cyclic.substructures import SubstructuredSector
 from rom.errors import ConfigError
 from rom.model import Array
 
-SPANNED = 1e-6  # share of a rigid motion that coordinates may miss and still have it
+RIGID_SPAN_RTOL = 1e-6  # share of a rigid motion that the coordinates may miss
 
 
 @typed
@@ -67,7 +67,7 @@ def _rigid(sector: SubstructuredSector, n: int, V: Complex) -> Array:
     if sector.standing(n):
         R = real_span(R).astype(complex)
     a = np.linalg.lstsq(V, R, rcond=None)[0]
-    if np.linalg.norm(V @ a - R) > SPANNED * np.linalg.norm(R):
+    if np.linalg.norm(V @ a - R) > RIGID_SPAN_RTOL * np.linalg.norm(R):
         a = a[:, :0]
     if sector.standing(n):
         return np.asarray(a.real)

@@ -32,8 +32,9 @@ from rom.scipy_operators import SciPyOperators
 if TYPE_CHECKING:
     from rom.cyclic.substructures import SubstructuredSector
 
-APART = 0.05  # of the size of a root: how far another one may lie, or differ in size
-ELSEWHERE = 1e-9  # of the stiffness of a dof: what other regions add to it counts as nothing
+# of the root's size: distance and difference in size of two roots that match
+ROOT_MATCH_RTOL = 0.05
+SHARED_STIFFNESS_RTOL = 1e-9  # of a dof's stiffness: round-off of what other regions add
 
 
 @typed
@@ -211,7 +212,7 @@ def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
         InterfaceError: if it shares none.
     """
     total, mine = K.diagonal(), K_blade.diagonal()
-    shared = (mine > 0.0) & (total - mine > ELSEWHERE * total)
+    shared = (mine > 0.0) & (total - mine > SHARED_STIFFNESS_RTOL * total)
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
     if nodes.size == 0:
         raise InterfaceError(f"region {name!r} shares no node with the rest of the sector.")
@@ -235,7 +236,7 @@ def _same_surface(sector: "SubstructuredSector", points: Array) -> csr_matrix:
     size = np.ptp(own, axis=0).max()
     boxes = [np.array([p.min(axis=0), p.max(axis=0)]) for p in (own, points)]
     apart = np.abs(boxes[0] - boxes[1]).max()
-    if apart > APART * size:
+    if apart > ROOT_MATCH_RTOL * size:
         raise InterfaceError(
             f"the root of this blade ends up to {apart:.3g} m from that of the sector, which is "
             f"{size:.3g} m wide.",

@@ -13,7 +13,7 @@ from rom.cyclic.travelling import travelling_modes
 from rom.errors import ConfigError
 from rom.model import Array
 
-SPARE = 4  # waves computed beyond those followed, which may come down from above
+N_SPARE_WAVES = 4  # beyond those followed: waves from above may cross them
 
 
 @typed
@@ -97,11 +97,11 @@ def _waves(
     most = free if standing else 2 * free
     n = whole("n", n, 1, most)
     if speed:
-        waves = travelling_modes(sector, diameter, min(n + SPARE, most), speed=speed)
+        waves = travelling_modes(sector, diameter, min(n + N_SPARE_WAVES, most), speed=speed)
         return waves.omega, waves.direction, waves.shapes
     if standing:
-        modes = cyclic_modes(sector, diameter, min(n + SPARE, free))
+        modes = cyclic_modes(sector, diameter, min(n + N_SPARE_WAVES, free))
         return modes.omega, np.zeros(modes.omega.size), modes.shapes
-    modes = cyclic_modes(sector, diameter, min((n + 1) // 2 + SPARE, free))
+    modes = cyclic_modes(sector, diameter, min((n + 1) // 2 + N_SPARE_WAVES, free))
     both = np.tile([1.0, -1.0], modes.omega.size)  # at rest a wave runs either way
     return np.repeat(modes.omega, 2), both, np.repeat(modes.shapes, 2, axis=1)

@@ -11,11 +11,11 @@ from rom.arguments import unit_vector
 from rom.errors import InterfaceError
 from rom.model import Array, Interface
 
-SAME = 1e-6  # of the size of a face: nodes that close are one
-WHOLE = 1e-3  # largest distance of the number of sectors from a whole number
-ALIKE = 0.02  # relative difference of area and spread of two faces cut into facets
-BESIDE = 0.05  # of the distance of its nodes from the axis: where the middle of a sector lies
-NEIGHBOURS = 15  # nodes that a node between them follows
+COINCIDENT_RTOL = 1e-6  # of the face's size
+SECTOR_COUNT_ATOL = 1e-3  # distance of the number of sectors from a whole number
+FACE_MATCH_RTOL = 0.02  # difference of area and spread of two faces cut into facets
+MIN_CENTRE_RATIO = 0.05  # distance of a sector's centre from the axis, of that of its nodes
+N_NEIGHBOURS = 15  # nodes that a node between them follows
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:
     size = float(np.ptp(master.points, axis=0).max())
     gap, partner = cKDTree(image).query(slave.points)
     k = slave.nodes.size
-    if k == master.nodes.size == np.unique(partner).size and gap.max() < SAME * size:
+    if k == master.nodes.size == np.unique(partner).size and gap.max() < COINCIDENT_RTOL * size:
         W = csr_matrix((np.ones(k), (np.arange(k), partner)), shape=(k, k))
         return Pairing(N, step, slave, master, W, matching=True)
     _refuse_different(slave, master, image, gap, 360 / N)
@@ -93,7 +93,9 @@ def refuse_all_around(points: Array, axis: Array, at: Array) -> None:
     """
     x = points - at
     across = x - np.outer(x @ axis, axis)
-    if np.linalg.norm(across.mean(axis=0)) < BESIDE * np.sqrt((across**2).sum(axis=1).mean()):
+    if np.linalg.norm(across.mean(axis=0)) < MIN_CENTRE_RATIO * np.sqrt(
+        (across**2).sum(axis=1).mean()
+    ):
         raise InterfaceError(
             f"the axis {np.round(axis, 6).tolist()} through {np.asarray(at).tolist()} m runs "
             "through the middle of the sector, which would fill all of the circle.",
@@ -108,7 +110,9 @@ def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[i
         x = face.points - at
         across = x - np.outer(x @ axis, axis)
         size = np.ptp(x, axis=0).max()
-        if (on_axis := np.flatnonzero(np.linalg.norm(across, axis=1) < SAME * size)).size:
+        if (
+            on_axis := np.flatnonzero(np.linalg.norm(across, axis=1) < COINCIDENT_RTOL * size)
+        ).size:
             raise InterfaceError(
                 f"{on_axis.size} nodes of the cyclic face {face.name!r} lie on the axis of "
                 "rotation, where all sectors meet.",
@@ -119,7 +123,7 @@ def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[i
     angle = np.arctan2(axis @ np.cross(*arms), arms[0] @ arms[1])
     share = 2 * np.pi / max(abs(angle), 1e-9)
     N = round(share)
-    if N < 2 or abs(share - N) > WHOLE:
+    if N < 2 or abs(share - N) > SECTOR_COUNT_ATOL:
         raise InterfaceError(
             f"the cyclic faces {low.name!r} and {high.name!r} enclose {np.degrees(abs(angle)):.6g} "
             f"degrees, which does not divide the circle: 360 degrees hold {share:.6g} sectors.",
@@ -134,7 +138,7 @@ def _refuse_different(
     shapes = [_spread(slave.surface_mass, slave.points), _spread(master.surface_mass, image)]
     scale = shapes[0][1:].max()
     apart = np.abs(shapes[0] - shapes[1]) / np.r_[shapes[0][0], np.full(6, scale)]
-    if apart.max() > ALIKE:
+    if apart.max() > FACE_MATCH_RTOL:
         raise InterfaceError(
             f"the cyclic faces {master.name!r} and {slave.name!r} do not match: turned by "
             f"{angle:g} degrees, their areas are {shapes[1][0]:.6g} and {shapes[0][0]:.6g} m^2 and "
@@ -168,7 +172,7 @@ def interpolation(points: Array, targets: Array) -> csr_matrix:
         Flyer, Fornberg, Bayona and Barnett, On the role of polynomials in RBF-FD approximations,
         J. Comput. Phys. 321 (2016) 21.
     """
-    k = min(NEIGHBOURS, points.shape[0])
+    k = min(N_NEIGHBOURS, points.shape[0])
     near = cKDTree(points).query(targets, k)[1].reshape(len(targets), k)
     weights = np.array([_weights(points[n] - x) for n, x in zip(near, targets, strict=True)])
     rows = np.repeat(np.arange(len(targets)), k)

@@ -34,8 +34,8 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report
 from rom.plausible import check_damping_ratio
 
-STIFFER = 0.1  # relative change of the stiffness of all blades that enriches the basis
-NEW = 1e-12  # squared share of a mode that is new, below which it is round-off
+STIFFNESS_CHANGE = 0.1  # of all blades, relative, that enriches the basis
+NEW_SHARE_TOL = 1e-12  # squared share of a mode that is new, below which it is round-off
 AT_ONCE = 1_000_000  # complex numbers held by one batch of wheels
 
 
@@ -257,12 +257,12 @@ def _tuned(
     sector: CyclicSector, K_blade: Any, diameter: int, n: int, speed: float
 ) -> tuple[Array, Complex]:
     """Squared frequencies and shapes in the space of tuned modes and those with stiffer blades."""
-    stiffer = replace(sector, K=sector.K + STIFFER * K_blade)
+    stiffer = replace(sector, K=sector.K + STIFFNESS_CHANGE * K_blade)
     Phi, more = (cyclic_modes(s, diameter, n, speed=speed).shapes for s in (sector, stiffer))
     for _ in range(2):
         more = more - Phi @ (Phi.conj().T @ (sector.M @ more))
     weight, V = np.linalg.eigh(more.conj().T @ (sector.M @ more))
-    new = weight > NEW
+    new = weight > NEW_SHARE_TOL
     Z = np.hstack([Phi, more @ (V[:, new] / np.sqrt(weight[new]))])
     K = sector.K if speed == 0.0 else spinning(sector, speed)
     lam, V = eigh(Z.conj().T @ (K @ Z), Z.conj().T @ (sector.M @ Z))

@@ -13,7 +13,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes
 from rom.scipy_operators import SciPyOperators, negative_count
 
-SPARE = 2  # modes beyond those asked for, so that no pair is cut
+N_SPARE_MODES = 2  # beyond those asked for, so that no pair is cut
 
 
 @typed
@@ -81,7 +81,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     parts = real_form(T)
     K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
     rigid = np.hstack([_stacked(R), _stacked(1j * R)])
-    _, pairs = _real(K_2, M_2, rigid, 2 * (n + SPARE), held=held)
+    _, pairs = _real(K_2, M_2, rigid, 2 * (n + N_SPARE_MODES), held=held)
     omega, shapes = _waves(T, K, sector.M, pairs, rigid.shape[1], n)
     return CyclicModes(omega, T @ shapes, sector=sector, diameter=diameter)
 

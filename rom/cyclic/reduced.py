@@ -15,7 +15,7 @@ from rom.cyclic.sector import Complex, CyclicSector
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
 from rom.reduction.method import CraigBampton
-from rom.reduction.polynomial import DEPENDENT, FourierLegendre, Polynomial, orthonormal_in
+from rom.reduction.polynomial import DEPENDENT_RTOL, FourierLegendre, Polynomial, orthonormal_in
 from rom.scipy_operators import SciPyOperators
 
 
@@ -166,7 +166,7 @@ def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre
     if at_rest.any():
         V = V * fading(face, at_rest)[:, None]
     norms = np.sqrt(np.einsum("km,km->m", V, S @ V))
-    return orthonormal_in(S, V[:, norms > DEPENDENT * norms.max()])
+    return orthonormal_in(S, V[:, norms > DEPENDENT_RTOL * norms.max()])
 
 
 def fading(face: Interface, at_rest: npt.NDArray[np.bool_]) -> Array:

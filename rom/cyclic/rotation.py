@@ -22,9 +22,9 @@ from rom.cyclic.sector import NONE, CyclicSector
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.rotation import skew
-from rom.scipy_operators import DENSE, SciPyOperators
+from rom.scipy_operators import MAX_DENSE_DOFS, SciPyOperators
 
-RESIDUAL = 1e-7  # of eigenvectors; the error of eigenvalues apart from others is its square
+EIGENVECTOR_RTOL = 1e-7  # residual of eigenvectors; the error of separate eigenvalues is its square
 NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender solids
 
 
@@ -126,7 +126,7 @@ def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
     Raises:
         ModelError: if K is not.
     """
-    if K.shape[0] <= DENSE:
+    if K.shape[0] <= MAX_DENSE_DOFS:
         return max(_largest(C.toarray(), K.toarray()), 0.0)
     inverse = LinearOperator(K.shape, matvec=splu(K.tocsc()).solve, dtype=K.dtype)
     start = np.sin(1.0 + np.arange(K.shape[0])).astype(K.dtype)
@@ -135,7 +135,7 @@ def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
     if size == 0.0:
         return 0.0
     # where none is positive they crowd at zero, which has no relative accuracy; one has
-    most = float(eigsh(C / size + K, 1, K, which="LA", tol=RESIDUAL, **how)[0]) - 1.0
+    most = float(eigsh(C / size + K, 1, K, which="LA", tol=EIGENVECTOR_RTOL, **how)[0]) - 1.0
     return most * size if most > NONE_POSITIVE else 0.0
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.cyclic.blades import (
-    ELSEWHERE,
+    SHARED_STIFFNESS_RTOL,
     ReducedBlade,
     blade_in,
     cut,
@@ -135,7 +135,7 @@ def substructured_sector(
 def _refuse_stiffened(sector: CyclicSector, model: FEModel, of_blade: Array) -> None:
     """What heat adds to a sector cannot be told apart into disk and blade."""
     own = all_rows(model, model.K).diagonal()[of_blade]
-    if np.any(abs(sector.K.diagonal()[of_blade] - own) > ELSEWHERE * own):
+    if np.any(abs(sector.K.diagonal()[of_blade] - own) > SHARED_STIFFNESS_RTOL * own):
         raise ConfigError(
             "the blade of the sector does not have the stiffness of its finite elements: what "
             "rom.heated_sector adds cannot be shared out between disk and blade.",

@@ -15,10 +15,10 @@ from rom.errors import ConfigError, ModelError, ModesMissedError
 from rom.model import Array, Modes
 from rom.scipy_operators import negative_count
 
-UNSTABLE = 1e-4  # growth rate, of the largest frequency found, of a motion that diverges
-RIGID = 0.01  # of the speed: so near to zero or to the speed, motions are rigid
-SPARE = 4  # waves computed beyond those asked for
-SMALL = 40  # dofs up to which all waves are computed at once
+GROWTH_RATE_RTOL = 1e-4  # growth rate of an unstable motion, of the largest frequency found
+RIGID_RTOL = 0.01  # of the speed: distance of a rigid motion's frequency from zero or the speed
+N_SPARE_WAVES = 4  # beyond those asked for
+MAX_DENSE_DOFS = 40  # all waves are computed at once up to here
 
 
 @typed
@@ -128,13 +128,15 @@ def _lowest(
         a, b = y[:f].ravel(), y[f:].ravel()
         return np.concatenate([-solve(M @ b + D @ a), a])
 
-    if f <= SMALL or m + SPARE >= 2 * f - 1:
+    if f <= MAX_DENSE_DOFS or m + N_SPARE_WAVES >= 2 * f - 1:
         columns = [inverse(e) for e in np.eye(2 * f, dtype=complex)]
         mu, V = eig(np.array(columns).T)
     else:
         operator = LinearOperator((2 * f, 2 * f), matvec=inverse, dtype=complex)
         start = np.exp(1j * np.arange(2 * f))
-        mu, V = eigs(operator, m + SPARE, v0=start, tol=0.0, ncv=max(2 * (m + SPARE) + 1, 20))
+        mu, V = eigs(
+            operator, m + N_SPARE_WAVES, v0=start, tol=0.0, ncv=max(2 * (m + N_SPARE_WAVES) + 1, 20)
+        )
     lam = shift + 1 / mu
     order = np.argsort(abs(lam))
     return lam[order], V[:f, order]
@@ -145,13 +147,13 @@ def _elastic(lam: Complex, speed: float) -> Complex:
 
     Whoever floats along in a straight line is seen from the wheel to circle at its speed.
     """
-    rigid = np.minimum(abs(lam), abs(abs(lam) - abs(speed))) < RIGID * abs(speed)
+    rigid = np.minimum(abs(lam), abs(abs(lam) - abs(speed))) < RIGID_RTOL * abs(speed)
     return lam[~rigid]
 
 
 def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
     growth = lam.real.max(initial=0.0)
-    if growth > UNSTABLE * abs(lam).max(initial=0.0):
+    if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
         worst = lam[lam.real.argmax()]
         raise ModelError(
             f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by "

@@ -8,7 +8,7 @@ from typing import Any
 
 from rom.doctor.finding import Finding
 
-REMOVE = "rom doctor --fix"
+REMOVE_COMMAND = "rom doctor --fix"
 AT_WORK = 60.0  # seconds after which nobody is still writing a temporary file
 END_OF_PICKLE = b"."
 
@@ -41,7 +41,7 @@ def _finding(name: str, where: str, damaged: list[Any], fix: bool) -> Finding:
     if fix:
         return Finding("caches", name, f"{len(damaged)} damaged files removed {where}".strip())
     value = f"{len(damaged)} damaged files, e.g. {damaged[0]}"
-    return Finding("caches", name, value, "note", REMOVE)
+    return Finding("caches", name, value, "note", REMOVE_COMMAND)
 
 
 def numba_folders() -> Iterator[Path]:

@@ -40,10 +40,10 @@ def blas(mapped: list[str]) -> list[Finding]:
     speed = _gigaflops()
     files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
     slow = [f for f in files if not FAST.search(f)]
-    shown = ", ".join(slow or files) or "not found in the memory map"
-    found = [Finding("BLAS", "library", shown)]
+    named = ", ".join(slow or files) or "not found in the memory map"
+    found = [Finding("BLAS", "library", named)]
     if slow:
-        found = [Finding("BLAS", "library", f"reference, {shown}", "note", SLOW_ADVICE)]
+        found = [Finding("BLAS", "library", f"reference, {named}", "note", SLOW_ADVICE)]
     wanted = better(taken_for(), abilities())
     if wanted:
         advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"

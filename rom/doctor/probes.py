@@ -7,7 +7,7 @@ from typing import Any
 
 from rom import child
 
-PATIENCE = 60.0  # seconds; a first import from a cold disk takes a few
+TIME_LIMIT = 60.0  # [s]; a first import from a cold disk takes a few
 
 
 @dataclass
@@ -23,9 +23,9 @@ class Probe:
 
     def answer(self) -> dict[str, dict[str, Any]]:
         """What the process found, by name."""
-        done = child.finish(self.process, PATIENCE)
+        done = child.finish(self.process, TIME_LIMIT)
         if done.overtime:
-            self.ending = f"no end within {PATIENCE:g} s"
+            self.ending = f"no end within {TIME_LIMIT:g} s"
         elif done.code:
             self.ending = f"crashed ({done.signal})" if done.signal else f"failed: {done.last}"
         lines = [json.loads(line) for line in done.out.splitlines() if line.startswith('{"name"')]

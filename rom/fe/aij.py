@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from rom.errors import ResourceError
-from rom.fe.memory import THIN, allowed_bytes, factor_bytes
+from rom.fe.memory import THIN_FACTOR_RATIO, allowed_bytes, factor_bytes
 from rom.model import Index, Numbers
 
-COPIES = 20  # matrices as large as the one gathered that one rank then makes of it
+N_COPIES = 20  # matrices as large as the one gathered that one rank then makes of it
 
 
 def symmetric(A: PETSc.Mat) -> csr_matrix:
@@ -69,7 +69,7 @@ def gathered(A: PETSc.Mat) -> csr_matrix:
     comm, (n, _) = A.comm.tompi4py(), A.getSize()
     starts, columns, values = A.getValuesCSR()
     counts = np.array(comm.allgather(values.size))
-    need = THIN * factor_bytes(2 * n) + 12.0 * COPIES * counts.sum()
+    need = THIN_FACTOR_RATIO * factor_bytes(2 * n) + 12.0 * N_COPIES * counts.sum()
     there = allowed_bytes(comm)
     if need > there:
         raise ResourceError(

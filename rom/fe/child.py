@@ -25,9 +25,9 @@ from rom.errors import (
 )
 from rom.fe.readers import GEOMETRIES, Read, read
 
-MEGABYTE, GIGABYTE = 2**20, 1e9
-SECONDS = 1800.0  # a mesher may run
-SHARE = 0.8  # of the memory of the machine a mesher may take
+BYTES_PER_MEGABYTE, GIGABYTE = 2**20, 1e9
+MESHER_TIME_LIMIT = 1800.0  # [s]
+MAX_MEMORY_SHARE = 0.8  # of the memory of the machine, for a mesher
 # LC_ALL: gmsh reads decimal points with the locale of the process
 VARIABLES = {"OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
@@ -106,15 +106,19 @@ def _limits(
 ) -> child.Limits:
     """Those of a mesher are chosen; those of a finished mesh follow from its size."""
     if reader in GEOMETRIES:
-        seconds = _chosen("time_limit", time_limit, SECONDS)
+        seconds = _chosen("time_limit", time_limit, MESHER_TIME_LIMIT)
         return child.Limits(
             seconds=seconds,
             # of what a killed parent has left behind, where nothing else ends it
             processor=2 * math.ceil(seconds),
-            memory=int(_chosen("memory_limit", memory_limit, SHARE * child.machine_bytes())),
+            memory=int(
+                _chosen("memory_limit", memory_limit, MAX_MEMORY_SHARE * child.machine_bytes())
+            ),
         )
     # measured: 0.08 s per megabyte and 10 bytes per byte; the rest is reserve
-    return child.Limits(processor=10 + 3 * size // MEGABYTE, memory=2048 * MEGABYTE + 100 * size)
+    return child.Limits(
+        processor=10 + 3 * size // BYTES_PER_MEGABYTE, memory=2048 * BYTES_PER_MEGABYTE + 100 * size
+    )
 
 
 def _chosen(name: str, value: float | None, default: float) -> float:

@@ -12,10 +12,10 @@ from rom.names import named
 
 QUADRATIC_HEX = 20  # nodes of a serendipity hexahedron; completed to 27 after reading
 # Mid-edge nodes by their corners, in the order of Abaqus and VTK.
-LOW, HIGH = ((0, 1), (1, 2), (2, 3), (3, 0)), ((4, 5), (5, 6), (6, 7), (7, 4))
+LOWER_EDGES, UPPER_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0)), ((4, 5), (5, 6), (6, 7), (7, 4))
 DECK_EDGES = {
     "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hex20": (*LOW, *HIGH, (0, 4), (1, 5), (2, 6), (3, 7)),
+    "hex20": (*LOWER_EDGES, *UPPER_EDGES, (0, 4), (1, 5), (2, 6), (3, 7)),
 }
 WHOLE = ("tet4", "hex8")
 

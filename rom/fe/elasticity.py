@@ -28,7 +28,7 @@ from rom.fe.solver import parsed
 from rom.fe.stress import Stresses
 from rom.model import Array, Attachment, FEModel, Index, Material, Orthotropic
 
-WHOLE = "solid"  # name of the only region of a mesh without named regions
+WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
 
 
@@ -76,7 +76,7 @@ def model(
     """
     from rom.fe.mesh import read_mesh, to_dolfinx
 
-    way = parsed(solver)  # before a mesh is made in vain
+    method = parsed(solver)  # before a mesh is made in vain
     install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
     read: list[SolidMesh] = []  # on rank 0; the others never hold the whole mesh
 
@@ -98,7 +98,7 @@ def model(
     )
     remarks = [*warnings, *made.provenance["warnings"]]
     provenance = origin | made.provenance | {"warnings": remarks}
-    return replace(made, operators=made.operators.solved_by(way), provenance=provenance)
+    return replace(made, operators=made.operators.solved_by(method), provenance=provenance)
 
 
 @typed
@@ -129,7 +129,7 @@ def assemble(
     Raises:
         ConfigError, MeshError, TagError, MaterialError, InterfaceError: see `model`.
     """
-    regions, facet_tags = dict(regions or {WHOLE: 0}), dict(facet_tags or {})
+    regions, facet_tags = dict(regions or {WHOLE_REGION: 0}), dict(facet_tags or {})
     name = _check_mesh(mesh, degree)
     solids = by_region(material, regions)
     _check_attachments(attachments, facet_tags)
@@ -144,7 +144,7 @@ def assemble(
     named = {region: solids[tag] for region, tag in regions.items()}
     remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
     _warn(mesh.comm, remarks)
-    told = list(dict.fromkeys(solid.doubt for solid in named.values() if solid.doubt))
+    doubts_found = list(dict.fromkeys(solid.doubt for solid in named.values() if solid.doubt))
     fields = {
         "interfaces": interfaces,
         "attachments": tuple(attachments),
@@ -157,7 +157,7 @@ def assemble(
             "cells": {name: mesh.topology.index_map(3).size_global},
             "units": "SI",
             "versions": versions(),
-            "warnings": [*told, *remarks],  # the first where the materials were made
+            "warnings": [*doubts_found, *remarks],  # the first where the materials were made
         },
     }
     return _finish(K, M, points, fields)

@@ -9,8 +9,8 @@ from rom.fe.memory import allowed_bytes, give_back, too_large
 from rom.fe.solver import DIRECT, Solver
 from rom.model import Array
 
-BLOCK = 32  # right-hand sides solved together: five to eight times cheaper than one by one
-PIVOT = 0.01  # threshold of pivoting, the default of MUMPS
+BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
+PIVOT_THRESHOLD = 0.01  # the default of MUMPS
 MEMORY_ERRORS = (-8, -9, -11, -13, -19)  # INFOG(1) of MUMPS: work space or allocation too small
 
 
@@ -59,7 +59,7 @@ class Factor:
         Raises:
             ResourceError: if MUMPS runs out of memory.
         """
-        self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT)
+        self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
         self.ksp.setUp()
         self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
         code = self.factor.getMumpsInfog(1)
@@ -72,8 +72,8 @@ class Factor:
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
         X = np.empty(F.shape)
-        for first in range(0, F.shape[1], BLOCK):
-            columns = slice(first, min(first + BLOCK, F.shape[1]))
+        for first in range(0, F.shape[1], BLOCK_SIZE):
+            columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
             B, Y = dense(F[:, columns], self.A), dense(np.zeros_like(F[:, columns]), self.A)
             self.factor.matSolve(B, Y)
             X[:, columns] = Y.getDenseArray()

@@ -15,7 +15,7 @@ from rom.fe.script import check_script
 from rom.plausible import scaled_doubt
 
 HIGHEST_ORDER = 2  # of cells, see `rom.fe.gmsh_groups.SOLIDS`
-HXT = 10  # Mesh.Algorithm3D whose meshes differ from run to run
+HXT_ALGORITHM = 10  # Mesh.Algorithm3D whose meshes differ from run to run
 NO_MEMORY = re.compile("Out of memory|bad_alloc")
 # gmsh hands a file without this start to its script parser, which can run shell commands
 MSH_START = (b"$MeshFormat", b"$Comments")
@@ -73,10 +73,10 @@ def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[No
     except MemoryError:
         raise
     except Exception as error:  # gmsh raises bare Exception
-        said = _log(gmsh, "Error") or [str(error)]
-        if NO_MEMORY.search(said[0]):
+        messages = _log(gmsh, "Error") or [str(error)]
+        if NO_MEMORY.search(messages[0]):
             raise MemoryError from error
-        text = re.sub(r"'[^']*/([^'/]*)'", r"'\1'", said[0]).rstrip(".")
+        text = re.sub(r"'[^']*/([^'/]*)'", r"'\1'", messages[0]).rstrip(".")
         text = f"gmsh says: {text}." if text else "gmsh cannot read it: the file is damaged."
         raise kind(text, hint="Open the file in gmsh to see more.") from error
 
@@ -170,7 +170,7 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
     if not gmsh.model.getEntities(3):
         raise MeshError("the geometry has no volume: a solid is needed.")
     gmsh.option.setNumber("General.NumThreads", 1)
-    if gmsh.option.getNumber("Mesh.Algorithm3D") == HXT:
+    if gmsh.option.getNumber("Mesh.Algorithm3D") == HXT_ALGORITHM:
         gmsh.option.setNumber("Mesh.Algorithm3D", 1)
     if request["order"]:
         gmsh.option.setNumber("Mesh.ElementOrder", request["order"])

@@ -7,7 +7,7 @@ import numpy as np
 from rom.errors import InterfaceError
 from rom.model import Array, Index
 
-ZERO = 1e-13  # of the largest eigenvalue: what is smaller is a motion without stiffness
+RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
 
 
 class HeldPETSc:
@@ -81,5 +81,5 @@ class HeldPETSc:
                 K = self.inner.gram(X, self.inner.apply_K(X))
                 M = self.inner.gram(X, self.inner.apply_M(X))
                 stiffness = (np.diag(K) / np.diag(M)).min()
-        if not stiffness > ZERO * self.inner.largest():
+        if not stiffness > RIGID_RTOL * self.inner.largest():
             raise self._singular()

@@ -14,11 +14,11 @@ from rom.fe.factor import Factor, dense_rows
 from rom.fe.krylov_schur import mode_pairs, vector
 from rom.model import Array
 
-TOLERANCE = 1e-12  # of the residual, in the norm of the preconditioner
-ITERATIONS = 400  # well posed elasticity takes 20 to 60, at any size
+RESIDUAL_RTOL = 1e-12  # in the norm of the preconditioner
+MAX_ITERATIONS = 400  # well posed elasticity takes 20 to 60, at any size
 MODE_TOLERANCE = 1e-8  # residual over eigenvalue; the eigenvalue itself errs by its square
 MODE_ITERATIONS = 20_000
-MISSED = 1e-5  # an eigenvalue lower than the last one by more than this share was missed
+MISSED_EIGENVALUE_RTOL = 1e-5  # distance below the last eigenvalue of one that was missed
 MULTIGRID = {
     "pc_type": "gamg",
     "pc_gamg_agg_nsmooths": 1,
@@ -55,8 +55,8 @@ class ConjugateGradients:
         X, R = np.zeros(F.shape), F.copy()
         Z = self.approximate(R)
         P, rz = Z.copy(), self._dots(R, Z)
-        goal, left = TOLERANCE**2 * rz, np.flatnonzero(rz > 0.0)
-        for _ in range(ITERATIONS):
+        goal, left = RESIDUAL_RTOL**2 * rz, np.flatnonzero(rz > 0.0)
+        for _ in range(MAX_ITERATIONS):
             if not left.size:
                 return X
             AP = dense_rows(self.A, P[:, left])
@@ -69,8 +69,8 @@ class ConjugateGradients:
             rz[left] = new
             left = left[new > goal[left]]
         raise SolverError(
-            f"{left.size} of {F.shape[1]} static solutions did not converge in {ITERATIONS} "
-            f"iterations (residual {np.sqrt((rz / goal).max()) * TOLERANCE:.1e}).",
+            f"{left.size} of {F.shape[1]} static solutions did not converge in {MAX_ITERATIONS} "
+            f"iterations (residual {np.sqrt((rz / goal).max()) * RESIDUAL_RTOL:.1e}).",
             hint='Use solver="direct" if the factor fits, or improve cells of extreme shape.',
         )
 
@@ -145,7 +145,7 @@ def davidson(ops: Any, inverse: ConjugateGradients, deflated: Array, k: int) -> 
     """
     lam, Phi = _davidson(ops, inverse, deflated, k, MODE_TOLERANCE)
     beside, _ = _davidson(ops, inverse, np.hstack([deflated, Phi]), 1, 1e-2)
-    if beside[0] < (1.0 - MISSED) * lam[-1]:
+    if beside[0] < (1.0 - MISSED_EIGENVALUE_RTOL) * lam[-1]:
         raise ModesMissedError(
             f"a mode near {np.sqrt(beside[0]) / (2 * np.pi):.6g} Hz was missed below the last one "
             f"found at {np.sqrt(lam[-1]) / (2 * np.pi):.6g} Hz.",

@@ -10,8 +10,8 @@ from rom.errors import SolverError
 from rom.fe.factor import Factor
 from rom.model import Array
 
-TOLERANCE = 1e-11  # of an eigenvalue; SLEPc's residual relative to it
-RESTARTS = 500
+EIGENVALUE_RTOL = 1e-11  # SLEPc's residual, of the eigenvalue
+MAX_RESTARTS = 500
 
 
 def krylov_schur(
@@ -41,7 +41,7 @@ def krylov_schur(
     solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
     solver.setTarget(sigma)
     solver.setDimensions(k, min(2 * k + 15, ops.n - deflated.shape[1]))
-    solver.setTolerances(TOLERANCE, RESTARTS)
+    solver.setTolerances(EIGENVALUE_RTOL, MAX_RESTARTS)
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setShift(sigma)

@@ -13,11 +13,11 @@ from rom.errors import SolverError
 from rom.fe.iterative import Inverse
 from rom.model import Array
 
-BLOCK = 6  # columns solved together: fewer make solving dearer, more make the space larger
-ROOM = 20  # blocks beside the modes sought before the space is restarted; twenty are seldom used
-RESTARTS = 20  # after which the method has failed
-TOLERANCE = 1e-10  # of an eigenvalue of the inverse: its residual when it counts as converged
-ROUGH = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
+BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
+MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
+MAX_RESTARTS = 20  # after which the method has failed
+EIGENVALUE_RTOL = 1e-10  # residual of an eigenvalue of the inverse
+SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
 
 
 class BlockLanczos:
@@ -41,14 +41,14 @@ class BlockLanczos:
         self, ops: Any, factor: Inverse, sigma: float, deflated: Array, k: int, spare: int = 0
     ):
         self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
-        self.tolerance = np.repeat([TOLERANCE, ROUGH], [k - spare, spare])
+        self.tolerance = np.repeat([EIGENVALUE_RTOL, SPARE_EIGENVALUE_RTOL], [k - spare, spare])
         self.n_deflated = deflated.shape[1]
         shape = (ops.n_local, self.n_deflated + capacity(k))
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
         self.size = 0
         self.T = np.zeros((0, 0))
         self._append(deflated, ops.apply_M(deflated))
-        phases = np.arange(1.0, BLOCK + 1.0)
+        phases = np.arange(1.0, BLOCK_SIZE + 1.0)
         start = np.cos(np.outer(ops.fixed, phases) + phases)  # depends on the place only
         self._append(*self._orthonormal(start)[:2])
 
@@ -58,20 +58,20 @@ class BlockLanczos:
         Raises:
             SolverError: if they do not.
         """
-        for _ in range(RESTARTS):
-            while self.size + BLOCK <= self.V.shape[1]:
+        for _ in range(MAX_RESTARTS):
+            while self.size + BLOCK_SIZE <= self.V.shape[1]:
                 if self._converged(self._grow()):
                     return
             self._restart()
         raise SolverError(
-            f"{self.k} modes did not converge in {RESTARTS} restarts.",
+            f"{self.k} modes did not converge in {MAX_RESTARTS} restarts.",
             hint="Ask for fewer modes, or check the mesh for cells of extreme shape.",
         )
 
     def pairs(self) -> tuple[Array, Array]:
         """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""
         theta, S = self._ritz(self.k)
-        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - BLOCK] @ S
+        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - BLOCK_SIZE] @ S
 
     def _append(self, X: Array, MX: Array) -> None:
         new = slice(self.size, self.size + X.shape[1])
@@ -80,7 +80,7 @@ class BlockLanczos:
 
     def _grow(self) -> Array:
         """One more block; returns its (p, p) coupling to the block before."""
-        load = self.MV[:, self.size - BLOCK : self.size]
+        load = self.MV[:, self.size - BLOCK_SIZE : self.size]
         W, MW, H, R = self._orthonormal(self.factor.solve(load))
         k, H = self.T.shape[0], H[self.n_deflated :]
         self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
@@ -109,12 +109,12 @@ class BlockLanczos:
 
     def _restart(self) -> None:
         """Keep the leading Ritz vectors and the last block only."""
-        kept = self.k + BLOCK
+        kept = self.k + BLOCK_SIZE
         theta, S = self._ritz(kept)
-        ends = self.n_deflated + np.array([0, kept, kept + BLOCK])
+        ends = self.n_deflated + np.array([0, kept, kept + BLOCK_SIZE])
         for V in (self.V, self.MV):
-            last = V[:, self.size - BLOCK : self.size].copy()
-            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - BLOCK] @ S
+            last = V[:, self.size - BLOCK_SIZE : self.size].copy()
+            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - BLOCK_SIZE] @ S
             V[:, ends[1] : ends[2]] = last
         self.size, self.T = ends[2], np.diag(theta)
 
@@ -123,7 +123,7 @@ class BlockLanczos:
         if self.T.shape[0] < self.k:
             return False
         theta, S = self._ritz(self.k)
-        residual = np.linalg.norm(R @ S[-BLOCK:], axis=0)
+        residual = np.linalg.norm(R @ S[-BLOCK_SIZE:], axis=0)
         return bool((residual <= self.tolerance * theta).all())
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
@@ -133,4 +133,4 @@ class BlockLanczos:
 
 def capacity(k: int) -> int:
     """Columns the space of k modes may have."""
-    return k + ROOM * BLOCK
+    return k + MAX_EXTRA_BLOCKS * BLOCK_SIZE

@@ -15,9 +15,9 @@ from rom.names import named
 from rom.plausible import FOAM_SPEED
 
 Solid = Material | Orthotropic
-LARGE = 20.0  # m; most machine parts above it are millimetres read as metres
+MAX_PLAUSIBLE_SIZE = 20.0  # [m]; most machine parts above it are millimetres read as metres
 NEARLY_INCOMPRESSIBLE = 0.49
-CONTRAST = 1e8  # of the stiffness, beyond which the conditioning eats half the digits
+MAX_STIFFNESS_RATIO = 1e8  # beyond it, conditioning costs half the digits
 
 
 def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
@@ -119,7 +119,7 @@ def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Ite
             "per cent. Use degree=2."
         )
     for name, solid in solids.items():
-        if not solid.doubt and solid.wave_speed > FOAM_SPEED and size > LARGE:
+        if not solid.doubt and solid.wave_speed > FOAM_SPEED and size > MAX_PLAUSIBLE_SIZE:
             yield (
                 f"the body is {size:.4g} m long and as stiff as metal. If the mesh is in "
                 "millimetres, give scale=1e-3."
@@ -131,7 +131,7 @@ def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Ite
             )
     stiffness = [np.linalg.eigvalsh(solid.stiffness) for solid in solids.values()]
     contrast = max(s[-1] for s in stiffness) / min(s[0] for s in stiffness)
-    if contrast > CONTRAST:
+    if contrast > MAX_STIFFNESS_RATIO:
         yield f"stiffness varies by {contrast:.1g} over the body; expect few correct digits."
 
 

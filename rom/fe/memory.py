@@ -7,8 +7,8 @@ from mpi4py import MPI
 from rom.errors import ResourceError
 from rom.memory import free_bytes
 
-SHARE = 0.85  # of the memory that is free
-THIN = 0.2  # of a block's factor: what a thin-walled body of as many dofs needs
+MAX_MEMORY_SHARE = 0.85  # of the memory that is free
+THIN_FACTOR_RATIO = 0.2  # factor of a thin-walled body over that of a block with as many dofs
 
 
 def factor_bytes(n: int) -> float:
@@ -36,7 +36,7 @@ def allowed_bytes(comm: MPI.Comm) -> float:
     Ranks of one machine share what it has.
     """
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    share = SHARE * free_bytes() / node.size
+    share = MAX_MEMORY_SHARE * free_bytes() / node.size
     node.Free()
     return comm.allreduce(share, op=MPI.MIN)
 
@@ -54,7 +54,10 @@ def check_factor_memory(n: int, n_columns: int = 0, *, comm: MPI.Comm) -> None:
     Raises:
         ResourceError: with the need and what there is.
     """
-    need, there = THIN * factor_bytes(n) + 8.0 * n * n_columns, allowed_bytes(comm) * comm.size
+    need, there = (
+        THIN_FACTOR_RATIO * factor_bytes(n) + 8.0 * n * n_columns,
+        allowed_bytes(comm) * comm.size,
+    )
     if need > there:
         raise too_large(n, need, there)
 
@@ -63,7 +66,7 @@ def too_large(n: int, need: float, there: float) -> ResourceError:
     """The error that says by how much a factor of n dofs does not fit."""
     return ResourceError(
         f"factoring {n} dofs is predicted to take {need / 2**30:.2f} GiB; "
-        f"{there / 2**30:.2f} GiB may be used ({SHARE:.0%} of what is free).",
+        f"{there / 2**30:.2f} GiB may be used ({MAX_MEMORY_SHARE:.0%} of what is free).",
         hint='Use a coarser mesh, more machines, solver="out-of-core" (the factor on disk) or '
         'solver="iterative" (no factor).',
     )

@@ -17,7 +17,7 @@ from rom.fe.readers import Read, packed
 from rom.model import Index
 
 SOLIDS = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20"}
-PROPERTY = "nastran:ref"
+PROPERTY_FIELD = "nastran:ref"
 
 
 def read(path: str) -> Read:
@@ -53,7 +53,7 @@ def read(path: str) -> Read:
 
 
 def _property(mesh: Any, block: int) -> Index:
-    numbers = mesh.cell_data.get(PROPERTY, [])
+    numbers = mesh.cell_data.get(PROPERTY_FIELD, [])
     if block >= len(numbers) or len(numbers[block]) != len(mesh.cells[block].data):
         raise FileFormatError("elements have no property number.", hint="Give each cell a PID.")
     return np.asarray(numbers[block], dtype=np.int64)

@@ -16,8 +16,8 @@ from rom.errors import InterfaceError
 from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, sub_entities, to_global
 from rom.model import Array, Index, Integers, Interface, Numbers, SurfaceMesh
 
-RESOLUTION = 1e-8  # of the size: nodes closer than this count as equal when sorted
-OFFSET = 0.381966  # keeps round coordinates away from the edge between two cells of that grid
+COINCIDENT_RTOL = 1e-8  # of the size, when nodes are sorted
+GRID_OFFSET = 0.381966  # keeps round coordinates away from the edge between two cells of that grid
 
 
 def gathered(comm: MPI.Comm, rows: Numbers) -> Numbers:
@@ -33,7 +33,7 @@ def all_points(V: Any) -> Array:
 
 def by_position(points: Array, size: float) -> Index:
     """Order of points by x, then y, then z, blind to round-off."""
-    x, y, z = np.floor(points / (RESOLUTION * size) + OFFSET).T
+    x, y, z = np.floor(points / (COINCIDENT_RTOL * size) + GRID_OFFSET).T
     return np.lexsort((z, y, x))
 
 

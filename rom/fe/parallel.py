@@ -14,7 +14,7 @@ from rom.errors import ParallelError, RomError
 from rom.launcher import ranks
 
 T = TypeVar("T")
-GRACE = 1.0  # seconds the other ranks leave rank 0 to print an error all of them have
+GRACE_PERIOD = 1.0  # [s] that other ranks leave rank 0 to print an error all of them have
 
 
 def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named: Any) -> T:
@@ -77,10 +77,12 @@ def _raise_together(comm: MPI.Comm, error: Exception | None) -> None:
         if error is not None:
             raise error
         return
-    shown = next((e for e in comm.allgather(_portable(error, comm.rank)) if e is not None), None)
-    if shown is not None:
-        shown.agreed = True  # rank 0 prints for all, see `install_abort_hook`
-        raise shown from error
+    first_error = next(
+        (e for e in comm.allgather(_portable(error, comm.rank)) if e is not None), None
+    )
+    if first_error is not None:
+        first_error.agreed = True  # rank 0 prints for all, see `install_abort_hook`
+        raise first_error from error
 
 
 def _portable(error: Exception | None, rank: int) -> RomError | None:
@@ -102,7 +104,7 @@ def install_abort_hook(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
     def abort(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         agreed = getattr(error, "agreed", False)
         if agreed and comm.rank > 0:
-            time.sleep(GRACE)
+            time.sleep(GRACE_PERIOD)
         elif isinstance(error, RomError):
             who = "" if agreed else f"rank {comm.rank}: "
             sys.stderr.write(f"{who}{kind.__name__}: {error}\n")
@@ -119,19 +121,19 @@ def launched_by_mpirun() -> bool:
     return ranks()[1] > 1
 
 
-def stop_all_ranks(code: int, complain: Callable[[], None]) -> None:
+def stop_all_ranks(code: int, print_error: Callable[[], None]) -> None:
     """End every rank with one exit code, whether one of them failed or all.
 
-    Rank 0 complains at once; another rank does only when rank 0 has not ended it within `GRACE`,
-    because then it is alone with its error.
+    Rank 0 complains at once; another rank does only when rank 0 has not ended it within
+    `GRACE_PERIOD`, because then it is alone with its error.
 
     Args:
         code: exit code.
-        complain: prints the error.
+        print_error: prints the error.
     """
     if MPI.COMM_WORLD.rank > 0:
-        time.sleep(GRACE)
-    complain()
+        time.sleep(GRACE_PERIOD)
+    print_error()
     sys.stdout.flush()
     sys.stderr.flush()
     MPI.COMM_WORLD.Abort(code)

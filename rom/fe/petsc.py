@@ -20,7 +20,7 @@ from rom.errors import ConfigError, ModelError, SolverError
 from rom.fe.aij import aij, gathered, weighted
 from rom.fe.counting import verify_count
 from rom.fe.factor import Factor, dense_rows
-from rom.fe.held import ZERO, HeldPETSc
+from rom.fe.held import RIGID_RTOL, HeldPETSc
 from rom.fe.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
 from rom.fe.krylov_schur import krylov_schur
 from rom.fe.lanczos import BlockLanczos, capacity
@@ -30,9 +30,9 @@ from rom.fe.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
 from rom.scipy_operators import dof_set
 
-SPARE = 3  # modes computed beyond the ones asked for, so that a gap for counting is found
-DENSE = 300  # dofs up to which all eigenvalues are computed at once
-SHIFT = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
+N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
+MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
+SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 
 
 class PETScOperators:
@@ -214,11 +214,11 @@ class PETScOperators:
         self, m: int, held: HeldPETSc, *, in_blocks: bool, finished: bool
     ) -> tuple[Array, Array]:
         """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
-        if self.n <= max(DENSE, capacity(m + SPARE)):
+        if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES)):
             lam, Phi = self.all_modes()
         else:
             none = np.zeros((self.n_local, 0))
-            lam, Phi = self.lowest(m + SPARE, 0.0, held.factor, none, in_blocks=in_blocks)
+            lam, Phi = self.lowest(m + N_SPARE_MODES, 0.0, held.factor, none, in_blocks=in_blocks)
             if finished and not in_blocks:  # SLEPc has taken the factor's matrix for its own
                 held.release()
             verify_count(self, lam, m, 0, held.factor if finished else None)
@@ -240,19 +240,19 @@ class PETScOperators:
         n_rigid = R.shape[1]
         if m == 0:
             return np.zeros(0), np.zeros((self.n_local, 0))
-        if self.n <= max(DENSE, capacity(m + SPARE) + n_rigid):
+        if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES) + n_rigid):
             lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
         else:
-            sigma = -SHIFT * self.first_elastic(R) if sigma is None else sigma
+            sigma = -SHIFT_RATIO * self.first_elastic(R) if sigma is None else sigma
             inverse = self.inverse(self.shifted(sigma), self.rigid)
-            lam, Phi = self.lowest(m + SPARE, sigma, inverse, R)
+            lam, Phi = self.lowest(m + N_SPARE_MODES, sigma, inverse, R)
             inverse.release()  # counting needs its memory
             self._refuse_mechanisms(lam, n_rigid)
             verify_count(self, lam, m, n_rigid)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
     def _refuse_mechanisms(self, lam: Array, n_rigid: int) -> None:
-        n_zero = int(np.count_nonzero(np.abs(lam) < ZERO * self.largest()))
+        n_zero = int(np.count_nonzero(np.abs(lam) < RIGID_RTOL * self.largest()))
         if n_rigid and n_zero:
             raise ModelError(
                 f"at least {n_zero} more motions without stiffness than the six of a connected "
@@ -312,7 +312,7 @@ class PETScOperators:
             return davidson(self, factor, deflated, k)
         if not in_blocks and isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)
-        space = BlockLanczos(self, factor, sigma, deflated, k, min(SPARE, k - 1))
+        space = BlockLanczos(self, factor, sigma, deflated, k, min(N_SPARE_MODES, k - 1))
         space.solve()
         return space.pairs()
 
@@ -336,7 +336,7 @@ class PETScOperators:
 
     def _by_inverse_iteration(self) -> float:
         """Smallest eigenvalue that is not zero, estimated without geometry."""
-        floor = ZERO * self.largest()
+        floor = RIGID_RTOL * self.largest()
         factor = Factor(self.shifted(-1e-6 * self.largest()), definite=True, solver=self.solver)
         X = self.fixed[:, None] ** np.arange(1.0, 9.0)
         for _ in range(4):

@@ -11,11 +11,11 @@ from rom.model import Array, Index, Mask
 
 # Smallest over largest possible determinant: round-off of coordinates gives 1e-16 times the
 # distance from the origin over the cell size, bad but usable cells of gmsh have 1e-4.
-FLAT = 1e-10
-CRAMPED = 1e-3  # curved cells of a quality below this are made straight if we may
-SLENDER = 100.0  # aspect ratio worth a warning; tetrahedra of a good mesh stay below 10
-STRAIGHT = 1e-9  # of the edge: mid-side nodes nearer than this to the middle are in the middle
-BLOCK = 20_000  # cells looked at together, bounds the memory
+FLAT_CELL_RTOL = 1e-10
+MIN_CURVED_QUALITY = 1e-3  # curved cells below are made straight if this is allowed
+MAX_ASPECT_RATIO = 100.0  # beyond it we warn; tetrahedra of a good mesh stay below 10
+STRAIGHT_EDGE_RTOL = 1e-9  # of the edge: distance of its mid-side node from the middle
+BLOCK_SIZE = 20_000  # cells looked at together, bounds the memory
 
 
 def check_shape(mesh: SolidMesh) -> list[str]:
@@ -27,7 +27,7 @@ def check_shape(mesh: SolidMesh) -> list[str]:
     quality = scaled_jacobian(mesh)
     _refuse(
         mesh,
-        np.abs(quality) < FLAT,
+        np.abs(quality) < FLAT_CELL_RTOL,
         quality,
         "have no volume",
         "Mesh again; see gmsh's Mesh.Optimize.",
@@ -41,7 +41,7 @@ def check_shape(mesh: SolidMesh) -> list[str]:
         "straight edges.",
     )
     ratio = aspect_ratio(mesh)
-    slender = np.flatnonzero(ratio > SLENDER)
+    slender = np.flatnonzero(ratio > MAX_ASPECT_RATIO)
     if not slender.size:
         return []
     return [
@@ -89,7 +89,7 @@ def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
         return mesh, []
     changed = np.zeros(len(mesh.cells), dtype=bool)
     while True:
-        bad = (scaled_jacobian(mesh) < CRAMPED) & _bent(mesh.points, mesh.cells, kind)
+        bad = (scaled_jacobian(mesh) < MIN_CURVED_QUALITY) & _bent(mesh.points, mesh.cells, kind)
         if not bad.any():
             break
         changed |= bad
@@ -109,7 +109,7 @@ def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
 def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
     at = kind.quadrature[:1] if kind.name == "tet4" else kind.quadrature
     gradients = kind.gradients(at)
-    blocks = [cells[i : i + BLOCK] for i in range(0, len(cells), BLOCK)]
+    blocks = [cells[i : i + BLOCK_SIZE] for i in range(0, len(cells), BLOCK_SIZE)]
     found = [jacobians(points[block], gradients).min(axis=1) for block in blocks]
     return np.concatenate(found) if found else np.empty(0)
 
@@ -120,7 +120,7 @@ def _bent(points: Array, cells: Index, kind: CellType) -> Mask:
     for node, support in enumerate(kind.supports[kind.n_corners :], kind.n_corners):
         corners = points[cells[:, list(support)]]
         away = np.abs(points[cells[:, node]] - corners.mean(axis=1)).max(axis=1)
-        bent |= away > STRAIGHT * np.ptp(corners, axis=1).max(axis=1)
+        bent |= away > STRAIGHT_EDGE_RTOL * np.ptp(corners, axis=1).max(axis=1)
     return bent
 
 

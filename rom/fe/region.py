@@ -17,7 +17,7 @@ from rom.fe.material import Solid, of_region, stress
 from rom.fe.stress import Stresses
 from rom.model import Array, Index, Layered, Region
 
-TOUCH = 1e-9  # of the extent: cells that close belong to one layer
+LAYER_GAP_RTOL = 1e-9  # of the extent: gap between cells of one layer
 
 
 class Regions(Mapping[str, Region]):
@@ -107,7 +107,7 @@ def stretched_forms(
 def joined(ends: Array) -> tuple[tuple[float, float], ...]:
     """Unions of the intervals (low, high) that touch, ascending."""
     found: list[list[float]] = []
-    touch = TOUCH * float(np.ptp(ends)) if ends.size else 0.0
+    touch = LAYER_GAP_RTOL * float(np.ptp(ends)) if ends.size else 0.0
     for low, high in ends[np.argsort(ends[:, 0])].tolist():
         if found and low <= found[-1][1] + touch:
             found[-1][1] = max(found[-1][1], high)

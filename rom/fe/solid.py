@@ -8,7 +8,7 @@ import numpy as np
 from rom.fe.elements import CELL_TYPES, CellType
 from rom.model import Array, Index
 
-SHOWN = 5  # culprits named in a message
+MAX_SHOWN = 5  # culprits named in a message
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,4 +57,4 @@ class SolidMesh:
 def cell_names(mesh: SolidMesh, cells: Index) -> str:
     """The numbers of the first few of some cells in their file, for messages."""
     ids = cells if mesh.cell_ids is None else mesh.cell_ids[cells]
-    return ", ".join(map(str, ids[:SHOWN])) + (", ..." if len(ids) > SHOWN else "")
+    return ", ".join(map(str, ids[:MAX_SHOWN])) + (", ..." if len(ids) > MAX_SHOWN else "")

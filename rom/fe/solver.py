@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 from rom.errors import ConfigError
 
-KNOWN = '"direct", "low-rank", "low-rank:1e-8", "out-of-core", "low-rank+out-of-core", "iterative"'
-DROPPED = 1e-8  # of a block's norm, below which a compressed factor forgets
+KNOWN_SOLVERS = (
+    '"direct", "low-rank", "low-rank:1e-8", "out-of-core", "low-rank+out-of-core", "iterative"'
+)
+LOW_RANK_RTOL = 1e-8  # of a block's norm: what a compressed factor drops
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +44,11 @@ def parsed(text: str) -> Solver:
     for word in str(text).split("+"):
         name, colon, number = word.partition(":")
         if name == "low-rank" and not low_rank:
-            low_rank = _tolerance(number, text) if colon else DROPPED
+            low_rank = _tolerance(number, text) if colon else LOW_RANK_RTOL
         elif word == "out-of-core" and not out_of_core:
             out_of_core = True
         else:
-            raise ConfigError(f"solver = {text!r} is unknown; known are {KNOWN}.")
+            raise ConfigError(f"solver = {text!r} is unknown; known are {KNOWN_SOLVERS}.")
     return Solver(low_rank=low_rank, out_of_core=out_of_core)
 
 

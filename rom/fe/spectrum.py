@@ -10,8 +10,8 @@ from scipy.linalg import eigh
 
 from rom.model import Array
 
-CLUSTER = 1e-7  # relative distance of eigenvalues whose modes are only defined as a plane
-EQUAL = 1e-6  # relative difference of entries that count as equally large
+CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
+EQUAL_ENTRY_RTOL = 1e-6  # difference of entries that count as equally large
 DIRECTIONS = np.array([[3.1, 1.7, 2.3], [1.3, 3.7, 1.9], [2.1, 1.1, 3.3]])  # no symmetry
 
 
@@ -24,8 +24,8 @@ def fixed_vector(comm: MPI.Comm, rigid: Array | None, first: int, n_local: int) 
     if rigid is None:
         return np.sin(1.0 + np.arange(first, first + n_local))
     points = points_of(rigid)
-    low = comm.allreduce(points.min(axis=0, initial=np.inf), op=LOWEST)
-    high = comm.allreduce(points.max(axis=0, initial=-np.inf), op=HIGHEST)
+    low = comm.allreduce(points.min(axis=0, initial=np.inf), op=MINIMUM_OP)
+    high = comm.allreduce(points.max(axis=0, initial=-np.inf), op=MAXIMUM_OP)
     size = (high - low).max()
     return np.sin((points - low) / size @ DIRECTIONS + np.arange(1.0, 4.0)).ravel()
 
@@ -40,14 +40,14 @@ def _elementwise(function: Any) -> MPI.Op:
     return MPI.Op.Create(lambda a, b, _: function(a, b), commute=True)
 
 
-LOWEST, HIGHEST = _elementwise(np.minimum), _elementwise(np.maximum)
+MINIMUM_OP, MAXIMUM_OP = _elementwise(np.minimum), _elementwise(np.maximum)
 
 
 def polynomial_fields(comm: MPI.Comm, rigid: Array) -> Array:
     """(n_local, 60) displacements that are polynomials of degree up to three in the coordinates."""
     x = points_of(rigid)
-    low = comm.allreduce(x.min(axis=0, initial=np.inf), op=LOWEST)
-    high = comm.allreduce(x.max(axis=0, initial=-np.inf), op=HIGHEST)
+    low = comm.allreduce(x.min(axis=0, initial=np.inf), op=MINIMUM_OP)
+    high = comm.allreduce(x.max(axis=0, initial=-np.inf), op=MAXIMUM_OP)
     x = 2.0 * (x - low) / np.maximum(high - low, 1e-9 * (high - low).max()) - 1.0
     powers = [np.polynomial.legendre.legvander(column, 3).T for column in x.T]
     scalar = [
@@ -79,7 +79,7 @@ def settled(ops: Any, lam: Array, Phi: Array) -> Array:
         Phi: (n_local, m) mass-normalised modes.
     """
     Phi = Phi.copy()
-    apart = np.diff(lam) > CLUSTER * np.abs(lam[1:])
+    apart = np.diff(lam) > CLUSTER_RTOL * np.abs(lam[1:])
     edges = np.concatenate([[0], np.flatnonzero(apart) + 1, [lam.size]])
     for start, end in pairwise(edges):
         if end - start > 1:
@@ -95,9 +95,9 @@ def signed(ops: Any, Phi: Array) -> Array:
     Among equally large entries the place decides, not the numbering.
     """
     size = np.abs(Phi)
-    largest = ops.comm.allreduce(size.max(axis=0, initial=0.0), op=HIGHEST)
+    largest = ops.comm.allreduce(size.max(axis=0, initial=0.0), op=MAXIMUM_OP)
     if Phi.shape[0]:
-        key = np.where(size >= (1 - EQUAL) * largest, ops.fixed[:, None], -np.inf)
+        key = np.where(size >= (1 - EQUAL_ENTRY_RTOL) * largest, ops.fixed[:, None], -np.inf)
         row = key.argmax(axis=0)
         best = np.vstack([np.take_along_axis(a, row[None], axis=0) for a in (key, Phi)])
     else:

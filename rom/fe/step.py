@@ -19,9 +19,9 @@ SHELL = re.compile(r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^
 ELEMENTS_ACROSS = 20  # default element size: this part of the diagonal
 CELLS_PER_CUBE = 8.0  # tetrahedra in a cube of the element size
 MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
-NEAR = 0.05  # of the diagonal: a point further from every face is a mistake
-EVERY = "every"  # names all faces without a name by their numbers
-TIE = 1e-6  # of the diagonal: two faces nearer than this to the point are equally near
+MAX_DISTANCE_RATIO = 0.05  # of the diagonal: a point further from every face is a mistake
+EVERY_FACE = "every"  # names all faces without a name by their numbers
+TIE_RTOL = 1e-6  # of the diagonal: difference in distance of two faces that are equally near
 
 
 def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
@@ -99,7 +99,7 @@ def pick(gmsh: Any, faces: dict[str, Any]) -> None:
         TagError: nothing, or two faces, at the place given.
     """
     for name, wanted in faces.items():
-        if wanted == EVERY:
+        if wanted == EVERY_FACE:
             _number(gmsh, name)
             continue
         _group(
@@ -153,13 +153,13 @@ def _nearest(gmsh: Any, name: str, point: list[float]) -> int:
     distance = {tag: _distance(gmsh, tag, point) for _, tag in gmsh.model.getEntities(2)}
     order, size = sorted(distance, key=lambda tag: distance[tag]), _diagonal(gmsh)
     best = distance[order[0]]
-    if best > NEAR * size:
+    if best > MAX_DISTANCE_RATIO * size:
         raise TagError(
             f"face {name!r}: the nearest face is {best:.3g} m from {point}, the body {size:.3g} m "
             "long.",
             hint="Points are in metres, on or near the face.",
         )
-    if len(order) > 1 and distance[order[1]] - best < TIE * size:
+    if len(order) > 1 and distance[order[1]] - best < TIE_RTOL * size:
         raise TagError(
             f"face {name!r}: faces {order[0]} and {order[1]} are equally near to {point}.",
             hint="Choose a point away from the edge.",

@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 from rom.errors import MeshError, TagError
 from rom.fe.elements import CELL_TYPES
 from rom.fe.quality import check_shape
-from rom.fe.solid import SHOWN, SolidMesh, cell_names
+from rom.fe.solid import MAX_SHOWN, SolidMesh, cell_names
 from rom.fe.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
 from rom.model import Mask
 from rom.names import check_text, named
 from rom.plausible import SIZE, far_doubt
 
 SIZE_LIMITS = (1e-60, 1e60)  # m; beyond, volumes times stiffness leave the range of numbers
-COINCIDENT = 1e-9  # of the size: nodes closer than this are at the same place
+COINCIDENT_RTOL = 1e-9  # of the mesh's size
 
 
 def validate(mesh: SolidMesh) -> list[str]:
@@ -139,7 +139,7 @@ def _check_connected(mesh: SolidMesh, faces: Faces) -> None:
         return
     n_loose = parts_by_node(mesh.corners)[0]
     cells = np.sort(np.bincount(part))[::-1]
-    sizes = ", ".join(map(str, cells[:SHOWN])) + (", ..." if n_parts > SHOWN else "")
+    sizes = ", ".join(map(str, cells[:MAX_SHOWN])) + (", ..." if n_parts > MAX_SHOWN else "")
     if n_loose == 1:
         raise MeshError(
             f"the mesh has {n_parts} parts ({sizes} cells) that meet only in an edge or a point: "
@@ -159,7 +159,7 @@ def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:
     """Number of corners of the outer surface that have another one at the same place."""
     skin = np.unique(faces.corners[faces.count == 1])
     tree = cKDTree(mesh.points[skin])
-    return int(np.unique(tree.query_pairs(COINCIDENT * mesh.size, output_type="ndarray")).size)
+    return int(np.unique(tree.query_pairs(COINCIDENT_RTOL * mesh.size, output_type="ndarray")).size)
 
 
 def _slits(mesh: SolidMesh, faces: Faces) -> list[str]:

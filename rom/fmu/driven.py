@@ -20,7 +20,7 @@ from rom.mbs.user import apply_laws, laws
 from rom.model import Array
 from rom.names import named
 
-SAME = 1e-9  # of a step: by how much the caller's time may differ
+TIME_RTOL = 1e-9  # of a step: difference from the caller's time
 
 
 class Driven:
@@ -114,8 +114,8 @@ class Driven:
             raise ConfigError(
                 f"no variable has the value reference {named(wrong)}; all are < {count}."
             )
-        told = self._outputs() if (np.asarray(refs) >= first).any() else np.zeros(count - first)
-        every = np.concatenate([self.parameters, self.inputs.values, told])
+        outputs = self._outputs() if (np.asarray(refs) >= first).any() else np.zeros(count - first)
+        every = np.concatenate([self.parameters, self.inputs.values, outputs])
         found: Array = every[np.asarray(refs, dtype=int)]
         return found
 
@@ -142,14 +142,14 @@ class Driven:
             ConfigError: if the mechanism is not at t, or h is not positive.
             SolverError: naming time and culprit; the mechanism then stays where it is.
         """
-        if self.state is None or abs(t - self.state.t) > SAME * max(h, 1e-3 * abs(t)):
+        if self.state is None or abs(t - self.state.t) > TIME_RTOL * max(h, 1e-3 * abs(t)):
             where = "not started" if self.state is None else f"at t = {self.state.t:.9g} s"
             raise ConfigError(f"a step from t = {t:.9g} s is asked for, the mechanism is {where}.")
         if not (np.isfinite(h) and h > 0.0):
             raise ConfigError(f"the communication step {h} s must be positive.")
         n = max(1, int(np.ceil(h / float(self.parameters[0]) - 1e-6)))
         dt, begun = h / n, self._jumped(self.state)
-        if begun.memory is not None and abs(begun.memory.h - dt) < SAME * dt:
+        if begun.memory is not None and abs(begun.memory.h - dt) < TIME_RTOL * dt:
             dt = begun.memory.h  # callers subtract times; one step length needs one factorisation
         motion = simulate(
             self.mechanism,
@@ -159,7 +159,7 @@ class Driven:
             save_every=n,
             state=begun,
         )
-        if abs(motion.final.t - begun.t - h) > 2 * SAME * h:
+        if abs(motion.final.t - begun.t - h) > 2 * TIME_RTOL * h:
             raise SolverError(f"the mechanism ended its run: {motion.status}")
         self.state, self.held, self.stepped = motion.final, self.inputs.values.copy(), True
         self.inputs.follow(self.state.t)

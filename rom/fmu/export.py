@@ -9,14 +9,14 @@ from rom.arguments import typed
 from rom.child import Limits, python, run, scratch
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
-from rom.fmu.server import SETTINGS
+from rom.fmu.server import SETTINGS_FILE
 from rom.io.files import check_writable
 from rom.io.fmu.archive import Content, write_archive
 from rom.io.fmu.description import Model, model_description
 from rom.io.fmu.variables import Variable
 
-FOLDER = "model"  # of the Python file, below the resources
-LONGEST = 600  # seconds to build the mechanism, its compilation included
+MODEL_FOLDER = "model"  # of the Python file, below the resources
+BUILD_TIME_LIMIT = 600  # [s] for the mechanism, its compilation included
 
 
 @path_came_first(1, 0, suffix=".fmu")
@@ -65,11 +65,11 @@ def write_fmu(
         raise ConfigError(f"{path} does not end in .fmu.")
     if not (dt > 0.0 and 0.0 <= rho_inf <= 1.0):
         raise ConfigError(f"dt = {dt} s must be positive, rho_inf = {rho_inf} within [0, 1].")
-    resources = {f"{FOLDER}/{p.name}": _read(p) for p in (script, *map(Path, files))}
-    settings: dict[str, Any] = {"script": f"{FOLDER}/{script.name}"}
+    resources = {f"{MODEL_FOLDER}/{p.name}": _read(p) for p in (script, *map(Path, files))}
+    settings: dict[str, Any] = {"script": f"{MODEL_FOLDER}/{script.name}"}
     settings |= {"inputs": list(inputs), "outputs": list(outputs)}
     settings |= {"dt": float(dt), "rho_inf": float(rho_inf)}
-    resources[SETTINGS] = json.dumps(settings, indent=1).encode()
+    resources[SETTINGS_FILE] = json.dumps(settings, indent=1).encode()
     describe = partial(_description, path.stem, _variables(resources, script), float(dt))
     return write_archive(path, Content(path.stem, "process.c", describe, resources))
 
@@ -89,9 +89,9 @@ def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
             (place / name).write_bytes(data)
         empty.mkdir()
         command = python("rom.fmu", str(place), str(out))
-        done = run(command, folder=empty, limits=Limits(seconds=LONGEST))
+        done = run(command, folder=empty, limits=Limits(seconds=BUILD_TIME_LIMIT))
         if not out.exists():
-            last = f"no end within {LONGEST} s" if done.overtime else done.last
+            last = f"no end within {BUILD_TIME_LIMIT} s" if done.overtime else done.last
             raise ConfigError(
                 f"{script.name} fails in a folder that holds only it and the files named: "
                 f"{last.replace(str(folder), '')}",

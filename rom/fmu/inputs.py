@@ -14,7 +14,7 @@ from rom.mbs.signals import drive_signal
 from rom.model import Array
 
 INFINITE = (-np.inf, np.inf)
-SPACING = 1e-4  # of the finite differences for the speed of a drive at the start [s]
+DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
 
 
 @dataclass
@@ -126,7 +126,7 @@ class Inputs:
 
 
 def _at(signal: Any, t: float) -> Array:
-    sample: Array = signal.sample(np.array([t]), INFINITE, SPACING)[0]
+    sample: Array = signal.sample(np.array([t]), INFINITE, DIFFERENCE_SPACING)[0]
     return sample
 
 

@@ -79,7 +79,7 @@ class Outputs:
 
     def _joint(self, mechanism: Mechanism, name: str) -> None:
         joint = mechanism.joints[name]
-        for what, row, unit in (("angle", joint.turn, "rad"), ("way", joint.way, "m")):
+        for what, row, unit in (("angle", joint.turn, "rad"), ("way", joint.displacement, "m")):
             if row is None:
                 continue
             k = len(mechanism.frictions)

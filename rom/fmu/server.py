@@ -23,7 +23,7 @@ from rom.fmu.driven import Driven
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Index
 
-SETTINGS, FUNCTION = "fmu.json", "mechanism"
+SETTINGS_FILE, BUILD_FUNCTION = "fmu.json", "mechanism"
 OK, ERROR = 0, 3
 HEAD = struct.Struct("=iii")
 NONE = np.zeros(0)
@@ -36,18 +36,22 @@ def driven(resources: Path) -> Driven:
         ConfigError: if the Python file has no function ``mechanism``, or that gives no Mechanism,
             or an input or output is unknown.
     """
-    settings = json.loads((resources / SETTINGS).read_text())
+    settings = json.loads((resources / SETTINGS_FILE).read_text())
     script = resources / settings["script"]
     sys.path.insert(0, str(script.parent))
     spec: Any = importlib.util.spec_from_file_location(script.stem, script)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    build = getattr(module, FUNCTION, None)
+    build = getattr(module, BUILD_FUNCTION, None)
     if not callable(build):
-        raise ConfigError(f"{script.name} has no function {FUNCTION}() that builds the mechanism.")
+        raise ConfigError(
+            f"{script.name} has no function {BUILD_FUNCTION}() that builds the mechanism."
+        )
     mechanism = build()
     if not isinstance(mechanism, Mechanism):
-        raise ConfigError(f"{FUNCTION}() of {script.name} gave {mechanism!r}, not a Mechanism.")
+        raise ConfigError(
+            f"{BUILD_FUNCTION}() of {script.name} gave {mechanism!r}, not a Mechanism."
+        )
     names = {key: tuple(settings[key]) for key in ("inputs", "outputs")}
     return Driven(mechanism, **names, dt=settings["dt"], rho_inf=settings["rho_inf"])
 

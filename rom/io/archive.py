@@ -11,11 +11,11 @@ import numpy as np
 from numpy.lib import format as npy
 
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.files import LARGEST, check_readable, write_whole
+from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
 from rom.model import Array
 from rom.names import named
 
-LIMIT = 4 * 1024**3  # bytes the arrays may have in memory before reading is refused
+MAX_BYTES = 4 * 1024**3  # that the arrays may have in memory before reading is refused
 
 
 class Kind(NamedTuple):
@@ -67,7 +67,7 @@ def write_archive(
 
 
 def read_archive(
-    path: str | Path, kind: Kind, limit: int = LIMIT
+    path: str | Path, kind: Kind, limit: int = MAX_BYTES
 ) -> tuple[dict[str, Any], dict[str, Array]]:
     """Manifest and arrays of a file, its checksums compared.
 
@@ -80,7 +80,7 @@ def read_archive(
         FileFormatError: if the file is missing, cut, changed, or of another kind.
         UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
     """
-    path = check_readable(path, max(limit, LARGEST))
+    path = check_readable(path, max(limit, MAX_FILE_BYTES))
     try:
         with zipfile.ZipFile(path) as archive:
             _refuse_oversize(archive, path, limit)

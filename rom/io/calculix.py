@@ -26,7 +26,7 @@ from rom.model import Array
 
 STORED = (".sti", ".mas")
 LABEL = re.compile(r"(\d{1,18})\.([1-6])")
-HINT = "Let CalculiX write .sti, .mas and .dof again; they belong together."
+REWRITE_HINT = "Let CalculiX write .sti, .mas and .dof again; they belong together."
 
 
 def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
@@ -49,7 +49,7 @@ def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
         raise FileFormatError(
             f"rows and columns are 1 to {len(dofs)}, as {path.stem}.dof lists them.",
             where=f"{path}, line {line + 1}",
-            hint=HINT,
+            hint=REWRITE_HINT,
         )
     i, j = place.T - 1
     missing = np.setdiff1d(np.arange(len(dofs)), i[i == j])
@@ -59,7 +59,7 @@ def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
             f"{missing.size} of {len(dofs)} diagonal entries are missing and {twice} entries "
             "come twice: the file is cut or changed.",
             where=str(path),
-            hint=HINT,
+            hint=REWRITE_HINT,
         )
     return coo_matrix((table[:, 2], (i, j)), shape=(len(dofs),) * 2).tocsr(), dofs
 
@@ -76,7 +76,7 @@ def _table(path: Path) -> Array:
     with path.open(encoding="latin1") as file:
         number = next((k for k, line in enumerate(file, 1) if not _is_entry(line)), 1)
     raise FileFormatError(
-        "an entry is row, column, value.", where=f"{path}, line {number}", hint=HINT
+        "an entry is row, column, value.", where=f"{path}, line {number}", hint=REWRITE_HINT
     )
 
 
@@ -98,10 +98,10 @@ def _dofs(path: Path) -> Dofs:
                 raise FileFormatError(
                     "a row is node.component, with 1 to 6 for the component.",
                     where=f"{path}, line {number}",
-                    hint=HINT,
+                    hint=REWRITE_HINT,
                 )
             rows.append((int(found[1]), int(found[2])))
     dofs = np.array(rows, dtype=np.int64)
     if len(np.unique(dofs, axis=0)) < len(dofs):
-        raise FileFormatError("a row is listed twice.", where=str(path), hint=HINT)
+        raise FileFormatError("a row is listed twice.", where=str(path), hint=REWRITE_HINT)
     return dofs

@@ -19,7 +19,7 @@ from rom.names import ORIGIN_MARK
 
 BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
-SYMMETRIC, SQUARE = 6, 1
+SYMMETRIC_FORM, SQUARE_FORM = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
 
 
@@ -150,7 +150,7 @@ def _fields(line: str) -> list[str]:
 def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: list[str]) -> None:
     name = fields[0].upper()
     if fields[1] == "0":  # the header card: form, type
-        if int(fields[2]) not in (SYMMETRIC, SQUARE) or int(fields[3]) not in (1, 2):
+        if int(fields[2]) not in (SYMMETRIC_FORM, SQUARE_FORM) or int(fields[3]) not in (1, 2):
             raise ValueError(f"{name} is not square and real (form {fields[2]}, type {fields[3]})")
         entries.setdefault(name, [])
         return
@@ -182,7 +182,7 @@ def _points(dofs: Dofs, nodes: dict[int, Array]) -> Iterator[str]:
 
 def _written(name: str, A: csc_matrix, dofs: Dofs) -> Iterator[str]:
     n = A.shape[0]
-    yield f"{'DMIG':<8}{name:<8.8}{0:8d}{SYMMETRIC:8d}{2:8d}{0:8d}{0:8d}{'':8}{n:8d}"
+    yield f"{'DMIG':<8}{name:<8.8}{0:8d}{SYMMETRIC_FORM:8d}{2:8d}{0:8d}{0:8d}{'':8}{n:8d}"
     for c in range(n):
         column = A[:, c].toarray().ravel()
         rows = c + np.flatnonzero(column[c:])  # the lower triangle

@@ -24,7 +24,7 @@ from rom.io.simscape import write_simscape
 from rom.io.user_element import write_user_element
 from rom.io.vtu import write_vtu
 
-SID = ".sid_fem"
+SID_SUFFIX = ".sid_fem"
 HOLDING = ("openfast", "openfast-4")  # formats with one free interface
 
 
@@ -55,7 +55,7 @@ OWN_UNITS = ("npz", "sid", "sid-pysid", "sid-geisler")  # say the units of the b
 FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
     "npz": (".npz", save),
     "vtu": (".vtu", write_vtu),
-    "sid": (SID, partial(_write_sid, dialect="fembs")),
+    "sid": (SID_SUFFIX, partial(_write_sid, dialect="fembs")),
     "dmig": (".dmig", _write_dmig),
     "op4": (".op4", _write_op4),
     "abaqus": (".inp", _write_abaqus),
@@ -132,7 +132,7 @@ def read_body(path: str | Path) -> FlexibleBody:
         ConfigError: if Standard Input Data contain geometric stiffness.
         FileFormatError: if the file is missing, cut, or not what its ending promises.
     """
-    if Path(path).suffix.lower() == SID:
+    if Path(path).suffix.lower() == SID_SUFFIX:
         record = read_sid(path)
         try:
             return sid_body(record)

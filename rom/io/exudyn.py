@@ -33,10 +33,10 @@ from rom.model import Array
 from rom.names import ORIGIN_MARK
 
 STAR = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
-MOVED = 1e-9  # share of what the momentum of a shape could be
-RADIUS = 1e-3  # of the star, of the size of the body
+MOMENTUM_RTOL = 1e-9  # share of what the momentum of a shape could be
+STAR_RADIUS_RATIO = 1e-3  # of the body's size
 
-MODULE = '''\
+MODULE_TEXT = '''\
 """A flexible body for Exudyn, {mark}.
 
     import exudyn as exu
@@ -126,7 +126,9 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
         RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.
     """
     path = Path(path)
-    if np.abs(body.S).max(initial=0.0) > MOVED * np.sqrt(body.mass * np.abs(body.M).max(initial=0)):
+    if np.abs(body.S).max(initial=0.0) > MOMENTUM_RTOL * np.sqrt(
+        body.mass * np.abs(body.M).max(initial=0)
+    ):
         warnings.warn(
             f"the shapes of body {body.name!r} move its mass centre; the gravity of Exudyn 1.13 "
             "turns the body as if they did not. body.with_reference('mean-axis') avoids that.",
@@ -137,7 +139,7 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
     np.savez_compressed(memory, **arrays(body))
     names = json.dumps(list(body.markers)).encode()
     stem = path.stem if path.stem.isidentifier() else "body"
-    text = MODULE.format(
+    text = MODULE_TEXT.format(
         mark=ORIGIN_MARK, stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue())
     )
     write_whole(path, lambda file: file.write(text.encode()))
@@ -170,7 +172,7 @@ def arrays(body: FlexibleBody) -> dict[str, Array]:
 
 def _nodes(body: FlexibleBody) -> dict[str, Array]:
     points, modes = [np.zeros((0, 3))], [np.zeros((0, body.n_modes))]
-    arms = RADIUS * body.size * STAR
+    arms = STAR_RADIUS_RATIO * body.size * STAR
     for m in body.markers.values():
         points.append(m.point + arms)
         turned = np.einsum("abc,ck,nb->nak", skew_tensor(), m.rotation, arms)

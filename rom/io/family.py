@@ -14,11 +14,11 @@ from rom.body.inertia import InertiaIntegrals
 from rom.body.stretch import Stretch
 from rom.errors import FileFormatError
 from rom.io import native
-from rom.io.archive import LIMIT, Kind, write_archive
+from rom.io.archive import MAX_BYTES, Kind, write_archive
 from rom.model import Array, Report, Row
 from rom.parameters import read, written
 
-SCHEMA = "rom-family"
+SCHEMA_NAME = "rom-family"
 VERSION = (1, 0)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
 
@@ -49,7 +49,7 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
     damping, numbers = _damping(body.damping)
     arrays |= numbers
     manifest = native.body_manifest(body.body) | {
-        "schema": SCHEMA,
+        "schema": SCHEMA_NAME,
         "version": list(VERSION),
         "parameters": written(body.parameters),
         "shares": [{"region": s.region, "fixed": s.fixed} for s in body.shares],
@@ -63,7 +63,7 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
 
 
 @typed
-def load(path: str | Path, *, limit: int = LIMIT) -> Any:
+def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
     """Read a flexible body, or a family of them.
 
     Args:
@@ -79,12 +79,14 @@ def load(path: str | Path, *, limit: int = LIMIT) -> Any:
         QualityGateError: if the numbers are not those of a body.
     """
     path = Path(path)
-    known = Kind({native.SCHEMA: native.VERSION, SCHEMA: VERSION}, "body file", native.FIELDS)
+    known = Kind(
+        {native.SCHEMA_NAME: native.VERSION, SCHEMA_NAME: VERSION}, "body file", native.FIELDS
+    )
     manifest, arrays = native.read_finite(path, known, limit)
     with native.stated(path):
         body = native.body_of(manifest, arrays)
     native.verify(body, path)
-    if manifest["schema"] == native.SCHEMA:
+    if manifest["schema"] == native.SCHEMA_NAME:
         return body
     with native.stated(path):
         family = _family(manifest, arrays, body)

@@ -11,7 +11,7 @@ from typing import IO
 from rom.errors import ConfigError, FileFormatError, ResourceError, UnsafeFileError
 from rom.names import MAX_FILE_NAME_BYTES, TEMPORARY_BYTES
 
-LARGEST = 2**32  # bytes of a file that is still read
+MAX_FILE_BYTES = 2**32  # of a file that is still read
 
 
 def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -77,7 +77,7 @@ def _check_possible(path: Path) -> None:
         )
 
 
-def check_readable(path: str | Path, largest: int = LARGEST) -> Path:
+def check_readable(path: str | Path, largest: int = MAX_FILE_BYTES) -> Path:
     """The path, if it is a file that may be read and is not too large.
 
     Raises:

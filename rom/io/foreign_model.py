@@ -18,7 +18,7 @@ from rom.model import Array, FEModel, Index, Interface
 from rom.plausible import DENSITY, MATRIX_SPEED, SIZE, warn_outside
 from rom.units import unit_system
 
-ASYMMETRY, MIXED_MASS, RIGID = 1e-6, 1e-6, 1e-6
+ASYMMETRY_RTOL, MIXED_MASS_RTOL, RIGID_RTOL = 1e-6, 1e-6, 1e-6
 MORE_NODES = 5
 # sqrt(K_ii / M_ii) times the distance of the next node over sqrt(E/rho); 1.6 to 3.3 for blocks,
 # beams, rods and phalanges of bricks and tetrahedra of either degree
@@ -102,8 +102,8 @@ def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:
     """(3 k, 3 k) symmetric matrix in the order of the nodes."""
     A, dofs = _completed(found), found.dofs
     if dofs is None:
-        per_node, rest = divmod(A.shape[0], labels.size)
-        if rest or per_node not in (3, 6):
+        per_node, remainder = divmod(A.shape[0], labels.size)
+        if remainder or per_node not in (3, 6):
             raise FileFormatError(
                 f"{A.shape[0]} rows are neither 3 nor 6 for each of {labels.size} nodes.",
                 where=found.where,
@@ -146,7 +146,7 @@ def _completed(found: NamedMatrix) -> csr_matrix:
     A = csr_matrix(A + A.T - A.T.multiply(both))
     if not A.nnz:
         raise FileFormatError("the matrix is empty.", where=found.where)
-    if abs(A - A.T).max() > ASYMMETRY * abs(A).max():
+    if abs(A - A.T).max() > ASYMMETRY_RTOL * abs(A).max():
         raise QualityGateError("the matrix is not symmetric.", where=found.where)
     return csr_matrix(0.5 * (A + A.T))
 
@@ -170,7 +170,7 @@ def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -
 
 def _check_mass(model: FEModel) -> None:
     scalar = model.M[::3][:, ::3]
-    if abs(model.M - kron(scalar, identity(3))).max() > MIXED_MASS * abs(model.M).max():
+    if abs(model.M - kron(scalar, identity(3))).max() > MIXED_MASS_RTOL * abs(model.M).max():
         raise ModelError(
             "the mass is not the same along x, y and z, or couples them: it is not that of solid "
             "elements.",
@@ -185,7 +185,7 @@ def _check_free(model: FEModel) -> None:
     turns = [np.cross(axis, X / size) for axis in np.eye(3)]
     R = np.column_stack([*(np.tile(axis, len(X)) for axis in np.eye(3)), *map(np.ravel, turns)])
     residual = np.abs(model.K @ R).max() / abs(model.K).max()
-    if not residual < RIGID:
+    if not residual < RIGID_RTOL:
         raise QualityGateError(
             f"a rigid motion meets the stiffness {residual:.2g} of its largest entry: the body is "
             "supported, or its nodes are not those of the matrix.",

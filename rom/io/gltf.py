@@ -18,10 +18,10 @@ import numpy as np
 from rom.io.files import write_whole
 from rom.model import Array, Index
 
-FLOAT, UNSIGNED = 5126, 5125  # componentType
-VERTICES, INDICES = 34962, 34963  # target of a bufferView
+FLOAT_TYPE, UNSIGNED_TYPE = 5126, 5125  # componentType
+VERTICES_TARGET, INDICES_TARGET = 34962, 34963  # target of a bufferView
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-NEGLIGIBLE = 1e-6  # share of the largest displacement below which a shape is left out
+SHAPE_RTOL = 1e-6  # of the largest displacement: shapes below are left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +64,12 @@ class _Document:
         self,
         values: Any,
         *,
-        component: int = FLOAT,
+        component: int = FLOAT_TYPE,
         target: int | None = None,
         bounds: bool = False,
     ) -> int:
         """Add an array (m,) or (m, c)."""
-        A = np.ascontiguousarray(values, dtype="<f4" if component == FLOAT else "<u4")
+        A = np.ascontiguousarray(values, dtype="<f4" if component == FLOAT_TYPE else "<u4")
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": A.nbytes}
         self.data += A.tobytes()
         if target is not None:
@@ -127,15 +127,15 @@ def upright(up: Array) -> Array:
 
 def _add(document: _Document, body: MovingMesh, clock: int, motion: dict[str, Any]) -> None:
     shapes, weights = _targets(body)
-    points = document.accessor(body.points, target=VERTICES, bounds=True)
+    points = document.accessor(body.points, target=VERTICES_TARGET, bounds=True)
     corners = body.triangles.ravel()
-    indices = document.accessor(corners, component=UNSIGNED, target=INDICES)
+    indices = document.accessor(corners, component=UNSIGNED_TYPE, target=INDICES_TARGET)
     primitive: dict[str, Any] = {"attributes": {"POSITION": points}, "indices": indices}
     primitive["material"] = document.put("materials", _material(body.colour))
     mesh: dict[str, Any] = {"name": body.name, "primitives": [primitive]}
     if shapes:
         primitive["targets"] = [
-            {"POSITION": document.accessor(u, target=VERTICES, bounds=True)} for u in shapes
+            {"POSITION": document.accessor(u, target=VERTICES_TARGET, bounds=True)} for u in shapes
         ]
         mesh["weights"] = weights[0].tolist()
     quaternion = _scalar_last(_continuous(body.orientation))
@@ -157,7 +157,7 @@ def _targets(body: MovingMesh) -> tuple[list[Array], Array]:
     reach = np.abs(body.q).max(axis=0, initial=0.0)
     moved = body.shapes * reach
     sizes = np.abs(moved).max(axis=0, initial=0.0)
-    kept = np.flatnonzero(sizes > NEGLIGIBLE * sizes.max(initial=0.0))
+    kept = np.flatnonzero(sizes > SHAPE_RTOL * sizes.max(initial=0.0))
     shapes = [moved[:, k].reshape(-1, 3) for k in kept]
     return shapes, body.q[:, kept] / np.where(reach[kept] > 0, reach[kept], 1.0)
 

@@ -15,7 +15,7 @@ from rom.io.market import BANNER, read_market
 from rom.io.op4 import read_op4
 from rom.io.user_element import read_user_element
 
-HEAD = 10_000  # bytes among which a user element is announced
+HEAD_BYTES = 10_000  # among which a user element is announced
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
             ".op4, .bdf, .dat, .pch, .dmig."
         )
     with path.open("rb") as file:
-        start = file.read(HEAD)
+        start = file.read(HEAD_BYTES)
     if ending == ".inp" or b"*USER ELEMENT" in start.upper():
         return dict(read_user_element(path))
     return {

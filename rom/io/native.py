@@ -14,14 +14,14 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
-from rom.body.recovery import STATES, StressRecovery
+from rom.body.recovery import N_FRAME_LOADS, StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError
-from rom.io.archive import LIMIT, Kind, read_archive, write_archive
+from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive
 from rom.model import Array, Report, Row
 from rom.names import named
 from rom.units import SYSTEMS
 
-SCHEMA = "rom-body"
+SCHEMA_NAME = "rom-body"
 VERSION = (1, 3)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
@@ -43,7 +43,7 @@ def save(body: FlexibleBody, path: str | Path) -> Path:
     return write_archive(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
 
 
-def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
+def load(path: str | Path, *, limit: int = MAX_BYTES) -> FlexibleBody:
     """Read a flexible body.
 
     Args:
@@ -56,7 +56,7 @@ def load(path: str | Path, *, limit: int = LIMIT) -> FlexibleBody:
         QualityGateError: if the numbers are not those of a body.
     """
     path = Path(path)
-    manifest, arrays = read_finite(path, Kind({SCHEMA: VERSION}, "body file", FIELDS), limit)
+    manifest, arrays = read_finite(path, Kind({SCHEMA_NAME: VERSION}, "body file", FIELDS), limit)
     with stated(path):
         body = body_of(manifest, arrays)
     verify(body, path)
@@ -134,7 +134,7 @@ def _patch(arrays: dict[str, Array], place: str) -> Patch | None:
 def body_manifest(body: FlexibleBody) -> dict[str, Any]:
     """What the file says of a body in words."""
     return {
-        "schema": SCHEMA,
+        "schema": SCHEMA_NAME,
         "version": list(VERSION),
         "name": body.name,
         "units": body.units,
@@ -231,7 +231,7 @@ def verify(body: FlexibleBody, path: Path) -> None:
     if body.stress is not None:
         n, A = body.stress.points.shape[0], body.stress.inertial
         fits = body.stress.points.shape == (n, 3) and body.stress.operator.shape == (6 * n, r)
-        if not fits or (A is not None and A.shape != (6 * n, STATES + r)):
+        if not fits or (A is not None and A.shape != (6 * n, N_FRAME_LOADS + r)):
             raise FileFormatError("the stress recovery does not fit the body.", where=str(path))
     if body.surface is not None:
         n = body.surface.points.shape[0]

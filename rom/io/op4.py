@@ -22,7 +22,7 @@ from rom.io.files import check_readable, write_whole
 from rom.model import Array
 
 MOST_ROWS = 10_000_000
-SYMMETRIC, RECTANGULAR = 6, 2
+SYMMETRIC_FORM, RECTANGULAR_FORM = 6, 2
 DIGITS = re.compile(rb"[ \d-]{24}")
 
 
@@ -97,7 +97,7 @@ def write_op4(matrices: dict[str, Any], path: str | Path) -> Path:
 def _written(name: str, A: csc_matrix) -> str:
     rows, columns = A.shape
     symmetric = rows == columns and abs(A - A.T).max() == 0
-    form = SYMMETRIC if symmetric else RECTANGULAR
+    form = SYMMETRIC_FORM if symmetric else RECTANGULAR_FORM
     lines = [f"{columns:8d}{rows:8d}{form:8d}{2:8d}{name.upper():<8.8}1P,3E23.16"]
     for c in range(columns):
         column = A[:, c].toarray().ravel()

@@ -19,12 +19,12 @@ from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.io.interface_form import InterfaceForm, interface_form
-from rom.io.openfast_reading import LOADING, Superelement
+from rom.io.openfast_reading import LOADING_LINE, Superelement
 from rom.model import Array
 from rom.names import ORIGIN_MARK, named
 
 VERSIONS = (4, 5)
-SPAN = 1e5  # s; how long the loads of version 4 are constant
+LOAD_DURATION = 1e5  # [s]; how long the loads of version 4 are constant
 GRAVITY = (0.0, 0.0, -9.81)
 UNITS = {"Mass": "kg, m", "Stiffness": "N, m", "Damping": "N, m, s"}
 
@@ -111,15 +111,15 @@ def _old(found: Superelement) -> Iterator[str]:
     n = len(found.M)
     yield "! Flex 5 Format"
     yield f"!Dimension: {n}"
-    yield f"!Time increment in simulation: {SPAN:g}"
-    yield f"!Total simulation time in file: {SPAN:g}"
+    yield f"!Time increment in simulation: {LOAD_DURATION:g}"
+    yield f"!Total simulation time in file: {LOAD_DURATION:g}"
     for kind, A in zip(UNITS, (found.M, found.K, found.D), strict=True):
         yield f"!{kind} Matrix (Units ({UNITS[kind]}))"
         yield f"!Dimension: {n}"
         yield from map(_row, A)
-    yield f"!{LOADING[1:].title()} (Units (N, m))"
+    yield f"!{LOADING_LINE[1:].title()} (Units (N, m))"
     yield f"!Dimension: 1 time column - {n} force columns - 1 wave elevation column"
-    yield from (_row(np.r_[t, found.weight, 0.0]) for t in (0.0, SPAN))
+    yield from (_row(np.r_[t, found.weight, 0.0]) for t in (0.0, LOAD_DURATION))
 
 
 def _row(values: Array) -> str:

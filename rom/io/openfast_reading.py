@@ -13,16 +13,16 @@ from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import check_readable
 from rom.model import Array
 
-MARK = "flex 5 format"  # second line of files for versions 2.3 to 4
-DIMENSION, STEP, DURATION = (
+OLD_FORMAT_MARK = "flex 5 format"  # second line of files for versions 2.3 to 4
+DIMENSION_LINE, STEP_LINE, DURATION_LINE = (
     "!dimension:",
     "!time increment in simulation:",
     "!total simulation time in file:",
 )
 MATRICES = {"!mass": "M", "!stiffness": "K", "!damping": "D", "!weight stiffness": "K_W"}
-WEIGHT, LOADING = "!weight constant", "!loading and wave elevation"
-MOST = 10_000  # coordinates
-ASYMMETRY, UNEVEN = 1e-6, 1e-3
+WEIGHT_LINE, LOADING_LINE = "!weight constant", "!loading and wave elevation"
+MAX_COORDINATES = 10_000  # coordinates
+ASYMMETRY_RTOL, TIME_STEP_RTOL = 1e-6, 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class _Reader:
 
     def __init__(self, path: str, lines: list[str]):
         self.path, self.lines, self.at = path, lines, 0
-        self.old = len(lines) > 1 and MARK in lines[1].lower()
+        self.old = len(lines) > 1 and OLD_FORMAT_MARK in lines[1].lower()
         self.head: dict[str, float] = {}
         self.blocks: dict[str, Array] = {}
 
@@ -76,30 +76,32 @@ class _Reader:
         while self.at < len(self.lines):
             line = self.lines[self.at].strip().lower()
             self.at += 1
-            key = next((k for k in (DIMENSION, STEP, DURATION) if line.startswith(k)), "")
+            key = next(
+                (k for k in (DIMENSION_LINE, STEP_LINE, DURATION_LINE) if line.startswith(k)), ""
+            )
             block = next((name for k, name in MATRICES.items() if line.startswith(k)), "")
             if key:
                 self.head[key] = self.number(line[len(key) :])
             elif block:
                 self.blocks[block] = self.rows(self.n, (self.n,))
-            elif line.startswith(WEIGHT):
+            elif line.startswith(WEIGHT_LINE):
                 self.blocks["weight"] = self.rows(1, (self.n,))[0]
-            elif line.startswith(LOADING):
+            elif line.startswith(LOADING_LINE):
                 self.blocks["loads"] = self.rows(self.steps, (self.n + 1, self.n + 2))
 
     @property
     def n(self) -> int:
-        n = self.head.get(DIMENSION, 0)
-        if n > MOST:
+        n = self.head.get(DIMENSION_LINE, 0)
+        if n > MAX_COORDINATES:
             raise UnsafeFileError(f"{n:.0f} coordinates are not read.", where=self.path)
         if n < 6 or n != int(n):
-            raise self.error(f"{DIMENSION!r} 6 or more has to come before the blocks")
+            raise self.error(f"{DIMENSION_LINE!r} 6 or more has to come before the blocks")
         return int(n)
 
     @property
     def steps(self) -> int:
         """Lines of loads that OpenFAST reads."""
-        dt, T = self.head.get(STEP, 0.0), self.head.get(DURATION, -1.0)
+        dt, T = self.head.get(STEP_LINE, 0.0), self.head.get(DURATION_LINE, -1.0)
         if not (dt > 0 and 0 <= T / dt < len(self.lines)):
             raise self.error(f"a time step {dt:g} s and a duration {T:g} s do not fit the file")
         return round(T / dt) + 1
@@ -139,10 +141,10 @@ class _Reader:
             raise self.error(f"the blocks {missing} are missing")
         n, b = self.n, self.blocks
         loads = b.get("loads", np.zeros((0, n + 2)))
-        if np.abs(np.diff(loads[:, 0]) - self.head.get(STEP, 0.0)).max(initial=0.0) > (
-            UNEVEN * self.head.get(STEP, 0.0)
+        if np.abs(np.diff(loads[:, 0]) - self.head.get(STEP_LINE, 0.0)).max(initial=0.0) > (
+            TIME_STEP_RTOL * self.head.get(STEP_LINE, 0.0)
         ):
-            raise self.error(f"the times of the loads are not {self.head[STEP]:g} s apart")
+            raise self.error(f"the times of the loads are not {self.head[STEP_LINE]:g} s apart")
         found = Superelement(
             M=b["M"],
             K=b["K"],
@@ -160,7 +162,7 @@ class _Reader:
 def _check(found: Superelement, path: str) -> None:
     for name in ("M", "K", "D"):
         A = getattr(found, name)
-        if np.abs(A - A.T).max() > ASYMMETRY * np.abs(A).max():
+        if np.abs(A - A.T).max() > ASYMMETRY_RTOL * np.abs(A).max():
             raise QualityGateError(f"the matrix {name} is not symmetric.", where=path)
     size = np.sqrt(np.abs(np.diag(found.M)))
     size[size == 0] = 1.0

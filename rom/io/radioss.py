@@ -17,8 +17,8 @@ from rom.errors import ConfigError
 from rom.io.dmig import write_dmig
 from rom.io.interface_form import interface_form
 
-FEWEST = 3
-STRAIGHT = 1e-6
+MIN_POINTS = 3
+COLLINEAR_RTOL = 1e-6  # second over first singular value of points on one line
 
 
 def write_radioss(
@@ -44,10 +44,10 @@ def write_radioss(
         )
     points = np.array([form.points[k] for k in sorted(form.points)])
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) < FEWEST or spread[1] < STRAIGHT * spread[0]:
+    if len(points) < MIN_POINTS or spread[1] < COLLINEAR_RTOL * spread[0]:
         raise ConfigError(
             f"body {body.name!r} has {len(points)} interfaces, {form.names}; OpenRadioss needs "
-            f"{FEWEST} that do not lie on one line."
+            f"{MIN_POINTS} that do not lie on one line."
         )
     labels = dict(nodes) if nodes else {name: k for k, name in enumerate(form.names, 1)}
     if set(labels) != set(form.names) or len(set(labels.values())) < len(labels):

@@ -21,7 +21,7 @@ from rom.io.sid_dialect import by_mode, first
 from rom.model import Array
 
 EPS = -skew_tensor()  # of Levi-Civita
-UNSTIFFENED = 1e-9  # share of Me below which the trace of Oe1 counts as inertia alone
+STIFFENING_RTOL = 1e-9  # share of Me below which the trace of Oe1 counts as inertia alone
 
 
 def standard_input(body: FlexibleBody) -> StandardInput:
@@ -119,7 +119,7 @@ def sid_body(record: StandardInput) -> FlexibleBody:
     b, r = record.blocks, record.n_modes
     Me, Oe1, Cr1 = b["Me"].M0, first(b["Oe"], r), first(b["Cr"], r)
     excess = np.abs(Oe1[:, :, :3].sum(axis=2) + 2 * Me).max(initial=0.0)
-    if excess > UNSTIFFENED * np.abs(Me).max(initial=0.0) or first(b["Ct"], r).any():
+    if excess > STIFFENING_RTOL * np.abs(Me).max(initial=0.0) or first(b["Ct"], r).any():
         raise ConfigError(
             f"the SID of {record.name!r} has geometric stiffness in Oe, where it cannot be told "
             "from inertia.",

@@ -19,9 +19,9 @@ from rom.io.sid import BLOCKS, DIALECTS, TENSOR, StandardInput, Taylor, repacked
 from rom.io.sid_reading import RawBlock, RawFile, read_raw, values
 from rom.model import Array, Report, Row
 
-LIMIT = 1e-8  # of a residual; files have twelve digits
+RESIDUAL_RTOL = 1e-8  # files have twelve digits
 GE = ("antisymmetric", "as_written")
-FLOOR = 1e-4  # share of what a block could be, below which its differences are round-off
+BLOCK_RTOL = 1e-4  # share of what a block could be, below which its differences are round-off
 
 
 @typed
@@ -46,7 +46,7 @@ def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
     record = _settled(read_raw(path))
     Ge, symmetric = record.blocks["Ge"], _symmetric_ge(record)
     scale = max(np.abs(Ge.M0).max(initial=0.0), _scales(record)[2])
-    if ge == "antisymmetric" and np.abs(symmetric).max(initial=0.0) > LIMIT * scale:
+    if ge == "antisymmetric" and np.abs(symmetric).max(initial=0.0) > RESIDUAL_RTOL * scale:
         share = np.abs(symmetric).max() / scale
         warnings.warn(
             f"{path}: the part of Ge that does work ({share:.2g} of its largest entry) is left "
@@ -71,7 +71,7 @@ def check_sid(record: StandardInput) -> Report:
 
 
 def _row(what: str, residual: float) -> Row:
-    return Row(what, float(residual), f"<= {LIMIT:g}", bool(residual <= LIMIT))
+    return Row(what, float(residual), f"<= {RESIDUAL_RTOL:g}", bool(residual <= RESIDUAL_RTOL))
 
 
 def _relations(record: StandardInput) -> Iterator[tuple[str, float]]:
@@ -99,7 +99,11 @@ def _scales(record: StandardInput) -> tuple[float, float, float]:
     b = record.blocks
     mass = float(np.abs(b["Me"].M0).max(initial=0.0))
     inertia = float(np.abs(b["J"].M0).max())
-    return FLOOR * np.sqrt(record.mass * mass), FLOOR * np.sqrt(inertia * mass), FLOOR * mass
+    return (
+        BLOCK_RTOL * np.sqrt(record.mass * mass),
+        BLOCK_RTOL * np.sqrt(inertia * mass),
+        BLOCK_RTOL * mass,
+    )
 
 
 def first(block: Taylor, r: int) -> Array:

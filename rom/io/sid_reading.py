@@ -14,7 +14,7 @@ from rom.io.sid import BLOCKS, GENERAL, NODE_BLOCKS, SYMMETRIC, UNIT, shape_of
 from rom.model import Array
 from rom.names import ORIGIN_MARK
 
-LARGEST = 2**28  # bytes of a file that is still read
+MAX_BYTES = 2**28  # of a file that is still read
 MOST_MODES = 1000  # blocks grow with their square
 ASSIGNMENT = re.compile(r"([A-Za-z]\w*(?:\s+\w+)?)\s*(?:\(([^)]*)\))?\s*=\s*(.*)")
 HEAD = re.compile(r"^\d+\s+\d+\s*:No\. nodes, No\. modes:")
@@ -87,7 +87,7 @@ def read_raw(path: str | Path) -> RawFile:
         FileFormatError: naming the line, if the file is missing, cut, or no SID.
         UnsafeFileError: if it is larger than 256 MiB or has more than 1000 coordinates.
     """
-    file = RawFile(check_readable(path, LARGEST))
+    file = RawFile(check_readable(path, MAX_BYTES))
     lines = _Lines(file, file.path.read_bytes().decode("ascii", "replace"))
     file.title = HEAD.sub("", lines.next()).strip().removesuffix(f"; {ORIGIN_MARK}")
     _expect(lines, "part")

@@ -12,13 +12,13 @@ from rom.errors import ConfigError, FileFormatError
 from rom.io.files import check_readable
 from rom.model import Array
 
-LARGEST = 2**30  # bytes of a file that is still read
+MAX_BYTES = 2**30  # of a file that is still read
 MARK = b"    -1"
-HEADER = 11  # records before the values
+N_HEADER_RECORDS = 11  # before the values
 FREQUENCY_RESPONSE = 4
 PER_RECEPTANCE = {8: 0, 11: 1, 12: 2}  # displacement, velocity, acceleration: powers of i omega
-FORCE = 13
-COMPLEX, DOUBLE = (5, 6), (4, 6)  # types of ordinate
+FORCE_TYPE = 13
+COMPLEX_TYPES, DOUBLE_TYPES = (5, 6), (4, 6)  # types of ordinate
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Function:
         Raises:
             ConfigError: if this is no motion per force.
         """
-        if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE:
+        if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE_TYPE:
             raise ConfigError(f"{_name(self)}: the function is no response to a force.")
         if self.numerator not in PER_RECEPTANCE:
             raise ConfigError(f"{_name(self)}: its numerator {self.numerator} is no motion.")
@@ -71,7 +71,7 @@ def read_universal(path: str | Path) -> tuple[Function, ...]:
         FileFormatError: if the file is missing, cut, or holds no function.
         UnsafeFileError: if it is larger than 1 GiB.
     """
-    path = check_readable(path, LARGEST)
+    path = check_readable(path, MAX_BYTES)
     data, place = path.read_bytes(), 0
     found: list[Function] = []
     while (place := _mark(data, place)) >= 0:
@@ -151,15 +151,15 @@ def _dataset(data: bytes, place: int, head: list[bytes]) -> tuple[int, Function 
     if not head or not (binary or head[0] == b"58"):
         return _behind(data, place), None
     lines = []
-    for _ in range(HEADER):
+    for _ in range(N_HEADER_RECORDS):
         end = _line_end(data, place)
         lines.append(data[place:end].decode("ascii", "replace").rstrip("\r\n"))
         place = end
     kind, spacing = int(lines[6][:10]), int(lines[6][20:30])
-    n, parts = int(lines[6][10:20]), 2 if kind in COMPLEX else 1
+    n, parts = int(lines[6][10:20]), 2 if kind in COMPLEX_TYPES else 1
     width = parts + (spacing == 0)
     if binary:
-        if spacing == 0 and kind in DOUBLE:
+        if spacing == 0 and kind in DOUBLE_TYPES:
             raise ValueError("uneven abscissas of double values are not read from binary")
         values, place = _binary(data, place, head, kind, n * width)
         closing = _closing(data, place)
@@ -197,8 +197,8 @@ def _function(lines: list[str], values: Array, spacing: int, parts: int) -> Func
 
 def _numbers(text: str, kind: int, uneven: bool, parts: int) -> Array:
     """Values in columns that may touch: E13.5, or E20.12 for double ordinates."""
-    widths = [20] * 4 if kind in DOUBLE else [13] * 6
-    if kind in DOUBLE and uneven:
+    widths = [20] * 4 if kind in DOUBLE_TYPES else [13] * 6
+    if kind in DOUBLE_TYPES and uneven:
         widths = [13, 20, 20] if parts == 2 else [13, 20] * 2
     ends = np.cumsum([0, *widths])
     found = []
@@ -220,7 +220,7 @@ def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -
     if len(data) < place + fields[3]:
         raise ValueError(f"{fields[3]} bytes announced, {len(data) - place} left")
     order = "<" if fields[0] == 1 else ">"
-    size = 8 if kind in DOUBLE else 4
+    size = 8 if kind in DOUBLE_TYPES else 4
     needed = count * size
     if fields[3] < needed and _closing(data, place + needed) < 0:
         raise ValueError(f"{fields[3]} bytes for {count} numbers of {size}")

@@ -14,7 +14,7 @@ from rom.io.files import write_whole
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
 
-TRIANGLE = 5  # VTK's number of this cell
+VTK_TRIANGLE = 5  # number of this cell type
 
 
 def write_vtkhdf(
@@ -53,7 +53,7 @@ def write_vtkhdf(
         root["Points"] = points.reshape(-1, 3)
         root["Connectivity"] = triangles.ravel()
         root["Offsets"] = 3 * np.arange(len(triangles) + 1)
-        root["Types"] = np.full(len(triangles), TRIANGLE, dtype=np.uint8)
+        root["Types"] = np.full(len(triangles), VTK_TRIANGLE, dtype=np.uint8)
         steps = root.create_group("Steps")
         steps.attrs["NSteps"] = f
         steps["Values"] = times

@@ -16,7 +16,7 @@ from rom.io.files import write_whole
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
 
-TRIANGLE = 5  # VTK's number of this cell
+VTK_TRIANGLE = 5  # number of this cell type
 TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
 
 
@@ -113,7 +113,7 @@ def _stressed(body: FlexibleBody, q: Array, stress: Array) -> str:
         "von Mises stress [Pa]": von_mises(stress),
         "displacement [m]": (surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
     }
-    return grid(surface.points, surface.triangles, TRIANGLE, at_points=fields)
+    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
 
 
 def _document(body: FlexibleBody) -> str:
@@ -124,7 +124,7 @@ def _document(body: FlexibleBody) -> str:
         f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
         for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
     }
-    return grid(surface.points, surface.triangles, TRIANGLE, at_points=fields)
+    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
 
 
 def grid(

@@ -156,12 +156,12 @@ def load_columns(s, W, lam, rank):
 @inner
 def add_gradient(s, W, at, c, row):
     """Add c times the gradient of joint coordinate ``at`` in the velocities to a row of W.UG."""
-    B, C = s.bodies, s.coordinates
+    bodies, C = s.bodies, s.coordinates
     for side in range(2):
         m = C.i[at] if side == 0 else C.j[at]
         b = s.markers.body[m]
-        first = column_of(s.graph, row, b) if s.graph.compact else B.v_at[b]
-        for q in range(6 + B.r[b] if b >= 0 else 0):
+        first = column_of(s.graph, row, b) if s.graph.compact else bodies.v_at[b]
+        for q in range(6 + bodies.r[b] if b >= 0 else 0):
             for p in range(6):
                 W.UG[row, first + q] += c * W.xg[at, 6 * side + p] * W.H[m, p, q]
 

@@ -236,10 +236,10 @@ def back_substitute(A, n, pivot, x):
 
 
 @inner
-def range_basis(G, rank, rest, U):
+def range_basis(G, rank, remainder, U):
     """Orthonormal basis of the range of G (m, n), written to the rows of U (rank, m).
 
-    Columns of G are taken in the order of what is left of them, and cleaned twice. ``rest``
+    Columns of G are taken in the order of what is left of them, and cleaned twice. ``remainder``
     (n, m) is working memory.
     """
     m, n = G.shape
@@ -247,22 +247,22 @@ def range_basis(G, rank, rest, U):
     for j in range(n):
         size = 0.0
         for i in range(m):
-            rest[j, i] = G[i, j]
+            remainder[j, i] = G[i, j]
             size += G[i, j] * G[i, j]
         if size > best:
             best, p = size, j
     for k in range(rank):
         for i in range(m):
-            U[k, i] = rest[p, i]
+            U[k, i] = remainder[p, i]
         clean(U, k)
         best, p = -1.0, 0
         for j in range(n):
             s, size = 0.0, 0.0
             for i in range(m):
-                s += U[k, i] * rest[j, i]
+                s += U[k, i] * remainder[j, i]
             for i in range(m):
-                x = rest[j, i] - s * U[k, i]
-                rest[j, i] = x
+                x = remainder[j, i] - s * U[k, i]
+                remainder[j, i] = x
                 size += x * x
             if size > best:
                 best, p = size, j

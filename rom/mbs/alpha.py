@@ -25,8 +25,8 @@ from rom.mbs.motion import (
     drive_power,
     evaluate,
     least_multipliers,
-    moved,
     residual,
+    retract,
     tangents,
 )
 from rom.mbs.multistep import follow_increment, is_multistep, keep_past, predict_multistep
@@ -34,17 +34,29 @@ from rom.mbs.stabilised import close_gaps, fit_velocities, velocity_gaps
 from rom.model import Array, Index
 
 # what a corrector pass says
-GOES_ON, CONVERGED, FAILED, NOT_FINITE, SINGULAR, ASK = 0, 1, 2, 3, 4, 5
+UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
 # entries of Step.count
-STEPS, ITERATIONS, FACTORISATIONS, LAST, FRESH, PASS, BEGAN, ASKS, ASKED, BOTH = range(10)
+#
+(
+    STEPS,
+    ITERATIONS,
+    FACTORISATIONS,
+    LAST_ITERATIONS,
+    HAS_FACTOR,
+    STEP_PASSES,
+    STEPS_BEFORE,
+    USES_LAWS,
+    LAWS_ASKED,
+    BOTH_LEVELS,
+) = range(10)
 MAX_PASSES = 25
 ROUND_OFF = 4e-16
 # share of the round-off of positions that increments are brought to: velocities and accelerations
 # feel an increment over the step and over its square, and their errors add up to momentum
-FINER = 1e-3
+INCREMENT_SHARE = 1e-3
 # gap in a joint, in rad or lengths of the mechanism, that may remain: the norm of increments hardly
 # sees a light body that spins fast
-GAP = 1e-11
+JOINT_GAP_TOL = 1e-11
 
 
 class Step(NamedTuple):
@@ -111,45 +123,45 @@ def bdf_coefficients(h: float, before: float) -> tuple[Array, Array]:
 
 
 @inner
-def predict(s, T):
+def predict(s, step):
     """Trial state with the accelerations and multipliers of the last step."""
-    h, beta, gamma, alpha_m, _ = T.method
-    c0, c1, c2 = T.bdf[0], T.bdf[1], T.bdf[-1]
-    for i in range(0 if is_multistep(T) else T.v.size):
-        T.vd1[i] = T.vd[i]
+    h, beta, gamma, alpha_m, _ = step.method
+    c0, c1, c2 = step.bdf[0], step.bdf[1], step.bdf[-1]
+    for i in range(0 if is_multistep(step) else step.v.size):
+        step.vd1[i] = step.vd[i]
         if c0 > 0.0:
-            T.v1[i] = (T.vd[i] - c1 * T.v[i] - c2 * T.a[i]) / c0
-            T.psi[i] = (T.v1[i] + c2 * T.psi[i]) / c0
+            step.v1[i] = (step.vd[i] - c1 * step.v[i] - c2 * step.a[i]) / c0
+            step.psi[i] = (step.v1[i] + c2 * step.psi[i]) / c0
         else:
-            a1 = (T.vd[i] - alpha_m * T.a[i]) / (1 - alpha_m)
-            T.v1[i] = T.v[i] + h * ((1 - gamma) * T.a[i] + gamma * a1)
-            T.psi[i] = h * T.v[i] + h * h * ((0.5 - beta) * T.a[i] + beta * a1)
-    T.drift[:] = 0.0
-    if is_multistep(T):
-        predict_multistep(s, T)
-    copy(T.lam, T.lam1)
-    T.size[0] = T.size[4] = 0.0
-    if T.count[LAST] > 4:
-        T.count[FRESH] = 0
-    moved(s, T.q, T.psi, T.q1)
+            a1 = (step.vd[i] - alpha_m * step.a[i]) / (1 - alpha_m)
+            step.v1[i] = step.v[i] + h * ((1 - gamma) * step.a[i] + gamma * a1)
+            step.psi[i] = h * step.v[i] + h * h * ((0.5 - beta) * step.a[i] + beta * a1)
+    step.drift[:] = 0.0
+    if is_multistep(step):
+        predict_multistep(s, step)
+    copy(step.lam, step.lam1)
+    step.size[0] = step.size[4] = 0.0
+    if step.count[LAST_ITERATIONS] > 4:
+        step.count[HAS_FACTOR] = 0
+    retract(s, step.q, step.psi, step.q1)
 
 
 @inner
-def turn_columns(s, W, T, rank):
+def turn_columns(s, W, step, rank):
     """Add Kt to S and turn UGT, rotations counted in increments of the rotation vector psi."""
-    B, Y = s.bodies, s.graph
-    for b in range(B.mass.size):
-        for e in range(Y.first[b], Y.first[b + 1]):
-            first = Y.x[e]
-            psi = vec(T.psi, B.v_at[Y.other[e]] + 3)
-            turn_rows(W.Kt, first, first + 6 + B.r[b], Y.y[e] + 3, psi)
-        if not Y.compact:
-            turn_rows(W.UGT, 0, rank, B.v_at[b] + 3, vec(T.psi, B.v_at[b] + 3))
-    for k in range(rank if Y.compact else 0):
+    bodies, graph = s.bodies, s.graph
+    for b in range(bodies.mass.size):
+        for e in range(graph.first[b], graph.first[b + 1]):
+            first = graph.x[e]
+            psi = vec(step.psi, bodies.v_at[graph.other[e]] + 3)
+            turn_rows(W.Kt, first, first + 6 + bodies.r[b], graph.y[e] + 3, psi)
+        if not graph.compact:
+            turn_rows(W.UGT, 0, rank, bodies.v_at[b] + 3, vec(step.psi, bodies.v_at[b] + 3))
+    for k in range(rank if graph.compact else 0):
         for p in range(4):
-            if Y.body[k, p] >= 0:
-                psi = vec(T.psi, B.v_at[Y.body[k, p]] + 3)
-                turn_rows(W.UGT, k, k + 1, Y.at[k, p] + 3, psi)
+            if graph.body[k, p] >= 0:
+                psi = vec(step.psi, bodies.v_at[graph.body[k, p]] + 3)
+                turn_rows(W.UGT, k, k + 1, graph.at[k, p] + 3, psi)
     for i in range(W.S.shape[0]):
         for j in range(W.S.shape[1]):
             W.S[i, j] += W.Kt[i, j]
@@ -168,194 +180,199 @@ def turn_rows(A, first, last, at, psi):
 
 
 @inner
-def factorise_step(s, W, T, rank):
+def factorise_step(s, W, step, rank):
     """Factorise beta h^2 (M beta' + C gamma' + K), bordered; `tangents` first."""
     for b in range(s.bodies.mass.size):
         block = own_block(s, b, W.S)
         for i in range(block.shape[0]):
-            W.weight[s.bodies.v_at[b] + i] = block[i, i] / (mass_factor(T) * T.size[3])
-    if rank < T.lam.size:
-        range_basis(W.G, rank, W.rest, W.U_lu)
+            W.weight[s.bodies.v_at[b] + i] = block[i, i] / (mass_factor(step) * step.size[3])
+    if rank < step.lam.size:
+        range_basis(W.G, rank, W.remainder, W.U_lu)
     border(W, rank)
-    turn_columns(s, W, T, rank)
-    load_columns(s, W, T.lam1, rank)
-    T.count[FACTORISATIONS] += 1
-    T.count[FRESH] = 1
+    turn_columns(s, W, step, rank)
+    load_columns(s, W, step.lam1, rank)
+    step.count[FACTORISATIONS] += 1
+    step.count[HAS_FACTOR] = 1
     return factorise_bordered(s, W, rank)
 
 
 @inner
-def mass_factor(T):
+def mass_factor(step):
     """Derivative of beta h^2 times the acceleration by the increment."""
-    return (1 - T.method[3]) / (1 - T.method[4])
+    return (1 - step.method[3]) / (1 - step.method[4])
 
 
 @inner
-def increment_norm(W, T):
+def increment_norm(W, step):
     """Mass-weighted length of the increment, relative to the size of the mechanism."""
     total = 0.0
     for i in range(W.delta.size):
         total += W.weight[i] * W.delta[i] ** 2
-    return math.sqrt(total) / T.size[1]
+    return math.sqrt(total) / step.size[1]
 
 
 @inner
-def increment_goal(W, T):
+def increment_goal(W, step):
     """Increment that no longer matters: a fraction of what the acceleration moves in a step.
 
     And the round-off of the positions.
     """
-    total, reach, h = 0.0, 0.0, T.method[0]
-    for i in range(T.vd1.size):
-        total += W.weight[i] * T.vd1[i] ** 2
-    for i in range(T.q1.size):
-        reach = max(reach, abs(T.q1[i]))
-    floor = ROUND_OFF * (1.0 + reach / T.size[1])
-    return max(T.size[2] * h * h * math.sqrt(total) / T.size[1], FINER * floor), floor
+    total, reach, h = 0.0, 0.0, step.method[0]
+    for i in range(step.vd1.size):
+        total += W.weight[i] * step.vd1[i] ** 2
+    for i in range(step.q1.size):
+        reach = max(reach, abs(step.q1[i]))
+    floor = ROUND_OFF * (1.0 + reach / step.size[1])
+    return max(
+        step.size[2] * h * h * math.sqrt(total) / step.size[1], INCREMENT_SHARE * floor
+    ), floor
 
 
 @inner
-def correct(s, W, T, rank):
+def correct(s, W, step, rank):
     """One Newton correction for the residual at hand; says how it went."""
-    h, beta, gamma, _, _ = T.method
-    n, bh2, lead = T.v.size, beta * h * h, beta * h / gamma
+    h, beta, gamma, _, _ = step.method
+    n, bh2, lead = step.v.size, beta * h * h, beta * h / gamma
     for i in range(n):
         W.rhs[i] = -bh2 * W.residual[i]
-    if T.count[BOTH] == 1:
+    if step.count[BOTH_LEVELS] == 1:
         velocity_gaps(s, W, W.part)
     gap = 0.0
-    for k in range(T.lam.size):
-        gap = max(gap, row_gap(s, W, T, k))
+    for k in range(step.lam.size):
+        gap = max(gap, row_gap(s, W, step, k))
         # a velocity moves gamma / (beta h) as fast as the increment that removes it
-        if T.count[BOTH] == 1:
+        if step.count[BOTH_LEVELS] == 1:
             W.part[k] *= -lead
         else:
             W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
     for i in range(n):
-        T.vd1[i] += mass_factor(T) / bh2 * W.delta[i]
-        T.v1[i] += gamma / (beta * h) * W.delta[i]
-        T.psi[i] += W.delta[i]
-    for k in range(T.lam.size):
-        T.lam1[k] += W.dlam[k] / bh2
-    size = increment_norm(W, T)
-    if T.count[BOTH] == 1:
+        step.vd1[i] += mass_factor(step) / bh2 * W.delta[i]
+        step.v1[i] += gamma / (beta * h) * W.delta[i]
+        step.psi[i] += W.delta[i]
+    for k in range(step.lam.size):
+        step.lam1[k] += W.dlam[k] / bh2
+    size = increment_norm(W, step)
+    if step.count[BOTH_LEVELS] == 1:
         close_gaps(s, W, n, rank, lead)
-        size += increment_norm(W, T)
+        size += increment_norm(W, step)
         for i in range(n):
-            T.psi[i] += W.delta[i]
-            T.drift[i] += W.delta[i]
-    if is_multistep(T):
-        follow_increment(s, T)
-    moved(s, T.q, T.psi, T.q1)
-    T.count[PASS] += 1
-    T.count[ITERATIONS] += 1
-    return verdict(W, T, size, gap)
+            step.psi[i] += W.delta[i]
+            step.drift[i] += W.delta[i]
+    if is_multistep(step):
+        follow_increment(s, step)
+    retract(s, step.q, step.psi, step.q1)
+    step.count[STEP_PASSES] += 1
+    step.count[ITERATIONS] += 1
+    return verdict(W, step, size, gap)
 
 
 @inner
-def row_gap(s, W, T, k):
+def row_gap(s, W, step, k):
     """Gap of constraint k as far as increments close it, in rad or lengths of the mechanism."""
     kind = s.rows.kind[k]
-    if T.count[BOTH] == 1 or kind == ROLL:
+    if step.count[BOTH_LEVELS] == 1 or kind == ROLL:
         return 0.0
     is_length = kind in (POINT, ALONG, DISTANCE, TOUCH)
-    return abs(W.value[k]) / (T.size[1] if is_length else 1.0)
+    return abs(W.value[k]) / (step.size[1] if is_length else 1.0)
 
 
 @inner
-def verdict(W, T, size, gap):
+def verdict(W, step, size, gap):
     """Judge the increment just applied by its size and by how fast increments and gaps shrink."""
-    last, wider = T.size[0], T.size[4]
-    T.size[0], T.size[4] = size, gap
+    last, wider = step.size[0], step.size[4]
+    step.size[0], step.size[4] = size, gap
     if not math.isfinite(size):
         return NOT_FINITE
-    goal, floor = increment_goal(W, T)
+    goal, floor = increment_goal(W, step)
     shrink = size / last if last > 0.0 else 1.0
-    closed = gap * min(1.0, gap / wider if wider > 0.0 else 1.0) <= GAP
+    closed = gap * min(1.0, gap / wider if wider > 0.0 else 1.0) <= JOINT_GAP_TOL
     closing = shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal
-    if size <= FINER * floor or (closing and closed):
+    if size <= INCREMENT_SHARE * floor or (closing and closed):
         return CONVERGED
-    if shrink > 0.5 and size < 100 * floor and T.count[PASS] > 3:
+    if shrink > 0.5 and size < 100 * floor and step.count[STEP_PASSES] > 3:
         return CONVERGED
-    if T.count[PASS] >= MAX_PASSES:
+    if step.count[STEP_PASSES] >= MAX_PASSES:
         return FAILED
     if last > 0.0 and shrink > 0.2:
-        T.count[FRESH] = 0
-    return GOES_ON
+        step.count[HAS_FACTOR] = 0
+    return UNFINISHED
 
 
 @inner
-def accept(s, W, T, rank):
+def accept(s, W, step, rank):
     """Make the trial state the present one, multipliers of least norm, and add up the work."""
-    h, _, _, alpha_m, alpha_f = T.method
-    if T.count[BOTH] == 1:
-        fit_velocities(s, W, T, rank)
-    if is_multistep(T):
-        keep_past(s, T)
-    for i in range(T.v.size):
-        rate = (1 - alpha_f) * T.vd1[i] + alpha_f * T.vd[i]
-        T.a[i] = T.v[i] if T.bdf[0] > 0.0 else (rate - alpha_m * T.a[i]) / (1 - alpha_m)
-    copy(T.q1, T.q)
-    copy(T.v1, T.v)
-    copy(T.vd1, T.vd)
-    copy(T.lam1, T.lam)
-    if rank < T.lam.size:
+    h, _, _, alpha_m, alpha_f = step.method
+    if step.count[BOTH_LEVELS] == 1:
+        fit_velocities(s, W, step, rank)
+    if is_multistep(step):
+        keep_past(s, step)
+    for i in range(step.v.size):
+        rate = (1 - alpha_f) * step.vd1[i] + alpha_f * step.vd[i]
+        step.a[i] = step.v[i] if step.bdf[0] > 0.0 else (rate - alpha_m * step.a[i]) / (1 - alpha_m)
+    copy(step.q1, step.q)
+    copy(step.v1, step.v)
+    copy(step.vd1, step.vd)
+    copy(step.lam1, step.lam)
+    if rank < step.lam.size:
         constraint_gradient(s, W)
-        least_multipliers(W, rank, T.lam)
+        least_multipliers(W, rank, step.lam)
     follow_coordinates(W)
-    drive_power(s, W, T.lam)  # the last correction moved the multipliers
+    drive_power(s, W, step.lam)  # the last correction moved the multipliers
     for k in range(3):
-        T.work[k] += 0.5 * h * (W.power[k] + T.lost[k])
-        T.lost[k] = W.power[k]
-    T.count[STEPS] += 1
-    T.count[LAST] = T.count[PASS]
-    T.count[PASS] = 0
+        step.work[k] += 0.5 * h * (W.power[k] + step.lost[k])
+        step.lost[k] = W.power[k]
+    step.count[STEPS] += 1
+    step.count[LAST_ITERATIONS] = step.count[STEP_PASSES]
+    step.count[STEP_PASSES] = 0
 
 
 @kernel
-def advance(s, W, T, rank, signals, every, out):
+def advance(s, W, step, rank, signals, every, out):
     """Take one step per row of ``signals``; save every so many. Says how the last one went.
 
     ``out`` holds arrays for q, v, vd, lam, work and base with one row per saved instant. When
-    forces of Python functions are to be asked for, T.count[ASKS] is 1: then it returns ASK with
-    everything evaluated, and goes on from there in the next call, which has the same arguments.
+    forces of Python functions are to be asked for, step.count[USES_LAWS] is 1: then it returns
+    NEEDS_LAWS with everything evaluated, and goes on from there in the next call, which has the
+    same arguments.
     """
-    h, beta, gamma, _, _ = T.method
-    c = (mass_factor(T), gamma * h, beta * h * h)
-    while T.count[STEPS] - T.count[BEGAN] < signals.shape[0]:
-        if T.count[ASKED] == 0:
-            if T.count[PASS] == 0:
-                copy(signals[T.count[STEPS] - T.count[BEGAN]], W.signal)
-                predict(s, T)
-            evaluate(s, W, T.q1, T.v1)
-            if T.count[ASKS] == 1:
-                T.count[ASKED] = 1
-                return ASK
-        T.count[ASKED] = 0
-        residual(s, W, T.q1, T.v1, T.vd1, T.lam1)
-        if T.count[FRESH] == 0:
-            tangents(s, W, T.v1, T.vd1, T.lam1, c)
+    h, beta, gamma, _, _ = step.method
+    c = (mass_factor(step), gamma * h, beta * h * h)
+    while step.count[STEPS] - step.count[STEPS_BEFORE] < signals.shape[0]:
+        if step.count[LAWS_ASKED] == 0:
+            if step.count[STEP_PASSES] == 0:
+                copy(signals[step.count[STEPS] - step.count[STEPS_BEFORE]], W.signal)
+                predict(s, step)
+            evaluate(s, W, step.q1, step.v1)
+            if step.count[USES_LAWS] == 1:
+                step.count[LAWS_ASKED] = 1
+                return NEEDS_LAWS
+        step.count[LAWS_ASKED] = 0
+        residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
+        if step.count[HAS_FACTOR] == 0:
+            tangents(s, W, step.v1, step.vd1, step.lam1, c)
             constraint_gradient(s, W)
-            if not factorise_step(s, W, T, rank):
+            if not factorise_step(s, W, step, rank):
                 return SINGULAR
-        answer = correct(s, W, T, rank)
+        answer = correct(s, W, step, rank)
         if answer > CONVERGED:
             return answer
         if answer == CONVERGED:
-            accept(s, W, T, rank)
-            if T.count[STEPS] % every == 0:
-                save(W, T, out, T.count[STEPS] // every - T.count[BEGAN] // every - 1)
+            accept(s, W, step, rank)
+            if step.count[STEPS] % every == 0:
+                save(
+                    W, step, out, step.count[STEPS] // every - step.count[STEPS_BEFORE] // every - 1
+                )
     return CONVERGED
 
 
 @inner
-def save(W, T, out, at):
+def save(W, step, out, at):
     """Copy the present state to a row of the output arrays."""
     Q, V, A, L, X, B = out
     copy(W.base, B[at])
-    copy(T.q, Q[at])
-    copy(T.v, V[at])
-    copy(T.vd, A[at])
-    copy(T.lam, L[at])
-    copy(T.work, X[at])
+    copy(step.q, Q[at])
+    copy(step.v, V[at])
+    copy(step.vd, A[at])
+    copy(step.lam, L[at])
+    copy(step.work, X[at])

@@ -22,7 +22,7 @@ PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
 # numbers that the law of a non-linear element may use as memory
-SPACE = 256
+LAW_MEMORY_SIZE = 256
 # velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
 # case that a block of a body or joint is singular for itself
 LARGEST_WHOLE = 2000
@@ -318,7 +318,7 @@ class Work(NamedTuple):
     arm: Array  # (l, 9) sum of positions and forces of spread loads, body frame
     pose: Array  # (e, 13 K) frames of non-linear elements: position, quaternion, velocities
     answer: Array  # (2 + 6 K + 72 K^2,) what the law of an element says
-    space: Array  # (SPACE,) for the laws to use as they like
+    space: Array  # (LAW_MEMORY_SIZE,) for the laws to use as they like
     signal: Array  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
     x: Array  # (c,) joint coordinates, angles followed over whole turns
     xd: Array  # (c,) their rates
@@ -349,7 +349,7 @@ class Work(NamedTuple):
     U_lu: Array  # (m, m) the range that is built into lu
     UG: Array  # (m, n) U_lu^T G, leading rows
     UGT: Array  # (m, n) the same in increments of the rotation vectors of a step
-    rest: Array  # (n, m)
+    remainder: Array  # (n, m)
     part: Array  # (m,)
     delta: Array  # (n,) increment
     dlam: Array  # (m,) increment of the multipliers
@@ -386,7 +386,7 @@ def workspace(system: System, n_signals: int) -> Work:
         "H": (k, 6, 6 + R),
         "pose": (e, 13 * K),
         "answer": (2 + 6 * K + 72 * K * K,),
-        "space": (SPACE,),
+        "space": (LAW_MEMORY_SIZE,),
         "arm": (system.spread.body.size, 9),
         "signal": (n_signals, 3),
         **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
@@ -394,7 +394,7 @@ def workspace(system: System, n_signals: int) -> Work:
         **dict.fromkeys(("x", "xd", "xc", "base"), (c,)),
         "xg": (c, 12),
         **dict.fromkeys(("G", "UG", "UGT"), (m, wide)),
-        "rest": (0, 0) if system.graph.compact else (n, m),
+        "remainder": (0, 0) if system.graph.compact else (n, m),
         "power": (3,),
         "driven": (1,),
         "motor": (system.actions.motor_at.size,),

@@ -7,15 +7,15 @@ import numpy as np
 from rom.arguments import typed
 from rom.mbs.arrays import ROLL
 from rom.mbs.solution import Solution
-from rom.mbs.validity import DEFORMATION, deformation, softening
+from rom.mbs.validity import MAX_DEFORMATION, deformation, softening
 from rom.model import Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
-ENERGY = 1e-2
-GAP = 1e-9
-QUATERNION = 1e-12
-MOMENTUM = 1e-5  # a method of second order conserves it to the error of its steps, not exactly
-CORRECTIONS = 8.0
+ENERGY_RTOL = 1e-2
+GAP_RTOL = 1e-9
+QUATERNION_ATOL = 1e-12
+MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
+MAX_MEAN_CORRECTIONS = 8.0
 
 
 @typed
@@ -50,11 +50,11 @@ def _energy(solution: Solution) -> list[Row]:
     parts = (e.kinetic, e.strain, e.potential, e.drives, e.forces, e.damping)
     turnover = max(np.ptp(part) for part in parts)
     scale = max(turnover, np.abs(e.kinetic).max(), np.abs(e.strain).max(), 1e-300)
-    rows = [_row("energy balance / energy", np.abs(e.balance).max() / scale, ENERGY)]
+    rows = [_row("energy balance / energy", np.abs(e.balance).max() / scale, ENERGY_RTOL)]
     if solution.t.size > 3:
         t = solution.t - solution.t.mean()
         slope = (t @ e.balance) / (t @ t) * np.ptp(solution.t)
-        rows.append(_row("drift of energy / energy", abs(slope) / scale, ENERGY))
+        rows.append(_row("drift of energy / energy", abs(slope) / scale, ENERGY_RTOL))
     return rows
 
 
@@ -77,7 +77,9 @@ def _momentum(solution: Solution) -> list[Row]:
         ("linear", "angular"), solution.momentum, (1.0, packed.length), strict=True
     ):
         size = max(np.abs(p).max(), moving * arm)
-        rows.append(_row(f"change of {name} momentum", np.abs(p - p[0]).max() / size, MOMENTUM))
+        rows.append(
+            _row(f"change of {name} momentum", np.abs(p - p[0]).max() / size, MOMENTUM_RTOL)
+        )
     return rows
 
 
@@ -87,11 +89,11 @@ def _joints(solution: Solution) -> list[Row]:
     packed = solution.packed
     rolling = packed.system.rows.kind == ROLL
     gap = np.abs(solution.gap / packed.row_scale)
-    rows = [_row("largest gap in a joint / size", gap[:, ~rolling].max(initial=0.0), GAP)]
+    rows = [_row("largest gap in a joint / size", gap[:, ~rolling].max(initial=0.0), GAP_RTOL)]
     if rolling.any():
         speed = max(np.sqrt(2 * solution.energy.kinetic.max() / packed.mass), 1e-300)
         slip = np.abs(solution.gap[:, rolling]).max() / speed
-        rows.append(_row("largest slip of what rolls / speed", slip, GAP))
+        rows.append(_row("largest slip of what rolls / speed", slip, GAP_RTOL))
     return rows
 
 
@@ -100,16 +102,16 @@ def _numbers(solution: Solution) -> list[Row]:
         np.abs(np.linalg.norm(solution.orientation(name), axis=1) - 1).max()
         for name in solution.packed.names
     ]
-    rows = [_row("quaternion length - 1", max(norms), QUATERNION)]
+    rows = [_row("quaternion length - 1", max(norms), QUATERNION_ATOL)]
     statistics: dict[str, Any] = solution.statistics
     if "iterations" in statistics:
         mean = statistics["iterations"] / max(statistics["steps"], 1)
-        rows.append(_row("Newton corrections per step", mean, CORRECTIONS))
+        rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
     for name, part in solution.mechanism.parts.items():
         if not part.r:
             continue
         bent, share = deformation(solution, name), softening(solution, name)
-        rows.append(_row(f"largest deformation of {name} / size", bent, DEFORMATION))
+        rows.append(_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION))
         if share:
             rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
     return rows

@@ -31,19 +31,19 @@ def border(W, rank):
 @inner
 def set_scaling(s, W, rank):
     """Scales with which masses and gradients have size one."""
-    B, Y, d, n = s.bodies, s.graph, W.scaling, W.residual.size
-    for b in range(B.mass.size):
+    bodies, graph, d, n = s.bodies, s.graph, W.scaling, W.residual.size
+    for b in range(bodies.mass.size):
         block = own_block(s, b, W.S)
-        for i in range(6 + B.r[b]):
-            d[B.v_at[b] + i] = 1.0 / math.sqrt(block[i, i]) if block[i, i] > 0.0 else 1.0
+        for i in range(6 + bodies.r[b]):
+            d[bodies.v_at[b] + i] = 1.0 / math.sqrt(block[i, i]) if block[i, i] > 0.0 else 1.0
     for k in range(rank):
         total = 0.0
-        for j in range(0 if Y.compact else n):
+        for j in range(0 if graph.compact else n):
             total += (W.UG[k, j] * d[j]) ** 2
-        for p in range(4 if Y.compact else 0):
-            b = Y.body[k, p]
-            for q in range(6 + B.r[b] if b >= 0 else 0):
-                total += (W.UG[k, Y.at[k, p] + q] * d[B.v_at[b] + q]) ** 2
+        for p in range(4 if graph.compact else 0):
+            b = graph.body[k, p]
+            for q in range(6 + bodies.r[b] if b >= 0 else 0):
+                total += (W.UG[k, graph.at[k, p] + q] * d[bodies.v_at[b] + q]) ** 2
         d[n + k] = 1.0 / math.sqrt(total) if total > 0.0 else 1.0
 
 
@@ -65,21 +65,21 @@ def fill(W, rank):
 @inner
 def fill_from_blocks(s, W):
     """The same from blocks."""
-    B, Y, n, d = s.bodies, s.graph, W.residual.size, W.scaling
+    bodies, graph, n, d = s.bodies, s.graph, W.residual.size, W.scaling
     W.lu[:] = 0.0
-    for b in range(B.mass.size):
-        for e in range(Y.first[b], Y.first[b + 1]):
-            t, u = B.v_at[b], B.v_at[Y.other[e]]
-            for i in range(6 + B.r[b]):
-                for j in range(6 + B.r[Y.other[e]]):
-                    W.lu[t + i, u + j] = W.S[Y.x[e] + i, Y.y[e] + j] * d[t + i] * d[u + j]
+    for b in range(bodies.mass.size):
+        for e in range(graph.first[b], graph.first[b + 1]):
+            t, u = bodies.v_at[b], bodies.v_at[graph.other[e]]
+            for i in range(6 + bodies.r[b]):
+                for j in range(6 + bodies.r[graph.other[e]]):
+                    W.lu[t + i, u + j] = W.S[graph.x[e] + i, graph.y[e] + j] * d[t + i] * d[u + j]
     for k in range(s.rows.kind.size):
         for p in range(4):
-            b = Y.body[k, p]
-            for q in range(6 + B.r[b] if b >= 0 else 0):
-                j = B.v_at[b] + q
-                W.lu[n + k, j] = W.UGT[k, Y.at[k, p] + q] * d[n + k] * d[j]
-                W.lu[j, n + k] = W.UG[k, Y.at[k, p] + q] * d[n + k] * d[j]
+            b = graph.body[k, p]
+            for q in range(6 + bodies.r[b] if b >= 0 else 0):
+                j = bodies.v_at[b] + q
+                W.lu[n + k, j] = W.UGT[k, graph.at[k, p] + q] * d[n + k] * d[j]
+                W.lu[j, n + k] = W.UG[k, graph.at[k, p] + q] * d[n + k] * d[j]
 
 
 @inner
@@ -130,13 +130,13 @@ def solve_bordered(s, W, rank, x, lam):
 @kernel
 def gradient_times(s, W, x, absolute, out):
     """Set out (m,) to G x, or to the sums of absolute values, G as last evaluated."""
-    Y = s.graph
+    graph = s.graph
     for k in range(s.rows.kind.size):
         out[k] = 0.0
         for p in range(4):
-            b = Y.body[k, p]
+            b = graph.body[k, p]
             for q in range(6 + s.bodies.r[b] if b >= 0 else 0):
-                term = W.G[k, Y.at[k, p] + q] * x[s.bodies.v_at[b] + q]
+                term = W.G[k, graph.at[k, p] + q] * x[s.bodies.v_at[b] + q]
                 out[k] += abs(term) if absolute else term
 
 

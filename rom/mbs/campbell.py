@@ -16,7 +16,7 @@ from rom.mbs.linearize import Linearization, linearize
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
-NEARNESS = 0.1  # weight of the relative change of frequency beside that of the shape
+FREQUENCY_WEIGHT = 0.1  # weight of the relative change of frequency beside that of the shape
 
 
 @dataclass(frozen=True)
@@ -127,5 +127,5 @@ def _follow(one: Linearization, two: Linearization, order: Array) -> tuple[Array
     mac = np.abs(a.conj().T @ b) ** 2 / np.maximum(sizes, 1e-300) ** 2
     w, u = one.eigenvalues.imag[order][:, None], two.eigenvalues.imag
     change = np.abs(w - u) / np.maximum(w + u, 1e-300)
-    row, column = linear_sum_assignment(mac - NEARNESS * change, maximize=True)
+    row, column = linear_sum_assignment(mac - FREQUENCY_WEIGHT * change, maximize=True)
     return column, mac[row, column]

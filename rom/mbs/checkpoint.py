@@ -5,15 +5,15 @@ from typing import Any
 
 from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError
-from rom.io.archive import LIMIT, Kind, read_archive, write_archive
+from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive
 from rom.mbs.state import Memory, State
 from rom.model import Array
 
-SCHEMA, VERSION = "rom-state", (1, 0)
+SCHEMA_NAME, VERSION = "rom-state", (1, 0)
 NEEDED = ("q", "v", "a", "lam")
-KIND = Kind({SCHEMA: VERSION}, "state file", NEEDED)
+KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED)
 OPTIONAL = ("algorithmic", "base")
-MEMORY = "memory/"
+MEMORY_PREFIX = "memory/"
 
 
 @typed
@@ -39,19 +39,19 @@ def packed_state(state: State) -> tuple[dict[str, Any], dict[str, Array]]:
     arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED}
     given = {name: getattr(state, name) for name in OPTIONAL}
     arrays |= {name: A for name, A in given.items() if A is not None}
-    manifest: dict[str, Any] = {"schema": SCHEMA, "version": list(VERSION)}
+    manifest: dict[str, Any] = {"schema": SCHEMA_NAME, "version": list(VERSION)}
     manifest["t"] = float(state.t).hex()
     manifest["rank"] = int(state.rank)
     if state.memory is not None:
         m = state.memory
-        arrays |= {MEMORY + name: A for name, A in m.arrays.items()}
+        arrays |= {MEMORY_PREFIX + name: A for name, A in m.arrays.items()}
         steps = {"h": float(m.h).hex(), "origin": float(m.origin).hex(), "taken": m.taken}
         manifest["memory"] = {"method": m.method, **steps}
     return manifest, dict(sorted(arrays.items()))
 
 
 @typed
-def load_state(path: str | Path, *, limit: int = LIMIT) -> State:
+def load_state(path: str | Path, *, limit: int = MAX_BYTES) -> State:
     """Read a state to go on from: ``rom.simulate(mechanism, state=..., ...)``.
 
     Args:
@@ -87,5 +87,7 @@ def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory
     if manifest is None:
         return None
     h, origin = (float.fromhex(manifest[name]) for name in ("h", "origin"))
-    own = {k.removeprefix(MEMORY): A for k, A in arrays.items() if k.startswith(MEMORY)}
+    own = {
+        k.removeprefix(MEMORY_PREFIX): A for k, A in arrays.items() if k.startswith(MEMORY_PREFIX)
+    }
     return Memory(str(manifest["method"]), h, origin, int(manifest["taken"]), own)

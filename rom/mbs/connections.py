@@ -148,8 +148,9 @@ class Connections:
         """Couple two joints: coordinate of the second = ``ratio`` times that of the first.
 
         Between two angles a pair of gears (negative ratio for outer teeth, seen along parallel
-        axes), a chain or a belt; between an angle and a way a rack [m/rad]. A carrier that moves
-        is the first body of both joints. Angles count over whole turns from the start.
+        axes), a chain or a belt; between an angle and a displacement a rack [m/rad]. A
+        carrier that moves is the first body of both joints. Angles count over whole turns from the
+        start.
 
         Args:
             name: name of the coupling; ``sol.reaction`` gives its load on the second body of
@@ -157,7 +158,7 @@ class Connections:
             joint1: driving joint.
             joint2: driven joint.
             ratio: d(coordinate 2) / d(coordinate 1).
-            coordinate1: "angle" or "way"; None for the only or the first one.
+            coordinate1: "angle" or "displacement"; None for the only or the first one.
             coordinate2: likewise of ``joint2``.
 
         Raises:
@@ -230,11 +231,14 @@ class Connections:
         return self.joints[joint]
 
     def _coordinate(self, joint: str, which: str | None, what: str) -> Row:
-        """The row that measures the coordinate "angle" or "way" of a joint; None for the first."""
+        """The row of the coordinate "angle" or "displacement" of a joint; None for the first."""
         found = self._joint_with_axis(joint, what)
-        rows = {None: found.coordinate, "angle": found.turn, "way": found.way}
+        rows = {None: found.coordinate, "angle": found.turn, "displacement": found.displacement}
+        rows["way"] = found.displacement  # as it was called before
         if which not in rows:
-            raise ConfigError(f"coordinate {which!r} of {joint!r}: it is 'angle' or 'way'.")
+            raise ConfigError(
+                f"coordinate {which!r} of {joint!r}: it is 'angle' or 'displacement'."
+            )
         row = rows[which]
         if row is None:
             raise ConfigError(f"joint {joint!r} is {found.kind}: it has no coordinate {which!r}.")

@@ -51,24 +51,24 @@ def angle_state(a, c, b, Oi, Oj, ci, cj):
 
 
 @inner
-def row_states(R, W):
+def row_states(rows, W):
     """Residual, gradient and convective term of all constraint rows."""
     zero = (0.0, 0.0, 0.0)
-    for k in range(R.kind.size):
-        i, j, kind = R.i[k], R.j[k], R.kind[k]
+    for k in range(rows.kind.size):
+        i, j, kind = rows.i[k], rows.j[k], rows.kind[k]
         if kind == COUPLING:
-            coupling_row(R, k, W)
+            coupling_row(rows, k, W)
             continue
         if kind in (TOUCH, ROLL):
-            rolling_row(R, k, W)
+            rolling_row(rows, k, W)
             continue
         Oi, Oj, qi, qj = row(W.V, i, 3), row(W.V, j, 3), row(W.conv, i, 3), row(W.conv, j, 3)
         gap = sub(row(W.P, j, 0), row(W.P, i, 0))
         pull = sub(row(W.conv, j, 0), row(W.conv, i, 0))
-        target = R.offset[k]
-        if R.signal[k] >= 0:
-            target += W.signal[R.signal[k], 0]
-        a = row(R.a, k, 0)
+        target = rows.offset[k]
+        if rows.signal[k] >= 0:
+            target += W.signal[rows.signal[k], 0]
+        a = row(rows.a, k, 0)
         if kind == POINT:
             W.value[k], W.gamma[k] = dot(a, gap) - target, dot(a, pull)
             set_gradient(W.g, k, scale(-1.0, a), zero, a, zero)
@@ -88,14 +88,14 @@ def row_states(R, W):
             W.gamma[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
             set_gradient(W.g, k, scale(-1.0, a), cross(a, gap), a, zero)
             continue
-        b = turn(W.E, j, row(R.b, k, 0))
+        b = turn(W.E, j, row(rows.b, k, 0))
         if kind == NORMAL:
             axb = cross(a, b)
             W.value[k] = dot(a, b) - target
             W.gamma[k] = normal_rates(a, b, Oi, Oj, qi, qj)[1]
             set_gradient(W.g, k, zero, axb, zero, scale(-1.0, axb))
         else:
-            c = turn(W.E, i, row(R.c, k, 0))
+            c = turn(W.E, i, row(rows.c, k, 0))
             angle, _, gamma, axis = angle_state(a, c, b, Oi, Oj, qi, qj)
             W.value[k], W.gamma[k] = wrapped(angle - target), gamma
             set_gradient(W.g, k, zero, scale(-1.0, axis), zero, axis)
@@ -111,11 +111,11 @@ def distance_state(gap, slide, pull):
 
 
 @inner
-def coupling_row(R, k, W):
+def coupling_row(rows, k, W):
     """Row k as the weighted sum of two joint coordinates, which are evaluated first."""
-    W.value[k], W.gamma[k] = -R.offset[k], 0.0
+    W.value[k], W.gamma[k] = -rows.offset[k], 0.0
     for side in range(2):
-        at, factor = R.at[k, side], R.factor[k, side]
+        at, factor = rows.at[k, side], rows.factor[k, side]
         W.value[k] += factor * W.x[at]
         W.gamma[k] += factor * W.xc[at]
         for p in range(12):
@@ -123,29 +123,29 @@ def coupling_row(R, k, W):
 
 
 @inner
-def column_of(Y, k, b):
+def column_of(graph, k, b):
     """First column in G of body b in constraint row k, which moves it."""
     for p in range(3):
-        if Y.body[k, p] == b:
-            return Y.at[k, p]
-    return Y.at[k, 3]
+        if graph.body[k, p] == b:
+            return graph.at[k, p]
+    return graph.at[k, 3]
 
 
 @inner
-def block_of(Y, b, c):
+def block_of(graph, b, c):
     """Number of the block of bodies b and c.
 
     Raises:
         IndexError: if the graph does not know that something couples them.
     """
-    low, high = Y.first[b], Y.first[b + 1]
+    low, high = graph.first[b], graph.first[b + 1]
     while low < high:
         middle = (low + high) // 2
-        if Y.other[middle] < c:
+        if graph.other[middle] < c:
             low = middle + 1
         else:
             high = middle
-    if low == Y.first[b + 1] or Y.other[low] != c:
+    if low == graph.first[b + 1] or graph.other[low] != c:
         raise IndexError("a force couples two bodies that share no joint and no pair of markers")
     return low
 
@@ -153,34 +153,34 @@ def block_of(Y, b, c):
 @inner
 def constraint_gradient(s, W):
     """Assemble G (m, n), the gradient of all rows in the velocities."""
-    B, K, R, G, Y = s.bodies, s.markers, s.rows, W.G, s.graph
-    for k in range(R.kind.size):
+    bodies, markers, rows, G, graph = s.bodies, s.markers, s.rows, W.G, s.graph
+    for k in range(rows.kind.size):
         for t in range(G.shape[1]):
             G[k, t] = 0.0
-        for side, m in enumerate((R.i[k], R.j[k], R.k[k], R.l[k])):
-            b = K.body[m] if m >= 0 else -1
+        for side, m in enumerate((rows.i[k], rows.j[k], rows.k[k], rows.l[k])):
+            b = markers.body[m] if m >= 0 else -1
             if b < 0:
                 continue
-            t, H = column_of(Y, k, b), W.H[m]
+            t, H = column_of(graph, k, b), W.H[m]
             for p in range(6):
                 w = W.g[k, 6 * side + p]
                 if w != 0.0:
-                    for q in range(6 + B.r[b]):
+                    for q in range(6 + bodies.r[b]):
                         G[k, t + q] += w * H[p, q]
 
 
 @inner
 def constraint_wrench(s, W, lam):
     """Add the constraint forces -lam g to the wrenches on the markers."""
-    R = s.rows
-    for k in range(R.kind.size):
+    rows = s.rows
+    for k in range(rows.kind.size):
         for p in range(6):
-            W.wrench[R.i[k], p] -= lam[k] * W.g[k, p]
-            W.wrench[R.j[k], p] -= lam[k] * W.g[k, 6 + p]
-        if R.k[k] >= 0:
+            W.wrench[rows.i[k], p] -= lam[k] * W.g[k, p]
+            W.wrench[rows.j[k], p] -= lam[k] * W.g[k, 6 + p]
+        if rows.k[k] >= 0:
             for p in range(6):
-                W.wrench[R.k[k], p] -= lam[k] * W.g[k, 12 + p]
-                W.wrench[R.l[k], p] -= lam[k] * W.g[k, 18 + p]
+                W.wrench[rows.k[k], p] -= lam[k] * W.g[k, 12 + p]
+                W.wrench[rows.l[k], p] -= lam[k] * W.g[k, 18 + p]
 
 
 @inner
@@ -234,12 +234,12 @@ def row_stiffness(kind, a, b, gap, axis, c, Q):
 @inner
 def pair_stiffness(s, W, i, j, S):
     """Add H^T Q H of a pair of markers to S."""
-    B, K, Q, QH = s.bodies, s.markers, W.Q, W.QH
+    bodies, markers, Q, QH = s.bodies, s.markers, W.Q, W.QH
     width = W.H.shape[2]
     for side in range(2):
         m = i if side == 0 else j
-        b = K.body[m]
-        n = 6 + B.r[b] if b >= 0 else 0
+        b = markers.body[m]
+        n = 6 + bodies.r[b] if b >= 0 else 0
         for p in range(12):
             for q in range(n):
                 total = 0.0
@@ -249,13 +249,13 @@ def pair_stiffness(s, W, i, j, S):
     for block in range(4):
         row, column = block // 2, block % 2
         mr, mc = (i if row == 0 else j), (i if column == 0 else j)
-        br, bc = K.body[mr], K.body[mc]
+        br, bc = markers.body[mr], markers.body[mc]
         if br < 0 or bc < 0:
             continue
         e = block_of(s.graph, br, bc)
         first, left = s.graph.x[e], s.graph.y[e]
-        for p in range(6 + B.r[br]):
-            for q in range(6 + B.r[bc]):
+        for p in range(6 + bodies.r[br]):
+            for q in range(6 + bodies.r[bc]):
                 total = 0.0
                 for x in range(6):
                     total += W.H[mr, x, p] * QH[6 * row + x, width * column + q]
@@ -265,19 +265,19 @@ def pair_stiffness(s, W, i, j, S):
 @inner
 def constraint_stiffness(s, W, lam, c, S):
     """Add c times the derivative of G^T lam, with the marker Jacobians constant, to S."""
-    R = s.rows
-    for joint in range(R.joint_i.size):
+    rows = s.rows
+    for joint in range(rows.joint_i.size):
         W.Q[:] = 0.0
         found = False
         for at in range(s.graph.joint_first[joint], s.graph.joint_first[joint + 1]):
             k = s.graph.joint_rows[at]
-            if R.kind[k] != POINT and lam[k] != 0.0:
-                i, j = R.i[k], R.j[k]
-                a, b = turn(W.E, i, row(R.a, k, 0)), turn(W.E, j, row(R.b, k, 0))
+            if rows.kind[k] != POINT and lam[k] != 0.0:
+                i, j = rows.i[k], rows.j[k]
+                a, b = turn(W.E, i, row(rows.a, k, 0)), turn(W.E, j, row(rows.b, k, 0))
                 gap = sub(row(W.P, j, 0), row(W.P, i, 0))
-                row_stiffness(R.kind[k], a, b, gap, row(W.g, k, 9), c * lam[k], W.Q)
-                if R.kind[k] in (TOUCH, ROLL):
-                    rolling_stiffness(R, k, W, c * lam[k])
+                row_stiffness(rows.kind[k], a, b, gap, row(W.g, k, 9), c * lam[k], W.Q)
+                if rows.kind[k] in (TOUCH, ROLL):
+                    rolling_stiffness(rows, k, W, c * lam[k])
                 found = True
         if found:
-            pair_stiffness(s, W, R.joint_i[joint], R.joint_j[joint], S)
+            pair_stiffness(s, W, rows.joint_i[joint], rows.joint_j[joint], S)

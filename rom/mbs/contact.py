@@ -15,7 +15,7 @@ from rom.mbs.arrays import BORE, DISC, PLANE, SPHERE
 from rom.mbs.compiled import inner
 from rom.mbs.constraints import pair_stiffness
 
-STEP = 1e-30
+COMPLEX_STEP = 1e-30
 
 
 @inner
@@ -91,9 +91,9 @@ def contact_wrenches(s, W):
 def stepped(x, dx):
     """The vector x with an imaginary step along dx."""
     return (
-        complex(x[0], STEP * dx[0]),
-        complex(x[1], STEP * dx[1]),
-        complex(x[2], STEP * dx[2]),
+        complex(x[0], COMPLEX_STEP * dx[0]),
+        complex(x[1], COMPLEX_STEP * dx[1]),
+        complex(x[2], COMPLEX_STEP * dx[2]),
     )
 
 
@@ -113,10 +113,10 @@ def contact_column(s, W, k, p, by_position, c):
     force, _, _, _ = contact_force(C.law[k], n, depth, down, motion)
     at_j, at_i = cross(down, force), cross(add(gap, down), force)
     for q in range(3):
-        W.Q[q, p] -= c / STEP * force[q].imag
-        W.Q[3 + q, p] -= c / STEP * at_i[q].imag
-        W.Q[6 + q, p] += c / STEP * force[q].imag
-        W.Q[9 + q, p] += c / STEP * at_j[q].imag
+        W.Q[q, p] -= c / COMPLEX_STEP * force[q].imag
+        W.Q[3 + q, p] -= c / COMPLEX_STEP * at_i[q].imag
+        W.Q[6 + q, p] += c / COMPLEX_STEP * force[q].imag
+        W.Q[9 + q, p] += c / COMPLEX_STEP * at_j[q].imag
 
 
 @inner

@@ -49,13 +49,13 @@ def coordinate_stiffness(s, W, at, c):
 @inner
 def coupling_stiffness(s, W, lam, c, S):
     """Add c times the derivative of G^T lam to S for the couplings."""
-    R, C = s.rows, s.coordinates
-    for k in range(R.kind.size):
-        if R.kind[k] == COUPLING:
+    rows, C = s.rows, s.coordinates
+    for k in range(rows.kind.size):
+        if rows.kind[k] == COUPLING:
             for side in range(2):
-                at = R.at[k, side]
+                at = rows.at[k, side]
                 W.Q[:] = 0.0
-                coordinate_stiffness(s, W, at, c * lam[k] * R.factor[k, side])
+                coordinate_stiffness(s, W, at, c * lam[k] * rows.factor[k, side])
                 pair_stiffness(s, W, C.i[at], C.j[at], S)
 
 

@@ -42,11 +42,11 @@ def slope(s: float, h: float, left: tuple[Array, Array], right: tuple[Array, Arr
 
 def between(system: System, left: Point, right: Point, t: float) -> tuple[Array, Array, Array]:
     """Coordinates, velocities and accelerations at a time between two instants."""
-    B: Any = system.bodies
+    bodies: Any = system.bodies
     h = right.t - left.t
     s = (t - left.t) / h
     q = left.q.copy()
-    for at, vt, r in zip(B.q_at, B.v_at, B.r, strict=True):
+    for at, vt, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
         for x, y, n in ((at, vt, 3), (at + 7, vt + 6, r)):
             here, there = slice(x, x + n), slice(y, y + n)
             q[here] = cubic(s, h, (left.q[here], left.v[there]), (right.q[here], right.v[there]))

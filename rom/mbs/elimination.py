@@ -13,29 +13,29 @@ from rom.mbs.compiled import inner
 
 # pivot of a node, relative to its largest one and to unit masses and gradients, that may be
 # nothing but round-off
-WEAK = 1e-13
+PIVOT_RTOL = 1e-13
 
 
 @inner
 def fill_blocks(s, W):
     """Write [S, UG^T; UGT, 0], scaled by W.scaling, into W.factor in the order of the plan."""
-    B, Y, P, F, d = s.bodies, s.graph, s.graph.plan, W.factor, W.scaling
+    bodies, graph, P, F, d = s.bodies, s.graph, s.graph.plan, W.factor, W.scaling
     n = W.residual.size
     F[:] = 0.0
-    for b in range(B.mass.size):
-        for e in range(Y.first[b], Y.first[b + 1]):
-            t, u = B.v_at[b], B.v_at[Y.other[e]]
-            for i in range(6 + B.r[b]):
+    for b in range(bodies.mass.size):
+        for e in range(graph.first[b], graph.first[b + 1]):
+            t, u = bodies.v_at[b], bodies.v_at[graph.other[e]]
+            for i in range(6 + bodies.r[b]):
                 to = P.block_to[e] + i * P.block_stride[e]
-                for j in range(6 + B.r[Y.other[e]]):
-                    F[to + j] = W.S[Y.x[e] + i, Y.y[e] + j] * d[t + i] * d[u + j]
+                for j in range(6 + bodies.r[graph.other[e]]):
+                    F[to + j] = W.S[graph.x[e] + i, graph.y[e] + j] * d[t + i] * d[u + j]
     for k in range(s.rows.kind.size):
         for p in range(4):
-            b = Y.body[k, p]
-            for q in range(6 + B.r[b] if b >= 0 else 0):
-                c = d[n + k] * d[B.v_at[b] + q]
-                F[P.row_to[k, p] + q] = W.UGT[k, Y.at[k, p] + q] * c
-                F[P.row_back[k, p] + q * P.row_stride[k, p]] = W.UG[k, Y.at[k, p] + q] * c
+            b = graph.body[k, p]
+            for q in range(6 + bodies.r[b] if b >= 0 else 0):
+                c = d[n + k] * d[bodies.v_at[b] + q]
+                F[P.row_to[k, p] + q] = W.UGT[k, graph.at[k, p] + q] * c
+                F[P.row_back[k, p] + q * P.row_stride[k, p]] = W.UG[k, graph.at[k, p] + q] * c
 
 
 @inner
@@ -61,7 +61,7 @@ def weak(A):
     least, most = abs(A[0, 0]), abs(A[0, 0])
     for i in range(A.shape[0]):
         least, most = min(least, abs(A[i, i])), max(most, abs(A[i, i]))
-    return not least > WEAK * max(most, 1.0)
+    return not least > PIVOT_RTOL * max(most, 1.0)
 
 
 @inner

@@ -20,8 +20,9 @@ from rom.model import Array
 
 MAX_PASSES = 60
 MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
-SMALLEST = 1 / 64  # of a load step, before the search is given up
-GOAL, ROUND_OFF = 1e-12, 1e-7  # of the last correction; above, where corrections stop to shrink
+MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
+CORRECTION_TOL = 1e-12  # of the last correction
+STALLED_TOL = 1e-7  # below it, corrections that no longer shrink are round-off
 
 
 @typed
@@ -74,7 +75,7 @@ def equilibrium(
             found = search.settle(found, load if load < 1.0 - 1e-9 else 1.0)
         except SolverError:
             width /= 2
-            if width < SMALLEST / steps:
+            if width < MIN_LOAD_STEP / steps:
                 raise
             continue
         done = load if load < 1.0 - 1e-9 else 1.0
@@ -117,9 +118,9 @@ class _Search:
 
     def steady(self, state: State) -> State:
         """The state with the velocities and accelerations of the steady rotation."""
-        B, v, a = self.now.packed.system.bodies, 0 * state.v, 0 * state.a
+        bodies, v, a = self.now.packed.system.bodies, 0 * state.v, 0 * state.a
         if self.spin.any():
-            for q_at, at in zip(B.q_at, B.v_at, strict=True):
+            for q_at, at in zip(bodies.q_at, bodies.v_at, strict=True):
                 v[at : at + 3] = np.cross(self.spin, state.q[q_at : q_at + 3] - self.about)
                 a[at : at + 3] = np.cross(self.spin, v[at : at + 3])
                 v[at + 3 : at + 6] = rotation.matrix(state.q[q_at + 3 : q_at + 7]).T @ self.spin
@@ -143,7 +144,7 @@ class _Search:
             now.W.base[:] = now.W.x
             state = self.steady(replace(state, q=q, lam=state.lam + factor * dlam))
             state = replace(state, base=now.W.base.copy())
-            if size < GOAL or (size < ROUND_OFF and size > 0.5 * last):
+            if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
                 return state
             last = size
         raise _failure(now, state, load)
@@ -178,22 +179,22 @@ class _Search:
 
 def _described(packed: Packed, motion: Array) -> str:
     """The body that moves most, and how."""
-    B = packed.system.bodies
+    bodies = packed.system.bodies
     sizes = []
-    for b, at in enumerate(B.v_at):
+    for b, at in enumerate(bodies.v_at):
         shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
-        sizes.append((shift @ shift + packed.length**2 * turn @ turn) * B.mass[b])
+        sizes.append((shift @ shift + packed.length**2 * turn @ turn) * bodies.mass[b])
     b = int(np.argmax(sizes))
-    at = B.v_at[b]
+    at = bodies.v_at[b]
     if not sizes[b] > 0.0:  # frames on interfaces that are held stay where they are
         bent = [np.abs(motion[at + 6 : at + 6 + r]).max(initial=0.0)
-                for at, r in zip(B.v_at, B.r, strict=True)]  # fmt: skip
+                for at, r in zip(bodies.v_at, bodies.r, strict=True)]  # fmt: skip
         return f"body {packed.names[int(np.argmax(bent))]!r} deforms"
     shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
     turns = np.linalg.norm(turn) * packed.length > 1e-6 * np.linalg.norm(shift)
-    way = turn if turns else shift
-    way = way / way[np.argmax(np.abs(way))]
-    axis = ", ".join(f"{x:.3g}" for x in np.round(way, 6) + 0.0)
+    direction = turn if turns else shift
+    direction = direction / direction[np.argmax(np.abs(direction))]
+    axis = ", ".join(f"{x:.3g}" for x in np.round(direction, 6) + 0.0)
     verb = "turns about its own axis" if turns else "slides along"
     return f"body {packed.names[b]!r} {verb} ({axis})"
 

@@ -16,10 +16,8 @@ from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
 from rom.model import Array
 
-# a zero so soon after the start is where the run began, not an event [s]
-START = 1e-10
-# of the root, relative to the step
-ROOT = 1e-14
+START_ATOL = 1e-10  # time after the start [s] within which a zero is the start, not an event
+ROOT_RTOL = 1e-14  # of the step
 
 Motion = Callable[[float], tuple[Array, Array]]
 
@@ -191,7 +189,7 @@ class Watch:
                 continue
             crossed.append((self._root(name, t0, t1, exact) if after else t1, name))
         for t, name in sorted(crossed):
-            if t - self.start > START:
+            if t - self.start > START_ATOL:
                 self.found[name].append((t, *exact(t)))
                 if self.events[name].terminal:
                     self.stop = name, t
@@ -208,7 +206,7 @@ class Watch:
         first, last = value(0.0), value(1.0)
         if np.sign(first) == np.sign(last):  # one of them is zero but for round-off
             return t0 if abs(first) < abs(last) else t1
-        return t0 + (t1 - t0) * float(brentq(value, 0.0, 1.0, xtol=ROOT))
+        return t0 + (t1 - t0) * float(brentq(value, 0.0, 1.0, xtol=ROOT_RTOL))
 
     @property
     def occurrences(self) -> dict[str, Occurrences]:

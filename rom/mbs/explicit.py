@@ -12,7 +12,7 @@ from scipy.integrate import DOP853
 from rom.errors import SolverError
 from rom.mbs.arrays import Work
 from rom.mbs.motion import evaluate, rates
-from rom.mbs.record import OF, Record, standing_at
+from rom.mbs.record import RUN_KEY, Record, standing_at
 from rom.mbs.signals import sampled
 from rom.mbs.state import Memory, State
 from rom.mbs.user import apply_laws, laws
@@ -110,7 +110,7 @@ def _memory(record: Record, equations: Equations, solver: DOP853, due: int) -> M
         "counts": np.array([solver.nfev, steps, due]),
     }
     y = _unit(record, solver.y.copy())
-    arrays[OF] = np.concatenate([[solver.t], y[: equations.n_q + equations.n]])
+    arrays[RUN_KEY] = np.concatenate([[solver.t], y[: equations.n_q + equations.n]])
     return Memory(settings.kind, settings.h, settings.t_start, steps, arrays)
 
 

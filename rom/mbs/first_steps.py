@@ -19,10 +19,10 @@ from rom.mbs.record import Record
 from rom.mbs.state import State, assembled, fitting_velocity
 from rom.model import Array
 
-RTOL, ATOL = 1e-11, 1e-13
+RADAU_RTOL, RADAU_ATOL = 1e-11, 1e-13
 
 
-def first_steps(record: Record, W: Work, T: Step) -> tuple[Array, tuple[Array, ...]]:
+def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array, ...]]:
     """Take the steps before the formula can begin, and give T its past.
 
     Returns:
@@ -32,7 +32,7 @@ def first_steps(record: Record, W: Work, T: Step) -> tuple[Array, tuple[Array, .
         ConfigError: if the run has fewer steps.
         SolverError: if the equations of motion are singular there.
     """
-    start, count = record.final, T.past.shape[1]
+    start, count = record.final, step.past.shape[1]
     if count > record.settings.steps:
         raise ConfigError(
             f"bdf of order {count + 1} needs {count} steps to begin with, the run has "
@@ -46,7 +46,7 @@ def first_steps(record: Record, W: Work, T: Step) -> tuple[Array, tuple[Array, .
     states, works = [first[0]], [first[1]]
     if count:
         y = np.concatenate([first[0].q, first[0].v, np.zeros(3)])
-        options = {"method": "Radau", "rtol": RTOL, "atol": ATOL, "t_eval": t[1:]}
+        options = {"method": "Radau", "rtol": RADAU_RTOL, "atol": RADAU_ATOL, "t_eval": t[1:]}
         found: Any = solve_ivp(equations, (t[0], t[-1]), y, **options)
         if not found.success:
             raise SolverError(
@@ -57,7 +57,7 @@ def first_steps(record: Record, W: Work, T: Step) -> tuple[Array, tuple[Array, .
             state, work = _instant(record, equations, float(x), y)
             states.append(state)
             works.append(work)
-    _remember(record, W, T, states, works[-1])
+    _remember(record, W, step, states, works[-1])
     rows = [[getattr(x, name) for x in states[1:]] for name in ("q", "v", "a", "lam")]
     rows += [works[1:], [x.base for x in states[1:]]]
     return t[1:], tuple(np.array(x) for x in rows)
@@ -77,22 +77,22 @@ def _instant(record: Record, equations: Equations, t: float, y: Array) -> tuple[
     return State(t, q, v, a, lam, equations.rank, None, base), y[-3:].copy()
 
 
-def _remember(record: Record, W: Work, T: Step, states: list[State], work: Array) -> None:
+def _remember(record: Record, W: Work, step: Step, states: list[State], work: Array) -> None:
     """Let T stand at the last state and know the ones before it."""
     now = states[-1]
     for name, x in (("q", now.q), ("v", now.v), ("vd", now.a), ("lam", now.lam), ("work", work)):
-        getattr(T, name)[:] = x
-    T.lost[:] = W.power
-    T.count[alpha.STEPS] = len(states) - 1
+        getattr(step, name)[:] = x
+    step.lost[:] = W.power
+    step.count[alpha.STEPS] = len(states) - 1
     for j, state in enumerate(states[-2::-1]):
-        T.past[0, j], T.past[1, j] = _seen(record, now.q, state.q), state.v
+        step.past[0, j], step.past[1, j] = _seen(record, now.q, state.q), state.v
 
 
 def _seen(record: Record, q: Array, other: Array) -> Array:
     """(n,) increment that leads from coordinates q to other ones."""
-    B: Any = record.packed.system.bodies
+    bodies: Any = record.packed.system.bodies
     out = np.zeros(record.packed.v.size)
-    for at, vt, r in zip(B.q_at, B.v_at, B.r, strict=True):
+    for at, vt, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
         back = q[at + 3 : at + 7] * np.array([1.0, -1.0, -1.0, -1.0])
         out[vt : vt + 3] = other[at : at + 3] - q[at : at + 3]
         out[vt + 3 : vt + 6] = rotation.log(rotation.multiply(back, other[at + 3 : at + 7]))

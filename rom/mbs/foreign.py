@@ -15,7 +15,7 @@ import numpy as np
 from rom.errors import ConfigError, RomError, SolverError
 from rom.model import Array
 
-KEPT = "The motion up to there is kept in error.solution."
+KEPT_HINT = "The motion up to there is kept in error.solution."
 
 
 def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -60,7 +60,7 @@ def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str
     """
     A = real(what, t, value, shape, needed)
     if not np.isfinite(A).all():
-        raise SolverError(f"{what} gives {A.tolist()} at t = {t:.9g} s.", hint=KEPT)
+        raise SolverError(f"{what} gives {A.tolist()} at t = {t:.9g} s.", hint=KEPT_HINT)
     return A
 
 
@@ -69,7 +69,7 @@ def real(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -
     A = _floats(value)
     if A is None or A.size != math.prod(shape) or (len(shape) > 1 and A.shape[0] != shape[0]):
         raise ConfigError(
-            f"{what} returned {_short(value)} at t = {t:.9g} s; needed is {needed}.", hint=KEPT
+            f"{what} returned {_short(value)} at t = {t:.9g} s; needed is {needed}.", hint=KEPT_HINT
         )
     return A.reshape(shape)
 
@@ -92,10 +92,10 @@ def _short(value: Any) -> str:
 
 def _failure(what: str, t: float, error: BaseException) -> RomError:
     trace = error.__traceback__.tb_next if error.__traceback__ else None
-    said = f"{type(error).__name__}: {error}".strip().removesuffix(":").rstrip(".")
+    message = f"{type(error).__name__}: {error}".strip().removesuffix(":").rstrip(".")
     if trace is None and isinstance(error, TypeError):  # it was not even entered
-        return ConfigError(f"{what} cannot be called at t = {t:.9g} s: {said}.", hint=KEPT)
-    return SolverError(f"{what} failed at t = {t:.9g} s: {said}{_place(trace)}.", hint=KEPT)
+        return ConfigError(f"{what} cannot be called at t = {t:.9g} s: {message}.", hint=KEPT_HINT)
+    return SolverError(f"{what} failed at t = {t:.9g} s: {message}{_place(trace)}.", hint=KEPT_HINT)
 
 
 def _place(trace: TracebackType | None) -> str:

@@ -37,11 +37,11 @@ def small_motions(system: Any, state: State, world: tuple[bool, ...]) -> tuple[A
     rotating blade has constant p. In world axes p stays: what a spinning disc, which looks the
     same from all sides, does in its bearings has constant coefficients.
     """
-    n, B = state.v.size, system.bodies
+    n, bodies = state.v.size, system.bodies
     T, T1, T2, T3 = np.eye(n), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    for b, at in enumerate(B.v_at):
+    for b, at in enumerate(bodies.v_at):
         x, o = slice(at, at + 3), slice(at + 3, at + 6)
-        p = state.q[B.q_at[b] + 3 : B.q_at[b] + 7]
+        p = state.q[bodies.q_at[b] + 3 : bodies.q_at[b] + 7]
         A, w, dw = rotation.matrix(p), rotation.skew(state.v[o]), rotation.skew(state.a[o])
         if world[b]:
             T[o, o], T2[o, o] = A.T, -w @ A.T

@@ -14,7 +14,7 @@ from rom.model import Index
 
 # operations of a whole factorisation over those by blocks, from which blocks are quicker: measured
 # on chains of rigid and flexible links
-WORTH = 4.0
+BLOCK_GAIN = 4.0
 
 
 def graph_of(system: Any, *, whole: bool = False) -> Graph:
@@ -27,11 +27,11 @@ def graph_of(system: Any, *, whole: bool = False) -> Graph:
     neighbours, groups = _neighbours(system), _groups(system)
     plan = None if whole or (system.rows.kind == ROLL).any() else _plan(system, neighbours, groups)
     compact = plan is not None
-    width, B = 6 + system.bodies.r, system.bodies
+    width, bodies = 6 + system.bodies.r, system.bodies
     first = _starts([len(others) for others in neighbours])
     other = _integers([c for others in neighbours for c in others])
     body = np.repeat(np.arange(width.size), np.diff(first))
-    x, y = B.v_at[body], B.v_at[other]
+    x, y = bodies.v_at[body], bodies.v_at[other]
     if compact:
         x, y = _starts(width[body])[:-1], np.zeros_like(other)
     own = _integers([first[b] + others.index(b) for b, others in enumerate(neighbours)])
@@ -78,19 +78,19 @@ def _groups(system: Any) -> list[Group]:
 
 def _bodies_of(system: Any, row: int) -> list[int]:
     """Different bodies that a constraint row moves."""
-    R, body = system.rows, system.markers.body
-    markers = [m[row] for m in (R.i, R.j, R.k, R.l) if m[row] >= 0]
+    rows, body = system.rows, system.markers.body
+    markers = [m[row] for m in (rows.i, rows.j, rows.k, rows.l) if m[row] >= 0]
     return list(dict.fromkeys(int(body[m]) for m in markers if body[m] >= 0))
 
 
 def _touched(system: Any, compact: bool) -> tuple[Index, Index]:
     """(m, 4) bodies that each row moves and their first columns in Work.G, padded with -1."""
-    B, m = system.bodies, system.rows.kind.size
+    bodies, m = system.bodies, system.rows.kind.size
     body, at = np.full((m, 4), -1, dtype=np.int64), np.full((m, 4), -1, dtype=np.int64)
     for k in range(m):
         moved = _bodies_of(system, k)
         body[k, : len(moved)] = moved
-        starts = _starts(6 + B.r[moved])[:-1] if compact else B.v_at[moved]
+        starts = _starts(6 + bodies.r[moved])[:-1] if compact else bodies.v_at[moved]
         at[k, : len(moved)] = starts
     return body, at
 
@@ -100,7 +100,7 @@ def _plan(system: Any, neighbours: list[list[int]], groups: list[Group]) -> Plan
     width = 6 + system.bodies.r
     size = [*map(int, width), *(len(group.rows) for group in groups)]
     total = sum(size)
-    limit = 2 / 3 * total**3 / WORTH
+    limit = 2 / 3 * total**3 / BLOCK_GAIN
     ordering = Ordering(size, neighbours, groups, forest(groups, len(width)))
     if not ordering.run(limit):
         return None

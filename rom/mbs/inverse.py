@@ -10,7 +10,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError, ModelError
 from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, moved
+from rom.mbs.motion import evaluate, retract
 from rom.mbs.packing import Packed, pack
 from rom.mbs.signals import first_failure, sample_all
 from rom.mbs.solution import Solution
@@ -18,7 +18,7 @@ from rom.mbs.state import State, assembled, fitting_velocity, initial_state, wit
 from rom.mbs.user import Law, MotorLaw, apply_laws, laws
 from rom.model import Array
 
-SPACING = 1e-4  # of the differences of drives without derivatives, relative to the duration
+DIFFERENCE_SPACING = 1e-4  # of drives without derivatives, relative to the duration
 
 
 @typed
@@ -47,7 +47,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
     if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0).all():
         raise ConfigError(f"t must hold at least two ascending times, got {np.shape(t)}.")
     packed = pack(mechanism)
-    span, spacing = (times[0], times[-1]), SPACING * (times[-1] - times[0])
+    span, spacing = (times[0], times[-1]), DIFFERENCE_SPACING * (times[-1] - times[0])
     state = initial_state(packed, times[0], spacing)
     _refuse_free(packed, state)
     signals = sample_all(packed.signals, times, span, spacing)
@@ -70,7 +70,7 @@ def _next(
 ) -> State:
     """The state at a time, found from the one before."""
     h, q = t - last.t, np.empty_like(last.q)
-    moved(packed.system, last.q, h * last.v + 0.5 * h * h * last.a, q)
+    retract(packed.system, last.q, h * last.v + 0.5 * h * h * last.a, q)
     q = assembled(packed, W, q)
     v = fitting_velocity(packed, W, q, last.v)
     evaluate(packed.system, W, q, v)

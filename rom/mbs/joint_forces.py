@@ -78,7 +78,7 @@ class JointForces:
             name: name of the motor.
             joint: joint with a coordinate.
             law: function of time [s], coordinate [rad or m] and its rate, or one of Numba.
-            coordinate: "angle" or "way"; None for the only or the first one.
+            coordinate: "angle" or "displacement"; None for the only or the first one.
             compiled: True to insist, False to leave it to Python, None for what works.
 
         Raises:
@@ -116,11 +116,12 @@ class JointForces:
                 change the speed by much more do not converge.
             coulomb: level that is always there [N or N m].
             mu: coefficient of friction.
-            radius: at which friction acts on an angle, that of the pin [m]; none for a way.
+            radius: at which friction acts on an angle, that of the pin [m]; none for a
+                displacement.
             static: level at rest over that of fast motion, at least 1.
             stribeck_speed: speed over which this fades [m/s or rad/s].
             viscous: [N s/m or N m s/rad].
-            coordinate: "angle" or "way"; None for the only or the first one.
+            coordinate: "angle" or "displacement"; None for the only or the first one.
 
         Raises:
             ConfigError: for a joint without such a coordinate, or numbers no friction has.
@@ -135,7 +136,7 @@ class JointForces:
         if mu and turns and radius is None:
             raise ConfigError(f"friction {name!r} with mu on an angle needs the radius of the pin.")
         if radius is not None and not turns:
-            raise ConfigError(f"friction {name!r} acts along a way: it has no radius.")
+            raise ConfigError(f"friction {name!r} acts along a displacement: it has no radius.")
         if number("static", static) < 1.0 or (static > 1.0 and stribeck_speed is None):
             raise ConfigError(
                 f"static = {static:g} of friction {name!r} must be at least 1, and above 1 it "
@@ -165,7 +166,7 @@ class JointForces:
             law: `rom.mbs.impact.Impact`, its friction without effect.
             lower: smallest coordinate without force [rad or m]; None for no limit.
             upper: largest one.
-            coordinate: "angle" or "way"; None for the only or the first one.
+            coordinate: "angle" or "displacement"; None for the only or the first one.
 
         Raises:
             ConfigError: for a joint without such a coordinate, or limits that leave no room.

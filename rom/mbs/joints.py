@@ -41,7 +41,7 @@ class Joint:
         rows: the constraints.
         coordinate: the row that measures the joint coordinate, or None.
         turn: the row that measures the angle, or None.
-        way: the row that measures the way along the axis, or None.
+        displacement: the row that measures the displacement along the axis, or None.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Joint:
     rows: tuple[Row, ...]
     coordinate: Row | None = None
     turn: Row | None = None
-    way: Row | None = None
+    displacement: Row | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +115,8 @@ def prismatic(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> 
         *(t.along(0, ZERO), t.along(1, ZERO)),
         *(t.normal(0, 2), t.normal(1, 2), t.normal(0, 1)),
     )
-    way = t.along(2, frames[0].T @ gap)
-    return Joint(name, "prismatic", markers, rows, way, None, way)
+    displacement = t.along(2, frames[0].T @ gap)
+    return Joint(name, "prismatic", markers, rows, displacement, None, displacement)
 
 
 def universal(
@@ -141,7 +141,9 @@ def fixed(name: str, markers: Any, frames: Any, _gap: Array) -> Joint:
 def screw(name: str, markers: Any, frames: Any, gap: Array, axis: Array, *, pitch: float) -> Joint:
     """Cylindrical, the way a multiple of the angle."""
     joint = cylindrical(name, markers, frames, gap, axis)
-    lead = Row(COUPLING, ZERO, ZERO, ZERO, terms=((joint.way, 1.0), (joint.turn, -pitch / TURN)))
+    lead = Row(
+        COUPLING, ZERO, ZERO, ZERO, terms=((joint.displacement, 1.0), (joint.turn, -pitch / TURN))
+    )
     return replace(joint, kind="screw", rows=(*joint.rows, lead))
 
 
@@ -156,9 +158,15 @@ def planar(name: str, markers: Any, frames: Any, _gap: Array, normal: Array) -> 
 def point_on_line(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> Joint:
     """The second point stays on a line of the first body."""
     t = triad(axis, frames)
-    way = t.along(2, frames[0].T @ gap)
+    displacement = t.along(2, frames[0].T @ gap)
     return Joint(
-        name, "point on line", markers, (t.along(0, ZERO), t.along(1, ZERO)), way, None, way
+        name,
+        "point on line",
+        markers,
+        (t.along(0, ZERO), t.along(1, ZERO)),
+        displacement,
+        None,
+        displacement,
     )
 
 

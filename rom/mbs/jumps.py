@@ -12,17 +12,17 @@ from rom.errors import ModelError
 from rom.model import Array
 from rom.plausible import warn
 
-INTERVALS = 4096  # at most, that are looked at in one go
+MAX_INTERVALS = 4096  # in one pass
 FEW_INTERVALS = 8  # at least
-SUSPECTS = 4  # sharpest places that are looked at closely
-CLOSE = 1e-9  # of the time looked at: both sides of a jump of the value
-RESOLUTION = 1e-15  # of a time, below which two times are one
-APART = 1e-4  # of an interval: points of a difference quotient
+N_SUSPECTS = 4  # sharpest places that are looked at closely
+JUMP_WIDTH_RTOL = 1e-9  # of the time looked at: both sides of a jump of the value
+TIME_RTOL = 1e-15  # of a time, below which two times are one
+DIFFERENCE_SPACING = 1e-4  # of an interval: points of a difference quotient
 ROUND_OFF = 2e-12  # of value over rate: they lie further apart than that, or say nothing
 SMALL_JUMP = 1e-6  # of the range of the values so far, that no reaction shows
-NOISE = 1e-12  # of the largest value
+VALUE_RTOL = 1e-12  # of the largest value
 SMALL_KINK = 1e-2  # of the largest rate so far
-CONTRADICTION = 0.05  # of the largest rate, by which a given rate may miss that of the value
+RATE_RTOL = 0.05  # of the largest rate: difference of a given rate from that of the value
 Function = Callable[[Array], Array]
 
 
@@ -58,7 +58,7 @@ def largest_jump(f: Function, t: Array, width: float, small: float) -> Jump | No
     if not np.isfinite(values).all() or np.ptp(values) <= small:
         return None
     bend = np.abs(np.diff(values, 2))  # what a straight line does not explain
-    inner = np.argsort(bend)[::-1][:SUSPECTS]
+    inner = np.argsort(bend)[::-1][:N_SUSPECTS]
     places = {int(k) for j in inner if bend[j] > 0.1 * small for k in (j, j + 1)}
     found = [_wider(f, _halved(f, t[k], t[k + 1], width), width, t) for k in sorted(places)]
     jumps = [jump for jump in found if abs(jump.size) > max(small, 0.1 * bend.max(initial=0.0))]
@@ -122,7 +122,7 @@ class Examined:
         """
         if self.end is None and time > self.until:
             first = max(self.start, self.until - spacing)
-            n = int(np.clip(np.ceil((time - first) / spacing), FEW_INTERVALS, INTERVALS))
+            n = int(np.clip(np.ceil((time - first) / spacing), FEW_INTERVALS, MAX_INTERVALS))
             t = np.linspace(first, time, n + 1)
             values = self.function(t)
             if np.isfinite(values).all():
@@ -133,8 +133,8 @@ class Examined:
     def _look_at(self, t: Array, values: Array) -> None:
         self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
         largest = max(abs(self.low), abs(self.high))
-        small = max(SMALL_JUMP * (self.high - self.low), NOISE * largest)
-        width = max(CLOSE * (t[-1] - t[0]), RESOLUTION * float(np.abs(t).max()))
+        small = max(SMALL_JUMP * (self.high - self.low), VALUE_RTOL * largest)
+        width = max(JUMP_WIDTH_RTOL * (t[-1] - t[0]), TIME_RTOL * float(np.abs(t).max()))
         jump = largest_jump(self.function, t, width, small)
         if jump is not None:
             self.end = jump.t, _refusal(self.name, jump)
@@ -143,13 +143,16 @@ class Examined:
 
     def _look_at_rate(self, t: Array, largest: float) -> None:
         interval = t[1] - t[0]
-        quotient = _quotient(self.function, (self.start, t[-1]), APART * interval)
+        quotient = _quotient(self.function, (self.start, t[-1]), DIFFERENCE_SPACING * interval)
         speed = quotient if self.rate is None else self.rate
         values = speed(t)
         self.top = max(self.top, float(np.abs(values).max()))
-        if not np.isfinite(values).all() or APART * interval * self.top < ROUND_OFF * largest:
+        if (
+            not np.isfinite(values).all()
+            or DIFFERENCE_SPACING * interval * self.top < ROUND_OFF * largest
+        ):
             return
-        kink = largest_jump(speed, t, 4 * APART * interval, SMALL_KINK * self.top)
+        kink = largest_jump(speed, t, 4 * DIFFERENCE_SPACING * interval, SMALL_KINK * self.top)
         doubt = "" if kink is None else _kink(self.name, kink)
         if self.rate is not None and not doubt:
             doubt = _contradiction(self.name, t, values, quotient(t))
@@ -189,7 +192,7 @@ def _quotient(function: Function, span: tuple[float, float], apart: float) -> Fu
 def _contradiction(name: str, t: Array, given: Array, found: Array) -> str:
     miss = np.abs(given - found)
     k = int(np.argmax(miss))
-    if miss[k] <= CONTRADICTION * max(np.abs(found).max(), np.abs(given).max()):
+    if miss[k] <= RATE_RTOL * max(np.abs(found).max(), np.abs(given).max()):
         return ""
     return (
         f"the rate given for drive {name!r} is {given[k]:.4g} at t = {t[k]:.6g} s, where its "

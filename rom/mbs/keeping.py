@@ -24,15 +24,15 @@ from rom.mbs.packing import Packed
 from rom.mbs.state import Memory, State
 from rom.model import Array
 
-SCHEMA, VERSION = "rom-motion", (1, 0)
+SCHEMA_NAME, VERSION = "rom-motion", (1, 0)
 COLUMNS = ("t", "q", "v", "a", "lam", "work", "base")
-PART = Kind({SCHEMA: VERSION}, "part of a motion", COLUMNS)
-NAME = "state.npz"
-EVENTS = "events/"
+PART = Kind({SCHEMA_NAME: VERSION}, "part of a motion", COLUMNS)
+STATE_FILE = "state.npz"
+EVENTS_PREFIX = "events/"
 # seconds of stepping between two parts, and how many times longer than it takes to write one
-INTERVAL, PATIENCE = 1.0, 60.0
+MIN_INTERVAL, WRITE_TIME_FACTOR = 1.0, 60.0
 # of the time spent so far: what a long run risks, so that it does not leave thousands of parts
-RISK = 1 / 500
+MAX_LOSS_RATIO = 1 / 500
 # of a system: addresses differ between processes, the graph follows from the rest
 PASSING = {"graph", "address", "motor"}
 
@@ -75,7 +75,7 @@ class Keeping:
     @property
     def state(self) -> Path:
         """The file to go on from."""
-        return self.folder / NAME
+        return self.folder / STATE_FILE
 
     def check(self) -> None:
         """Refuse to write over a motion, or to go on with none; to be asked early.
@@ -110,7 +110,7 @@ class Keeping:
         counted = [None if origin is None else float(origin).hex(), taken]
         self._manifest = {"counted": counted, "digests": {**self.made_from, **digests}}
         self._first = perf_counter()
-        self._next = self._first + INTERVAL
+        self._next = self._first + MIN_INTERVAL
 
     def read(self) -> Kept:
         """What is there.
@@ -183,7 +183,7 @@ class Keeping:
             parts += 1
             columns = zip(*blocks[self._blocks :], strict=True)
             arrays = dict(zip(COLUMNS, map(np.concatenate, columns), strict=True))
-            manifest = {"schema": SCHEMA, "version": list(VERSION)}
+            manifest = {"schema": SCHEMA_NAME, "version": list(VERSION)}
             write_archive(self._path(parts), manifest, arrays, "the motion")
         manifest, arrays = packed_state(state)
         signs = None if noted is None else [[k, float(x)] for k, x in noted.signs.items()]
@@ -192,7 +192,9 @@ class Keeping:
         write_archive(self.state, manifest | more, arrays | events, "the state")
         self._parts, self._blocks = parts, count
         now = perf_counter()
-        pause = max(INTERVAL, PATIENCE * (now - begun), RISK * (now - self._first))
+        pause = max(
+            MIN_INTERVAL, WRITE_TIME_FACTOR * (now - begun), MAX_LOSS_RATIO * (now - self._first)
+        )
         self._next = now + pause
 
     def remove(self) -> None:
@@ -246,7 +248,7 @@ def _arrays(noted: Noted) -> dict[str, Array]:
         for part, what in enumerate(("t", "q", "v")):
             rows = [item[part] for item in items[: noted.counts[name]]]
             if rows:
-                out[f"{EVENTS}{k}/{what}"] = np.array(rows, dtype=float)
+                out[f"{EVENTS_PREFIX}{k}/{what}"] = np.array(rows, dtype=float)
     return out
 
 
@@ -255,6 +257,6 @@ def _noted(signs: Sequence[tuple[str, float]] | None, arrays: Mapping[str, Array
         return None
     found: dict[str, list[tuple[float, Array, Array]]] = {}
     for k, (name, _) in enumerate(signs):
-        columns = [arrays.get(f"{EVENTS}{k}/{what}", ()) for what in ("t", "q", "v")]
+        columns = [arrays.get(f"{EVENTS_PREFIX}{k}/{what}", ()) for what in ("t", "q", "v")]
         found[name] = [(float(t), q, v) for t, q, v in zip(*columns, strict=True)]
     return Noted(dict(signs), {name: len(items) for name, items in found.items()}, found)

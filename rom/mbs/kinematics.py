@@ -42,49 +42,49 @@ def axes_of(A, theta, E):
 @inner
 def marker_states(s, W, q, v):
     """Position, axes, twist, convective acceleration and Jacobian of all markers."""
-    B, K = s.bodies, s.markers
-    for m in range(K.body.size):
-        b = K.body[m]
+    bodies, markers = s.bodies, s.markers
+    for m in range(markers.body.size):
+        b = markers.body[m]
         if b < 0:
             for i in range(3):
-                W.P[m, i], W.E[m, i, i] = K.point[m, i], 1.0
+                W.P[m, i], W.E[m, i, i] = markers.point[m, i], 1.0
             continue
-        r, at, vt, A = B.r[b], B.q_at[b], B.v_at[b], W.A[b]
-        shape, twist, w = K.shape[m], K.twist[m], vec(v, vt + 3)
-        u = add(row(K.point, m, 0), elastic_sum(shape, q, at + 7, r))
-        theta, jerk, whirl = elastic_sum(twist, q, at + 7, r), ZERO, ZERO
-        if B.stiffened[b] == 1:
-            bent_shapes(K, m, q, at + 7, r, W.move[m])
+        r, at, vt, A = bodies.r[b], bodies.q_at[b], bodies.v_at[b], W.A[b]
+        shape, twist, w = markers.shape[m], markers.twist[m], vec(v, vt + 3)
+        u = add(row(markers.point, m, 0), elastic_sum(shape, q, at + 7, r))
+        theta, second_order, second_order_angular = elastic_sum(twist, q, at + 7, r), ZERO, ZERO
+        if bodies.stiffened[b] == 1:
+            bent_shapes(markers, m, q, at + 7, r, W.move[m])
             shape, twist = W.move[m, :3], W.move[m, 3:]
-            u = scale(0.5, add(add(u, row(K.point, m, 0)), elastic_sum(shape, q, at + 7, r)))
+            u = scale(0.5, add(add(u, row(markers.point, m, 0)), elastic_sum(shape, q, at + 7, r)))
             theta = scale(0.5, add(theta, elastic_sum(twist, q, at + 7, r)))
-            jerk = bent_sum(K.bend[m], 0, v, vt + 6, r)
-            whirl = bent_sum(K.bend[m], 3, v, vt + 6, r)
+            second_order = bent_sum(markers.bend[m], 0, v, vt + 6, r)
+            second_order_angular = bent_sum(markers.bend[m], 3, v, vt + 6, r)
         slip, rate = elastic_sum(shape, v, vt + 6, r), elastic_sum(twist, v, vt + 6, r)
         spin = spatial_tangent(theta, rate)
-        swirl = add(cross(w, spin), spatial_tangent_rate(theta, rate))
-        swirl = add(swirl, spatial_tangent(theta, whirl))
-        push = add(jerk, cross(w, add(cross(w, u), scale(2.0, slip))))
+        convective_angular = add(cross(w, spin), spatial_tangent_rate(theta, rate))
+        convective_angular = add(convective_angular, spatial_tangent(theta, second_order_angular))
+        convective = add(second_order, cross(w, add(cross(w, u), scale(2.0, slip))))
         write(W.P, m, 0, add(vec(q, at), mv(A, u)))
         write(W.u, m, 0, u)
         write(W.theta, m, 0, theta)
         write(W.V, m, 0, add(vec(v, vt), mv(A, add(cross(w, u), slip))))
         write(W.V, m, 3, mv(A, add(w, spin)))
-        write(W.conv, m, 0, mv(A, push))
-        write(W.conv, m, 3, mv(A, swirl))
+        write(W.conv, m, 0, mv(A, convective))
+        write(W.conv, m, 3, mv(A, convective_angular))
         axes_of(A, theta, W.E[m])
         marker_jacobian(shape, twist, A, u, theta, r, W.H[m])
 
 
 @inner
-def bent_shapes(K, m, q, at, r, move):
+def bent_shapes(markers, m, q, at, r, move):
     """Displacement and rotation of a marker per elastic rate, second order included."""
     for p in range(3):
         for k in range(r):
-            move[p, k], move[3 + p, k] = K.shape[m, p, k], K.twist[m, p, k]
+            move[p, k], move[3 + p, k] = markers.shape[m, p, k], markers.twist[m, p, k]
             for l in range(r):
-                move[p, k] += K.bend[m, p, k, l] * q[at + l]
-                move[3 + p, k] += K.bend[m, 3 + p, k, l] * q[at + l]
+                move[p, k] += markers.bend[m, p, k, l] * q[at + l]
+                move[3 + p, k] += markers.bend[m, 3 + p, k, l] * q[at + l]
 
 
 @inner
@@ -126,13 +126,13 @@ def marker_jacobian(shape, twist, A, u, theta, r, H):
 @inner
 def spread_wrench(s, W, sign, out):
     """Add sign H^T wrench of all markers to the generalised forces ``out``."""
-    B, K = s.bodies, s.markers
-    for m in range(K.body.size):
-        b = K.body[m]
+    bodies, markers = s.bodies, s.markers
+    for m in range(markers.body.size):
+        b = markers.body[m]
         if b < 0:
             continue
-        H, t, w = W.H[m], B.v_at[b], W.wrench[m]
-        for j in range(6 + B.r[b]):
+        H, t, w = W.H[m], bodies.v_at[b], W.wrench[m]
+        for j in range(6 + bodies.r[b]):
             total = 0.0
             for i in range(6):
                 total += H[i, j] * w[i]
@@ -153,18 +153,18 @@ def wrench_stiffness(s, W, c, S):
 
     The change of the tangent operator of an elastically rotating marker is kept to first order.
     """
-    B, K = s.bodies, s.markers
-    for m in range(K.body.size):
-        b = K.body[m]
+    bodies, markers = s.bodies, s.markers
+    for m in range(markers.body.size):
+        b = markers.body[m]
         if b < 0:
             continue
-        r, A, block = B.r[b], W.A[b], own_block(s, b, S)
+        r, A, block = bodies.r[b], W.A[b], own_block(s, b, S)
         f, n = mtv(A, vec(W.wrench[m], 0)), mtv(A, vec(W.wrench[m], 3))
         u, theta = vec(W.u[m], 0), vec(W.theta[m], 0)
-        shape, twist = K.shape[m], K.twist[m]
-        if B.stiffened[b] == 1:
+        shape, twist = markers.shape[m], markers.twist[m]
+        if bodies.stiffened[b] == 1:
             shape, twist = W.move[m, :3], W.move[m, 3:]
-            bent_wrench_stiffness(K.bend[m], f, n, theta, r, c, block)
+            bent_wrench_stiffness(markers.bend[m], f, n, theta, r, c, block)
         for j in range(3):
             e = unit(j)
             df, dn = cross(f, e), cross(n, e)

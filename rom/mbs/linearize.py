@@ -16,13 +16,21 @@ from rom.mbs.modes import modes, phases
 from rom.mbs.packing import Packed
 from rom.mbs.parts import Marker
 from rom.mbs.state import State, fitting_velocity, initial_state, with_accelerations
-from rom.mbs.variation import PROBE, Instant, consistent, free_motions, instant, of_unit_mass
+from rom.mbs.variation import (
+    DIFFERENCE_STEP,
+    Instant,
+    consistent,
+    free_motions,
+    instant,
+    of_unit_mass,
+)
 from rom.model import Array
 
-TURN = 1e-3  # angle by which the joints are moved on, to see how their free motions change
-STEADY = 1e-11  # relative change below which they stay
-ZERO, ZERO_BY_DIFFERENCES = 2e-7, 1e-5  # frequency that is round-off, relative to the highest
-DRIFT = 1e-3  # relative change of the matrices in a radian from which they count as periodic
+PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]
+STEADY_RTOL = 1e-11  # change of free motions that do not change
+ZERO_FREQUENCY_RTOL = 2e-7  # round-off of a frequency, of the highest one
+DIFFERENCED_ZERO_RTOL = 1e-5  # the same where tangents are differences
+DRIFT_RTOL = 1e-3  # change of the matrices in a radian from which they count as periodic
 
 
 @typed
@@ -178,10 +186,10 @@ def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearizati
         change = max(np.abs(found.K - moved_on.K).max(initial=0.0),
                      rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
         size = max(float(size), rate**2)
-        if change > DRIFT * TURN * size:
+        if change > DRIFT_RTOL * PROBE_ANGLE * size:
             warnings.warn(
-                f"the linear equations change with time, by {change / TURN / size:.2g} of their "
-                "size per radian: these frequencies are those of one instant.",
+                f"the linear equations change with time, by {change / PROBE_ANGLE / size:.2g} of "
+                "their size per radian: these frequencies are those of one instant.",
                 RomWarning,
                 stacklevel=4,
             )
@@ -200,7 +208,7 @@ class _Path:
     @cached_property
     def rate(self) -> float:
         """Speed of the mechanism in radians, or sizes, per second."""
-        size = self.now.probe() / PROBE
+        size = self.now.probe() / DIFFERENCE_STEP
         v, a = np.abs(self.state.v) / size, np.abs(self.state.a) / size
         return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
 
@@ -219,17 +227,17 @@ class _Path:
         """First and second time derivative of the free motions."""
         if self.rate == 0.0 or not self.Z.size:
             return 0 * self.Z, 0 * self.Z
-        h = TURN / self.rate
+        h = PROBE_ANGLE / self.rate
         _, before = self.at(-h)
         _, after = self.at(h)
         change = max(np.abs(after - self.Z).max(), np.abs(before - self.Z).max())
-        if change < STEADY * np.abs(self.Z).max():
+        if change < STEADY_RTOL * np.abs(self.Z).max():
             return 0 * self.Z, 0 * self.Z
         return (after - before) / (2 * h), (after - 2 * self.Z + before) / h**2
 
     def later(self) -> "_Path":
         """The same a little later."""
-        h = TURN / self.rate
+        h = PROBE_ANGLE / self.rate
         q, Z = self.at(h)
         v = fitting_velocity(self.now.packed, self.now.W, q, self.state.v + h * self.state.a)
         self.now.evaluate(q, v)
@@ -249,7 +257,7 @@ def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) 
     K2 = test.T @ (M @ acceleration + Cv @ (T @ Zd + T1 @ Z) + Kq @ basis)
     test = np.linalg.solve(M2, test.T).T
     C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
-    M2, noise = np.eye(len(K2)), ZERO if now.exact(state) else ZERO_BY_DIFFERENCES
+    M2, noise = np.eye(len(K2)), ZERO_FREQUENCY_RTOL if now.exact(state) else DIFFERENCED_ZERO_RTOL
     return Linearization(state, M2, C2, K2, basis, test, noise, now.probe(), now.packed, H)
 
 

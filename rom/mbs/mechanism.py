@@ -19,7 +19,7 @@ from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigi
 from rom.mbs.surface_contact import SurfaceContacts
 from rom.model import Array
 from rom.names import check_name, check_text
-from rom.notebook import listed, shown
+from rom.notebook import html_table, listed
 from rom.plausible import DAMPING, GRAVITY, SPEED, STIFFNESS, warn_outside
 
 
@@ -119,7 +119,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         ends = [(name, j.kind, "", listed(f"{m.body}.{m.place}" for m in j.markers))
                 for name, j in self.joints.items()]  # fmt: skip
         title = f"Mechanism of {len(self.parts)} bodies and {len(self.joints)} joints"
-        return shown(title, ("name", "kind", "mass [kg]", "markers"), [*kinds, *ends])
+        return html_table(title, ("name", "kind", "mass [kg]", "markers"), [*kinds, *ends])
 
     def add_rigid(  # noqa: PLR0913  one keyword per property of a body
         self,

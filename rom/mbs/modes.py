@@ -5,7 +5,7 @@ from scipy.linalg import eig
 
 from rom.model import Array
 
-SYMMETRIC = 1e-9
+ASYMMETRY_RTOL = 1e-9
 
 
 def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
@@ -14,7 +14,7 @@ def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
     Frequencies ascend. A pair of real eigenvalues is one mode, its larger value is given.
     Below the share ``zero`` of the highest frequency counts as a motion that nothing holds.
     """
-    symmetric = np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * np.abs(K).max(initial=0.0)
+    symmetric = np.abs(K - K.T).max(initial=0.0) <= ASYMMETRY_RTOL * np.abs(K).max(initial=0.0)
     if symmetric and not C.any():
         squares, V = np.linalg.eigh(0.5 * (K + K.T))
         roots = np.sqrt((-squares).astype(complex))

@@ -47,7 +47,7 @@ def body_masses(s, W):
 
 
 @kernel
-def linearise(s, W, q, v):
+def linearize_constraints(s, W, q, v):
     """`evaluate`, then set W.G to the constraint gradient and W.S to the mass matrix."""
     evaluate(s, W, q, v)
     constraint_gradient(s, W)
@@ -104,7 +104,7 @@ def tangents(s, W, v, a, lam, c):
 def least_multipliers(W, rank, lam):
     """Replace lam by the multipliers of least norm that give the same forces."""
     m = lam.size
-    range_basis(W.G, rank, W.rest, W.U)
+    range_basis(W.G, rank, W.remainder, W.U)
     for k in range(rank):
         total = 0.0
         for p in range(m):
@@ -117,24 +117,24 @@ def least_multipliers(W, rank, lam):
 
 
 @kernel
-def moved(s, q, psi, out):
+def retract(s, q, psi, out):
     """Coordinates q o exp(psi): positions and elastic add up, rotations turn in the body frame."""
-    B = s.bodies
-    for b in range(B.mass.size):
-        at, vt = B.q_at[b], B.v_at[b]
+    bodies = s.bodies
+    for b in range(bodies.mass.size):
+        at, vt = bodies.q_at[b], bodies.v_at[b]
         for i in range(3):
             out[at + i] = q[at + i] + psi[vt + i]
         turned(q, at + 3, vec(psi, vt + 3), out)
-        for k in range(B.r[b]):
+        for k in range(bodies.r[b]):
             out[at + 7 + k] = q[at + 7 + k] + psi[vt + 6 + k]
 
 
 @inner
 def coordinate_rates(s, q, v, out):
     """Time derivatives of the coordinates for the velocities v."""
-    B = s.bodies
-    for b in range(B.mass.size):
-        at, vt = B.q_at[b], B.v_at[b]
+    bodies = s.bodies
+    for b in range(bodies.mass.size):
+        at, vt = bodies.q_at[b], bodies.v_at[b]
         e0, e1, e2, e3 = q[at + 3], q[at + 4], q[at + 5], q[at + 6]
         x, y, z = scale(0.5, vec(v, vt + 3))
         for i in range(3):
@@ -143,7 +143,7 @@ def coordinate_rates(s, q, v, out):
         out[at + 4] = e0 * x + e2 * z - e3 * y
         out[at + 5] = e0 * y + e3 * x - e1 * z
         out[at + 6] = e0 * z + e1 * y - e2 * x
-        for k in range(B.r[b]):
+        for k in range(bodies.r[b]):
             out[at + 7 + k] = v[vt + 6 + k]
 
 
@@ -163,7 +163,7 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     body_masses(s, W)
     constraint_gradient(s, W)
     if accepted and rank < m:
-        range_basis(W.G, rank, W.rest, W.U_lu)
+        range_basis(W.G, rank, W.remainder, W.U_lu)
     border(W, rank)
     if not factorise_bordered(s, W, rank):
         return False

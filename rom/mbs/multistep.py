@@ -35,61 +35,61 @@ def multistep_coefficients(h: float, order: int) -> tuple[Array, Array]:
 
 
 @inner
-def is_multistep(T):
+def is_multistep(step):
     """Whether a step is one of this module: BDF of an order other than two."""
-    return T.bdf.size != 3
+    return step.bdf.size != 3
 
 
 @inner
-def earlier(T, which, i):
+def earlier(step, which, i):
     """Entry i of the past positions (0) or velocities (1), times their weights."""
     total = 0.0
-    for j in range(T.past.shape[1]):
-        total += T.bdf[j + 2] * T.past[which, j, i]
+    for j in range(step.past.shape[1]):
+        total += step.bdf[j + 2] * step.past[which, j, i]
     return total
 
 
 @inner
-def predict_multistep(s, T):
+def predict_multistep(s, step):
     """Trial increment for the accelerations of the last step."""
-    c0, c1 = T.bdf[0], T.bdf[1]
-    for i in range(T.v.size):
-        v = (T.vd[i] - c1 * T.v[i] - earlier(T, 1, i)) / c0
-        T.psi[i] = (v - earlier(T, 0, i)) / c0
-    follow_increment(s, T)
+    c0, c1 = step.bdf[0], step.bdf[1]
+    for i in range(step.v.size):
+        v = (step.vd[i] - c1 * step.v[i] - earlier(step, 1, i)) / c0
+        step.psi[i] = (v - earlier(step, 0, i)) / c0
+    follow_increment(s, step)
 
 
 @inner
-def follow_increment(s, T):
+def follow_increment(s, step):
     """Set velocities and accelerations to those of the increment, less what closes gaps."""
-    c0, c1 = T.bdf[0], T.bdf[1]
-    for i in range(T.v.size):
-        T.v1[i] = c0 * (T.psi[i] - T.drift[i]) + earlier(T, 0, i)
+    c0, c1 = step.bdf[0], step.bdf[1]
+    for i in range(step.v.size):
+        step.v1[i] = c0 * (step.psi[i] - step.drift[i]) + earlier(step, 0, i)
     for t in s.bodies.v_at:
-        w = spatial_tangent(scale(-1.0, vec(T.psi, t + 3)), vec(T.v1, t + 3))
-        T.v1[t + 3], T.v1[t + 4], T.v1[t + 5] = w
-    for i in range(T.v.size):
-        T.vd1[i] = c0 * T.v1[i] + c1 * T.v[i] + earlier(T, 1, i)
+        w = spatial_tangent(scale(-1.0, vec(step.psi, t + 3)), vec(step.v1, t + 3))
+        step.v1[t + 3], step.v1[t + 4], step.v1[t + 5] = w
+    for i in range(step.v.size):
+        step.vd1[i] = c0 * step.v1[i] + c1 * step.v[i] + earlier(step, 1, i)
 
 
 @inner
-def keep_past(s, T):
+def keep_past(s, step):
     """Let the present instant become a past one, and see all of them from the new instant."""
-    count = T.past.shape[1]
+    count = step.past.shape[1]
     if count == 0:
         return
     for j in range(count - 1, 0, -1):
-        copy(T.past[:, j - 1], T.past[:, j])
-    T.past[0, 0] = 0.0
-    copy(T.v, T.past[1, 0])
+        copy(step.past[:, j - 1], step.past[:, j])
+    step.past[0, 0] = 0.0
+    copy(step.v, step.past[1, 0])
     for j in range(count):
-        past = T.past[0, j]
+        past = step.past[0, j]
         for t in s.bodies.v_at:
-            w = joined(scale(-1.0, vec(T.psi, t + 3)), vec(past, t + 3))
+            w = joined(scale(-1.0, vec(step.psi, t + 3)), vec(past, t + 3))
             for p in range(3):
-                past[t + 3 + p] = w[p] + T.psi[t + 3 + p]
-        for i in range(T.psi.size):
-            past[i] -= T.psi[i]
+                past[t + 3 + p] = w[p] + step.psi[t + 3 + p]
+        for i in range(step.psi.size):
+            past[i] -= step.psi[i]
 
 
 @inner

@@ -34,8 +34,8 @@ from rom.mbs.parts import Marker, Part
 from rom.model import Array, Index
 
 # of a law, as numba.cfunc takes it
-SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
-UNIT = 1e-9  # by which a quaternion may miss the unit length
+LAW_SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
+QUATERNION_ATOL = 1e-9  # difference of a quaternion from unit length
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def _check(name: str, body: Any) -> None:
             "positive in a motion.",
             where=name,
         )
-    if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > UNIT:
+    if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > QUATERNION_ATOL:
         raise ModelError("a quaternion of a frame has not the length one.", where=name)
     for group in body.elements:
         if group.frames.ndim != 2 or len(group.frames) != len(group.numbers):

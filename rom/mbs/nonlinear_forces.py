@@ -31,9 +31,9 @@ def ask(context, address, numbers, pose, wanted, answer, space):
 @inner
 def take_frames(s, W, e, q, v):
     """Copy the frames of element e to its row of W.pose."""
-    N, B = s.nonlinear, s.bodies
+    N, bodies = s.nonlinear, s.bodies
     for k in range(N.count[e]):
-        at, vt = B.q_at[N.body[e, k]], B.v_at[N.body[e, k]]
+        at, vt = bodies.q_at[N.body[e, k]], bodies.v_at[N.body[e, k]]
         for i in range(7):
             W.pose[e, 13 * k + i] = q[at + i]
         for i in range(6):
@@ -57,14 +57,14 @@ def nonlinear_residuals(s, W, q, v):
 @inner
 def nonlinear_tangents(s, W, ck, cc, K, S):
     """Add stiffness times ck and damping times cc to K and S; `nonlinear_residuals` first."""
-    N, Y = s.nonlinear, s.graph
+    N, graph = s.nonlinear, s.graph
     for e in range(N.address.size):
         ask(N.address[e], N.numbers[e], W.pose[e], 1, W.answer, W.space)
         n = 6 * N.count[e]
         for k in range(N.count[e]):
             for l in range(N.count[e]):
-                block = block_of(Y, N.body[e, k], N.body[e, l])
-                x, y = Y.x[block], Y.y[block]
+                block = block_of(graph, N.body[e, k], N.body[e, l])
+                x, y = graph.x[block], graph.y[block]
                 for i in range(6):
                     at = 2 + n + (6 * k + i) * n + 6 * l
                     for j in range(6):

@@ -60,8 +60,8 @@ class Packed:
     def row_scale(self) -> Array:
         """(m,) length of the mechanism for rows that measure lengths, one for the others."""
         rows = self.system.rows
-        way = [k >= 0 and self.system.coordinates.kind[k] == ALONG for k in rows.at[:, 0]]
-        lengths = np.isin(rows.kind, LENGTHS) | np.array(way, dtype=bool)
+        slides = [k >= 0 and self.system.coordinates.kind[k] == ALONG for k in rows.at[:, 0]]
+        lengths = np.isin(rows.kind, LENGTHS) | np.array(slides, dtype=bool)
         return np.where(lengths, self.length, 1.0)
 
     @property

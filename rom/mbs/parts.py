@@ -15,12 +15,12 @@ GROUND = "ground"
 SINGULAR_MASS = 1e-11
 
 
-SURFACE = "surface point "  # markers that a contact puts on the surface of a flexible body
+SURFACE_PREFIX = "surface point "  # markers that a contact puts on the surface of a flexible body
 
 
 def surface_place(k: int) -> str:
     """Place of the marker on point k of the surface of a flexible body; it does not turn."""
-    return f"{SURFACE}{k}"
+    return f"{SURFACE_PREFIX}{k}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class Part:
         """Point of the surface that a contact has put a marker on, or None."""
         if self.flexible is None or not isinstance(place, str) or place in self.names:
             return None
-        return int(place.removeprefix(SURFACE)) if place.startswith(SURFACE) else None
+        return int(place.removeprefix(SURFACE_PREFIX)) if place.startswith(SURFACE_PREFIX) else None
 
 
 def ground_part() -> Part:

@@ -28,9 +28,9 @@ MAX_STEPS = 10**12
 # of a time that was written in decimals
 ROUND_OFF = 1e-12
 # first step of chosen length, relative to the duration
-FIRST = 1e-4
+FIRST_STEP_RATIO = 1e-4
 # place of the works in a block, behind the time; the array by which a memory knows its state
-WORKS, OF = 4, "of"
+WORK_ROW, RUN_KEY = 4, "of"
 TOLERANCES = (1e-14, 1e-2)  # of the Newton iteration: round-off, and no solution at all
 
 
@@ -89,7 +89,7 @@ class Settings:
                 hint="Take longer steps. They need to resolve what moves, not more.",
             )
         end = max(abs(self.t_start), abs(self.t_end))
-        step = FIRST * (self.t_end - self.t_start) if self.dt is None else self.dt
+        step = FIRST_STEP_RATIO * (self.t_end - self.t_start) if self.dt is None else self.dt
         if end + step == end or not np.isfinite(self.t_end - self.t_start):
             what = "the first step" if self.dt is None else "dt"
             raise ConfigError(
@@ -201,8 +201,8 @@ class Settings:
         memory = None if state is None else state.memory
         if memory is None or memory.method != self.kind:
             return self
-        if OF in memory.arrays:
-            same = self.t_start == state.t and np.array_equal(memory.arrays[OF], of(state))
+        if RUN_KEY in memory.arrays:
+            same = self.t_start == state.t and np.array_equal(memory.arrays[RUN_KEY], of(state))
             whole = self.dt is None or memory.h == replace(self, t_start=memory.origin).h
             if same and whole:
                 return replace(self, t_start=memory.origin, begun=memory.taken)
@@ -258,7 +258,7 @@ class Record:
     given: State | None = None
     compiled: float = 0.0
     counts: dict[str, int] = field(default_factory=dict)
-    shown: float = 0.0
+    shown_at: float = 0.0
     watch: Watch | None = None
     noted: Noted | None = None
     keeping: Keeping | None = None
@@ -314,8 +314,8 @@ class Record:
         now = perf_counter()
         if self.keeping is not None and self.keeping.due(now):
             self.keeping.write(self.blocks, self.final, self.noted)
-        if self.settings.progress and now - self.shown > 0.2:
-            self.shown = now
+        if self.settings.progress and now - self.shown_at > 0.2:
+            self.shown_at = now
             span = self.settings.t_end - self.settings.t_start
             share = (self.t - self.settings.t_start) / span
             line(f"t = {self.t:.6g} s  {100 * share:3.0f} %  {now - self.clock:.0f} s")
@@ -330,7 +330,7 @@ class Record:
         if self.settings.progress:
             line("")
         t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
-        arrays[WORKS] -= arrays[WORKS][0]
+        arrays[WORK_ROW] -= arrays[WORK_ROW][0]
         signals = np.full((t.size, len(self.packed.signals), 3), np.nan)
         table, failure = sampled(
             self.packed.signals, padded(t), self.settings.span, self.settings.spacing

@@ -16,7 +16,7 @@ from rom.mbs.variation import instant
 from rom.model import Array
 
 # reciprocal condition number of the dynamic stiffness from which a response counts as infinite
-INFINITE = 1e-13
+RECIPROCAL_CONDITION_TOL = 1e-13
 
 
 @dataclass(frozen=True)
@@ -109,21 +109,23 @@ def transmissibility(
     now = instant(mechanism, around.state.t)
     now.W.base[:] = around.state.base
     M, C, K = now.matrices(around.state)
-    way = _forced(now.gradient(around.state.q, around.state.v)[1], now.packed, drive, now.probe())
+    enforced = _forced(
+        now.gradient(around.state.q, around.state.v)[1], now.packed, drive, now.probe()
+    )
     s = 2j * np.pi * f[:, None]
-    load = -(s**2 * (M @ way) + s * (C @ way) + K @ way) @ around.test
+    load = -(s**2 * (M @ enforced) + s * (C @ enforced) + K @ enforced) @ around.test
     y = _solved(around, f, load[:, :, None])[:, :, 0]
-    return (y @ around.basis.T + way) @ around.jacobian(motion).T
+    return (y @ around.basis.T + enforced) @ around.jacobian(motion).T
 
 
 def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:
     """(n,) smallest motion that moves the drive by one unit and no other joint."""
     unit = np.zeros(G.shape[0])
     unit[packed.rows_of(drive)] = 1.0
-    way = scale * np.linalg.lstsq(G * scale, unit, rcond=1e-9)[0]
-    if np.abs(G @ way - unit).max() > 1e-8:
+    enforced = scale * np.linalg.lstsq(G * scale, unit, rcond=1e-9)[0]
+    if np.abs(G @ enforced - unit).max() > 1e-8:
         raise ModelError("the other joints do not let this drive move.", where=drive)
-    return way
+    return enforced
 
 
 def _checked(frequencies: npt.ArrayLike) -> Array:
@@ -140,7 +142,7 @@ def _solved(around: Linearization, f: Array, load: Array) -> Array:
     size = np.sqrt(np.maximum(np.abs(np.diagonal(A, axis1=1, axis2=2)), 1e-300))
     scaled = A / size[:, :, None] / size[:, None, :]
     singular = 1 / np.linalg.cond(scaled) if A.shape[1] else np.ones(f.size)
-    if singular.min() < INFINITE:
+    if singular.min() < RECIPROCAL_CONDITION_TOL:
         k = int(np.argmin(singular))
         raise SolverError(
             f"the response at {f[k]:.9g} Hz is infinite: a free motion, or a resonance that "

@@ -31,12 +31,12 @@ def lowest_rate(n, s, dn, ds, radius):
 
 
 @inner
-def rolling_vectors(R, k, W):
+def rolling_vectors(rows, k, W):
     """Direction, normal, wheel axis, gap of the markers and vector to the lowest point of row k."""
-    i, j = R.i[k], R.j[k]
-    a, n = turn(W.E, i, row(R.a, k, 0)), turn(W.E, i, row(R.c, k, 0))
-    s = turn(W.E, j, row(R.b, k, 0))
-    return a, n, s, sub(row(W.P, j, 0), row(W.P, i, 0)), lowest(n, s, R.factor[k, 0])
+    i, j = rows.i[k], rows.j[k]
+    a, n = turn(W.E, i, row(rows.a, k, 0)), turn(W.E, i, row(rows.c, k, 0))
+    s = turn(W.E, j, row(rows.b, k, 0))
+    return a, n, s, sub(row(W.P, j, 0), row(W.P, i, 0)), lowest(n, s, rows.factor[k, 0])
 
 
 @inner
@@ -50,19 +50,19 @@ def gradient_rate(vectors, radius, slide, Oi, Oj):
 
 
 @inner
-def rolling_row(R, k, W):
+def rolling_row(rows, k, W):
     """Residual, gradient and convective term of a row of kind TOUCH or ROLL.
 
     Both have the gradient of the velocity of the touching material point along the direction a:
     for the height this is so because the lowest point is lowest.
     """
-    i, j = R.i[k], R.j[k]
-    vectors = rolling_vectors(R, k, W)
+    i, j = rows.i[k], rows.j[k]
+    vectors = rolling_vectors(rows, k, W)
     a, _, _, gap, down = vectors
     arm = add(gap, down)
     four = (scale(-1.0, a), scale(-1.0, cross(arm, a)), a, cross(down, a))
     slide = sub(row(W.V, j, 0), row(W.V, i, 0))
-    rates = gradient_rate(vectors, R.factor[k, 0], slide, row(W.V, i, 3), row(W.V, j, 3))
+    rates = gradient_rate(vectors, rows.factor[k, 0], slide, row(W.V, i, 3), row(W.V, j, 3))
     W.gamma[k], sliding = 0.0, 0.0
     for side in range(4):
         m, at = (i if side < 2 else j), 3 * (side % 2)
@@ -70,16 +70,16 @@ def rolling_row(R, k, W):
         sliding += dot(four[side], row(W.V, m, at))
         for p in range(3):
             W.g[k, 3 * side + p] = four[side][p]
-    W.value[k] = sliding if R.kind[k] == ROLL else dot(a, arm)
+    W.value[k] = sliding if rows.kind[k] == ROLL else dot(a, arm)
 
 
 @inner
-def rolling_stiffness(R, k, W, c):
+def rolling_stiffness(rows, k, W, c):
     """Add c times the derivative of the gradient of row k to W.Q."""
-    vectors = rolling_vectors(R, k, W)
+    vectors = rolling_vectors(rows, k, W)
     for p in range(12):
         vi, Oi, vj, Oj = unit_twist(p)
-        rates = gradient_rate(vectors, R.factor[k, 0], sub(vj, vi), Oi, Oj)
+        rates = gradient_rate(vectors, rows.factor[k, 0], sub(vj, vi), Oi, Oj)
         for side in range(4):
             for q in range(3):
                 W.Q[3 * side + q, p] += c * rates[side][q]

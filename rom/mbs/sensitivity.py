@@ -17,10 +17,10 @@ from rom.mbs.tangent import Tangent
 from rom.mbs.variation import Instant, instant
 from rom.model import Array
 
-STEP = 1e-4  # of a parameter, relative to its size
+DIFFERENCE_STEP = 1e-4  # of a parameter, relative to its size
 # steps that are tried where the result is a motion, and the relative error that ends the search
-WIDEST, HALVINGS, ENOUGH = 5e-2, 9, 1e-9
-APART = 1e-6  # distance of eigenvalues from which on each has its own derivative
+MAX_STEP, MAX_HALVINGS, ERROR_RTOL = 5e-2, 9, 1e-9
+SEPARATE_RTOL = 1e-6  # distance of eigenvalues from which on each has its own derivative
 Builder = Callable[..., Mechanism]
 Output = Callable[[Mechanism, State], Any]
 
@@ -200,7 +200,7 @@ def _rest(
 
 def _path(build: Builder, values: dict[str, float], name: str, state: State) -> _Path:
     """The equilibria one step of a parameter before and after, by the implicit function theorem."""
-    step = STEP * (abs(values[name]) or 1.0)
+    step = DIFFERENCE_STEP * (abs(values[name]) or 1.0)
     sides = []
     for sign in (-1, 1):
         mechanism = build(**{**values, name: values[name] + sign * step})
@@ -260,7 +260,7 @@ def _vectors(E: Array, linear: Linearization, k: int) -> tuple[complex, Array, A
     s, every = linear.eigenvalues[k], linear.eigenvalues
     others = np.delete(every, k)
     near = np.abs(others - s).min(initial=np.inf)
-    if near < APART * np.abs(every).max():
+    if near < SEPARATE_RTOL * np.abs(every).max():
         raise ModelError(
             f"two eigenvalues are equal ({abs(s):.6g} rad/s): neither has a derivative of its own.",
             hint="Let the parameters break the symmetry a little.",
@@ -278,17 +278,17 @@ def _vectors(E: Array, linear: Linearization, k: int) -> tuple[complex, Array, A
 
 def _rate(E: Array, change: Array, s: complex, x: Array, y: Array) -> complex:
     """Derivative of an eigenvalue."""
-    push = y.conj() @ (s**2 * change[0] + s * change[1] + change[2]) @ x
-    return -push / (y.conj() @ (2 * s * E[0] + E[1]) @ x)
+    projected_change = y.conj() @ (s**2 * change[0] + s * change[1] + change[2]) @ x
+    return -projected_change / (y.conj() @ (2 * s * E[0] + E[1]) @ x)
 
 
 def _ridders(
     result: Callable[..., Any], values: dict[str, float], name: str
 ) -> tuple[Array, float]:
     """Derivative by one parameter, and its estimated relative error."""
-    step = positive("step", WIDEST * (abs(values[name]) or 1.0))
+    step = positive("step", MAX_STEP * (abs(values[name]) or 1.0))
     best, error, last = np.zeros(0), np.inf, None
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         ends = [np.asarray(result(**{**values, name: values[name] + x})) for x in (-step, step)]
         if ends[0].shape != ends[1].shape:
             raise ConfigError(f"the result has another shape for another {name!r}.")
@@ -300,7 +300,7 @@ def _ridders(
                 miss = float(np.abs(better - last[1]).max(initial=0.0)) / size
                 if miss < error:
                     best, error = better, miss
-                if error < ENOUGH or miss > 10 * error:
+                if error < ERROR_RTOL or miss > 10 * error:
                     break
             last = (slope, better)
         else:

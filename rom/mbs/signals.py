@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import RomError, SolverError
-from rom.mbs.foreign import KEPT, ask, real
+from rom.mbs.foreign import KEPT_HINT, ask, real
 from rom.mbs.jumps import Examined
 from rom.model import Array
 
@@ -208,5 +208,5 @@ def first_failure(
     return k, SolverError(
         f"the function of {name!r} gives {table[k, int(np.argmax(bad[k]))].tolist()} at "
         f"t = {t[k]:.9g} s.",
-        hint=KEPT,
+        hint=KEPT_HINT,
     )

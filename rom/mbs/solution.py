@@ -19,7 +19,7 @@ from rom.mbs.signals import sample_all
 from rom.mbs.state import State
 from rom.mbs.tracks import Tracks, follow
 from rom.model import Array
-from rom.notebook import listed, shown
+from rom.notebook import html_table, listed
 from rom.rotation import matrix
 
 
@@ -112,7 +112,7 @@ class Solution:
             *plain,
             *happened,
         ]
-        return shown(f"Motion. {self.status}", ("", ""), rows)
+        return html_table(f"Motion. {self.status}", ("", ""), rows)
 
     def at(self, t: Any) -> "Solution":
         """The motion at other times, with everything that can be asked of a solution.
@@ -207,8 +207,8 @@ class Solution:
         if recovery.inertial is not None:
             at, A = self._start_of(body, velocity=True), matrix(self.orientation(body)[instant])
             a = self.a[instant, at : at + 6 + part.r]
-            lift = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
-            moving = recovery.accelerations(lift, a[3:6], self.omega(body)[instant], a[6:])
+            a_minus_g = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
+            moving = recovery.accelerations(a_minus_g, a[3:6], self.omega(body)[instant], a[6:])
         found: Array = recovery.field(q, moving)
         return found
 
@@ -284,8 +284,8 @@ class Solution:
     def _start_of(self, body: str, *, velocity: bool = False) -> int:
         if body not in self.packed.names:
             raise ConfigError(f"no body {body!r}; the mechanism has {sorted(self.packed.names)}.")
-        B = self.packed.system.bodies
-        starts = B.v_at if velocity else B.q_at
+        bodies = self.packed.system.bodies
+        starts = bodies.v_at if velocity else bodies.q_at
         return int(starts[self.packed.names.index(body)])
 
     def _track(self, body: str, place: Any) -> Tracks:

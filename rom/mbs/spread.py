@@ -58,9 +58,9 @@ def spread_residuals(s, W, q, v):
         put(W.residual, t + 3, scale(-1.0, moment))
         W.power[1] += dot(force, vec(v, t)) + dot(moment, vec(v, t + 3))
         for j in range(s.bodies.r[b]):
-            push = a * trace(seen(L.shapes[k, j], A, world), 0)
-            W.residual[t + 6 + j] -= push
-            W.power[1] += push * v[t + 6 + j]
+            modal_force = a * trace(seen(L.shapes[k, j], A, world), 0)
+            W.residual[t + 6 + j] -= modal_force
+            W.power[1] += modal_force * v[t + 6 + j]
 
 
 @inner

@@ -19,21 +19,21 @@ from rom.mbs.compiled import inner
 from rom.mbs.motion import evaluate
 
 # corrections of the velocities at the end of a step; each gains a digit or more
-PASSES = 8
+MAX_CORRECTIONS = 8
 
 
 @inner
 def velocity_gaps(s, W, out):
     """Velocities with which the constraints are violated; `evaluate` first."""
-    R = s.rows
-    for k in range(R.kind.size):
+    rows = s.rows
+    for k in range(rows.kind.size):
         out[k] = 0.0
-        for side, m in enumerate((R.i[k], R.j[k], R.k[k], R.l[k])):
+        for side, m in enumerate((rows.i[k], rows.j[k], rows.k[k], rows.l[k])):
             if m >= 0:
                 for p in range(6):
                     out[k] += W.g[k, 6 * side + p] * W.V[m, p]
-        if R.signal[k] >= 0:
-            out[k] -= W.signal[R.signal[k], 1]
+        if rows.signal[k] >= 0:
+            out[k] -= W.signal[rows.signal[k], 1]
 
 
 @inner
@@ -43,19 +43,19 @@ def close_gaps(s, W, n, rank, lead):
     for i in range(n):
         W.rhs[i] = 0.0
     for k in range(W.part.size):
-        rest = lead * W.part[k] - W.value[k]
-        W.part[k] = 0.0 if s.rows.kind[k] == ROLL else rest
+        residual = lead * W.part[k] - W.value[k]
+        W.part[k] = 0.0 if s.rows.kind[k] == ROLL else residual
     solve_bordered(s, W, rank, W.delta, W.dlam)
 
 
 @inner
-def fit_velocities(s, W, T, rank):
+def fit_velocities(s, W, step, rank):
     """Remove the velocity gaps that the last correction left, to round-off."""
-    h, _, gamma, alpha_m, alpha_f = T.method
+    h, _, gamma, alpha_m, alpha_f = step.method
     c = (1 - alpha_m) / ((1 - alpha_f) * gamma * h)
-    n, last = T.v1.size, math.inf
-    for _ in range(PASSES):
-        evaluate(s, W, T.q1, T.v1)
+    n, last = step.v1.size, math.inf
+    for _ in range(MAX_CORRECTIONS):
+        evaluate(s, W, step.q1, step.v1)
         velocity_gaps(s, W, W.part)
         total = 0.0
         for k in range(W.part.size):
@@ -68,5 +68,5 @@ def fit_velocities(s, W, T, rank):
             W.rhs[i] = 0.0
         solve_bordered(s, W, rank, W.delta, W.dlam)
         for i in range(n):
-            T.v1[i] += W.delta[i]
-            T.vd1[i] += c * W.delta[i]
+            step.v1[i] += W.delta[i]
+            step.vd1[i] += c * W.delta[i]

@@ -9,7 +9,7 @@ from rom.mbs import alpha
 from rom.mbs.alpha import Step
 from rom.mbs.arrays import ROLL, Work
 from rom.mbs.bordered import factorised, gradient_times, least_motion
-from rom.mbs.motion import evaluate, linearise, moved
+from rom.mbs.motion import evaluate, linearize_constraints, retract
 from rom.mbs.multistep import multistep_coefficients
 from rom.mbs.record import Record, Settings
 from rom.mbs.signals import sample_all
@@ -61,16 +61,16 @@ def begin(
         state = replace(state, algorithmic=before)
     copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
     count, work = np.zeros(10, dtype=np.int64), np.zeros(3)
-    count[alpha.ASKS], count[alpha.BOTH] = bool(forces), settings.both
+    count[alpha.USES_LAWS], count[alpha.BOTH_LEVELS] = bool(forces), settings.both
     power = _power(record, W, state, forces)
     past = np.zeros((2, weights.size - 2, n))
-    T = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
+    step = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
     if goes_on:
-        recall(state.memory, W, T)
+        recall(state.memory, W, step)
     if goes_on and settings.begun:
         W.base[:] = state.base
-        go_on(state.memory, T)
-    return T, state if goes_on else replace(state, memory=None)
+        go_on(state.memory, step)
+    return step, state if goes_on else replace(state, memory=None)
 
 
 def _method(settings: Settings, h: float) -> tuple[Array, Array]:
@@ -99,7 +99,7 @@ def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Arr
 
 def across(record: Record, W: Work, state: State, shift: Array) -> Array:
     """The part of a velocity, or of each column, that changes the gaps of the constraints."""
-    linearise(record.packed.system, W, state.q, state.v)
+    linearize_constraints(record.packed.system, W, state.q, state.v)
     if record.packed.by_blocks:
         return _across_by_blocks(record, W, shift)
     A = W.G @ np.linalg.solve(W.S, W.G.T)
@@ -120,37 +120,41 @@ def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
     return out.T.reshape(shift.shape)
 
 
-def remember(settings: Settings, W: Work, T: Step, steps: int) -> Memory:
+def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
     """All that the next step depends on and the state does not tell."""
     names = (*FACTOR, "factor" if W.by_blocks[0] else "lu")
     arrays = {name: getattr(W, name).copy() for name in names}
-    arrays["method"], arrays["bdf"] = T.method.copy(), T.bdf.copy()
-    arrays["before"], arrays["psi"], arrays["past"] = T.a.copy(), T.psi.copy(), T.past.copy()
-    arrays["count"] = T.count[[alpha.LAST, alpha.FRESH]]
-    arrays["work"], arrays["lost"] = T.work.copy(), T.lost.copy()
-    arrays["counts"] = T.count[list(SINCE)]
+    arrays["method"], arrays["bdf"] = step.method.copy(), step.bdf.copy()
+    arrays["before"], arrays["psi"], arrays["past"] = (
+        step.a.copy(),
+        step.psi.copy(),
+        step.past.copy(),
+    )
+    arrays["count"] = step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]]
+    arrays["work"], arrays["lost"] = step.work.copy(), step.lost.copy()
+    arrays["counts"] = step.count[list(SINCE)]
     origin = settings.t_start if settings.origin is None else settings.origin
     return Memory(settings.kind, settings.h, origin, settings.taken + steps, arrays)
 
 
-def recall(memory: Memory, W: Work, T: Step) -> None:
+def recall(memory: Memory, W: Work, step: Step) -> None:
     """Go on with the factorisation of an earlier run that `fits`."""
-    T.a[:], T.psi[:] = memory.arrays["before"], memory.arrays["psi"]
-    T.past[:] = memory.arrays.get("past", T.past)
+    step.a[:], step.psi[:] = memory.arrays["before"], memory.arrays["psi"]
+    step.past[:] = memory.arrays.get("past", step.past)
     for name in (*FACTOR, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
-    T.count[[alpha.LAST, alpha.FRESH]] = memory.arrays["count"]
+    step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]] = memory.arrays["count"]
 
 
-def go_on(memory: Memory, T: Step) -> None:
+def go_on(memory: Memory, step: Step) -> None:
     """Count steps and works on from those of a run that was interrupted."""
-    T.work[:], T.lost[:] = memory.arrays["work"], memory.arrays["lost"]
-    T.count[list(SINCE)] = memory.arrays["counts"]
+    step.work[:], step.lost[:] = memory.arrays["work"], memory.arrays["lost"]
+    step.count[list(SINCE)] = memory.arrays["counts"]
 
 
-def copied(T: Step) -> Step:
+def copied(step: Step) -> Step:
     """A step memory of its own with the same content."""
-    return Step(*(x.copy() for x in T))
+    return Step(*(x.copy() for x in step))
 
 
 def fits(memory: Memory | None, method: Array, weights: Array) -> bool:
@@ -211,7 +215,7 @@ def accelerated(
     system = record.packed.system
     signals_at(record, W, state.t + shift)
     q = np.empty_like(state.q)
-    moved(system, state.q, shift * state.v + shift**2 * (state.a / 2 + shift * jerk / 6), q)
+    retract(system, state.q, shift * state.v + shift**2 * (state.a / 2 + shift * jerk / 6), q)
     later = replace(state, q=q, v=state.v + shift * (state.a + shift * jerk / 2))
     evaluate(system, W, later.q, later.v)
     apply_laws(forces, W, state.t + shift)

@@ -10,7 +10,7 @@ from rom.arguments import typed
 from rom.errors import ModelError, RomWarning, SolverError
 from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.bordered import factorised, gradient_times, least_motion, mass_diagonal, weigh
-from rom.mbs.motion import evaluate, linearise, moved, rates
+from rom.mbs.motion import evaluate, linearize_constraints, rates, retract
 from rom.mbs.packing import Packed
 from rom.mbs.signals import first_failure, sample_all
 from rom.model import Array, Integers
@@ -111,7 +111,7 @@ def _start(packed: Packed, signal: Array, t: float) -> State:
 
 def _independent(packed: Packed, W: Work, q: Array) -> bool:
     """Whether the elimination by blocks meets no joint that could repeat others."""
-    linearise(packed.system, W, q, np.zeros(packed.v.size))
+    linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
     weigh(packed.system, W, _weights(packed, W))
     return bool(factorised(packed.system, W, RANK_TOLERANCE**1.5))
 
@@ -141,11 +141,11 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
     scale, held = packed.row_scale, np.flatnonzero(packed.system.rows.kind != ROLL)
     weight = None
     for _ in range(MAX_ASSEMBLY):
-        linearise(packed.system, W, q, v)
+        linearize_constraints(packed.system, W, q, v)
         weight = _weights(packed, W) if weight is None else weight
         step = -_least_change(packed, W, W.value, weight, held)
         largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
-        moved(packed.system, q.copy(), _limited(packed, step), q)
+        retract(packed.system, q.copy(), _limited(packed, step), q)
         if largest < 1e-15 or not np.isfinite(largest):
             break
         if largest < 1e-12 and np.abs(W.value / scale).max() < 1e-14:
@@ -178,12 +178,12 @@ def _check_gap(packed: Packed, gap: Array) -> None:
 
 def _weights(packed: Packed, W: Work) -> Array:
     """(n,) inverse square root of what a unit of each velocity coordinate costs."""
-    B = packed.system.bodies
+    bodies = packed.system.bodies
     mass = np.zeros(packed.v.size)
     mass_diagonal(packed.system, W, mass)
-    for b, t in enumerate(B.v_at):
+    for b, t in enumerate(bodies.v_at):
         mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
-        mass[t + 6 : t + 6 + B.r[b]] *= ELASTIC_WEIGHT
+        mass[t + 6 : t + 6 + bodies.r[b]] *= ELASTIC_WEIGHT
     return 1 / np.sqrt(mass)
 
 
@@ -212,7 +212,7 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
     """
     if not W.value.size:
         return v.copy()
-    linearise(packed.system, W, q, v)
+    linearize_constraints(packed.system, W, q, v)
     weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
     now, size, every = np.zeros_like(wanted), np.zeros_like(wanted), np.arange(wanted.size)
     for _ in range(2):  # the second pass removes the round-off of the first
@@ -241,7 +241,7 @@ def _prescribed(packed: Packed, W: Work, derivative: int) -> Array:
 
 def _singular(packed: Packed, W: Work, q: Array) -> tuple[Array, Array]:
     """Left singular vectors (m, m) and relative singular values of the scaled constraints."""
-    linearise(packed.system, W, q, np.zeros(packed.v.size))
+    linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
     A = W.G * _weights(packed, W)
     norms = np.linalg.norm(A, axis=1)
     A = A / np.where(norms > 0, norms, 1.0)[:, None]
@@ -299,7 +299,7 @@ def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
     step = weight * free.sum(axis=0)
     reach = max(_largest_turn(packed, step), 1e-300)
     beside = np.empty_like(q)
-    moved(packed.system, q, step * (1e-2 / reach), beside)
+    retract(packed.system, q, step * (1e-2 / reach), beside)
     try:
         beside = assembled(packed, W, beside)
     except ModelError:
@@ -314,7 +314,7 @@ def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
 
 
 def _largest_turn(packed: Packed, step: Array) -> float:
-    B: Any = packed.system.bodies
-    turns = [np.linalg.norm(step[t + 3 : t + 6]) for t in B.v_at]
-    shifts = [np.linalg.norm(step[t : t + 3]) / packed.length for t in B.v_at]
+    bodies: Any = packed.system.bodies
+    turns = [np.linalg.norm(step[t + 3 : t + 6]) for t in bodies.v_at]
+    shifts = [np.linalg.norm(step[t : t + 3]) / packed.length for t in bodies.v_at]
     return float(max(*turns, *shifts))

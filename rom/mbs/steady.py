@@ -13,12 +13,13 @@ from rom.mbs.arrays import ROLL
 from rom.mbs.frames import chosen, small_motions
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.state import State, initial_state, with_accelerations
-from rom.mbs.variation import PROBE, Instant, consistent, difference, instant
+from rom.mbs.variation import DIFFERENCE_STEP, Instant, consistent, difference, instant
 from rom.model import Array
 
-CHANGES = 1e-3  # share by which the equations lead out of the constraints, if they change in time
-NOISE = 3e-4  # growth that counts as none, relative to the speed; multiple zeros come by its root
-RANK = 1e-9  # relative singular value of constraints that repeat others
+# share by which the equations lead out of constraints that change in time
+CONSTRAINT_RATE_RTOL = 1e-3
+GROWTH_RATE_RTOL = 3e-4  # of the speed: multiple zeros are computed to the root of round-off
+RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 
 
 @typed
@@ -41,7 +42,7 @@ class SteadyMotion:
     def stable(self) -> bool:
         """Whether no deviation grows exponentially."""
         size = max(self.rate, float(np.abs(self.eigenvalues).max(initial=0.0)))
-        return bool(self.eigenvalues.real.max(initial=0.0) <= NOISE * size)
+        return bool(self.eigenvalues.real.max(initial=0.0) <= GROWTH_RATE_RTOL * size)
 
 
 @typed
@@ -84,7 +85,7 @@ def steady_motion(
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
     world = chosen(frame, now.packed.names)
     state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
-    size = now.probe() / PROBE
+    size = now.probe() / DIFFERENCE_STEP
     rate = _rate(state, size)
     both = np.concatenate([size, size * rate])
     motions = small_motions(now.packed.system, state, world)
@@ -93,7 +94,7 @@ def steady_motion(
     N = _null_space(B)
     reduced = N.T @ A @ N
     away = np.abs(A @ N - N @ reduced).max(initial=0.0)
-    if away > CHANGES * max(rate, np.abs(reduced).max(initial=0.0)):
+    if away > CONSTRAINT_RATE_RTOL * max(rate, np.abs(reduced).max(initial=0.0)):
         warnings.warn(
             f"the motion is not steady: its linear equations leave the constraints by {away:.2g} "
             "1/s; these eigenvalues are those of one instant.",
@@ -156,4 +157,4 @@ def _null_space(B: Array) -> Array:
         return np.eye(B.shape[1])
     norms = np.linalg.norm(B, axis=1)
     _, s, V = np.linalg.svd(B / np.where(norms > 0, norms, 1.0)[:, None])
-    return V[int((s > RANK * s[0]).sum()) :].T
+    return V[int((s > RANK_RTOL * s[0]).sum()) :].T

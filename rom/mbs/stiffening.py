@@ -23,16 +23,16 @@ def contract_moment(T, x, at, r, out):
 
 
 @inner
-def bent_integrals(B, W, b, q, v):
+def bent_integrals(bodies, W, b, q, v):
     """Add the second order to W.SP, W.Ct and W.J (before its trace), set W.Td and W.T1d."""
-    f, r, at, vt = B.flex[b], B.r[b], B.q_at[b], B.v_at[b]
+    f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
     J, moment, spread = W.J[b], W.Ta, W.T1a
-    contract_moment(B.T[f], q, at + 7, r, moment)
-    contract_moment(B.T[f], v, vt + 6, r, W.Td[b])
+    contract_moment(bodies.T[f], q, at + 7, r, moment)
+    contract_moment(bodies.T[f], v, vt + 6, r, W.Td[b])
     spread[:] = 0.0
     W.T1d[b] = 0.0
-    contract(B.T1[f], q, at + 7, r, W.line, spread)
-    contract(B.T1[f], v, vt + 6, r, W.line, W.T1d[b])
+    contract(bodies.T1[f], q, at + 7, r, W.line, spread)
+    contract(bodies.T1[f], v, vt + 6, r, W.line, W.T1d[b])
     for k in range(r):
         for i in range(3):
             W.Ct[b, i, k] += moment[k, i]
@@ -62,14 +62,14 @@ def bent_twist(W, b, r, v, vt):
 
 
 @inner
-def bent_stiffness(B, W, b, v, a, c, S):
+def bent_stiffness(bodies, W, b, v, a, c, S):
     """Add what the second order adds to the columns of the elastic coordinates."""
-    f, r, t = B.flex[b], B.r[b], B.v_at[b]
+    f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
     w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
-    lift = mtv(A, sub(vec(a, t), vec(B.gravity, 0)))
-    contract_moment(B.T[f], a, t + 6, r, W.Ta)
+    a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
+    contract_moment(bodies.T[f], a, t + 6, r, W.Ta)
     W.T1a[:] = 0.0
-    contract(B.T1[f], a, t + 6, r, W.line, W.T1a)
+    contract(bodies.T1[f], a, t + 6, r, W.line, W.T1a)
     for l in range(r):
         e, spread = 6 + l, W.T1d[b, l]
         force = add(row(W.Ta, l, 0), scale(2.0, cross(w, row(W.Td[b], l, 0))))
@@ -77,6 +77,6 @@ def bent_stiffness(B, W, b, v, a, c, S):
         spin = sub(scale(trace(spread, 0), w), transposed_times(spread, w))
         place(S, 3, e, c, add(dual(W.T1a[l], 0), scale(2.0, spin)))
         for k in range(r):
-            s = B.T1[f, l, 9 * k : 9 * k + 9]
-            push = dot(row(B.T[f], l, 3 * k), lift) + dot(dw, dual(s, 0))
-            S[6 + k, e] += c * (push + dot(w, times(s, w)) - dot(w, w) * trace(s, 0))
+            s = bodies.T1[f, l, 9 * k : 9 * k + 9]
+            inertia = dot(row(bodies.T[f], l, 3 * k), a_minus_g) + dot(dw, dual(s, 0))
+            S[6 + k, e] += c * (inertia + dot(w, times(s, w)) - dot(w, w) * trace(s, 0))

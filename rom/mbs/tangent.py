@@ -10,10 +10,11 @@ from rom.mbs.state import State
 from rom.mbs.variation import Instant, free_motions, of_unit_mass
 from rom.model import Array
 
-TURN, SHIFT = 0.3, 0.3  # largest rotation [rad] and displacement [sizes] of one correction
+MAX_ROTATION = 0.3  # of one correction [rad]
+MAX_DISPLACEMENT = 0.3  # of one correction, of the mechanism's size
 # stiffness that counts as none, relative to the largest one and to that of the loads: differences
 # leave 1e-11 of the latter
-NONE, FAINT = 1e-13, 1e-9
+STIFFNESS_RTOL, LOAD_STIFFNESS_RTOL = 1e-13, 1e-9
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,18 @@ class Tangent:
 
     def none(self, squares: Array) -> float:
         """Stiffness that counts as none."""
-        return max(NONE * np.abs(squares).max(initial=0.0), FAINT * self.pull, 1e-300)
+        return max(
+            STIFFNESS_RTOL * np.abs(squares).max(initial=0.0),
+            LOAD_STIFFNESS_RTOL * self.pull,
+            1e-300,
+        )
 
     @property
     def faint(self) -> float:
         """Force per root of mass, in a free motion, that counts as none."""
-        return FAINT * self.pull * self.now.packed.length * np.sqrt(self.now.packed.mass)
+        return (
+            LOAD_STIFFNESS_RTOL * self.pull * self.now.packed.length * np.sqrt(self.now.packed.mass)
+        )
 
     def driven(self) -> Array | None:
         """(n,) free motion that forces drive and no stiffness opposes, if there is one."""
@@ -116,4 +123,6 @@ def sizes(packed: Packed, step: Array) -> tuple[float, float]:
         bend = step[at + 6 : at + 6 + r] * np.sqrt(modal / mass)
         shifts.append(float(np.linalg.norm(bend)) / packed.length)
     turn, shift = max(turns), max(shifts)
-    return float(max(turn, shift)), float(1 / max(1.0, turn / TURN, shift / SHIFT))
+    return float(max(turn, shift)), float(
+        1 / max(1.0, turn / MAX_ROTATION, shift / MAX_DISPLACEMENT)
+    )

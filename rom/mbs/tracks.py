@@ -76,14 +76,14 @@ def track(s, W, motion, marker, rows, out):
 
 
 @inner
-def body_momentum(B, W, b, q, v, out):
+def body_momentum(bodies, W, b, q, v, out):
     """Add linear momentum, and angular momentum about the world origin, of body b."""
-    t, r, A = B.v_at[b], B.r[b], W.A[b]
+    t, r, A = bodies.v_at[b], bodies.r[b], W.A[b]
     w, d, u = vec(v, t + 3), vec(W.d[b], 0), mtv(A, vec(v, t))
-    linear = add(scale(B.mass[b], u), add(cross(w, d), vec(W.dd[b], 0)))
+    linear = add(scale(bodies.mass[b], u), add(cross(w, d), vec(W.dd[b], 0)))
     angular = add(cross(d, u), mv(W.J[b], w))
     for k in range(r):
         angular = add(angular, scale(v[t + 6 + k], dual(W.SP[b, k], 0)))
     p = mv(A, linear)
     put(out, 0, p)
-    put(out, 3, add(mv(A, angular), cross(vec(q, B.q_at[b]), p)))
+    put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))

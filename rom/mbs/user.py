@@ -11,7 +11,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.packing import Packed
 from rom.model import Array
 
-PAIR = "two vectors of three numbers: force and moment"
+PAIR_TEXT = "two vectors of three numbers: force and moment"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Law:
         others = () if self.j < 0 else (motion_of(W, self.j),)
         what = f"user force {self.name!r}"
         answer = ask(what, t, self.function, t, a, *others)
-        force, moment = numbers(what, t, answer, (2, 3), PAIR)
+        force, moment = numbers(what, t, answer, (2, 3), PAIR_TEXT)
         W.user[self.i, :3] += force
         W.user[self.i, 3:] += moment
         for other in others:

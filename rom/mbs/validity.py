@@ -13,7 +13,7 @@ from rom.mbs.solution import Solution
 from rom.model import Array
 
 # of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
-DEFORMATION = 0.1
+MAX_DEFORMATION = 0.1
 
 
 def warn_of_limits(solution: Solution) -> None:
@@ -30,7 +30,7 @@ def warn_of_limits(solution: Solution) -> None:
                 "force has used up the stiffness of a body without geometric stiffness, which this "
                 "one lacks: its deformation is wrong. Reduce it with stiffening=True."
             )
-        if bent > DEFORMATION:
+        if bent > MAX_DEFORMATION:
             _warn(
                 f"body {name!r} deformed by {bent:.2g} of its size and left the range of small "
                 "elastic deformation; its motion is no longer to be trusted. Divide it into "

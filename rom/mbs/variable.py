@@ -18,7 +18,7 @@ from rom.mbs.alpha import Step
 from rom.mbs.arrays import Work, workspace
 from rom.mbs.ending import kept_before_the_end
 from rom.mbs.implicit import counts, failed_step, space
-from rom.mbs.record import FIRST, OF, Record, of, standing_at
+from rom.mbs.record import FIRST_STEP_RATIO, RUN_KEY, Record, of, standing_at
 from rom.mbs.signals import sampled
 from rom.mbs.starting import (
     accelerated,
@@ -34,18 +34,17 @@ from rom.mbs.user import apply_laws, laws
 from rom.model import Array
 
 # a step is at most so much longer or shorter than the last, and aims below the tolerance
-LONGER, SHORTER, AIM = 2.0, 0.2, 0.8
+MAX_STEP_GROWTH, MIN_STEP_GROWTH, ERROR_AIM = 2.0, 0.2, 0.8
 # errors of early steps grow on the way to the end
-MARGIN = 3.0
-# a longer step is worth a new factorisation from here on
-WORTH = 1.3
+ERROR_MARGIN = 3.0
+MIN_WORTHWHILE_GROWTH = 1.3  # of a step that justifies a new factorisation
 # smallest step relative to the duration
-SMALLEST = 1e-12
+MIN_STEP_RATIO = 1e-12
 # what a step changes and a rejected one gives back
 CHANGED = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
 # what a run remembers beside its step memory, whose arrays have this in front of their names
 NUMBERS = ("h", "before", "fastest", "shortest", "longest", "rejected", "uneven")
-STEP = "step."
+STEP_PREFIX = "step."
 
 
 def increment(turns: Any, h: float, left: tuple[Array, Array], right: tuple[Array, Array]) -> Array:
@@ -83,10 +82,10 @@ class _Run:
         self.beside = workspace(record.packed.system, len(record.packed.signals))
         self.state, self.bdf, self.uneven = state, record.settings.method == "bdf", False
         bare = replace(state, memory=None)
-        self.T, start = begin(record, W, bare, self.forces, FIRST * self.duration)
+        self.T, start = begin(record, W, bare, self.forces, FIRST_STEP_RATIO * self.duration)
         self.old = self.T._replace(**{name: getattr(self.T, name).copy() for name in CHANGED})
         self.out, self.base = space(W, self.T, 1), W.base.copy()
-        self.h = self.before = FIRST * self.duration
+        self.h = self.before = FIRST_STEP_RATIO * self.duration
         self.fastest, self.rejected = record.packed.length / self.duration, 0
         self.shortest, self.longest = np.inf, 0.0
         self.jerk, self.next = np.zeros_like(state.v), start
@@ -98,12 +97,12 @@ class _Run:
     def remembered(self) -> Memory:
         """All that the next step depends on and the state does not tell."""
         record, memory = self.record, remember(self.record.settings, self.W, self.T, 0)
-        steps = {STEP + name: x.copy() for name, x in self.T._asdict().items()}
+        steps = {STEP_PREFIX + name: x.copy() for name, x in self.T._asdict().items()}
         arrays = memory.arrays | steps
         arrays["numbers"] = np.array([getattr(self, name) for name in NUMBERS], dtype=float)
         # joint coordinates are followed apart from those of the saved instants
         arrays["jerk"], arrays["base"] = self.jerk.copy(), self.W.base.copy()
-        arrays[OF] = of(record.final)
+        arrays[RUN_KEY] = of(record.final)
         taken = int(self.T.count[alpha.STEPS])
         return replace(memory, h=self.h, origin=record.settings.t_start, taken=taken, arrays=arrays)
 
@@ -112,7 +111,7 @@ class _Run:
         arrays = state.memory.arrays
         recall(state.memory, self.W, self.T)
         for name in Step._fields:
-            getattr(self.T, name)[:] = arrays[STEP + name]
+            getattr(self.T, name)[:] = arrays[STEP_PREFIX + name]
         for name, x in zip(NUMBERS, arrays["numbers"], strict=True):
             setattr(self, name, float(x))
         self.rejected, self.uneven = int(self.rejected), bool(self.uneven)
@@ -135,10 +134,10 @@ class _Run:
             if error > 1.0:
                 self.reject(answer, error, t)
         self.accept(t)
-        factor = min(AIM / np.sqrt(max(error, 1e-6)), LONGER)
+        factor = min(ERROR_AIM / np.sqrt(max(error, 1e-6)), MAX_STEP_GROWTH)
         if self.record.stopped or t >= end:
             return
-        if factor > WORTH or factor < AIM:
+        if factor > MIN_WORTHWHILE_GROWTH or factor < ERROR_AIM:
             self.prepare(factor * self.h)
         elif self.bdf and self.uneven:
             self.prepare(self.h)
@@ -146,33 +145,35 @@ class _Run:
 
     def attempt(self, t: float) -> int:
         """Take the step to a time; says how it went."""
-        T, W, settings, packed = self.T, self.W, self.record.settings, self.record.packed
+        step, W, settings, packed = self.T, self.W, self.record.settings, self.record.packed
         for name in CHANGED:
-            getattr(self.old, name)[:] = getattr(T, name)
+            getattr(self.old, name)[:] = getattr(step, name)
         self.base[:] = W.base
         times = np.array([t])
         h = settings.spacing
         table, failure = sampled(packed.signals, times, settings.span, h, h)
         if failure is not None:
             raise failure
-        T.count[alpha.BEGAN], rank = T.count[alpha.STEPS], self.record.final.rank
-        answer = alpha.ASK
-        while answer == alpha.ASK:
+        step.count[alpha.STEPS_BEFORE], rank = step.count[alpha.STEPS], self.record.final.rank
+        answer = alpha.NEEDS_LAWS
+        while answer == alpha.NEEDS_LAWS:
             clock = perf_counter()
-            answer = alpha.advance(packed.system, W, T, rank, table, 1, self.out)
+            answer = alpha.advance(packed.system, W, step, rank, table, 1, self.out)
             self.record.compiled += perf_counter() - clock
-            if answer == alpha.ASK:
+            if answer == alpha.NEEDS_LAWS:
                 apply_laws(self.forces, W, t)
         return answer
 
     def error(self) -> float:
         """Error of the step just taken, relative to length and speed."""
-        T, last, now, h = self.T, self.record.final, self.next, self.h
+        step, last, now, h = self.T, self.record.final, self.next, self.h
         turns = self.record.packed.system.bodies.v_at + 3
-        shift = T.psi - increment(turns, h, (last.v, last.a), (now.v, now.a))
+        shift = step.psi - increment(turns, h, (last.v, last.a), (now.v, now.a))
         change = now.v - last.v - h / 2 * (last.a + now.a)
         self.fastest = max(self.fastest, self.length(now.v))
-        return MARGIN * max(self.length(shift) / T.size[1], self.length(change) / self.fastest)
+        return ERROR_MARGIN * max(
+            self.length(shift) / step.size[1], self.length(change) / self.fastest
+        )
 
     def length(self, x: Array) -> float:
         """Length of a change of velocities or coordinates, weighted by mass."""
@@ -190,8 +191,8 @@ class _Run:
         self.W.base[:] = self.base
         self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]] = spent
         self.rejected += 1
-        h = self.h * max(SHORTER, AIM / np.sqrt(error))
-        if h < SMALLEST * self.duration:
+        h = self.h * max(MIN_STEP_GROWTH, ERROR_AIM / np.sqrt(error))
+        if h < MIN_STEP_RATIO * self.duration:
             why = f"its error is {error:.3g} times the tolerance"
             if answer != alpha.CONVERGED:
                 why = failed_step(self.record, self.W, self.T, answer, t).message
@@ -205,52 +206,55 @@ class _Run:
 
     def prepare(self, h: float) -> None:
         """Let the next step have another length."""
-        T = self.T
-        if T.count[alpha.STEPS] == 0:
-            spent = T.count.copy()
+        step = self.T
+        if step.count[alpha.STEPS] == 0:
+            spent = step.count.copy()
             fresh, _ = begin(self.record, self.W, self.state, self.forces, h)
             for name in (*CHANGED, "method", "bdf"):
-                getattr(T, name)[:] = getattr(fresh, name)
-            T.count[:] = spent
+                getattr(step, name)[:] = getattr(fresh, name)
+            step.count[:] = spent
         elif self.bdf:
-            T.method[:], T.bdf[:] = alpha.bdf_coefficients(h, self.before)
+            step.method[:], step.bdf[:] = alpha.bdf_coefficients(h, self.before)
             self.uneven = h != self.before
         else:
-            T.a[:] += (T.method[3] - T.method[4]) * (h - self.h) * self.jerk
-            T.method[0] = h
+            step.a[:] += (step.method[3] - step.method[4]) * (h - self.h) * self.jerk
+            step.method[0] = h
             self.reset_across()
-        T.count[alpha.FRESH], self.h = 0, h
+        step.count[alpha.HAS_FACTOR], self.h = 0, h
 
     def reset_across(self) -> None:
         """Begin anew across the constraints, where another length of steps would excite them."""
-        record, W, T, now = self.record, self.beside, self.T, self.record.final
-        h = T.method[0]
-        lag, shift = T.method[3] - T.method[4], shift_ahead(record, now, T.method, self.jerk)
+        record, W, step, now = self.record, self.beside, self.T, self.record.final
+        h = step.method[0]
+        lag, shift = (
+            step.method[3] - step.method[4],
+            shift_ahead(record, now, step.method, self.jerk),
+        )
         wanted = (now.v + h**2 * shift, now.a + lag * h * self.jerk, now.a)
-        present = (T.v, T.a, T.vd)
+        present = (step.v, step.a, step.vd)
         change = across(record, W, now, (np.array(wanted) - np.array(present)).T)
         for x, y in zip(present, change.T, strict=True):
             x += y
 
     def consistent(self, t: float) -> State:
         """The present instant with velocities, accelerations and multipliers that fit."""
-        T, rank = self.T, self.record.final.rank
+        step, rank = self.T, self.record.final.rank
         self.beside.base[:] = self.base
         signals_at(self.record, self.beside, t)
-        v = fitting_velocity(self.record.packed, self.beside, T.q, T.v)
-        state = State(t, T.q.copy(), v, T.vd, T.lam, rank, None, self.base)
-        at_rest = np.zeros_like(T.v)
+        v = fitting_velocity(self.record.packed, self.beside, step.q, step.v)
+        state = State(t, step.q.copy(), v, step.vd, step.lam, rank, None, self.base)
+        at_rest = np.zeros_like(step.v)
         return accelerated(self.record, self.beside, state, self.forces, 0.0, at_rest)
 
     def accept(self, t: float) -> None:
         """Go on from the new instant."""
-        record, T, state = self.record, self.T, self.next
+        record, step, state = self.record, self.T, self.next
         self.jerk, self.before = (state.a - record.final.a) / self.h, self.h
         self.shortest, self.longest = min(self.shortest, self.h), max(self.longest, self.h)
-        record.counts = counts(T) | {"rejected": self.rejected}
+        record.counts = counts(step) | {"rejected": self.rejected}
         record.counts |= {"shortest": self.shortest, "longest": self.longest}
-        saved = np.array([T.count[alpha.STEPS] % record.settings.save_every == 0])
-        row = (state.q, state.v, state.a, state.lam, T.work.copy(), state.base)
+        saved = np.array([step.count[alpha.STEPS] % record.settings.save_every == 0])
+        row = (state.q, state.v, state.a, state.lam, step.work.copy(), state.base)
         out = tuple(x[None] for x in row)
         if record.watch and kept_before_the_end(
             record, self.beside, self.forces, np.array([t]), out, saved

@@ -9,7 +9,7 @@ from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.arrays import ROLL, Work, workspace
 from rom.mbs.compiled import kernel
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, linearise, moved, residual, tangents
+from rom.mbs.motion import evaluate, linearize_constraints, residual, retract, tangents
 from rom.mbs.packing import Packed, pack
 from rom.mbs.signals import first_failure, sample_all
 from rom.mbs.state import State, fitting_velocity, with_accelerations
@@ -17,11 +17,11 @@ from rom.mbs.user import Law, MotorLaw, apply_laws, laws
 from rom.model import Array
 
 # central differences: rotations in rad, displacements in sizes of the mechanism
-PROBE = 1e-5
-SPACING = 1e-6  # of the differences of drives [s]
+DIFFERENCE_STEP = 1e-5
+DIFFERENCE_SPACING = 1e-6  # of drives [s]
 ELASTIC_TURN = 1e-4  # rotation of a marker by deformation, up to which tangents are exact [rad]
-GAP = 1e-7  # of a joint, relative to the size of the mechanism
-MISS = 1e-3  # of the velocities; what a time integration leaves is far below
+GAP_RTOL = 1e-7  # of the mechanism's size
+VELOCITY_RTOL = 1e-3  # a time integration leaves far less
 
 
 @kernel
@@ -85,7 +85,7 @@ class Instant:
 
     def gradient(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
         """(m,) gaps of the constraints, their gradient (m, n), and the mass matrix (n, n)."""
-        linearise(self.packed.system, self.W, q, v)
+        linearize_constraints(self.packed.system, self.W, q, v)
         return self.W.value.copy(), self.W.G.copy(), self.W.S.copy()
 
     def damping(self, state: State) -> Array:
@@ -132,23 +132,23 @@ class Instant:
     def reactions(self, state: State) -> Array:
         """(n, m) derivative of the residual by the multipliers; friction may depend on them."""
         q, v, a = state.q, state.v, state.a
-        step = np.full(state.lam.size, PROBE * np.abs(state.lam).max(initial=0.0) or 1.0)
+        step = np.full(state.lam.size, DIFFERENCE_STEP * np.abs(state.lam).max(initial=0.0) or 1.0)
         return difference(lambda d: self.residual(q, v, a, state.lam + d), step)
 
     def shifted(self, q: Array, delta: Array) -> Array:
         """(n_q,) coordinates q after the small motion delta (n,)."""
         out = np.empty_like(q)
-        moved(self.packed.system, q, np.ascontiguousarray(delta), out)
+        retract(self.packed.system, q, np.ascontiguousarray(delta), out)
         return out
 
     def probe(self) -> Array:
         """(n,) small motion of each coordinate for differences."""
-        B, length = self.packed.system.bodies, self.packed.length
-        step = np.full(self.packed.v.size, PROBE)
-        for b, at in enumerate(B.v_at):
-            r, mass = B.r[b], B.mass[b]
+        bodies, length = self.packed.system.bodies, self.packed.length
+        step = np.full(self.packed.v.size, DIFFERENCE_STEP)
+        for b, at in enumerate(bodies.v_at):
+            r, mass = bodies.r[b], bodies.mass[b]
             step[at : at + 3] *= length
-            modal = np.diag(B.M[B.flex[b]])[:r]
+            modal = np.diag(bodies.M[bodies.flex[b]])[:r]
             step[at + 6 : at + 6 + r] *= length * np.sqrt(mass / modal)
         return step
 
@@ -172,7 +172,7 @@ def instant(mechanism: Any, t: float) -> Instant:
         raise ConfigError(f"t = {t!r} is no time.")
     packed = pack(mechanism, whole=True)
     W = workspace(packed.system, len(packed.signals))
-    table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), SPACING)
+    table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), DIFFERENCE_SPACING)
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
@@ -200,11 +200,11 @@ def consistent(now: Instant, state: Any) -> State:
         W.base[:] = state.base
     value, G, _ = now.gradient(state.q, state.v)
     rolls = packed.system.rows.kind == ROLL
-    _check(packed, np.where(rolls, 0.0, value) / packed.row_scale, GAP, "stays open by")
+    _check(packed, np.where(rolls, 0.0, value) / packed.row_scale, GAP_RTOL, "stays open by")
     v = fitting_velocity(packed, W, state.q, state.v)
     size = (np.abs(G) @ np.maximum(np.abs(v), np.abs(state.v))).max(initial=0.0)
     if size > 0.0:
-        _check(packed, G @ (v - state.v) / size, MISS, "contradicts the velocities by")
+        _check(packed, G @ (v - state.v) / size, VELOCITY_RTOL, "contradicts the velocities by")
     state = replace(state, v=v, t=now.t)
     now.evaluate(state.q, state.v)
     return with_accelerations(packed, W, state)

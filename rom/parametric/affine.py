@@ -17,7 +17,7 @@ from rom.model import Array, FEModel, Region
 from rom.parameters import Density, Parameter, Point, factors
 from rom.workflow import mesh_operators
 
-EMPTY = 1e-12  # share of mass and stiffness below which all belongs to named regions
+REMAINDER_RTOL = 1e-12  # share of mass and stiffness below which all belongs to named regions
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +127,8 @@ class AffineModel:
         ops = self.ops
         first, K = ops.first // 3, symmetric(ops.gram(E, ops.apply_K(E)))
         points = self.model.points[first : first + ops.n_local // 3]
-        rest = inertia_integrals(ops, points, E)
-        mass, stiffness = rest.mass, np.trace(K)
+        remainder = inertia_integrals(ops, points, E)
+        mass, stiffness = remainder.mass, np.trace(K)
         for name, region in self.regions.items():
             part: Any = RegionOperators(ops, region)
             integrals = inertia_integrals(part, points, E)
@@ -139,10 +139,10 @@ class AffineModel:
                 None if stress is None else _stress(region.stresses, self.model, E),
             )
             yield share
-            rest, K = weighted(np.array([1, -1]), [rest, integrals]), K - share.K
+            remainder, K = weighted(np.array([1, -1]), [remainder, integrals]), K - share.K
             stress = None if stress is None else stress - share.stress
-        if rest.mass > EMPTY * mass or np.trace(K) > EMPTY * stiffness:
-            yield Share(None, rest, K, stress)
+        if remainder.mass > REMAINDER_RTOL * mass or np.trace(K) > REMAINDER_RTOL * stiffness:
+            yield Share(None, remainder, K, stress)
         if self.model.attachments:
             yield Share(None, self._carried(E), np.zeros_like(K), None, fixed=True)
 

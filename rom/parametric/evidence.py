@@ -69,8 +69,8 @@ def certified(
             if table["full"]:
                 found += frequency_rows(support, table, tol)
             elif table["estimated"]:
-                said = f"{support}: estimated error of {len(table['reduced'])} frequencies"
-                found.append(row(said, max(table["estimated"]), tol))
+                label = f"{support}: estimated error of {len(table['reduced'])} frequencies"
+                found.append(row(label, max(table["estimated"]), tol))
         found += rigid_rows(ops, body, elastic_part(ops, Psi))
         rows += [replace(line, quantity=f"{where}: {line.quantity}") for line in found]
     return Report(f"certificate of the family {family.body.name}", tuple(rows)), comparison

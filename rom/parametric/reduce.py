@@ -33,9 +33,9 @@ from rom.reduction.method import Method
 from rom.reduction.samples import CommonBasis, first_sample
 
 log = logging.getLogger("rom")
-SMALL = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy
-TRIALS = 2  # points per parameter at which errors are estimated while the basis grows
-METHOD = 2.0  # times the error of the method at the centre is no reason for another point
+SHAPE_RATIO = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy
+TRIALS_PER_PARAMETER = 2  # points at which errors are estimated while the basis grows
+METHOD_ERROR_FACTOR = 2.0  # times the error at the centre, which more points do not reduce
 
 
 @typed
@@ -123,7 +123,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         return family
     certificate, comparison = certified(
         affine, family, connection, common.basis, interfaces, tol,
-        first=1 + TRIALS * len(affine.moving),
+        first=1 + TRIALS_PER_PARAMETER * len(affine.moving),
     )  # fmt: skip
     return replace(
         family, certificate=certificate, provenance=provenance | {"comparison": comparison}
@@ -151,9 +151,9 @@ def _common_basis(
     """The bases of the centre, of the corners, and of trial points whose errors are too large."""
     boundary = connection.boundary
     basis = method.basis(connection.ops, boundary, connection.labels)
-    common = first_sample(connection.ops, basis, boundary, SMALL * np.sqrt(tol))
+    common = first_sample(connection.ops, basis, boundary, SHAPE_RATIO * np.sqrt(tol))
     samples, moving = [centre(affine.parameters)], affine.moving
-    limit = max(tol, METHOD * estimated(connection, basis)) if moving else tol
+    limit = max(tol, METHOD_ERROR_FACTOR * estimated(connection, basis)) if moving else tol
     for ops, moved in affine.rigid_samples():
         common = common.with_shapes(connect(ops, moved, kinds).ops.rigid, boundary)
 
@@ -169,7 +169,7 @@ def _common_basis(
 
     for point in corners(affine.parameters, moving):
         visit(point, whatever=True)
-    trials = scattered(affine.parameters, TRIALS * len(moving))
+    trials = scattered(affine.parameters, TRIALS_PER_PARAMETER * len(moving))
     added = [visit(point, whatever=False) for point in trials]
     if affine.ops.first == 0:
         log.info("%d points sampled, %d of them trials; %d columns", len(samples), sum(added),

@@ -19,10 +19,10 @@ from rom.parametric.affine import AffineModel, RegionOperators, symmetric
 from rom.reduction.characteristic import GivenFunctions
 from rom.reduction.polynomial import orthonormal_in
 
-BESIDE = 1e-6  # of the extent, by which regions may overlap along the axis
-APART = 1e-9  # share of mass and stiffness that may lie outside all regions
-NOTHING = 1e-9  # of the extent: arms of rotations that are round-off
-RIGID = 1e-6  # relative distance of rigid motions from the basis that is still accepted
+OVERLAP_RTOL = 1e-6  # of the extent, by which regions may overlap along the axis
+REMAINDER_RTOL = 1e-9  # share of mass and stiffness that may lie outside all regions
+ARM_RTOL = 1e-9  # of the extent: round-off of the arms of rotations
+RIGID_RTOL = 1e-6  # distance of rigid motions from the basis that is still accepted
 
 
 class StretchedModel(AffineModel):
@@ -60,7 +60,7 @@ class StretchedModel(AffineModel):
         for other, layered in self.layered.items():
             for low, high in layered.layers if other != name else ():
                 for a, b in self.layered[name].layers:
-                    if min(b, high) - max(a, low) > BESIDE * extent:
+                    if min(b, high) - max(a, low) > OVERLAP_RTOL * extent:
                         raise ParameterError(
                             f"region {name!r} is no layer of its own: {other!r} lies beside it "
                             f"from {max(a, low):g} to {min(b, high):g} m.",
@@ -120,7 +120,7 @@ class StretchedModel(AffineModel):
         """Orthonormal; rotations of every field on their own."""
         motions = np.hstack(self.stretch.motions(face.points))
         size = np.linalg.norm(motions, axis=0)
-        real = size > NOTHING * np.ptp(self.model.points) * size[0]  # a face at x = 1e-17 has none
+        real = size > ARM_RTOL * np.ptp(self.model.points) * size[0]  # a face at x = 1e-17 has none
         S = kron(face.surface_mass, identity(3), format="csr")
         return GivenFunctions(orthonormal_in(S, motions[:, real]))
 
@@ -177,7 +177,7 @@ class StretchedModel(AffineModel):
         gap, size = (
             np.sqrt(np.diag(ops.gram(A, ops.apply_M(A))).max()) for A in (R - Phi @ C, ops.rigid)
         )
-        if gap > RIGID * size:
+        if gap > RIGID_RTOL * size:
             raise ModelError(f"the basis misses a rigid motion of a stretched body by {gap:.1e}.")
         return C
 
@@ -188,7 +188,7 @@ class StretchedModel(AffineModel):
         M = sum(np.einsum("aakk->k", s.integrals.S_kl)[first:].sum() for s in shares)
         for A, found in ((ops.apply_K(E), K), (ops.apply_M(E), M)):
             whole = np.trace(ops.gram(E, A))
-            if abs(whole - found) > APART * whole:
+            if abs(whole - found) > REMAINDER_RTOL * whole:
                 raise ParameterError(
                     f"the regions {sorted(self.regions)} are not the whole model, whose thickness "
                     "is to change."

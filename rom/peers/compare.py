@@ -21,7 +21,7 @@ CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rom"
 ENVIRONMENT = CACHE / "peers"
 N_MODES = 20
 RBE3_DOFS = 40_000  # beyond, Exudyn's rbe3 runs out of memory
-SAME = 1e-6  # relative difference of frequencies that are the same model's
+FREQUENCY_RTOL = 1e-6  # difference of frequencies of the same model
 SCRIPT = Path(__file__).with_name("craig_bampton.py")
 
 
@@ -44,7 +44,13 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
             theirs = answer_of([python, str(SCRIPT), file, program, "rbe2", str(N_MODES)])
             yield case, f"{program} over rom", theirs["seconds"] / ours["processor"], "", aim
             gap = np.abs(np.array(theirs["frequencies"]) / ours["frequencies"] - 1).max()
-            yield case, f"{program}: difference of ten frequencies", gap, "", f"below {SAME:g}"
+            yield (
+                case,
+                f"{program}: difference of ten frequencies",
+                gap,
+                "",
+                f"below {FREQUENCY_RTOL:g}",
+            )
         if ours["dofs"] <= RBE3_DOFS:
             mean = answer_of([*rod, "rbe3", str(N_MODES)])
             theirs = answer_of([python, str(SCRIPT), file, "exudyn", "rbe3", str(N_MODES)])

@@ -38,7 +38,7 @@ def stiff(points: Any, interfaces: list[Any]) -> tuple[csr_matrix, int]:
     n = points.size
     gone = np.concatenate([(3 * nodes[:, None] + np.arange(3)).ravel() for nodes in interfaces])
     kept = np.setdiff1d(np.arange(n), gone)
-    rest = coo_matrix((np.ones(kept.size), (kept, np.arange(kept.size))), shape=(n, kept.size))
+    selection = coo_matrix((np.ones(kept.size), (kept, np.arange(kept.size))), shape=(n, kept.size))
     blocks = []
     for nodes in interfaces:
         x = points[nodes] - points[nodes].mean(axis=0)
@@ -50,7 +50,7 @@ def stiff(points: Any, interfaces: list[Any]) -> tuple[csr_matrix, int]:
         dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
         rows, columns = np.repeat(dofs, 6), np.tile(np.arange(6), dofs.size)
         blocks.append(coo_matrix((R.ravel(), (rows, columns)), shape=(n, 6)))
-    return csr_matrix(vstack([rest.T, *(block.T for block in blocks)]).T), kept.size
+    return csr_matrix(vstack([selection.T, *(block.T for block in blocks)]).T), kept.size
 
 
 def by_scipy(K: Any, M: Any, points: Any, interfaces: list[Any], n_modes: int, solver: str) -> Any:

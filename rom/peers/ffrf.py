@@ -27,7 +27,7 @@ from exudyn.FEM import FEMinterface, ObjectFFRFreducedOrderInterface  # noqa: E4
 
 FREE = {"revolute": [1, 1, 1, 1, 1, 0], "point_on_line": [1, 1, 0, 0, 0, 0]}  # about or along z
 PRISMATIC = [0, 1, 1, 1, 1, 1]  # along x
-DENSE = 150  # unknowns below which a dense factor is the faster one
+MAX_DENSE_UNKNOWNS = 150  # a dense factor is the faster one up to here
 
 
 class Body:
@@ -133,7 +133,9 @@ class Model:
         settings.displayStatistics = settings.displayComputationTime = False
         n = self.mbs.systemData.ODE2Size() + self.mbs.systemData.AEsize()
         kind = exu.LinearSolverType
-        settings.linearSolver.solverType = kind.EXUdense if n < DENSE else kind.EigenSparse
+        settings.linearSolver.solverType = (
+            kind.EXUdense if n < MAX_DENSE_UNKNOWNS else kind.EigenSparse
+        )
         start = process_time()
         self.mbs.SolveDynamic(settings)
         seconds = process_time() - start

@@ -36,7 +36,7 @@ CASE: dict[str, Any] = {
     "diameter": 0.1, "length": 0.05, "clearance": 1e-4, "viscosity": 0.03, "speed": 300.0,
     "groove_deg": 20, "cells": (53, 8), "guess": (0.5, -0.7),
 }  # fmt: skip
-SOMMERFELD, TIMES = 0.580, 20
+SOMMERFELD_NUMBER, N_REPEATS = 0.580, 20
 
 Row = tuple[str, str, float, str, str]
 
@@ -47,7 +47,7 @@ def two_groove() -> tuple[JournalBearing, float]:
     grooves = [Groove(angle, np.radians(CASE["groove_deg"])) for angle in (0.0, np.pi)]
     bearing = JournalBearing(*size, grooves, cells=(120, 8))
     film = CASE["viscosity"] * CASE["speed"] / (2 * np.pi) * size[0] * size[1]
-    return bearing, film / SOMMERFELD * (size[0] / 2 / size[2]) ** 2
+    return bearing, film / SOMMERFELD_NUMBER * (size[0] / 2 / size[2]) ** 2
 
 
 def coefficients_compared() -> Iterator[Row]:
@@ -60,10 +60,10 @@ def coefficients_compared() -> Iterator[Row]:
     kept = {"speed": CASE["speed"], "viscosity": CASE["viscosity"]}
     equilibrium(bearing, (0.0, -load), **kept)
     start = process_time()
-    for _ in range(TIMES):
+    for _ in range(N_REPEATS):
         film = equilibrium(bearing, (0.0, -load), **kept)
         K, C = coefficients(film)
-    ours = (process_time() - start) / TIMES
+    ours = (process_time() - start) / N_REPEATS
     yield case, "rom, rest and coefficients", 1e3 * ours, "ms of the processor", ""
     yield case, "rom, coefficients off Lund and Thomsen", off(K, C), "", "below 0.03"
     command = [interpreter(ENVIRONMENT, PACKAGES), str(SCRIPT), json.dumps(CASE | {"load": load})]
@@ -100,8 +100,8 @@ def gear_unit(cells: tuple[int, int] = (120, 8), torque: float = 300.0) -> Trans
     pair = replace(pair, centre_distance=pair.distance + 1e-4)
     z, load, rotors = np.linspace(0.0, 0.2, 5), np.pi / 2 - pair.alpha, list[Rotor]()
     wheels = ((0.104, load + np.pi, (0.05, 0.025, 5e-5)), (0.628, -load, (0.09, 0.06, 8e-5)))
-    for outer, way, size in wheels:
-        grooves = [Groove(way + side * np.pi / 2, np.radians(20)) for side in (1, -1)]
+    for outer, angle, size in wheels:
+        grooves = [Groove(angle + side * np.pi / 2, np.radians(20)) for side in (1, -1)]
         held = JournalBearing(*size, grooves, cells=cells)
         wheel = Disc.of_ring(2, outer=outer, inner=size[0], width=0.04)
         rotors.append(Rotor(Shaft(z, size[0], [wheel]), 2, {0: held, 4: held}))

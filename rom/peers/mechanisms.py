@@ -22,19 +22,19 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 Described = dict[str, Any]
-X, Y, Z, NONE = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]
+X, Y, Z, ORIGIN = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]
 
 
 def pendulum(body: FlexibleBody, gravity: float = 9.81, spin: float = 0.0) -> Described:
     """A bar along x on a ball joint, released level; spin [rad/s] about the vertical y."""
-    link = _link(body, NONE)
+    link = _link(body, ORIGIN)
     root = body.markers["root"].point
     link["omega"] = [0.0, spin, 0.0]
     link["velocity"] = [-spin * root[2], 0.0, spin * root[0]]
     return {
         "gravity": [0.0, -gravity, 0.0],
         "bodies": {"bar 0": link},
-        "joints": [["hook", "spherical", ["ground", NONE], ["bar 0", "root"], None]],
+        "joints": [["hook", "spherical", ["ground", ORIGIN], ["bar 0", "root"], None]],
         "watch": ["bar 0", "tip"],
     }
 
@@ -43,7 +43,7 @@ def chain(body: FlexibleBody, links: int, gravity: float = 9.81) -> Described:
     """Equal bars on hinges about z, released level."""
     reach = _span(body)
     names = [f"bar {k}" for k in range(links)]
-    ends = [["ground", NONE], *([name, "tip"] for name in names[:-1])]
+    ends = [["ground", ORIGIN], *([name, "tip"] for name in names[:-1])]
     return {
         "gravity": [0.0, -gravity, 0.0],
         "bodies": {name: _link(body, (k * reach).tolist()) for k, name in enumerate(names)},
@@ -72,16 +72,16 @@ def slider_crank(
     turn = spin / float(reach[0])  # the small end does not go sideways
     rod["velocity"] = [turn * root[1], pin[1] - turn * root[0], 0.0]
     rod["omega"] = [0.0, 0.0, turn]
-    crank = _rigid(heavy, radius, NONE, {"o": NONE, "pin": [radius, 0.0, 0.0]})
+    crank = _rigid(heavy, radius, ORIGIN, {"o": ORIGIN, "pin": [radius, 0.0, 0.0]})
     crank["omega"] = [0.0, 0.0, speed]
     end = (np.array([radius, 0.0, 0.0]) + reach).tolist()
-    slider = _rigid(light, radius, end, {"o": NONE})
+    slider = _rigid(light, radius, end, {"o": ORIGIN})
     slider["velocity"] = [-turn * float(reach[1]), 0.0, 0.0]
     return {
         "gravity": [0.0, -9.81, 0.0],
         "bodies": {"crank": crank, "rod": rod, "slider": slider},
         "joints": [
-            ["main", "revolute", ["ground", NONE], ["crank", "o"], Z],
+            ["main", "revolute", ["ground", ORIGIN], ["crank", "o"], Z],
             ["crank pin", "revolute", ["crank", "pin"], ["rod", "root"], Z],
             ["wrist pin", "point_on_line", ["slider", "o"], ["rod", "tip"], Z],
             ["guide", "prismatic", ["ground", end], ["slider", "o"], X],
@@ -109,7 +109,7 @@ def _rigid(
     mass: float, radius: float, at: list[float], markers: dict[str, list[float]]
 ) -> dict[str, Any]:
     """A rigid body at rest with the inertia of a wheel of that radius about any axis."""
-    still = {"velocity": NONE, "omega": NONE}
+    still = {"velocity": ORIGIN, "omega": ORIGIN}
     return {
         "mass": mass,
         "inertia": [mass * radius**2 / 2] * 3,
@@ -121,7 +121,7 @@ def _rigid(
 def _link(body: FlexibleBody, start: list[float]) -> dict[str, Any]:
     """A bar at rest whose root is at ``start``."""
     at = start - body.markers["root"].point
-    return {"at": at.tolist(), "velocity": NONE, "omega": NONE}
+    return {"at": at.tolist(), "velocity": ORIGIN, "omega": ORIGIN}
 
 
 def _span(body: FlexibleBody) -> Array:

@@ -31,9 +31,9 @@ from rom.workflow import reduce
 
 SCRIPT = Path(__file__).with_name("ffrf.py")
 ENDS = ("root", "tip")
-H = 2.5e-4  # step of the pendulum and the slider-crank [s]; of chains four times that
-TIMED = 4000  # steps timed here, over the number of bodies
-SAME = 1e-5  # difference of paths relative to the size of the mechanism
+TIME_STEP = 2.5e-4  # of the pendulum and the slider-crank [s]; four times that for chains
+N_TIMED_STEPS = 4000  # over the number of bodies
+PATH_RTOL = 1e-5  # of the mechanism's size
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def by_rom(body: FlexibleBody, run: Run) -> Moved:
         "save_every": run.steps // run.samples,
     }
     path = simulate(mech, t_end=run.t_end, **options).position(*run.mechanism["watch"])
-    steps = max(run.steps, TIMED // len(run.mechanism["bodies"]))
+    steps = max(run.steps, N_TIMED_STEPS // len(run.mechanism["bodies"]))
     setup, whole = (
         min(_seconds(mech, n * dt, options) for _ in range(run.times)) for n in (1, steps)
     )
@@ -141,11 +141,11 @@ def measured(
     for lc in meshes:
         model = with_all_nodes(rod(lc))
         body = reduced(model)
-        runs = {"pendulum": Run(chain(body, 1), 400 * H, 400, times=3)}
+        runs = {"pendulum": Run(chain(body, 1), 400 * TIME_STEP, 400, times=3)}
         if lc == meshes[0]:
             crank = slider_crank(body, 0.04, 60.0)
-            runs["slider-crank"] = Run(crank, 400 * H, 400, times=3)
-            runs |= {f"chain of {k}": Run(chain(body, k), 800 * H, 200) for k in links}
+            runs["slider-crank"] = Run(crank, 400 * TIME_STEP, 400, times=3)
+            runs |= {f"chain of {k}": Run(chain(body, k), 800 * TIME_STEP, 200) for k in links}
         yield from _compared(model, body, runs)
 
 
@@ -180,7 +180,7 @@ def _compared(
         yield case, "rom", ours.rate, "steps/s", ""
         yield case, "rom over Exudyn", ours.rate / theirs.rate, "", aim
         apart = np.abs(ours.positions - theirs.positions).max() / _reach(run.mechanism, body)
-        yield case, "difference of paths", apart, "of the size", f"below {SAME:g}"
+        yield case, "difference of paths", apart, "of the size", f"below {PATH_RTOL:g}"
 
 
 def _reach(mechanism: Described, body: FlexibleBody) -> float:

@@ -15,15 +15,15 @@ import numpy as np
 from rom import rotation
 from rom.child import scratch
 from rom.components.cosserat import Rod, body
-from rom.components.wind_turbine import BLADES, RATED, VISCOSITY, blade, ramp, run_up, stations
+from rom.components.wind_turbine import N_BLADES, RATED, VISCOSITY, blade, ramp, run_up, stations
 from rom.mbs.integrate import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 from rom.peers.compare import answer_of, interpreter
 
 SCRIPT = Path(__file__).with_name("beams.py")
-RISE, DT, RHO, SAMPLES = 20.0, 0.02, 0.9, 200
-FINE = 192  # segments of the blade whose lag is the reference
+RISE_TIME, TIME_STEP, RHO_INF, N_SAMPLES = 20.0, 0.02, 0.9, 200
+N_REFERENCE_SEGMENTS = 192  # of the blade whose lag is the reference
 FROM_SECTION = [2, 0, 1]  # first axis along the beam there, third along the rod here
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -33,11 +33,11 @@ def rotor(segments: int) -> Mechanism:
     mech = Mechanism(gravity=ORIGIN)
     hub = mech.add_rigid("hub", mass=1.0, inertia=(1.0, 1.0, 1.0), at=ORIGIN)
     mech.revolute("shaft", mech.ground.marker(ORIGIN), hub.marker(ORIGIN), axis=(1, 0, 0))
-    speed, angle = ramp(RATED, RISE)
+    speed, angle = ramp(RATED, RISE_TIME)
     mech.drive("motor", "shaft", angle, rate=speed)
     one = body(blade(segments, damped=True))
-    for k in range(BLADES):
-        turn = rotation.exp([2 * np.pi / BLADES * k, 0.0, 0.0])
+    for k in range(N_BLADES):
+        turn = rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0])
         part = mech.add_nonlinear(f"blade {k}", one, orientation=turn)
         root = mech.design_point(part.marker("start"))
         mech.fixed(f"root {k}", hub.marker(root), part.marker("start"))
@@ -46,14 +46,14 @@ def rotor(segments: int) -> Mechanism:
 
 def by_rom(segments: int) -> tuple[float, Array]:
     """Processor time of the steps [s], and (samples + 1, 3) deflection of the first tip."""
-    mech, every = rotor(segments), round(RISE / DT) // SAMPLES
-    options: dict[str, Any] = {"dt": DT, "rho_inf": RHO, "save_every": every}
-    _timed(mech, every * DT, options)  # reads the compiled kernels
-    setup, _ = _timed(mech, every * DT, options)
-    seconds, sol = _timed(mech, RISE, options)
+    mech, every = rotor(segments), round(RISE_TIME / TIME_STEP) // N_SAMPLES
+    options: dict[str, Any] = {"dt": TIME_STEP, "rho_inf": RHO_INF, "save_every": every}
+    _timed(mech, every * TIME_STEP, options)  # reads the compiled kernels
+    setup, _ = _timed(mech, every * TIME_STEP, options)
+    seconds, sol = _timed(mech, RISE_TIME, options)
     last = max(mech.nonlinear["blade 0"].parts, key=lambda part: float(part.at[2]))
     seen = deflection(sol.position(last.name), last.at)
-    return (seconds - setup) * SAMPLES / (SAMPLES - 1), seen
+    return (seconds - setup) * N_SAMPLES / (N_SAMPLES - 1), seen
 
 
 def _timed(mech: Mechanism, t_end: float, options: dict[str, Any]) -> tuple[float, Any]:
@@ -64,8 +64,8 @@ def _timed(mech: Mechanism, t_end: float, options: dict[str, Any]) -> tuple[floa
 
 def deflection(tip: Array, home: Array) -> Array:
     """(k, 3) positions of a tip [m] as seen from the rotor, less its place at rest."""
-    t = np.linspace(0.0, RISE, len(tip))
-    angle = ramp(RATED, RISE)[1]
+    t = np.linspace(0.0, RISE_TIME, len(tip))
+    angle = ramp(RATED, RISE_TIME)[1]
     back = [rotation.matrix(rotation.exp([-angle(s), 0.0, 0.0])) for s in t]
     return np.array([A @ x - home for A, x in zip(back, tip, strict=True)])
 
@@ -73,9 +73,11 @@ def deflection(tip: Array, home: Array) -> Array:
 def by_exudyn(segments: int) -> tuple[float, Array, str]:
     """The same by Exudyn, and its version."""
     described = {
-        "blades": [beams(blade(segments, azimuth=2 * np.pi / BLADES * k)) for k in range(BLADES)],
-        "final": RATED, "rise": RISE, "t_end": RISE, "steps": round(RISE / DT),
-        "samples": SAMPLES, "rho_inf": RHO,
+        "blades": [
+            beams(blade(segments, azimuth=2 * np.pi / N_BLADES * k)) for k in range(N_BLADES)
+        ],
+        "final": RATED, "rise": RISE_TIME, "t_end": RISE_TIME,
+        "steps": round(RISE_TIME / TIME_STEP), "samples": N_SAMPLES, "rho_inf": RHO_INF,
     }  # fmt: skip
     with scratch("peers") as folder:
         file = folder / "rotor.json"
@@ -117,17 +119,21 @@ def _segment_masses(rod: Rod) -> list[float]:
 
 def measured(segments: int = 48) -> Iterator[tuple[str, str, float, str, str]]:
     """Case, quantity, value, unit and aim of each figure; see `rom.bench.rods`."""
-    case = f"run-up, {BLADES} blades, {round(RISE / DT)} steps"
-    fine = run_up(blade(FINE, damped=True), t_end=RISE, dt=DT).tip[:, 1].max()
+    case = f"run-up, {N_BLADES} blades, {round(RISE_TIME / TIME_STEP)} steps"
+    fine = (
+        run_up(blade(N_REFERENCE_SEGMENTS, damped=True), t_end=RISE_TIME, dt=TIME_STEP)
+        .tip[:, 1]
+        .max()
+    )
     theirs, beam, version = by_exudyn(segments)
     yield case, f"Exudyn {version}, {segments} elements", theirs, "s of the processor", ""
     error = abs(np.abs(beam[:, 1]).max() / fine - 1)
-    yield case, f"their lag against {FINE} segments", error, "", ""
+    yield case, f"their lag against {N_REFERENCE_SEGMENTS} segments", error, "", ""
     for n, aim in ((segments, "below 0.01"), (2 * segments, "below 0.002")):
         seconds, tip = by_rom(n)
         yield case, f"rom, {n} segments", seconds, "s of the processor", ""
         yield case, f"Exudyn over rom, {n} segments", theirs / seconds, "", "above 1"
         error = abs(np.abs(tip[:, 1]).max() / fine - 1)
-        yield case, f"lag of {n} against {FINE} segments", error, "", aim
+        yield case, f"lag of {n} against {N_REFERENCE_SEGMENTS} segments", error, "", aim
     apart = np.abs(tip - beam).max() / np.abs(tip).max()
     yield case, "difference of the tips", apart, "of the deflection", "below 0.01"

@@ -26,8 +26,8 @@ from rom.reduction.polynomial import FourierLegendre, Polynomial
 from rom.rows import row
 
 N_CHECKED = 3  # lowest modes by which a reduction is judged
-MORE = 2  # times as many modes, among which those of the neighbour are looked for
-COARSE = 1e-3  # relative frequency error that is worth a warning
+MODE_COUNT_FACTOR = 2  # modes computed per mode asked for, to find those of the neighbouring state
+FREQUENCY_RTOL = 1e-3  # error that is worth a warning
 
 
 @typed
@@ -96,7 +96,9 @@ class ReducedSpinUp(SpeedTable):
             for speed, sector in ((self.speeds[0], self.sectors[0]), (self.top, self.sectors[-1]))
             for line in sector.certificate.rows
         ]
-        between = row(f"between states: worst error of {N_CHECKED} frequencies", self.error, COARSE)
+        between = row(
+            f"between states: worst error of {N_CHECKED} frequencies", self.error, FREQUENCY_RTOL
+        )
         return Report("certificate of the spin-up", (*rows, between))
 
     def at(self, speed: float) -> ReducedSector:
@@ -174,7 +176,7 @@ class SpinUp(SpeedTable):
         sectors: list[ReducedSector] = []
         for speed in self.speeds:
             state = self.at(speed)
-            wide = n_modes * (MORE if sectors else 1)
+            wide = n_modes * (MODE_COUNT_FACTOR if sectors else 1)
             Psi, q, omega = _basis(state, float(speed), wide, functions)
             if sectors:
                 Phi = _resembling(Psi[:, 2 * q :], sectors[-1].Psi[:, 2 * q :], state.M)
@@ -182,7 +184,7 @@ class SpinUp(SpeedTable):
             sectors.append(projected(state, Psi, q, omega))
         small = ReducedSpinUp(self.speeds, self.omega, tuple(sectors))
         error = self._error(small)
-        if error > COARSE:
+        if error > FREQUENCY_RTOL:
             warnings.warn(
                 f"reduced frequencies are off by {error:.1e}, judged by the lowest {N_CHECKED} "
                 f"between {self.speeds.size} states: ask for more states or modes.",

@@ -19,9 +19,9 @@ from rom.cyclic.sector import CyclicSector
 from rom.model import Array
 from rom.scipy_operators import SYMMETRIC
 
-ITERATIONS = 25
-CONVERGED = 1e-9  # last increment, of the displacement; the next one is its square
-SHORTEST = 1 / 256  # of a stretch of load, in which a path is followed before giving up
+MAX_ITERATIONS = 25
+INCREMENT_RTOL = 1e-9  # last increment, of the displacement; the next one is its square
+MIN_LOAD_STEP = 1 / 256  # of a stretch of load, at which a path is given up
 
 
 class SteadyRotation:
@@ -74,7 +74,7 @@ class SteadyRotation:
 
     def newton(self, a: Array) -> Array | None:
         """The equilibrium near some displacement; None if it is not found or not stable."""
-        for _ in range(ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             lu = _factor(self.tangent(a)[self.free][:, self.free])
             if lu is None:
                 return None
@@ -84,7 +84,7 @@ class SteadyRotation:
             size, whole = np.linalg.norm(step), np.linalg.norm(a)
             if not np.isfinite(size):
                 return None
-            if size <= CONVERGED * whole:
+            if size <= INCREMENT_RTOL * whole:
                 return a if (lu.U.diagonal() > 0).all() else None
         return None
 
@@ -109,7 +109,7 @@ class SteadyRotation:
             found = self.newton(a + slope * (ahead - now))
             if found is not None:
                 slope, a, now = (found - a) / (ahead - now), found, ahead
-            elif abs(step) > SHORTEST * abs(end - start):
+            elif abs(step) > MIN_LOAD_STEP * abs(end - start):
                 step /= 2
             else:
                 load(now)

@@ -28,7 +28,7 @@ from rom.names import named
 from rom.prestress.heat import Heat
 from rom.scipy_operators import SciPyOperators, negative_count
 
-DEPENDENT = 1e-9  # of the largest: what is left of a motion that others contain
+RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain
 
 
 @typed
@@ -187,7 +187,7 @@ def _pins(motions: Array) -> Index:
     scaled = motions / np.linalg.norm(motions, axis=0)
     R, order = qr(scaled.T, mode="r", pivoting=True)
     size = np.abs(np.diag(R))
-    return np.sort(order[: np.count_nonzero(size > DEPENDENT * size[0])]).astype(np.int64)
+    return np.sort(order[: np.count_nonzero(size > RANK_RTOL * size[0])]).astype(np.int64)
 
 
 def _carried_along(K_geo: csr_matrix, held: Index, R: Array) -> csr_matrix:

@@ -12,7 +12,7 @@ from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes
 from rom.reduction.free_interface import numbered
 
-DENSE = 600  # coordinates whose Lyapunov equation, twice as large, is solved in seconds
+MAX_COORDINATES = 600  # a Lyapunov equation of twice the size is solved in seconds up to here
 
 
 @typed
@@ -144,10 +144,10 @@ def second_order_balanced_truncation(
 def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[Array, Array]:
     """Factors of Gramians: velocity observability S S^T, position controllability R R^T."""
     n = K.shape[0]
-    if n > DENSE:
+    if n > MAX_COORDINATES:
         raise ResourceError(
             f"{n} coordinates make a dense Lyapunov equation of {2 * n}; it is refused above "
-            f"{DENSE}.",
+            f"{MAX_COORDINATES}.",
             hint="Reduce with CraigBampton first, or choose a smaller pool.",
         )
     scale = np.sqrt(np.linalg.norm(np.linalg.solve(M, K), 2))  # of time, for the conditioning

@@ -33,7 +33,8 @@ from rom.reduction.interface import Connection
 
 KINDS = ("macneal", "rubin", "dual")
 SAME_PLACE = 1e-6  # distance of two interfaces, of their distance from the origin, that still meet
-SPENT = 1e-11  # residual flexibility, of the whole one, that is none: the modes describe all of it
+# of the whole one: residual flexibility below is none, the modes describe all
+FLEXIBILITY_RTOL = 1e-11
 Place = tuple[str, str]  # substructure, interface
 
 
@@ -162,10 +163,10 @@ class DualAssembly:
             return K, block_diag(np.eye(len(Lam)), H)
         gamma, Q = np.linalg.eigh(Gamma)
         soft = Q[:, ~hard] / gamma[~hard]
-        push = soft @ (Q[:, ~hard].T @ Psi)  # forces that close the gaps
-        K, M = Lam + Psi.T @ push, np.eye(len(Lam))
+        closing_forces = soft @ (Q[:, ~hard].T @ Psi)  # forces that close the gaps
+        K, M = Lam + Psi.T @ closing_forces, np.eye(len(Lam))
         if kind == "rubin":
-            M = M + push.T @ H @ push
+            M = M + closing_forces.T @ H @ closing_forces
         N = null_space(Q[:, hard].T @ Psi) if hard.any() else np.eye(len(Lam))
         return N.T @ K @ N, N.T @ M @ N
 
@@ -204,7 +205,7 @@ class DualAssembly:
         elastic = np.diag(Lam) > 0
         by_modes = Psi[:, elastic] / np.sqrt(np.diag(Lam)[elastic])
         whole = np.linalg.norm(by_modes @ by_modes.T + Gamma, 2) if Gamma.size else 0.0
-        return np.asarray(np.linalg.eigvalsh(Gamma) < SPENT * whole)
+        return np.asarray(np.linalg.eigvalsh(Gamma) < FLEXIBILITY_RTOL * whole)
 
     def _n_rigid(self, fixed: tuple[Place, ...]) -> int:
         """Rigid motions that couplings and supports leave free."""

@@ -11,8 +11,8 @@ from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index
 from rom.reduction.fixed_interface import constraint_modes, unit_motions
 
-ZERO = 1e-12  # eigenvalue, of a rough vector's Rayleigh quotient, that belongs to a rigid motion
-SPENT = 1e-12  # residual flexibility, of the whole one, that is left to nothing but round-off
+RIGID_RTOL = 1e-12  # eigenvalue of a rigid motion, of a rough vector's Rayleigh quotient
+FLEXIBILITY_RTOL = 1e-12  # of the whole one: residual flexibility below is round-off
 
 
 @typed
@@ -139,7 +139,7 @@ def free_modes(ops: Operators, n_modes: int) -> tuple[Array, Array, Array]:
         i = np.arange(ops.first, ops.first + ops.n_local)
         rough = (np.sin(1.0 + i) * (-1.0) ** i)[:, None]
         K, M = ops.gram(rough, ops.apply_K(rough)), ops.gram(rough, ops.apply_M(rough))
-        n_rigid = int(np.count_nonzero(omega**2 < ZERO * K.item() / M.item()))
+        n_rigid = int(np.count_nonzero(omega**2 < RIGID_RTOL * K.item() / M.item()))
     R = orthonormal(ops, Phi[:, :n_rigid])
     elastic = slice(n_rigid, n_rigid + n_modes)
     return R, omega[elastic], Phi[:, elastic]
@@ -181,7 +181,7 @@ def _attached(ops: Operators, boundary: Index, G: Array) -> Array:
     G_bb = 0.5 * (G_bb + G_bb.T)
     scale = 1 / np.sqrt(np.maximum(np.diag(G_bb), np.finfo(float).tiny))
     lam = np.linalg.eigvalsh(scale[:, None] * G_bb * scale)
-    if lam[0] < SPENT * lam[-1]:
+    if lam[0] < FLEXIBILITY_RTOL * lam[-1]:
         raise InterfaceError(
             f"the residual flexibility of the {boundary.size} boundary dofs is singular "
             f"({lam[0] / lam[-1]:.1e}): the modes kept describe all of it, or dofs depend on "

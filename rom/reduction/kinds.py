@@ -17,7 +17,7 @@ from rom.reduction.snapshots import Snapshots, snapshot_functions
 
 RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
 RECORDS = (Polynomial, FourierLegendre, Snapshots, CharacteristicFunctions)
-KNOWN = (
+KNOWN_KINDS = (
     '"full", "rbe2", "rbe3", rom.Polynomial(order) or "polynomial:3", '
     'rom.FourierLegendre(harmonics, order) or "fourier:3,2", rom.Snapshots(values, n=…)'
 )
@@ -165,4 +165,4 @@ def parsed(name: str, kind: Any) -> Any:
         values = numbers.split(",")
         if family and len(values) == family[1] and all(v.strip().isdecimal() for v in values):
             return family[0](*map(int, values))
-    raise ConfigError(f"interface {name!r} has the kind {kind!r}; known kinds: {KNOWN}.")
+    raise ConfigError(f"interface {name!r} has the kind {kind!r}; known kinds: {KNOWN_KINDS}.")

@@ -11,7 +11,7 @@ from rom.model import Basis, Index
 from rom.reduction.fixed_interface import unit_motions
 from rom.reduction.free_interface import numbered, without_dependent
 
-RESONANT = 1e-8  # relative distance of a frequency from a mode that counts as none
+RESONANCE_RTOL = 1e-8  # distance of a frequency from a mode
 
 
 @typed
@@ -83,7 +83,7 @@ def _refuse_resonance(ops: Operators, held: object, s: float, f: float) -> None:
         X = held(ops.apply_M(X))  # type: ignore[operator]
         X = X / np.sqrt(ops.gram(X, ops.apply_M(X)).item())
     gap = ops.gram(X, ops.apply_K(X)).item() - s
-    if abs(gap) < RESONANT * s:
+    if abs(gap) < RESONANCE_RTOL * s:
         raise SolverError(
             f"{f:g} Hz is a natural frequency of the body with its interfaces held: its answer "
             "there is infinite.",

@@ -124,9 +124,9 @@ def _lowest(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
     if n == n_modes:  # there are no others
         return ops.modes(held, n, finished=True)
     if keep > n_modes and ops.first == 0:
-        said = (
+        message = (
             f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share the "
             f"frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
         )
-        warnings.warn(RomWarning(said), stacklevel=4)
+        warnings.warn(RomWarning(message), stacklevel=4)
     return omega[:keep], Phi[:, :keep]

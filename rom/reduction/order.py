@@ -15,11 +15,11 @@ from rom.reduction.interface import connect
 from rom.reduction.kinds import parsed
 from rom.reduction.method import CraigBampton
 from rom.reduction.polynomial import Polynomial
-from rom.reduction.selection import REACH, SAFETY, reduced_modes
+from rom.reduction.selection import BAND_FACTOR, SAFETY_FACTOR, reduced_modes
 
 log = logging.getLogger("rom")
-HIGHEST = 10  # order beyond which all dofs of an interface are the better choice
-SHIFT = 0.02  # of the first elastic eigenvalue: makes the stiffness of a free body definite
+MAX_ORDER = 10  # beyond it, all dofs of an interface are the better choice
+SHIFT_RATIO = 0.02  # of the first elastic eigenvalue: makes the stiffness of a free body definite
 
 
 def with_orders(
@@ -53,7 +53,7 @@ def with_orders(
         )
     error = _error_in_band(ops, connect(ops, model, interfaces | dict.fromkeys(open_, "full")).ops)
     half, found = replace(method, tol=0.5 * method.tol), np.inf
-    for order in range(1, HIGHEST + 1):
+    for order in range(1, MAX_ORDER + 1):
         kinds = interfaces | dict.fromkeys(open_, Polynomial(order))
         connection = connect(ops, model, kinds)
         basis = half.basis(connection.ops, connection.boundary, connection.labels)
@@ -63,8 +63,8 @@ def with_orders(
         if found <= method.tol:
             return kinds, half
     raise SolverError(
-        f"polynomials of order {HIGHEST} on {open_} leave an estimated error of {found:.1e} up to "
-        f"{method.f_max:g} Hz; asked for was {method.tol:g}.",
+        f"polynomials of order {MAX_ORDER} on {open_} leave an estimated error of {found:.1e} up "
+        f"to {method.f_max:g} Hz; asked for was {method.tol:g}.",
         hint='Use "full" on these interfaces, or a larger tolerance.',
     )
 
@@ -79,10 +79,10 @@ def _error_in_band(ops: Operators, full: Operators) -> Callable[[Array, float], 
         elastic = lam > 1e-9 * lam[-1]
         lam, V = lam[elastic], V[:, elastic]
         if not inverse:  # one factor serves all orders
-            inverse.append(full.hold(np.zeros(0, dtype=np.int64), -SHIFT * lam[0]))
-        near = int(np.searchsorted(lam, (REACH * omega_max) ** 2))
+            inverse.append(full.hold(np.zeros(0, dtype=np.int64), -SHIFT_RATIO * lam[0]))
+        near = int(np.searchsorted(lam, (BAND_FACTOR * omega_max) ** 2))
         eta = residual_errors(ops, inverse[0], Psi @ V[:, :near], seen_in=full)
         inside = lam[:near] <= (1 + 4 * eta) * omega_max**2  # the exact one may be
-        return SAFETY * float(eta[inside].max(initial=0.0))
+        return SAFETY_FACTOR * float(eta[inside].max(initial=0.0))
 
     return error

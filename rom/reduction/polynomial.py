@@ -19,9 +19,9 @@ from rom.arguments import typed, whole
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
 
-DEPENDENT = 1e-9  # share of a function that is new, below which it is dropped
+DEPENDENT_RTOL = 1e-9  # share of a function that is new, below which it is dropped
 ON_AXIS = 1e-6  # distance from an axis, of the size, where the angle about it is round-off
-THIN = 1e-9  # extent of a surface, of its largest one, that counts as none
+EXTENT_RTOL = 1e-9  # extent of a surface that counts as none, of its largest one
 MOST_VALUES = 10**8  # of all functions at all nodes: 0.8 GB
 
 
@@ -112,7 +112,9 @@ def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface
     """
     S, V = interface.surface_mass, kind.functions(interface)
     size = np.sqrt(S.sum())  # of the constant function; all others reach one
-    V = V[:, [_norm(S, v) > DEPENDENT * size for v in V.T]]  # cosines of right angles are round-off
+    V = V[
+        :, [_norm(S, v) > DEPENDENT_RTOL * size for v in V.T]
+    ]  # cosines of right angles are round-off
     Q = orthonormal_in(S, V)
     linear = np.linalg.matrix_rank(_local(interface), tol=1e-6)
     if linear < 2 or Q.shape[1] < 3:
@@ -135,7 +137,7 @@ def orthonormal_in(S: object, V: Array) -> Array:
         for _ in range(2):
             v = v - Q @ (SQ.T @ v)
         after = _norm(S, v)
-        if before == 0.0 or after < DEPENDENT * before or Q.shape[1] == V.shape[0]:
+        if before == 0.0 or after < DEPENDENT_RTOL * before or Q.shape[1] == V.shape[0]:
             continue
         v = v / after
         v = v - Q @ (SQ.T @ v)  # after strong cancellation the second pass is not enough
@@ -171,7 +173,7 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
     e = (e - (e @ axis) * axis) / np.linalg.norm(e - (e @ axis) * axis)
     along = x @ axis - 0.5 * ((x @ axis).max() + (x @ axis).min())
     reach = np.abs(along).max()
-    flat = reach <= THIN * np.ptp(interface.points, axis=0).max()
+    flat = reach <= EXTENT_RTOL * np.ptp(interface.points, axis=0).max()
     across = x @ e, x @ np.cross(axis, e)
     theta = np.arctan2(across[1], across[0])
     theta[np.hypot(*across) < ON_AXIS * np.ptp(interface.points, axis=0).max()] = np.nan
@@ -191,7 +193,7 @@ def _local(interface: Interface) -> Array:
     """
     x = interface.points - _centroid(interface)
     reach = np.abs(x).max(axis=0)
-    thin = reach <= THIN * reach.max()
+    thin = reach <= EXTENT_RTOL * reach.max()
     return np.where(thin, 0.0, x / np.where(thin, 1.0, reach))
 
 

@@ -16,8 +16,8 @@ from rom.eigen import Operators
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
 
-LAST = 0.3  # part of the last normal mode, by size, that is too little to be kept
-NEVER = 1e-7  # size, of its own, below which what is left of a shape is round-off
+LAST_MODE_SHARE = 0.3  # part of the last normal mode, by size, that is too little to be kept
+SHAPE_RTOL = 1e-7  # of a shape's own size: remainders below are round-off
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +51,12 @@ class CommonBasis:
         """
         weight = np.ones(other.Psi.shape[1])
         if other.omega.size:
-            falling = self.small / LAST * (other.omega[-1] / other.omega) ** 2
+            falling = self.small / LAST_MODE_SHARE * (other.omega[-1] / other.omega) ** 2
             weight[-other.omega.size :] = np.minimum(falling, 1.0)
-        return self.with_shapes(other.Psi * weight, boundary, max(self.small, NEVER), weight)
+        return self.with_shapes(other.Psi * weight, boundary, max(self.small, SHAPE_RTOL), weight)
 
     def with_shapes(
-        self, shapes: Array, boundary: Index, small: float = NEVER, weight: Array | float = 1.0
+        self, shapes: Array, boundary: Index, small: float = SHAPE_RTOL, weight: Array | float = 1.0
     ) -> "CommonBasis":
         """With what is new in some shapes.
 

@@ -9,9 +9,10 @@ from rom.eigen import Held, Operators
 from rom.model import Array
 from rom.reduction.enhanced import projected, residual_shapes
 
-REACH = 2.0  # reduced frequencies up to so many times the band may stand for exact ones inside it
-SAFETY = 1.1  # the estimate is asymptotic: among crowded modes it is a little too small
-GROWTH = 1.6  # factor by which the number of modes grows until the band is accurate
+# reduced frequencies up to so many times the band may approximate those inside it
+BAND_FACTOR = 2.0
+SAFETY_FACTOR = 1.1  # the estimate is asymptotic: among crowded modes it is a little too small
+GROWTH_FACTOR = 1.6  # of the number of modes until the band is accurate
 
 
 def enough_modes(
@@ -39,7 +40,7 @@ def enough_modes(
         error = truncation_errors(ops, held, Psi_b, omega, Phi, omega_max)
         if error(m) <= tol or m == held.n_free:
             break
-        m = min(int(np.ceil(GROWTH * m)), held.n_free)
+        m = min(int(np.ceil(GROWTH_FACTOR * m)), held.n_free)
     low, high = 0, m  # error(high) is accepted, or there are no more modes
     while low < high:
         middle = (low + high) // 2
@@ -61,7 +62,7 @@ def truncation_errors(
 
     def error(k: int) -> float:
         lam, V = reduced_modes(K[: n_b + k, : n_b + k], M[: n_b + k, : n_b + k])
-        near = (lam > 1e-9 * lam[-1]) & (lam <= (REACH * omega_max) ** 2)
+        near = (lam > 1e-9 * lam[-1]) & (lam <= (BAND_FACTOR * omega_max) ** 2)
         lam, V = lam[near], V[:, near]
         t, d = np.zeros((2, K.shape[0], lam.size))
         t[: n_b + k] = V
@@ -69,7 +70,7 @@ def truncation_errors(
         d[n_b + m :] = V[:n_b]
         eta = np.abs(_eigenvalue_errors(K, M, t, d * lam, lam))
         inside = lam <= (1 + 2 * eta) * omega_max**2  # the exact one may be, if eta is too small
-        return 0.5 * SAFETY * float(eta[inside].max(initial=0.0))
+        return 0.5 * SAFETY_FACTOR * float(eta[inside].max(initial=0.0))
 
     return error
 

@@ -10,7 +10,7 @@ from rom.eigen import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
 
-NOISE = 1e-9  # singular value, of the size of the snapshots, that is left to round-off
+RANK_RTOL = 1e-9  # singular value of round-off, of the size of the snapshots
 
 
 @typed
@@ -80,7 +80,7 @@ def snapshot_functions(kind: Snapshots, interface: Interface) -> Array:
     X = weighted[1] - R @ (R.T @ weighted[1])
     X = X - R @ (R.T @ X)
     U, sigma, _ = np.linalg.svd(X, full_matrices=False)
-    rank = int(np.count_nonzero(sigma > NOISE * np.linalg.norm(weighted[1])))
+    rank = int(np.count_nonzero(sigma > RANK_RTOL * np.linalg.norm(weighted[1])))
     m = _number(kind, sigma[:rank], interface.name)
     return _per_axis(np.linalg.inv(L.T), np.hstack([R, U[:, :m]]))
 

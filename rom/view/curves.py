@@ -12,13 +12,13 @@ from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view import page
 
-WIDTH, PANEL = 1400, 330  # pixel
+PAGE_WIDTH, PANEL_HEIGHT = 1400, 330  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 MARKERS = ("o", "s", "^", "D", "v", "x")
 GREY = "#5c636e"
-ACROSS = 5  # names in a row of a wide legend
-FEW = 10  # sizes that have room for a tick each
-EXACT = 1e-12  # errors below are drawn there: round-off has no meaning
+LEGEND_COLUMNS = 5  # of a wide legend
+MAX_TICKS = 10  # sizes that have room for a tick each
+MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
 @path_came_first(1, 2, 0)
@@ -60,14 +60,14 @@ def history(
                 look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
                 look |= {"ls": "none", "marker": "o", "ms": 7} if pair else {}
                 axes.plot(factor * x, y, label=name, **look)
-            axes.set_ylabel(label, size=page.BODY)
+            axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(factor * t[0], factor * t[-1])
             if len(curves) > 2:
                 axes.margins(y=0.3)  # room for the legend
             finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
         for axes in areas[:-1]:
             axes.set_xticklabels([])
-        areas[-1].set_xlabel(over or f"time [{unit}]", size=page.BODY)
+        areas[-1].set_xlabel(over or f"time [{unit}]", size=page.BODY_SIZE)
         return page.save(figure, path)
 
 
@@ -98,7 +98,7 @@ def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> 
         longest = 0
         for k, (support, table) in enumerate(comparison.items()):
             full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
-            error = np.maximum(np.abs(reduced / full - 1), EXACT)
+            error = np.maximum(np.abs(reduced / full - 1), MIN_ERROR)
             longest = max(longest, full.size)
             look: dict[str, Any] = {"color": LINES[k % len(LINES)]}
             look["marker"] = MARKERS[k % len(MARKERS)]
@@ -106,8 +106,8 @@ def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> 
             axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
         axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")
         axes.set_xticks(range(1, longest + 1))
-        axes.set_xlabel("elastic mode", size=page.BODY)
-        axes.set_ylabel("relative error", size=page.BODY)
+        axes.set_xlabel("elastic mode", size=page.BODY_SIZE)
+        axes.set_ylabel("relative error", size=page.BODY_SIZE)
         finish(axes, legend=True)
         return page.save(figure, path)
 
@@ -144,14 +144,14 @@ def convergence(
                 if x.shape != y.shape:
                     raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
                 look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
-                axes.loglog(x, np.maximum(np.abs(y), EXACT), label=name, **look)
-            axes.set_ylabel(label, size=page.BODY)
+                axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
+            axes.set_ylabel(label, size=page.BODY_SIZE)
             _near_ticks(axes)
             finish(axes, legend=True)
         _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
         for axes in areas[:-1]:
             axes.set_xticklabels([])
-        areas[-1].set_xlabel(xlabel, size=page.BODY)
+        areas[-1].set_xlabel(xlabel, size=page.BODY_SIZE)
         return page.save(figure, path)
 
 
@@ -198,21 +198,27 @@ def campbell(
                 areas[1].plot(turns, damping[:, k], label=label, **look)
         _multiples(areas[0], diagram, turns, orders)
         for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
-            axes.set_ylabel(label, size=page.BODY)
+            axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(turns[0], turns[-1])
             finish(axes, legend=False)
         areas[0].legend(
-            fontsize=page.SMALL, framealpha=0.9, edgecolor="none", loc="upper left", ncol=ACROSS
+            fontsize=page.SMALL_SIZE,
+            framealpha=0.9,
+            edgecolor="none",
+            loc="upper left",
+            ncol=LEGEND_COLUMNS,
         )
         for axes in areas[:-1]:
             axes.set_xticklabels([])
-        areas[-1].set_xlabel("speed [1/min]", size=page.BODY)
+        areas[-1].set_xlabel("speed [1/min]", size=page.BODY_SIZE)
         return page.save(figure, path)
 
 
 def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
     """Rays of the orders, each named where it leaves the picture, and rings where modes meet."""
-    rows = -(-(diagram.frequencies.shape[1] + 1) // ACROSS)  # of the legend, above all modes
+    rows = -(
+        -(diagram.frequencies.shape[1] + 1) // LEGEND_COLUMNS
+    )  # of the legend, above all modes
     top = (1.06 + 0.1 * rows) * diagram.frequencies.max()
     axes.set_ylim(0.0, top)
     for k, order in enumerate(orders):
@@ -224,7 +230,7 @@ def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> 
         if end < turns[-1]:
             where = {"xytext": (0, 3), "ha": "center", "va": "bottom"}
         axes.annotate(f"{order:g}x", (end, order * end / 60), textcoords="offset points",
-                      color=GREY, size=page.SMALL, **where)  # fmt: skip
+                      color=GREY, size=page.SMALL_SIZE, **where)  # fmt: skip
         for _, speed in diagram.crossings(order):
             at = 30 * speed / np.pi
             axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
@@ -234,7 +240,7 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
     """One horizontal axis for all panels, with ticks at the sizes themselves if they are few."""
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
     low, high = ticks[0] / 1.15, ticks[-1] * 1.15
-    if ticks.size > FEW:
+    if ticks.size > MAX_TICKS:
         decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
         ticks = np.outer(decades, [1, 2, 5]).ravel()
         ticks = ticks[(ticks >= low) & (ticks <= high)]
@@ -255,21 +261,24 @@ def _near_ticks(axes: Any) -> None:
 
 
 def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
-    text, below = page.caption(caption, WIDTH - 60)
-    height = 80 + n * (PANEL + 25) + 60 + below + 25
-    figure = page.sheet(WIDTH, height)
-    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
-    areas = [page.area(figure, 150, 85 + k * (PANEL + 25), WIDTH - 190, PANEL) for k in range(n)]
-    page.words(figure, text, 30, height - below - 20, size=page.SMALL)
+    text, below = page.caption(caption, PAGE_WIDTH - 60)
+    height = 80 + n * (PANEL_HEIGHT + 25) + 60 + below + 25
+    figure = page.sheet(PAGE_WIDTH, height)
+    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    areas = [
+        page.area(figure, 150, 85 + k * (PANEL_HEIGHT + 25), PAGE_WIDTH - 190, PANEL_HEIGHT)
+        for k in range(n)
+    ]
+    page.words(figure, text, 30, height - below - 20, size=page.SMALL_SIZE)
     return figure, areas
 
 
 def finish(axes: Any, *, legend: bool, loc: str = "best") -> None:
     """Grid, spines and legend of the house."""
-    axes.tick_params(labelsize=page.SMALL)
+    axes.tick_params(labelsize=page.SMALL_SIZE)
     axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     if legend:
-        axes.legend(fontsize=page.SMALL, framealpha=0.9, edgecolor="none", loc=loc)
+        axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none", loc=loc)

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-FINER = 2  # pictures are drawn so many times larger and averaged: smooth edges on every driver
-LIFT = 2e-3  # of the height of the picture, towards the eye; parallel projection does not see it
-CREASE = 35.0  # degrees from which an edge stays sharp in shading
+OVERSAMPLING = 2  # pictures are drawn larger and averaged: smooth edges on every driver
+EDGE_OFFSET = 2e-3  # of the picture's height, towards the eye; parallel projection does not show it
+CREASE_ANGLE = 35.0  # from which an edge stays sharp in shading [degree]
 
 
 def main(folder: Path) -> None:
@@ -23,7 +23,9 @@ def main(folder: Path) -> None:
     with np.load(folder / "arrays.npz", allow_pickle=False) as file:
         arrays = dict(file)
     width, height = scene["size"]
-    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[FINER * width, FINER * height])
+    plotter: Any = pyvista.Plotter(
+        off_screen=True, window_size=[OVERSAMPLING * width, OVERSAMPLING * height]
+    )
     plotter.set_background("white")
     aim(plotter, scene, arrays)
     moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
@@ -36,8 +38,8 @@ def main(folder: Path) -> None:
             add(plotter, scene, arrays, k, frame)
         plotter.render()
         fine = plotter.screenshot(return_img=True)[..., :3].astype(np.uint16)
-        blocks = fine.reshape(height, FINER, width, FINER, 3).sum(axis=(1, 3))
-        pictures[frame] = (blocks + FINER**2 // 2) // FINER**2
+        blocks = fine.reshape(height, OVERSAMPLING, width, OVERSAMPLING, 3).sum(axis=(1, 3))
+        pictures[frame] = (blocks + OVERSAMPLING**2 // 2) // OVERSAMPLING**2
     np.save(folder / "pictures.npy", pictures)
     plotter.close()
 
@@ -60,7 +62,7 @@ def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, fra
     style, values = scene["actors"][k], arrays.get(f"values {k}")
     points = arrays[f"points {k}"][frame]
     if arrays[f"cells {k}"].shape[1] < 3:  # lines and dots lie in front of the faces they are on
-        points = points + LIFT * scene["height"] * arrays["toward"].astype(np.float32)
+        points = points + EDGE_OFFSET * scene["height"] * arrays["toward"].astype(np.float32)
     grid = _grid(points, arrays[f"cells {k}"])
     look: dict[str, Any] = {
         "opacity": style["opacity"],
@@ -75,10 +77,12 @@ def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, fra
         look |= {"scalars": "value", "cmap": scene["colours"], "clim": scene["limits"]}
         look["show_scalar_bar"] = False
     if arrays[f"cells {k}"].shape[1] < 3:
-        look |= {"lighting": False, "line_width": FINER * style["width"]}
-        look |= {"point_size": FINER * style["width"], "render_points_as_spheres": True}
+        look |= {"lighting": False, "line_width": OVERSAMPLING * style["width"]}
+        look |= {"point_size": OVERSAMPLING * style["width"], "render_points_as_spheres": True}
     else:
-        grid = grid.compute_normals(feature_angle=CREASE, split_vertices=True, cell_normals=False)
+        grid = grid.compute_normals(
+            feature_angle=CREASE_ANGLE, split_vertices=True, cell_normals=False
+        )
         look |= {"smooth_shading": True, "ambient": 0.4, "diffuse": 0.65, "specular": 0.1}
     plotter.add_mesh(grid, **look)
 

@@ -19,8 +19,8 @@ from rom.view.offscreen import Image, render, require
 from rom.view.scene import Actor, Camera, aimed, sharp_edges
 from rom.view.solids import Mesh, cylinder
 
-WIDTH, STILL = 900, 740  # of a film and of one instant in a series [pixel]
-CLOCK = 40  # height of the strip with the time [pixel]
+FILM_WIDTH, STILL_WIDTH = 900, 740  # of a film and of one instant in a series [pixel]
+CLOCK_HEIGHT = 40  # of the strip with the time [pixel]
 METAL = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 SCALES = ((1.0, "m"), (1e3, "mm"), (1e6, "um"), (1e9, "nm"))  # per metre
 
@@ -58,13 +58,13 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     path = page.checked(path, ".gif")
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
     stage = _stage(mechanism, solution, steps, shapes or {}, magnify)
-    images = render(stage.actors, stage.camera(WIDTH, view, up), limits=stage.limits)
+    images = render(stage.actors, stage.camera(FILM_WIDTH, view, up), limits=stage.limits)
     with page.styled():
         blank = _film_sheet(stage, images.shape[1], magnify)
         clocks = np.stack([_clock(text) for text in clock_texts(solution.t[steps])])
     pages = np.repeat(blank[None], len(images), axis=0)
-    pages[:, CLOCK : CLOCK + images.shape[1]] = images
-    pages[:, :CLOCK] = clocks
+    pages[:, CLOCK_HEIGHT : CLOCK_HEIGHT + images.shape[1]] = images
+    pages[:, :CLOCK_HEIGHT] = clocks
     write_gif(path, pages, seconds / len(images))
     return path
 
@@ -86,7 +86,7 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     wanted = np.asarray(times, dtype=float).ravel()
     steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in wanted])
     stage = _stage(mechanism, solution, steps, shapes or {}, magnify)
-    images = render(stage.actors, stage.camera(STILL, view, up), limits=stage.limits)
+    images = render(stage.actors, stage.camera(STILL_WIDTH, view, up), limits=stage.limits)
     with page.styled():
         return page.save(_series_sheet(stage, images, solution.t[steps], magnify), path)
 
@@ -160,8 +160,8 @@ def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:
     largest = max(float(v.max()) for v in sizes.values())
     factor, unit = next((s for s in SCALES if largest * s[0] >= 1.0), SCALES[-1])
     for k, v in sizes.items():
-        shown: Array = v * factor
-        actors[k] = Actor(actors[k].points, actors[k].cells, shown, actors[k].colour)
+        scaled: Array = v * factor
+        actors[k] = Actor(actors[k].points, actors[k].cells, scaled, actors[k].colour)
     limits = 0.0, max(largest * factor, 1e-12)
     return Stage(together(actors), limits, unit, " and ".join(flexible))
 
@@ -234,35 +234,35 @@ def clock_texts(times: Array) -> list[str]:
 
 def _clock(text: str) -> Image:
     """The strip above a picture of the film, with the time."""
-    strip = page.sheet(WIDTH, CLOCK)
+    strip = page.sheet(FILM_WIDTH, CLOCK_HEIGHT)
     page.words(strip, text, 20, 8)
     return page.pixels(strip)
 
 
 def _film_sheet(stage: Stage, height: int, magnify: float) -> Image:
     """What stays around the pictures of a film."""
-    text, below = page.caption(_words(stage, magnify), WIDTH - 40)
+    text, below = page.caption(_words(stage, magnify), FILM_WIDTH - 40)
     bar = 90 if stage.name else 10
-    top = CLOCK + height
-    figure = page.sheet(WIDTH, top + bar + below + 20)
-    _bar(figure, stage, WIDTH, top)
-    page.words(figure, text, 20, top + bar, size=page.SMALL)
+    top = CLOCK_HEIGHT + height
+    figure = page.sheet(FILM_WIDTH, top + bar + below + 20)
+    _bar(figure, stage, FILM_WIDTH, top)
+    page.words(figure, text, 20, top + bar, size=page.SMALL_SIZE)
     return page.pixels(figure)
 
 
 def _series_sheet(stage: Stage, images: Image, times: Array, magnify: float) -> Any:
     columns = min(2, len(images))
-    width, height = columns * (STILL + 20) + 20, images.shape[1] + 50
+    width, height = columns * (STILL_WIDTH + 20) + 20, images.shape[1] + 50
     rows = -(-len(images) // columns)
     text, below = page.caption(_words(stage, magnify), width - 60)
     bar = 90 if stage.name else 10
     figure = page.sheet(width, 20 + rows * height + bar + below + 30)
     for k, (image, t) in enumerate(zip(images, times, strict=True)):
-        left, top = 20 + (k % columns) * (STILL + 20), 20 + (k // columns) * height
+        left, top = 20 + (k % columns) * (STILL_WIDTH + 20), 20 + (k // columns) * height
         page.words(figure, f"t = {t * 1e3:.4g} ms", left + 10, top)
         page.place(figure, image, left, top + 35)
     _bar(figure, stage, width, 20 + rows * height)
-    page.words(figure, text, 30, 30 + rows * height + bar, size=page.SMALL)
+    page.words(figure, text, 30, 30 + rows * height + bar, size=page.SMALL_SIZE)
     return figure
 
 

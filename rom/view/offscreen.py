@@ -14,8 +14,8 @@ from rom.errors import ConfigError, ResourceError
 from rom.view.scene import Actor, Camera
 
 Image = npt.NDArray[np.uint8]
-COLOURS = "viridis"
-INSTALL = "pip install 'fenicsx-rom[view]'"
+COLOUR_MAP = "viridis"
+INSTALL_COMMAND = "pip install 'fenicsx-rom[view]'"
 
 
 def render(
@@ -52,7 +52,9 @@ def require(package: str) -> None:
         ResourceError: naming it.
     """
     if find_spec(package) is None:
-        raise ResourceError(f"pictures need {package}, which is not installed.", hint=f"{INSTALL}.")
+        raise ResourceError(
+            f"pictures need {package}, which is not installed.", hint=f"{INSTALL_COMMAND}."
+        )
 
 
 def write_scene(
@@ -71,7 +73,7 @@ def write_scene(
     np.savez(folder / "arrays.npz", **arrays)
     style = [{"colour": a.colour, "width": a.width, "opacity": a.opacity} for a in actors]
     scene = {"height": camera.height, "size": camera.size, "limits": limits, "actors": style}
-    (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOURS}))
+    (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOUR_MAP}))
 
 
 def child_failure(done: Ended) -> ConfigError:

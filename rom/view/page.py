@@ -9,22 +9,22 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.io.files import check_writable, write_whole
-from rom.view.offscreen import COLOURS, Image, require
-from rom.view.scene import INK
+from rom.view.offscreen import COLOUR_MAP, Image, require
+from rom.view.scene import TEXT_COLOUR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 150
-TITLE, BODY, SMALL = 12.5, 9.5, 8.5  # points
-LINE = 26  # pixels from one line of small text to the next
+TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
+LINE_HEIGHT = 26  # of small text [pixel]
 STYLE = {
     "font.family": "DejaVu Sans",
-    "text.color": INK,
-    "axes.labelcolor": INK,
+    "text.color": TEXT_COLOUR,
+    "axes.labelcolor": TEXT_COLOUR,
     "axes.edgecolor": "#5c636e",
-    "xtick.color": INK,
-    "ytick.color": INK,
+    "xtick.color": TEXT_COLOUR,
+    "ytick.color": TEXT_COLOUR,
     "axes.linewidth": 0.8,
 }
 
@@ -82,15 +82,15 @@ def place(figure: "Figure", image: Image, left: float, top: float) -> Any:
 def words(figure: "Figure", text: str, left: float, top: float, **options: Any) -> Any:
     """Write text whose upper left corner is at a pixel."""
     w, h = figure.get_size_inches() * DPI
-    look: dict[str, Any] = {"size": BODY, "va": "top", "color": INK} | options
+    look: dict[str, Any] = {"size": BODY_SIZE, "va": "top", "color": TEXT_COLOUR} | options
     return figure.text(left / w, 1 - top / h, text, **look)
 
 
 def caption(text: str, width: int) -> tuple[str, int]:
     """The text broken into lines that fit into so many pixels, and its height."""
-    letters = int(width / (SMALL * DPI / 72 * 0.545))
+    letters = int(width / (SMALL_SIZE * DPI / 72 * 0.545))
     lines = textwrap.wrap(text, letters)
-    return "\n".join(lines), LINE * len(lines)
+    return "\n".join(lines), LINE_HEIGHT * len(lines)
 
 
 def colour_bar(
@@ -102,12 +102,12 @@ def colour_bar(
     """Horizontal colour bar with its scale below; the rectangle is that of the bar."""
     axes = area(figure, *rectangle)
     axes.imshow(
-        np.linspace(0, 1, 512)[None], aspect="auto", cmap=COLOURS, extent=(*limits, 0.0, 1.0)
+        np.linspace(0, 1, 512)[None], aspect="auto", cmap=COLOUR_MAP, extent=(*limits, 0.0, 1.0)
     )
     axes.set_yticks([])
-    axes.tick_params(labelsize=SMALL, pad=3, length=4)
+    axes.tick_params(labelsize=SMALL_SIZE, pad=3, length=4)
     axes.locator_params(axis="x", nbins=6)
-    axes.set_title(label, size=SMALL, pad=6)
+    axes.set_title(label, size=SMALL_SIZE, pad=6)
 
 
 def pixels(figure: "Figure") -> Image:

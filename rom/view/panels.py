@@ -11,9 +11,10 @@ from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view import page
-from rom.view.curves import LINES, WIDTH, finish
+from rom.view.curves import LINES, PAGE_WIDTH, finish
 
-HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 370, 95, 30, 55, 75  # pixel, of a diagram and around it
+# pixel, of a diagram and around it
+PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
 GUIDE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
 Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
 
@@ -60,19 +61,21 @@ def panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str, cap
     """
     path = page.checked(path, ".png")
     with page.styled():
-        text, below = page.caption(caption, WIDTH - 60)
-        step = ABOVE + HEIGHT + BELOW
+        text, below = page.caption(caption, PAGE_WIDTH - 60)
+        step = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN
         total = 65 + len(rows) * step + below + 25
-        figure = page.sheet(WIDTH, total)
-        page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+        figure = page.sheet(PAGE_WIDTH, total)
+        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
         for i, row in enumerate(rows):
-            width = (WIDTH - 2 * RIGHT) / len(row)
+            width = (PAGE_WIDTH - 2 * RIGHT_MARGIN) / len(row)
             for j, panel in enumerate(row):
-                left = RIGHT + j * width + LEFT + (90 if panel.bars else 0)
-                right = RIGHT + (j + 1) * width - RIGHT
-                area = page.area(figure, left, 65 + i * step + ABOVE, right - left, HEIGHT)
-                _draw(area, panel, (right - left, HEIGHT))
-        page.words(figure, text, 30, total - below - 20, size=page.SMALL)
+                left = RIGHT_MARGIN + j * width + LEFT_MARGIN + (90 if panel.bars else 0)
+                right = RIGHT_MARGIN + (j + 1) * width - RIGHT_MARGIN
+                area = page.area(
+                    figure, left, 65 + i * step + TOP_MARGIN, right - left, PANEL_HEIGHT
+                )
+                _draw(area, panel, (right - left, PANEL_HEIGHT))
+        page.words(figure, text, 30, total - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 
@@ -86,9 +89,9 @@ def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
         axes.plot(*_paired(name, line), "o", label=name, **look)
     if panel.bars:
         _draw_bars(axes, panel.bars)
-    axes.set_title(panel.title, size=page.BODY, loc="left")
-    axes.set_xlabel(panel.xlabel, size=page.SMALL)
-    axes.set_ylabel(panel.ylabel, size=page.SMALL)
+    axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
+    axes.set_xlabel(panel.xlabel, size=page.SMALL_SIZE)
+    axes.set_ylabel(panel.ylabel, size=page.SMALL_SIZE)
     named = sum(not name.startswith("_") for name in (*panel.curves, *panel.points))
     low, high = axes.get_ylim()
     room = 0.11 * (named + 0.5)  # for the legend above all lines

@@ -11,10 +11,10 @@ from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.view import page
 from rom.view.offscreen import render
-from rom.view.scene import INK, Actor, aimed, directed_edges
+from rom.view.scene import TEXT_COLOUR, Actor, aimed, directed_edges
 
-WIDTH = 1500  # pixel
-PART, NET = "#c9d1da", "#6b7480"
+PAGE_WIDTH = 1500  # [pixel]
+PART_COLOUR, EDGE_COLOUR = "#c9d1da", "#6b7480"
 MARKED = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")  # one per interface
 
 
@@ -41,7 +41,7 @@ def mesh(
     """
     path = page.checked(path, ".png")
     actors = mesh_actors(model)
-    image = render(actors, aimed(actors[0].points, WIDTH, view=view, up=up))[0]
+    image = render(actors, aimed(actors[0].points, PAGE_WIDTH, view=view, up=up))[0]
     with page.styled():
         return page.save(_sheet(model, image, title), path)
 
@@ -56,8 +56,8 @@ def mesh_actors(model: FEModel) -> list[Actor]:
         raise ConfigError("the model has no surface to draw.", hint="Give it a `SurfaceMesh`.")
     points, triangles = model.points[model.surface.nodes], model.surface.triangles
     edges = np.unique(np.sort(directed_edges(triangles)[0], axis=1), axis=0)
-    actors = [Actor(points[None], triangles, colour=PART)]
-    actors.append(Actor(points[None], edges, colour=NET, width=0.6))
+    actors = [Actor(points[None], triangles, colour=PART_COLOUR)]
+    actors.append(Actor(points[None], edges, colour=EDGE_COLOUR, width=0.6))
     place = {int(node): k for k, node in enumerate(model.surface.nodes)}
     for k, interface in enumerate(model.interfaces.values()):
         on = np.zeros(len(points), dtype=bool)
@@ -75,15 +75,15 @@ def _sheet(model: FEModel, image: Any, title: str) -> Any:
         "the outer surface; coloured surfaces are the interfaces, through which the body touches "
         "the rest of the mechanism."
     )
-    text, height = page.caption(words, WIDTH - 60)
+    text, height = page.caption(words, PAGE_WIDTH - 60)
     top = image.shape[0] + 90
-    figure = page.sheet(WIDTH, top + 50 + height + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+    figure = page.sheet(PAGE_WIDTH, top + 50 + height + 20)
+    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     page.place(figure, image, 0, 80)
     left = 30
     for k, name in enumerate(model.interfaces):
-        page.words(figure, "\u25a0", left, top, color=MARKED[k % len(MARKED)], size=page.TITLE)
-        page.words(figure, name, left + 30, top + 3, size=page.BODY)
+        page.words(figure, "\u25a0", left, top, color=MARKED[k % len(MARKED)], size=page.TITLE_SIZE)
+        page.words(figure, name, left + 30, top + 3, size=page.BODY_SIZE)
         left += 60 + 16 * len(name)
-    page.words(figure, text, 30, top + 45, size=page.SMALL, color=INK)
+    page.words(figure, text, 30, top + 45, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure

@@ -14,11 +14,11 @@ from rom.model import Array, Index
 from rom.view import page
 from rom.view.curves import LINES, MARKERS, finish
 from rom.view.film import write_gif
-from rom.view.offscreen import COLOURS
+from rom.view.offscreen import COLOUR_MAP
 
-WIDTH, PANEL = 1500, 430  # pixel
+PAGE_WIDTH, PANEL_HEIGHT = 1500, 430  # pixel
 FILM = (640, 700)  # of the picture in a film [pixel]
-SKIN, NET, GHOST = "#dfe5ec", "#6b7480", "#d1495b"
+SURFACE_COLOUR, EDGE_COLOUR, UNDEFORMED_COLOUR = "#dfe5ec", "#6b7480", "#d1495b"
 
 
 @typed
@@ -73,34 +73,34 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if the shapes do not fit beside the curves, or pictures cannot be made here.
     """
-    path, left = page.checked(path, ".png"), WIDTH - 30 - sum(s.width + 30 for s in shapes)
+    path, left = page.checked(path, ".png"), PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
     if left < 400:
         raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves.")
     with page.styled():
-        text, below = page.caption(caption, WIDTH - 60)
-        height = 135 + PANEL + 110 + below
-        figure = page.sheet(WIDTH, height)
-        page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
-        axes = page.area(figure, 110, 120, left - 140, PANEL)
+        text, below = page.caption(caption, PAGE_WIDTH - 60)
+        height = 135 + PANEL_HEIGHT + 110 + below
+        figure = page.sheet(PAGE_WIDTH, height)
+        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
         for k, (name, (x, y)) in enumerate(curves.items()):
             look = {"color": LINES[k], "marker": MARKERS[k], "lw": 1.5}
             axes.semilogx(np.asarray(x), np.asarray(y), label=name, **look)
-        axes.axhline(limit[1], color=NET, ls="--", lw=1.0, label=limit[0])
+        axes.axhline(limit[1], color=EDGE_COLOUR, ls="--", lw=1.0, label=limit[0])
         ticks = np.unique(np.concatenate([np.asarray(x) for x, _ in curves.values()]))
         axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
         axes.minorticks_off()
-        axes.set_xlabel(xlabel, size=page.BODY)
-        axes.set_ylabel(ylabel, size=page.BODY)
+        axes.set_xlabel(xlabel, size=page.BODY_SIZE)
+        axes.set_ylabel(ylabel, size=page.BODY_SIZE)
         finish(axes, legend=True)
         for shape in shapes:
-            page.words(figure, shape.title, left + 10, 80, size=page.BODY)
-            _shape(page.area(figure, left, 120, shape.width, PANEL), shape)
+            page.words(figure, shape.title, left + 10, 80, size=page.BODY_SIZE)
+            _shape(page.area(figure, left, 120, shape.width, PANEL_HEIGHT), shape)
             if shape.values is not None:
-                bar = (left + 40, 120 + PANEL + 32, shape.width - 80, 14)
+                bar = (left + 40, 120 + PANEL_HEIGHT + 32, shape.width - 80, 14)
                 limits = (0.0, float(shape.values.max()))
                 page.colour_bar(figure, limits, shape.label, bar)
             left += shape.width + 30
-        page.words(figure, text, 30, height - below - 15, size=page.SMALL)
+        page.words(figure, text, 30, height - below - 15, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 
@@ -143,7 +143,7 @@ def flow(
             _shape(axes, shape, highest=highest, frame=frame)
             bar = (width / 2 - 200, height + 80, 400, 14)
             page.colour_bar(figure, (0.0, highest), shape.label, bar)
-            page.words(figure, text, 20, height + 142, size=page.SMALL)
+            page.words(figure, text, 20, height + 142, size=page.SMALL_SIZE)
             pages.append(page.pixels(figure))
     write_gif(path, np.stack(pages), seconds / len(pages))
     return path
@@ -155,13 +155,13 @@ def _shape(
     x, y = shape.points.T
     if shape.values is None:
         axes.tripcolor(x, y, shape.triangles, facecolors=np.zeros(len(shape.triangles)),
-                       cmap=_one_colour(), edgecolors=NET, lw=0.5)  # fmt: skip
+                       cmap=_one_colour(), edgecolors=EDGE_COLOUR, lw=0.5)  # fmt: skip
     else:
         top = highest or float(shape.values.max())
-        axes.tripcolor(x, y, shape.triangles, facecolors=shape.values, cmap=COLOURS, vmin=0.0,
+        axes.tripcolor(x, y, shape.triangles, facecolors=shape.values, cmap=COLOUR_MAP, vmin=0.0,
                        vmax=top, edgecolors="face", lw=0.7)  # fmt: skip
     for edge in _boundary(shape.triangles):
-        axes.plot(*shape.before[edge].T, color=GHOST, ls="--", lw=0.9)
+        axes.plot(*shape.before[edge].T, color=UNDEFORMED_COLOUR, ls="--", lw=0.9)
     both = np.vstack([shape.points, shape.before]) if frame is None else frame
     low, high = both.min(axis=0), both.max(axis=0)
     margin = 0.04 * (high - low).max()
@@ -174,7 +174,7 @@ def _shape(
 def _one_colour() -> Any:
     from matplotlib.colors import ListedColormap
 
-    return ListedColormap([SKIN])
+    return ListedColormap([SURFACE_COLOUR])
 
 
 def _boundary(triangles: Index) -> Index:

@@ -13,15 +13,13 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view import page
 from rom.view.curves import LINES, MARKERS
-from rom.view.offscreen import COLOURS
+from rom.view.offscreen import COLOUR_MAP
 
-WIDTH, GAP, BELOW, BAR = (
-    1400,
-    120,
-    150,
-    60,
-)  # pixel: between columns, between rows, for a colour bar
-STONE, EDGE = "#d9d2c3", "#5c636e"
+PAGE_WIDTH = 1400  # [pixel]
+COLUMN_GAP = 120  # [pixel]
+ROW_GAP = 150  # [pixel]
+BAR_WIDTH = 60  # of a colour bar [pixel]
+STONE_COLOUR, EDGE_COLOUR = "#d9d2c3", "#5c636e"
 
 
 @typed
@@ -83,34 +81,34 @@ def plane(
     if not drawings:
         raise ConfigError("there is nothing to draw.")
     rows = -(-len(drawings) // columns)
-    text, below = page.caption(caption, WIDTH - 60)
-    width = (WIDTH - 30) // columns - GAP
+    text, below = page.caption(caption, PAGE_WIDTH - 60)
+    width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
     with page.styled():
-        tall = 110 + rows * (height + BELOW) + below + 10
-        figure = page.sheet(WIDTH, tall)
-        page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+        tall = 110 + rows * (height + ROW_GAP) + below + 10
+        figure = page.sheet(PAGE_WIDTH, tall)
+        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
         for k, drawing in enumerate(drawings):
             row, column = divmod(k, columns)
-            left = 95 + column * (width + GAP)
-            narrow = BAR if drawing.label else 0
-            axes = page.area(figure, left, 110 + row * (height + BELOW), width - narrow, height)
+            left = 95 + column * (width + COLUMN_GAP)
+            narrow = BAR_WIDTH if drawing.label else 0
+            axes = page.area(figure, left, 110 + row * (height + ROW_GAP), width - narrow, height)
             _draw(figure, axes, drawing)
-        page.words(figure, text, 30, tall - below - 20, size=page.SMALL)
+        page.words(figure, text, 30, tall - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 
 def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
-    axes.set_title(drawing.title, size=page.BODY, loc="left")
-    axes.set_xlabel(drawing.x, size=page.SMALL)
-    axes.set_ylabel(drawing.y, size=page.SMALL)
-    axes.tick_params(labelsize=page.SMALL)
+    axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
+    axes.set_xlabel(drawing.x, size=page.SMALL_SIZE)
+    axes.set_ylabel(drawing.y, size=page.SMALL_SIZE)
+    axes.tick_params(labelsize=page.SMALL_SIZE)
     if drawing.shade is not None:
         image = axes.imshow(
-            drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOURS, aspect="auto"
+            drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP, aspect="auto"
         )
         bar = figure.colorbar(image, ax=axes, fraction=0.05, pad=0.03)
-        bar.set_label(drawing.label, size=page.SMALL)
-        bar.ax.tick_params(labelsize=page.SMALL)
+        bar.set_label(drawing.label, size=page.SMALL_SIZE)
+        bar.ax.tick_params(labelsize=page.SMALL_SIZE)
     _fill(figure, axes, drawing)
     for k, (label, curves) in enumerate(drawing.curves.items()):
         for n, curve in enumerate(curves):
@@ -127,7 +125,7 @@ def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
         axes.set_aspect("equal", adjustable="box" if drawing.shade is not None else "datalim")
     if axes.get_legend_handles_labels()[0]:
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
-        axes.legend(fontsize=page.SMALL, frameon=False, ncol=2, **place)
+        axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=2, **place)
 
 
 def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
@@ -136,14 +134,14 @@ def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
         return
     from matplotlib.collections import PolyCollection
 
-    look: dict[str, Any] = {"edgecolor": EDGE, "linewidth": 0.8}
+    look: dict[str, Any] = {"edgecolor": EDGE_COLOUR, "linewidth": 0.8}
     if drawing.values is None:
-        axes.add_collection(PolyCollection(drawing.polygons, facecolor=STONE, **look))
+        axes.add_collection(PolyCollection(drawing.polygons, facecolor=STONE_COLOUR, **look))
     else:
         values = np.asarray(drawing.values, dtype=float)
-        blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOURS, **look)
+        blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOUR_MAP, **look)
         axes.add_collection(blocks)
         bar = figure.colorbar(blocks, ax=axes, fraction=0.05, pad=0.03)
-        bar.set_label(drawing.label, size=page.SMALL)
-        bar.ax.tick_params(labelsize=page.SMALL)
+        bar.set_label(drawing.label, size=page.SMALL_SIZE)
+        bar.ax.tick_params(labelsize=page.SMALL_SIZE)
     axes.autoscale_view()

@@ -9,8 +9,8 @@ from rom.errors import ConfigError
 from rom.model import Array, Index
 
 SHARP = np.cos(np.deg2rad(35.0))  # cosine of the angle from which an edge is drawn
-INK, GHOST = "#20242a", "#7c828c"
-MARGIN = 0.03  # of the view, left free on every side
+TEXT_COLOUR, UNDEFORMED_COLOUR = "#20242a", "#7c828c"
+MARGIN_RATIO = 0.03  # of the view, left free on every side
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def aimed(
     seen = points @ np.column_stack([right, upright, toward])
     low, high = seen.min(axis=0), seen.max(axis=0)
     extent = np.maximum(high - low, 1e-6 * np.ptp(seen) + 1e-12)
-    wide, tall = extent[:2] + 2 * MARGIN * extent[:2].max()
+    wide, tall = extent[:2] + 2 * MARGIN_RATIO * extent[:2].max()
     pixels = 2 * round(width * float(np.clip(tall / wide, *heights)) / 2)
     focus = np.column_stack([right, upright, toward]) @ (0.5 * (low + high))
     return Camera(focus, toward, upright, max(tall, wide * pixels / width), (width, pixels))

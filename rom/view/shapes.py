@@ -11,10 +11,10 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view import page
 from rom.view.offscreen import Image, render
-from rom.view.scene import GHOST, Actor, aimed, sharp_edges
+from rom.view.scene import UNDEFORMED_COLOUR, Actor, aimed, sharp_edges
 
-PANEL = 740  # width of one mode [pixel]
-AMPLITUDE = 0.08  # largest displacement shown, of the size of the body
+PANEL_WIDTH = 740  # of one mode [pixel]
+AMPLITUDE_RATIO = 0.08  # largest displacement shown, of the body's size
 
 
 @typed
@@ -71,11 +71,12 @@ def drawn(surface: Any, shapes: list[Array], view: Any, up: Any) -> Image:
     X, size = surface.points, np.ptp(surface.points, axis=0).max()
     lengths = [np.linalg.norm(u, axis=1) for u in shapes]
     moved = [
-        X + AMPLITUDE * size * u / length.max() for u, length in zip(shapes, lengths, strict=True)
+        X + AMPLITUDE_RATIO * size * u / length.max()
+        for u, length in zip(shapes, lengths, strict=True)
     ]
-    camera = aimed(np.stack([X, *moved]), PANEL, view=view, up=up)
+    camera = aimed(np.stack([X, *moved]), PANEL_WIDTH, view=view, up=up)
     edges, values = sharp_edges(X, surface.triangles), [v / v.max() for v in lengths]
-    still = Actor(X[None], edges, colour=GHOST, width=1.0)
+    still = Actor(X[None], edges, colour=UNDEFORMED_COLOUR, width=1.0)
     return render([still, Actor(np.stack(moved), surface.triangles, np.stack(values))], camera)
 
 
@@ -90,21 +91,21 @@ def sheet(images: Any, names: list[str], title: str, words: str, what: str) -> A
         what: that whose size displacements are compared with.
     """
     columns = min(2, len(images))
-    width = columns * (PANEL + 20) + 20
+    width = columns * (PANEL_WIDTH + 20) + 20
     rows, height = -(-len(images) // columns), images[0].shape[0] + 50
     text, below = page.caption(
-        f"{words} The largest displacement is drawn as {AMPLITUDE:.0%} of the size of the {what}; "
-        "grey lines show the undeformed edges.",
+        f"{words} The largest displacement is drawn as {AMPLITUDE_RATIO:.0%} of the size of "
+        f"the {what}; grey lines show the undeformed edges.",
         width - 60,
     )
     figure = page.sheet(width, 80 + rows * height + 110 + below + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     for k, (image, name) in enumerate(zip(images, names, strict=True)):
-        left, top = 20 + (k % columns) * (PANEL + 20), 80 + (k // columns) * height
+        left, top = 20 + (k % columns) * (PANEL_WIDTH + 20), 80 + (k // columns) * height
         page.words(figure, name, left + 10, top + 10)
         page.place(figure, image, left, top + 40)
     top = 80 + rows * height
     label = "displacement / largest displacement of the mode"
     page.colour_bar(figure, (0.0, 1.0), label, (width / 2 - 250, top + 35, 500, 18))
-    page.words(figure, text, 30, top + 110, size=page.SMALL)
+    page.words(figure, text, 30, top + 110, size=page.SMALL_SIZE)
     return figure

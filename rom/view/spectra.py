@@ -15,8 +15,8 @@ from rom.view.curves import LINES, finish
 from rom.view.offscreen import render
 from rom.view.scene import Actor, aimed
 
-WIDTH, TOP, BOTTOM = 1500, 430, 430  # pixel
-DOTS, FAINT = "#8b929c", "#6b7480"
+PAGE_WIDTH, TOP_HEIGHT, BOTTOM_HEIGHT = 1500, 430, 430  # pixel
+DOT_COLOUR, LINE_COLOUR = "#8b929c", "#6b7480"
 
 
 @path_came_first(1, 2, 3, 0)
@@ -53,18 +53,18 @@ def updating(  # noqa: PLR0913  keywords of one picture
             raise ConfigError(f"{name!r} has {np.size(values)} values for {f.size} frequencies.")
     image = _structure(*structure)
     with page.styled():
-        text, below = page.caption(caption, WIDTH - 60)
-        height = 85 + TOP + 110 + BOTTOM + 95 + below
-        figure = page.sheet(WIDTH, height)
-        page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
-        _responses(page.area(figure, 130, 85, WIDTH - 170, TOP), f, curves, label)
-        top = 85 + TOP + 110
-        _changes(page.area(figure, 250, top, 540, BOTTOM), changes)
-        page.place(figure, image, 840, top + (BOTTOM - image.shape[0]) // 2 - 20)
+        text, below = page.caption(caption, PAGE_WIDTH - 60)
+        height = 85 + TOP_HEIGHT + 110 + BOTTOM_HEIGHT + 95 + below
+        figure = page.sheet(PAGE_WIDTH, height)
+        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        _responses(page.area(figure, 130, 85, PAGE_WIDTH - 170, TOP_HEIGHT), f, curves, label)
+        top = 85 + TOP_HEIGHT + 110
+        _changes(page.area(figure, 250, top, 540, BOTTOM_HEIGHT), changes)
+        page.place(figure, image, 840, top + (BOTTOM_HEIGHT - image.shape[0]) // 2 - 20)
         for k, (mark, what) in enumerate(((LINES[0], "sensors"), (LINES[1], "exciters"))):
-            page.words(figure, "\u25cf", 1000 + 170 * k, top + BOTTOM - 10, color=mark)
-            page.words(figure, what, 1025 + 170 * k, top + BOTTOM - 10, size=page.SMALL)
-        page.words(figure, text, 30, height - below - 15, size=page.SMALL)
+            page.words(figure, "\u25cf", 1000 + 170 * k, top + BOTTOM_HEIGHT - 10, color=mark)
+            page.words(figure, what, 1025 + 170 * k, top + BOTTOM_HEIGHT - 10, size=page.SMALL_SIZE)
+        page.words(figure, text, 30, height - below - 15, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 
@@ -72,15 +72,15 @@ def _responses(
     axes: Any, f: Array, curves: dict[str, npt.ArrayLike | npt.NDArray[np.complex128]], label: str
 ) -> None:
     looks: tuple[dict[str, Any], ...] = (
-        {"ls": "", "marker": ".", "ms": 5, "color": DOTS},
+        {"ls": "", "marker": ".", "ms": 5, "color": DOT_COLOUR},
         {"ls": "--", "lw": 1.3, "color": LINES[2]},
         {"lw": 1.6, "color": LINES[0]},
     )
     for (name, values), look in zip(curves.items(), looks, strict=False):
         axes.semilogy(f, np.abs(np.asarray(values)), label=name, **look)
     axes.set_xlim(f[0], f[-1])
-    axes.set_xlabel("frequency [Hz]", size=page.BODY)
-    axes.set_ylabel(label, size=page.BODY)
+    axes.set_xlabel("frequency [Hz]", size=page.BODY_SIZE)
+    axes.set_ylabel(label, size=page.BODY_SIZE)
     finish(axes, legend=True)
 
 
@@ -90,16 +90,16 @@ def _changes(axes: Any, changes: dict[str, tuple[float, float, float]]) -> None:
     axes.barh(place, true, height=0.72, color="#d5dae1", label="true")
     axes.errorbar(found, place, xerr=2 * spread, fmt="o", ms=5, color=LINES[0], capsize=3,
                   label="found, ± two standard deviations")  # fmt: skip
-    axes.plot([0, 0], [-0.6, len(changes) - 0.4], color=FAINT, lw=0.8)
+    axes.plot([0, 0], [-0.6, len(changes) - 0.4], color=LINE_COLOUR, lw=0.8)
     axes.set_yticks(place, list(changes))
     axes.set_ylim(-0.6, len(changes) + 0.3)
-    axes.set_xlabel("change of the model [%]", size=page.BODY)
+    axes.set_xlabel("change of the model [%]", size=page.BODY_SIZE)
     finish(axes, legend=False)
-    axes.legend(fontsize=page.SMALL, loc="upper center", ncol=2, frameon=False, borderpad=0.1)
+    axes.legend(fontsize=page.SMALL_SIZE, loc="upper center", ncol=2, frameon=False, borderpad=0.1)
 
 
 def _structure(points: Array, beams: Index, sensors: Array, exciters: Array) -> Any:
-    actors = [Actor(points[None], beams, colour=FAINT, width=4.0)]
+    actors = [Actor(points[None], beams, colour=LINE_COLOUR, width=4.0)]
     for where, colour, size in ((sensors, LINES[0], 11.0), (exciters, LINES[1], 15.0)):
         where = np.asarray(where, dtype=float)
         actors.append(Actor(where[None], np.arange(len(where))[:, None], colour=colour, width=size))

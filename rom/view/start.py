@@ -11,11 +11,11 @@ from rom.rotation import matrix
 from rom.view import page
 from rom.view.film import bars, placed
 from rom.view.offscreen import render
-from rom.view.scene import INK, Actor, aimed, sharp_edges
+from rom.view.scene import TEXT_COLOUR, Actor, aimed, sharp_edges
 
-WIDTH = 1200  # pixel
+PAGE_WIDTH = 1200  # [pixel]
 COLOURS = ("#9aa5b1", "#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#c3c9d0", "#5c636e")
-NAMED = 16  # bodies in the legend
+MAX_LEGEND_BODIES = 16  # bodies in the legend
 
 
 @typed
@@ -42,7 +42,7 @@ def start(
     path = page.checked(path, ".png")
     actors = start_actors(mechanism)
     points = np.concatenate([actor.points[0] for actor in actors])
-    image = render(actors, aimed(points, WIDTH, view=view, up=up))[0]
+    image = render(actors, aimed(points, PAGE_WIDTH, view=view, up=up))[0]
     with page.styled():
         return page.save(_sheet(mechanism, image, title), path)
 
@@ -66,22 +66,22 @@ def _sheet(mechanism: Any, image: Any, title: str) -> Any:
         "Flexible bodies are drawn by their surface, rigid ones as bars from the mass centre to "
         "their markers."
     )
-    text, below = page.caption(words, WIDTH - 60)
-    names = list(mechanism.parts)[:NAMED]
+    text, below = page.caption(words, PAGE_WIDTH - 60)
+    names = list(mechanism.parts)[:MAX_LEGEND_BODIES]
     rows, row, left = [], 0, 30
     for name in names:
         wide = 60 + 13 * len(name)
-        if left + wide > WIDTH - 30:
+        if left + wide > PAGE_WIDTH - 30:
             row, left = row + 1, 30
         rows.append((row, left))
         left += wide
     top = image.shape[0] + 90
-    figure = page.sheet(WIDTH, top + 35 * (row + 1) + 15 + below + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE, weight="bold")
+    figure = page.sheet(PAGE_WIDTH, top + 35 * (row + 1) + 15 + below + 20)
+    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     page.place(figure, image, 0, 80)
     for k, (name, (line, at)) in enumerate(zip(names, rows, strict=True)):
         colour = COLOURS[k % len(COLOURS)]
-        page.words(figure, "\u25a0", at, top + 35 * line, color=colour, size=page.TITLE)
-        page.words(figure, name, at + 30, top + 35 * line + 3, size=page.BODY)
-    page.words(figure, text, 30, top + 35 * (row + 1) + 10, size=page.SMALL, color=INK)
+        page.words(figure, "\u25a0", at, top + 35 * line, color=colour, size=page.TITLE_SIZE)
+        page.words(figure, name, at + 30, top + 35 * line + 3, size=page.BODY_SIZE)
+    page.words(figure, text, 30, top + 35 * (row + 1) + 10, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure

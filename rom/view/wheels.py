@@ -15,7 +15,7 @@ from rom.model import Array, FEModel, Index, SurfaceMesh
 from rom.view import page
 from rom.view.shapes import drawn, sheet
 
-SAME = 1e-6  # of the size of the wheel: nodes of neighbours that close are one
+COINCIDENT_RTOL = 1e-6  # of the wheel's size: nodes of neighbouring sectors
 
 
 @path_came_first(1, 2, 0)
@@ -76,6 +76,8 @@ def _outside(model: FEModel, surface: SurfaceMesh, hidden: tuple[str, ...]) -> t
 
 def _joined(points: Array, triangles: Index) -> tuple[Index, Index]:
     """One of each group of points in the same place, and the triangles between these."""
-    grid = np.round(points / (SAME * np.ptp(points)) + 0.381966)  # away from round coordinates
+    grid = np.round(
+        points / (COINCIDENT_RTOL * np.ptp(points)) + 0.381966
+    )  # away from round coordinates
     _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     return first, place.ravel()[triangles]

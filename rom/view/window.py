@@ -19,11 +19,11 @@ from rom.errors import ConfigError
 from rom.view.draw import add, aim
 from rom.view.offscreen import child_failure, require, write_scene
 from rom.view.scene import Actor, aimed, sharp_edges
-from rom.view.shapes import AMPLITUDE, displacement
+from rom.view.shapes import AMPLITUDE_RATIO, displacement
 
-SIZE = 1200  # width of the window [pixel]
-FRAMES, PAUSE = 24, 40  # of one period of a mode; between frames [ms]
-KEYS = "arrow keys: next and last; mouse: turn; q: close"
+WINDOW_WIDTH = 1200  # [pixel]
+N_FRAMES, FRAME_PAUSE = 24, 40  # of one period of a mode; between frames [ms]
+KEYS_HELP = "arrow keys: next and last; mouse: turn; q: close"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +52,12 @@ def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
         raise ConfigError(f"body {body.name!r} has no surface to draw.")
     omega, V = body.modes(fixed=fixed)
     X, size = body.surface.points, np.ptp(body.surface.points, axis=0).max()
-    sine = np.sin(2 * np.pi * np.arange(FRAMES) / FRAMES)[:, None, None]
+    sine = np.sin(2 * np.pi * np.arange(N_FRAMES) / N_FRAMES)[:, None, None]
     scenes = []
     for i, k in enumerate(np.flatnonzero(omega > 0)[:n]):
         u = displacement(body, V[:, k])
         length = np.linalg.norm(u, axis=1)
-        moved = X + AMPLITUDE * size / length.max() * sine * u
+        moved = X + AMPLITUDE_RATIO * size / length.max() * sine * u
         edges = sharp_edges(X, body.surface.triangles)
         surface = Actor(moved, body.surface.triangles, (length / length.max())[None])
         title = f"{body.name}, mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
@@ -84,7 +84,7 @@ def leave(scenes: Sequence[Scene], folder: Path) -> None:
     for k, scene in enumerate(scenes):
         (folder / str(k)).mkdir()
         seen = np.concatenate([actor.points.reshape(-1, 3) for actor in scene.actors])
-        write_scene(folder / str(k), scene.actors, aimed(seen, SIZE), (0.0, 1.0))
+        write_scene(folder / str(k), scene.actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
     (folder / "titles.json").write_text(json.dumps([scene.title for scene in scenes]))
 
 
@@ -97,7 +97,7 @@ class Window:
         self.folder, self.at, self.frame = folder, 0, 0
         self.titles = json.loads((folder / "titles.json").read_text())
         self.plotter: Any = pyvista.Plotter(
-            off_screen=off_screen, window_size=[SIZE, 3 * SIZE // 4]
+            off_screen=off_screen, window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4]
         )
         self.plotter.background_color = pyvista.Color("white")
         self.go(0)
@@ -112,7 +112,9 @@ class Window:
         self.plotter.clear_actors()
         for k in range(len(self.scene["actors"])):
             add(self.plotter, self.scene, self.arrays, k, 0)
-        text = f"{self.titles[self.at]}\n{KEYS}" if len(self.titles) > 1 else self.titles[self.at]
+        text = (
+            f"{self.titles[self.at]}\n{KEYS_HELP}" if len(self.titles) > 1 else self.titles[self.at]
+        )
         self.plotter.add_text(text, font_size=10, color="#20242a", name="title", render=False)
         if not step:
             aim(self.plotter, self.scene, self.arrays)
@@ -130,7 +132,7 @@ class Window:
         """Until it is closed."""
         self.plotter.add_key_event("Right", lambda: self.go(1))
         self.plotter.add_key_event("Left", lambda: self.go(-1))
-        self.plotter.add_timer_event(max_steps=10**9, duration=PAUSE, callback=self.tick)
+        self.plotter.add_timer_event(max_steps=10**9, duration=FRAME_PAUSE, callback=self.tick)
         self.plotter.show()
 
 

@@ -51,7 +51,7 @@ def started(*arguments):
     code = 99
     try:
         with Path("said.txt").open("w") as sys.stderr, Path(os.devnull).open("w") as sys.stdout:
-            keeping.INTERVAL = keeping.PATIENCE = 0.02
+            keeping.MIN_INTERVAL = keeping.WRITE_TIME_FACTOR = 0.02
             code = main(list(arguments))
     finally:
         os._exit(code)

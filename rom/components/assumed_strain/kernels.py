@@ -9,10 +9,10 @@ import numpy as np
 
 from rom.components.compiled import inner, kernel
 
-FLOOR = 0.15  # share of its first area below which a triangle does not shorten the time step
-COURANT = 0.6  # share of the critical step
-ROUND = 1e-6  # relative difference of principal stretches that count as equal
-H = 1e-6  # change of strain for the tangent
+MIN_AREA_RATIO = 0.15  # of a triangle's first area; smaller ones do not shorten the time step
+COURANT_NUMBER = 0.6  # of the critical step
+EQUAL_STRETCH_RTOL = 1e-6  # relative difference of principal stretches that count as equal
+STRAIN_INCREMENT = 1e-6  # of the differences that give the tangent
 
 
 @inner
@@ -75,7 +75,7 @@ def _stress(C11, C22, C12, C33, ep, numbers, state, out):
     mean, beta = 0.5 * (T[0] + T[1]), 0.5 * (T[0] - T[1])
     turned, tau = beta * c + T[2] * s, T[2] * c - beta * s  # in the principal frame
     S1, S2 = (mean + turned) / l1, (mean - turned) / l2
-    tau *= (g1 - g2) / (l1 - l2) if r > ROUND * m else 1 / m
+    tau *= (g1 - g2) / (l1 - l2) if r > EQUAL_STRETCH_RTOL * m else 1 / m
     mean, beta = 0.5 * (S1 + S2), 0.5 * (S1 - S2)
     out[0], out[1] = mean + beta * c - tau * s, mean - beta * c + tau * s
     out[2], out[3] = beta * s + tau * c, T[3] / np.exp(2 * e33)
@@ -148,10 +148,12 @@ def tangents(x, patch, G, weights, radius, numbers, state, history, K):
             for j in range(4):
                 for sign in range(2):
                     c = C.copy()
-                    c[j] += (2 if j != 2 else 1) * H * (1 - 2 * sign)  # of 2 E12 it is E12
+                    c[j] += (
+                        (2 if j != 2 else 1) * STRAIN_INCREMENT * (1 - 2 * sign)
+                    )  # of 2 E12 it is E12
                     _stress(c[0], c[1], c[2], c[3], history[e, p], numbers, state, out)
                     two[sign] = out[:4]
-                D[:, j] = (two[0] - two[1]) / (2 * H)
+                D[:, j] = (two[0] - two[1]) / (2 * STRAIN_INCREMENT)
             _stress(C[0], C[1], C[2], C[3], history[e, p], numbers, state, out)
             B[:] = 0.0
             for s in range(sides):
@@ -190,7 +192,7 @@ def fly(x, v, mass, free, parts, numbers, state, speed, times, histories, path, 
             if shot == len(path):
                 return steps, spent
         if steps % 10 == 0:
-            dt = COURANT * _shortest(x, patch, area) / speed
+            dt = COURANT_NUMBER * _shortest(x, patch, area) / speed
             if not dt > 0:
                 return -1, spent
         f[:] = 0.0
@@ -215,5 +217,7 @@ def _shortest(x, patch, area):
         a, b, c = patch[e, 0], patch[e, 1], patch[e, 2]
         ux, uy, vx, vy = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[c, 0] - x[a, 0], x[c, 1] - x[a, 1]
         side = max(ux * ux + uy * uy, vx * vx + vy * vy, (ux - vx) ** 2 + (uy - vy) ** 2)
-        least = min(least, max(abs(ux * vy - uy * vx), 2 * FLOOR * area[e]) / np.sqrt(side))
+        least = min(
+            least, max(abs(ux * vy - uy * vx), 2 * MIN_AREA_RATIO * area[e]) / np.sqrt(side)
+        )
     return least

@@ -107,10 +107,10 @@ class Bodies:
     def at_rest_as_a_whole(self, x: Array, v: Array) -> tuple[Array, Array]:
         """(x, v) about the mass centre with P = L = 0, velocities scaled so that E = 0."""
         x = self.centred(x)
-        rest = match(self.mass, x, v)
-        if rest.energy <= 1e-20 * self.kinetic(v):
+        matched = match(self.mass, x, v)
+        if matched.energy <= 1e-20 * self.kinetic(v):
             raise ModelError("the velocities are a rigid motion: nothing is left to scale.")
-        return x, rest.rest * np.sqrt(-self.potential(x) / rest.energy)
+        return x, matched.rest * np.sqrt(-self.potential(x) / matched.energy)
 
     def move(self, x: Array, v: Array, t: Array) -> tuple[Array, Array]:
         """Positions and velocities (k, n, 3) at the times t (k,), starting at t[0].

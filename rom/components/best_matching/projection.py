@@ -9,7 +9,7 @@ from rom.eigen import rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 
-UNSEEN = 1e-12  # share of inertia below which a rotation is left out: points on a line
+INERTIA_RTOL = 1e-12  # share of inertia below which a rotation is left out: points on a line
 ON_ITSELF = 1e-9  # sum of the two smaller singular values below which no rotation is best
 
 
@@ -55,7 +55,7 @@ def rigid_part(mass: Any, R: Array, V: Array) -> Array:
         raise ConfigError(f"{V.shape[0]} velocities do not fit {R.shape[0]} rows of generators.")
     G = R.T @ MR
     unit = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
-    G = np.linalg.pinv(G * np.outer(unit, unit), rcond=UNSEEN, hermitian=True)
+    G = np.linalg.pinv(G * np.outer(unit, unit), rcond=INERTIA_RTOL, hermitian=True)
     return unit[:, None] * G @ (unit[:, None] * MR.T) @ V
 
 
@@ -70,9 +70,9 @@ def match(mass: Any, x: Array, v: Array, *, scale: bool = False) -> Matched:
     """
     R, v = generators(x, scale=scale), configuration(v)
     motion = rigid_part(mass, R, v.ravel())
-    rest = v.ravel() - R @ motion
-    energy = 0.5 * rest @ _weighted(mass, rest[:, None])[:, 0]
-    return Matched(motion, rest.reshape(-1, 3), float(energy))
+    residual = v.ravel() - R @ motion
+    energy = 0.5 * residual @ _weighted(mass, residual[:, None])[:, 0]
+    return Matched(motion, residual.reshape(-1, 3), float(energy))
 
 
 def frame(mass: Any, reference: Array, x: Array, *, plane: bool = False) -> tuple[Array, Array]:

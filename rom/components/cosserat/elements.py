@@ -9,7 +9,7 @@ rigid plate at each end. A segment stretches and shears, a vertex bends and twis
 where s o s is the rotation between the neighbours in the reference: k vanishes there whatever the
 corner. Increments turn in the frame of the section, p <- p o exp(phi). The unknowns are ordered
 along the rod, plate, x_0, segment, x_1, ..., x_N, plate, three numbers each, so that a row of the
-tangent reaches `REACH` columns to either side.
+tangent reaches `HALF_BANDWIDTH` columns to either side.
 
 Source:
     After Lang, Linn, Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
@@ -27,8 +27,8 @@ from rom.model import Array
 
 HERE = Path(__file__).parent
 drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules
-REACH = 8  # columns on either side of the diagonal
-WIDTH = 3 * REACH + 1  # of the band with room for pivoting
+HALF_BANDWIDTH = 8  # columns on either side of the diagonal
+BAND_WIDTH = 3 * HALF_BANDWIDTH + 1  # columns of the band with room for pivoting
 
 
 class Rod(NamedTuple):
@@ -71,7 +71,7 @@ class Work(NamedTuple):
         R, D, H, a, f, e: rotation, gradient of the strain, matrix, strain, force, quaternion of an
             element.
         r: (n,) forces out of balance, n = 6 N + 9.
-        A: (n, WIDTH) band of the tangent, A[i, j - i + REACH].
+        A: (n, BAND_WIDTH) band of the tangent, A[i, j - i + HALF_BANDWIDTH].
         d: (n, 1) increments.
     """
 
@@ -89,7 +89,7 @@ class Work(NamedTuple):
 def work(rod: Rod) -> Work:
     """Memory for a rod."""
     n = 6 * rod.h.size + 9
-    shapes = ((3, 3), (3, 9), (9, 9), (3,), (3,), (4,), (n,), (n, WIDTH), (n, 1))
+    shapes = ((3, 3), (3, 9), (9, 9), (3,), (3,), (4,), (n,), (n, BAND_WIDTH), (n, 1))
     return Work(*(np.zeros(shape) for shape in shapes))
 
 
@@ -142,8 +142,8 @@ def add_turning(A, row, factor, a):
     """Add factor [a]x to the diagonal block of a band that starts at a row."""
     for k in range(3):
         c, d = (k + 1) % 3, (k + 2) % 3
-        A[row + c, d - c + REACH] -= factor * a[k]
-        A[row + d, c - d + REACH] += factor * a[k]
+        A[row + c, d - c + HALF_BANDWIDTH] -= factor * a[k]
+        A[row + d, c - d + HALF_BANDWIDTH] += factor * a[k]
 
 
 @inner
@@ -248,7 +248,7 @@ def add_element(W, C, viscous, weight, rate, at, v):
             total = W.H[c, d]
             for k in range(3):
                 total += weight * (C[k] + rate * viscous[k]) * W.D[k, c] * W.D[k, d]
-            W.A[at + c, d - c + REACH] += total
+            W.A[at + c, d - c + HALF_BANDWIDTH] += total
 
 
 @kernel

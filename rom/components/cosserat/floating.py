@@ -31,7 +31,7 @@ from rom.components.cosserat.vibration import lumped_mass
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
 
-FRAME = 6  # velocities of the frame: of its origin in the world, angular in its own axes
+FRAME_DOFS = 6  # of the origin in the world, angular in the frame's own axes
 
 
 @dataclass(frozen=True)
@@ -73,22 +73,22 @@ class Instant:
     @property
     def parts(self) -> tuple[Array, Array, Array, Array]:
         """Velocities of the frame (3,), (3,), of vertices (N + 1, 3), of sections (N + 2, 3)."""
-        pairs = np.append(self.z[FRAME:], np.zeros(3)).reshape(-1, 6)
+        pairs = np.append(self.z[FRAME_DOFS:], np.zeros(3)).reshape(-1, 6)
         return self.z[:3], self.z[3:6], pairs[:-1, 3:], pairs[:, :3]
 
 
 def jacobian(now: Instant) -> Array:
     """(n, 6 + n) velocities in space per velocity of frame and rod."""
-    n = now.z.size - FRAME
-    J, A = np.zeros((n, FRAME + n)), rotation.matrix(now.P)
+    n = now.z.size - FRAME_DOFS
+    J, A = np.zeros((n, FRAME_DOFS + n)), rotation.matrix(now.P)
     for i, xi in enumerate(now.xi):
         at = slice(6 * i + 3, 6 * i + 6)
         J[at, :3], J[at, 3:6] = np.eye(3), -A @ rotation.skew(xi)
-        J[at, FRAME + at.start : FRAME + at.stop] = A
+        J[at, FRAME_DOFS + at.start : FRAME_DOFS + at.stop] = A
     for k, theta in enumerate(now.theta):
         at = slice(6 * k, 6 * k + 3)
         J[at, 3:6] = rotation.matrix(theta).T
-        J[at, FRAME + at.start : FRAME + at.stop] = np.eye(3)
+        J[at, FRAME_DOFS + at.start : FRAME_DOFS + at.stop] = np.eye(3)
     return J
 
 
@@ -108,7 +108,7 @@ def convective(rod: Rod, now: Instant) -> Array:
 def at_start(rod: Rod, now: Instant) -> tuple[Array, Array]:
     """Reference condition: the frame is fixed to the plate at the start of the rod."""
     C = np.zeros((6, now.z.size))
-    C[:, FRAME : FRAME + 6] = np.eye(6)
+    C[:, FRAME_DOFS : FRAME_DOFS + 6] = np.eye(6)
     return C, np.zeros(6)
 
 
@@ -122,9 +122,9 @@ def chord(rod: Rod, now: Instant) -> tuple[Array, Array]:
     along = along / np.linalg.norm(along)
     across = np.linalg.svd(along[None])[2][1:]
     C = np.zeros((6, n))
-    C[:3, FRAME + 3 : FRAME + 6] = np.eye(3)
+    C[:3, FRAME_DOFS + 3 : FRAME_DOFS + 6] = np.eye(3)
     C[3:5, -6:-3] = across
-    C[5, FRAME : FRAME + 3] = along @ rotation.matrix(now.theta[0])
+    C[5, FRAME_DOFS : FRAME_DOFS + 3] = along @ rotation.matrix(now.theta[0])
     return C, np.zeros(6)
 
 
@@ -132,11 +132,11 @@ def mean_axis(rod: Rod, now: Instant) -> tuple[Array, Array]:
     """Tisserand's condition: the relative motion has no momentum."""
     C = np.zeros((6, now.z.size))
     for i, (m, xi) in enumerate(zip(rod.mass, now.xi, strict=True)):
-        at = slice(FRAME + 6 * i + 3, FRAME + 6 * i + 6)
+        at = slice(FRAME_DOFS + 6 * i + 3, FRAME_DOFS + 6 * i + 6)
         C[:3, at], C[3:, at] = m * np.eye(3), m * rotation.skew(xi)
     rate = np.zeros(6)
     for k, (J, q) in enumerate(zip(rod.inertia, now.theta, strict=True)):
-        at = slice(FRAME + 6 * k, FRAME + 6 * k + 3)
+        at = slice(FRAME_DOFS + 6 * k, FRAME_DOFS + 6 * k + 3)
         R, w = rotation.matrix(q), now.parts[3][k]
         C[3:, at] += R * J
         rate[3:] += R @ np.cross(w, J * w)
@@ -155,13 +155,13 @@ def accelerations(
     """
     J, (C, rate), M = jacobian(now), conditions(rod, now), lumped_mass(rod)
     W = work(rod)
-    internal(rod, now.xi, now.theta, now.z[FRAME:], 0.0, W)
+    internal(rod, now.xi, now.theta, now.z[FRAME_DOFS:], 0.0, W)
     f = np.zeros((len(rod.p), 6))
     f[:-1, 3:] = load[0]
     sections = now.shape.p
     f[:, :3] = [rotation.matrix(p).T @ moment for p, moment in zip(sections, load[1], strict=True)]
     right = J.T @ (f.ravel()[:-3] - convective(rod, now))
-    right[FRAME:] -= W.r
+    right[FRAME_DOFS:] -= W.r
     left = np.block([[J.T * M @ J, C.T], [C, np.zeros((6, 6))]])
     solution = np.linalg.solve(left, np.append(right, -rate))
     return solution[:-6], solution[-6:]
@@ -215,7 +215,7 @@ def simulate(
                          hint="Take the inertias of cosserat.body(rod).")  # fmt: skip
     conditions, shape = REFERENCES[reference_condition], reference(rod)
     load = (np.zeros_like(rod.x), np.zeros((len(rod.p), 3))) if load is None else load
-    z = np.zeros(FRAME + 6 * rod.h.size + 9)
+    z = np.zeros(FRAME_DOFS + 6 * rod.h.size + 9)
     z[:3], z[3:6] = velocity, omega
     begun = Instant(np.zeros(3), np.array([1.0, 0, 0, 0]), shape.x, shape.p, z)
     n, times = rod.h.size, np.atleast_1d(np.asarray(t, dtype=float))

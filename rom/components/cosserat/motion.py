@@ -21,7 +21,7 @@ from rom import rotation
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.elements import (
-    REACH,
+    HALF_BANDWIDTH,
     Rod,
     energy,
     internal,
@@ -36,7 +36,8 @@ from rom.mbs.alpha import coefficients
 from rom.model import Array, Mask
 
 HELD, HEAVY, LIGHT = 0, 1, 2  # dofs; light ones have no mass and follow the rest
-CONVERGED, ITERATIONS = 1e-9, 25  # last increment, in rad and lengths of the rod
+INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
+MAX_ITERATIONS = 25
 
 Loads = tuple[Array, Array]
 Placement = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]
@@ -77,16 +78,16 @@ def add_inertia(rod, v, a, accelerating, rate, W):
     for i in range(rod.mass.size):
         for c in range(6 * i + 3, 6 * i + 6):
             W.r[c] += rod.mass[i] * a[c]
-            W.A[c, REACH] += rod.mass[i] * accelerating
+            W.A[c, HALF_BANDWIDTH] += rod.mass[i] * accelerating
     for k in range(rod.inertia.shape[0]):
         J, w, at = rod.inertia[k], v[6 * k : 6 * k + 3], 6 * k
         for c in range(3):
             d, e = (c + 1) % 3, (c + 2) % 3
             W.a[c] = J[c] * w[c]
             W.r[at + c] += J[c] * a[at + c] + (J[e] - J[d]) * w[d] * w[e]
-            W.A[at + c, REACH] += accelerating * J[c]
-            W.A[at + c, d - c + REACH] += rate * (J[e] - J[d]) * w[e]
-            W.A[at + c, e - c + REACH] += rate * (J[e] - J[d]) * w[d]
+            W.A[at + c, HALF_BANDWIDTH] += accelerating * J[c]
+            W.A[at + c, d - c + HALF_BANDWIDTH] += rate * (J[e] - J[d]) * w[e]
+            W.A[at + c, e - c + HALF_BANDWIDTH] += rate * (J[e] - J[d]) * w[d]
 
 
 @inner
@@ -142,7 +143,7 @@ def advance(rod, S, old, load, free, new, W):
     rate = S.gamma / (S.beta * S.h)
     accelerating = (1 - S.alpha_m) / (S.beta * S.h * S.h * (1 - S.alpha_f))
     length, count = rod.h.sum(), 0
-    for iteration in range(ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         place(old, D, free, new)
         update(S, old, D, free, new)
         internal(rod, new.x, new.p, new.v, rate, W)
@@ -157,7 +158,7 @@ def advance(rod, S, old, load, free, new, W):
         if products == 0 or not turned + moved < 1e3:
             return -1, count
         add_increment(D, W.d)
-        if max(turned, moved) < CONVERGED:
+        if max(turned, moved) < INCREMENT_RTOL:
             place(old, D, free, new)
             update(S, old, D, free, new)
             return iteration + 1, count

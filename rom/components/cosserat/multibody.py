@@ -26,15 +26,15 @@ from rom.components.cosserat.elements import (
 )
 from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ModelError
-from rom.mbs.arrays import SPACE
+from rom.mbs.arrays import LAW_MEMORY_SIZE
 from rom.mbs.nonlinear import Elements, Frames
 from rom.model import Array
 
-POSE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity
+POSE_SIZE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity
 # where the nine dofs of an element are among the twelve of its two frames
-SEGMENT, VERTEX = (0, 1, 2, 9, 10, 11, 6, 7, 8), (3, 4, 5, 0, 1, 2, 9, 10, 11)
+SEGMENT_DOFS, VERTEX_DOFS = (0, 1, 2, 9, 10, 11, 6, 7, 8), (3, 4, 5, 0, 1, 2, 9, 10, 11)
 # inertia that a plate without one takes over from the segment beside it: a trapezoid's share
-SHARE = 0.25
+PLATE_INERTIA_SHARE = 0.25
 
 
 @inner
@@ -49,7 +49,7 @@ def memory(space):
 @inner
 def rate_of(pose, place):
     """Velocity of one of the twelve dofs of two frames."""
-    return pose[POSE * (place // 6) + 7 + place % 6]
+    return pose[POSE_SIZE * (place // 6) + 7 + place % 6]
 
 
 @inner
@@ -85,26 +85,26 @@ def answer_of(W, C, viscous, weight, at, pose, wanted, answer):  # noqa: PLR0913
 
 def segment(numbers, pose, wanted, answer, space):
     """Stretch and shear of a segment: numbers h, C (3), viscous (3), a0 (3)."""
-    given, poses = carray(numbers, (10,)), carray(pose, (2 * POSE,))
-    W = memory(carray(space, (SPACE,)))
+    given, poses = carray(numbers, (10,)), carray(pose, (2 * POSE_SIZE,))
+    W = memory(carray(space, (LAW_MEMORY_SIZE,)))
     h, C = given[0], given[1:4]
     stretched(h, C, given[7:10], poses[0:3], poses[13:16], poses[16:20], W)
     if wanted:
         stretch_geometry(h, W)
     result = carray(answer, (302,))
-    answer_of(W, C, given[4:7], h, SEGMENT, poses, wanted, result)
+    answer_of(W, C, given[4:7], h, SEGMENT_DOFS, poses, wanted, result)
 
 
 def vertex(numbers, pose, wanted, answer, space):
     """Bending and twist of a vertex: numbers l, B (3), viscous (3), s (4), S (9)."""
-    given, poses = carray(numbers, (20,)), carray(pose, (2 * POSE,))
-    W = memory(carray(space, (SPACE,)))
+    given, poses = carray(numbers, (20,)), carray(pose, (2 * POSE_SIZE,))
+    W = memory(carray(space, (LAW_MEMORY_SIZE,)))
     B, S = given[1:4], given[11:20].reshape((3, 3))
     curved(given[0], B, given[7:11], S, poses[3:7], poses[16:20], W)
     if wanted:
         curvature_geometry(S, W)
     result = carray(answer, (302,))
-    answer_of(W, B, given[4:7], given[0], VERTEX, poses, wanted, result)
+    answer_of(W, B, given[4:7], given[0], VERTEX_DOFS, poses, wanted, result)
 
 
 @cache
@@ -172,7 +172,7 @@ def _inertia(rod: Rod) -> Array:
     J = rod.inertia.copy()
     for plate, beside in ((0, 1), (-1, -2)):
         if (J[plate] <= 0.0).any():
-            moved = SHARE * rod.inertia[beside]
+            moved = PLATE_INERTIA_SHARE * rod.inertia[beside]
             J[plate] += moved
             J[beside] -= moved
     return J

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.elements import (
-    REACH,
+    HALF_BANDWIDTH,
     Rod,
     add_turning,
     internal,
@@ -18,10 +18,10 @@ from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, Mask
 
-CAP = 0.2  # largest rotation of an iteration [rad]: larger steps jump to other equilibria
-CONVERGED = 1e-8  # last increment, in rad and in lengths of the rod; the next one is its square
-ITERATIONS = 200
-SHORTEST = 1e-4  # part of the load that is tried before giving up
+MAX_ROTATION = 0.2  # rotation of an iteration [rad]: larger steps jump to other equilibria
+INCREMENT_RTOL = 1e-8  # last increment, in rad and lengths of the rod; the next one is its square
+MAX_ITERATIONS = 200
+MIN_LOAD_STEP = 1e-4  # part of the load that is tried before giving up
 
 
 @kernel
@@ -49,9 +49,9 @@ def add_spin(rod, x, p, spin, W):
             along = spin[0] * x[i, 0] + spin[1] * x[i, 1] + spin[2] * x[i, 2]
             square = spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]
             W.r[at + c] += rod.mass[i] * (spin[c] * along - square * x[i, c])
-            W.A[at + c, REACH] += rod.mass[i] * (spin[c] * spin[c] - square)
-            W.A[at + c, d - c + REACH] += rod.mass[i] * spin[c] * spin[d]
-            W.A[at + c, e - c + REACH] += rod.mass[i] * spin[c] * spin[e]
+            W.A[at + c, HALF_BANDWIDTH] += rod.mass[i] * (spin[c] * spin[c] - square)
+            W.A[at + c, d - c + HALF_BANDWIDTH] += rod.mass[i] * spin[c] * spin[d]
+            W.A[at + c, e - c + HALF_BANDWIDTH] += rod.mass[i] * spin[c] * spin[e]
     for k in range(rod.inertia.shape[0]):
         rotation_of(p[k], W.R)
         w, J, at = W.a, rod.inertia[k], 6 * k
@@ -61,9 +61,9 @@ def add_spin(rod, x, p, spin, W):
             d, e = (c + 1) % 3, (c + 2) % 3
             more = J[e] - J[d]
             W.r[at + c] += more * w[d] * w[e]
-            W.A[at + c, REACH] += more * (w[e] * w[e] - w[d] * w[d])
-            W.A[at + c, d - c + REACH] += more * w[d] * w[c]
-            W.A[at + c, e - c + REACH] -= more * w[e] * w[c]
+            W.A[at + c, HALF_BANDWIDTH] += more * (w[e] * w[e] - w[d] * w[d])
+            W.A[at + c, d - c + HALF_BANDWIDTH] += more * w[d] * w[c]
+            W.A[at + c, e - c + HALF_BANDWIDTH] -= more * w[e] * w[c]
 
 
 @inner
@@ -94,7 +94,7 @@ def newton(rod, x, p, load, spin, free, W):
     """Find equilibrium in place; the number of iterations, -1 if it was not found."""
     length = rod.h.sum()
     rest = np.zeros(W.r.size)
-    for iteration in range(ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         internal(rod, x, p, rest, 0.0, W)
         add_loads(p, load[0], load[1], W)
         add_spin(rod, x, p, spin, W)
@@ -106,8 +106,8 @@ def newton(rod, x, p, load, spin, free, W):
         turned, moved = largest(W.d, length)
         if not np.isfinite(turned + moved):
             return -1
-        move(x, p, W.d, min(1.0, CAP / max(turned, CAP)))
-        if max(turned, moved) < CONVERGED:
+        move(x, p, W.d, min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION)))
+        if max(turned, moved) < INCREMENT_RTOL:
             return iteration + 1
     return -1
 
@@ -191,7 +191,7 @@ def equilibrium(
             share, shape = now, Shape(x, p)
             if 1.0 - share < 1e-12:
                 break
-        elif part > SHORTEST:
+        elif part > MIN_LOAD_STEP:
             part /= 2
         else:
             raise _stuck(shape, share)
@@ -229,7 +229,7 @@ def dense(A: Array) -> Array:
     """(n, n) matrix of a band."""
     n = len(A)
     K = np.zeros((n, n))
-    for k in range(-REACH, REACH + 1):
+    for k in range(-HALF_BANDWIDTH, HALF_BANDWIDTH + 1):
         rows = np.arange(max(0, -k), min(n, n - k))
-        K[rows, rows + k] = A[rows, k + REACH]
+        K[rows, rows + k] = A[rows, k + HALF_BANDWIDTH]
     return K

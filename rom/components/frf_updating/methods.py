@@ -20,10 +20,11 @@ from rom.components.frf_updating.models import (
 from rom.errors import ConfigError
 from rom.model import Array
 
-EVALUATIONS = 100  # of the responses; what has not converged by then started too far away
-STEPS, CLIP = 40, 0.2  # linear solutions, and the largest change of a parameter in each
-LEAST = -0.95  # a change that leaves a twentieth of the stiffness or mass
-EQUAL = 1e-12  # relative distance of eigenvalues that are one; their modes have no derivative
+MAX_EVALUATIONS = 100  # evaluations of the responses; more are needed if the start is too far away
+MAX_STEPS = 40  # linear solutions
+MAX_PARAMETER_CHANGE = 0.2  # in one step
+MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
+EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
     A, B = (modes.Phi.T @ dA @ modes.Phi for dA in (model.dK, model.dM))
     lam, d = modes.lam, modes.d
     gap = lam - lam[:, None]  # lam_j - lam_i in row i, column j
-    apart = np.abs(gap) > EQUAL * lam[-1]
+    apart = np.abs(gap) > EQUAL_EIGENVALUE_RTOL * lam[-1]
     gap = np.where(apart, gap, 1.0)
     C = ((d - d[:, None]) * A - (d * lam[:, None] - d[:, None] * lam) * B) / gap * apart
     i = np.arange(lam.size)
@@ -144,9 +145,9 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
         return _weighted(test.weights, dH / H[..., None])
 
     start = np.concatenate([p, np.log(zeta)])
-    low = np.concatenate([np.full(n_p, LEAST), np.full(np.size(zeta), -np.inf)])
+    low = np.concatenate([np.full(n_p, MIN_PARAMETER), np.full(np.size(zeta), -np.inf)])
     found = least_squares(
-        residual, start, jacobian, bounds=(low, np.inf), max_nfev=EVALUATIONS,
+        residual, start, jacobian, bounds=(low, np.inf), max_nfev=MAX_EVALUATIONS,
         xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
     return _update(found.x, n_p, found.fun, found.jac, [*path[1:], found.x[:n_p]])
@@ -167,7 +168,7 @@ def update_by_input(
     x, ratios, path = np.array(p, dtype=float), np.array(zeta, dtype=float), []
     weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
     weights = weights.mean(axis=1, keepdims=True)
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         here = model.at(x)
         modes = modal(here, ratios)
         H = _receptance(here, modes, test.omega, test.inputs)
@@ -176,9 +177,11 @@ def update_by_input(
         left = (U.T @ modes.Phi) * modes.g(test.omega)[:, None, :]
         J = _weighted(weights, _by_all(here, modes, ratios.size, left, y, test.omega))
         r = _weighted(weights, U.T @ (test.H - H))
-        step = np.clip(-np.linalg.lstsq(J, r, rcond=None)[0], -CLIP, CLIP)
+        step = np.clip(
+            -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
+        )
         ratios = ratios * np.exp(step[x.size :])
-        x = np.maximum(x + step[: x.size], LEAST)
+        x = np.maximum(x + step[: x.size], MIN_PARAMETER)
         path.append(x)
     return _update(np.concatenate([x, np.log(ratios)]), x.size, r, J, path)
 
@@ -205,7 +208,7 @@ def response_function_method(
             "more."
         )
     p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
-    clip = CLIP if steps > 1 else np.inf
+    clip = MAX_PARAMETER_CHANGE if steps > 1 else np.inf
     o = np.setdiff1d(np.arange(len(model.K)), s)
     w = test.omega[:, None, None]
     F = np.eye(len(model.K))[:, s[list(test.inputs)]]
@@ -219,7 +222,7 @@ def response_function_method(
         change = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
         J, r = _weighted(test.weights, change), _weighted(test.weights, H @ F - test.H)
         step = np.linalg.lstsq(J, r, rcond=None)[0]
-        p = np.maximum(p + np.clip(step, -clip, clip), LEAST)
+        p = np.maximum(p + np.clip(step, -clip, clip), MIN_PARAMETER)
         path.append(p)
     return _update(p, p.size, r - J @ step, J, path)
 

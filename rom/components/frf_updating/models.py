@@ -12,8 +12,8 @@ from rom.model import Array
 from rom.reduction.fixed_interface import craig_bampton
 
 Complex = NDArray[np.complex128]
-RIGID = 1e-4  # eigenvalue of a rigid motion over the lowest elastic one: round-off
-DEPENDENT = 1e-7  # singular value of a basis, relative, below which a column says nothing new
+RIGID_RTOL = 1e-4  # round-off of a rigid motion's eigenvalue, of the lowest elastic one
+RANK_RTOL = 1e-7  # singular value of dependent columns of a basis, of the largest one
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
         raise ModelError("the changes leave a mass matrix that is not positive.") from error
     elastic = slice(model.n_rigid, None)
     rigid = np.abs(lam[: model.n_rigid]).max(initial=0.0)
-    if rigid > RIGID * np.abs(lam[elastic]).min(initial=np.inf):
+    if rigid > RIGID_RTOL * np.abs(lam[elastic]).min(initial=np.inf):
         raise ModelError(
             f"n_rigid = {model.n_rigid}, but a motion among them has the frequency "
             f"{np.sqrt(rigid):.4g} rad/s: the structure is held."
@@ -214,7 +214,7 @@ def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -
     at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]
     Psi = np.hstack([craig_bampton(here.K, here.M, s, n_modes).Psi for here in at])
     U, size, _ = np.linalg.svd(Psi / np.linalg.norm(Psi, axis=0), full_matrices=False)
-    return U[:, size > DEPENDENT * size[0]]
+    return U[:, size > RANK_RTOL * size[0]]
 
 
 def sensor_dofs(model: ParametricModel) -> Any:

@@ -17,7 +17,7 @@ from rom.components.gear_mesh.geometry import GearPair
 from rom.errors import ModelError
 from rom.model import Array, Index
 
-POINT, WEIGHT = np.polynomial.legendre.leggauss(3)
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,8 @@ def _stiffness(points: Array, cells: Index, nu: float) -> Any:
     """Stiffness of plane strain, E = 1."""
     D = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, 0.5 - nu]]) / ((1 + nu) * (1 - 2 * nu))
     X, Ke = points[cells], np.zeros((len(cells), 18, 18))
-    for a, wa in zip(POINT, WEIGHT, strict=True):
-        for b, wb in zip(POINT, WEIGHT, strict=True):
+    for a, wa in zip(GAUSS_POINTS, GAUSS_WEIGHTS, strict=True):
+        for b, wb in zip(GAUSS_POINTS, GAUSS_WEIGHTS, strict=True):
             (Na, da), (Nb, db) = _line(a), _line(b)
             dN = np.stack([np.outer(da, Nb).ravel(), np.outer(Na, db).ravel()])
             J = dN @ X

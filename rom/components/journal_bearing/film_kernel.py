@@ -22,8 +22,8 @@ from rom.model import Array, Index
 HERE = Path(__file__).parent
 drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")
 FULL, REYNOLDS, JFO = 0, 1, 2  # no cavitation; oil from nowhere; oil is conserved
-MOTIONS = 4  # journal centre x, y and tilt about x, y
-MOST = 100  # changes of the cavitated region
+N_MOTIONS = 4  # journal centre x, y and tilt about x, y
+MAX_ITERATIONS = 100  # changes of the cavitated region
 
 
 class Grid(NamedTuple):
@@ -65,7 +65,7 @@ def per_motion(grid, face, i, Z, k):
 def thickness(grid, motion, face, i, Z):
     """Film at column i, or at the face behind it."""
     H = grid.bore[face, i]
-    for k in range(MOTIONS):
+    for k in range(N_MOTIONS):
         H += motion[k] * per_motion(grid, face, i, Z, k)
     return H
 
@@ -133,7 +133,7 @@ def assemble(grid, motion, rate, active, law, place, band, rhs):  # noqa: PLR091
             H, Z = thickness(grid, motion, 1, i, grid.Z[j]), grid.Z[j]
             H_before = thickness(grid, motion, 1, before, Z)
             squeeze = 0.0
-            for k in range(MOTIONS):
+            for k in range(N_MOTIONS):
                 squeeze += 12 * dtheta * dZ * rate[k] * per_motion(grid, 0, i, Z, k)
             rhs[row] = -6 * dZ * (H - H_before) - squeeze
             for side in range(2):
@@ -188,17 +188,17 @@ def opened(grid, motion, P, fill, place, X):
             east = 3 * h**2 * dZ / dtheta * (P[i, j] - P[after, j]) + 6 * dZ * fill[i, j]
             west = 3 * h_before**2 * dZ / dtheta * (P[i, j] - P[before, j])
             west -= 6 * dZ * fill[before, j]
-            for k in range(MOTIONS):
+            for k in range(N_MOTIONS):
                 X[row, k] = -east * per_motion(grid, 1, i, Z, k)
                 X[row, k] -= west * per_motion(grid, 1, before, Z, k)
                 g = per_motion(grid, 0, i, Z, k)
-                X[row, MOTIONS + k] = -12 * dtheta * dZ * fill[i, j] * g
+                X[row, N_MOTIONS + k] = -12 * dtheta * dZ * fill[i, j] * g
             for side in range(2):
                 o, face = j - 1 + 2 * side, j + side
                 drop = P[i, j] - (P[i, o] if 0 <= o < nz else 0.0)
                 Z = grid.Z_face[face]
                 a = 3 * thickness(grid, motion, 0, i, Z) ** 2 * along_width(grid, face) * drop
-                for k in range(MOTIONS):
+                for k in range(N_MOTIONS):
                     X[row, k] -= a * per_motion(grid, 0, i, Z, k)
 
 
@@ -222,7 +222,7 @@ def solve_film(grid, motion, rate, law, active, P, fill):
     nt, nz = P.shape
     place = np.empty(nt, dtype=np.int64)
     count = -1
-    for iteration in range(MOST):
+    for iteration in range(MAX_ITERATIONS):
         w = order(active, grid.fixed, law, place)
         band, u = np.zeros((nt * nz, 2 * w + 1)), np.zeros((nt * nz, 1))
         assemble(grid, motion, rate, active, law, place, band, u[:, 0])
@@ -238,7 +238,7 @@ def solve_film(grid, motion, rate, law, active, P, fill):
         if changed(u, grid.fixed, law, place, active) == 0:
             count = iteration + 1
             break
-    X = np.zeros((nt * nz, 2 * MOTIONS))
+    X = np.zeros((nt * nz, 2 * N_MOTIONS))
     opened(grid, motion, P, fill, place, X)
     back_substitute(band, X)
     return *resultants(grid, active, place, P, X), count
@@ -249,15 +249,15 @@ def resultants(grid, active, place, P, X):
     """Forces on the motions, and their derivatives from those of the pressures."""
     nt, nz = P.shape
     cell = (grid.Z_face[1] - grid.Z_face[0]) * 2 * math.pi / nt * (2.0 if grid.half > 0.0 else 1.0)
-    F, dF = np.zeros(MOTIONS), np.zeros((MOTIONS, 2 * MOTIONS))
+    F, dF = np.zeros(N_MOTIONS), np.zeros((N_MOTIONS, 2 * N_MOTIONS))
     for i in range(nt):
         for j in range(nz):
-            for k in range(MOTIONS):
+            for k in range(N_MOTIONS):
                 if k >= 2 and grid.half > 0.0:
                     continue  # the image takes the moment
                 g = cell * per_motion(grid, 0, i, grid.Z[j], k)
                 F[k] += P[i, j] * g
                 if active[i, j] == 1 and grid.fixed[i, j] == 0:
-                    for m in range(2 * MOTIONS):
+                    for m in range(2 * N_MOTIONS):
                         dF[k, m] += X[place[i] * nz + j, m] * g
     return F, dF

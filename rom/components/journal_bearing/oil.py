@@ -11,7 +11,7 @@ from rom.components.journal_bearing.statics import equilibrium
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 
-KELVIN = 273.15
+CELSIUS_ZERO = 273.15  # [K]
 AT_100 = {32: 5.4, 46: 6.8, 68: 8.7}  # usual mineral oils of these grades [mm^2/s]
 
 
@@ -40,14 +40,14 @@ class Oil:
     def law(self) -> tuple[float, float]:
         """A and B of log10 log10 (nu + 0.7) = A - B log10 T."""
         cold, hot = (np.log10(np.log10(nu + 0.7)) for nu in (self.nu_40, self.nu_100))
-        T = np.log10([KELVIN + 40, KELVIN + 100])
+        T = np.log10([CELSIUS_ZERO + 40, CELSIUS_ZERO + 100])
         B = (cold - hot) / (T[1] - T[0])
         return float(cold + B * T[0]), float(B)
 
     def viscosity(self, celsius: npt.ArrayLike) -> Array:
         """Dynamic viscosity [Pa s] at a temperature [degrees Celsius]."""
         A, B = self.law()
-        nu = 10 ** (10 ** (A - B * np.log10(np.asarray(celsius, dtype=float) + KELVIN))) - 0.7
+        nu = 10 ** (10 ** (A - B * np.log10(np.asarray(celsius, dtype=float) + CELSIUS_ZERO))) - 0.7
         return 1e-6 * self.density * nu
 
 

@@ -10,7 +10,10 @@ from rom.components.journal_bearing.oil_film import Film, film
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 
-STEP, THINNEST, TIMES, ENOUGH = 0.1, 2e-3, 200, 1e-9  # clearances; Newton steps; of the load
+MAX_STEP = 0.1  # of the clearance
+MIN_FILM_RATIO = 2e-3  # thinnest film, of the clearance
+MAX_ITERATIONS = 200  # Newton steps
+LOAD_RTOL = 1e-9  # of the load
 
 
 def equilibrium(
@@ -44,21 +47,21 @@ def equilibrium(
     turn = np.pi / 3 + np.arctan2(W[1], W[0])
     given = 0.3 * c * np.array([np.cos(turn), np.sin(turn)]) if start is None else start
     x, warm = np.array(given, dtype=float), None
-    for _ in range(TIMES):
+    for _ in range(MAX_ITERATIONS):
         now = film(bearing, x, speed=speed, viscosity=viscosity, warm=warm)
         missing, warm = now.force[:2] + W, now.active
-        if np.hypot(*missing) <= ENOUGH * size:
+        if np.hypot(*missing) <= LOAD_RTOL * size:
             return now
         K = now.stiffness[:2, :2]
         if not np.isfinite(K).all() or np.linalg.cond(K) > 1e12:
             break
         step = np.linalg.solve(K, missing)
-        step *= min(1.0, STEP * c / np.hypot(*step))
+        step *= min(1.0, MAX_STEP * c / np.hypot(*step))
         here = bearing.thinnest(x)
         while bearing.thinnest(x + step) < 0.5 * here:
             step /= 2
         x = x + step
-        if bearing.thinnest(x) < THINNEST * c:
+        if bearing.thinnest(x) < MIN_FILM_RATIO * c:
             break
     raise SolverError(_no_film(bearing, now, size), hint=_cure(bearing))
 

@@ -13,7 +13,7 @@ from rom.model import Array
 from rom.rotation import skew
 
 GRAVITY = 9.81  # m/s^2
-STEP = 0.1  # time step times the highest frequency
+STEP_RATIO = 0.1  # time step times the highest frequency
 STATES = ("whole", "cracked", "punched")
 
 
@@ -176,7 +176,7 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
     """
     if not (0 < t_end < np.inf and keep >= 1 and (dt is None or dt > 0)):
         raise ConfigError(f"t_end = {t_end} s, dt = {dt} s, keep = {keep}: all must be positive.")
-    n = int(np.ceil(t_end / (STEP / g.highest_frequency() if dt is None else dt)))
+    n = int(np.ceil(t_end / (STEP_RATIO / g.highest_frequency() if dt is None else dt)))
     every = max(1, n // keep)
     numbers = (
         (g.boulder, g.plug, GRAVITY if g.weight else 0.0, g.speed),
@@ -227,7 +227,7 @@ def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str
 
 
 def _scaled(record: Any, path: str, factor: float) -> Any:
-    name, _, rest = path.partition(".")
+    name, _, remainder = path.partition(".")
     value = getattr(record, name)
-    value = _scaled(value, rest, factor) if rest else factor * value
+    value = _scaled(value, remainder, factor) if remainder else factor * value
     return replace(record, **{name: value})

@@ -11,7 +11,7 @@ from rom.components.rockfall import kernels
 from rom.errors import ConfigError
 from rom.model import Array
 
-ROCK = 2600.0  # kg/m^3
+ROCK_DENSITY = 2600.0  # [kg/m^3]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,9 @@ class Cushion:
             raise ConfigError(f"{self}: needed are {needed}.")
 
     @classmethod
-    def of_sand(cls, boulder: float, lame: float, *, rock: float = ROCK, **more: Any) -> "Cushion":
+    def of_sand(
+        cls, boulder: float, lame: float, *, rock: float = ROCK_DENSITY, **more: Any
+    ) -> "Cushion":
         """Hertz's half space, with equal Lame constants, under a spherical boulder.
 
         Its largest force is P = 2.108 (m g)^(2/3) lame^(2/5) H^(3/5) in t, m and kN, the formula
@@ -83,10 +85,10 @@ class Cushion:
         n = self.exponent + 1
         high = min((n * energy / self.stiffness) ** (1 / n), self.limit * (1 - 1e-9))
 
-        def rest(d: float) -> float:
+        def residual(d: float) -> float:
             return float(quad(self.force, 0, d, limit=200)[0] - energy)
 
-        return float(brentq(rest, 0, high) if self.hardening > 0 < rest(high) else high)
+        return float(brentq(residual, 0, high) if self.hardening > 0 < residual(high) else high)
 
 
 @dataclass(frozen=True, slots=True)

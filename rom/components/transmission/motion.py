@@ -13,7 +13,7 @@ from rom.components.transmission.unit import Rest, Transmission, rest
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 
-TIMES, ENOUGH = 30, 1e-9
+MAX_ITERATIONS, FORCE_RTOL = 30, 1e-9
 
 
 # coordinates, rates, normal force of the teeth, error of transmission, heat, work
@@ -164,7 +164,7 @@ class Step:
         theta: float,
         v: Array | None = None,
         *,
-        enough: float = ENOUGH,
+        enough: float = FORCE_RTOL,
         alpha: float = 0.0,
     ):
         """Start from balance; alpha from -1/3 to 0 damps what steps do not resolve.
@@ -197,7 +197,7 @@ class Step:
         old, size, now = -self.alpha * before.sum(axis=0), np.abs(before).max(), 1 + self.alpha
         ahead = guess - q0 if guess is not None else dt * self.v + dt**2 / 4 * self.a
         q = q0 + unit.allowed(q0, ahead) * ahead
-        for _ in range(TIMES):
+        for _ in range(MAX_ITERATIONS):
             v, a = self._rates(dt, q - q0, self.v, self.a)
             self.now = unit.forces(q, v, theta, self.now.films)
             R = now * (unit.load + self.now.force - self.K @ q - self.C @ v) + old - self.M @ a

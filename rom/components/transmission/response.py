@@ -14,7 +14,7 @@ from rom.components.transmission.unit import Rest
 from rom.errors import ModelError
 from rom.model import Array
 
-TIMES = 60
+MAX_ITERATIONS = 60
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,10 @@ def mesh_response(state: Rest, *, harmonics: int = 6, positions: int = 96) -> Re
             hint="Lower the speed, or load the bearings more.",
         )
     M, C, K = linearised(state)
-    push, k = _excitation(state, positions)
+    excitation, k = _excitation(state, positions)
     K += W.T @ (k - state.forces.mesh.stiffness) @ W
     C += W.T @ (unit.mesh.damping * k - state.forces.mesh.damping) @ W
-    waves = 2 * np.fft.rfft(push, axis=0)[1 : harmonics + 1] / positions
+    waves = 2 * np.fft.rfft(excitation, axis=0)[1 : harmonics + 1] / positions
     F, load = state.forces.mesh.force, float(state.forces.mesh.load.sum())
     rb, error, force = unit.mesh.pair.rb, [], []
     for h, wave in enumerate(waves, start=1):
@@ -83,7 +83,7 @@ def _excitation(state: Rest, positions: int) -> tuple[Array, Array]:
     mesh, q = state.unit.mesh, state.unit.wheels @ state.q
     wanted, turned, forces, stiffness = state.forces.mesh.force[5], [], [], []
     for t in 2 * np.pi / mesh.pair.teeth[0] * np.arange(positions) / positions:
-        for _ in range(TIMES):
+        for _ in range(MAX_ITERATIONS):
             teeth = mesh.forces(q, state.theta + t)
             missing = (teeth.force[5] - wanted) / max(teeth.stiffness[5, 5], 1.0)
             q[5] += missing

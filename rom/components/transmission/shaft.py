@@ -13,7 +13,7 @@ import numpy.typing as npt
 from rom.errors import ModelError
 from rom.model import Array
 
-GAUSS, WEIGHT = np.polynomial.legendre.leggauss(4)
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 STEEL = (206e9, 0.3, 7850.0)
 
 
@@ -131,7 +131,7 @@ def _beam(
     stiff = kappa * shear * area
     phi = 12 * E * I / (stiff * l**2)
     M, K, G = (np.zeros((12, 12)) for _ in range(3))
-    for x, w in zip((1 + GAUSS) / 2, WEIGHT * l / 2, strict=True):
+    for x, w in zip((1 + GAUSS_POINTS) / 2, GAUSS_WEIGHTS * l / 2, strict=True):
         N, T, dN, dT = _shapes(x, l, phi)
         ux, py, uy, px = (_row(c, v) for c, v in ((0, N), (4, T), (1, N), (3, -T)))
         M += w * rho * (area * (np.outer(ux, ux) + np.outer(uy, uy)))

@@ -21,9 +21,10 @@ from rom.components.transmission.shaft import Disc
 from rom.errors import ModelError
 from rom.model import Array
 
-MODES = 8  # of each kind, next to the static shapes under loads on the seats
-ALIKE, ROUND = 0.02, 0.05  # frequencies of a pair; motion out of a plane
-DEPENDENT = 1e-10
+MAX_MODES = 8  # of each kind, next to the static shapes under loads on the seats
+PAIR_RTOL = 0.02  # difference of the frequencies of a pair
+PLANARITY_RTOL = 0.05  # motion out of a plane
+DEPENDENT_RTOL = 1e-10
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class SolidShaft:
         felt = [np.abs(B[:, k]).max(axis=(0, 1)) for k in ([0, 1, 3, 4], [2], [5])]
         bent, stretched, twisted = (np.flatnonzero(np.argmax(felt, axis=0) == k) for k in range(3))
         pairs = self._in_plane(omega[bent], V[:, bent], B[:, :, bent])
-        modes = (pairs, V[:, stretched[:MODES]], V[:, twisted[:MODES]])
+        modes = (pairs, V[:, stretched[:MAX_MODES]], V[:, twisted[:MAX_MODES]])
         flexibility = (V / omega**2) @ V.T
         found = []
         for rows, shapes, own in zip(([0, 4], [2], [5]), modes, ([0, 4], [2], [5]), strict=True):
@@ -139,9 +140,9 @@ class SolidShaft:
             ModelError: if the first modes are no pair, so that the body is not round.
         """
         found = []
-        for k in range(0, min(2 * MODES, omega.size - 1), 2):
+        for k in range(0, min(2 * MAX_MODES, omega.size - 1), 2):
             _, s, turn = np.linalg.svd(B[:, [1, 3], k : k + 2].reshape(-1, 2))
-            if omega[k + 1] > (1 + ALIKE) * omega[k] or s[1] > ROUND * s[0]:
+            if omega[k + 1] > (1 + PAIR_RTOL) * omega[k] or s[1] > PLANARITY_RTOL * s[0]:
                 break
             found.append(V[:, k : k + 2] @ turn[1])
         if not found:
@@ -159,7 +160,7 @@ def _normalised(M: Array, rigid: Array, elastic: Array, mass: float) -> Array:
     found = rigid * np.sqrt(mass / np.sum(rigid * (M @ rigid), axis=0))
     elastic = elastic / np.sqrt(np.sum(elastic * (M @ elastic), axis=0))
     size, V = np.linalg.eigh(elastic.T @ M @ elastic)
-    keep = size > DEPENDENT
+    keep = size > DEPENDENT_RTOL
     return np.hstack([found, elastic @ V[:, keep] * np.sqrt(mass / size[keep])])
 
 

@@ -16,9 +16,11 @@ from rom.components.transmission.unit import Rest, Transmission, rest
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 
-PASSES, ENOUGH, PRECISE = 40, 1e-6, 1e-7  # periods; of the motion; of forces in a step
-TRIALS = 3
-DAMPED = -0.05  # films are so stiff that without it rates alternate from step to step
+MAX_PERIODS = 40
+MOTION_RTOL = 1e-6  # of the motion
+STEP_FORCE_RTOL = 1e-7  # of forces in a step
+MAX_TRIALS = 3
+ALPHA = -0.05  # films are so stiff that without damping rates alternate from step to step
 
 
 @dataclass(frozen=True)
@@ -95,12 +97,12 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
             "with pitch errors no motion repeats with every tooth.",
             hint="Leave out the pitch errors, or simulate.",
         )
-    for more in range(TRIALS - 1):
+    for more in range(MAX_TRIALS - 1):
         try:
             return _closed(start, steps + more)
         except SolverError:
             continue
-    return _closed(start, steps + TRIALS - 1)
+    return _closed(start, steps + MAX_TRIALS - 1)
 
 
 def _closed(start: Rest | Steady, steps: int) -> Steady:
@@ -108,11 +110,11 @@ def _closed(start: Rest | Steady, steps: int) -> Steady:
     q, v = (start.q, np.zeros(start.q.size)) if isinstance(start, Rest) else (
         start.q[0], start.v[0])  # fmt: skip
     n, last, dt, guess = q.size, np.inf, unit.mesh_period / steps, None
-    for count in range(1, PASSES + 1):
+    for count in range(1, MAX_PERIODS + 1):
         rows, F, Q = _period(unit, q, v, start.theta, steps, guess)
         ends = np.array([rows[-1][k] - rows[0][k] for k in (0, 1)])
         gap = float(np.abs(ends * [[1.0], [unit.mesh_period]]).max() / np.abs(q).max())
-        if gap < ENOUGH:
+        if gap < MOTION_RTOL:
             return _found(unit, start.theta, rows, F, count, gap)
         if gap > last:
             q, v, last, guess = rows[-1][0], rows[-1][1], np.inf, None
@@ -122,7 +124,7 @@ def _closed(start: Rest | Steady, steps: int) -> Steady:
         q, v = q + change[:n], v + change[n:]
         guess = np.array([row[0] for row in rows]) + Q @ change
     raise SolverError(
-        f"no motion repeats with the mesh at {unit.speed:.1f} rad/s: after {PASSES} periods "
+        f"no motion repeats with the mesh at {unit.speed:.1f} rad/s: after {MAX_PERIODS} periods "
         f"{gap:.1e} of the motion are left.",
         hint="Start from a speed nearby, take more steps per period, or simulate.",
     )
@@ -161,7 +163,10 @@ def _period(
 
     The derivatives are (2n, 2n) and (steps + 1, n, 2n), the guess is (steps + 1, n).
     """
-    step, dt = Step(unit, q, theta, v, enough=PRECISE, alpha=DAMPED), unit.mesh_period / steps
+    step, dt = (
+        Step(unit, q, theta, v, enough=STEP_FORCE_RTOL, alpha=ALPHA),
+        unit.mesh_period / steps,
+    )
     rows, D = [step.row()], step.first_tangents()
     Q = [D[0]]
     for k in range(1, steps + 1):

@@ -19,8 +19,8 @@ from rom.errors import ModelError
 from rom.model import Array
 
 LATERAL = (0, 1, 3, 4)  # coordinates of a node that bend the shaft
-ROUND = 1e-6  # smallest over largest axis of an orbit below which it is a line
-LOOSE = 1e-12  # of the stiffest push back, below which there is none
+LINE_ORBIT_RTOL = 1e-6  # smallest over largest axis of an orbit that is a line
+SUPPORT_STIFFNESS_RTOL = 1e-12  # smallest over largest stiffness of a shaft that is held
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def _refuse_loose(shaft: Shaft, supports: Mapping[int, Support]) -> None:
         R = np.kron([1.0, arms[node]], np.eye(2))
         S += R.T @ _square(support.stiffness) @ R
     size = np.linalg.svd(S, compute_uv=False)
-    if not size[-1] > LOOSE * size[0]:
+    if not size[-1] > SUPPORT_STIFFNESS_RTOL * size[0]:
         raise ModelError(
             f"bearings at the nodes {sorted(supports)} leave a rigid motion of the shaft free.",
             hint="Give it two bearings that push back in both directions.",
@@ -166,4 +166,4 @@ def _direction(shapes: npt.NDArray[np.complex128], M: Array) -> Array:
     weight = np.diag(M)[0::4][:, None]
     area = (weight * (x.conj() * y).imag).sum(axis=0)
     size = 0.5 * (weight * (np.abs(x) ** 2 + np.abs(y) ** 2)).sum(axis=0)
-    return np.where(np.abs(area) > ROUND * size, -np.sign(area), 0.0)
+    return np.where(np.abs(area) > LINE_ORBIT_RTOL * size, -np.sign(area), 0.0)

@@ -22,7 +22,10 @@ from rom.model import Array
 
 MIRROR = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
 LOADS = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
-TIMES, ENOUGH, STEP, THINNEST = 80, 1e-10, 0.1, 2e-3  # the last two in clearances
+MAX_ITERATIONS = 80
+RESIDUAL_RTOL = 1e-10
+MAX_STEP = 0.1  # of the clearance
+MIN_FILM_RATIO = 2e-3  # thinnest film, of the clearance
 
 
 @dataclass(frozen=True)
@@ -235,7 +238,7 @@ class Transmission:
         for inside, bearing, _ in self.journals:
             at, d = inside[:4] @ q, inside[:4] @ step
             moved = float(np.hypot(*d[:2])) / bearing.clearance
-            share = min(share, STEP / max(moved, 1e-30))
+            share = min(share, MAX_STEP / max(moved, 1e-30))
             here = bearing.thinnest(at)
             reach = share * (np.hypot(*d[:2]) + bearing.length / 2 * np.hypot(*d[2:]))
             if reach < 0.5 * here:
@@ -309,7 +312,7 @@ def _touching(unit: Transmission, theta: float) -> Array:
     # the gear is loaded and turns the other way than the pinion: both move alike
     ahead = np.array([-y, x]) / max(np.hypot(x, y), 1e-300)
     least = min(bearing.clearance for _, bearing, _ in unit.journals)
-    return q + STEP * least * (unit.rigid[0] + unit.rigid[1])[:, :2] @ ahead
+    return q + MAX_STEP * least * (unit.rigid[0] + unit.rigid[1])[:, :2] @ ahead
 
 
 def _newton(
@@ -317,11 +320,11 @@ def _newton(
 ) -> tuple[Array, Forces, float]:
     still, warm = np.zeros(q.size), None
     scale = _scale(unit)
-    for _ in range(TIMES):
+    for _ in range(MAX_ITERATIONS):
         forces = unit.forces(q, still, theta, warm)
         R, warm = f + forces.force - K @ q, forces.films
         residual = float(np.abs(R * scale).max() / np.abs(f * scale).max())
-        if residual < ENOUGH:
+        if residual < RESIDUAL_RTOL:
             if not forces.mesh.load.any():
                 raise SolverError(
                     "contact is lost: no teeth touch at rest.", hint="Raise the load."
@@ -334,7 +337,7 @@ def _newton(
                 hint="Raise the load or the viscosity.",
             )
         thin = min(f.bearing.thinnest(f.motion) / f.bearing.clearance for f in forces.films)
-        if thin < THINNEST:
+        if thin < MIN_FILM_RATIO:
             break
         step = np.linalg.solve(K + forces.stiffness, R)
         q = q + unit.allowed(q, step) * step

@@ -18,7 +18,7 @@ from rom.names import ORIGIN_MARK, check_text
 
 SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
-LONGEST = 600.0  # seconds to compile
+COMPILE_TIME_LIMIT = 600.0  # [s]
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
 
 
@@ -93,9 +93,13 @@ def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
         command = [compiler, *OPTIONS, *names, "-lm", "-o", "out.so"]
         # what the compiler puts aside goes when the folder goes
         variables = {"TMPDIR": str(folder)}
-        done = run(command, folder=folder, limits=Limits(seconds=LONGEST), variables=variables)
+        done = run(
+            command, folder=folder, limits=Limits(seconds=COMPILE_TIME_LIMIT), variables=variables
+        )
         if done.overtime:
-            raise ResourceError(f"{compiler} has not compiled the FMU within {LONGEST:g} s.")
+            raise ResourceError(
+                f"{compiler} has not compiled the FMU within {COMPILE_TIME_LIMIT:g} s."
+            )
         if done.code:
             raise ResourceError(f"{compiler} cannot compile the FMU: {done.err.strip()}")
         return (folder / "out.so").read_bytes()

@@ -28,7 +28,7 @@ OUTPUTS = (
     ("angular_velocity", "rad/s"),
 )
 ROUND_OFF = 1e-12  # share of the damping of two modes below which they count as not coupled
-STEPS = 20  # communication steps that are proposed for the period of the first vibration
+STEPS_PER_PERIOD = 20  # communication steps proposed for the period of the first vibration
 
 
 @typed
@@ -63,7 +63,7 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
     if not omega.size:
         raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
     first = omega[omega > 0.0][:1] / (2 * np.pi)
-    step = 1.0 / (STEPS * float(first[0])) if first.size else 1e-3
+    step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
     describe = partial(_description, path.stem, _variables(body), step)
     content = Content(path.stem, "linear.c", describe, data=_tables(body, omega, V))
     return write_archive(path, content)

@@ -116,11 +116,11 @@ def _variable(listed: ET.Element, reference: int, variable: Variable) -> None:
 
 def _structure(root: ET.Element, variables: list[Variable]) -> None:
     structure = ET.SubElement(root, "ModelStructure")
-    told = [str(k) for k, v in enumerate(variables, 1) if v.causality == "output"]
-    if not told:
+    output_indices = [str(k) for k, v in enumerate(variables, 1) if v.causality == "output"]
+    if not output_indices:
         return
     outputs = ET.SubElement(structure, "Outputs")
     unknowns = ET.SubElement(structure, "InitialUnknowns")
-    for index in told:
+    for index in output_indices:
         ET.SubElement(outputs, "Unknown", index=index, dependencies="")
         ET.SubElement(unknowns, "Unknown", index=index)
