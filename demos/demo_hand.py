@@ -16,12 +16,12 @@ import numpy as np
 
 import rom
 from rom import view
-from rom.bench_models import bar
-from rom.components.compliant_hand import INDEX, SPRING, Finger, close, hand, rest
-from rom.components.control_chart import Chart, envelope, muscle
-from rom.components.grasp import Bar, grasp
-from rom.components.helical_spring import HelicalSpring
-from rom.components.solid_finger import parts_of_compliance
+from rom.bench.models import bar
+from rom.components.cosserat.helical_spring import HelicalSpring
+from rom.components.hand.compliant_hand import INDEX, SPRING, Finger, close, hand, rest
+from rom.components.hand.control_chart import Chart, envelope, muscle
+from rom.components.hand.grasp import Bar, grasp
+from rom.components.hand.solid_finger import parts_of_compliance
 from rom.view import Panel
 
 options = argparse.ArgumentParser(description="fingers of springs, their stiffness and command")

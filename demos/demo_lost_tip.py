@@ -17,7 +17,7 @@ from scipy.sparse import block_diag, bmat, identity
 
 import rom
 from rom import view
-from rom.scipy_operators import SciPyOperators
+from rom.eigen.scipy import SciPyOperators
 
 options = argparse.ArgumentParser(description="a bladed disk with one short blade")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

@@ -15,9 +15,7 @@ from time import perf_counter
 import numpy as np
 
 from rom import view
-from rom.components import frf_data as data
-from rom.components.airframe import LINKS, airframe
-from rom.components.frf_updating import (
+from rom.components.updating import (
     AtSensors,
     Measurement,
     ParametricModel,
@@ -27,6 +25,8 @@ from rom.components.frf_updating import (
     update_by_input,
     update_by_output,
 )
+from rom.components.updating import frf_data as data
+from rom.components.updating.airframe import LINKS, airframe
 
 options = argparse.ArgumentParser(description="updating of a test bed like an aircraft")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

@@ -28,12 +28,12 @@ PICTURE = re.compile(r"\b(\w+\.(?:png|gif))\b")
 ALSO = {  # what public functions give back or raise
     "errors": ("errors",),
     "mbs": (
-        "mbs.solution",
-        "mbs.linearize",
-        "mbs.response",
-        "mbs.campbell",
-        "mbs.state",
-        "mbs.signals",
+        "mbs.results.solution",
+        "mbs.analysis.linearize",
+        "mbs.analysis.response",
+        "mbs.analysis.campbell",
+        "mbs.results.state",
+        "mbs.parts.signals",
     ),
 }
 CURES = {  # what to do about it, where no single message can tell

@@ -20,25 +20,26 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from rom.body.assembly import Assembly
+    from rom.assembly.assembly import Assembly
+    from rom.assembly.dual import DualAssembly, FreeSubstructure
     from rom.body.damping import ModalDamping, Rayleigh
-    from rom.body.family import BodyFamily
     from rom.body.flexible import FlexibleBody
     from rom.body.spread import SpreadLoad, mass_load, surface_load
-    from rom.checks import check
+    from rom.checks.gates import check
     from rom.config.component import read_component
     from rom.config.mechanism import read_mechanism
-    from rom.cyclic.bladed_wheel import BladedWheel
-    from rom.cyclic.bladeless_disk import bladed_wheel
-    from rom.cyclic.blades import ReducedBlade, reduced_blade
+    from rom.cyclic.blades.blade import reduced_blade
+    from rom.cyclic.blades.bladed_wheel import BladedWheel
+    from rom.cyclic.blades.disk import bladed_wheel
+    from rom.cyclic.blades.mistuning import MistunedWheel, mistuned_wheel
+    from rom.cyclic.blades.records import ReducedBlade
+    from rom.cyclic.blades.substructured_sector import substructured_sector
     from rom.cyclic.campbell import WheelCampbell, wheel_campbell
-    from rom.cyclic.mistuning import MistunedWheel, mistuned_wheel
     from rom.cyclic.modes import CyclicModes, cyclic_modes
     from rom.cyclic.reduced import reduce_sector
     from rom.cyclic.rotation import rotating_sector
     from rom.cyclic.sector import CyclicSector
-    from rom.cyclic.springs import supported_sector
-    from rom.cyclic.substructures import substructured_sector
+    from rom.cyclic.supports import supported_sector
     from rom.cyclic.travelling import TravellingModes, travelling_modes
     from rom.errors import (
         ConfigError,
@@ -62,28 +63,28 @@ if TYPE_CHECKING:
     from rom.fmu.export import write_fmu
     from rom.io.export import export
     from rom.io.family import load, save
+    from rom.io.fields.vtu import write_stress, write_stress_history
     from rom.io.fmu.body import write_body_fmu
-    from rom.io.foreign_model import read_model
     from rom.io.history import write_history
-    from rom.io.sid_dialect import read_sid
-    from rom.io.vtu import write_stress, write_stress_history
-    from rom.mbs.audit import audit
-    from rom.mbs.campbell import campbell
-    from rom.mbs.checkpoint import load_state, save_state
-    from rom.mbs.equilibrium import equilibrium
-    from rom.mbs.integrate import simulate
-    from rom.mbs.inverse import inverse_dynamics
-    from rom.mbs.keeping import Keeping
-    from rom.mbs.linearize import linearize
-    from rom.mbs.mechanism import Mechanism
-    from rom.mbs.release import release
-    from rom.mbs.response import frequency_response, transmissibility
-    from rom.mbs.sensitivity import (
+    from rom.io.matrices.read_model import read_model
+    from rom.io.sid.dialect import read_sid
+    from rom.mbs.analysis.campbell import campbell
+    from rom.mbs.analysis.equilibrium import equilibrium
+    from rom.mbs.analysis.inverse_dynamics import inverse_dynamics
+    from rom.mbs.analysis.linearize import linearize
+    from rom.mbs.analysis.response import frequency_response, transmissibility
+    from rom.mbs.analysis.sensitivity import (
         equilibrium_sensitivity,
         frequency_sensitivity,
         motion_sensitivity,
     )
-    from rom.mbs.steady import SteadyMotion, steady_motion
+    from rom.mbs.analysis.steady_motion import SteadyMotion, steady_motion
+    from rom.mbs.integrate.keeping import Keeping
+    from rom.mbs.integrate.release import release
+    from rom.mbs.integrate.simulation import simulate
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.audit import audit
+    from rom.mbs.results.checkpoint import load_state, save_state
     from rom.model import (
         Attachment,
         Basis,
@@ -97,25 +98,25 @@ if TYPE_CHECKING:
         Report,
         SurfaceMesh,
     )
-    from rom.parameters import Density, Thickness, YoungsModulus
+    from rom.parametric.family import BodyFamily
+    from rom.parametric.parameters import Density, Thickness, YoungsModulus
     from rom.parametric.reduce import reduce_parametric
     from rom.prestress.heat import Heat
+    from rom.prestress.speed_table import ReducedSpinUp, SpinUp
     from rom.prestress.spin_up import held_solid, spin_up
-    from rom.prestress.states import ReducedSpinUp, SpinUp
     from rom.prestress.thermal import heated, heated_sector, thermal_buckling
-    from rom.reduction.balanced import BalancedTruncation, second_order_balanced_truncation
-    from rom.reduction.characteristic import Characteristic
-    from rom.reduction.dual import DualAssembly, FreeSubstructure
-    from rom.reduction.enhanced import EnhancedCraigBampton
-    from rom.reduction.fixed_interface import craig_bampton
-    from rom.reduction.free_interface import FreeFree, Herting, Rubin
-    from rom.reduction.krylov import MomentMatching
-    from rom.reduction.loads import WithLoads
-    from rom.reduction.method import CraigBampton, Guyan
-    from rom.reduction.polynomial import FourierLegendre, Polynomial
-    from rom.reduction.snapshots import Snapshots
-    from rom.report import write_report
-    from rom.view.motion import write_animation
+    from rom.reduction.bases.balanced import BalancedTruncation, second_order_balanced_truncation
+    from rom.reduction.bases.enhanced import EnhancedCraigBampton
+    from rom.reduction.bases.fixed_interface import craig_bampton
+    from rom.reduction.bases.free_interface import FreeFree, Herting, Rubin
+    from rom.reduction.bases.krylov import MomentMatching
+    from rom.reduction.bases.loads import WithLoads
+    from rom.reduction.bases.method import CraigBampton, Guyan
+    from rom.reduction.interfaces.characteristic import Characteristic
+    from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
+    from rom.reduction.interfaces.snapshots import Snapshots
+    from rom.report.html import write_report
+    from rom.view.scenes.animation_files import write_animation
     from rom.workflow import mass_properties, modes, reduce, substructure
 
 _one_thread_each()
@@ -248,125 +249,125 @@ PACKAGES = (
     "rotation", "units", "view",
 )  # fmt: skip
 MODULES = {  # imported when a name is first used: asking for help must not load SciPy
-    "Assembly": "body.assembly",
+    "Assembly": "assembly.assembly",
     "Attachment": "model",
-    "BalancedTruncation": "reduction.balanced",
+    "BalancedTruncation": "reduction.bases.balanced",
     "Basis": "model",
-    "BladedWheel": "cyclic.bladed_wheel",
-    "BodyFamily": "body.family",
-    "Characteristic": "reduction.characteristic",
+    "BladedWheel": "cyclic.blades.bladed_wheel",
+    "BodyFamily": "parametric.family",
+    "Characteristic": "reduction.interfaces.characteristic",
     "ConfigError": "errors",
-    "CraigBampton": "reduction.method",
+    "CraigBampton": "reduction.bases.method",
     "CyclicModes": "cyclic.modes",
     "CyclicSector": "cyclic.sector",
-    "Density": "parameters",
-    "DualAssembly": "reduction.dual",
-    "EnhancedCraigBampton": "reduction.enhanced",
+    "Density": "parametric.parameters",
+    "DualAssembly": "assembly.dual",
+    "EnhancedCraigBampton": "reduction.bases.enhanced",
     "FEModel": "model",
     "FileFormatError": "errors",
     "FlexibleBody": "body.flexible",
-    "FourierLegendre": "reduction.polynomial",
-    "FreeFree": "reduction.free_interface",
-    "FreeSubstructure": "reduction.dual",
-    "Guyan": "reduction.method",
+    "FourierLegendre": "reduction.interfaces.polynomial",
+    "FreeFree": "reduction.bases.free_interface",
+    "FreeSubstructure": "assembly.dual",
+    "Guyan": "reduction.bases.method",
     "Heat": "prestress.heat",
-    "Herting": "reduction.free_interface",
+    "Herting": "reduction.bases.free_interface",
     "Interface": "model",
     "InterfaceError": "errors",
     "InterruptedRun": "errors",
-    "Keeping": "mbs.keeping",
+    "Keeping": "mbs.integrate.keeping",
     "Layered": "model",
     "Material": "model",
     "MaterialError": "errors",
     "Mechanism": "mbs.mechanism",
     "MeshError": "errors",
-    "MistunedWheel": "cyclic.mistuning",
+    "MistunedWheel": "cyclic.blades.mistuning",
     "ModalDamping": "body.damping",
     "ModelError": "errors",
     "Modes": "model",
     "ModesMissedError": "errors",
-    "MomentMatching": "reduction.krylov",
+    "MomentMatching": "reduction.bases.krylov",
     "Orthotropic": "model",
     "ParallelError": "errors",
     "ParameterError": "errors",
-    "Polynomial": "reduction.polynomial",
+    "Polynomial": "reduction.interfaces.polynomial",
     "QualityGateError": "errors",
     "Rayleigh": "body.damping",
-    "ReducedBlade": "cyclic.blades",
-    "ReducedSpinUp": "prestress.states",
+    "ReducedBlade": "cyclic.blades.blade",
+    "ReducedSpinUp": "prestress.speed_table",
     "Region": "model",
     "Report": "model",
     "ResourceError": "errors",
     "RomError": "errors",
     "RomWarning": "errors",
-    "Rubin": "reduction.free_interface",
-    "Snapshots": "reduction.snapshots",
+    "Rubin": "reduction.bases.free_interface",
+    "Snapshots": "reduction.interfaces.snapshots",
     "SolverError": "errors",
-    "SpinUp": "prestress.states",
+    "SpinUp": "prestress.speed_table",
     "SpreadLoad": "body.spread",
-    "SteadyMotion": "mbs.steady",
+    "SteadyMotion": "mbs.analysis.steady_motion",
     "SurfaceMesh": "model",
     "TagError": "errors",
-    "Thickness": "parameters",
+    "Thickness": "parametric.parameters",
     "TravellingModes": "cyclic.travelling",
     "UnsafeFileError": "errors",
     "WheelCampbell": "cyclic.campbell",
-    "WithLoads": "reduction.loads",
-    "YoungsModulus": "parameters",
-    "audit": "mbs.audit",
-    "bladed_wheel": "cyclic.bladeless_disk",
-    "campbell": "mbs.campbell",
-    "check": "checks",
-    "craig_bampton": "reduction.fixed_interface",
+    "WithLoads": "reduction.bases.loads",
+    "YoungsModulus": "parametric.parameters",
+    "audit": "mbs.results.audit",
+    "bladed_wheel": "cyclic.blades.disk",
+    "campbell": "mbs.analysis.campbell",
+    "check": "checks.gates",
+    "craig_bampton": "reduction.bases.fixed_interface",
     "cyclic_modes": "cyclic.modes",
-    "equilibrium": "mbs.equilibrium",
-    "equilibrium_sensitivity": "mbs.sensitivity",
+    "equilibrium": "mbs.analysis.equilibrium",
+    "equilibrium_sensitivity": "mbs.analysis.sensitivity",
     "export": "io.export",
-    "frequency_response": "mbs.response",
-    "frequency_sensitivity": "mbs.sensitivity",
+    "frequency_response": "mbs.analysis.response",
+    "frequency_sensitivity": "mbs.analysis.sensitivity",
     "heated": "prestress.thermal",
     "heated_sector": "prestress.thermal",
     "held_solid": "prestress.spin_up",
-    "inverse_dynamics": "mbs.inverse",
-    "linearize": "mbs.linearize",
+    "inverse_dynamics": "mbs.analysis.inverse_dynamics",
+    "linearize": "mbs.analysis.linearize",
     "load": "io.family",
-    "load_state": "mbs.checkpoint",
+    "load_state": "mbs.results.checkpoint",
     "mass_load": "body.spread",
     "mass_properties": "workflow",
-    "mistuned_wheel": "cyclic.mistuning",
+    "mistuned_wheel": "cyclic.blades.mistuning",
     "modes": "workflow",
-    "motion_sensitivity": "mbs.sensitivity",
+    "motion_sensitivity": "mbs.analysis.sensitivity",
     "read_component": "config.component",
     "read_mechanism": "config.mechanism",
-    "read_model": "io.foreign_model",
-    "read_sid": "io.sid_dialect",
+    "read_model": "io.matrices.read_model",
+    "read_sid": "io.sid.dialect",
     "reduce": "workflow",
     "reduce_parametric": "parametric.reduce",
     "reduce_sector": "cyclic.reduced",
-    "reduced_blade": "cyclic.blades",
-    "release": "mbs.release",
+    "reduced_blade": "cyclic.blades.blade",
+    "release": "mbs.integrate.release",
     "rotating_sector": "cyclic.rotation",
     "save": "io.family",
-    "save_state": "mbs.checkpoint",
-    "second_order_balanced_truncation": "reduction.balanced",
-    "simulate": "mbs.integrate",
+    "save_state": "mbs.results.checkpoint",
+    "second_order_balanced_truncation": "reduction.bases.balanced",
+    "simulate": "mbs.integrate.simulation",
     "spin_up": "prestress.spin_up",
-    "steady_motion": "mbs.steady",
+    "steady_motion": "mbs.analysis.steady_motion",
     "substructure": "workflow",
-    "substructured_sector": "cyclic.substructures",
-    "supported_sector": "cyclic.springs",
+    "substructured_sector": "cyclic.blades.substructured_sector",
+    "supported_sector": "cyclic.supports",
     "surface_load": "body.spread",
     "thermal_buckling": "prestress.thermal",
-    "transmissibility": "mbs.response",
+    "transmissibility": "mbs.analysis.response",
     "travelling_modes": "cyclic.travelling",
     "wheel_campbell": "cyclic.campbell",
-    "write_animation": "view.motion",
+    "write_animation": "view.scenes.animation_files",
     "write_body_fmu": "io.fmu.body",
     "write_fmu": "fmu.export",
     "write_history": "io.history",
-    "write_report": "report",
-    "write_stress": "io.vtu",
-    "write_stress_history": "io.vtu",
+    "write_report": "report.html",
+    "write_stress": "io.fields.vtu",
+    "write_stress_history": "io.fields.vtu",
 }
 
 

@@ -20,9 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rom.interruption import terminable, uninterrupted
+from rom.places import ABOVE
 
 ENTRY = Path(__file__).with_name("child_entry.py")
-ROOT = str(Path(__file__).resolve().parents[1])
+ROOT = str(ABOVE)
 INSTALLED = ("site-packages", "dist-packages")  # on the path of every child anyway
 FOLDER_PREFIX, FOLDER_SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
 GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL

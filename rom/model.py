@@ -131,8 +131,8 @@ class FEModel:
         surface: outer surface for pictures; None when there is none.
         provenance: how the model was made: geometry file, parameters, material, versions.
         operators: the five verbs on this model when K and M are not SciPy matrices.
-        stresses: evaluates stress of displacements, `rom.fe.stress.Stresses`; None for a model
-            without finite elements.
+        stresses: evaluates stress of displacements, `rom.fe.forms.stress.Stresses`; None for a
+            model without finite elements.
         regions: {name: share of the region}, for parameters; empty when they are not known.
     """
 

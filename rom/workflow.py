@@ -11,26 +11,26 @@ from typing import Any, overload
 import numpy as np
 
 from rom.arguments import typed, whole
-from rom.attachment import added_mass
+from rom.assembly.dual import FreeSubstructure, free_substructure
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody, Marker
 from rom.body.prestress import UnitLoads
 from rom.body.projection import elastic_part, flexible_body
-from rom.certificate import certify_body
+from rom.checks.certificate import certify_body
 from rom.cyclic.reduced import ReducedSector, reduce_sector
 from rom.cyclic.sector import CyclicSector
-from rom.eigen import Operators, rigid_motions
+from rom.eigen.attachments import added_mass
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Modes
 from rom.names import check_name
-from rom.reduction.characteristic import Characteristic
-from rom.reduction.dual import FreeSubstructure, free_substructure
-from rom.reduction.interface import connect
-from rom.reduction.kinds import by_name
-from rom.reduction.method import CraigBampton, Method
-from rom.reduction.order import with_orders
-from rom.scipy_operators import SciPyOperators
+from rom.reduction.bases.method import CraigBampton, Method
+from rom.reduction.interfaces.characteristic import Characteristic
+from rom.reduction.interfaces.connection import connect
+from rom.reduction.interfaces.kinds import by_name
+from rom.reduction.interfaces.order import with_orders
 
 log = logging.getLogger("rom")
 CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet

@@ -17,12 +17,12 @@ from wheels import beam_ring, bladed_model, bladed_ring
 
 import rom
 import rom.view
-from rom.eigen import rigid_motions
-from rom.mbs.impact import Impact
-from rom.mbs.solution import Solution
-from rom.mbs.state import State
-from rom.reduction.interface import connect
-from rom.scipy_operators import SciPyOperators
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import rigid_motions
+from rom.mbs.elements.impact import Impact
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
+from rom.reduction.interfaces.connection import connect
 
 X, Y, Z = np.eye(3)
 KINDS = {"root": "rbe2", "tip": "rbe2"}

@@ -4,8 +4,8 @@ from itertools import permutations
 
 import numpy as np
 
-from rom.fe.elements import CELL_TYPES
-from rom.fe.solid import SolidMesh
+from rom.fe.mesh.cell_types import CELL_TYPES
+from rom.fe.mesh.solid import SolidMesh
 
 GMSH = {"tet4": 4, "hex8": 5, "tet10": 11, "hex27": 12, "tri3": 2, "quad4": 3, "tri6": 9}
 TRIANGLES = {3: "tri3", 4: "quad4", 6: "tri6"}

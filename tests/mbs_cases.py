@@ -11,11 +11,11 @@ from scipy.linalg import block_diag, eigh
 from rom.body.flexible import FlexibleBody, Marker
 from rom.body.stiffening import known_loads
 from rom.errors import RomWarning
-from rom.mbs.arrays import workspace
-from rom.mbs.integrate import simulate
+from rom.mbs.equations.equations import evaluate, residual, tangents
+from rom.mbs.equations.packing import pack
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.kernels.system import workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, residual, tangents
-from rom.mbs.packing import pack
 
 
 @njit

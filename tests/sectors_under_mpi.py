@@ -47,7 +47,7 @@ def wheel():
 
 
 def _in_a_megabyte(model):
-    from rom.fe import aij
+    from rom.fe.operators import aij
 
     plenty, aij.allowed_bytes = aij.allowed_bytes, lambda comm: 2.0**20
     try:

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 import rom
 from rom import rotation
 from rom.components import cosserat
-from rom.components.blade_element import (
+from rom.components.wind.blade_element import (
     CHORD,
     DRAG_COEFFICIENT,
     LIFT_SLOPE,
@@ -17,12 +17,12 @@ from rom.components.blade_element import (
     in_wind,
     strips,
 )
-from rom.components.whole_turbine import N_BLADES, turbine
-from rom.components.wind_turbine import RATED, blade
+from rom.components.wind.whole_turbine import N_BLADES, turbine
+from rom.components.wind.wind_turbine import RATED, blade
 from rom.errors import ConfigError
-from rom.mbs.arrays import workspace
-from rom.mbs.motion import retract
-from rom.mbs.packing import pack
+from rom.mbs.equations.equations import retract
+from rom.mbs.equations.packing import pack
+from rom.mbs.kernels.system import workspace
 
 WIND = 11.4
 

@@ -9,10 +9,10 @@ from scipy.sparse import csr_matrix
 from wheels import bladed_model
 
 import rom
-from rom.cyclic.blades import cut, region, root_of
-from rom.eigen import dofs_of
+from rom.cyclic.blades.blade import cut, region, root_of
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError
-from rom.scipy_operators import SciPyOperators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [

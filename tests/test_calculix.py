@@ -17,11 +17,11 @@ from solid import block
 
 import rom
 from rom.errors import ConfigError, FileFormatError, RomError, UnsafeFileError
-from rom.io.calculix import read_stored_matrix
-from rom.io.interface_form import interface_form
-from rom.io.matrix_files import read_matrix
-from rom.io.node_files import read_nodes
-from rom.io.user_element import read_user_element, write_user_element
+from rom.io.matrices.calculix import read_stored_matrix
+from rom.io.matrices.matrix_files import read_matrix
+from rom.io.matrices.node_files import read_nodes
+from rom.io.matrices.user_element import read_user_element, write_user_element
+from rom.io.programs.interface_form import interface_form
 
 HERE = Path(__file__).parent / "reference" / "foreign"
 LABELS = np.array([12, 3, 40, 7, 101, 55, 20, 60])  # of the corners, z fastest

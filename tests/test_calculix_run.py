@@ -20,10 +20,10 @@ from scipy.spatial import cKDTree
 import rom
 from rom.cli.main import main
 from rom.errors import ConfigError, InterfaceError, MeshError, TagError
-from rom.fe.input_deck import input_deck
-from rom.fe.mesh import read_mesh
-from rom.io.interface_form import interface_form
-from rom.io.matrix_files import read_matrix
+from rom.fe.mesh.input_deck import input_deck
+from rom.fe.mesh.read import read_mesh
+from rom.io.matrices.matrix_files import read_matrix
+from rom.io.programs.interface_form import interface_form
 
 BEAM = {
     "path": str(Path(__file__).parents[1] / "meshes" / "beam.geo"),
@@ -69,7 +69,7 @@ def beam():
 @pytest.fixture
 def same_quadrature(monkeypatch):
     """Assembly here takes the mass as CalculiX does."""
-    from rom.fe import region
+    from rom.fe.forms import region
 
     def quadrature(name, degree, curved):
         return 2 * (degree - 1), GAUSS[degree]
@@ -123,7 +123,7 @@ def test_ten_frequencies_are_equal(beam, degree, apart, fixed, same_quadrature, 
     ours = rom.modes(model(degree), n_rigid + 10, fixed=fixed).frequencies[n_rigid:]
     assert_allclose(ours, theirs, rtol=1e-6)
     with pytest.MonkeyPatch.context() as patch:
-        from rom.fe import region
+        from rom.fe.forms import region
 
         patch.setattr(region, "_quadrature", lambda *_: (2 * (degree - 1), 2 * degree))
         exact = rom.modes(model(degree), n_rigid + 10, fixed=fixed).frequencies[n_rigid:]

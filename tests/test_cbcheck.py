@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import rom
-from rom.bench import KINDS
-from rom.bench_models import bar as bar_of
-from rom.eigen import rigid_motions
-from rom.reduction.interface import connect
+from rom.bench.models import KINDS
+from rom.bench.models import bar as bar_of
+from rom.eigen.verbs import rigid_motions
+from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
 REFERENCE = Path(__file__).parent / "reference"

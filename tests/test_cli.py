@@ -16,11 +16,11 @@ from schema import errors
 from solid import block
 
 import rom
-from rom.cli import check
 from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
 from rom.cli.parser import VERBS, build_parser
 from rom.cli.schemas import schema
+from rom.cli.verbs import check
 from rom.errors import RomWarning
 
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
@@ -180,19 +180,19 @@ def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
 
 
 def test_bench_lists_its_benchmarks(capsys):
-    from rom.bench import BENCHMARKS
+    from rom.bench.benchmarks import BENCHMARKS
 
     assert list(answer(capsys, "bench", "--list")["benchmarks"]) == list(BENCHMARKS)
 
 
 def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):
-    from rom import bench
+    from rom.bench import benchmarks
 
     def one():
         """One."""
-        yield bench.Figure("one", "30 dofs", "ratio", 2.5, "", "below 3")
+        yield benchmarks.Figure("one", "30 dofs", "ratio", 2.5, "", "below 3")
 
-    monkeypatch.setattr(bench, "BENCHMARKS", {"one": one})
+    monkeypatch.setattr(benchmarks, "BENCHMARKS", {"one": one})
     assert main(["bench"]) == 0
     assert capsys.readouterr().out.splitlines()[1].split() == [
         "one,", "30", "dofs:", "ratio", "2.5", "below", "3",
@@ -259,7 +259,7 @@ def test_progress_goes_to_stderr(option, seen, monkeypatch, capsys):
 
 def test_a_closed_pipe_is_silent():
     """As in ``rom check | head -1``: the reader leaves before the answer."""
-    code = "import sys; from rom.cli.speech import say; from rom.cli import check\n"
+    code = "import sys; from rom.cli.speech import say; from rom.cli.verbs import check\n"
     code += "from rom.cli.answer import Answer; from rom.cli.main import main\n"
     code += "check.run = lambda args: Answer({}, 'done')\nsys.exit(main(['check', 'x']))"
     process = subprocess.Popen(
@@ -338,8 +338,8 @@ def test_volumes_and_vtk_order_of_every_cell_type(kind, tmp_path):
     """VTK's own volume of each cell is the one computed here only with the right node order."""
     from cells import solid
 
-    from rom.fe.summary import cell_volumes, vtk_cells
-    from rom.io.vtu import grid
+    from rom.fe.mesh.summary import cell_volumes, vtk_cells
+    from rom.io.fields.vtu import grid
 
     pyvista = pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     mesh = solid(kind, (2, 1, 1), (2.0, 1.0, 1.5))
@@ -366,7 +366,7 @@ def test_a_curved_cell_has_its_exact_volume():
 
     from cells import solid
 
-    from rom.fe.summary import cell_volumes
+    from rom.fe.mesh.summary import cell_volumes
 
     cube = solid("hex27", (1, 1, 1), (1.0, 1.0, 1.0))
     points = cube.points.copy()

@@ -43,7 +43,7 @@ def reported(*words):
 
 def without_pictures(monkeypatch):
     from rom.errors import ResourceError
-    from rom.view import offscreen, page
+    from rom.view.canvas import offscreen, page
 
     def refuse(package):
         raise ResourceError(f"pictures need {package}, which is not installed.")

@@ -9,7 +9,7 @@ from solid import block
 from test_config_mechanism import PENDULUM
 
 import rom
-from rom.bench import Figure
+from rom.bench.benchmarks import Figure
 from rom.cli.main import main
 from rom.cli.parser import VERBS
 from rom.cli.schemas import schema

@@ -11,7 +11,7 @@ from test_config_mechanism import CRANK
 
 import rom
 from rom.cli.main import main
-from rom.view import window
+from rom.view.scenes import window
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 
@@ -35,7 +35,9 @@ def folder(bar, tmp_path, monkeypatch):
 
 def test_without_a_display_it_draws_and_says_so(folder, capsys, monkeypatch):
     asked = []
-    monkeypatch.setattr("rom.view.shapes.mode_shapes", lambda *a, **how: asked.append((a, how)))
+    monkeypatch.setattr(
+        "rom.view.scenes.mode_shapes.mode_shapes", lambda *a, **how: asked.append((a, how))
+    )
     assert main(["view", "rod.rom.npz", "-n", "1", "--fixed", "root"]) == 0
     said = capsys.readouterr().out
     assert said == "rod.png: modes of body bar; there is no display for a window\n"
@@ -79,7 +81,7 @@ CODE = """
 import sys
 import numpy as np
 from pathlib import Path
-from rom.view.window import Window
+from rom.view.scenes.window import Window
 
 window = Window(Path(sys.argv[1]), off_screen=True)
 window.plotter.show(auto_close=False)

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom import rotation
-from rom.components.cable import Hole, Tendon
-from rom.components.compliant_hand import PHALANX_RIGIDITY_RATIO, Finger, close, hand, rest
 from rom.components.cosserat import Shape, elastic_energy, linearised, reference, straight
-from rom.components.grasp import Bar, grasp
-from rom.components.helical_spring import HelicalSpring, plate_compliance, spring_rod
+from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
+from rom.components.hand.cable import Hole, Tendon
+from rom.components.hand.compliant_hand import PHALANX_RIGIDITY_RATIO, Finger, close, hand, rest
+from rom.components.hand.grasp import Bar, grasp
 from rom.errors import ConfigError, ModelError, SolverError
 
 MM = 1e-3

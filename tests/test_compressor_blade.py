@@ -12,9 +12,9 @@ from scipy.sparse.linalg import eigsh
 from test_mesh_read import areas
 
 import rom
-from rom.fe.mesh import read_mesh
-from rom.fe.quality import aspect_ratio, scaled_jacobian
-from rom.reduction.polynomial import Polynomial, interface_functions
+from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
+from rom.fe.mesh.read import read_mesh
+from rom.reduction.interfaces.polynomial import Polynomial, interface_functions
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx

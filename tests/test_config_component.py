@@ -14,7 +14,7 @@ from rom.cli.main import main
 from rom.cli.schemas import schema
 from rom.config.component import read_component
 from rom.errors import ConfigError, FileFormatError
-from rom.io.op4 import write_op4
+from rom.io.matrices.op4 import write_op4
 
 PART = """\
 name = "bar"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.components.control_chart import COUPLING, GROUPS, NO_GROUP, Chart, envelope, muscle
+from rom.components.hand.control_chart import COUPLING, GROUPS, NO_GROUP, Chart, envelope, muscle
 from rom.errors import ConfigError
 
 DT = 1e-2

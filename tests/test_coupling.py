@@ -11,9 +11,9 @@ from test_assembly import COUPLED, ROOT, half, halves, joined, study, whole
 from test_polynomial import surface
 
 import rom
-from rom.body import coupling
+from rom.assembly import coupling
 from rom.body.flexible import Marker, Patch
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
 

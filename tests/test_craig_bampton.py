@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from solid import chain
 
 from rom.errors import ConfigError, InterfaceError, QualityGateError, SolverError
-from rom.reduction.fixed_interface import craig_bampton
+from rom.reduction.bases.fixed_interface import craig_bampton
 
 
 def test_fixed_interface_frequencies_are_exact():

@@ -118,7 +118,7 @@ def test_the_geometry_is_a_sector_with_a_blade(bladed_disk):
 )  # fmt: skip
 def test_impossible_wheels_are_named(parameters, culprit):
     from rom.errors import ConfigError
-    from rom.fe.mesh import read_mesh
+    from rom.fe.mesh.read import read_mesh
 
     with pytest.raises(ConfigError, match=culprit):
         read_mesh("meshes/bladed_disk.geo", parameters=parameters)

@@ -11,7 +11,7 @@ from wheels import mass_ring
 
 import rom
 from rom.cyclic.reduced import distance, face_functions, fading
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from rom import report, view
+from rom import view
 from rom.deprecated import path_came_first
+from rom.report import html
 
 
 @path_came_first(1, 2, 0)
@@ -32,8 +33,8 @@ def test_the_earlier_order_gives_the_same_and_warns():
 
 def test_a_report_and_a_picture_in_the_earlier_order(tmp_path):
     with pytest.warns(DeprecationWarning, match="write_report takes the path behind"):
-        report.write_report(tmp_path / "old.html", "title", {"one": ["<p>x</p>"]})
-    report.write_report({"one": ["<p>x</p>"]}, tmp_path / "new.html", "title")
+        html.write_report(tmp_path / "old.html", "title", {"one": ["<p>x</p>"]})
+    html.write_report({"one": ["<p>x</p>"]}, tmp_path / "new.html", "title")
     assert (tmp_path / "old.html").read_text() == (tmp_path / "new.html").read_text()
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
     curve = [("x [m]", {"a": np.arange(3.0)})]

@@ -13,7 +13,7 @@ from solid import block, composite
 import rom
 from rom import errors
 from rom.cli.parser import VERBS
-from rom.io.op4 import write_op4
+from rom.io.matrices.op4 import write_op4
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -194,7 +194,7 @@ def named(name):
     thing = rom
     for part in name.split(".")[1:]:
         if thing is rom.fe:
-            return part in rom.fe.__all__ or (ROOT / "rom" / "fe" / f"{part}.py").exists()
+            return part in rom.fe.__all__ or any((ROOT / "rom" / "fe").glob(f"{part}*"))
         try:
             thing = getattr(thing, part)
         except AttributeError:

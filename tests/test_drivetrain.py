@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.cosserat import modes, reference, simulate
-from rom.components.drivetrain import GENERATOR, HUB, SHAFT_STIFFNESS, rotor
-from rom.components.wind_turbine import blade
+from rom.components.wind.drivetrain import GENERATOR, HUB, SHAFT_STIFFNESS, rotor
+from rom.components.wind.wind_turbine import blade
 
 TORQUE, RISE = 2e6, 2.0  # N m, reached after so many seconds
 

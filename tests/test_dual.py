@@ -9,9 +9,9 @@ from solid import block
 from test_operators import KINDS
 
 import rom
+from rom.assembly.dual import free_substructure
 from rom.errors import ConfigError, InterfaceError
-from rom.reduction.dual import free_substructure
-from rom.reduction.interface import connect
+from rom.reduction.interfaces.connection import connect
 
 COUPLED = ((("left", "tip"), ("right", "root")),)
 ROOT = ("left", "root")
@@ -102,7 +102,7 @@ def test_all_modes_are_the_whole():
 
 def test_a_slender_beam_of_two_halves_bends_as_euler_and_bernoulli_say():
     """Free: (4.730041)^2 sqrt(E I / (rho A L^4)) for the thin side, from two bodies."""
-    from rom.bench_models import bar
+    from rom.bench.models import bar
 
     left, right = bar((0.5, 0.02, 0.01), (8, 1, 1)), bar((0.5, 0.02, 0.01), (8, 1, 1))
     kinds = {"root": "full", "tip": "full"}

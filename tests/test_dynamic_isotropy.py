@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.components.dynamic_isotropy import (
+from rom.components.linkages.dynamic_isotropy import (
     angle_grid,
     christoffel,
     closed_loci,
     isotropic_configurations,
     isotropy_index,
 )
-from rom.components.two_dof_linkages import (
+from rom.components.linkages.two_dof_linkages import (
     FiveBar,
     Link,
     TwoLink,

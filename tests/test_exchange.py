@@ -13,12 +13,12 @@ from solid import block
 from test_mbdyn import groups, numbers
 
 import rom
-from rom.io.dmig import read_dmig, read_grids
 from rom.io.export import FORMATS, read_body
-from rom.io.node_files import read_nodes
-from rom.io.op4 import read_op4
-from rom.io.openfast_reading import read_openfast
-from rom.io.user_element import read_user_element
+from rom.io.matrices.dmig import read_dmig, read_grids
+from rom.io.matrices.node_files import read_nodes
+from rom.io.matrices.op4 import read_op4
+from rom.io.matrices.user_element import read_user_element
+from rom.io.programs.openfast_reading import read_openfast
 
 KINDS = {"root": "rbe2", "tip": "rbe3"}
 WHOLE = ("npz", "sid", "sid-pysid", "sid-geisler")

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from solid import block
 
 import rom
-from rom.io.exudyn import arrays
-from rom.peers.compare import ENVIRONMENT
+from rom.bench.peers.compare import ENVIRONMENT
+from rom.io.programs.exudyn import arrays
 
 PEER = Path(__file__).parents[1] / ENVIRONMENT / "bin" / "python"
 SCRIPT = """

@@ -287,13 +287,13 @@ def test_a_thousand_points_need_no_finite_elements(family, tmp_path):
 import sys
 sys.modules.update(dict.fromkeys(("dolfinx", "ufl", "petsc4py", "slepc4py", "mpi4py", "gmsh")))
 import numpy as np
-import rom, rom.scipy_operators
+import rom, rom.eigen.scipy
 def gone(*arguments, **options):
     raise AssertionError("the full model was asked")
-for name, thing in vars(rom.scipy_operators.SciPyOperators).items():
+for name, thing in vars(rom.eigen.scipy.SciPyOperators).items():
     if callable(thing):
-        setattr(rom.scipy_operators.SciPyOperators, name, gone)
-rom.scipy_operators.splu = rom.scipy_operators.eigsh = gone
+        setattr(rom.eigen.scipy.SciPyOperators, name, gone)
+rom.eigen.scipy.splu = rom.eigen.scipy.eigsh = gone
 family = rom.load({str(path)!r})
 E = np.geomspace(0.5, 2.0, 1000)
 found = np.array([family.frequencies(8, fixed="root", E_web=e)[0] for e in E])

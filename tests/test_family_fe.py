@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from test_fe_body_mpi import ENVIRONMENT
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import rigid_motions
 from rom.parametric.affine import AffineModel
-from rom.scipy_operators import SciPyOperators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -145,17 +145,20 @@ def _csr(A, n):
 
 def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
     import rom.fe.elasticity
-    import rom.fe.factor
-    import rom.fe.petsc
-    import rom.fe.stress
+    import rom.fe.forms.stress
+    import rom.fe.operators.factor
+    import rom.fe.operators.petsc
 
     def gone(*arguments, **options):
         raise AssertionError("the finite elements were asked")
 
     for owner, names in (
-        (rom.fe.petsc.PETScOperators, ("apply_K", "apply_M", "gram", "hold", "modes", "varied")),
-        (rom.fe.factor.Factor, ("__init__", "solve")),
-        (rom.fe.stress.Stresses, ("__init__", "at_nodes")),
+        (
+            rom.fe.operators.petsc.PETScOperators,
+            ("apply_K", "apply_M", "gram", "hold", "modes", "varied"),
+        ),
+        (rom.fe.operators.factor.Factor, ("__init__", "solve")),
+        (rom.fe.forms.stress.Stresses, ("__init__", "at_nodes")),
         (rom.fe.elasticity, ("assemble", "assemble_matrix", "model")),
     ):
         for name in names:

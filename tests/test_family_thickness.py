@@ -13,9 +13,9 @@ from solid import STEEL, block
 
 import rom
 from rom.body.reference import rigid_elastic
-from rom.body.stretch import Stretch
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import FileFormatError, ParameterError
+from rom.parametric.layers import Stretch
 from rom.parametric.stretched import StretchedModel
 
 ROOT = Path(rom.__file__).parents[1]

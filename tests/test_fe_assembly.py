@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from solid import block
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MaterialError, RomWarning, TagError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tetrahedra")]

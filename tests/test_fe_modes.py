@@ -12,8 +12,8 @@ from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 
-from rom.fe import lanczos, memory, petsc, spectrum  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
+from rom.fe.operators import lanczos, memory, petsc, spectrum  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 
@@ -155,7 +155,7 @@ def test_a_part_that_hangs_on_nothing_is_a_mechanism():
     other = beam((8, 2, 2))
     from scipy.sparse import block_diag
 
-    from rom.eigen import rigid_motions
+    from rom.eigen.verbs import rigid_motions
 
     points = np.vstack([one.points, other.points + np.array([0.0, 0.0, 1.0])])
     from petsc4py import PETSc

@@ -55,7 +55,7 @@ def test_iteration_refuses_a_body_that_can_move(direct):
 
 
 def test_a_missed_mode_is_found_by_the_second_search(monkeypatch):
-    from rom.fe import iterative
+    from rom.fe.operators import iterative
 
     search = iterative._davidson
 
@@ -69,7 +69,7 @@ def test_a_missed_mode_is_found_by_the_second_search(monkeypatch):
 
 
 def test_iteration_without_success_is_an_error(monkeypatch):
-    from rom.fe import iterative
+    from rom.fe.operators import iterative
 
     monkeypatch.setattr(iterative, "MAX_ITERATIONS", 3)
     with pytest.raises(SolverError, match="6 of 6 static solutions did not converge in 3"):

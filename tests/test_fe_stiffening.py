@@ -17,9 +17,9 @@ import rom
 from rom.body.prestress import _turning, centrifugal
 from rom.body.rotating import rotating_matrices
 from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR, interface_loads
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.reduction.interface import connect
+from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")

@@ -9,7 +9,7 @@ from scipy.linalg import null_space
 
 import rom
 from rom.errors import ConfigError
-from rom.reduction.interface import connect
+from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -128,7 +128,7 @@ def test_messages(model):
         rom.write_stress(replace(body, stress=None), np.zeros(8), "x.vtu")
     with pytest.raises(ConfigError, match=r"q has the shape \(3,\)"):
         body.stress.field(np.zeros(3))
-    from rom.bench_models import bar
+    from rom.bench.models import bar
 
     with pytest.raises(ConfigError, match="has no finite elements"):
         rom.reduce(

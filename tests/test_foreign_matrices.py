@@ -25,11 +25,11 @@ from rom.errors import (
     RomError,
     UnsafeFileError,
 )
-from rom.io.dmig import read_dmig, read_grids, real, write_dmig
-from rom.io.foreign_model import read_model
-from rom.io.interface_form import interface_form
-from rom.io.matrix_files import read_matrix, write_abaqus_matrix
-from rom.io.op4 import read_op4, write_op4
+from rom.io.matrices.dmig import read_dmig, read_grids, real, write_dmig
+from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
+from rom.io.matrices.op4 import read_op4, write_op4
+from rom.io.matrices.read_model import read_model
+from rom.io.programs.interface_form import interface_form
 
 HERE = Path(__file__).parent / "reference" / "foreign"
 LABELS = np.array([7, 3, 12, 20, 101, 55, 41, 60])  # of the nodes of the block

@@ -7,9 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eig, eigh
 from test_universal import dataset
 
-from rom.components import airframe as aircraft
-from rom.components import frf_data as data
-from rom.components.frf_updating import (
+from rom.components.updating import (
     AtSensors,
     Measurement,
     ParametricModel,
@@ -23,8 +21,10 @@ from rom.components.frf_updating import (
     update_by_input,
     update_by_output,
 )
+from rom.components.updating import airframe as aircraft
+from rom.components.updating import frf_data as data
 from rom.errors import ConfigError, ModelError
-from rom.io.universal import assemble, read_universal
+from rom.io.fields.universal import assemble, read_universal
 
 TRUE = np.array([0.30, -0.25, 0.0, 0.20, 0.0, -0.35, 0.0, 0.25, -0.20])
 ZETA = np.array([1.2, 0.8, 1.5, 1.0, 2.0]) / 100

@@ -5,7 +5,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom.components.cosserat import clamped, equilibrium, linearised, loads, reference
-from rom.components.helical_spring import HelicalSpring, plate_compliance, spring_rod, wire_rod
+from rom.components.cosserat.helical_spring import (
+    HelicalSpring,
+    plate_compliance,
+    spring_rod,
+    wire_rod,
+)
 from rom.errors import ModelError
 
 MM = 1e-3

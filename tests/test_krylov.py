@@ -8,7 +8,7 @@ from test_operators import KINDS
 
 import rom
 from rom.errors import ConfigError, InterfaceError, SolverError
-from rom.reduction.interface import connect
+from rom.reduction.interfaces.connection import connect
 
 INTERFACES = {"root": "rbe2", "tip": "rbe2"}
 

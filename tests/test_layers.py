@@ -176,5 +176,7 @@ def test_importing_rom_loads_nothing_heavy():
 
 
 def test_the_mesh_checks_run_without_gmsh_and_dolfinx():
-    done = run_blocked("import rom.fe.validate, rom.fe.mesh, rom.fe.summary", blocked=HEAVY)
+    done = run_blocked(
+        "import rom.fe.mesh.validate, rom.fe.mesh, rom.fe.mesh.summary", blocked=HEAVY
+    )
     assert done.returncode == 0, done.stderr

@@ -8,7 +8,7 @@ from test_operators import KINDS
 
 import rom
 from rom.errors import ConfigError
-from rom.reduction.interface import connect
+from rom.reduction.interfaces.connection import connect
 
 INTERFACES = {"root": "rbe2", "tip": "polynomial:1"}
 

@@ -9,8 +9,9 @@ from scipy.linalg import eigh
 from solid import STEEL, block
 
 import rom
-from rom.components.block_contact import SLIDES
-from rom.components.masonry import (
+from rom.components.masonry.block_contact import SLIDES
+from rom.components.masonry.limits import Rock, arch, stands
+from rom.components.masonry.stones import (
     Masonry,
     polygon_moments,
     reduced_stone,
@@ -18,8 +19,7 @@ from rom.components.masonry import (
     stone,
     touching,
 )
-from rom.components.masonry_limits import Rock, arch, stands
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, MaterialError, ModelError
 
 G = 9.81

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from rom.components import masonry as module
-from rom.components.masonry import (
+from rom.components.masonry import stones as module
+from rom.components.masonry.limits import Rock, arch, minimum_thickness, stands, wall
+from rom.components.masonry.stones import (
     simulate,
 )
-from rom.components.masonry_limits import Rock, arch, minimum_thickness, stands, wall
 from rom.errors import ConfigError
 
 G = 9.81

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mbs_cases import lattice, lattice_body, simulate_quietly, slider_crank
 
-from rom.mbs.audit import audit
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
 
 
 @pytest.fixture(scope="module")

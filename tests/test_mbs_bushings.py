@@ -9,11 +9,11 @@ from test_mbs_equations import check_tangents, difference, shifted
 
 from rom import rotation
 from rom.errors import ConfigError
-from rom.mbs.audit import audit
-from rom.mbs.bushing import bushing_energy
-from rom.mbs.integrate import simulate
+from rom.mbs.elements.bushing_kernels import bushing_energy
+from rom.mbs.equations.equations import evaluate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate
+from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 TILT = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])

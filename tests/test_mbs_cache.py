@@ -3,13 +3,13 @@
 import numpy as np
 from numba import njit
 
-from rom.mbs import compiled
-from rom.mbs.compiled import drop_stale_cache
+from rom.mbs.kernels import compiled
+from rom.mbs.kernels.compiled import drop_stale_cache
 
 
 def test_only_sources_of_kernels_drop_them(tmp_path):
     kernels, plain = tmp_path / "motion.py", tmp_path / "mechanism.py"
-    kernels.write_text("from rom.mbs.compiled import kernel\n")
+    kernels.write_text("from rom.mbs.kernels.compiled import kernel\n")
     plain.write_text("text = 1\n")
     stamp, code = tmp_path / "cache" / "stamp", tmp_path / "cache" / "motion.advance-1.py311.nbi"
     assert drop_stale_cache(tmp_path, stamp)
@@ -17,9 +17,9 @@ def test_only_sources_of_kernels_drop_them(tmp_path):
     assert not drop_stale_cache(tmp_path, stamp)
     plain.write_text("text = 2\n")
     assert not drop_stale_cache(tmp_path, stamp) and code.exists()
-    for source in (kernels, tmp_path / "arrays.py"):
+    for source in (kernels, tmp_path / "system.py"):
         code.write_text("machine code")
-        source.write_text("from rom.mbs.compiled import inner\n")
+        source.write_text("from rom.mbs.kernels.compiled import inner\n")
         assert drop_stale_cache(tmp_path, stamp) and not code.exists()
 
 

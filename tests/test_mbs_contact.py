@@ -10,12 +10,12 @@ from scipy.special import gamma
 from test_mbs_equations import difference, shifted
 
 from rom.errors import ConfigError
-from rom.mbs.audit import audit
-from rom.mbs.contact import contact_energy
-from rom.mbs.impact import Impact, damping_of, hertz_stiffness
-from rom.mbs.integrate import simulate
+from rom.mbs.elements.contact import contact_energy
+from rom.mbs.elements.impact import Impact, damping_of, hertz_stiffness
+from rom.mbs.equations.equations import evaluate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate
+from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 TILTED = np.array([1.0, 2.0, 2.0]) / 3

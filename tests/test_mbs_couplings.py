@@ -7,11 +7,11 @@ from numpy.testing import assert_allclose
 from test_mbs_equations import GRAVITY, check_tangents, difference, shifted
 
 from rom.errors import ConfigError, ModelError
-from rom.mbs.arrays import ROLL
-from rom.mbs.audit import audit
-from rom.mbs.integrate import simulate
+from rom.mbs.equations.equations import evaluate, linearize_constraints
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, linearize_constraints
+from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 AXIS, ACROSS = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3

@@ -17,9 +17,9 @@ from scipy.linalg import null_space
 
 from rom import rotation
 from rom.body.rotating import rotating_matrices
+from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
+from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate, linearize_constraints, rates, retract
-from rom.mbs.state import initial_state
 
 GRAVITY = np.array([0.3, -9.0, 2.0])
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import rom
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.mbs.impact import Impact
+from rom.mbs.elements.impact import Impact
 from rom.mbs.mechanism import Mechanism
 
 g = 9.81

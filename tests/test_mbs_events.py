@@ -11,9 +11,9 @@ from scipy.special import ellipk
 from test_mbs_rigid import heavy_top
 
 from rom.errors import ConfigError, SolverError
-from rom.mbs.dense import vector_rate
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.interpolation import vector_rate
 
 G = 9.81
 

@@ -11,7 +11,7 @@ from solid import block
 
 import rom
 from rom import rotation
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 
 EXACT = {"method": "dop853", "rtol": 1e-9, "atol": 1e-11}

@@ -5,7 +5,7 @@ import pytest
 from mbs_cases import nodal_body, random_body, random_nodes, simulate_quietly, slider_crank
 
 from rom.errors import ConfigError, InterruptedRun, ModelError, SolverError
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 
 Z = (0, 0, 1)

@@ -18,12 +18,12 @@ from scipy.integrate import solve_ivp
 from test_mbs_equations import difference, shifted
 
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.actions import load_columns
-from rom.mbs.audit import audit
-from rom.mbs.constraints import constraint_gradient
-from rom.mbs.impact import Impact
-from rom.mbs.integrate import simulate
+from rom.mbs.elements.impact import Impact
+from rom.mbs.elements.joint_kernels import load_columns
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
 
 
 @njit

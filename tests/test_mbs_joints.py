@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.errors import ModelError, RomWarning
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 
 Z = np.array([0.0, 0.0, 1.0])

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, SolverError
-from rom.mbs import integrate, keeping
+from rom.mbs.integrate import keeping, simulation
+from rom.mbs.integrate.run import Record
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.record import Record
 
 FAULTS_EACH = 10 if os.environ.get("ROM_LONG") else 2
 
@@ -198,7 +198,7 @@ def test_a_warning_that_is_an_error_does_not_take_the_motion_with_it(monkeypatch
     def warn(solution):
         raise rom.errors.QualityGateError("too fast.")
 
-    monkeypatch.setattr(integrate, "warn_of_limits", warn)
+    monkeypatch.setattr(simulation, "warn_of_limits", warn)
     with pytest.raises(rom.errors.QualityGateError) as caught:
         run("force", Broken(), METHODS["alpha"])
     assert caught.value.solution.t[-1] == pytest.approx(T_END)

@@ -13,11 +13,11 @@ from test_mbs_spin import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 
 import rom
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.mbs.linearize import linearize
+from rom.mbs.analysis.linearize import linearize
+from rom.mbs.analysis.local_equations import difference, instant
+from rom.mbs.analysis.quadratic_eigen import modes
+from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.modes import modes
-from rom.mbs.state import initial_state
-from rom.mbs.variation import difference, instant
 
 g, TINY = 9.81, (1e-12, 1e-12, 1e-12)
 X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)

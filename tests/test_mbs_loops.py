@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.mbs.audit import audit
-from rom.mbs.integrate import simulate
+from rom.mbs.equations.equations import linearize_constraints
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import linearize_constraints
+from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]

@@ -14,9 +14,9 @@ from numpy.testing import assert_allclose
 from scipy.special import ellipj, ellipk
 
 from rom.errors import RomWarning
-from rom.mbs.audit import audit
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 g = 9.81

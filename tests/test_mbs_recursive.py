@@ -12,14 +12,14 @@ from scipy.integrate import solve_ivp
 
 import rom
 from rom.errors import ModelError, RomWarning
-from rom.mbs import graph
-from rom.mbs.arrays import workspace
-from rom.mbs.bordered import factorise_bordered, solve_bordered
-from rom.mbs.integrate import simulate
+from rom.mbs.equations import graph
+from rom.mbs.equations.linear_solve import factorise_bordered, solve_bordered
+from rom.mbs.equations.packing import pack
+from rom.mbs.integrate.consistent_start import initial_state
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.integrate.step_memory import across
+from rom.mbs.kernels.system import workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.packing import pack
-from rom.mbs.starting import across
-from rom.mbs.state import initial_state
 
 Z, GRAVITY = (0, 0, 1), 9.81
 RODS = {}

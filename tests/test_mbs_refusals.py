@@ -5,9 +5,9 @@ import pytest
 from mbs_cases import random_body, simulate_quietly, slider_crank
 
 from rom.errors import ConfigError, InterruptedRun, SolverError
-from rom.mbs.audit import audit
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
 
 Z = (0, 0, 1)
 NAN, INF = float("nan"), float("inf")

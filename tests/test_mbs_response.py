@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom.errors import ConfigError, ModelError, RomWarning, SolverError
-from rom.mbs.campbell import Campbell
+from rom.mbs.analysis.campbell import Campbell
 from rom.mbs.mechanism import Mechanism
 
 X, Y, Z = np.eye(3)

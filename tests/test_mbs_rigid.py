@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ellipj
 
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 
 TOP = json.loads((Path(__file__).parent / "reference" / "heavy_top.json").read_text())

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.signals import Signal
+from rom.mbs.parts.signals import Signal
 
 POLYNOMIAL = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7, -0.4])
 

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 from solid import CORNERS, GAUSS, block, shape_functions
 
 import rom
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Material
 

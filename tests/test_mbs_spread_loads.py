@@ -14,7 +14,7 @@ import rom
 from rom import rotation
 from rom.body.flexible import Surface
 from rom.errors import ConfigError, ModelError
-from rom.reduction.interface import connect
+from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

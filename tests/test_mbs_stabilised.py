@@ -12,9 +12,9 @@ from test_mbs_variable import errors, free_crank
 import rom
 from rom import rotation
 from rom.errors import ConfigError
-from rom.mbs.arrays import workspace
-from rom.mbs.motion import linearize_constraints
-from rom.mbs.multistep import joined, multistep_coefficients
+from rom.mbs.equations.equations import linearize_constraints
+from rom.mbs.integrate.bdf import joined, multistep_coefficients
+from rom.mbs.kernels.system import workspace
 
 BDF = [{"method": "bdf", "order": k} for k in (1, 3, 4, 5)]
 STABILISED = [{"stabilised": True}, {"method": "bdf", "stabilised": True}]

@@ -6,7 +6,7 @@ from numba import njit
 from numpy.testing import assert_allclose
 
 from rom import rotation
-from rom.mbs.alpha import Step, coefficients, turn_columns
+from rom.mbs.integrate.generalized_alpha import Step, coefficients, turn_columns
 from rom.mbs.mechanism import Mechanism
 
 

@@ -13,9 +13,9 @@ from scipy.linalg import eigh
 from rom import rotation
 from rom.body.stiffening import SecondOrder
 from rom.errors import ConfigError, RomWarning
-from rom.mbs.audit import audit
-from rom.mbs.integrate import simulate
+from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
 
 EXACT = {"method": "dop853", "rtol": 1e-10, "atol": 1e-12}
 # Southwell's beam: exact flapwise frequencies by speed, in sqrt(EI / m L^3)

@@ -10,8 +10,8 @@ from solid import block
 import rom
 from rom import rotation
 from rom.errors import ConfigError, ModelError
-from rom.mbs.impact import Impact
-from rom.mbs.parts import Marker, surface_place
+from rom.mbs.elements.impact import Impact
+from rom.mbs.parts.bodies import Marker, surface_place
 
 SIZE, G = (0.4, 0.3, 0.2), 9.81
 WEIGHT = 7850.0 * 0.4 * 0.3 * 0.2 * G

@@ -10,10 +10,10 @@ from test_mbs_rigid import heavy_top
 
 from rom import rotation
 from rom.errors import ConfigError, SolverError
-from rom.mbs.alpha import STEPS, bdf_coefficients
-from rom.mbs.integrate import simulate
-from rom.mbs.starting import across, shift_ahead
-from rom.mbs.variable import _Run, increment
+from rom.mbs.integrate.adaptive_step import _Run, increment
+from rom.mbs.integrate.generalized_alpha import STEPS, bdf_coefficients
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.integrate.step_memory import across, shift_ahead
 
 IMPLICIT = ["generalized-alpha", "bdf"]
 STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")

@@ -7,9 +7,9 @@ from damage import damaged, outcome
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rom.errors import FileFormatError, MeshError, RomError, RomWarning, TagError
-from rom.fe import abaqus, nastran, readers
-from rom.fe.elements import CELL_TYPES
-from rom.fe.mesh import read_mesh
+from rom.fe.mesh.cell_types import CELL_TYPES
+from rom.fe.mesh.read import read_mesh
+from rom.fe.mesh.sources import abaqus, nastran, readers
 
 MESHIO = {"tet4": "tetra", "tet10": "tetra10", "hex8": "hexahedron", "hex20": "hexahedron20"}
 # node order of VTK, which meshio uses, in that of gmsh
@@ -180,7 +180,7 @@ def test_a_wedge_in_nastran_is_refused(tmp_path):
 
 def test_a_missing_library_is_named(tmp_path, monkeypatch):
     from rom.errors import ResourceError
-    from rom.fe import readers
+    from rom.fe.mesh.sources import readers
 
     def reader(name):
         raise ModuleNotFoundError("No module named 'meshio'", name="meshio")
@@ -235,7 +235,7 @@ def test_broken_nastran_deck_is_refused(tmp_path, text):
 
 @pytest.mark.parametrize("ending", [".inp", ".bdf"])
 def test_damaged_decks_are_refused_or_harmless(ending, tmp_path):
-    """In this process, without the guard of `rom.fe.child`, which names the file."""
+    """In this process, without the guard of `rom.fe.mesh.child`, which names the file."""
     meshio, box, _ = meshio_box("tet4")
     path, kind = tmp_path / f"x{ending}", {".inp": "abaqus", ".bdf": "nastran"}[ending]
     box.cell_data = {"nastran:ref": [np.ones(len(box.cells[0].data), dtype=int)]}

@@ -9,7 +9,7 @@ from test_mesh_read import areas
 from test_mesh_validate import volume
 
 from rom.errors import ConfigError
-from rom.fe.mesh import read_mesh
+from rom.fe.mesh.read import read_mesh
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx

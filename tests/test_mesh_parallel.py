@@ -25,7 +25,7 @@ from dolfinx import fem
 from cells import solid
 from dataclasses import replace
 from rom.errors import RomError
-from rom.fe.mesh import to_dolfinx
+from rom.fe.mesh.read import to_dolfinx
 comm = MPI.COMM_WORLD
 found = {}
 for kind in ("tet4", "tet10", "hex8", "hex27"):
@@ -95,7 +95,7 @@ def test_curved_cells_keep_their_middle_nodes(kind):
     import ufl
     from dolfinx import fem
 
-    from rom.fe.mesh import to_dolfinx
+    from rom.fe.mesh.read import to_dolfinx
 
     box = solid(kind, (2, 2, 2), (2.0, 1.0, 1.0))
     x, y, z = box.points.T
@@ -114,7 +114,7 @@ def test_a_mesh_made_by_hand_is_checked_before_dolfinx_sees_it():
 
     from mpi4py import MPI
 
-    from rom.fe.mesh import to_dolfinx
+    from rom.fe.mesh.read import to_dolfinx
 
     mesh = solid()
     cells = mesh.cells.copy()

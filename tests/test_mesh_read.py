@@ -10,8 +10,8 @@ from cells import blocks_of, solid, write_msh
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rom.errors import ConfigError, RomWarning, TagError
-from rom.fe.mesh import read_mesh
-from rom.fe.quality import scaled_jacobian
+from rom.fe.mesh.quality import scaled_jacobian
+from rom.fe.mesh.read import read_mesh
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx

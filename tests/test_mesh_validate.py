@@ -11,12 +11,12 @@ from cells import grid, second_order, solid, tetrahedra
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rom.errors import MeshError, TagError
-from rom.fe.elements import CELL_TYPES, jacobians
-from rom.fe.quality import aspect_ratio, scaled_jacobian
-from rom.fe.repair import repair
-from rom.fe.solid import SolidMesh
-from rom.fe.topology import faces_of, parts_by_face, row_ids
-from rom.fe.validate import validate
+from rom.fe.mesh.cell_types import CELL_TYPES, jacobians
+from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
+from rom.fe.mesh.repair import repair
+from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.topology import faces_of, parts_by_face, row_ids
+from rom.fe.mesh.validate import validate
 
 KINDS = sorted(CELL_TYPES)
 

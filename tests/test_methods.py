@@ -9,11 +9,11 @@ from solid import block
 from test_operators import KINDS
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
-from rom.reduction.enhanced import estimated_errors, projected, residual_shapes
-from rom.reduction.fixed_interface import fixed_interface
-from rom.scipy_operators import SciPyOperators
+from rom.reduction.bases.enhanced import estimated_errors, projected, residual_shapes
+from rom.reduction.bases.fixed_interface import fixed_interface
 
 METHODS = [rom.CraigBampton, rom.EnhancedCraigBampton, rom.Rubin, rom.Herting]
 

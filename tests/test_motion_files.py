@@ -12,7 +12,7 @@ from solid import block
 
 import rom
 from rom.errors import ConfigError
-from rom.io.gltf import MovingMesh, write_glb
+from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.rotation import matrix
 
 BOX = (
@@ -215,7 +215,7 @@ def test_vtk_reads_the_series_in_one_file(motion, tmp_path):
 
 @pytest.mark.parametrize("up", [(0, 1, 0), (0, -1, 0), (0, 0, 1), (1, 2, -0.5)])
 def test_upright_becomes_y(up):
-    from rom.io.gltf import upright
+    from rom.io.fields.gltf import upright
 
     p = upright(np.array(up, dtype=float))
     assert_allclose(matrix(p) @ up / np.linalg.norm(up), [0, 1, 0], atol=1e-12)

@@ -221,7 +221,7 @@ def test_names_do_not_break_out_of_xml(marked, tmp_path):
 
 
 def test_names_do_not_break_out_of_html(marked):
-    from rom.report import checks, paragraph, source, table
+    from rom.report.html import checks, paragraph, source, table
 
     written = [paragraph(INJECTED), source(INJECTED), table([INJECTED], [[INJECTED]], INJECTED),
                checks(rom.Report(INJECTED, (rom.model.Row(INJECTED, 1.0, INJECTED, True),)),

@@ -11,8 +11,8 @@ from solid import block
 import rom
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.openfast import LOAD_DURATION, superelement, write_openfast
-from rom.io.openfast_reading import read_openfast
+from rom.io.programs.openfast import LOAD_DURATION, superelement, write_openfast
+from rom.io.programs.openfast_reading import read_openfast
 
 HERE = Path(__file__).parent / "reference" / "foreign"
 KINDS = {"root": "rbe2", "tip": "rbe2"}

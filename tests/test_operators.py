@@ -7,9 +7,9 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_matrix, random
 from solid import block
 
-from rom.eigen import count_shift, mac, orthonormal, rigid_motions
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import count_shift, mac, orthonormal, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
-from rom.scipy_operators import SciPyOperators
 
 
 def scipy_operators(model):
@@ -20,7 +20,7 @@ def petsc_operators(model):
     pytest.importorskip("petsc4py", reason="PETSc is not installed")
     from petsc4py import PETSc
 
-    from rom.fe.petsc import PETScOperators
+    from rom.fe.operators.petsc import PETScOperators
 
     def aij(A):
         A = csr_matrix(A)
@@ -98,7 +98,7 @@ def test_a_mode_that_was_skipped_is_noticed(make, model, monkeypatch):
     """The solver is made to overlook one mode; the inertia count must tell."""
     ops = make(model)
     if isinstance(ops, SciPyOperators):
-        import rom.scipy_operators as module
+        import rom.eigen.scipy as module
 
         whole = module.eigsh
 

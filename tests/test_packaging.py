@@ -84,7 +84,7 @@ def test_the_wheel_holds_every_module_and_its_data(shipped):
     names = set(zipfile.ZipFile(shipped[1]).namelist())
     files = [p for p in (ROOT / "rom").rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     wanted = {str(p.relative_to(ROOT)) for p in files}
-    assert {"rom/py.typed", "rom/components/nrel5mw_blade.csv"} <= wanted <= names
+    assert {"rom/py.typed", "rom/components/wind/nrel5mw_blade.csv"} <= wanted <= names
     assert not {n for n in names if not n.startswith(("rom/", "fenicsx_rom-"))}
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rom.bench.peers import films
 from rom.components.journal_bearing import equilibrium
 from rom.components.transmission import rest
-from rom.peers import films
 
 
 @pytest.fixture

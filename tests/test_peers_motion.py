@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.bench import motion
-from rom.bench_models import bar
+from rom.bench.benchmarks import motion
+from rom.bench.models import bar
+from rom.bench.peers import motion as peer
+from rom.bench.peers import reference
+from rom.bench.peers.mechanisms import built, pendulum
 from rom.errors import ConfigError
-from rom.mbs.integrate import simulate
-from rom.peers import motion as peer
-from rom.peers import reference
-from rom.peers.mechanisms import built, pendulum
+from rom.mbs.integrate.simulation import simulate
 
 STORED = json.loads((Path(__file__).parent / "reference" / "exudyn_motion.json").read_text())
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from rom import rotation
+from rom.bench.peers import rods
 from rom.components.cosserat import body
-from rom.components.wind_turbine import RATED, blade, ramp, run_up
-from rom.peers import rods
+from rom.components.wind.wind_turbine import RATED, blade, ramp, run_up
 
 
 def test_beams_have_the_sections_of_the_blade():

@@ -15,11 +15,11 @@ import rom
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import known_loads
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.fe.mesh import checked
+from rom.fe.mesh.validate import checked
+from rom.io.matrices.op4 import write_op4
 from rom.io.native import body_arrays
-from rom.io.op4 import write_op4
-from rom.mbs.impact import Impact
-from rom.mbs.jumps import Examined
+from rom.mbs.elements.impact import Impact
+from rom.mbs.parts.jumps import Examined
 from rom.plausible import far_doubt, scaled_doubt
 
 
@@ -319,7 +319,7 @@ Mesh.MeshSizeMax = 0.1 * (1 + L);
 @pytest.mark.parametrize(("name", "text"), [("a.geo", GEO), ("b.py", BUILDER)])
 @pytest.mark.parametrize(("L", "n"), [(0.2, 0), (20.0, 1)])
 def test_geometries_compare_parameters_with_their_defaults(name, text, L, n, tmp_path):
-    from rom.fe.mesh import read_mesh
+    from rom.fe.mesh.read import read_mesh
 
     path = tmp_path / name
     path.write_text(text)
@@ -331,7 +331,7 @@ def test_geometries_compare_parameters_with_their_defaults(name, text, L, n, tmp
 @pytest.mark.parametrize(("scale", "n"), [(1.0, 0), (1e-3, 1)])
 def test_a_step_file_that_is_scaled_on_top_of_its_unit_is_doubted(scale, n, tmp_path):
     gmsh = pytest.importorskip("gmsh")
-    from rom.fe.mesh import read_mesh
+    from rom.fe.mesh.read import read_mesh
 
     path = tmp_path / "box.step"
     gmsh.initialize([], False)

@@ -7,13 +7,13 @@ from scipy.sparse import diags
 from solid import block
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.scipy import HeldSciPy
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
-from rom.reduction.interface import connect
-from rom.reduction.kinds import tie
-from rom.reduction.polynomial import cylinder_coordinates, interface_functions
-from rom.scipy_operators import HeldSciPy
+from rom.reduction.interfaces.connection import connect
+from rom.reduction.interfaces.kinds import tie
+from rom.reduction.interfaces.polynomial import cylinder_coordinates, interface_functions
 from rom.workflow import operators
 
 TURN = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]

@@ -7,9 +7,9 @@ from solid import block
 
 import rom
 from rom.errors import ConfigError
-from rom.io.interface_form import interface_form
-from rom.io.matrix_files import read_matrix
-from rom.io.radioss import write_radioss
+from rom.io.matrices.matrix_files import read_matrix
+from rom.io.programs.interface_form import interface_form
+from rom.io.programs.radioss import write_radioss
 from rom.model import Interface
 
 KINDS = {"root": "rbe2", "tip": "rbe2", "side": "rbe2"}

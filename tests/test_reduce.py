@@ -11,10 +11,10 @@ from solid import block
 
 import rom
 from rom.body.reference import rigid_elastic, rigid_mass
-from rom.eigen import mean_motion, rigid_motions
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, InterfaceError, MaterialError, ModelError
-from rom.reduction.interface import connect
-from rom.scipy_operators import SciPyOperators
+from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}

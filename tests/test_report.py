@@ -5,9 +5,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from rom import report
 from rom.errors import ConfigError
 from rom.model import Report, Row
+from rom.report import html
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+M8AAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
@@ -43,12 +43,12 @@ def read(path):
 def test_the_report_needs_no_other_file(tmp_path):
     (tmp_path / "a.png").write_bytes(PNG)
     checks = Report("x", (Row("mass", 1.25, "<= 2", True), Row("gap & co", 3.0, "<= 2", False)))
-    path = report.write_report(
+    path = html.write_report(
         {
-            "One": [report.paragraph("a < b"), report.picture(tmp_path / "a.png", "It's small")],
+            "One": [html.paragraph("a < b"), html.picture(tmp_path / "a.png", "It's small")],
             "Two": [
-                report.table(("f [Hz]", "n"), [(123.456789, 3), ("x<y", 4)], "Numbers"),
-                report.checks(checks, "Checks"),
+                html.table(("f [Hz]", "n"), [(123.456789, 3), ("x<y", 4)], "Numbers"),
+                html.checks(checks, "Checks"),
             ],
         },
         tmp_path / "r.html",
@@ -62,10 +62,10 @@ def test_the_report_needs_no_other_file(tmp_path):
 
 def test_a_report_that_cannot_be_written_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"\.html"):
-        report.write_report({}, tmp_path / "r.txt", title="")
+        html.write_report({}, tmp_path / "r.txt", title="")
     with pytest.raises(ConfigError, match="does not exist"):
-        report.write_report({}, tmp_path / "no" / "r.html", title="")
+        html.write_report({}, tmp_path / "no" / "r.html", title="")
     with pytest.raises(ConfigError, match="no picture"):
-        report.picture(tmp_path / "missing.png", "")
+        html.picture(tmp_path / "missing.png", "")
     with pytest.raises(ConfigError, match="a row of 1 cells under a header of 2"):
-        report.table(("a", "b"), [(1,)], "")
+        html.table(("a", "b"), [(1,)], "")

@@ -22,7 +22,7 @@ from rom.components.rockfall import (
     sensitivity,
     strike,
 )
-from rom.eigen import mean_motion
+from rom.eigen.verbs import mean_motion
 from rom.errors import ConfigError, ModelError, SolverError
 
 MESHES = Path(rom.__file__).parents[1] / "meshes"
@@ -475,7 +475,7 @@ def test_messages_name_what_is_wrong(make, error, words):
 @pytest.mark.fenicsx
 def test_a_patch_beyond_the_supports_is_refused():
     pytest.importorskip("gmsh", reason="needs gmsh")
-    from rom.fe.mesh import read_mesh
+    from rom.fe.mesh.read import read_mesh
 
     with pytest.raises(ConfigError, match=r"patch = 4 < B = 3\.5"):
         read_mesh(MESHES / "gallery_slab.geo", parameters={"patch": 4.0})

@@ -11,16 +11,16 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom import rotation, view
-from rom.bench_models import bar
+from rom.bench.models import bar
 from rom.components import cosserat
 from rom.components.cosserat import body, shape_of
 from rom.errors import ConfigError, ModelError
-from rom.mbs.arrays import workspace
-from rom.mbs.motion import retract
-from rom.mbs.nonlinear import Elements, Frames
-from rom.mbs.packing import pack
-from rom.mbs.state import initial_state
-from rom.view.film import shades_of
+from rom.mbs.elements.nonlinear import Elements, Frames
+from rom.mbs.equations.equations import retract
+from rom.mbs.equations.packing import pack
+from rom.mbs.integrate.consistent_start import initial_state
+from rom.mbs.kernels.system import workspace
+from rom.view.scenes.film import shades_of
 
 ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
 ORIGIN = (0.0, 0.0, 0.0)

@@ -224,7 +224,7 @@ def test_springs_that_hold_nothing_are_refused(published):
      ({"w": 0.5}, "discs of width w = 0.5")],
 )  # fmt: skip
 def test_impossible_rotors_are_named(parameters, culprit):
-    from rom.fe.mesh import read_mesh
+    from rom.fe.mesh.read import read_mesh
 
     with pytest.raises(ConfigError, match=culprit):
         read_mesh("meshes/rotor.geo", parameters=parameters)

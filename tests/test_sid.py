@@ -13,9 +13,9 @@ from particles import motion, particles
 
 import rom
 from rom.errors import ConfigError, FileFormatError, RomWarning, UnsafeFileError
-from rom.io.sid import DIALECTS, Taylor, write_sid
-from rom.io.sid_body import sid_body, standard_input
-from rom.io.sid_dialect import check_sid, read_sid
+from rom.io.sid.body import sid_body, standard_input
+from rom.io.sid.dialect import check_sid, read_sid
+from rom.io.sid.format import DIALECTS, Taylor, write_sid
 
 RNG = np.random.default_rng(11)
 

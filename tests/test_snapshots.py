@@ -7,10 +7,10 @@ from scipy.sparse import identity, kron
 from solid import block
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
-from rom.reduction.kinds import tie
-from rom.reduction.snapshots import snapshot_functions
+from rom.reduction.interfaces.kinds import tie
+from rom.reduction.interfaces.snapshots import snapshot_functions
 
 MODEL = block(cells=(6, 3, 3))
 ROOT = MODEL.interfaces["root"]

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom import rotation
-from rom.bench_models import bar
-from rom.components.compliant_hand import INDEX, SPRING, Finger, rest
-from rom.components.helical_spring import HelicalSpring
-from rom.components.solid_finger import (
+from rom.bench.models import bar
+from rom.components.cosserat.helical_spring import HelicalSpring
+from rom.components.hand.compliant_hand import INDEX, SPRING, Finger, rest
+from rom.components.hand.solid_finger import (
     heavy_spring,
     link_compliance,
     parts_of_compliance,

@@ -13,8 +13,8 @@ import rom
 from rom.components import cosserat
 from rom.cyclic.rotation import centrifugal_displacement
 from rom.errors import ConfigError, InterfaceError, ModelError, RomWarning
-from rom.prestress.states import lagrange
-from rom.prestress.steady import SteadyRotation
+from rom.prestress.speed_table import lagrange
+from rom.prestress.steady_rotation import SteadyRotation
 from rom.prestress.thermal import finite_solid
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")

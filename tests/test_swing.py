@@ -12,8 +12,8 @@ from solid import block
 from test_cli import step_box
 
 import rom
-from rom.cli import swing
 from rom.cli.schemas import schema
+from rom.cli.verbs import swing
 from rom.errors import ConfigError, RomWarning
 
 L, B, H = 1.0, 0.1, 0.08

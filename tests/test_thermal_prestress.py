@@ -12,7 +12,7 @@ from scipy.sparse.linalg import eigsh
 from wheels import bladed_model
 
 import rom
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.prestress.thermal import _stressed, _thermal, finite_solid
 

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 from test_transmission import unit
 
 import rom
-from rom.bench import KINDS
-from rom.bench_models import STEEL, bar
+from rom.bench.models import KINDS, STEEL, bar
 from rom.components.transmission import Housing, linearised, mesh_response, rest, simulate
 from rom.errors import ModelError
 

@@ -13,8 +13,8 @@ from wheels import bladed_model
 import rom
 from rom.cyclic.rotation import arms, rotation_matrices
 from rom.cyclic.sector import region
+from rom.eigen.scipy import SciPyOperators
 from rom.errors import ConfigError, ModelError
-from rom.scipy_operators import SciPyOperators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [

@@ -11,10 +11,10 @@ from solid import block
 
 import rom
 from rom import rotation
-from rom.components.dynamic_isotropy import (
+from rom.components.linkages.dynamic_isotropy import (
     christoffel,
 )
-from rom.components.two_dof_linkages import (
+from rom.components.linkages.two_dof_linkages import (
     FiveBar,
     TwoLink,
     mechanism_inertia,

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rom.errors import ConfigError, FileFormatError
-from rom.io.universal import assemble, read_universal
+from rom.io.fields.universal import assemble, read_universal
 
 
 def header(kind, n, spacing, *, response=(7, 3), reference=(11, -3), numerator=12):

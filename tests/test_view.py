@@ -16,13 +16,13 @@ from PIL import Image  # noqa: E402
 from rom import view  # noqa: E402
 from rom.body.flexible import Surface  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402
-from rom.mbs.campbell import Campbell  # noqa: E402
-from rom.mbs.integrate import simulate  # noqa: E402
+from rom.mbs.analysis.campbell import Campbell  # noqa: E402
+from rom.mbs.integrate.simulation import simulate  # noqa: E402
 from rom.mbs.mechanism import Mechanism  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
-from rom.view.film import _stage  # noqa: E402
-from rom.view.offscreen import render  # noqa: E402
-from rom.view.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
+from rom.view.canvas.offscreen import render  # noqa: E402
+from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
+from rom.view.scenes.film import _stage  # noqa: E402
 
 
 def pixels(path, frame=0):
@@ -246,8 +246,8 @@ def test_wrong_requests_are_refused(bar, tmp_path):
 def test_vtk_stays_in_the_process_that_draws():
     """VTK and dolfinx in one process may abort."""
     script = (
-        "import sys, numpy as np; from rom.view.offscreen import render; "
-        "from rom.view.scene import Actor, Camera; "
+        "import sys, numpy as np; from rom.view.canvas.offscreen import render; "
+        "from rom.view.canvas.scene import Actor, Camera; "
         "camera = Camera(np.zeros(3), np.eye(3)[2], np.eye(3)[1], 2.0, (40, 20)); "
         "actor = Actor(np.eye(3)[None], np.array([[0, 1, 2]])); "
         "assert render([actor], camera).shape == (1, 20, 40, 3); "
@@ -255,7 +255,7 @@ def test_vtk_stays_in_the_process_that_draws():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    script = "import sys, rom.view.draw, pyvista; assert 'dolfinx' not in sys.modules"
+    script = "import sys, rom.view.canvas.draw, pyvista; assert 'dolfinx' not in sys.modules"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 
@@ -269,7 +269,7 @@ def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
 def test_values_within_two_decades_have_ticks_at_one_two_five():
     from matplotlib.figure import Figure
 
-    from rom.view.curves import _near_ticks
+    from rom.view.figures.curves import _near_ticks
 
     axes = Figure().subplots()
     axes.loglog([1, 10], [2.5, 40])
@@ -295,8 +295,8 @@ def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
 
 
 def test_a_panel_may_have_logarithmic_scales():
-    from rom.view import page
-    from rom.view.panels import _draw
+    from rom.view.canvas import page
+    from rom.view.figures.panels import _draw
 
     line = view.Panel(
         "Cost", "links", "time [ms]", curves={"one": ([1, 1000], [0.1, 100])}, log=True

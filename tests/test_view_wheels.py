@@ -13,7 +13,7 @@ WORDS = {"title": "Wheel", "caption": "A test.", "hidden": ("root", "tip")}
 
 def test_a_wheel_is_drawn_from_one_sector(tmp_path):
     """Waves that differ give pictures that differ; faces inside the wheel are left out."""
-    from rom.view.wheels import _joined, _outside
+    from rom.view.scenes.wheels import _joined, _outside
 
     model = block((0.3, 0.1, 0.08), (3, 2, 2), origin=(-0.15, 0.2, 0.0))
     nodes, triangles = _outside(model, model.surface, WORDS["hidden"])

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from rom.components.whole_turbine import (
+from rom.components.wind.whole_turbine import (
     GEAR_RATIO,
     GENERATOR_INERTIA,
     HUB_INERTIA,
@@ -13,7 +13,7 @@ from rom.components.whole_turbine import (
     WHEEL_INERTIA,
     turbine,
 )
-from rom.components.wind_turbine import RATED, blade, ramp, run_up
+from rom.components.wind.wind_turbine import RATED, blade, ramp, run_up
 from rom.errors import ConfigError
 
 SPEED, ANGLE = ramp(RATED, 20.0)

@@ -5,7 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom.components.cosserat import equilibrium, loads, modes, reference
-from rom.components.wind_turbine import BLADE_LENGTH, RATED, blade, ramp, run_up, stations, tower
+from rom.components.wind.wind_turbine import (
+    BLADE_LENGTH,
+    RATED,
+    blade,
+    ramp,
+    run_up,
+    stations,
+    tower,
+)
 
 RPM = np.pi / 30
 

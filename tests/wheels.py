@@ -94,8 +94,8 @@ def bladed_mesh(  # noqa: PLR0913  one keyword per size
         offset: shifts the nodes inside each sector, so that its faces have other nodes.
         twist: angle of the faces that changes with z [rad].
     """
-    from rom.fe.mesh import checked
-    from rom.fe.solid import SolidMesh
+    from rom.fe.mesh.solid import SolidMesh
+    from rom.fe.mesh.validate import checked
 
     around, along, up, across = cells
     up = up if tip > rim else 0
@@ -153,8 +153,8 @@ def revolved_mesh(N, r, z, solid, faces):
         solid: (radius, z of the middle of a cell) -> name of its region, or nothing.
         faces: {name: (z line, largest r)} of faces across the axis that are interfaces.
     """
-    from rom.fe.mesh import checked
-    from rom.fe.solid import SolidMesh
+    from rom.fe.mesh.solid import SolidMesh
+    from rom.fe.mesh.validate import checked
 
     angle = 2 * np.pi / N
     i, j, k = np.meshgrid(np.arange(2), np.arange(len(r)), np.arange(len(z)), indexing="ij")
@@ -200,7 +200,7 @@ def model_of(mesh, degree=2, material=None):
     import rom
     from rom.fe.elasticity import assemble
     from rom.fe.jit import compiling
-    from rom.fe.mesh import to_dolfinx
+    from rom.fe.mesh.read import to_dolfinx
 
     with compiling(MPI.COMM_SELF):
         grid, cell_tags, facet_tags = to_dolfinx(mesh, MPI.COMM_SELF)

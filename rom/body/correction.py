@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from rom.body.prestress import centrifugal
-from rom.eigen import Operators
+from rom.eigen.verbs import Operators
 from rom.model import Array, Basis
 
 COUPLING_RTOL = 1e-7  # round-off of the stiffness between constraint modes and inner columns

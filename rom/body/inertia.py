@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.eigen import Operators
+from rom.eigen.verbs import Operators
 from rom.model import Array
 
 

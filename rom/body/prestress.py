@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from rom.attachment import carried_displacements
 from rom.body.flexible import Marker
 from rom.body.stiffening import CENTRIFUGAL, PRODUCTS, interface_loads
-from rom.eigen import Operators, dofs_of, mean_motion, rigid_motions
+from rom.eigen.attachments import carried_displacements
+from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
 
@@ -38,7 +38,7 @@ class UnitLoads:
         model: the model, with finite elements.
         mesh: operators of the mesh alone, nodal dofs.
         whole: the same with attachments.
-        connection: the model in interface coordinates, see `rom.reduction.interface`.
+        connection: the model in interface coordinates, see `rom.reduction.interfaces.connection`.
     """
 
     model: FEModel

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_matrix
 
-from rom.attachment import carried_displacements
 from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.body.prestress import UnitLoads
 from rom.body.recovery import StressRecovery
-from rom.eigen import (
+from rom.eigen.attachments import carried_displacements
+from rom.eigen.verbs import (
     Operators,
     dofs_of,
     given_rigid_motions,

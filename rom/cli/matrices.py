@@ -72,7 +72,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
         ConfigError: for an option of geometries, missing nodes, or an interface without a set.
         RomError: of `rom.read_model`.
     """
-    from rom.io.foreign_model import read_model
+    from rom.io.matrices.read_model import read_model
 
     odd = [
         f"--{name.replace('_', '-')}"
@@ -101,7 +101,7 @@ def source(text: str) -> Any:
 
 def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
     """Labels of the nodes of each interface."""
-    from rom.io.node_files import read_node_sets
+    from rom.io.matrices.node_files import read_node_sets
 
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):

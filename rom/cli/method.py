@@ -8,8 +8,8 @@ from rom.config.methods import CRAIG_BAMPTON, METHODS
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
-    from rom.reduction.characteristic import Characteristic
-    from rom.reduction.method import Method
+    from rom.reduction.bases.method import Method
+    from rom.reduction.interfaces.characteristic import Characteristic
 
 
 def frequencies(text: str) -> tuple[float, ...]:
@@ -65,8 +65,8 @@ def method(args: argparse.Namespace) -> "Method | Characteristic":
     Raises:
         ConfigError: if they contradict each other.
     """
-    from rom.reduction.characteristic import Characteristic
-    from rom.reduction.loads import WithLoads
+    from rom.reduction.bases.loads import WithLoads
+    from rom.reduction.interfaces.characteristic import Characteristic
 
     chosen = _plain(args)
     if args.gravity_shapes:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
-    from rom.model import FEModel, Material
+    from rom.model import Material
 
 
 BYTES_PER_GIGABYTE = 1e9
@@ -177,7 +177,7 @@ def add_interfaces(parser: argparse.ArgumentParser) -> None:
 
 
 def reading(args: argparse.Namespace) -> dict[str, Any]:
-    """Keyword arguments of `rom.fe.mesh.read_mesh`."""
+    """Keyword arguments of `rom.fe.mesh.read.read_mesh`."""
     pairs = [number_or_text(pair) for pair in args.parameter]
     return {"parameters": unique(pairs, "-p"), "scale": args.scale, **meshing(args)}
 
@@ -188,21 +188,16 @@ def meshing(args: argparse.Namespace) -> dict[str, Any]:
     return {"trust": args.trust, "time_limit": args.time_limit, "memory_limit": memory}
 
 
-def read_model(args: argparse.Namespace) -> "FEModel":
-    """The finite element model the options ask for."""
-    from rom.cli.matrices import check_geometry, read_matrices
-
-    if args.mass is not None:
-        return read_matrices(args)
-    check_geometry(args)
-    from rom.fe.elasticity import model
-
-    numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
-    return model(args.file, **numbers, **reading(args))
-
-
 def material(args: argparse.Namespace) -> "Material":
     """The material the options ask for."""
     from rom.model import Material
 
     return Material(E=args.E, nu=args.nu, rho=args.rho)
+
+
+def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:
+    """Long options of a verb."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction) and verb in action.choices:
+            parser = action.choices[verb]
+    return sorted(s for s in parser._option_string_actions if s.startswith("--"))

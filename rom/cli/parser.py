@@ -4,7 +4,8 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from rom.cli import (
+from rom.cli.options import options_of
+from rom.cli.verbs import (
     bench,
     check,
     completion,
@@ -110,14 +111,6 @@ def suggestion(word: str, known: list[str]) -> str:
     return nearest(word.partition("=")[0], known)
 
 
-def options_of(parser: argparse.ArgumentParser, verb: str | None) -> list[str]:
-    """Long options of a verb."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction) and verb in action.choices:
-            parser = action.choices[verb]
-    return sorted(s for s in parser._option_string_actions if s.startswith("--"))
-
-
 def given(argv: list[str]) -> dict[str, Any]:
     """Only the options that a command line says, by their destination."""
     parser = build_parser()
@@ -161,7 +154,7 @@ def build_parser() -> Parser:
             "--json-schema", action=ShowSchema, nargs=0, help="print what --json holds, and leave"
         )
         add_common(sub, default=argparse.SUPPRESS)
-        sub.set_defaults(run=module.run)
+        sub.set_defaults(run=module.run, parser=parser)
     return parser
 
 

@@ -4,8 +4,8 @@ from typing import Any
 
 from numba import cfunc, njit
 
-from rom.mbs.compiled import OPTIONS, drop_stale_cache
-from rom.mbs.nonlinear import LAW_SIGNATURE, Elements
+from rom.mbs.elements.nonlinear import LAW_SIGNATURE, Elements
+from rom.mbs.kernels.compiled import OPTIONS, drop_stale_cache
 from rom.model import Array, Index
 
 __all__ = ["drop_stale_cache", "elements", "inner", "kernel", "law"]
@@ -15,7 +15,7 @@ _OPTIONS = OPTIONS | {"_nrt": True}
 kernel = njit(**_OPTIONS)
 # callable from other kernels only
 inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-# of the elements of non-linear bodies, see `rom.mbs.nonlinear`
+# of the elements of non-linear bodies, see `rom.mbs.elements.nonlinear`
 law = cfunc(LAW_SIGNATURE, **_OPTIONS)
 
 

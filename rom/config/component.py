@@ -26,7 +26,7 @@ class Component:
     Attributes:
         document: the file.
         values: its values in SI, by the keys of `rom.config.component_keys.TABLE`.
-        meshing: ``trust`` and limits of `rom.fe.mesh.read_mesh`, which no file can say.
+        meshing: ``trust`` and limits of `rom.fe.mesh.read.read_mesh`, which no file can say.
     """
 
     document: Document
@@ -47,8 +47,8 @@ class Component:
     @property
     def kinds(self) -> dict[str, Any]:
         """Kinds of the interfaces, for `rom.reduce`."""
-        from rom.reduction.kinds import parsed
-        from rom.reduction.polynomial import FourierLegendre, Polynomial
+        from rom.reduction.interfaces.kinds import parsed
+        from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 
         records = {"polynomial": Polynomial, "fourier": FourierLegendre}
         found = {}
@@ -61,7 +61,7 @@ class Component:
 
     @property
     def mesh(self) -> tuple[Path, dict[str, Any]]:
-        """File and keywords for `rom.fe.mesh.read_mesh`.
+        """File and keywords for `rom.fe.mesh.read.read_mesh`.
 
         Raises:
             ConfigError: without a geometry.
@@ -188,8 +188,8 @@ class Component:
     def _matrices(self) -> "FEModel":
         from dataclasses import replace
 
-        from rom.io.foreign_model import read_model
-        from rom.io.node_files import read_node_sets
+        from rom.io.matrices.node_files import read_node_sets
+        from rom.io.matrices.read_model import read_model
 
         m = self.values["matrices"]
         for name in ("material", "geometry"):

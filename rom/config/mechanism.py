@@ -15,9 +15,9 @@ from rom.config.mechanism_keys import IMPACT, SECTIONS, TABLE
 from rom.errors import ConfigError, RomWarning
 
 if TYPE_CHECKING:
-    from rom.mbs.keeping import Keeping
+    from rom.mbs.integrate.keeping import Keeping
     from rom.mbs.mechanism import Mechanism
-    from rom.mbs.solution import Solution
+    from rom.mbs.results.solution import Solution
 
 GROUND = "ground"
 METHODS = {  # section: method of a mechanism; in the others the kind of the entry
@@ -96,7 +96,7 @@ class MechanismFile:
         Raises:
             RomError: as `mechanism` and `rom.simulate`.
         """
-        from rom.mbs.integrate import simulate
+        from rom.mbs.integrate.simulation import simulate
 
         made = self.mechanism() if made is None else made
         with self.at("simulation"):
@@ -308,7 +308,7 @@ def _bushing(first: list[Any], values: dict[str, Any], _place: Place, _t_end: fl
 
 
 def _impact(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:
-    from rom.mbs.impact import Impact
+    from rom.mbs.elements.impact import Impact
 
     numbers = {key.name: values.pop(key.name) for key in IMPACT if key.name in values}
     return [*first, Impact(**numbers)], values

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
-    from rom.reduction.characteristic import Characteristic
-    from rom.reduction.method import Method
+    from rom.reduction.bases.method import Method
+    from rom.reduction.interfaces.characteristic import Characteristic
 
 CRAIG_BAMPTON = "craig-bampton"
 METHODS = {  # name: module, class, and how many modes when nobody says; None for none
@@ -31,8 +31,8 @@ def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic"
     Raises:
         ConfigError: if they contradict each other.
     """
-    from rom.reduction.characteristic import Characteristic
-    from rom.reduction.loads import WithLoads
+    from rom.reduction.bases.loads import WithLoads
+    from rom.reduction.interfaces.characteristic import Characteristic
 
     method = _plain(settings)
     if settings.get("gravity_shapes"):
@@ -58,7 +58,7 @@ def _plain(settings: dict[str, Any]) -> "Method":
     if modes is not None and (f_max is not None or default is None):
         raise ConfigError(f"{name} {'keeps no modes' if default is None else 'has f_max'}: "
                           "leave modes out.")  # fmt: skip
-    make: Any = getattr(import_module(f"rom.reduction.{module}"), kind)
+    make: Any = getattr(import_module(f"rom.reduction.bases.{module}"), kind)
     if f_max is not None:
         made = make(f_max=f_max, tol=settings.get("tol"))
     elif name == "moment-matching":

@@ -1,1 +1,5 @@
-"""Wheels of equal sectors: bladed disks from the matrices of one sector."""
+"""Wheels of equal sectors.
+
+`sector` and `faces` describe one, `modes` and `reduced` solve it; `rotation`, `gyroscopic`,
+`travelling` and `campbell` let it turn, `supports` hold it; `blades` lets blades differ.
+"""

@@ -9,9 +9,9 @@ from scipy.sparse import bmat, csr_matrix
 from rom.arguments import typed, whole
 from rom.cyclic.rotation import divergence_speed
 from rom.cyclic.sector import Complex, CyclicSector
+from rom.eigen.scipy import SciPyOperators, negative_count
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes
-from rom.scipy_operators import SciPyOperators, negative_count
 
 N_SPARE_MODES = 2  # beyond those asked for, so that no pair is cut
 

@@ -12,11 +12,16 @@ from scipy.spatial import cKDTree
 from rom.arguments import typed
 from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
+from rom.eigen.scipy import SciPyOperators
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
-from rom.reduction.method import CraigBampton
-from rom.reduction.polynomial import DEPENDENT_RTOL, FourierLegendre, Polynomial, orthonormal_in
-from rom.scipy_operators import SciPyOperators
+from rom.reduction.bases.method import CraigBampton
+from rom.reduction.interfaces.polynomial import (
+    DEPENDENT_RTOL,
+    FourierLegendre,
+    Polynomial,
+    orthonormal_in,
+)
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import typed
 from rom.cyclic.sector import NONE, CyclicSector
+from rom.eigen.scipy import MAX_DENSE_DOFS, SciPyOperators
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.rotation import skew
-from rom.scipy_operators import MAX_DENSE_DOFS, SciPyOperators
 
 EIGENVECTOR_RTOL = 1e-7  # residual of eigenvectors; the error of separate eigenvalues is its square
 NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender solids

@@ -21,9 +21,9 @@ import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
 from rom.arguments import finite, matrix, typed, whole
-from rom.attachment import added_mass
 from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
-from rom.eigen import rigid_motions
+from rom.eigen.attachments import added_mass
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import named

@@ -10,10 +10,10 @@ from scipy.sparse.linalg import LinearOperator, eigs, splu
 from rom.arguments import typed, whole
 from rom.cyclic.modes import real_form, spinning
 from rom.cyclic.sector import Complex, CyclicSector
-from rom.eigen import count_shift
+from rom.eigen.scipy import negative_count
+from rom.eigen.verbs import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError
 from rom.model import Array, Modes
-from rom.scipy_operators import negative_count
 
 GROWTH_RATE_RTOL = 1e-4  # growth rate of an unstable motion, of the largest frequency found
 RIGID_RTOL = 0.01  # of the speed: distance of a rigid motion's frequency from zero or the speed

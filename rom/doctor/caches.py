@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rom.doctor.finding import Finding
+from rom.places import PACKAGE
 
 REMOVE_COMMAND = "rom doctor --fix"
 AT_WORK = 60.0  # seconds after which nobody is still writing a temporary file
@@ -49,7 +50,7 @@ def numba_folders() -> Iterator[Path]:
     own = os.environ.get("NUMBA_CACHE_DIR")
     if own:
         yield Path(own)
-    yield Path(__file__).resolve().parents[1]
+    yield PACKAGE
 
 
 def damaged_files(folder: Path) -> Iterator[Path]:

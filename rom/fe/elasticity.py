@@ -12,20 +12,20 @@ from petsc4py import PETSc
 import numpy as np
 
 from rom.arguments import typed
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagError
-from rom.fe.aij import symmetric
 from rom.fe.compat import assemble_matrix, cell_name, lagrange, versions
+from rom.fe.forms.material import by_region, coefficients, described, doubts
+from rom.fe.forms.nodes import all_points, interface, outer_surface
+from rom.fe.forms.region import Regions, aij, forms
+from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
-from rom.fe.material import by_region, coefficients, described, doubts
-from rom.fe.memory import give_back
-from rom.fe.nodes import all_points, interface, outer_surface
+from rom.fe.mesh.solid import SolidMesh
+from rom.fe.operators.aij import symmetric
+from rom.fe.operators.memory import give_back
+from rom.fe.operators.petsc import PETScOperators
+from rom.fe.operators.solver import parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
-from rom.fe.petsc import PETScOperators
-from rom.fe.region import Regions, aij, forms
-from rom.fe.solid import SolidMesh
-from rom.fe.solver import parsed
-from rom.fe.stress import Stresses
 from rom.model import Array, Attachment, FEModel, Index, Material, Orthotropic
 
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
@@ -48,7 +48,7 @@ def model(
 
     Args:
         path: ``.geo``, ``.py``, ``.step``, ``.msh``, ``.inp`` or ``.bdf``, see
-            `rom.fe.mesh.read_mesh`.
+            `rom.fe.mesh.read.read_mesh`.
         material: `Material`, `Orthotropic`, or {region name: material}.
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
         parameters: values of the geometry's parameters.
@@ -59,7 +59,7 @@ def model(
             and without the count that proves no mode missed.
         comm: the ranks that share the model.
         mesh_options: ``scale``, ``faces``, ``order``, ``trust``, ``time_limit`` and
-            ``memory_limit`` of `rom.fe.mesh.read_mesh`.
+            ``memory_limit`` of `rom.fe.mesh.read.read_mesh`.
 
     Returns:
         FEModel, free-free. On one process K and M are SciPy matrices, under mpirun PETSc
@@ -74,7 +74,7 @@ def model(
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
     """
-    from rom.fe.mesh import read_mesh, to_dolfinx
+    from rom.fe.mesh.read import read_mesh, to_dolfinx
 
     method = parsed(solver)  # before a mesh is made in vain
     install_abort_hook(comm)  # whatever a script does next, one failing rank must end all

@@ -9,14 +9,15 @@ from rom.errors import ConfigError, SolverError
 from rom.fmu.inputs import Inputs
 from rom.fmu.outputs import Outputs
 from rom.io.fmu.variables import Variable
-from rom.mbs.arrays import Work, workspace
-from rom.mbs.integrate import simulate
+from rom.mbs.equations.equations import evaluate
+from rom.mbs.equations.packing import Packed, pack
+from rom.mbs.equations.python_laws import apply_laws, laws
+from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.kernels.system import Work, workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.motion import evaluate
-from rom.mbs.packing import Packed, pack
-from rom.mbs.signals import sample_all
-from rom.mbs.state import State, initial_state, with_accelerations
-from rom.mbs.user import apply_laws, laws
+from rom.mbs.parts.signals import sample_all
+from rom.mbs.results.state import State
 from rom.model import Array
 from rom.names import named
 

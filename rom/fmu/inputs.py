@@ -10,7 +10,7 @@ from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
 from rom.mbs.connections import Drive
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.signals import drive_signal
+from rom.mbs.parts.signals import drive_signal
 from rom.model import Array
 
 INFINITE = (-np.inf, np.inf)

@@ -7,10 +7,10 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
-from rom.mbs.arrays import Work
+from rom.mbs.equations.packing import Packed
+from rom.mbs.kernels.system import Work
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.packing import Packed
-from rom.mbs.parts import Marker
+from rom.mbs.parts.bodies import Marker
 from rom.model import Array
 from rom.rotation import quaternion
 

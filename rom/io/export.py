@@ -8,21 +8,21 @@ from typing import Any
 from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
-from rom.io.dmig import write_dmig
-from rom.io.exudyn import write_exudyn
+from rom.io.fields.vtu import write_vtu
 from rom.io.fmu.body import write_body_fmu
-from rom.io.interface_form import InterfaceForm, interface_form
-from rom.io.mbdyn import write_mbdyn
+from rom.io.matrices.dmig import write_dmig
+from rom.io.matrices.op4 import write_op4
+from rom.io.matrices.user_element import write_user_element
 from rom.io.native import load, save
-from rom.io.op4 import write_op4
-from rom.io.openfast import write_openfast
-from rom.io.radioss import write_radioss
-from rom.io.sid import write_sid
-from rom.io.sid_body import sid_body, standard_input
-from rom.io.sid_dialect import read_sid
-from rom.io.simscape import write_simscape
-from rom.io.user_element import write_user_element
-from rom.io.vtu import write_vtu
+from rom.io.programs.exudyn import write_exudyn
+from rom.io.programs.interface_form import InterfaceForm, interface_form
+from rom.io.programs.mbdyn import write_mbdyn
+from rom.io.programs.openfast import write_openfast
+from rom.io.programs.radioss import write_radioss
+from rom.io.programs.simscape import write_simscape
+from rom.io.sid.body import sid_body, standard_input
+from rom.io.sid.dialect import read_sid
+from rom.io.sid.format import write_sid
 
 SID_SUFFIX = ".sid_fem"
 HOLDING = ("openfast", "openfast-4")  # formats with one free interface
@@ -82,8 +82,8 @@ def export(
         path: file to write.
         to: "vtu" for ParaView, "npz" for the native body file, "sid" for Standard Input Data of
             Simpack, "sid-pysid" and "sid-geisler" for its dialects, "dmig" and "op4" for Nastran
-            (KAAX, MAAX, BAAX, see `rom.io.interface_form`), "abaqus" for a linear user element with
-            stiffness and mass but no damping, "exudyn" for a Python module that adds
+            (KAAX, MAAX, BAAX, see `rom.io.programs.interface_form`), "abaqus" for a linear user
+            element with stiffness and mass but no damping, "exudyn" for a Python module that adds
             the body to an Exudyn system, "mbdyn" for its modal joint, "simscape" for its Reduced
             Order Flexible Solid, "radioss" for a flexible body of OpenRadioss, "openfast" for a
             superelement of OpenFAST's module ExtPtfm with the weight of the body, "openfast-4" for

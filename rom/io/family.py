@@ -8,15 +8,15 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh
-from rom.body.family import BodyFamily, Share
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
-from rom.body.stretch import Stretch
 from rom.errors import FileFormatError
 from rom.io import native
 from rom.io.archive import MAX_BYTES, Kind, write_archive
 from rom.model import Array, Report, Row
-from rom.parameters import read, written
+from rom.parametric.family import BodyFamily, Share
+from rom.parametric.layers import Stretch
+from rom.parametric.parameters import read, written
 
 SCHEMA_NAME = "rom-family"
 VERSION = (1, 0)  # counts like that of the body file

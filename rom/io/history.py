@@ -43,7 +43,7 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
     acts on the second body of its joint, its moment about the second marker.
 
     Args:
-        solution: a `rom.mbs.solution.Solution` with n_t instants.
+        solution: a `rom.mbs.results.solution.Solution` with n_t instants.
         path: ``.csv`` for one table with a line per instant, or ``.h5`` (``.hdf5``) for a tree of
             arrays with their units as attributes.
         every: take every so many instants.

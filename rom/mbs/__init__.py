@@ -1,1 +1,6 @@
-"""Multibody dynamics in the floating frame of reference."""
+"""Mechanisms of rigid and flexible bodies, and their motion.
+
+`kernels` are compiled, `parts` and `elements` what a mechanism has, `mechanism` what users write;
+`equations` packs it, `integrate` moves it, `results` are what comes out, `analysis` needs no
+motion.
+"""

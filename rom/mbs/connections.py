@@ -10,9 +10,9 @@ import numpy.typing as npt
 from rom import rotation
 from rom.arguments import number, positive, typed, unit_vector
 from rom.errors import ConfigError, ModelError
-from rom.mbs import joints
-from rom.mbs.joints import Joint, Row
-from rom.mbs.parts import Marker, Part
+from rom.mbs.parts import joints
+from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.parts.joints import Joint, Row
 from rom.model import Array
 
 TimeFunction = Callable[[float], Any]

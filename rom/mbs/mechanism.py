@@ -11,12 +11,12 @@ from rom import rotation
 from rom.arguments import AnyBody, finite, matrix33, number, positive, start_pose, typed
 from rom.errors import ConfigError
 from rom.mbs.connections import Connections, Drive, TimeFunction
-from rom.mbs.elements import Bushing, Contact, Elements, Spread
-from rom.mbs.joint_forces import Friction, JointForces, Motor, Stop
-from rom.mbs.joints import Joint
-from rom.mbs.nonlinear import Assembly, NonlinearBodies
-from rom.mbs.parts import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
-from rom.mbs.surface_contact import SurfaceContacts
+from rom.mbs.elements.force_elements import Bushing, Contact, Elements, Spread
+from rom.mbs.elements.joint_forces import Friction, JointForces, Motor, Stop
+from rom.mbs.elements.nonlinear import Assembly, NonlinearBodies
+from rom.mbs.elements.surface_contact import SurfaceContacts
+from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
+from rom.mbs.parts.joints import Joint
 from rom.model import Array
 from rom.names import check_name, check_text
 from rom.notebook import html_table, listed
@@ -254,9 +254,10 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
     ) -> None:
         """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
-        ``a`` and ``b`` are `rom.mbs.user.MarkerMotion`. The function returns (force, moment) in
-        the world that act on the first marker; the reaction, at the same place in space, acts on
-        the body of the second one, so that momentum is conserved whatever the law.
+        ``a`` and ``b`` are `rom.mbs.equations.python_laws.MarkerMotion`. The function returns
+        (force, moment) in the world that act on the first marker; the reaction, at the same place
+        in space, acts on the body of the second one, so that momentum is conserved whatever the
+        law.
         """
         self._check_new(name)
         self._check_markers(name, m1, *(() if m2 is None else (m2,)))
@@ -274,9 +275,9 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
         Args:
             name: key of ``solution.events``.
-            function: of the time and of an `rom.mbs.events.Instant`, which knows positions and
-                velocities; looked at after every step, so that two zeros within one step are
-                not seen.
+            function: of the time and of an `rom.mbs.integrate.events.Instant`, which knows
+                positions and velocities; looked at after every step, so that two zeros within one
+                step are not seen.
             direction: 1 counts rising values only, -1 falling ones, 0 both.
             terminal: end the run there.
         """

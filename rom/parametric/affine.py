@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from rom.attachment import added_mass, carried_displacements
-from rom.body.family import Share
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals, weighted
-from rom.body.stretch import Stretch
-from rom.eigen import Operators
+from rom.eigen.attachments import added_mass, carried_displacements
+from rom.eigen.verbs import Operators
 from rom.errors import ParameterError
 from rom.model import Array, FEModel, Region
-from rom.parameters import Density, Parameter, Point, factors
+from rom.parametric.family import Share
+from rom.parametric.layers import Stretch
+from rom.parametric.parameters import Density, Parameter, Point, factors
 from rom.workflow import mesh_operators
 
 REMAINDER_RTOL = 1e-12  # share of mass and stiffness below which all belongs to named regions

@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from rom.body.family import BodyFamily
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import elastic_part
-from rom.certificate import N_COMPARED, compared, reduced_shapes, rigid_rows
-from rom.eigen import residual_errors
+from rom.checks.certificate import N_COMPARED, compared, reduced_shapes, rigid_rows
+from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
-from rom.parameters import scattered
 from rom.parametric.affine import AffineModel
-from rom.reduction.interface import Connection, connect
+from rom.parametric.family import BodyFamily
+from rom.parametric.parameters import scattered
+from rom.reduction.interfaces.connection import connect
+from rom.reduction.interfaces.records import Connection
 from rom.rows import frequency_rows, row
 
 HELD_OUT = 3  # points of the certificate

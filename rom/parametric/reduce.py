@@ -9,12 +9,15 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh
-from rom.body.family import BodyFamily
 from rom.body.projection import canonical_columns, elastic_part, flexible_body
 from rom.errors import ConfigError, ParameterError
 from rom.model import FEModel
 from rom.names import check_name
-from rom.parameters import (
+from rom.parametric.affine import AffineModel
+from rom.parametric.common_basis import CommonBasis, first_sample
+from rom.parametric.evidence import certified, estimated
+from rom.parametric.family import BodyFamily
+from rom.parametric.parameters import (
     Parameter,
     Point,
     Thickness,
@@ -24,13 +27,11 @@ from rom.parameters import (
     scattered,
     written,
 )
-from rom.parametric.affine import AffineModel
-from rom.parametric.evidence import certified, estimated
 from rom.parametric.stretched import StretchedModel
-from rom.reduction.characteristic import Characteristic
-from rom.reduction.interface import Connection, connect
-from rom.reduction.method import Method
-from rom.reduction.samples import CommonBasis, first_sample
+from rom.reduction.bases.method import Method
+from rom.reduction.interfaces.characteristic import Characteristic
+from rom.reduction.interfaces.connection import connect
+from rom.reduction.interfaces.records import Connection
 
 log = logging.getLogger("rom")
 SHAPE_RATIO = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 from scipy.sparse import identity, kron
 
-from rom.body.family import Share
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import inertia_integrals
-from rom.body.stretch import Stretch
-from rom.eigen import Operators, rigid_motions
+from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered
-from rom.parameters import Parameter, Point, Thickness, centre, factor, factors
 from rom.parametric.affine import AffineModel, RegionOperators, symmetric
-from rom.reduction.characteristic import GivenFunctions
-from rom.reduction.polynomial import orthonormal_in
+from rom.parametric.family import Share
+from rom.parametric.layers import Stretch
+from rom.parametric.parameters import Parameter, Point, Thickness, centre, factor, factors
+from rom.reduction.interfaces.characteristic import GivenFunctions
+from rom.reduction.interfaces.polynomial import orthonormal_in
 
 OVERLAP_RTOL = 1e-6  # of the extent, by which regions may overlap along the axis
 REMAINDER_RTOL = 1e-9  # share of mass and stiffness that may lie outside all regions

@@ -14,8 +14,8 @@ from rom.cyclic.sector import NONE, CyclicSector
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel
 from rom.prestress.heat import Heat
-from rom.prestress.states import SpinUp, straightened
-from rom.prestress.steady import SteadyRotation
+from rom.prestress.speed_table import SpinUp, straightened
+from rom.prestress.steady_rotation import SteadyRotation
 from rom.prestress.thermal import finite_solid, held_dofs
 
 

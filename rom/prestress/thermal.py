@@ -21,12 +21,12 @@ from rom.arguments import typed
 from rom.cyclic.modes import real_form
 from rom.cyclic.rotation import axial_pins, largest_ratio
 from rom.cyclic.sector import CyclicSector
-from rom.eigen import dofs_of, rigid_motions
+from rom.eigen.scipy import SciPyOperators, negative_count
+from rom.eigen.verbs import dofs_of, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.names import named
 from rom.prestress.heat import Heat
-from rom.scipy_operators import SciPyOperators, negative_count
 
 RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain
 
@@ -106,7 +106,7 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ())
 
 
 def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
-    """The solid in large motion, heated, see `rom.fe.finite_strain.FiniteStrain`.
+    """The solid in large motion, heated, see `rom.fe.forms.finite_strain.FiniteStrain`.
 
     Raises:
         ConfigError: if the model has no finite elements.

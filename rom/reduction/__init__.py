@@ -1,1 +1,1 @@
-"""Reduction bases on operators and on plain matrices; no dolfinx, no PETSc."""
+"""Reduction: `bases` of shapes, on `interfaces` of a kind."""

@@ -1,17 +1,17 @@
 """Pictures and films, drawn off-screen in a process that never loads dolfinx."""
 
-from rom.view.curves import campbell, convergence, frequencies, history
-from rom.view.film import animate, instants
-from rom.view.panels import Panel, panels
-from rom.view.part import mesh
-from rom.view.plane import Shape, deformed, flow
-from rom.view.planes import Drawing, plane
-from rom.view.rods import sleeves
-from rom.view.shapes import mode_shapes
-from rom.view.solids import box, cylinder
-from rom.view.spectra import updating
-from rom.view.start import start
-from rom.view.wheels import wheel_modes
+from rom.view.canvas.solids import box, cylinder
+from rom.view.figures.curves import campbell, convergence, frequencies, history
+from rom.view.figures.fields import Drawing, plane
+from rom.view.figures.panels import Panel, panels
+from rom.view.figures.sheets import Shape, deformed, flow
+from rom.view.figures.updating import updating
+from rom.view.scenes.film import animate, instants
+from rom.view.scenes.mechanisms import start
+from rom.view.scenes.meshes import mesh
+from rom.view.scenes.mode_shapes import mode_shapes
+from rom.view.scenes.rods import sleeves
+from rom.view.scenes.wheels import wheel_modes
 
 __all__ = [
     "Drawing",

@@ -9,7 +9,7 @@ from solid import block
 
 import rom
 from rom.io.archive import write_archive
-from rom.mbs.state import Memory, State
+from rom.mbs.results.state import Memory, State
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 WRONG = (None, -1, 1e308, "x", [1], {"x": 1}, True)

@@ -13,8 +13,8 @@ from command import rom as command
 from solid import block
 
 import rom
-from rom.cli import check
 from rom.cli.main import main
+from rom.cli.verbs import check
 
 BEAM = str(ROOT / "meshes" / "beam.geo")
 STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]

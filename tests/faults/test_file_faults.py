@@ -14,16 +14,16 @@ from solid import block
 
 import rom
 from rom.errors import ConfigError, FileFormatError
-from rom.io.calculix import read_stored_matrix
-from rom.io.dmig import read_dmig, read_grids
 from rom.io.export import read_body
-from rom.io.matrix_files import read_matrix, write_abaqus_matrix
-from rom.io.node_files import read_node_sets, read_nodes
-from rom.io.op4 import read_op4
-from rom.io.openfast_reading import read_openfast
-from rom.io.sid_dialect import read_sid
-from rom.io.universal import read_universal
-from rom.io.user_element import read_user_element
+from rom.io.fields.universal import read_universal
+from rom.io.matrices.calculix import read_stored_matrix
+from rom.io.matrices.dmig import read_dmig, read_grids
+from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
+from rom.io.matrices.node_files import read_node_sets, read_nodes
+from rom.io.matrices.op4 import read_op4
+from rom.io.matrices.user_element import read_user_element
+from rom.io.programs.openfast_reading import read_openfast
+from rom.io.sid.dialect import read_sid
 
 HERE = Path(__file__).parents[1] / "reference" / "foreign"
 KINDS = {"root": "rbe2", "tip": "rbe2"}

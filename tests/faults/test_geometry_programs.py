@@ -24,7 +24,7 @@ from rom.errors import (
     TagError,
     UnsafeFileError,
 )
-from rom.fe.mesh import read_mesh
+from rom.fe.mesh.read import read_mesh
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -149,7 +149,7 @@ def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
     name = lay(files, here)
     if name == "box.py":
         return
-    blind = "import sys, rom.fe.gmsh_session as g, rom.fe.child as c\n"
+    blind = "import sys, rom.fe.mesh.sources.gmsh_session as g, rom.fe.mesh.child as c\n"
     blind += "g.check_script = lambda path: None\ng.MSH_START = (b'',)\n"
     blind += "c.main(sys.argv[1])"
     monkeypatch.setattr(child, "python", lambda _, folder: [sys.executable, "-c", blind, folder])
@@ -167,7 +167,7 @@ def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
 @LINUX
 def test_a_process_killed_for_starting_another_is_called_unsafe(here, monkeypatch):
     lay(STARTERS["directly"], here)
-    blind = "import sys, rom.fe.gmsh_session as g, rom.fe.child as c\n"
+    blind = "import sys, rom.fe.mesh.sources.gmsh_session as g, rom.fe.mesh.child as c\n"
     blind += "g.check_script = lambda path: None\nc.main(sys.argv[1])"
     monkeypatch.setattr(child, "python", lambda _, folder: [sys.executable, "-c", blind, folder])
     with pytest.raises(UnsafeFileError, match=r"^box\.geo: tries to start a process"):
@@ -179,7 +179,7 @@ def test_a_confined_process_has_threads_and_its_folder_and_nothing_else(tmp_path
     code = f"""
 import os, socket, subprocess, threading
 from pathlib import Path
-from rom.fe.confinement import confine
+from rom.fe.mesh.sources.confinement import confine
 folder, outside = Path({str(tmp_path)!r}, "in"), Path({str(tmp_path)!r}, "out")
 folder.mkdir()
 confine(folder)
@@ -271,7 +271,7 @@ def test_memory_beyond_the_limit_is_a_resource_error(script, here):
 
 @pytest.mark.parametrize("none", [0, 0.0, float("inf")])
 def test_no_limit_is_no_limit(none, here):
-    from rom.fe.child import _limits
+    from rom.fe.mesh.child import _limits
 
     assert _limits("geo", 1, none, none) == child.Limits()
     usual = _limits("geo", 1, None, None)

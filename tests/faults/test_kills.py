@@ -34,8 +34,8 @@ FILM = """
 from rom.interruption import heed_lost_signals
 heed_lost_signals()
 import numpy as np
-from rom.view.offscreen import render
-from rom.view.scene import Actor, Camera
+from rom.view.canvas.offscreen import render
+from rom.view.canvas.scene import Actor, Camera
 rng = np.random.default_rng(0)
 camera = Camera(np.zeros(3), np.eye(3)[2], np.eye(3)[1], 2.0, (400, 300))
 render([Actor(rng.random((400, 300, 3)), rng.integers(0, 300, (4000, 3)))], camera)

@@ -25,7 +25,7 @@ from rom.errors import (
     TagError,
     UnsafeFileError,
 )
-from rom.fe.mesh import read_mesh
+from rom.fe.mesh.read import read_mesh
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx

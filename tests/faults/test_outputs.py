@@ -12,10 +12,10 @@ from solid import block
 import rom
 from rom.cli.main import main
 from rom.cli.parser import VERBS, build_parser
-from rom.config import reporting
 from rom.errors import ConfigError
 from rom.io.export import FORMATS
 from rom.io.ours import FILE_SIGNS, SAME_KIND, check_replaceable, is_ours
+from rom.report import pages
 
 BEAM = str(ROOT / "meshes" / "beam.geo")
 STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]
@@ -63,7 +63,7 @@ def folder(body, tmp_path, monkeypatch):
 def test_a_file_of_the_user_is_kept_until_force_is_said(case, folder, capsys, monkeypatch):
     if {"h5", "vtkhdf"} & set(WRITERS[case][0]):
         pytest.importorskip("h5py", reason="h5py is not installed")
-    monkeypatch.setattr(reporting, "drawn", lambda *_: [])  # pictures take seconds
+    monkeypatch.setattr(pages, "drawn", lambda *_: [])  # pictures take seconds
     words, name = WRITERS[case]
     Path(name).write_bytes(NOTES)
     before = sorted(os.listdir("out"))
@@ -196,8 +196,8 @@ def test_pictures_are_recognised_and_those_of_others_are_not(tmp_path):
     pytest.importorskip("PIL")
     from PIL import Image
 
-    from rom.view import page
-    from rom.view.film import write_gif
+    from rom.view.canvas import page
+    from rom.view.canvas.gif import write_gif
 
     ours = page.save(page.sheet(60, 40), tmp_path / "ours.png")
     write_gif(tmp_path / "ours.gif", np.zeros((2, 8, 8, 3), np.uint8) + 7, 0.1)

@@ -115,14 +115,14 @@ STARTERS = {
     "mesh": "import rom.fe.mesh as m; m.read_mesh('box.geo')",
     "film": "import rom; b = rom.load('bar.rom.npz'); from rom.view import mode_shapes; "
     "mode_shapes(b, 'modes.png', n=1)",
-    "window": "import rom; b = rom.load('bar.rom.npz'); from rom.view.window import *; "
+    "window": "import rom; b = rom.load('bar.rom.npz'); from rom.view.scenes.window import *; "
     "show(mode_scenes(b, 1))",
     "body FMU": "import rom; rom.write_body_fmu(rom.load('bar.rom.npz'), 'bar.fmu')",
     "FMU": "import rom; open('empty.py', 'w').write('import rom\\ndef mechanism():\\n"
     "    return rom.Mechanism()\\n'); rom.write_fmu('m.fmu', 'empty.py', dt=1e-3)",
     "probes": "from rom.doctor.probes import start; print(start('rom.doctor.drawing').answer())",
-    "peers": "from rom import child; from rom.peers.compare import answer_of; "
-    "answer_of(child.python('rom.peers.ours', '1'))",
+    "peers": "from rom import child; from rom.bench.peers.compare import answer_of; "
+    "answer_of(child.python('rom.bench.peers.ours', '1'))",
 }
 
 

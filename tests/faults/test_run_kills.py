@@ -12,7 +12,7 @@ import pytest
 
 import rom
 from rom.cli.main import main
-from rom.mbs import keeping
+from rom.mbs.integrate import keeping
 
 KILLS = 10 if os.environ.get("ROM_LONG") else 3
 MECHANISM = """
@@ -170,12 +170,12 @@ def test_a_film_that_is_interrupted_takes_nothing_away(folder, monkeypatch, caps
 
     short = [*RUN, "--t-end", "0.01", "-q"]
     with monkeypatch.context() as patch:
-        patch.setattr("rom.view.motion.write_animation", interrupted)
+        patch.setattr("rom.view.scenes.animation_files.write_animation", interrupted)
         assert main([*short, "--film", "glb"]) == 7
     assert sorted(os.listdir("out")) == ["motion.csv", "run.json"]
     before = files(folder / "out")
     with monkeypatch.context() as patch:
-        patch.setattr("rom.mbs.record.Record.pause", interrupted)
+        patch.setattr("rom.mbs.integrate.run.Record.pause", interrupted)
         patch.setattr("rom.io.history.write_whole", interrupted)
         assert main(short) == 7
     assert files(folder / "out") == before

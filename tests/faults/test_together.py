@@ -22,7 +22,7 @@ from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
 from rom.io.claim import LOCK_NAME, claimed
 from rom.io.files import write_whole
-from rom.report import paragraph, write_report
+from rom.report.html import paragraph, write_report
 
 FORK = multiprocessing.get_context("fork")
 WRITES = 40
@@ -209,7 +209,7 @@ def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeyp
 KERNELS = """
 import sys
 from pathlib import Path
-from rom.mbs.compiled import drop_stale_cache
+from rom.mbs.kernels.compiled import drop_stale_cache
 folder = Path(__file__).parent
 for _ in range({drops}):
     drop_stale_cache(folder, folder / "__pycache__" / "stamp")
@@ -224,7 +224,7 @@ from numba import njit
 def inner(x):
     return 2 * x
 
-@njit(cache=True)  # as in rom.mbs.compiled import kernel
+@njit(cache=True)  # as in rom.mbs.kernels.compiled import kernel
 def outer(x):
     return 2 * inner(x)
 """

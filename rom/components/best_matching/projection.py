@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.eigen import rigid_motions
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 

@@ -32,7 +32,7 @@ from rom.components.cosserat.shape import Shape, reference
 from rom.components.cosserat.statics import add_loads, clamped, largest
 from rom.components.cosserat.vibration import lumped_mass
 from rom.errors import ConfigError, SolverError
-from rom.mbs.alpha import coefficients
+from rom.mbs.integrate.generalized_alpha import coefficients
 from rom.model import Array, Mask
 
 HELD, HEAVY, LIGHT = 0, 1, 2  # dofs; light ones have no mass and follow the rest

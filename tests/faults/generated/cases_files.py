@@ -18,7 +18,7 @@ from rom.errors import (
     UnsafeFileError,
 )
 from rom.io.archive import write_archive
-from rom.io.sid_dialect import read_sid
+from rom.io.sid.dialect import read_sid
 
 READ = (FileFormatError, QualityGateError, UnsafeFileError, ModelError)
 BODY, STATE, FAMILY, SID = "good.npz", "good.state.npz", "family.npz", "good.SID_FEM"

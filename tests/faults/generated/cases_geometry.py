@@ -15,7 +15,7 @@ from rom.errors import (
     TagError,
     UnsafeFileError,
 )
-from rom.fe.mesh import read_mesh
+from rom.fe.mesh.read import read_mesh
 
 ENDLESS = {
     "a loop": "For i In {1 : 1e9}\n  x = Sqrt(i);\nEndFor",

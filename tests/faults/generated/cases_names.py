@@ -7,7 +7,7 @@ import rom
 from generated.case import Case, Works, case, edit, require
 from generated.stock import MATRICES, STEEL, body, model, origin, pendulum
 from rom.errors import ConfigError, InterfaceError, ModelError, ParameterError
-from rom.report import paragraph
+from rom.report.html import paragraph
 
 HOSTILE = {
     "a path upwards": "../pwned",

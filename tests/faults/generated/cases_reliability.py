@@ -17,7 +17,7 @@ from rom.errors import (
     QualityGateError,
     TagError,
 )
-from rom.fe.mesh import read_mesh
+from rom.fe.mesh.read import read_mesh
 
 BOX, CURVED = solid(), solid("tet10")
 BLOCKS, NAMES = blocks_of(BOX)

@@ -13,9 +13,9 @@ from solid import block
 
 import rom
 from rom.child import environment
-from rom.io.dmig import write_dmig
-from rom.io.op4 import write_op4
-from rom.mbs.state import Memory, State
+from rom.io.matrices.dmig import write_dmig
+from rom.io.matrices.op4 import write_op4
+from rom.mbs.results.state import Memory, State
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}

@@ -1,0 +1,266 @@
+"""Reduced bodies coupled where they touch: modes of the whole from its parts."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from rom.arguments import typed
+from rom.assembly.condensed import (
+    CondensedAssembly,
+    Partition,
+    check_count,
+    joint_functions,
+    local_traces,
+    natural_modes,
+    partition,
+    per_body,
+    supported,
+    system_functions,
+)
+from rom.assembly.coupling import coupled_rows
+from rom.body.flexible import FlexibleBody, Marker
+from rom.errors import ConfigError
+from rom.model import Array, Modes, Report, Row
+from rom.rows import frequency_rows, row
+
+Place = tuple[str, str]  # body, interface
+N_COMPARED = 6  # elastic modes that certificates look at
+GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
+MISSING = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
+
+
+@typed
+@dataclass(frozen=True)
+class Assembly:
+    """Bodies that share interfaces, in the position in which they were modelled.
+
+    Interfaces are coupled by their coordinates: all dofs of conforming meshes ("full"), whatever
+    the order of their nodes; rigid or mean motions; or the coefficients of equal functions. Where
+    meshes do not match, a projection couples moments of common functions.
+
+    Attributes:
+        bodies: {name: body}, all in one system of coordinates; those of other units are
+            converted to SI.
+        couplings: ((body, interface), (body, interface)) pairs that move together.
+        projection: functions that couple deformable interfaces whose coordinates differ, e.g.
+            ``Polynomial(4)``; displacements that they contain pass without error.
+
+    Raises:
+        ConfigError: if a body is unknown or a coupling is no pair of places.
+        InterfaceError: if two interfaces are of different kind or size, lie apart, or need a
+            projection.
+    """
+
+    bodies: dict[str, FlexibleBody]
+    couplings: tuple[tuple[Place, Place], ...]
+    projection: Any = None
+
+    def __post_init__(self) -> None:
+        if self.projection is not None and not hasattr(self.projection, "functions"):
+            raise ConfigError(
+                f"projection = {self.projection!r} gives no functions of a surface.",
+                hint="Use for example rom.Polynomial(4).",
+            )
+        in_si = {name: body.in_units("SI") for name, body in self.bodies.items()}
+        object.__setattr__(self, "bodies", in_si)
+        _ = self._coupled  # refuses couplings that cannot be
+
+    @property
+    def n_conditions(self) -> tuple[int, ...]:
+        """Number of coordinates, or moments, that each coupling makes equal."""
+        return tuple(term[0][1].shape[0] for term in self._coupled)
+
+    def frequencies(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Array:
+        """Natural frequencies of the assembly [Hz].
+
+        Args:
+            n: how many, lowest first; None for all.
+            fixed: (body, interface) pairs that are held.
+
+        Raises:
+            InterfaceError: if an interface is unknown.
+        """
+        return self.modes(n, fixed=fixed).frequencies
+
+    def modes(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Modes:
+        """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
+        M, K = self._matrices()
+        N = self._free(fixed)
+        omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
+        return Modes(omega[:n], per_body(self._widths(), N @ V[:, :n]))
+
+    def reduced(
+        self, n_interface: int, *, level: str = "system", fixed: tuple[Place, ...] = ()
+    ) -> CondensedAssembly:
+        """The assembly with few functions on its coupled interfaces: characteristic modes.
+
+        Other interfaces keep their coordinates. A repeated frequency of the interfaces is kept
+        whole, so that the result may have more functions than asked for; it says how many.
+
+        Args:
+            n_interface: number of functions; with level "local", modes per body.
+            level: "system": lowest modes of all interfaces of the whole, the best choice per
+                function; "local": lowest modes of each body with its interfaces free, both sides
+                of an interface taking the union, so that a body can be replaced alone.
+            fixed: (body, interface) pairs that are held.
+
+        Raises:
+            ConfigError: if the interfaces have fewer coordinates, nothing is coupled, the level
+                is unknown, or "local" meets an interface that is coupled twice.
+            InterfaceError: if an interface is unknown.
+        """
+        if level not in ("system", "local"):
+            raise ConfigError(f'level = {level!r} is neither "system" nor "local".')
+        if not self.couplings:
+            raise ConfigError("nothing is coupled: there are no interfaces to reduce.")
+        (M, K), H = self._matrices(), self._interfaces()
+        parts = self._partition(None, fixed)
+        if level == "system":
+            W = system_functions(parts, n_interface)
+        else:
+            W = joint_functions(H @ parts.C, self._traces(n_interface, fixed))
+        basis = np.hstack([parts.C @ W, parts.F])
+        M, K = basis.T @ M @ basis, basis.T @ K @ basis
+        n, n_rigid = W.shape[1], self._n_rigid(fixed)
+        omega = natural_modes(M[:n, :n], K[:n, :n], n_rigid)[0]
+        few = natural_modes(M, K, n_rigid)[0][n_rigid:][:N_COMPARED]
+        table = {"reduced": few.tolist(), "full": self._elastic(few.size, fixed).tolist()}
+        report = Report("certificate of the condensed assembly",
+                        tuple(frequency_rows(f"{n} interface functions", table)))  # fmt: skip
+        return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid, report)
+
+    def _elastic(self, n: int, fixed: tuple[Place, ...]) -> Array:
+        """(n,) lowest circular frequencies that are not those of rigid motions [rad/s]."""
+        n_rigid = self._n_rigid(fixed)
+        return self.modes(n_rigid + n, fixed=fixed).omega[n_rigid:]
+
+    @cached_property
+    def certificate(self) -> Report:
+        """The certificates of the bodies, and whether couplings close in the lowest modes."""
+        rows = [
+            replace(line, quantity=f"{name}: {line.quantity}")
+            for name, body in self.bodies.items()
+            for line in (body.certificate.rows if body.certificate is not None else MISSING)
+        ]
+        return Report("certificate of the assembly", (*rows, *self._gap_row()))
+
+    def _gap_row(self) -> list[Row]:
+        """Largest gap of the coupled coordinates over their motion, in the lowest elastic modes."""
+        if not self.couplings:
+            return []
+        M, K = self._matrices()
+        N, n_rigid = self._free(()), self._n_rigid(())
+        V = N @ natural_modes(N.T @ M @ N, N.T @ K @ N, n_rigid)[1][:, n_rigid:][:, :N_COMPARED]
+        sides = [np.abs(self._placed(term[:1]) @ V).max() for term in self._coupled]
+        gap = np.abs(self._rows(()) @ V).max()
+        return [row("gap of coupled interfaces, over their motion", gap / max(sides), GAP_RTOL)]
+
+    def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
+        """Per coupling, the interface motions that the modes of its two bodies ask for."""
+        places = [place for coupling in self.couplings for place in coupling]
+        twice = sorted({place for place in places if places.count(place) > 1})
+        if twice:
+            raise ConfigError(
+                f"{twice[0]} is coupled {places.count(twice[0])} times.",
+                hint='level="local" needs every interface in one coupling; use level="system".',
+            )
+        coupled = list(dict.fromkeys(body for body, _ in places))
+        parts = {name: self._partition(name, fixed) for name in coupled}
+        check_count(n, max(part.lam.size for part in parts.values()))
+        found: dict[Place, Array] = {}
+        for name in coupled:
+            rows = self._rows_of(name)
+            traces = local_traces(parts[name], n, [*rows.values()], name)
+            found |= dict(zip(rows, traces, strict=True))
+        return [[found[place] for place in coupling] for coupling in self.couplings]
+
+    def _partition(self, name: str | None, fixed: tuple[Place, ...]) -> Partition:
+        """Interface motions of one body, or of the whole; kept for other numbers of functions."""
+        key = (name, tuple(map(tuple, fixed)))
+        if key not in self._partitions:
+            if name is None:
+                N, H, matrices = self._free(fixed), self._interfaces(), self._matrices()
+            else:
+                fixed = tuple(place for place in fixed if place[0] == name)
+                body, held = self.bodies[name], [self._marker(place).hold for place in fixed]
+                N = supported(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
+                H, matrices = np.vstack([*self._rows_of(name).values()]), body.full_matrices()
+            self._partitions[key] = partition(*matrices, N, H, self._n_rigid(fixed))
+        return self._partitions[key]
+
+    @cached_property
+    def _partitions(self) -> dict[Any, Partition]:
+        return {}
+
+    def _interfaces(self) -> Array:
+        """(h, n) coordinates of all coupled interfaces."""
+        return np.vstack([self._placed(term[:1]) for term in self._coupled])
+
+    def _rows_of(self, name: str) -> dict[Place, Array]:
+        """Coordinates of the coupled interfaces of one body."""
+        return {p: rows for term in self._coupled for p, rows, _ in term if p[0] == name}
+
+    @cached_property
+    def _coupled(self) -> list[tuple[tuple[Place, Array, float], ...]]:
+        """Per coupling both places with their rows and signs: the sum vanishes."""
+        size = max((body.size for body in self.bodies.values()), default=0.0)
+        terms = []
+        for coupling in self.couplings:
+            try:
+                one, other = (self._marker(place) for place in coupling)
+            except (TypeError, ValueError) as error:
+                raise ConfigError(
+                    f"coupling {coupling!r} is not a pair of (body, interface)."
+                ) from error
+            rows = coupled_rows(coupling, one, other, size, self.projection)
+            terms.append(tuple(zip(coupling, rows, (1.0, -1.0), strict=True)))
+        return terms
+
+    def _matrices(self) -> tuple[Array, Array]:
+        pairs = [body.full_matrices() for body in self.bodies.values()]
+        M, K = (block_diag(*parts) for parts in zip(*pairs, strict=True))
+        return M, K
+
+    def _widths(self) -> dict[str, int]:
+        return {name: 6 + body.n_modes for name, body in self.bodies.items()}
+
+    def _marker(self, place: Place) -> Marker:
+        body, interface = place
+        if body not in self.bodies:
+            raise ConfigError(f"no body {body!r}; the assembly has {sorted(self.bodies)}.")
+        return self.bodies[body].marker(interface)
+
+    def _free(self, fixed: tuple[Place, ...]) -> Array:
+        """(n, m) motions of all bodies that satisfy couplings and supports."""
+        size = max(body.size for body in self.bodies.values())
+        scale = np.concatenate(
+            [np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
+             for b in self.bodies.values()]
+        )  # fmt: skip
+        return scale[:, None] * supported(self._rows(fixed) * scale)
+
+    def _rows(self, fixed: tuple[Place, ...]) -> Array:
+        """(c, n) what is zero: differences of coupled interfaces, coordinates of held ones."""
+        held = [((place, self._marker(place).hold, 1.0),) for place in fixed]
+        n = sum(self._widths().values())
+        return np.vstack([np.zeros((0, n)), *map(self._placed, [*self._coupled, *held])])
+
+    def _placed(self, term: tuple[tuple[Place, Array, float], ...]) -> Array:
+        """(c, n) sum of rows, each at the columns of its body."""
+        widths = self._widths()
+        starts = dict(zip(widths, np.cumsum([0, *widths.values()])[:-1], strict=True))
+        block = np.zeros((term[0][1].shape[0], sum(widths.values())))
+        for place, rows, sign in term:
+            start = starts[place[0]]
+            block[:, start : start + rows.shape[1]] += sign * rows
+        return block
+
+    def _n_rigid(self, fixed: tuple[Place, ...]) -> int:
+        """Rigid motions of the whole that supports leave free."""
+        size = max(body.size for body in self.bodies.values())
+        held = [self._marker(place).hold[:, :6] for place in fixed]
+        rows = np.vstack([np.zeros((1, 6)), *held]) * np.r_[np.ones(3), np.full(3, 1 / size)]
+        return 6 - int(np.linalg.matrix_rank(rows, tol=1e-9))

@@ -1,0 +1,198 @@
+"""Characteristic constraint modes: few functions for the interfaces of an assembly, computed.
+
+The motions of an assembly split into those that hold its coupled interfaces (F) and those that
+move them (C), chosen orthogonal to the first in the stiffness, C^T K F = 0: statics of the bodies
+between their interfaces. The eigenproblem of the second part alone says which motions of the
+interfaces matter at low frequency::
+
+    C^T K C chi = lambda C^T M C chi
+
+Source:
+    Castanier, Tan and Pierre, Characteristic constraint modes for component mode synthesis, AIAA
+    J. 39 (2001) 1182; for components of their own, Hong, Epureanu and Castanier, Next-generation
+    parametric reduced-order models, Mech. Syst. Signal Process. 37 (2013) 403.
+"""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, eigh, null_space
+
+from rom.arguments import whole
+from rom.eigen.verbs import whole_clusters
+from rom.model import Array, Modes, Report
+
+RANK_RTOL = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
+RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
+log = logging.getLogger("rom")
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """Motions of a structure, with and without motion of its interfaces.
+
+    Attributes:
+        C: (n, c) motions that move the interfaces, K-orthogonal to F.
+        F: (n, f) motions that hold them, M-orthonormal.
+        lam: (c,) eigenvalues of the interface motions [rad^2/s^2], ascending.
+        chi: (c, c) their shapes in C: the characteristic constraint modes, all of them.
+    """
+
+    C: Array
+    F: Array
+    lam: Array
+    chi: Array
+
+
+@dataclass(frozen=True, slots=True)
+class CondensedAssembly:
+    """An assembly whose coupled interfaces follow few functions; its supports stay as chosen.
+
+    Attributes:
+        level: "system" or "local".
+        n_interface: number of interface functions kept.
+        interface_omega: (n_interface,) circular frequencies of the interface functions [rad/s],
+            fixed-interface modes left out.
+        basis: (n, m) motions kept, in the coordinates of all bodies, interface functions first.
+        M: (m, m) mass.
+        K: (m, m) stiffness.
+        widths: {body: number of its coordinates}.
+        n_rigid: rigid motions that the supports leave free.
+        certificate: frequencies against the assembly with all its interface coordinates.
+    """
+
+    level: str
+    n_interface: int
+    interface_omega: Array
+    basis: Array
+    M: Array
+    K: Array
+    widths: dict[str, int]
+    n_rigid: int
+    certificate: Report
+
+    def frequencies(self, n: int | None = None) -> Array:
+        """Natural frequencies [Hz], lowest first; None for all."""
+        return self.modes(n).frequencies
+
+    def modes(self, n: int | None = None) -> Modes:
+        """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
+        omega, V = natural_modes(self.M, self.K, self.n_rigid)
+        return Modes(omega[:n], per_body(self.widths, self.basis @ V[:, :n]))
+
+
+def natural_modes(M: Array, K: Array, n_rigid: int) -> tuple[Array, Array]:
+    """Frequencies (m,) [rad/s], exactly zero for rigid motions, and mass-normalised shapes."""
+    if not M.size:
+        return np.zeros(0), M
+    scale = 1 / np.sqrt(np.diag(M))
+    lam, V = eigh(scale[:, None] * K * scale, scale[:, None] * M * scale)
+    omega = np.sqrt(np.maximum(lam, 0.0))
+    omega[:n_rigid] = 0.0
+    return omega, scale[:, None] * V
+
+
+def per_body(widths: dict[str, int], shapes: Array) -> dict[str, Array]:
+    """The rows of every body."""
+    ends = np.cumsum(list(widths.values()))[:-1]
+    return dict(zip(widths, np.split(shapes, ends), strict=True))
+
+
+def partition(M: Array, K: Array, N: Array, H: Array, n_rigid: int) -> Partition:
+    """Split the motions N by whether they move the interface coordinates H.
+
+    Args:
+        M: (n, n) mass.
+        K: (n, n) stiffness.
+        N: (n, m) motions that satisfy the supports.
+        H: (h, n) coordinates of the interfaces.
+        n_rigid: rigid motions in N.
+    """
+    N = N / np.sqrt(np.einsum("ij,ij->j", N, M @ N))
+    rows = H @ N
+    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    _, spectrum, Vt = np.linalg.svd(rows)
+    c = int(np.count_nonzero(spectrum > RANK_RTOL * spectrum[0]))
+    C, F = N @ Vt[:c].T, N @ Vt[c:].T
+    if F.shape[1]:
+        lam, Phi = eigh(F.T @ K @ F, F.T @ M @ F)
+        F = F @ Phi
+        stiff = lam > RIGID_RTOL * lam[-1]
+        C = C - F[:, stiff] @ ((F[:, stiff].T @ K @ C) / lam[stiff, None])
+    lam, chi = eigh(C.T @ K @ C, C.T @ M @ C)
+    lam[:n_rigid] = 0.0
+    return Partition(C, F, np.maximum(lam, 0.0), chi)
+
+
+def enough(lam: Array, n: int, where: str) -> int:
+    """The number of functions kept: n, or more to keep a repeated eigenvalue whole."""
+    m = whole_clusters(lam, n)
+    if m > n:
+        repeated = np.sqrt(lam[m - 1]) / (2 * np.pi)
+        log.info("%s: %d functions instead of %d, %.4g Hz is repeated", where, m, n, repeated)
+    return m
+
+
+def check_count(n: int, available: int) -> None:
+    """Refuse a number of functions that interfaces do not have.
+
+    Raises:
+        ConfigError: naming the value.
+    """
+    whole("n_interface", n, 1, available, reason="coordinates of the coupled interfaces")
+
+
+def system_functions(parts: Partition, n: int) -> Array:
+    """(c, n) lowest characteristic constraint modes of the whole assembly."""
+    check_count(n, parts.lam.size)
+    return parts.chi[:, : enough(parts.lam, n, "interfaces of the assembly")]
+
+
+def local_traces(parts: Partition, n: int, rows: list[Array], where: str) -> list[Array]:
+    """Interface motions of the lowest characteristic constraint modes of one component.
+
+    Args:
+        parts: the component with its supports.
+        n: number of modes; all if the component has fewer.
+        rows: (h_j, n_b) coordinates of each of its coupled interfaces.
+        where: name of the component, for the log.
+
+    Returns:
+        (h_j, m_j) directions per interface, scaled to one; modes that hold it are left out.
+    """
+    m = enough(parts.lam, min(n, parts.lam.size), f"interfaces of {where!r}")
+    motion = parts.C @ parts.chi[:, :m]
+    traces = [H @ motion for H in rows]
+    largest = np.max([np.linalg.norm(T, axis=0) for T in traces], axis=0)
+    scaled = []
+    for T in traces:
+        size = np.linalg.norm(T, axis=0)
+        moves = size > RANK_RTOL * largest
+        scaled.append(T[:, moves] / size[moves])
+    return scaled
+
+
+def joint_functions(moved: Array, traces: list[list[Array]]) -> Array:
+    """(c, m) interface motions of the assembly that contain those of the components.
+
+    Both sides of an interface take the union of their functions, orthonormalised by a singular
+    value decomposition, so that they stay compatible.
+
+    Args:
+        moved: (h, c) coordinates of all interfaces, one below the other, per motion.
+        traces: per interface, the directions that its two components ask for.
+    """
+    unions = []
+    for both in traces:
+        U, spectrum, _ = np.linalg.svd(np.hstack(both), full_matrices=False)
+        unions.append(U[:, spectrum > RANK_RTOL * spectrum[0]])
+    X = np.linalg.lstsq(moved, block_diag(*unions), rcond=RANK_RTOL)[0]
+    Q, spectrum, _ = np.linalg.svd(X, full_matrices=False)
+    return Q[:, spectrum > RANK_RTOL * spectrum[0]]
+
+
+def supported(rows: Array) -> Array:
+    """(n, m) motions for which all rows vanish."""
+    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    return null_space(rows, rcond=RANK_RTOL) if rows.size else np.eye(rows.shape[1])

@@ -1,0 +1,227 @@
+"""Substructures coupled by interface forces: MacNeal, Rubin and dual Craig-Bampton.
+
+A free body follows u = R alpha + Phi eta + G g: rigid motions, some elastic free-free modes, and
+what these leave of its static answer to forces g on its interfaces. Coupled interfaces feel equal
+and opposite forces lambda; with B for their differences::
+
+    Gamma = sum B G B^T,  Psi = B [R, Phi],  H = sum B G^T M G B^T
+
+    macneal  K = diag(0, Lambda) + Psi^T Gamma^-1 Psi,  M = 1
+    rubin    the same K,  M = 1 + Psi^T Gamma^-1 H Gamma^-1 Psi
+    dual     [ diag(0, Lambda)  Psi^T  ]       [ 1     ]
+             [ Psi              -Gamma ],  M = [    H  ]
+
+The first two meet exactly; Rubin's is a Ritz method, never below the exact frequencies. Dual
+Craig-Bampton keeps the forces as unknowns, so that substructures can be exchanged one by one; its
+interfaces meet weakly, and it has a negative eigenvalue per force, which belongs to no motion.
+
+Source:
+    MacNeal, Comput. Struct. 1 (1971) 581; Rubin, AIAA J. 13 (1975) 995; Rixen, A dual
+    Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math. 168 (2004) 383.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, eigh, null_space
+
+from rom.arguments import typed
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, Index
+from rom.reduction.bases.free_interface import free_modes, residual_flexibility
+from rom.reduction.interfaces.records import Connection
+
+KINDS = ("macneal", "rubin", "dual")
+SAME_PLACE = 1e-6  # distance of two interfaces, of their distance from the origin, that still meet
+# of the whole one: residual flexibility below is none, the modes describe all
+FLEXIBILITY_RTOL = 1e-11
+Place = tuple[str, str]  # substructure, interface
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class FreeSubstructure:
+    """A free body as its interfaces see it.
+
+    Attributes:
+        parts: {interface: rows in the arrays below}.
+        origins: {interface: (3,) where it is [m]}.
+        rigid: (n_b, 6) interface coordinates of M-orthonormal rigid motions.
+        omega: (m,) elastic free-free frequencies [rad/s].
+        shapes: (n_b, m) interface coordinates of the mass-normalised modes.
+        flexibility: (n_b, n_b) residual flexibility G [m/N].
+        mass: (n_b, n_b) kinetic energy of the residual shapes, G^T M G.
+    """
+
+    parts: dict[str, Index]
+    origins: dict[str, Array]
+    rigid: Array
+    omega: Array
+    shapes: Array
+    flexibility: Array
+    mass: Array
+
+
+def free_substructure(
+    connection: Connection, origins: dict[str, Array], n_modes: int
+) -> FreeSubstructure:
+    """What a coupling by forces needs of a body in interface coordinates; see the class.
+
+    Raises:
+        ConfigError: for more modes than there are dofs.
+        InterfaceError: if the interfaces leave a rigid motion free.
+    """
+    ops, b = connection.ops, connection.boundary
+    R, omega, Phi = free_modes(ops, n_modes)
+    G = residual_flexibility(ops, b, R, omega, Phi)
+    F, H = ops.rows(G, b), ops.gram(G, ops.apply_M(G))
+    return FreeSubstructure(
+        parts=connection.parts,
+        origins=origins,
+        rigid=ops.rows(R, b),
+        omega=omega,
+        shapes=ops.rows(Phi, b),
+        flexibility=0.5 * (F + F.T),
+        mass=0.5 * (H + H.T),
+    )
+
+
+@typed
+@dataclass(frozen=True)
+class DualAssembly:
+    """Free substructures whose interfaces are held together by forces.
+
+    Attributes:
+        bodies: {name: substructure}, all in one system of coordinates.
+        couplings: ((body, interface), (body, interface)) pairs that move together; coordinates of
+            conforming "full" interfaces are paired in their order.
+
+    Raises:
+        ConfigError: if a body is unknown.
+        InterfaceError: if an interface is unknown, or two differ in size or lie apart.
+    """
+
+    bodies: dict[str, FreeSubstructure]
+    couplings: tuple[tuple[Place, Place], ...]
+
+    def __post_init__(self) -> None:
+        for one, other in self.couplings:
+            sizes = [self._rows(place).size for place in (one, other)]
+            if sizes[0] != sizes[1]:
+                raise InterfaceError(
+                    f"{one} has {sizes[0]} coordinates and {other} has {sizes[1]}: they cannot "
+                    "move together.",
+                    hint="Give both the same kind, on conforming meshes or with Polynomial.",
+                )
+            x, y = (self.bodies[body].origins[name] for body, name in (one, other))
+            if np.linalg.norm(x - y) > SAME_PLACE * max(np.linalg.norm(x), np.linalg.norm(y)):
+                raise InterfaceError(f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.")
+
+    def frequencies(
+        self, n: int | None = None, *, kind: str = "dual", fixed: tuple[Place, ...] = ()
+    ) -> Array:
+        """Natural frequencies of the whole [Hz], lowest first.
+
+        Args:
+            n: how many; None for all.
+            kind: "macneal", "rubin" or "dual".
+            fixed: (body, interface) pairs that are held.
+
+        Raises:
+            ConfigError: if the kind is unknown.
+            InterfaceError: if an interface is unknown, or forces on interfaces are redundant.
+        """
+        lam = self.eigenvalues(kind=kind, fixed=fixed)
+        lam = lam[lam > -1e-9 * np.abs(lam).max()] if kind == "dual" else lam
+        omega = np.sqrt(np.maximum(lam, 0.0))
+        omega[: self._n_rigid(fixed)] = 0.0
+        return omega[:n] / (2 * np.pi)
+
+    def eigenvalues(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> Array:
+        """All eigenvalues [rad^2/s^2], ascending, with those below zero of a dual assembly."""
+        K, M = self.matrices(kind=kind, fixed=fixed)
+        scale = 1 / np.sqrt(np.diag(M))
+        found: Array = eigh(
+            scale[:, None] * K * scale, scale[:, None] * M * scale, eigvals_only=True
+        )
+        return found
+
+    def matrices(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> tuple[Array, Array]:
+        """Stiffness and mass of the whole in modal coordinates, and forces for "dual"."""
+        if kind not in KINDS:
+            raise ConfigError(f"kind = {kind!r} is none of {', '.join(KINDS)}.")
+        Lam, Psi, Gamma, H = self._coupled(fixed)
+        hard = self._hard(Lam, Psi, Gamma)
+        if kind == "dual":
+            if hard.any():
+                raise InterfaceError(
+                    f"{np.count_nonzero(hard)} interface forces find no residual flexibility: the "
+                    "modes kept describe all of it, or couplings repeat each other.",
+                    hint="Ask for fewer modes.",
+                )
+            K = np.block([[Lam, Psi.T], [Psi, -Gamma]])
+            return K, block_diag(np.eye(len(Lam)), H)
+        gamma, Q = np.linalg.eigh(Gamma)
+        soft = Q[:, ~hard] / gamma[~hard]
+        closing_forces = soft @ (Q[:, ~hard].T @ Psi)  # forces that close the gaps
+        K, M = Lam + Psi.T @ closing_forces, np.eye(len(Lam))
+        if kind == "rubin":
+            M = M + closing_forces.T @ H @ closing_forces
+        N = null_space(Q[:, hard].T @ Psi) if hard.any() else np.eye(len(Lam))
+        return N.T @ K @ N, N.T @ M @ N
+
+    def _coupled(self, fixed: tuple[Place, ...]) -> tuple[Array, Array, Array, Array]:
+        """Modal stiffness, gaps of the modes, flexibility and residual mass of the forces."""
+        bodies = list(self.bodies.values())
+        n_rigid = [b.rigid.shape[1] for b in bodies]
+        diagonal = [np.r_[np.zeros(k), b.omega**2] for k, b in zip(n_rigid, bodies, strict=True)]
+        B = self._differences(fixed)
+        Psi = B @ block_diag(*(np.hstack([b.rigid, b.shapes]) for b in bodies))
+        Gamma, H = (
+            B @ block_diag(*parts) @ B.T
+            for parts in zip(*((b.flexibility, b.mass) for b in bodies), strict=True)
+        )
+        return np.diag(np.concatenate(diagonal)), Psi, Gamma, H
+
+    def _differences(self, fixed: tuple[Place, ...]) -> Array:
+        """(c, n_b of all) signed selection of interface coordinates that must vanish."""
+        starts = np.cumsum([0, *(len(b.rigid) for b in self.bodies.values())])
+        first = dict(zip(self.bodies, starts, strict=False))
+        terms: list[tuple[tuple[Place, float], ...]] = [
+            ((one, 1.0), (other, -1.0)) for one, other in self.couplings
+        ]
+        terms += [((place, 1.0),) for place in fixed]
+        blocks = [np.zeros((0, starts[-1]))]
+        for term in terms:
+            block = np.zeros((self._rows(term[0][0]).size, starts[-1]))
+            for place, sign in term:
+                columns = first[place[0]] + self._rows(place)
+                block[np.arange(columns.size), columns] = sign
+            blocks.append(block)
+        return np.vstack(blocks)
+
+    def _hard(self, Lam: Array, Psi: Array, Gamma: Array) -> Array:
+        """Which eigenvectors of Gamma have no flexibility beside that of the modes."""
+        elastic = np.diag(Lam) > 0
+        by_modes = Psi[:, elastic] / np.sqrt(np.diag(Lam)[elastic])
+        whole = np.linalg.norm(by_modes @ by_modes.T + Gamma, 2) if Gamma.size else 0.0
+        return np.asarray(np.linalg.eigvalsh(Gamma) < FLEXIBILITY_RTOL * whole)
+
+    def _n_rigid(self, fixed: tuple[Place, ...]) -> int:
+        """Rigid motions that couplings and supports leave free."""
+        R = block_diag(*(b.rigid for b in self.bodies.values()))
+        gaps = self._differences(fixed) @ R
+        if not gaps.size:
+            return R.shape[1]
+        return R.shape[1] - int(np.linalg.matrix_rank(gaps, tol=1e-9 * np.linalg.norm(gaps, 2)))
+
+    def _rows(self, place: Place) -> Index:
+        body, interface = place
+        if body not in self.bodies:
+            raise ConfigError(f"no body {body!r}; the assembly has {sorted(self.bodies)}.")
+        if interface not in self.bodies[body].parts:
+            raise InterfaceError(
+                f"body {body!r} has no interface {interface!r}; it has "
+                f"{sorted(self.bodies[body].parts)}."
+            )
+        return self.bodies[body].parts[interface]

@@ -1,0 +1,353 @@
+"""Benchmarks: ratios measured in one run, so that the speed of the machine cancels.
+
+Each benchmark is a function that yields figures; ``BENCHMARKS`` lists them, ``rom bench`` runs
+them.
+"""
+
+import resource
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import pi
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import identity, kron
+
+from rom.bench.models import (
+    CRANK_SPEED,
+    KINDS,
+    STEEL,
+    TITANIUM,
+    bar,
+    chain_of,
+    geometry,
+    slider_crank,
+)
+from rom.errors import ConfigError
+from rom.model import FEModel
+from rom.reduction.bases.method import CraigBampton
+from rom.reduction.interfaces.connection import connect
+from rom.workflow import operators, reduce
+
+BED = TITANIUM.E / 0.010  # as soft as 10 mm of the same metal [N/m^3]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One measured number.
+
+    Attributes:
+        benchmark: name of the benchmark.
+        case: what was run.
+        quantity: what was measured.
+        value: the number.
+        unit: its unit; "" for a ratio.
+        aim: what we want it to be, in words; "" when it is for information.
+    """
+
+    benchmark: str
+    case: str
+    quantity: str
+    value: float
+    unit: str = ""
+    aim: str = ""
+
+
+def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
+    """A whole reduction against the bare MUMPS factorisation of the same matrix.
+
+    Two rbe2 interfaces and 20 fixed-interface modes of a beam of quadratic tetrahedra.
+
+    Args:
+        sizes: numbers of dofs aimed at; the meshes come close.
+    """
+    from rom.fe import model as read_model
+
+    for size in sizes:
+        model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
+        connection = connect(operators(model), model, KINDS)
+        bare = _seconds(connection.ops.hold, connection.boundary)
+        kept = {"method": CraigBampton(20), "interfaces": KINDS, "reference": "root"}
+        whole = _seconds(reduce, model, **kept, certify=False)
+        case = f"{model.n_dofs} dofs"
+        yield Figure("reduction", case, "factorisation of K_ii", bare, "s")
+        yield Figure("reduction", case, "whole reduction", whole, "s")
+        yield Figure("reduction", case, "whole over factorisation", whole / bare, "", "below 3")
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+        yield Figure("reduction", case, "peak memory of the process", peak, "GiB", "below 12")
+
+
+def large_reduction() -> Iterator[Figure]:
+    """The same at 300 000 dofs, in one process."""
+    yield from reduction((300e3,))
+
+
+def integrator(turns: int = 40) -> Iterator[Figure]:
+    """A slider-crank whose connecting rod has 20 fixed-interface modes, 1000 steps a turn.
+
+    Needs no FEniCSx: the rod is a straight bar.
+
+    Args:
+        turns: how long it runs; a first turn warms up and is not counted.
+    """
+    from rom.mbs.integrate.simulation import simulate
+
+    beam = bar((0.16, 0.02, 0.012), (16, 2, 1))
+    method, kinds = CraigBampton(20), dict(KINDS)
+    rod = reduce(beam, method=method, interfaces=kinds, reference=tuple(kinds), certify=False)
+    mechanism, turn = slider_crank(rod), 2 * pi / CRANK_SPEED
+    warm = simulate(mechanism, t_end=turn, dt=turn / 1000)
+    run = simulate(mechanism, t_end=(turns + 1) * turn, dt=turn / 1000, state=warm.final)
+    case = f"{rod.n_modes} elastic coordinates, {run.statistics['steps']} steps"
+    yield Figure("integrator", case, "steps per second", run.statistics["steps_per_second"], "1/s")
+    share = run.statistics["share_outside"]
+    yield Figure("integrator", case, "share outside compiled code", share, "", "below 0.1")
+
+
+def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]:
+    """Hanging chains of flexible links that swing from the horizontal: cost against length.
+
+    Each link has 8 fixed-interface modes and six coordinates of its ends. Needs no FEniCSx.
+
+    Args:
+        lengths: numbers of links.
+    """
+    from rom.mbs.integrate.simulation import simulate
+
+    straight = bar((0.25, 0.02, 0.012), (8, 1, 1))
+    link = reduce(
+        straight, method=CraigBampton(8), interfaces=dict(KINDS), reference="root", certify=False
+    )
+    dt, per_link = 1e-3, []
+    for n in lengths:
+        mechanism, steps = chain_of(link, n), max(10, min(200, 6400 // n))
+        warm = simulate(mechanism, t_end=2 * dt, dt=dt)
+        run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
+        case, speed = f"{n} links of {link.n_modes} modes", run.statistics["steps_per_second"]
+        per_link.append(1 / speed / n)
+        yield Figure("chain", case, "steps per second", speed, "1/s")
+    grown = per_link[-1] / per_link[len(per_link) // 2]
+    case = f"{lengths[-1]} against {lengths[len(lengths) // 2]} links"
+    yield Figure("chain", case, "time per step and link", grown, "", "below 2")
+
+
+def peers(meshes: tuple[float, ...] = (0.0047, 0.00257)) -> Iterator[Figure]:
+    """The same reduction by Exudyn and by SciPy with SuperLU and CHOLMOD; two processes too.
+
+    A connecting rod, two bores, 20 modes, one thread per process. The programs are installed from
+    the package index into an environment of their own, ``~/.cache/rom/peers``.
+
+    Args:
+        meshes: element sizes [m]; about 29 000 and 105 000 dofs.
+    """
+    from rom.bench.peers.compare import compared
+
+    for lc in meshes:
+        for case, quantity, value, unit, aim in compared(lc):
+            yield Figure("peers", case, quantity, value, unit, aim)
+
+
+def motion(
+    meshes: tuple[float, ...] = (0.024, 0.0045, 0.00255), links: tuple[int, ...] = (4, 16, 64)
+) -> Iterator[Figure]:
+    """The same motion by Exudyn: steps per second, and how far apart the paths are.
+
+    The same connecting rod of 14 modes, mechanism, generalised-alpha and step; one thread,
+    processor time.
+
+    Args:
+        meshes: element sizes [m] of the rod of a pendulum; about 5000, 31 000 and 103 000 dofs.
+            Slider-crank and chains have the first.
+        links: lengths of the chains.
+    """
+    from rom.bench.peers.motion import measured
+
+    for case, quantity, value, unit, aim in measured(meshes, links):
+        yield Figure("motion", case, quantity, value, unit, aim)
+
+
+def rods(lengths: tuple[int, ...] = (100, 1000, 10_000)) -> Iterator[Figure]:
+    """A swinging rod: cost against the number of segments; then a rotor, here and by Exudyn.
+
+    Args:
+        lengths: numbers of segments of the one rod, which hangs on a ball joint.
+    """
+    from rom.bench.peers.rods import measured
+    from rom.components.cosserat import body, straight
+    from rom.mbs.integrate.simulation import simulate
+    from rom.mbs.mechanism import Mechanism
+
+    dt, origin, per_segment = 1e-3, (0.0, 0.0, 0.0), []
+    for n in lengths:
+        mechanism, steps = Mechanism(), max(10, 40_000 // n)
+        section = {"stretch": 1e6, "bend": 100.0, "mass": 1.0, "inertia": 1e-3}
+        rod = mechanism.add_nonlinear("rod", body(straight(10.0, n, **section)))
+        mechanism.spherical("hook", mechanism.ground.marker(origin), rod.marker("start"))
+        warm = simulate(mechanism, t_end=2 * dt, dt=dt)
+        run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
+        speed, passes = run.statistics["steps_per_second"], run.statistics["iterations"] / steps
+        per_segment.append(1 / speed / n / passes)
+        yield Figure("rods", f"{n} segments", "steps per second", speed, "1/s")
+    case = f"{lengths[-1]} against {lengths[0]} segments"
+    grown = per_segment[-1] / per_segment[0]
+    yield Figure("rods", case, "time per segment and iteration", grown, "", "below 2")
+    for case, quantity, value, unit, aim in measured():
+        yield Figure("rods", case, quantity, value, unit, aim)
+
+
+def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:
+    """All dofs of the dovetail flanks of a compressor blade against polynomials on them.
+
+    With 20 fixed-interface modes. Errors are those of ten frequencies of the blade on an elastic
+    bed, against all dofs.
+
+    Args:
+        parameters: of the geometry; the defaults put 1700 dofs on the flanks.
+    """
+    from rom.fe import model as read_model
+
+    parameters = parameters or {"lc": 0.006, "lc_flank": 0.0025}
+    model = read_model(geometry("compressor_blade"), material=TITANIUM, parameters=parameters)
+    taken, f = {}, {}
+    for kind in ("polynomial:3", "polynomial:4", "full"):
+        kinds = dict.fromkeys(model.interface_names, kind)
+        body = reduce(model, method=CraigBampton(20), interfaces=kinds, certify=False)
+        taken[kind], f[kind] = body.provenance["seconds to reduce"], _on_a_bed(body, model)
+        columns = sum(len(marker.hold) for marker in body.markers.values())
+        case = f"{model.n_dofs} dofs, {kind}"
+        yield Figure("blade", case, "interface coordinates", columns)
+        yield Figure("blade", case, "whole reduction", taken[kind], "s")
+    for kind in ("polynomial:3", "polynomial:4"):
+        case, error = f"{model.n_dofs} dofs, {kind}", np.abs(f[kind] / f["full"] - 1).max()
+        yield Figure("blade", case, "worst of ten frequencies", error, "", "below 0.001")
+        yield Figure("blade", case, "times as fast", taken["full"] / taken[kind], "", "above 10")
+
+
+def film(solves: int = 400) -> Iterator[Figure]:
+    """Oil films of 120 x 8 cells under a journal on an orbit, each with all its derivatives.
+
+    Args:
+        solves: films around the orbit, each started from the one before.
+    """
+    from rom.components.journal_bearing import Groove, JournalBearing
+    from rom.components.journal_bearing import film as film_of
+
+    angle = np.linspace(0, 2 * pi, solves)
+    orbit = 1e-5 * np.stack([6 + np.cos(angle), 1.5 * np.sin(angle)], axis=1)
+    for law in ("reynolds", "jfo"):
+        bearing = JournalBearing(0.1, 0.05, 1e-4, [Groove(pi, 0.35)], cavitation=law, aligned=True)
+        now = film_of(bearing, orbit[0], speed=300.0, viscosity=0.03)
+        taken, changes = np.empty(solves), 0
+        for k, x in enumerate(orbit):
+            start = perf_counter()
+            now = film_of(bearing, x, speed=300.0, viscosity=0.03, warm=now.active)
+            taken[k], changes = perf_counter() - start, changes + now.iterations
+        case = f"120 x 8 cells, {law}"
+        each = 1e3 * float(np.median(taken))
+        yield Figure("film", case, "film and derivatives", each, "ms", "below 1")
+        yield Figure("film", case, "systems solved per film", changes / solves)
+
+
+def transmission(
+    speeds: int = 100, cells: tuple[int, int] = (120, 8), ross: bool = True
+) -> Iterator[Figure]:
+    """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
+
+    Args:
+        speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
+        cells: of each film.
+        ross: compare with ROSS, which is installed from the package index.
+    """
+    from rom.bench.peers.films import coefficients_compared, speeds_run_through
+
+    if ross:
+        for row in coefficients_compared():
+            yield Figure("transmission", *row)
+    for row in speeds_run_through(speeds, cells):
+        yield Figure("transmission", *row)
+
+
+def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
+    """Modes of a bladed disk: one reduced sector, one full sector, the whole wheel.
+
+    Both kinds of sectors give all nodal diameters; the whole wheel is asked for as many modes. Time
+    is that of the processor, the peak of the memory that of the process so far.
+
+    Args:
+        families: modes for each number of nodal diameters.
+        parameters: of the geometry.
+    """
+    from rom.bench.wheel import measured
+
+    for row in measured(geometry("bladed_disk"), families, parameters):
+        yield Figure("wheel", *row)
+
+
+def loops(*sizes: int) -> Iterator[Figure]:
+    """Stones in contact, a map of postures, a bar that flows: compiled loops on one processor.
+
+    Args:
+        sizes: as `rom.bench.loops.measured` takes them.
+    """
+    from rom.bench.loops import measured
+
+    for case, quantity, value, unit, aim in measured(*sizes):
+        yield Figure("loops", case, quantity, value, unit, aim)
+
+
+BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
+    "blade": blade,
+    "film": film,
+    "transmission": transmission,
+    "integrator": integrator,
+    "chain": chain,
+    "loops": loops,
+    "reduction": reduction,
+    "large-reduction": large_reduction,
+    "wheel": wheel,
+    "peers": peers,
+    "motion": motion,
+    "rods": rods,
+}
+
+
+def run(names: tuple[str, ...] = ()) -> Iterator[Figure]:
+    """Run benchmarks by name; all of them when no name is given.
+
+    Raises:
+        ConfigError: listing the names that exist.
+    """
+    for name in names or tuple(BENCHMARKS):
+        if name not in BENCHMARKS:
+            raise ConfigError(f"there is no benchmark {name!r}; there are {sorted(BENCHMARKS)}.")
+        yield from BENCHMARKS[name]()
+
+
+def _beam(n_dofs: float) -> dict[str, float]:
+    """A stocky beam 1 m x 0.2 m x 0.1 m with about that many dofs of quadratic tetrahedra.
+
+    The law was fitted to meshes of 32 000 to 282 000 dofs.
+    """
+    lc = 0.026 * (31572 / n_dofs) ** (1 / 2.685)
+    return {"L": 1.0, "b": 0.2, "h": 0.1, "lc": lc}
+
+
+def _on_a_bed(body: Any, model: FEModel) -> Any:
+    """Ten frequencies [Hz] with springs under all interfaces.
+
+    Orthonormal functions feel the bed each for itself, nodal dofs through the surface mass.
+    """
+    M, K = body.full_matrices()
+    for name, marker in body.markers.items():
+        H, S = marker.hold, model.interfaces[name].surface_mass
+        felt = kron(S, identity(3)) @ H if marker.kind == "full" else H
+        K = K + BED * H.T @ felt
+    return np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * pi)
+
+
+def _seconds(work: Callable[..., Any], *arguments: Any, **named: Any) -> float:
+    start = perf_counter()
+    work(*arguments, **named)
+    return perf_counter() - start

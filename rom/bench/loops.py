@@ -1,0 +1,65 @@
+"""Compiled loops of discrete components, in time of the processor."""
+
+from collections.abc import Callable, Iterator
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from rom.components.assumed_strain import Flight, Metal, fly, rectangle, sheet
+from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index
+from rom.components.linkages.two_dof_linkages import FiveBar, rod
+from rom.components.masonry.limits import arch
+from rom.components.masonry.stones import Motion, simulate
+
+COPPER = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
+BAR_LENGTH, BAR_RADIUS, IMPACT_SPEED = 32.4e-3, 3.2e-3, 227.0  # of Taylor's bar [m, m, m/s]
+
+
+def measured(
+    blocks: int = 40, steps: int = 10_000, cells: int = 400, height: int = 50
+) -> Iterator[tuple[str, str, float, str, str]]:
+    """Case, quantity, value, unit and aim: an arch, a map of isotropy, Taylor's bar.
+
+    Args:
+        blocks: voussoirs of the arch.
+        steps: that it makes, of 1 ms.
+        cells: of the map along each angle.
+        height: rows of squares in the bar.
+    """
+    stones = arch(blocks, 5.0, 0.6)
+    _still(stones, 10)  # compiles
+    taken, motion = _timed(_still, stones, steps)
+    case = f"arch of {blocks} blocks, {steps} steps"
+    yield case, "processor time", taken, "s", "below 30"
+    yield case, "fastest stone", float(np.abs(motion.v[-1]).max()), "m/s", "below 1e-06"
+    five = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
+    taken, index = _timed(lambda: isotropy_index(five.inertia(*angle_grid(cells))))
+    case = f"five-bar linkage, {cells} x {cells} postures"
+    yield case, "processor time", taken, "s", "below 2"
+    yield case, "best index of isotropy", float(index.max()), "", "above 0.999"
+    _struck(2, 1e-8)
+    taken, flight = _timed(_struck, height, 80e-6)
+    case = f"Taylor's bar, {flight.steps} steps"
+    yield case, "processor time", taken, "s", "below 20"
+    yield case, "radius of its foot", 1e3 * float(flight.x[-1, :, 0].max()), "mm", "below 7.1"
+
+
+def _still(stones: Any, steps: int) -> Motion:
+    return simulate(stones, t_end=1e-3 * steps, dt=1e-3, keep=0.97, save_every=steps)
+
+
+def _struck(height: int, t_end: float) -> Flight:
+    corners = [(0, 0), (BAR_RADIUS, 0), (BAR_RADIUS, BAR_LENGTH), (0, BAR_LENGTH)]
+    X, T = rectangle((5, height), corners)
+    body = sheet(X, T, element="F1", state="axisymmetric")
+    axis, wall = (2 * np.flatnonzero(X[:, k] < 1e-9) + k for k in (0, 1))
+    v = np.zeros_like(X)
+    v[:, 1] = -IMPACT_SPEED
+    return fly(body, COPPER, v, np.concatenate([axis, wall]), t_end)
+
+
+def _timed(work: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
+    start = process_time()
+    result = work(*arguments)
+    return process_time() - start, result

@@ -1,0 +1,125 @@
+"""What the benchmarks measure without FEniCSx: a bar of bricks, and mechanisms."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import bmat, csr_matrix, identity, kron
+
+from rom.errors import ConfigError
+from rom.model import FEModel, Interface, Material
+from rom.places import ABOVE
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+
+STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+TITANIUM = Material(E=114e9, nu=0.33, rho=4430.0)
+CRANK_SPEED = 300.0  # [rad/s]
+
+
+def bar(size: tuple[float, ...], cells: tuple[int, ...], material: Material = STEEL) -> FEModel:
+    """A straight bar of bricks with 27 nodes; its ends are the interfaces "root" and "tip".
+
+    On a grid, integrals over the bar are Kronecker products of integrals along its edges.
+    """
+    along = [_line(length, n) for length, n in zip(size, cells, strict=True)]
+    lines = [np.linspace(0.0, length, 2 * n + 1) for length, n in zip(size, cells, strict=True)]
+    points = np.array(np.meshgrid(*lines, indexing="ij")).reshape(3, -1).T
+
+    def integral(c: int | None = None, d: int | None = None) -> Any:
+        """Of N_i N_j, the first derived along axis c and the second along d."""
+        mx, my, mz = (line[int(a == c), int(a == d)] for a, line in enumerate(along))
+        return kron(kron(mx, my), mz)
+
+    lam, mu = material.stiffness[0, 1], material.stiffness[3, 3]
+    shear = mu * sum(integral(c, c) for c in range(3))
+    blocks = [
+        [lam * integral(c, d) + mu * integral(d, c) + (c == d) * shear for d in range(3)]
+        for c in range(3)
+    ]
+    node_by_node = np.arange(points.size).reshape(3, -1).T.ravel()
+    K = csr_matrix(bmat(blocks))[node_by_node][:, node_by_node]
+    M = material.rho * kron(integral(), identity(3))
+    face = kron(along[1][0, 0], along[2][0, 0])
+    numbers = np.arange(len(points)).reshape(-1, face.shape[0])
+    ends = {
+        name: Interface(name, nodes, points[nodes], csr_matrix(face), points[nodes].mean(axis=0))
+        for name, nodes in (("root", numbers[0]), ("tip", numbers[-1]))
+    }
+    return FEModel(0.5 * (K + K.T), csr_matrix(M), points, ends)
+
+
+def _line(length: float, cells: int) -> dict[tuple[int, int], Any]:
+    """Integrals of the products of quadratic shape functions and their derivatives on a line.
+
+    Returns:
+        {(p, q): (2 cells + 1,) * 2 sparse matrix of the integrals of N_i^(p) N_j^(q)}.
+    """
+    h = length / cells
+    slope = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
+    elements = {
+        (0, 0): np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) * h / 30,
+        (1, 0): slope,
+        (0, 1): slope.T,
+        (1, 1): np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / (3 * h),
+    }
+    whole = {key: np.zeros((2 * cells + 1,) * 2) for key in elements}
+    for key, element in elements.items():
+        for first in range(0, 2 * cells, 2):
+            whole[key][first : first + 3, first : first + 3] += element
+    return {key: csr_matrix(matrix) for key, matrix in whole.items()}
+
+
+def slider_crank(rod: Any) -> Any:
+    """Crank of 40 mm at full speed, the rod, and a slider of 0.3 kg."""
+    from rom.mbs.mechanism import Mechanism
+
+    mech, radius = Mechanism(gravity=(0, -9.81, 0)), 0.04
+    a, b = rod.marker("root").point, rod.marker("tip").point
+    moving = {"velocity": (0, CRANK_SPEED * radius, 0)}
+    crank = mech.add_rigid(
+        "crank",
+        mass=1.0,
+        inertia=(6e-4, 9e-4, 6e-4),
+        at=(0, 0, 0),
+        omega=(0, 0, CRANK_SPEED),
+        markers={"pin": (radius, 0, 0)},
+    )
+    bar = mech.add_flexible("rod", rod, at=np.array([radius, 0, 0]) - a, **moving)
+    end = np.array([radius, 0, 0]) + b - a
+    slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=end)
+    z, origin = (0, 0, 1), (0.0, 0.0, 0.0)
+    mech.revolute("main", mech.ground.marker(origin), crank.marker(origin), axis=z)
+    mech.revolute("crank pin", crank.marker("pin"), bar.marker("root"), axis=z)
+    mech.revolute("wrist pin", bar.marker("tip"), slider.marker(origin), axis=z)
+    mech.prismatic("guide", mech.ground.marker(end), slider.marker(origin), axis=(1, 0, 0))
+    mech.drive("motor", "main", lambda t: CRANK_SPEED * t)
+    return mech
+
+
+def chain_of(link: Any, n: int) -> Any:
+    """So many links in a row along x, hinged about z to each other and to the ground."""
+    from rom.mbs.mechanism import Mechanism
+
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    step = link.marker("tip").point - link.marker("root").point
+    before = mech.ground.marker((0.0, 0.0, 0.0))
+    for k in range(n):
+        part = mech.add_flexible(f"link {k}", link, at=k * step - link.marker("root").point)
+        mech.revolute(f"pin {k}", before, part.marker("root"), axis=(0, 0, 1))
+        before = part.marker("tip")
+    return mech
+
+
+def geometry(name: str) -> Path:
+    """Path of a geometry that comes with the source tree.
+
+    Raises:
+        ConfigError: if the package was installed without it.
+    """
+    path = ABOVE / "meshes" / f"{name}.geo"
+    if not path.is_file():
+        raise ConfigError(
+            f"{path} does not exist: benchmarks need the source tree.", hint="Clone the project."
+        )
+    return path

@@ -1,0 +1,147 @@
+"""Run-up of a rotor of three rods, here and by the geometrically exact beams of Exudyn.
+
+The same blades, numbers of segments and elements, law of the speed, step and spectral radius.
+Processor time, one thread, without set-up.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from rom import rotation
+from rom.bench.peers.compare import answer_of, interpreter
+from rom.child import scratch
+from rom.components.cosserat import Rod, body
+from rom.components.wind.wind_turbine import (
+    N_BLADES,
+    RATED,
+    VISCOSITY,
+    blade,
+    ramp,
+    run_up,
+    stations,
+)
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+from rom.model import Array
+
+SCRIPT = Path(__file__).with_name("beams.py")
+RISE_TIME, TIME_STEP, RHO_INF, N_SAMPLES = 20.0, 0.02, 0.9, 200
+N_REFERENCE_SEGMENTS = 192  # of the blade whose lag is the reference
+FROM_SECTION = [2, 0, 1]  # first axis along the beam there, third along the rod here
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def rotor(segments: int) -> Mechanism:
+    """A hub that is driven about the first axis of the world, and three blades."""
+    mech = Mechanism(gravity=ORIGIN)
+    hub = mech.add_rigid("hub", mass=1.0, inertia=(1.0, 1.0, 1.0), at=ORIGIN)
+    mech.revolute("shaft", mech.ground.marker(ORIGIN), hub.marker(ORIGIN), axis=(1, 0, 0))
+    speed, angle = ramp(RATED, RISE_TIME)
+    mech.drive("motor", "shaft", angle, rate=speed)
+    one = body(blade(segments, damped=True))
+    for k in range(N_BLADES):
+        turn = rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0])
+        part = mech.add_nonlinear(f"blade {k}", one, orientation=turn)
+        root = mech.design_point(part.marker("start"))
+        mech.fixed(f"root {k}", hub.marker(root), part.marker("start"))
+    return mech
+
+
+def by_rom(segments: int) -> tuple[float, Array]:
+    """Processor time of the steps [s], and (samples + 1, 3) deflection of the first tip."""
+    mech, every = rotor(segments), round(RISE_TIME / TIME_STEP) // N_SAMPLES
+    options: dict[str, Any] = {"dt": TIME_STEP, "rho_inf": RHO_INF, "save_every": every}
+    _timed(mech, every * TIME_STEP, options)  # reads the compiled kernels
+    setup, _ = _timed(mech, every * TIME_STEP, options)
+    seconds, sol = _timed(mech, RISE_TIME, options)
+    last = max(mech.nonlinear["blade 0"].parts, key=lambda part: float(part.at[2]))
+    seen = deflection(sol.position(last.name), last.at)
+    return (seconds - setup) * N_SAMPLES / (N_SAMPLES - 1), seen
+
+
+def _timed(mech: Mechanism, t_end: float, options: dict[str, Any]) -> tuple[float, Any]:
+    start = process_time()
+    sol = simulate(mech, t_end=t_end, **options)
+    return process_time() - start, sol
+
+
+def deflection(tip: Array, home: Array) -> Array:
+    """(k, 3) positions of a tip [m] as seen from the rotor, less its place at rest."""
+    t = np.linspace(0.0, RISE_TIME, len(tip))
+    angle = ramp(RATED, RISE_TIME)[1]
+    back = [rotation.matrix(rotation.exp([-angle(s), 0.0, 0.0])) for s in t]
+    return np.array([A @ x - home for A, x in zip(back, tip, strict=True)])
+
+
+def by_exudyn(segments: int) -> tuple[float, Array, str]:
+    """The same by Exudyn, and its version."""
+    described = {
+        "blades": [
+            beams(blade(segments, azimuth=2 * np.pi / N_BLADES * k)) for k in range(N_BLADES)
+        ],
+        "final": RATED, "rise": RISE_TIME, "t_end": RISE_TIME,
+        "steps": round(RISE_TIME / TIME_STEP), "samples": N_SAMPLES, "rho_inf": RHO_INF,
+    }  # fmt: skip
+    with scratch("peers") as folder:
+        file = folder / "rotor.json"
+        file.write_text(json.dumps(described))
+        found = answer_of([interpreter(), str(SCRIPT), str(file)])
+    tip = np.array(found["tips"])[:, 0]
+    return found["seconds"], deflection(tip, tip[0]), found["version"]
+
+
+def beams(rod: Rod) -> dict[str, Any]:
+    """Nodes and sections of a blade with elements between its vertices."""
+    table, eta = stations(), np.linspace(0.0, 1.0, len(rod.x))
+    twist = np.radians(np.interp(eta, table["eta"], table["twist_deg"]))
+    root = rotation.matrix(rod.p[0]) @ _about_third(twist[0])
+    frames = [(root @ _about_third(-a))[:, FROM_SECTION] for a in twist]
+    nodes = np.column_stack([rod.x, [rotation.quaternion(A) for A in frames]])
+    middle = (eta[1:] + eta[:-1]) / 2
+    named = ("EA", "kGA", "kGA", "GJ", "EI_edge", "EI_flap")
+    stiffness = np.column_stack([np.interp(middle, table["eta"], table[x]) for x in named])
+    viscosity = np.array(VISCOSITY)[[2, 0, 1, 5, 3, 4]]
+    J = rod.inertia[1:-1] / rod.h[:, None]
+    mass = np.array(_segment_masses(rod)) / rod.h
+    return {"nodes": nodes.tolist(), "length": rod.h.tolist(), "stiffness": stiffness.tolist(),
+            "damping": (viscosity * stiffness).tolist(), "inertia": J[:, FROM_SECTION].tolist(),
+            "mass": mass.tolist()}  # fmt: skip
+
+
+def _about_third(angle: float) -> Array:
+    return rotation.matrix(rotation.exp([0.0, 0.0, angle]))
+
+
+def _segment_masses(rod: Rod) -> list[float]:
+    """Masses of the segments [kg], halves of which are lumped at the vertices."""
+    masses: list[float] = []
+    for lumped in rod.mass[:-1]:
+        masses.append(2 * (lumped - (masses[-1] / 2 if masses else 0.0)))
+    return masses
+
+
+def measured(segments: int = 48) -> Iterator[tuple[str, str, float, str, str]]:
+    """Case, quantity, value, unit and aim of each figure; see `rom.bench.benchmarks.rods`."""
+    case = f"run-up, {N_BLADES} blades, {round(RISE_TIME / TIME_STEP)} steps"
+    fine = (
+        run_up(blade(N_REFERENCE_SEGMENTS, damped=True), t_end=RISE_TIME, dt=TIME_STEP)
+        .tip[:, 1]
+        .max()
+    )
+    theirs, beam, version = by_exudyn(segments)
+    yield case, f"Exudyn {version}, {segments} elements", theirs, "s of the processor", ""
+    error = abs(np.abs(beam[:, 1]).max() / fine - 1)
+    yield case, f"their lag against {N_REFERENCE_SEGMENTS} segments", error, "", ""
+    for n, aim in ((segments, "below 0.01"), (2 * segments, "below 0.002")):
+        seconds, tip = by_rom(n)
+        yield case, f"rom, {n} segments", seconds, "s of the processor", ""
+        yield case, f"Exudyn over rom, {n} segments", theirs / seconds, "", "above 1"
+        error = abs(np.abs(tip[:, 1]).max() / fine - 1)
+        yield case, f"lag of {n} against {N_REFERENCE_SEGMENTS} segments", error, "", aim
+    apart = np.abs(tip - beam).max() / np.abs(tip).max()
+    yield case, "difference of the tips", apart, "of the deflection", "below 0.01"

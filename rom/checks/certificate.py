@@ -1,0 +1,229 @@
+"""The certificate: what was measured to show that the reduced body stands for the full model."""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom.body.flexible import FlexibleBody
+from rom.body.projection import Elastic
+from rom.body.reference import rigid_mass
+from rom.eigen.verbs import Held, Operators, given_rigid_motions, mac, residual_errors
+from rom.model import Array, Basis, Report, Row
+from rom.reduction.interfaces.records import Connection
+from rom.rows import FREQUENCY_RTOL, frequency_rows, row
+
+N_COMPARED = 6  # elastic modes compared in each support
+# Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
+# rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
+ASYMMETRY_RTOL = 1e-6
+MIN_JUDGED_ERROR = 1e-6  # frequency error above which the estimate is compared with it
+MAX_ERROR_RATIO = 2.0  # frequency error over its estimate
+ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
+CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
+
+
+def certify_body(
+    connection: Connection, ops: Operators, body: FlexibleBody, basis: Basis, elastic: Elastic
+) -> tuple[Report, dict[str, Any]]:
+    """Compare a reduced body with the full model it came from.
+
+    Args:
+        connection: the full model in interface coordinates, so that like is compared with like.
+        ops: the full model in nodal dofs.
+        body: the reduced body.
+        basis: its basis in interface coordinates.
+        elastic: the elastic part of the basis.
+
+    Returns:
+        The report, and a table {support: {"reduced": [Hz], "estimated": [relative errors],
+        "full": [Hz], "mac": []}}; the last two are empty when full modes cannot be afforded, and
+        the estimates when the method has none.
+    """
+    rows: list[Row] = []
+    comparison = {}
+    statics = body.has_static_shapes
+    supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
+    inner = connection.ops.hold(connection.boundary) if statics else None
+    for fixed in supports:
+        table = compared(connection, ops, body, (basis, inner), fixed)
+        if table["reduced"]:
+            comparison[" + ".join(fixed) + " held" if fixed else "free"] = table
+    if not connection.ops.affordable:
+        rows.append(Row("dofs; full modes are too dear, errors estimated", ops.n, "--", True))
+    for support, table in comparison.items():
+        rows += frequency_rows(support, table) if table["full"] else []
+        rows += _estimate_rows(support, table)
+    rows += _static_row(connection, body) if statics else []
+    rows += rigid_rows(ops, body, elastic)
+    rows += _matrix_rows(connection, basis, body)
+    rows += _effective_mass(body, tuple(connection.parts)) if statics else []
+    return Report(f"certificate of {body.name}", tuple(rows)), comparison
+
+
+def compared(
+    connection: Connection,
+    ops: Operators,
+    body: FlexibleBody,
+    reduction: tuple[Basis, Held | None],
+    fixed: tuple[str, ...],
+) -> dict[str, list[float]]:
+    """Frequencies of both models in one support, their errors, and the agreement of shapes."""
+    omega_r = body.modes(fixed=fixed)[0]
+    n_rigid = int(np.count_nonzero(omega_r == 0.0))
+    n = min(N_COMPARED, omega_r.size - n_rigid)
+    table: dict[str, list[float]] = {"full": [], "reduced": [], "mac": [], "estimated": []}
+    if n <= 0 or n_rigid not in (0, 6):
+        return table
+    # the reduced shapes again, as combinations of the columns of the basis
+    basis, inner = reduction
+    shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)
+    table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
+    if inner and not any(label.startswith("enhanced") for label in basis.labels):
+        # constraint modes leave no residual on interfaces: one inverse serves every support
+        found = residual_errors(connection.ops, inner, shapes[:, n_rigid:])
+        table["estimated"] = found.tolist()
+    if connection.ops.affordable:
+        omega, Phi = connection.ops.modes(connection.held(fixed), n + n_rigid)
+        omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
+        agreement = mac(ops, Phi, connection.ops.expand(shapes))
+        table["full"] = (omega / (2 * np.pi)).tolist()
+        table["mac"] = _cluster_mac(agreement, omega, omega_r[: n + n_rigid]).tolist()
+    return table
+
+
+def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
+    """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
+    ops = connection.ops
+    drop = [connection.parts[name] for name in fixed]
+    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
+    Psi = basis.Psi[:, keep]
+    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+    scale = 1 / np.sqrt(np.diag(M))
+    K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
+    _, V = eigh(K, M, subset_by_index=(0, n - 1))
+    return Psi @ (scale[:, None] * V)
+
+
+def _cluster_mac(table: Array, full: Array, reduced: Array) -> Array:
+    """For each full mode the part of it spanned by its best partner and that one's neighbours.
+
+    Modes of nearly one frequency may rotate among themselves; they count together.
+    """
+    best = reduced[np.argmax(table, axis=1)]
+    near = np.abs(reduced[None, :] - best[:, None]) <= CLUSTER_RTOL * best[:, None]
+    return np.minimum((table * near).sum(axis=1), 1.0)
+
+
+def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
+    """The estimates; against the truth where that is known and more than round-off."""
+    if not table["estimated"]:
+        return []
+    estimate = np.array(table["estimated"])
+    worst = row(
+        f"{support}: estimated error of {estimate.size} frequencies",
+        estimate.max(),
+        FREQUENCY_RTOL,
+    )
+    if not table["full"]:
+        return [worst]
+    error = np.array(table["reduced"]) / np.array(table["full"]) - 1
+    ratio = (error / np.maximum(estimate, MIN_JUDGED_ERROR)).max()
+    return [worst, row(f"{support}: largest error over its estimate", ratio, MAX_ERROR_RATIO)]
+
+
+def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:
+    """Deflection under unit loads on the other interfaces, the first one held; exact for CB."""
+    names = tuple(connection.parts)
+    if len(names) < 2:
+        return []
+    ops, first = connection.ops, names[0]
+    loaded = connection.held(names[1:])
+    held = ops.hold(connection.held((first,)))
+    F = np.zeros((ops.n_local, loaded.size))
+    mine = (loaded >= ops.first) & (loaded < ops.first + ops.n_local)
+    F[loaded[mine] - ops.first, np.flatnonzero(mine)] = 1.0
+    full = ops.rows(held(F), loaded)
+    H, G = body.marker(first).hold, np.vstack([body.marker(name).hold for name in names[1:]])
+    rigid = np.linalg.lstsq(H[:, :6], -H[:, 6:], rcond=None)[0]
+    motion = G[:, :6] @ rigid + G[:, 6:]
+    if np.abs(H[:, :6] @ rigid + H[:, 6:]).max() > 1e-9 * np.abs(H[:, 6:]).max():
+        return []  # the first interface deforms: its frame does not follow a rigid motion
+    reduced = motion @ np.linalg.solve(body.K, motion.T)
+    diagonal = np.sqrt(np.diag(full))
+    error = np.abs((reduced - full) / np.outer(diagonal, diagonal)).max()
+    return [row(f"{first} held: static flexibility of the interfaces", error, 1e-6)]
+
+
+def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
+    """Rigid motions of the body against those of the full model."""
+    R = given_rigid_motions(ops)
+    KR, MR = ops.apply_K(R), ops.apply_M(R)
+    full = ops.gram(R, MR)
+    size = np.r_[np.ones(3), np.full(3, body.size)]
+    weight = body.mass * np.outer(size, size)
+    stiffness = body.omega[0] ** 2 if body.omega.size else 1.0
+    return [
+        row(
+            "mass, centre, inertia: body against full",
+            np.abs((rigid_mass(body) - full) / weight).max(),
+            1e-9,
+        ),
+        row("rigid motions inside the basis", elastic.residual, 1e-8),
+        row(
+            "energy of rigid motions, over the first mode",
+            np.abs(ops.gram(R, KR) / weight).max() / stiffness,
+            1e-6,
+        ),
+    ]
+
+
+def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> list[Row]:
+    ops = connection.ops
+    M = ops.gram(basis.Psi, ops.apply_M(basis.Psi))
+    K = ops.gram(basis.Psi, ops.apply_K(basis.Psi))
+    quotient = np.diag(K) / np.diag(M)
+    stiff = quotient > ROUND_OFF * quotient.max()  # a rigid column has no stiffness of its own
+    asymmetry = max(_asymmetry(K[stiff][:, stiff]), _asymmetry(M))
+    scale = 1 / np.sqrt(np.diag(M))
+    lam = np.linalg.eigvalsh(scale[:, None] * (0.5 * (M + M.T)) * scale)
+    return [
+        *_coupling_row(connection, basis, K, stiff),
+        row("asymmetry of projected K and M", asymmetry, ASYMMETRY_RTOL),
+        row("smallest eigenvalue of the scaled mass", lam[0], 1e-13, above=True),
+        row("condition of the scaled mass", lam[-1] / max(lam[0], 1e-300), 1e13),
+        row("mass-normalised shapes", np.abs(body.M - np.eye(body.n_modes)).max(initial=0.0), 1e-8),
+        row("lowest elastic frequency [Hz]", body.omega[0] / (2 * np.pi), 0.0, above=True),
+    ]
+
+
+def _coupling_row(connection: Connection, basis: Basis, K: Array, stiff: Any) -> list[Row]:
+    """Constraint modes and fixed-interface modes do not couple in K; other modes do.
+
+    Constraint modes of a single interface are rigid motions, whose stiffness is round-off.
+    """
+    normal = [label.startswith("fixed-interface") for label in basis.labels]
+    n_b = normal.index(True) if any(normal) else 0
+    if not any(normal) or not all(normal[n_b:]) or n_b > connection.boundary.size:
+        return []
+    b, size = np.flatnonzero(stiff[:n_b]), np.sqrt(np.abs(np.diag(K)))
+    coupling = np.abs(K[b, n_b:] / np.outer(size[b], size[n_b:])).max(initial=0.0)
+    return [row("constraint against normal modes in K", coupling, 1e-8)]
+
+
+def _asymmetry(A: Array) -> float:
+    scale = np.sqrt(np.abs(np.diag(A)))
+    scale[scale == 0] = 1.0
+    return float(np.abs((A - A.T) / np.outer(scale, scale)).max())
+
+
+def _effective_mass(body: FlexibleBody, names: tuple[str, ...]) -> list[Row]:
+    """Share of the mass that the kept modes carry when the supports shake; for information."""
+    supports = {f"{names[0]} held": names[:1], "all interfaces held": names}
+    return [
+        Row(f"{support}: effective mass along {axis}", float(value), "information", True)
+        for support, fixed in supports.items()
+        for axis, value in zip(
+            "xyz", body.effective_mass(fixed=fixed)[:, :3].sum(axis=0) / body.mass, strict=True
+        )
+    ]

@@ -1,0 +1,61 @@
+"""Natural frequencies of the full finite element model, free or held at interfaces."""
+
+import argparse
+
+from rom.cli.answer import Answer, table
+from rom.cli.described import component, described
+from rom.cli.matrices import add_matrices
+from rom.cli.model import read_model
+from rom.cli.options import add_geometry, add_interfaces, add_material, count, names, unique
+
+SUMMARY = "natural frequencies of the full model"
+EXAMPLES = """\
+  rom modes meshes/beam.geo --E 210e9 --nu 0.3 --rho 7850 -n 12
+  rom modes meshes/beam.geo --E 210e9 --nu 0.3 --rho 7850 -n 6 --fixed root
+  mpirun -n 2 rom modes part.msh --E 70e9 --nu 0.33 --rho 2700 --json
+  rom modes meshes/connecting_rod.toml --fixed pin_a   # interfaces as in its body
+  rom modes rod.sti --mass rod.mas --nodes rod.inp --fixed pin_a
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_geometry(parser)
+    add_material(parser)
+    add_interfaces(parser)
+    add_matrices(parser)
+    parser.add_argument(
+        "-n", "--number", type=count, default=12, help="number of modes; rigid ones count too"
+    )
+    parser.add_argument(
+        "--fixed", metavar="NAME,...", type=names, default=(), help="interfaces held"
+    )
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Assemble and solve."""
+    from rom.workflow import modes
+
+    if described(args):
+        part = component(args)
+        kinds, model = part.kinds, part.model()
+        number, fixed = (part.values["modes"][key] for key in ("number", "fixed"))
+    else:
+        kinds, model = unique(args.interface, "-i"), read_model(args)
+        number, fixed = args.number, args.fixed
+    found = modes(model, number, fixed=fixed, interfaces=kinds or None)
+    data = {
+        "file": str(args.file),
+        "n_dofs": model.n_dofs,
+        "mass": model.mass(),
+        "fixed": list(fixed),
+        "frequencies": found.frequencies.tolist(),
+        "residual": found.residual.tolist(),
+    }
+    rows = [
+        (str(k + 1), f"{f:.6g}", f"{r:.1e}")
+        for k, (f, r) in enumerate(zip(found.frequencies, found.residual, strict=True))
+    ]
+    support = f"held at {', '.join(fixed)}" if fixed else "free"
+    head = f"{args.file}: {model.n_dofs} dofs, {data['mass']:.6g} kg, {support}"
+    return Answer(data, head + "\n\n" + table(("mode", "frequency [Hz]", "residual"), rows))

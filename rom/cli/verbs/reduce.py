@@ -1,0 +1,163 @@
+"""Reduce a finite element model to a flexible body and compare the two.
+
+The body is written even when a quality figure fails, with that verdict inside; the exit code is
+then 5.
+"""
+
+import argparse
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.answer import Answer, failures, report_data
+from rom.cli.described import component, described
+from rom.cli.matrices import add_matrices, solid_options
+from rom.cli.method import add_method, method
+from rom.cli.model import read_model
+from rom.cli.options import (
+    OUTPUT,
+    add_geometry,
+    add_interfaces,
+    add_material,
+    names,
+    number,
+    require,
+    unique,
+)
+from rom.cli.output import add_force, checked, files_in
+from rom.errors import ConfigError
+from rom.names import check_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rom.body.damping import ModalDamping, Rayleigh
+    from rom.body.flexible import FlexibleBody
+
+SUMMARY = "reduce a model to a flexible body, with its certificate"
+EXAMPLES = """\
+  rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
+      -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz
+  rom reduce meshes/beam.geo --E 70e9 --nu 0.33 --rho 2700 -i root=rbe2 -i tip=rbe3 \\
+      --f-max 3e3 --reference root,tip --damping-ratio 0.01 -o beam.rom.npz
+  rom reduce rod.op4:KAA --mass rod.op4:MAA --nodes rod.bdf --units mm-t-s \\
+      --set pin_a=11-14 --set pin_b=81-84 -i pin_a=rbe2 -i pin_b=rbe2 -o rod.rom.npz
+  rom reduce meshes/connecting_rod.toml -m 30 -o rod.rom.npz   # options go before the file
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_geometry(parser)
+    add_material(parser)
+    add_interfaces(parser)
+    add_matrices(parser)
+    add_method(parser)
+    parser.add_argument(
+        "--reference",
+        metavar="FRAME",
+        type=names,
+        default=("mean-axis",),
+        help="frame: mean-axis, an interface, or two interfaces A,B (default mean-axis)",
+    )
+    damping = parser.add_mutually_exclusive_group()
+    damping.add_argument("--damping-ratio", type=number, help="of every mode, e.g. 0.01")
+    damping.add_argument("--rayleigh", metavar="ALPHA,BETA", help="D = ALPHA M + BETA K [1/s], [s]")
+    parser.add_argument(
+        "--stiffening",
+        action="store_true",
+        help="add the geometric stiffness of rotation and of loads on the interfaces",
+    )
+    parser.add_argument("--name", help="name of the body (default: that of the file)")
+    parser.add_argument("--stress", action="store_true", help="make surface stress recoverable")
+    parser.add_argument("--no-certificate", action="store_true", help="skip the comparison")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="e.g. rod.rom.npz; may be said by a .toml file"
+    )
+    add_force(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Assemble, reduce, compare; the file is written at the end."""
+    from rom.io.native import save
+
+    body, output = _described(args) if described(args) else _by_options(args)
+    failed = failures(body.certificate) if body.certificate else ()
+    return Answer(_data(body, output), _text(body, output), lambda: save(body, output), failed)
+
+
+def _checked(
+    args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
+) -> Path:
+    """The file to write, before anything is computed for it."""
+    require({OUTPUT: output})
+    check_name(name, "a body")
+    return checked(args, output, "npz", inputs=inputs)
+
+
+def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
+    part = component(args)
+    output = _checked(args, args.output or part.output, part.name, files_in(part.values))
+    return part.body(), output
+
+
+def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
+    from rom.workflow import reduce
+
+    needed = solid_options(args) | {"-i/--interface": args.interface, OUTPUT: args.output}
+    require(needed, "A body needs an interface, for example -i pin_a=rbe2.")
+    name = args.name or args.file.stem
+    output = _checked(args, args.output, name)
+    chosen, damping = method(args), _damping(args)
+    body = reduce(
+        read_model(args),
+        method=chosen,
+        interfaces=unique(args.interface, "-i"),
+        reference=args.reference[0] if len(args.reference) == 1 else args.reference,
+        damping=damping,
+        name=name,
+        stress=args.stress,
+        stiffening=args.stiffening,
+        certify=not args.no_certificate,
+    )
+    return body, output
+
+
+def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
+    from rom.body.damping import ModalDamping, Rayleigh
+
+    if args.damping_ratio is not None:
+        return ModalDamping(args.damping_ratio)
+    if args.rayleigh is None:
+        return None
+    try:
+        alpha, beta = map(float, args.rayleigh.split(","))
+    except ValueError:
+        raise ConfigError(
+            f"--rayleigh {args.rayleigh} is not two numbers, as in 0.1,1e-6."
+        ) from None
+    return Rayleigh(alpha, beta)
+
+
+def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:
+    return {
+        "output": str(output),
+        "name": body.name,
+        "mass": body.mass,
+        "n_modes": body.n_modes,
+        "reference": body.reference,
+        "interfaces": list(body.interface_names),
+        "geometric stiffness": list(body.K_geo),
+        "frequencies": (body.omega / (2 * pi)).tolist(),
+        "certificate": None if body.certificate is None else report_data(body.certificate),
+        "provenance": body.provenance,
+    }
+
+
+def _text(body: "FlexibleBody", output: Path) -> str:
+    full = body.provenance["reduction"]["full dofs"]
+    head = (
+        f"{output}: body {body.name}, {body.mass:.6g} kg, {full} dofs reduced to "
+        f"6 + {body.n_modes}, frame {body.reference}"
+    )
+    return head if body.certificate is None else f"{head}\n\n{body.certificate}"

@@ -1,0 +1,50 @@
+"""Write a report of a body, a component, a mechanism or a finished run: one HTML file.
+
+Pictures are inside; the file opens without network. Where no picture can be drawn it says why.
+"""
+
+import argparse
+from pathlib import Path
+from shlex import quote
+
+from rom.cli.answer import Answer
+from rom.cli.options import add_meshing, meshing
+from rom.cli.output import add_force, checked
+
+SUMMARY = "write a report as one HTML file"
+EXAMPLES = """\
+  rom report rod.rom.npz -o rod.html
+  rom report meshes/connecting_rod.toml -o rod.html   # meshes and reduces it first
+  rom report demos/slider_crank.toml -o crank.html    # as it starts
+  rom report out -o motion.html                       # what rom simulate left
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    parser.add_argument("file", type=Path, help="body file, .toml file, or folder of a run")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="report, .html")
+    add_force(parser)
+    add_meshing(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Describe; the file is written at the end."""
+    from rom import __version__
+    from rom.errors import ConfigError
+    from rom.report.html import write_report
+    from rom.report.pages import describe
+
+    if args.output.suffix.lower() != ".html":
+        raise ConfigError(f"{args.output}: a report is written as .html.")
+    checked(args, args.output)
+    command = f"rom {' '.join(map(quote, args.argv))}"
+    title, sections = describe(args.file, command=command, version=__version__, **meshing(args))
+    data = {
+        "file": str(args.file),
+        "output": str(args.output),
+        "title": title,
+        "sections": list(sections),
+    }
+    text = f"{args.output}: {title}"
+    return Answer(data, text, lambda: write_report(sections, args.output, title=title))

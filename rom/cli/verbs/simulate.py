@@ -1,0 +1,247 @@
+"""Move the mechanism of a .toml file; or let a body swing about one of its interfaces.
+
+The motion is written as a table, with pictures and films when they are asked for.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.answer import Answer, failures, report_data
+from rom.cli.described import described, mechanism
+from rom.cli.options import OUTPUT, add_meshing, positive, require, vector
+from rom.cli.output import add_force, checked, claim, files_in
+from rom.cli.ranks import ranks
+from rom.errors import ConfigError, RomError
+from rom.names import inside
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+    from rom.mbs.integrate.keeping import Keeping
+    from rom.model import Report
+
+PARTS_FOLDER = "motion.parts"  # where the motion is kept while the run lasts
+SUMMARY = "move a mechanism, or let a body swing as a pendulum"
+EXAMPLES = """\
+  rom simulate demos/slider_crank.toml -o out/
+  rom simulate demos/slider_crank.toml --t-end 0.01 --film glb -o out/
+  rom simulate rod.rom.npz --hinge pin_a --gravity 0,-9.81,0 --t-end 1 --dt 1e-3 -o out/
+  rom simulate rod.rom.npz --hinge pin_a --axis=-1,0,0 --t-end 0.2 --dt 1e-4 -o out/
+  rom simulate rod.rom.npz --hinge pin_a --t-end 1 --dt 1e-3 --film glb --history h5 -o out/
+  rom simulate demos/slider_crank.toml -o out/ --resume   # after anything that ended it
+While a long run lasts, its motion is kept in motion.parts in the output folder. Add --resume to the
+command of a run that was ended, by Ctrl-C, an error or a kill, to go on to the same bits; with a
+--t-end before the time it had reached, the files of the motion up to there are written.
+Mechanisms of several bodies are described in a file, or built in Python, see demos/.
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    parser.add_argument("file", type=Path, help="mechanism, .toml, or body, e.g. rod.rom.npz")
+    parser.add_argument("--hinge", help="interface the body hangs on")
+    parser.add_argument("--axis", type=vector, default=(0.0, 0.0, 1.0), help="default 0,0,1")
+    parser.add_argument(
+        "--gravity", type=vector, default=(0.0, -9.81, 0.0), help="[m/s^2], default 0,-9.81,0"
+    )
+    parser.add_argument("--t-end", type=positive, help="duration [s]")
+    parser.add_argument("--dt", type=positive, help="time step [s]")
+    parser.add_argument(
+        "--film", choices=("glb", "vtkhdf"), help="film in space: for browsers, or for ParaView"
+    )
+    parser.add_argument(
+        "--history", choices=("csv", "h5"), help="every marker, reaction and energy, too"
+    )
+    parser.add_argument("-o", "--output", type=Path, help="folder, made if missing")
+    add_force(parser)
+    add_meshing(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the run that ended early in this folder"
+    )
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Load, simulate, audit; the table is written at the end."""
+    return _mechanism(args) if described(args) else _pendulum(args)
+
+
+def _mechanism(args: argparse.Namespace) -> Answer:
+    from rom import __version__
+    from rom.report.run import Run, made_from, paths_of
+    from rom.report.run import run as move
+
+    require({OUTPUT: args.output})
+    file = mechanism(args)
+    for path in paths_of(file, claim(args)):
+        checked(args, path, inputs=files_in(file.values))
+    keep = _keeping(args, made_from(file))
+    origin = {"command": _command(args), "version": __version__}
+
+    def rescue(solution: Any, audit: "Report") -> Path:
+        motion, *_, record = Run(file, solution, audit, **origin).paths(args.output)
+        Run(file, solution, audit, **origin).write_motion([motion, record])
+        return motion
+
+    with _rescuing(args, keep, rescue):
+        done = move(file, **origin, progress=_aloud(args), keep=keep)
+
+    def write() -> None:
+        done.write(args.output)
+        _finish(keep)
+
+    return _answer(done.solution, done.audit, done.paths(args.output), write)
+
+
+def _aloud(args: argparse.Namespace) -> bool:
+    return ranks()[0] == 0 and not args.quiet
+
+
+def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | None":
+    """The folder of the motion under way; one rank writes it."""
+    from rom.mbs.integrate.keeping import Keeping
+
+    keep = Keeping(args.output / PARTS_FOLDER, args.resume, made_from)
+    if args.resume and not keep.state.exists() and (args.output / "run.json").exists():
+        raise ConfigError(
+            f"there is nothing to resume: the run in {args.output} came to its end.",
+            hint="Leave out --resume to run it anew.",
+        )
+    keep.check()
+    return keep if ranks()[0] == 0 else None
+
+
+def _finish(keep: "Keeping | None") -> None:
+    if keep is not None:
+        keep.remove()
+
+
+@contextmanager
+def _rescuing(
+    args: argparse.Namespace, keep: "Keeping | None", write: Callable[[Any, "Report"], Path]
+) -> Iterator[None]:
+    """Write the motion up to whatever ends it inside, and say how to go on."""
+    try:
+        yield
+    except BaseException as error:
+        solution = getattr(error, "solution", None)
+        if solution is None or keep is None:
+            raise
+        from rom.mbs.parts.foreign import KEPT_HINT
+        from rom.mbs.results.audit import audit
+
+        path = write(solution, audit(solution))
+        if isinstance(error, RomError):
+            hints = [
+                error.hint.replace(KEPT_HINT, "").strip(),
+                f"The motion up to there is in {path}.",
+            ]
+            if keep.state.exists():
+                resume = "" if args.resume else " --resume"
+                hints.append(f"To go on: {_command(args)}{resume}.")
+            error.hint = " ".join(hint for hint in hints if hint)
+        raise
+
+
+def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
+    data = {
+        "output": str(paths[0]),
+        "also": [str(also) for also in paths[1:]],
+        "steps": len(solution.t) - 1,
+        "status": solution.status,
+        "audit": report_data(audit),
+    }
+    text = f"{paths[0]}: {data['steps']} steps. {solution.status}\n\n{audit}"
+    return Answer(data, text, write, failures(audit))
+
+
+def _pendulum(args: argparse.Namespace) -> Answer:
+    from rom import __version__
+    from rom.io.native import load
+    from rom.report.run import RECORD_FILE, Record, file_digest
+
+    needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
+    require(needed | {OUTPUT: args.output})
+    if args.dt > args.t_end:
+        raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
+    if not any(args.axis):
+        raise ConfigError("--axis 0,0,0 has no direction.")
+    folder = claim(args)
+    body = load(args.file)
+    body.marker(args.hinge)
+    path = inside(folder, body.name, ".csv")
+    films = [path.with_suffix(f".{args.film}")] if args.film else []
+    tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
+    paths = [checked(args, each) for each in (path, *films, *tables, folder / RECORD_FILE)]
+    hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
+    made_from = {f"--{name}": repr(value) for name, value in hung.items()}
+    keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
+    record = Record(body.name, _command(args), __version__)
+
+    def rescue(solution: Any, audit: "Report") -> Path:
+        _write_motion(path, tables, body, solution)
+        record.write([path, *tables, args.output / RECORD_FILE], solution, audit)
+        return path
+
+    with _rescuing(args, keep, rescue):
+        solution, audit = _swing(body, args, keep)
+
+    def write() -> None:
+        _write_motion(path, tables, body, solution)
+        record.write(paths, solution, audit)
+        _write_films(films, solution)
+        _finish(keep)
+
+    return _answer(solution, audit, paths, write)
+
+
+def _command(args: argparse.Namespace) -> str:
+    return f"rom {' '.join(map(quote, args.argv))}"
+
+
+def _swing(
+    body: "FlexibleBody", args: argparse.Namespace, keep: "Keeping | None"
+) -> tuple[Any, Any]:
+    from rom.mbs.integrate.simulation import simulate
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.audit import audit
+
+    mechanism = Mechanism(gravity=args.gravity)
+    part = mechanism.add_flexible(body.name, body, at=(0.0, 0.0, 0.0))
+    hinge = mechanism.ground.marker(tuple(body.marker(args.hinge).point))
+    mechanism.revolute("hinge", hinge, part.marker(args.hinge), axis=args.axis)
+    steps = {"t_end": args.t_end, "dt": args.dt}
+    solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
+    return solution, audit(solution)
+
+
+def _write_motion(path: Path, tables: list[Path], body: "FlexibleBody", solution: Any) -> None:
+    from rom.io.history import write_history
+
+    _write(path, body, solution)
+    for table in tables:
+        write_history(solution, table)
+
+
+def _write_films(films: list[Path], solution: Any) -> None:
+    from rom.view.scenes.animation_files import write_animation
+
+    for film in films:
+        write_animation(solution, film)
+
+
+def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:
+    """One line per time: positions of the interfaces [m], then elastic coordinates."""
+    import numpy as np
+
+    from rom.io.files import write_whole
+    from rom.io.history import table
+
+    places = {name: solution.position(body.name, name) for name in body.interface_names}
+    names = ["t [s]", *(f"{name} {axis} [m]" for name in places for axis in "xyz")]
+    names += [f"q{k + 1}" for k in range(body.n_modes)]
+    values = np.column_stack([solution.t, *places.values(), solution.elastic(body.name)])
+    content = table(names, values, "%.10g")
+    write_whole(path, lambda file: file.write(content))

@@ -1,0 +1,241 @@
+"""Mesh a part, reduce it, hang it on one of its faces and show how it swings, in one go.
+
+The part is released at rest, as it is drawn, with gravity across it. Of its certificate the rows
+without support do not count here, for the hinge holds it. For everything else there are the single
+verbs: mesh, reduce, check, simulate, view.
+"""
+
+import argparse
+import logging
+import os
+import sys
+from dataclasses import dataclass
+from math import pi, sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.answer import Answer, failures, report_data
+from rom.cli.options import add_geometry, count, positive, reading, vector
+from rom.cli.output import add_force, checked, claim
+from rom.errors import ConfigError
+from rom.names import inside
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+
+log = logging.getLogger("rom")
+SUMMARY = "show a part of yours, reduced and swinging, in one go"
+EXAMPLES = """\
+  rom swing part.step --hinge 3 -o out   # the faces: rom mesh with --faces
+  rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
+"""
+MATERIALS = {  # E [Pa], nu, rho [kg/m^3]; handbook values
+    "aluminium": (70e9, 0.33, 2700.0),
+    "nylon": (2.8e9, 0.4, 1140.0),
+    "steel": (210e9, 0.3, 7850.0),
+    "titanium": (114e9, 0.34, 4430.0),
+}
+N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
+FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
+DRAWN_DEFORMATION_RATIO = 0.05  # largest deformation as drawn, of the body's size
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_geometry(parser)
+    parser.add_argument(
+        "--hinge", metavar="FACE", required=True,
+        help="face it hangs on: a name, or in a .step file a number or a point X,Y,Z [m]",
+    )  # fmt: skip
+    parser.add_argument(
+        "--material", choices=sorted(MATERIALS), default="steel", help="default steel"
+    )
+    parser.add_argument("-m", "--modes", type=count, default=20, help="modes kept (default 20)")
+    parser.add_argument(
+        "--gravity", type=vector, help="[m/s^2], default 9.81 along the axis most across the part"
+    )
+    parser.add_argument("--t-end", type=positive, help="duration [s], default one swing")
+    parser.add_argument(
+        "--magnify", type=positive, help="of deformations, default so that they are seen"
+    )
+    parser.add_argument("--film", action="store_true", help="a film, too; half a second a picture")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
+    add_force(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Mesh, reduce, simulate; files are written at the end."""
+    files = _files(args)
+    hinge, faces = hinge_of(args.hinge)
+    body = _reduced(args, hinge, faces)
+    swing = planned(body, hinge, args.gravity, args.t_end)
+    log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
+    if not compiled_before():
+        log.info("move it without compiling first, which takes some seconds")
+        leave_uncompiled()
+    mechanism, solution = _moved(body, hinge, swing)
+    magnify = args.magnify or magnification(body, solution.elastic(body.name))
+    certificate = body.certificate
+    data = {
+        "files": [str(path) for path in files.values()],
+        "mass": body.mass,
+        "gravity": list(swing.gravity),
+        "t_end": swing.t_end,
+        "magnify": magnify,
+        "frequencies": body.frequencies(6, fixed=(hinge,)).tolist(),
+        "certificate": report_data(certificate),
+    }
+    return Answer(
+        data, _text(body, hinge, data), lambda: _write(files, body, (mechanism, solution), magnify),
+        tuple(text for text in failures(certificate) if not text.startswith("free:")),
+    )  # fmt: skip
+
+
+def _files(args: argparse.Namespace) -> dict[str, Path]:
+    """What will be written, by its ending; refused before the computation."""
+    folder = claim(args)
+    kinds = (".rom.npz", ".png", ".gif") if args.film else (".rom.npz", ".png")
+    return {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
+
+
+def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
+    """Name of the interface, and the face to pick for it if it has none."""
+    if text.isdecimal():
+        return "hinge", {"hinge": int(text)}
+    if "," not in text:
+        return text, {}
+    try:
+        return "hinge", {"hinge": list(vector(text))}
+    except argparse.ArgumentTypeError as error:
+        raise ConfigError(f"--hinge: {error}.") from None
+
+
+def _reduced(args: argparse.Namespace, hinge: str, faces: dict[str, Any]) -> "FlexibleBody":
+    from rom.body.damping import ModalDamping
+    from rom.fe.elasticity import model
+    from rom.model import Material
+    from rom.reduction.bases.method import CraigBampton
+    from rom.workflow import reduce
+
+    E, nu, rho = MATERIALS[args.material]
+    full = model(args.file, material=Material(E=E, nu=nu, rho=rho), faces=faces, **reading(args))
+    log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, full.mass(), args.material)
+    return reduce(
+        full, method=CraigBampton(args.modes), interfaces={hinge: "rbe2"}, reference=hinge,
+        damping=ModalDamping(0.01), name=args.file.stem,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """Gravity (3,) [m/s^2], axis (3,) of the hinge, duration [s]."""
+
+    gravity: tuple[float, ...]
+    axis: tuple[float, ...]
+    t_end: float
+
+
+def planned(
+    body: "FlexibleBody", hinge: str, gravity: Any = None, t_end: float | None = None
+) -> Swing:
+    """The swing of a body from rest: across gravity, for one period of the rigid pendulum.
+
+    Raises:
+        ConfigError: if the body hangs at rest already.
+    """
+    import numpy as np
+
+    arm = body.first_moment / body.mass - body.marker(hinge).point
+    if gravity is None:
+        gravity = -9.81 * np.eye(3)[2 - int(np.argmin(np.abs(arm[::-1]).round(12)))]
+    g = np.asarray(gravity, dtype=float)
+    axis = np.cross(arm, g)
+    lever = np.linalg.norm(axis) / max(float(np.linalg.norm(g)), 1e-300)
+    if lever < 1e-3 * body.size:
+        raise ConfigError(
+            f"gravity {g.tolist()} passes {lever:.2g} m beside the hinge: nothing would swing.",
+            hint="Choose another --hinge, or --gravity across the part.",
+        )
+    n = axis / np.linalg.norm(axis)
+    inertia = n @ body.inertia @ n - body.mass * _square_across(body.first_moment / body.mass, n)
+    inertia += body.mass * _square_across(arm, n)
+    period = 2 * pi * sqrt(inertia / (body.mass * float(np.linalg.norm(g)) * lever))
+    return Swing(tuple(g.tolist()), tuple(n.tolist()), t_end or FAR_SWING * period)
+
+
+def _square_across(x: Any, n: Any) -> float:
+    """Squared distance of a point from the axis through the origin."""
+    return float(x @ x - (x @ n) ** 2)
+
+
+def compiled_before() -> bool:
+    """Whether the integrator is compiled; asked before it is imported, which decides."""
+    import rom.mbs
+
+    if "rom.mbs.kernels.compiled" in sys.modules:
+        return True
+    places = [Path(rom.mbs.__path__[0]), Path.home() / ".cache" / "numba"]
+    places += [Path(p) for p in (os.environ.get("NUMBA_CACHE_DIR"),) if p]
+    return any(
+        place.is_dir() and any(place.rglob("generalized_alpha.advance-*.nbi")) for place in places
+    )
+
+
+def leave_uncompiled() -> None:
+    """Run kernels in Python from now on: compiling them takes minutes, one swing some seconds."""
+    import numba
+
+    numba.config.DISABLE_JIT = True
+
+
+def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> tuple[Any, Any]:
+    from rom.mbs.integrate.simulation import simulate
+    from rom.mbs.mechanism import Mechanism
+
+    mechanism = Mechanism(gravity=swing.gravity)
+    part = mechanism.add_flexible(body.name, body)
+    place = mechanism.ground.marker(tuple(body.marker(hinge).point))
+    mechanism.revolute("hinge", place, part.marker(hinge), axis=swing.axis)
+    return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / N_STEPS, rho_inf=0.5)
+
+
+def magnification(body: "FlexibleBody", q: Any) -> float:
+    """1, 2 or 5 times a power of ten, with which the largest deformation is seen; at least 1.
+
+    Args:
+        body: the body, with its surface.
+        q: (n_t, r) elastic coordinates.
+    """
+    import numpy as np
+
+    shape = body.surface.shape
+    largest = max(float(np.linalg.norm((shape @ x).reshape(-1, 3), axis=1).max()) for x in q)
+    wanted = DRAWN_DEFORMATION_RATIO * body.size / max(largest, 1e-12 * body.size)
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(max(1.0, power * max(d for d in (1, 2, 5) if d * power <= wanted)))
+
+
+def _write(
+    files: dict[str, Path], body: "FlexibleBody", motion: tuple[Any, Any], magnify: float
+) -> None:
+    import numpy as np
+
+    from rom.io.native import save
+    from rom.view import animate, instants
+
+    save(body, files[".rom.npz"])
+    times = np.linspace(0, 0.5 * motion[1].t[-1], N_INSTANTS)
+    up = -np.asarray(motion[0].gravity, dtype=float)
+    instants(*motion, files[".png"], times=times, magnify=magnify, up=up)
+    if ".gif" in files:
+        animate(*motion, files[".gif"], magnify=magnify, up=up, frames=40)
+
+
+def _text(body: "FlexibleBody", hinge: str, data: dict[str, Any]) -> str:
+    full = body.provenance["reduction"]["full dofs"]
+    held = ", ".join(f"{f:.5g}" for f in data["frequencies"])
+    return (
+        f"{body.name}: {body.mass:.4g} kg, {full} dofs reduced to 6 + {body.n_modes}\n"
+        f"held at {hinge}: {held} Hz\n"
+        f"deformations drawn {data['magnify']:g} times larger\n" + "\n".join(data["files"])
+    )

@@ -1,0 +1,94 @@
+"""Look at a body, a component or a mechanism: in a window where there is a display, else a picture.
+
+A body moves in its modes, a component shows its mesh, a mechanism its bodies as they are placed.
+"""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rom.cli.answer import Answer
+from rom.cli.described import component, described, mechanism
+from rom.cli.options import add_meshing, count, names
+from rom.cli.output import add_force, checked
+
+SUMMARY = "look at a body, a component or a mechanism"
+EXAMPLES = """\
+  rom view rod.rom.npz                  # a window to turn it around in
+  rom view rod.rom.npz -o modes.png
+  rom view rod.rom.npz -n 4 --fixed pin_a -o modes.png
+  rom view demos/slider_crank.toml -o start.png
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz, or .toml file")
+    parser.add_argument("-n", "--number", type=count, default=6, help="number of modes (default 6)")
+    parser.add_argument(
+        "--fixed", metavar="NAME,...", type=names, default=(), help="interfaces held, for modes"
+    )
+    parser.add_argument("-o", "--output", type=Path, help="picture, .png, and no window")
+    add_meshing(parser)
+    add_force(parser)
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Load; the picture is drawn, or the window opened, at the end."""
+    from rom.errors import ConfigError
+    from rom.view.scenes.window import has_display
+
+    window = args.output is None and has_display()
+    path = args.output or Path(f"{args.file.name.partition('.')[0]}.png")
+    if path.suffix.lower() != ".png":
+        raise ConfigError(f"{path}: a picture is written as .png only.")
+    if not window:
+        checked(args, path)
+    what, draw, scenes = _subject(args)
+    data = {"file": str(args.file), "output": None if window else str(path)}
+    if window:
+        from rom.view.scenes.window import show
+
+        return Answer(data, f"{what}, in a window", lambda: show(scenes()))
+    why = "" if args.output else "; there is no display for a window"
+    return Answer(data, f"{path}: {what}{why}", lambda: draw(path))
+
+
+def _subject(args: argparse.Namespace) -> tuple[str, Callable[[Path], Any], Callable[[], Any]]:
+    """What it is, how it is drawn, and how it is shown in a window."""
+    from rom.view.scenes.window import Scene, mode_scenes
+
+    if not described(args):
+        from rom.io.native import load
+        from rom.view.scenes.mode_shapes import mode_shapes
+
+        body = load(args.file)
+        body.check_support(args.fixed)
+        return (
+            f"modes of body {body.name}",
+            lambda path: mode_shapes(body, path, n=args.number, fixed=args.fixed),
+            lambda: mode_scenes(body, args.number, args.fixed),
+        )
+    from rom.config.document import read_document
+
+    if "bodies" in read_document(args.file).data:
+        from rom.view.scenes.mechanisms import start, start_actors
+
+        file = mechanism(args)
+        made, look = file.mechanism(), file.values["output"]
+        how = {key: look[key] for key in ("view", "up") if key in look}
+        return (
+            f"mechanism {file.name} as it is placed",
+            lambda path: start(made, path, title=f"Mechanism {file.name}", **how),
+            lambda: [Scene(file.name, start_actors(made))],
+        )
+    from rom.view.scenes.meshes import mesh, mesh_actors
+
+    part = component(args)
+    model = part.model()
+    return (
+        f"mesh of component {part.name}",
+        lambda path: mesh(model, path, title=f"Component {part.name}"),
+        lambda: [Scene(part.name, mesh_actors(model))],
+    )

@@ -1,0 +1,310 @@
+"""Fingers whose joints are compression springs, closed by cables.
+
+A finger is one rod: joints are springs, phalanges are links that neither bend nor, nearly,
+stretch. Its third axis points along, its first to the palm, where the cable runs. Coils that touch
+on the inner side stop a joint.
+
+Source:
+    After the idea of Potratz, Yang, Abdel-Malek, Pena Pitarch and Grosland, A light weight
+    compliant hand mechanism with high degrees of freedom, J. Biomech. Eng. 127 (2005) 934; all
+    sizes are ours, lengths of fingers after Chatzioglou and others 2024.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
+from rom.components.cosserat.helical_spring import HelicalSpring
+from rom.components.hand.cable import Hole, Tendon
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.model import Array, Mask
+
+PHALANX_RIGIDITY_RATIO = 1e5  # rigidity of a phalanx over that of the springs
+STOP_STIFFNESS_RATIO = 50.0  # stiffness of touching coils over that of the spring
+MAX_ROTATION = 0.2  # of an iteration [rad]
+INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
+MAX_ITERATIONS = 80
+MAX_HALVINGS = 8  # of the load step
+SPRING = HelicalSpring(0.7e-3, 7e-3, 5, 8e-3)
+INDEX = (18e-3, 12e-3, 10e-3)  # m
+LENGTHS = {  # m, of whole fingers
+    "thumb": 49.5e-3, "index": 64e-3, "middle": 70.7e-3, "ring": 65.5e-3, "little": 53.3e-3,
+}  # fmt: skip
+
+Extra = Callable[[Shape], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Finger:
+    """Springs and phalanges in series, with a cable.
+
+    Attributes:
+        springs: from the palm outward.
+        phalanges: length of the link beyond each spring [m]; the last may be zero, a bare plate.
+        offset: of the cable from the centre line, towards the palm [m].
+        friction: of the cable where it turns.
+        stiffener: factor of the rigidities of joints against bending and shear out of the plane of
+            flexion, and against torsion.
+        n: segments of a spring.
+
+    Raises:
+        ModelError: if springs and phalanges do not match.
+    """
+
+    springs: tuple[HelicalSpring, ...] = (SPRING,) * 3
+    phalanges: tuple[float, ...] = INDEX
+    offset: float = 4.5e-3
+    friction: float = 0.0
+    stiffener: float = 1.0
+    n: int = 16
+
+    def __post_init__(self) -> None:
+        if len(self.springs) != len(self.phalanges) or not self.springs:
+            raise ModelError(f"{len(self.springs)} springs and {len(self.phalanges)} phalanges.",
+                             hint="Each spring carries one phalanx.")  # fmt: skip
+        if min(self.phalanges[:-1], default=1.0) <= 0 or self.phalanges[-1] < 0:
+            raise ModelError(f"phalanges of {self.phalanges} m: only the last may be zero.")
+
+    @cached_property
+    def joints(self) -> tuple[tuple[int, int, int, int], ...]:
+        """Vertex and frame of the plates at the base and at the top of each spring."""
+        bases = [j * (self.n + 1) for j in range(len(self.springs))]
+        frames = [i if i else 0 for i in bases]
+        tops = [i + self.n for i in bases]
+        return tuple((b, f, t, t + 1) for b, f, t in zip(bases, frames, tops, strict=True))
+
+    @cached_property
+    def rod(self) -> Rod:
+        """The finger as a rod."""
+        h: list[float] = []
+        stretch: list[Array] = []
+        cells: list[Array] = []
+        bends: list[bool] = []
+        for spring, link in zip(self.springs, self.phalanges, strict=True):
+            own = {k: np.array(v) for k, v in spring.rigidities().items()}
+            own["stretch"][1] *= self.stiffener
+            own["bend"][[0, 2]] *= self.stiffener
+            h += [spring.length / self.n] * self.n
+            stretch += [own["stretch"]] * self.n
+            cells += [own["bend"]] * (self.n + 1)
+            bends += [True] * self.n
+            if link > 0:
+                h, bends = [*h, link], [*bends, False]
+                stretch.append(np.full(3, PHALANX_RIGIDITY_RATIO * spring.axial))
+        if self.phalanges[-1] > 0:
+            cells.append(np.full(3, PHALANX_RIGIDITY_RATIO * self.springs[-1].bending))
+        x = np.zeros((len(h) + 1, 3))
+        x[1:, 2] = np.cumsum(h)
+        still = np.tile([1.0, 0, 0, 0], (len(h) + 2, 1))
+        return rod(x, still, stretch=np.array(stretch), bend=np.array(cells), bends=bends)
+
+    @cached_property
+    def tendon(self) -> Tendon:
+        """The cable through the plates at both ends of each spring."""
+        arm = (self.offset, 0.0, 0.0)
+        holes = [Hole(v, f, arm) for b, g, t, k in self.joints for v, f in ((b, g), (t, k))]
+        return Tendon(tuple(holes), self.friction)
+
+    def angles(self, shape: Shape) -> Array:
+        """(joints,) angle between the plates of each spring [rad]."""
+        return np.array([_angle(shape, f, k)[0] for _, f, _, k in self.joints])
+
+    def clearances(self, shape: Shape) -> Array:
+        """(joints,) way left until coils touch on the inner side [m]."""
+        left = []
+        for spring, (b, f, t, k) in zip(self.springs, self.joints, strict=True):
+            line = np.linalg.norm(np.diff(shape.x[b : t + 1], axis=0), axis=1).sum()
+            left.append(spring.clearance(line, _angle(shape, f, k)[0]))
+        return np.array(left)
+
+    def stops(self, shape: Shape) -> tuple[Array, Array]:
+        """Forces out of balance (n,) and tangent (n, n) of coils that touch."""
+        n = 6 * self.rod.h.size + 9
+        r, K = np.zeros(n), np.zeros((n, n))
+        gaps = self.clearances(shape)
+        for spring, gap, (b, f, t, k) in zip(self.springs, gaps, self.joints, strict=True):
+            if gap >= 0:
+                continue
+            g = np.zeros(n)
+            d = np.diff(shape.x[b : t + 1], axis=0)
+            d /= np.linalg.norm(d, axis=1)[:, None]
+            for i, e in enumerate(d):
+                g[6 * (b + i) + 3 : 6 * (b + i) + 6] -= e
+                g[6 * (b + i) + 9 : 6 * (b + i) + 12] += e
+            arm = (spring.diameter + spring.wire) / 2 * _angle(shape, f, k)[1]
+            g[6 * f : 6 * f + 3] += arm
+            g[6 * k : 6 * k + 3] -= arm
+            r += STOP_STIFFNESS_RATIO * spring.stiffness * gap * g
+            K += STOP_STIFFNESS_RATIO * spring.stiffness * np.outer(g, g)
+        return r, K
+
+
+def _angle(shape: Shape, a: int, b: int) -> tuple[float, Array]:
+    """Angle from frame a to frame b, and its axis in both; zero when they agree."""
+    turn = rotation.log(rotation.multiply(shape.p[a] * [1, -1, -1, -1], shape.p[b]))
+    angle = float(np.linalg.norm(turn))
+    return angle, turn / angle if angle > 1e-9 else np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A finger at rest.
+
+    Attributes:
+        finger: the finger.
+        shape: of its rod.
+        tension: of the cable at its first hole [N].
+        pull: length of cable drawn out of the finger [m].
+        load: force on the tip [N].
+    """
+
+    finger: Finger
+    shape: Shape
+    tension: float
+    pull: float
+    load: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def tip(self) -> Array:
+        """(3,) position of the fingertip [m]."""
+        return self.shape.x[-1]
+
+    @property
+    def angles(self) -> Array:
+        """(joints,) bending of the joints [rad]."""
+        return self.finger.angles(self.shape)
+
+    @property
+    def bound(self) -> Mask:
+        """(joints,) whether coils of a joint touch."""
+        return self.finger.clearances(self.shape) < 0
+
+    def tip_compliance(self) -> Array:
+        """(6, 6) motion of the tip per load on it, world axes, tension held [m/N, rad/N m]."""
+        finger = self.finger
+        free = clamped(finger.rod)
+        K = linearised(finger.rod, self.shape, loads(finger.rod, tip=self.load))[1]
+        K += self.tension * finger.tendon.forces(finger.rod, self.shape)[1]
+        K += finger.stops(self.shape)[1]
+        T = np.zeros((len(K), 6))
+        T[-6:-3, :3], T[-3:, 3:] = np.eye(3), self.shape.frame(-1).T
+        return T[free].T @ np.linalg.solve(K[np.ix_(free, free)], T[free])
+
+
+def rest(finger: Finger) -> Posture:
+    """The straight finger without load."""
+    return Posture(finger, reference(finger.rod), 0.0, 0.0)
+
+
+def close(
+    finger: Finger,
+    *,
+    tension: float | None = None,
+    pull: float | None = None,
+    load: npt.ArrayLike = (0.0, 0.0, 0.0),
+    start: Posture | None = None,
+    way: float = 1.0,
+    extra: Extra | None = None,
+) -> Posture:
+    """Posture for a tension of the cable or a length drawn out, and a force on the tip.
+
+    The way from ``start`` is gone in one step, or in halves where that fails.
+
+    Args:
+        finger: the finger.
+        tension: of the cable at its first hole [N]; zero if neither is given.
+        pull: length drawn out [m] instead.
+        load: (3,) dead force on the tip [N].
+        start: posture to start from, straight if not given.
+        way: 1 when the cable is drawn in, -1 when it is let out: the sign of friction.
+        extra: function of a shape that gives more forces out of balance (n,) and their tangent
+            (n, n), such as those of contacts.
+
+    Raises:
+        ConfigError: for both tension and pull, a tension below zero, a pull beyond the springs.
+        SolverError: if no posture was found; its attribute ``posture`` is the last good one.
+    """
+    if tension is not None and pull is not None:
+        raise ConfigError("both tension and pull are given.", hint="One follows from the other.")
+    if tension is not None and tension < 0:
+        raise ConfigError(f"tension {tension:g} N: a cable does not push.", hint="Slack is zero.")
+    limit = 0.9 * sum(s.length for s in finger.springs)
+    if pull is not None and not 0 <= pull < limit:
+        raise ConfigError(f"pull {pull:g} m is outside 0 to {limit:g} m: springs are not longer.")
+    here = rest(finger) if start is None else start
+    drawn = pull is not None
+    first = here.pull if drawn else here.tension
+    goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
+    begin = np.append(here.load, first)
+    share, part = 0.0, 1.0
+    while share < 1.0:
+        now = begin + min(share + part, 1.0) * (goal - begin)
+        found = _balance(finger, here, now, drawn, way, extra)
+        if found is not None:
+            share, here = min(share + part, 1.0), found
+        elif part > 0.5**MAX_HALVINGS:
+            part /= 2
+        else:
+            error = SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
+                                hint="A joint buckles, or the load is too large.")  # fmt: skip
+            error.posture = here  # type: ignore[attr-defined]
+            raise error
+    return here
+
+
+def _balance(finger: Finger, start: Posture, goal: Array, drawn: bool, way: float,
+             extra: Extra | None) -> Posture | None:  # fmt: skip
+    """Newton's method with capped rotations; one more unknown, the tension, when pull is given."""
+    one, cable = finger.rod, finger.tendon
+    free = np.flatnonzero(clamped(one))
+    load, length = loads(one, tip=goal[:3]), cable.length(reference(one))
+    shape, tension = start.shape, start.tension if drawn else float(goal[3])
+    straight = replace(cable, friction=0.0)
+    for _ in range(MAX_ITERATIONS):
+        r, K = linearised(one, shape, load)
+        g, H = cable.forces(one, shape, way)
+        for more, stiffness in (finger.stops(shape), *((extra(shape),) if extra else ())):
+            r, K = r + more, K + stiffness
+        r, K = (r + tension * g)[free], (K + tension * H)[np.ix_(free, free)]
+        X = np.linalg.solve(K, -np.column_stack([r, g[free]]))
+        if drawn:
+            row = straight.forces(one, shape)[0][free]
+            missing = goal[3] - (length - cable.length(shape))
+            change = (-missing - row @ X[:, 0]) / (row @ X[:, 1])
+        else:
+            change = 0.0
+        d = np.zeros(6 * len(one.x) + 6)
+        d[free] = X[:, 0] + change * X[:, 1]
+        rows = d.reshape(-1, 6)
+        turned = np.abs(rows[:, :3]).max()
+        if not np.isfinite(turned):
+            return None
+        factor = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION))
+        shape = _moved(shape, factor * rows)
+        tension += factor * change
+        if max(turned, np.abs(rows[:-1, 3:]).max() / one.x[-1, 2]) < INCREMENT_RTOL:
+            pull = length - cable.length(shape)
+            return Posture(finger, shape, tension, pull, tuple(goal[:3]))
+    return None
+
+
+def _moved(shape: Shape, rows: Array) -> Shape:
+    """A shape after increments, rotation and translation in each row."""
+    turns = [rotation.exp(phi) for phi in rows[:, :3]]
+    p = [rotation.multiply(q, turn) for q, turn in zip(shape.p, turns, strict=True)]
+    return Shape(shape.x + rows[:-1, 3:], np.array(p))
+
+
+def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
+    """Five fingers of three joints each; phalanges scale with the length of the finger."""
+    springs = sum(s.length for s in (SPRING,) * 3)
+    shares = np.array(INDEX) / sum(INDEX)
+    return {
+        name: Finger(phalanges=tuple(shares * (length - springs)), friction=friction, n=n)
+        for name, length in LENGTHS.items()
+    }

@@ -1,0 +1,230 @@
+"""Dynamic isotropy: where two motors feel the same inertia, whatever the direction.
+
+The kinetic energy of a mechanism with two degrees of freedom is q'^T A(q) q' / 2. It is isotropic
+where A is a multiple of the identity: a11 = a22 and a12 = 0. Two equations for two angles leave
+isolated points in general. The index 2 sqrt(det A) / tr A is one there and smaller elsewhere; on
+the torus of both angles its level curves are closed. Around an isolated isotropic point the vector
+((a11 - a22) / 2, a12) winds once, to the left or to the right, and these windings add up to zero.
+
+`rom.components.linkages.two_dof_linkages` has inertias to begin with.
+
+Source:
+    After Di Gregorio, Cammarata and Sinatra on the dynamic isotropy of two-dof mechanisms; their
+    index was not available, the one here has the same loci as the ratio of the eigenvalues.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.model import Array, Index
+
+Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
+DIFFERENCE_STEP = 1e-5  # of central differences [rad]
+# least Jacobian of the normalised equations for an isotropic point that stands alone
+MIN_JACOBIAN = 1e-6
+DETERMINANT_RTOL = 1e-12  # of the squared trace: round-off by which a determinant is negative
+
+
+def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
+    """(...) index 2 sqrt(det A) / tr A, one where isotropic; independent of the scale of A.
+
+    Args:
+        A: (..., 2, 2) generalised inertia.
+        lengths: (2,) by which the coordinates are multiplied first: (1, 1) for two angles, (L, 1)
+            with a characteristic length L for an angle beside a displacement.
+
+    Raises:
+        ConfigError, ModelError: for lengths that are not positive; for an inertia that is not.
+    """
+    scale = np.asarray(lengths, dtype=float)
+    if scale.shape != (2,) or not (scale > 0).all():
+        raise ConfigError(f"lengths = {lengths!r}: two positive numbers are needed.")
+    A = _positive(np.asarray(A, dtype=float) / np.multiply.outer(scale, scale))
+    determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
+    return 2 * np.sqrt(np.maximum(determinant, 0.0)) / (A[..., 0, 0] + A[..., 1, 1])
+
+
+def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
+    """(2, 2, 2) symbols of the first kind: motors give A q'' + sum_jk symbols[:, j, k] q'_j q'_k.
+
+    All are zero where the mechanism is dynamically uniform. By central differences.
+    """
+    q1, q2 = np.asarray(q, dtype=float)
+    step = DIFFERENCE_STEP * np.array([1.0, -1.0])
+    D = np.stack([inertia(q1 + step, q2 + 0 * step), inertia(q1 + 0 * step, q2 + step)])
+    D = (D[:, 0] - D[:, 1]) / (2 * DIFFERENCE_STEP)  # D[k] = dA / dq_k
+    return 0.5 * (np.einsum("kij->ijk", D) + np.einsum("jik->ijk", D) - D)
+
+
+def angle_grid(n: int) -> tuple[Array, Array]:
+    """(n, n), (n, n) angles of both motors over one turn, the first along the rows."""
+    angles = 2 * np.pi * np.arange(n) / n
+    q1, q2 = np.meshgrid(angles, angles, indexing="ij")
+    return q1, q2
+
+
+@dataclass(frozen=True, slots=True)
+class Isotropic:
+    """Isotropic configurations.
+
+    Attributes:
+        q: (k, 2) angles in [0, 2 pi), ascending.
+        inertia: (k,) the inertia both motors feel [kg m^2].
+        winding: (k,) 1 or -1 for an isolated point, 0 for a point of a curve of isotropy.
+    """
+
+    q: Array
+    inertia: Array
+    winding: Index
+
+
+def isotropic_configurations(inertia: Inertia, *, n: int = 400) -> Isotropic:
+    """All isotropic configurations on the torus of two angles.
+
+    Cells of an n by n grid in which both equations may change sign are refined by Newton.
+
+    Args:
+        inertia: function of two arrays of angles (...) that returns (..., 2, 2).
+        n: number of cells per turn; points closer than a cell may be taken for one.
+
+    Raises:
+        ConfigError, ModelError: for a grid of less than four cells; if the function returns no
+            inertia.
+        SolverError: if the windings of isolated points do not add up to zero: some were missed.
+    """
+    if n < 4:
+        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
+    start = _suspects(_anisotropy(inertia, *angle_grid(n)))
+    q = 2 * np.pi * (start + 0.5) / n
+    for _ in range(40):
+        f, J = _anisotropy(inertia, *q.T), _gradient(inertia, q)
+        step = -np.einsum("kij,kj->ki", np.linalg.pinv(J, rcond=1e-9), f)
+        q = q + step / np.maximum(np.abs(step).max(axis=1, initial=0.0) / 0.1, 1.0)[:, None]
+    q = _distinct(q[np.abs(_anisotropy(inertia, *q.T)).max(axis=1, initial=0.0) < 1e-11])
+    turn = np.linalg.det(_gradient(inertia, q))
+    winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
+    if winding.all() and winding.sum():
+        raise SolverError(
+            f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0: "
+            f"a grid of {n} cells per turn misses some.",
+            hint="Take a finer grid.",
+        )
+    return Isotropic(q, inertia(*q.T)[:, 0, 0], winding)
+
+
+def _anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
+    """(..., 2) half the difference of the diagonal, and the coupling, over half the trace."""
+    A = _positive(inertia(q1, q2))
+    trace = A[..., 0, 0] + A[..., 1, 1]
+    return np.stack([(A[..., 0, 0] - A[..., 1, 1]) / trace, 2 * A[..., 0, 1] / trace], axis=-1)
+
+
+def _positive(A: Array) -> Array:
+    """A (..., 2, 2) if it can be an inertia: of positive trace and no negative determinant."""
+    if np.shape(A)[-2:] != (2, 2):
+        raise ModelError(f"an inertia of two motors has the shape (..., 2, 2), not {np.shape(A)}.")
+    trace = A[..., 0, 0] + A[..., 1, 1]
+    determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
+    if not ((trace > 0) & (determinant > -DETERMINANT_RTOL * trace**2)).all():
+        raise ModelError("the inertia is not positive: some motion would have no kinetic energy.")
+    return A
+
+
+def _gradient(inertia: Inertia, q: Array) -> Array:
+    """(k, 2, 2) derivatives of both equations at angles (k, 2)."""
+    columns = [
+        _anisotropy(inertia, *(q + e).T) - _anisotropy(inertia, *(q - e).T)
+        for e in DIFFERENCE_STEP * np.eye(2)
+    ]
+    return np.stack(columns, axis=-1) / (2 * DIFFERENCE_STEP)
+
+
+def _suspects(f: Array) -> Index:
+    """(k, 2) cells of a periodic grid (n, n, 2) in which both values may vanish."""
+    corners = np.stack([np.roll(f, s, axis=(0, 1)) for s in ((0, 0), (-1, 0), (0, -1), (-1, -1))])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    margin = 0.25 * (high - low) + 1e-12  # the values are curved between the corners
+    return np.argwhere(((low <= margin) & (high >= -margin)).all(axis=-1))
+
+
+def _distinct(q: Array) -> Array:
+    """Angles modulo one turn, each configuration once, ascending."""
+    q = np.mod(q, 2 * np.pi)
+    kept: list[Array] = []
+    for x in q[np.lexsort(q.T[::-1])]:
+        apart = [np.abs((x - y + np.pi) % (2 * np.pi) - np.pi).max() for y in kept]
+        if not apart or min(apart) > 1e-6:
+            kept.append(x)
+    return np.array(kept).reshape(-1, 2)
+
+
+def closed_loci(index: Array, level: float) -> list[Array]:
+    """Curves of one value of a field on the torus, each closed, across the seam as well.
+
+    Args:
+        index: (n, n) values on `angle_grid`.
+        level: the value.
+
+    Returns:
+        (k, 2) angles of each curve [rad], continuous; the last point is the first one, moved by
+        whole turns if the curve goes around the torus.
+
+    Raises:
+        ConfigError: if the field is not that of a square grid, or has gaps.
+    """
+    if np.ndim(index) != 2 or len(set(np.shape(index))) != 1 or not np.isfinite(index).all():
+        raise ConfigError(f"a field {np.shape(index)}: (n, n) finite values are needed.")
+    names, neighbours = _joined(index, level)
+    points, fresh, curves = _crossings(index, level, names), np.ones(len(names), dtype=bool), []
+    for start in range(len(names)):
+        if not fresh[start]:
+            continue
+        path, before, at = [start], start, neighbours[start, 0]
+        while at != start:
+            path.append(at)
+            one, other = neighbours[at]
+            before, at = at, other if one == before else one
+        fresh[path] = False
+        curves.append(np.unwrap(points[[*path, start]], axis=0))
+    return curves
+
+
+def _joined(index: Array, level: float) -> tuple[Index, Index]:
+    """Grid edges that the level crosses (k,), and the two crossings next to each (k, 2).
+
+    Each edge belongs to two cells and every cell joins its crossings in pairs: curves cannot end.
+    """
+    n = len(index)
+    along = np.arange(n * n).reshape(n, n)  # edge from node (i, j) to (i + 1, j)
+    up = n * n + along  # to (i, j + 1)
+    sides = np.stack([along, np.roll(up, -1, axis=0), np.roll(along, -1, axis=1), up])
+    corners = np.stack(
+        [np.roll(index, s, axis=(0, 1)) for s in ((0, 0), (-1, 0), (-1, -1), (0, -1))]
+    )
+    inside = corners >= level
+    cut = inside != np.roll(inside, -1, axis=0)
+    plain, saddle = cut.sum(axis=0) == 2, cut.all(axis=0)
+    pairs = sides[:, plain].T[cut[:, plain].T].reshape(-1, 2)
+    bottom, right, top, left = sides[:, saddle]
+    through = inside[0, saddle] == (corners.mean(axis=0) >= level)[saddle]
+    one = np.column_stack([bottom, np.where(through, right, left)])
+    other = np.column_stack([top, np.where(through, left, right)])
+    pairs = np.vstack([pairs, one, other])
+    ends = np.vstack([pairs, pairs[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    names = ends[::2, 0]
+    return names, np.searchsorted(names, ends[:, 1]).reshape(-1, 2)
+
+
+def _crossings(index: Array, level: float, names: Index) -> Array:
+    """(k, 2) angles at which the level crosses grid edges, linearly interpolated."""
+    n = len(index)
+    up, node = np.divmod(names, n * n)
+    i, j = np.divmod(node, n)
+    here, there = index[i, j], index[(i + 1 - up) % n, (j + up) % n]
+    share = (level - here) / (there - here)
+    return 2 * np.pi / n * np.column_stack([i + share * (1 - up), j + share * up])

@@ -1,0 +1,282 @@
+"""Discontinuous deformation analysis: blocks in contact, one implicit step after the other.
+
+Corners of one block touch edges of another one; a closed contact is a stiff spring along
+the normal of the edge and, while it sticks, one along it. Which contacts are closed, stick or slip
+is found by open-close iteration within each step. Time runs by Newmark's scheme with beta = 1/2 and
+gamma = 1, which is exact for constant forces and damps vibrations by 1 / sqrt(1 + (omega h)^2 / 2)
+a step. Gyroscopic terms of the deformation are neglected, as usual.
+
+Source:
+    After Shi (1988). Different here: elastic shapes live in body axes, stick and slip follow by
+    return mapping, and contacts open by force, since a tolerance of the gap would carry tension.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.components.compiled import inner, kernel
+from rom.components.masonry.block_contact import OPEN, SLIDES, STICKS, Blocks, find_contacts
+from rom.model import Array, Index
+
+STATE_CHANGES = 12  # open-close iterations before the step is cut
+MAX_SOLUTIONS = 60  # solutions of one step, while friction follows the normal forces
+STEP_FACTOR, MIN_STEP_RATIO = 3.0, 3.0**-8
+FRICTION_TOLERANCE = 1e-9  # of the largest normal force
+
+
+class Work(NamedTuple):
+    """Memory of a step: corners P and their Jacobians T, the equations, the solution."""
+
+    P: Array
+    T: Array
+    A: Array
+    left: Index
+    rhs: Array
+    d: Array
+    q: Array
+    v: Array
+
+
+def work(B: Blocks) -> Work:
+    """Memory for steps of these blocks."""
+    V, (b, m) = len(B.corner), B.load.shape
+    n = int(B.size[B.equation >= 0].sum())
+    return Work(
+        np.zeros((V, 2)), np.zeros((V, 2, m)), np.zeros((n, n)), np.zeros(n, dtype=np.int64),
+        np.zeros(n), np.zeros((b, m)), np.zeros((b, m)), np.zeros((b, m)),
+    )  # fmt: skip
+
+
+@inner
+def envelope(B, C, left):
+    """First column of each row that closed contacts or the block itself fill."""
+    for b in range(B.size.size):
+        for p in range(B.size[b] if B.equation[b] >= 0 else 0):
+            left[B.equation[b] + p] = B.equation[b]
+    for k in range(C.used[0]):
+        i, j = B.equation[C.who[k, 0]], B.equation[C.who[k, 2]]
+        if i >= 0 and j >= 0 and C.state[k] != OPEN:
+            for p in range(B.size[C.who[k, 0]] if i > j else B.size[C.who[k, 2]]):
+                row = max(i, j) + p
+                left[row] = min(left[row], min(i, j))
+
+
+@inner
+def assemble(B, law, C, h, W):
+    """Set the lower triangle of 2 M / h^2 + K + contact springs, row by row from W.left."""
+    envelope(B, C, W.left)
+    for row in range(W.left.size):
+        W.A[row, W.left[row] : row + 1] = 0.0
+    for b in range(B.size.size):
+        at = B.equation[b]
+        for p in range(B.size[b] if at >= 0 else 0):
+            for r in range(p + 1):
+                W.A[at + p, at + r] += 2 * B.M[b, p, r] / (h * h) + B.K[b, p, r]
+    for k in range(C.used[0]):
+        if C.state[k] != OPEN:
+            add_spring(B, C.who[k], C.n[k], law.normal, W.A)
+        if C.state[k] == STICKS:
+            add_spring(B, C.who[k], C.t[k], law.shear, W.A)
+
+
+@inner
+def add_spring(B, who, g, stiffness, A):
+    """Add stiffness g g^T to the lower triangle."""
+    for one in range(2):
+        for other in range(2):
+            at, to = B.equation[who[2 * one]], B.equation[who[2 * other]]
+            if at < to or to < 0:
+                continue
+            for p in range(B.size[who[2 * one]]):
+                for r in range(p + 1 if at == to else B.size[who[2 * other]]):
+                    A[at + p, to + r] += stiffness * g[one, p] * g[other, r]
+
+
+@inner
+def factorise(A, left):
+    """Cholesky factor in place, within the envelope; False if a pivot is not positive."""
+    for i in range(left.size):
+        for j in range(left[i], i + 1):
+            low = max(left[i], left[j])
+            total = A[i, j]
+            row, column = A[i, low:j], A[j, low:j]
+            for k in range(row.size):
+                total -= row[k] * column[k]
+            if i > j:
+                A[i, j] = total / A[j, j]
+            elif total > 0.0:
+                A[i, i] = math.sqrt(total)
+            else:
+                return False
+    return True
+
+
+@inner
+def solve(A, left, x):
+    """Solve with the factor, in place."""
+    n = left.size
+    for i in range(n):
+        total = x[i]
+        for k in range(left[i], i):
+            total -= A[i, k] * x[k]
+        x[i] = total / A[i, i]
+    for i in range(n - 1, -1, -1):
+        x[i] /= A[i, i]
+        for k in range(left[i], i):
+            x[k] -= A[i, k] * x[i]
+
+
+@inner
+def right_hand_side(B, law, C, h, W):
+    """Set W.rhs: momentum, loads, elastic forces, springs and friction at the start of the step."""
+    for b in range(B.size.size):
+        at = B.equation[b]
+        for p in range(B.size[b] if at >= 0 else 0):
+            total = B.load[b, p]
+            for r in range(B.size[b]):
+                total += 2 * B.M[b, p, r] * W.v[b, r] / h - B.K[b, p, r] * W.q[b, r]
+            W.rhs[at + p] = total
+    for k in range(C.used[0]):
+        if C.state[k] == OPEN:
+            continue
+        normal_force = -law.normal * C.gap[k]
+        drag = -law.shear * C.slip[k]
+        if C.state[k] == SLIDES:
+            drag = -C.way[k] * law.friction * C.force[k]
+        for one in range(2):
+            b = C.who[k, 2 * one]
+            for p in range(B.size[b] if B.equation[b] >= 0 else 0):
+                W.rhs[B.equation[b] + p] += normal_force * C.n[k, one, p] + drag * C.t[k, one, p]
+
+
+@inner
+def change(B, C, k, g, d):
+    """Gap or slip gained over the step: its gradient g times the increments."""
+    total = 0.0
+    for one in range(2):
+        b = C.who[k, 2 * one]
+        for p in range(B.size[b]):
+            total += g[k, one, p] * d[b, p]
+    return total
+
+
+@inner
+def review(B, law, C, d):
+    """States and normal forces at the end of the step: contacts that change, friction error."""
+    changed, error, largest = 0, 0.0, 0.0
+    for k in range(C.used[0]):
+        force = -law.normal * (C.gap[k] + change(B, C, k, C.n, d))
+        trial = law.shear * (C.slip[k] + change(B, C, k, C.t, d))
+        state = STICKS
+        if force < (law.tension if C.state[k] == OPEN else -law.tension):
+            state = OPEN
+        elif abs(trial) > law.friction * force + law.tension:
+            state = SLIDES
+        direction, pressed = math.copysign(1.0, trial), max(force, 0.0)
+        if state != C.state[k] or (state == SLIDES and direction != C.way[k]):
+            changed += 1
+        if state == SLIDES:
+            error = max(error, abs(pressed - C.force[k]))
+        C.state[k], C.way[k], C.force[k] = state, direction, pressed
+        largest = max(largest, force)
+    return changed, error > FRICTION_TOLERANCE * largest
+
+
+@inner
+def step(B, law, C, h, W):
+    """Open-close iteration for the increments W.d over h; False if it does not settle."""
+    changes, factored = 0, False
+    for _ in range(MAX_SOLUTIONS):
+        if not factored:
+            assemble(B, law, C, h, W)
+            if not factorise(W.A, W.left):
+                return False
+        right_hand_side(B, law, C, h, W)
+        solve(W.A, W.left, W.rhs)
+        farthest = 0.0
+        for b in range(B.size.size):
+            for p in range(B.size[b] if B.equation[b] >= 0 else 0):
+                W.d[b, p] = W.rhs[B.equation[b] + p]
+            for a in range(B.first[b], B.first[b + 1]):
+                for axis in range(2):
+                    displacement = 0.0
+                    for p in range(B.size[b]):
+                        displacement += W.T[a, axis, p] * W.d[b, p]
+                    farthest = max(farthest, abs(displacement))
+        changed, unsettled = review(B, law, C, W.d)
+        if not changed and not unsettled:
+            return farthest < 0.5 * law.reach
+        factored = not changed
+        changes += 1 if changed else 0
+        if changes > STATE_CHANGES:
+            return False
+    return False
+
+
+@inner
+def accept(B, law, C, h, keep, W):
+    """Move on by W.d: coordinates, velocities times ``keep``, anchors of what slipped."""
+    for k in range(C.used[0]):
+        if C.state[k] == SLIDES:
+            end = C.along[k, 0] + change(B, C, k, C.t, W.d) / C.along[k, 3]
+            stretch = C.way[k] * law.friction * C.force[k] / law.shear
+            C.anchor[k] = end - stretch / C.along[k, 3]
+    for b in range(B.size.size):
+        for p in range(B.size[b] if B.equation[b] >= 0 else 0):
+            W.q[b, p] += W.d[b, p]
+            W.v[b, p] = keep * (2 * W.d[b, p] / h - W.v[b, p])
+
+
+@inner
+def energy(B, law, C, W):
+    """Kinetic, elastic and potential energy, with that of the contact springs."""
+    total = 0.0
+    for b in range(B.size.size):
+        for p in range(B.size[b]):
+            total -= B.load[b, p] * W.q[b, p]
+            for r in range(B.size[b]):
+                total += 0.5 * W.v[b, p] * B.M[b, p, r] * W.v[b, r]
+                total += 0.5 * W.q[b, p] * B.K[b, p, r] * W.q[b, r]
+    for k in range(C.used[0]):
+        if C.state[k] != OPEN:
+            total += 0.5 * C.force[k] ** 2 / law.normal
+        if C.state[k] == SLIDES:
+            total += 0.5 * (law.friction * C.force[k]) ** 2 / law.shear
+        if C.state[k] == STICKS:
+            total += 0.5 * law.shear * (C.slip[k] + change(B, C, k, C.t, W.d)) ** 2
+    return total
+
+
+@inner
+def remember(C, old):
+    """Copy what the next list of contacts takes over."""
+    n = C.used[0]
+    old.used[0] = n
+    old.who[:n], old.state[:n], old.anchor[:n] = C.who[:n], C.state[:n], C.anchor[:n]
+    old.way[:n], old.force[:n] = C.way[:n], C.force[:n]
+
+
+@kernel
+def advance(B, law, C, old, W, h, n_steps, keep, cuts):  # noqa: PLR0913  all there is
+    """Make steps of h from W.q, W.v; the energy at the end, NaN if a step cannot be made.
+
+    Steps that do not settle are cut by three, down to h / 3^8; ``cuts`` (1,) counts them.
+    """
+    for _ in range(n_steps):
+        done, part = 0.0, h
+        while done < h * (1 - 1e-9):
+            part = min(part, h - done)
+            remember(C, old)
+            find_contacts(B, law, W.q, old, C, W.P, W.T)
+            while not step(B, law, C, part, W):
+                part /= STEP_FACTOR
+                cuts[0] += 1
+                if part < MIN_STEP_RATIO * h:
+                    return math.nan
+                find_contacts(B, law, W.q, old, C, W.P, W.T)
+            accept(B, law, C, part, keep ** (part / h), W)
+            done += part
+            part *= STEP_FACTOR
+    return energy(B, law, C, W)

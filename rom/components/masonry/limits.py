@@ -1,0 +1,241 @@
+"""Could it stand? Arches and walls of rigid stones that take no tension, by statics alone.
+
+If any forces in the joints balance the weight, press and stay within friction, dry masonry stands
+(the lower bound theorem; with friction it is exact for joints that dilate as they slip).
+`arch` and `wall` lay the stones, `stands` looks for such forces by linear programming,
+`minimum_thickness` is the closed form for circular arches of infinitely many voussoirs.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq, linprog, minimize_scalar
+from scipy.sparse import coo_matrix
+
+from rom.components.masonry.stones import Masonry, Stone, stone, touching
+from rom.errors import ConfigError, SolverError
+from rom.model import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Rock:
+    """Material and joints.
+
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio.
+        rho: density [kg/m^3].
+        friction: tangent of the angle of friction.
+        contact: stiffness of a contact over E times the thickness.
+    """
+
+    E: float = 10e9
+    nu: float = 0.2
+    rho: float = 2000.0
+    friction: float = 0.84
+    contact: float = 20.0
+
+    def stone(self, outline: Array, solid: Array | None = None) -> Stone:
+        """A stone of unit depth."""
+        return stone(outline, E=self.E, nu=self.nu, rho=self.rho, solid=solid)
+
+    def masonry(self, stones: list[Stone], held: tuple[int, ...]) -> Masonry:
+        """Stones in contact."""
+        return Masonry(tuple(stones), held, self.contact * self.E, self.friction)
+
+
+def arch(
+    n: int,
+    radius: float,
+    thickness: float,
+    *,
+    half_angle: float = np.pi / 2,
+    rock: Rock | None = None,
+) -> Masonry:
+    """Circular arch of n equal voussoirs with radial joints, between two held springers.
+
+    The springers are the first and the last stone; they are wider than the arch.
+
+    Args:
+        n: number of voussoirs.
+        radius: of the centre line [m].
+        thickness: [m].
+        half_angle: from the crown to the springing [rad].
+        rock: material and joints; the default is hard stone.
+
+    Raises:
+        ConfigError: if this is no arch.
+    """
+    if n < 2 or not 0 < thickness < 2 * radius or not 0 < half_angle <= np.pi / 2:
+        raise ConfigError(
+            f"no arch has {n} voussoirs, radius {radius}, thickness {thickness}, half angle "
+            f"{half_angle}."
+        )
+    rock = rock or Rock()
+    joints = np.linspace(-half_angle, half_angle, n + 1)
+    inner, outer = radius - thickness / 2, radius + thickness / 2
+    stones = [
+        rock.stone(_sector(inner, outer, joints[[k, k + 1]]),
+                   _sector(inner, outer, np.linspace(joints[k], joints[k + 1], 33)))
+        for k in range(n)
+    ]  # fmt: skip
+    left, right = (_springer(inner, outer, half_angle * side) for side in (-1, 1))
+    return rock.masonry([rock.stone(left), *stones, rock.stone(right)], (0, n + 1))
+
+
+def _sector(inner: float, outer: float, angles: Array) -> Array:
+    """Outline between two radii, angles from the crown to the right; counterclockwise."""
+    ray = np.column_stack([np.sin(angles), np.cos(angles)])
+    return np.vstack([outer * ray[::-1], inner * ray])
+
+
+def _springer(inner: float, outer: float, angle: float) -> Array:
+    """Held stone behind the joint at an angle, half a thickness wider on both sides."""
+    t, side = outer - inner, np.sign(angle)
+    ray = np.array([np.sin(angle), np.cos(angle)])
+    beyond = side * t * np.array([ray[1], -ray[0]])
+    a, b = (inner - t / 2) * ray, (outer + t / 2) * ray
+    ring = np.array([b + beyond, b, a, a + beyond])
+    return ring if side > 0 else ring[::-1]
+
+
+def wall(
+    length: float,
+    courses: int,
+    *,
+    brick: tuple[float, float] = (0.5, 0.25),
+    opening: tuple[float, float, int, int] | None = None,
+    rock: Rock | None = None,
+) -> Masonry:
+    """Wall in running bond on held ground, the first stone; with an opening under one long lintel.
+
+    Args:
+        length: a multiple of half a brick [m].
+        courses: number of courses.
+        brick: length and height of a brick [m].
+        opening: left and right end [m], first course and the course of the lintel.
+        rock: material and joints; the default is hard stone.
+
+    Raises:
+        ConfigError: if nothing of the wall is left, or the opening is not inside it.
+    """
+    rock, (b, h) = rock or Rock(), brick
+    if not (length > 0 and courses >= 1 and min(brick) > 0):
+        raise ConfigError(f"no wall is {length} m long with {courses} courses of bricks {brick}.")
+    if opening and not (0 < opening[0] < opening[1] < length and opening[2] <= opening[3]):
+        raise ConfigError(
+            f"the opening {opening} is not in a wall of {length} m.",
+            hint="Left end, right end [m], first course, course of the lintel.",
+        )
+    stones = [rock.stone(_box(-b, length + b, -h, 0.0))]
+    for r in range(courses):
+        cuts = np.r_[0.0, np.arange(b / 2 if r % 2 else b, length - 1e-9, b), length]
+        spans, hole = list(pairwise(cuts)), None
+        if opening and opening[2] <= r <= opening[3]:
+            bearing = b / 2 if r == opening[3] else 0.0
+            hole = opening[0] - bearing, opening[1] + bearing
+            spans = [s for x, y in spans for s in ((x, min(y, hole[0])), (max(x, hole[1]), y))]
+        spans += [hole] if hole and opening and r == opening[3] else []
+        stones += [rock.stone(_box(x, y, r * h, r * h + h)) for x, y in spans if y > x + 1e-9]
+    return rock.masonry(stones, (0,))
+
+
+def _box(left: float, right: float, bottom: float, top: float) -> Array:
+    return np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
+
+
+def stands(masonry: Masonry) -> bool:
+    """Whether forces in the joints can carry the weight of rigid stones where they lie.
+
+    Normal forces at the corners press, tangential ones stay within friction, and every stone that
+    is not held is in equilibrium.
+
+    Raises:
+        SolverError: if linear programming fails.
+    """
+    B, C = masonry.blocks(), touching(masonry)
+    row = np.where(B.equation >= 0, 3 * (np.cumsum(B.equation >= 0) - 1), -1)
+    n, entries = int(C.used[0]), []
+    scale = np.r_[1.0, 1.0, 1 / np.sqrt(B.M[0, 2, 2] / B.M[0, 0, 0])]
+    for one in range(2):
+        at = row[C.who[:, 2 * one]]
+        for k in np.flatnonzero(at >= 0):
+            for p in range(3):
+                entries.append((at[k] + p, k, scale[p] * C.n[k, one, p]))
+                entries.append((at[k] + p, n + k, scale[p] * C.t[k, one, p]))
+    i, j, values = np.array(entries).T
+    shape = (3 * int((B.equation >= 0).sum()), 2 * n)
+    balance = coo_matrix((values, (i.astype(int), j.astype(int))), shape=shape)
+    weight = (B.load[B.equation >= 0, :3] * scale).ravel()
+    k, ones = np.arange(n), np.ones(n)
+    mu = np.full(n, masonry.friction)
+    slip = coo_matrix(
+        (np.r_[-mu, ones, -mu, -ones], (np.r_[k, k, n + k, n + k], np.r_[k, n + k, k, n + k]))
+    )
+    found = linprog(
+        np.zeros(2 * n), slip, np.zeros(2 * n), balance, -weight / np.abs(weight).max(),
+        [(0, None)] * n + [(None, None)] * n, method="highs",
+    )  # fmt: skip
+    if found.status not in (0, 2):
+        raise SolverError(f"no answer whether the masonry stands: {found.message}")
+    return bool(found.status == 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """The thinnest arch.
+
+    Attributes:
+        ratio: thickness over radius of the centre line.
+        hinge: angle of the intrados hinges from the crown [rad].
+        thrust: horizontal thrust over weight per length and radius.
+    """
+
+    ratio: float
+    hinge: float
+    thrust: float
+
+
+def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True) -> Limit:
+    """Thinnest circular arch with hinges at the crown and springings outside, between them inside.
+
+    With the radius of the centre line and the weight per length as units, Ro and Ri the radii of
+    the faces, the line of thrust H at the crown has the radius::
+
+        rho(theta) = (H Ro + c (1 - cos theta)) / (H cos theta + theta sin theta)
+
+    It passes the springing at Ro, which gives H, and touches Ri.
+
+    Args:
+        half_angle: from the crown to the springing [rad]; large enough for inner hinges.
+        true_weight: weight in the mass centre of each sector, c = 1 + ratio^2 / 12 (Milankovitch);
+            otherwise on the centre line, c = 1.
+
+    Raises:
+        ConfigError: if hinges cannot open inside: thin arches as flat are stable until they slip.
+
+    Source:
+        After Milankovitch, as cited by Alexakis and Makris; derived anew.
+    """
+
+    def lowest(ratio: float) -> tuple[float, float, float]:
+        Ro, c = 1 + ratio / 2, 1 + true_weight * ratio**2 / 12
+        cos, sin = np.cos(half_angle), np.sin(half_angle)
+        H = (Ro * half_angle * sin - c * (1 - cos)) / (Ro * (1 - cos))
+
+        def radius(theta: float) -> float:
+            thrust = H * Ro + c * (1 - np.cos(theta))
+            return float(thrust / (H * np.cos(theta) + theta * np.sin(theta)))
+
+        best = minimize_scalar(
+            radius, bounds=(0.0, half_angle), method="bounded", options={"xatol": 1e-12}
+        )
+        return best.fun - (1 - ratio / 2), best.x, H
+
+    if not 0 < half_angle <= np.pi / 2 or lowest(1e-6)[0] >= 0:
+        raise ConfigError(
+            f"half_angle = {half_angle} rad: between 0 and pi / 2, and not too flat for hinges."
+        )
+    ratio = brentq(lambda x: lowest(x)[0], 1e-6, 0.5, xtol=1e-15)
+    return Limit(float(ratio), *map(float, lowest(ratio)[1:]))

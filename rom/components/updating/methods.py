@@ -1,0 +1,249 @@
+"""Least squares over responses and over equations, and the response function method."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+
+from rom.components.updating.models import (
+    AtSensors,
+    Complex,
+    Measurement,
+    Modal,
+    Model,
+    ParametricModel,
+    modal,
+    sensor_dofs,
+)
+from rom.errors import ConfigError
+from rom.model import Array
+
+MAX_EVALUATIONS = 100  # evaluations of the responses; more are needed if the start is too far away
+MAX_STEPS = 40  # linear solutions
+MAX_PARAMETER_CHANGE = 0.2  # in one step
+MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
+EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """What updating found.
+
+    Attributes:
+        p: (n_p,) relative changes of stiffness and mass.
+        zeta: (m,) damping ratios of the lowest elastic modes.
+        deviation: (n_p + m,) standard deviations of p and ln zeta that the residual implies.
+        history: (k, n_p) p after each step.
+        residual: root mean square of the weighted residual.
+    """
+
+    p: Array
+    zeta: Array
+    deviation: Array
+    history: Array
+    residual: float
+
+
+def responses(
+    model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
+) -> Complex:
+    """Receptances (n_f, n_s, n_e) [m/N] at the sensors, for forces at the sensors ``inputs``.
+
+    Parameters p (n_p,), damping ratios zeta (m,) of the lowest elastic modes, omega (n_f,) [rad/s].
+
+    Raises:
+        ConfigError: for an input that is no sensor, or a frequency that is not finite.
+    """
+    here = model.at(p)
+    if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
+        raise ConfigError(
+            f"inputs = {inputs} of the sensors 0 to {len(here.sensors) - 1}, at finite omega."
+        )
+    return _receptance(here, modal(here, zeta), omega, inputs)
+
+
+def _receptance(
+    model: ParametricModel, modes: Modal, omega: Array, inputs: tuple[int, ...]
+) -> Complex:
+    seen = model.sensors @ modes.Phi
+    return np.einsum("sn,fn,en->fse", seen, modes.g(omega), seen[list(inputs)], optimize=True)
+
+
+def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Array, Array]:
+    """Phi^T dZ Phi = A - omega^2 B + i omega C, each (n_p, n, n), at constant damping ratios.
+
+    The damping changes with its modes; of their derivatives remain divided differences of d.
+    """
+    A, B = (modes.Phi.T @ dA @ modes.Phi for dA in (model.dK, model.dM))
+    lam, d = modes.lam, modes.d
+    gap = lam - lam[:, None]  # lam_j - lam_i in row i, column j
+    apart = np.abs(gap) > EQUAL_EIGENVALUE_RTOL * lam[-1]
+    gap = np.where(apart, gap, 1.0)
+    C = ((d - d[:, None]) * A - (d * lam[:, None] - d[:, None] * lam) * B) / gap * apart
+    i = np.arange(lam.size)
+    own = np.divide(d, 2 * lam, out=np.zeros_like(d), where=lam > 0)  # d = 2 zeta sqrt(lam)
+    C[:, i, i] = own * (A[:, i, i] - lam * B[:, i, i]) + d * B[:, i, i]
+    return A, B, C
+
+
+def _by_all(model: ParametricModel, modes: Modal, m: int, *sides: Any) -> Complex:
+    """Sides times Phi^T dZ Phi, (n_f, a, b, n_p + m): by p and m logarithms of damping ratios."""
+    left, right, omega = sides
+    by_p = _through(left, _modal_sensitivity(model, modes), right, omega)
+    e = slice(model.n_rigid, model.n_rigid + m)
+    damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
+    return np.concatenate([by_p, damped * (1j * omega[:, None, None, None] * modes.d[e])], axis=-1)
+
+
+def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) -> Complex:
+    """Left (A - omega^2 B + i omega C) right: (n_f, a, n), (n_q, n, n), (n_f, n, b).
+
+    The narrower side is pushed through all matrices at once; they are symmetric.
+    """
+    if left.shape[1] < right.shape[2]:
+        flipped = _through(np.swapaxes(right, 1, 2), S, np.swapaxes(left, 1, 2), omega)
+        return np.swapaxes(flipped, 1, 2)
+    n_f, n, b = right.shape
+    columns = np.ascontiguousarray(np.moveaxis(right, 1, 0).reshape(n, n_f * b))
+    w, pushed = np.repeat(omega, b), np.zeros((), dtype=complex)
+    for part, factor in zip(S, (1.0, -(w**2), 1j * w), strict=True):
+        pairs = part.reshape(-1, n) @ (columns * factor).view(np.float64)  # a quarter of the work
+        pushed = pushed + pairs.view(np.complex128)
+    pushed = pushed.reshape(-1, n, n_f, b).transpose(2, 1, 3, 0).reshape(n_f, n, -1)
+    return (left @ pushed).reshape(n_f, left.shape[1], b, -1)
+
+
+def sensitivity(
+    model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
+) -> tuple[Complex, Complex]:
+    """Receptances (n_f, n_s, n_e), and their derivatives by p and ln zeta, (..., n_p + m)."""
+    here = model.at(p)
+    modes = modal(here, zeta)
+    seen, g = here.sensors @ modes.Phi, modes.g(omega)
+    sides = (seen * g[:, None, :], g[:, :, None] * seen[list(inputs)].T, omega)
+    H = _receptance(here, modes, omega, inputs)
+    return H, -_by_all(here, modes, np.size(zeta), *sides)
+
+
+def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
+    """Least squares of ln(H / H_test) over p and ln zeta, from a start (n_p,), (m,).
+
+    Each value counts by its relative error, so that antiresonances weigh as much as resonances.
+    """
+    test.check(model, zeta)
+    n_p, path = np.size(p), []
+
+    def residual(x: Array) -> Array:
+        H = responses(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
+        return _weighted(test.weights, np.log(H / test.H))
+
+    def jacobian(x: Array) -> Array:
+        path.append(x[:n_p].copy())
+        H, dH = sensitivity(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
+        return _weighted(test.weights, dH / H[..., None])
+
+    start = np.concatenate([p, np.log(zeta)])
+    low = np.concatenate([np.full(n_p, MIN_PARAMETER), np.full(np.size(zeta), -np.inf)])
+    found = least_squares(
+        residual, start, jacobian, bounds=(low, np.inf), max_nfev=MAX_EVALUATIONS,
+        xtol=1e-12, ftol=1e-12, gtol=1e-12,
+    )  # fmt: skip
+    return _update(found.x, n_p, found.fun, found.jac, [*path[1:], found.x[:n_p]])
+
+
+def update_by_input(
+    model: AtSensors, test: Measurement, p: ArrayLike, zeta: ArrayLike, *, rank: int
+) -> Update:
+    """Least squares of U^T Z^-1 (Z(p) U U^T y - f): linear in p and zeta in each step.
+
+    U spans the strongest ``rank`` directions of all test and model responses together; both sets
+    are condensed with it. The rank, at most the number of sensors, must reach the number of modes
+    in the band. Otherwise as `update_by_output`.
+    """
+    test.check(model, zeta)
+    if not 1 <= rank <= test.H.shape[1]:
+        raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
+    x, ratios, path = np.array(p, dtype=float), np.array(zeta, dtype=float), []
+    weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
+    weights = weights.mean(axis=1, keepdims=True)
+    for _ in range(MAX_STEPS):
+        here = model.at(x)
+        modes = modal(here, ratios)
+        H = _receptance(here, modes, test.omega, test.inputs)
+        U = common_basis(test.H, H, rank)
+        y = modes.Phi.T @ here.M @ (U @ (U.T @ test.H))  # Phi^-1 = Phi^T M
+        left = (U.T @ modes.Phi) * modes.g(test.omega)[:, None, :]
+        J = _weighted(weights, _by_all(here, modes, ratios.size, left, y, test.omega))
+        r = _weighted(weights, U.T @ (test.H - H))
+        step = np.clip(
+            -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
+        )
+        ratios = ratios * np.exp(step[x.size :])
+        x = np.maximum(x + step[: x.size], MIN_PARAMETER)
+        path.append(x)
+    return _update(np.concatenate([x, np.log(ratios)]), x.size, r, J, path)
+
+
+def response_function_method(
+    model: ParametricModel, test: Measurement, p: ArrayLike, C: Array, *, steps: int = 1
+) -> Update:
+    """Solve H - H_test = H dZ(p) H_test, linear in p.
+
+    Exact in one step when every dof is measured without noise. Else unmeasured rows of H_test
+    follow the measured ones as the model at the last p says. Of several steps none changes a
+    parameter by more than 0.2. The damping C (n, n) [N s/m] is known, sensors are dofs.
+
+    Raises:
+        ConfigError: if damping or sensors do not fit the model, or without a step.
+
+    Source:
+        The identity is that of the response function method of Lin and Ewins.
+    """
+    test.check(model)
+    if np.shape(C) != model.K.shape or steps < 1:
+        raise ConfigError(
+            f"C is {np.shape(C)} for {len(model.K)} dofs, with {steps} steps: square, and one or "
+            "more."
+        )
+    p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
+    clip = MAX_PARAMETER_CHANGE if steps > 1 else np.inf
+    o = np.setdiff1d(np.arange(len(model.K)), s)
+    w = test.omega[:, None, None]
+    F = np.eye(len(model.K))[:, s[list(test.inputs)]]
+    for _ in range(steps):
+        here = model.at(p)
+        Z = here.K - w**2 * here.M + 1j * w * C
+        H = np.linalg.inv(Z)[:, s]
+        known = np.empty((w.size, *F.shape), dtype=complex)
+        known[:, s] = test.H
+        known[:, o] = np.linalg.solve(Z[:, o][:, :, o], F[o] - Z[:, o][:, :, s] @ test.H)
+        change = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
+        J, r = _weighted(test.weights, change), _weighted(test.weights, H @ F - test.H)
+        step = np.linalg.lstsq(J, r, rcond=None)[0]
+        p = np.maximum(p + np.clip(step, -clip, clip), MIN_PARAMETER)
+        path.append(p)
+    return _update(p, p.size, r - J @ step, J, path)
+
+
+def common_basis(test: Complex, model: Complex, rank: int) -> Array:
+    """(n_s, rank) orthonormal directions of test and model responses, each of norm one."""
+    Y = np.concatenate([np.moveaxis(H, 1, 0).reshape(H.shape[1], -1) for H in (test, model)], 1)
+    Y = Y / np.linalg.norm(Y, axis=0)
+    return np.linalg.svd(np.hstack([Y.real, Y.imag]), full_matrices=False)[0][:, :rank]
+
+
+def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update:
+    variance = (r @ r) / max(r.size - x.size, 1)
+    spread = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)) * variance)
+    return Update(x[:n_p], np.exp(x[n_p:]), spread, np.array(path), np.sqrt((r @ r) / r.size))
+
+
+def _weighted(weights: Any, r: Complex) -> Array:
+    """Weighted residual, or its derivatives (.., n_q), real parts above imaginary parts."""
+    weights = np.asarray(weights, dtype=float)
+    if r.ndim == 3:
+        return np.concatenate([(part * weights).ravel() for part in (r.real, r.imag)])
+    weights = weights[..., None] if weights.ndim else weights
+    return np.vstack([(part * weights).reshape(-1, r.shape[-1]) for part in (r.real, r.imag)])

@@ -1,0 +1,229 @@
+"""Models with parameters, their modes, and what is measured of them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+
+from rom.errors import ConfigError, ModelError
+from rom.model import Array
+from rom.reduction.bases.fixed_interface import craig_bampton
+
+Complex = NDArray[np.complex128]
+RIGID_RTOL = 1e-4  # round-off of a rigid motion's eigenvalue, of the lowest elastic one
+RANK_RTOL = 1e-7  # singular value of dependent columns of a basis, of the largest one
+
+
+@dataclass(frozen=True, slots=True)
+class ParametricModel:
+    """K(p) = K + sum p_i dK_i and M(p) = M + sum p_i dM_i, seen at sensors.
+
+    Attributes:
+        K: (n, n) stiffness at p = 0 [N/m].
+        M: (n, n) mass at p = 0 [kg].
+        dK: (n_p, n, n) what each parameter adds to K; zeros where it does not.
+        dM: (n_p, n, n) what each parameter adds to M.
+        sensors: (n_s, n) rows that give the measured displacements.
+        n_rigid: number of rigid motions, 0 for a supported and 6 for a free structure.
+    """
+
+    K: Array
+    M: Array
+    dK: Array
+    dM: Array
+    sensors: Array
+    n_rigid: int = 0
+
+    def __post_init__(self) -> None:
+        n, n_p = len(self.K), len(self.dK)
+        wanted = {"M": (n, n), "dK": (n_p, n, n), "dM": (n_p, n, n)}
+        wanted["sensors"] = (len(self.sensors), n)
+        for name, shape in wanted.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise ConfigError(f"{name} is {found} where {shape} belongs to {n} dofs.")
+
+    def at(self, p: ArrayLike) -> "ParametricModel":
+        """The model with its origin at p (n_p,)."""
+        p = np.asarray(p, dtype=float)
+        if p.shape != (len(self.dK),):
+            raise ConfigError(f"p has the shape {p.shape}; the model has {len(self.dK)} of them.")
+        K, M = (A + np.tensordot(p, dA, 1) for A, dA in ((self.K, self.dK), (self.M, self.dM)))
+        return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
+
+    def in_basis(self, T: Array) -> "ParametricModel":
+        """The model reduced to u = T a, T (n, r) the same for all p: fast, still parametric."""
+        K, M, dK, dM = (T.T @ A @ T for A in (self.K, self.M, self.dK, self.dM))
+        return ParametricModel(K, M, dK, dM, self.sensors @ T, self.n_rigid)
+
+
+@dataclass(frozen=True, slots=True)
+class AtSensors:
+    """A parametric model condensed statically to its sensors, anew for each p.
+
+    With T = [1; -K_oo^-1 K_os] the stiffness at the sensors has the derivative T^T dK T, and the
+    mass also that of T. What is between the sensors follows them statically, so that frequencies
+    are too high however good the data.
+
+    Attributes:
+        full: the model; its sensors are dofs.
+    """
+
+    full: ParametricModel
+
+    def at(self, p: ArrayLike) -> ParametricModel:
+        """The condensed model with its origin at p and the derivatives there.
+
+        Raises:
+            ConfigError, ModelError: if sensors are no dofs, or do not hold the structure.
+        """
+        model = self.full.at(p)
+        s = sensor_dofs(model)
+        o = np.setdiff1d(np.arange(len(model.K)), s)
+        try:
+            K_oo = cho_factor(model.K[np.ix_(o, o)])
+        except LinAlgError as error:
+            raise ModelError("held at its sensors, the structure can still move.") from error
+        T = np.zeros((len(model.K), s.size))
+        T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
+        dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
+        moved = np.swapaxes(dT, 1, 2) @ (model.M @ T)[o]
+        K, M, dK, dM = (T.T @ A @ T for A in (model.K, model.M, model.dK, model.dM))
+        dM = dM + moved + np.swapaxes(moved, 1, 2)
+        return ParametricModel(K, M, dK, dM, np.eye(s.size), model.n_rigid)
+
+
+Model = ParametricModel | AtSensors
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Measured receptances.
+
+    Attributes:
+        omega: (n_f,) circular frequencies [rad/s].
+        H: (n_f, n_s, n_e) displacement at each sensor per unit force at each exciter [m/N];
+            a sensor that symmetry keeps at rest has only noise to say and is left out.
+        inputs: (n_e,) which sensors have an exciter.
+        weights: (n_f, n_s, n_e), (n_f, 1, 1) or one number: how far to trust each value.
+
+    Raises:
+        ConfigError: if these do not fit each other, or a channel is dead.
+    """
+
+    omega: Array
+    H: Complex
+    inputs: tuple[int, ...]
+    weights: Any = 1.0
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
+            n = (len(self.omega), len(self.inputs))
+            raise ConfigError(f"H is {np.shape(self.H)} for {n[0]} frequencies, {n[1]} exciters.")
+        if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
+            raise ConfigError("H has entries that are zero or not finite: a dead channel.")
+        if not set(self.inputs) <= set(range(self.H.shape[1])):
+            raise ConfigError(f"inputs = {self.inputs} of the sensors 0 to {self.H.shape[1] - 1}.")
+        w = np.shape(self.weights)
+        if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
+            raise ConfigError(f"weights {w} fit neither a number nor responses {self.H.shape}.")
+
+    def check(self, model: "Model", zeta: ArrayLike = ()) -> None:
+        """See that a model and damping ratios can answer to it.
+
+        Raises:
+            ConfigError: if the sensors differ in number, or a ratio is not positive.
+        """
+        full = model.full if isinstance(model, AtSensors) else model
+        if len(full.sensors) != self.H.shape[1]:
+            raise ConfigError(
+                f"the model has {len(full.sensors)} sensors, the test {self.H.shape[1]}."
+            )
+        if not (np.asarray(zeta) > 0).all():
+            raise ConfigError(f"zeta = {zeta!r}: damping ratios to start from must be positive.")
+
+
+@dataclass(frozen=True, slots=True)
+class Modal:
+    """A model in its own modes: Z^-1 = Phi diag(g(omega)) Phi^T with modal damping.
+
+    Attributes:
+        lam: (n,) eigenvalues [rad^2/s^2].
+        Phi: (n, n) modes, mass-normalised.
+        d: (n,) damping 2 zeta omega [rad/s] of each mode.
+    """
+
+    lam: Array
+    Phi: Array
+    d: Array
+
+    def g(self, omega: Array) -> Complex:
+        """(n_f, n) receptance of each mode."""
+        w = omega[:, None]
+        return 1.0 / (self.lam - w**2 + 1j * w * self.d)
+
+
+def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
+    """Modes of a model at its origin; zeta (m,) for the lowest elastic ones, the others undamped.
+
+    Raises:
+        ConfigError, ModelError: for more ratios than modes; for mass or stiffness not positive.
+    """
+    try:
+        lam, Phi = eigh(model.K, model.M)
+    except LinAlgError as error:
+        raise ModelError("the changes leave a mass matrix that is not positive.") from error
+    elastic = slice(model.n_rigid, None)
+    rigid = np.abs(lam[: model.n_rigid]).max(initial=0.0)
+    if rigid > RIGID_RTOL * np.abs(lam[elastic]).min(initial=np.inf):
+        raise ModelError(
+            f"n_rigid = {model.n_rigid}, but a motion among them has the frequency "
+            f"{np.sqrt(rigid):.4g} rad/s: the structure is held."
+        )
+    lam[: model.n_rigid] = 0.0
+    if not (lam[elastic] > 0).all():
+        raise ModelError(
+            f"{model.n_rigid} rigid motions leave the eigenvalue {lam[elastic].min():.3g}"
+            " rad^2/s^2: the stiffness is not positive."
+        )
+    zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
+    if zeta.size > lam.size - model.n_rigid:
+        raise ConfigError(f"{zeta.size} damping ratios for {lam.size - model.n_rigid} modes.")
+    damped = slice(model.n_rigid, model.n_rigid + zeta.size)
+    d[damped] = 2 * zeta * np.sqrt(lam[damped])
+    return Modal(lam, Phi, d)
+
+
+def damping_matrix(model: ParametricModel, zeta: ArrayLike) -> Array:
+    """(n, n) C = sum 2 zeta omega (M phi)(M phi)^T at the origin of the model [N s/m]."""
+    modes = modal(model, zeta)
+    return (model.M @ modes.Phi * modes.d) @ (model.M @ modes.Phi).T
+
+
+def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -> Array:
+    """(n, r) basis for a range of p: Craig-Bampton at samples (k, n_p), held at the sensors.
+
+    Raises:
+        ConfigError: without a mode, or if sensors are no dofs.
+    """
+    if n_modes < 1:
+        raise ConfigError(f"n_modes = {n_modes}: a basis needs one or more between the sensors.")
+    s = sensor_dofs(model)
+    at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]
+    Psi = np.hstack([craig_bampton(here.K, here.M, s, n_modes).Psi for here in at])
+    U, size, _ = np.linalg.svd(Psi / np.linalg.norm(Psi, axis=0), full_matrices=False)
+    return U[:, size > RANK_RTOL * size[0]]
+
+
+def sensor_dofs(model: ParametricModel) -> Any:
+    """(n_s,) the dofs that the sensors are.
+
+    Raises:
+        ConfigError: if they are none.
+    """
+    s = model.sensors.argmax(axis=1)
+    if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
+        raise ConfigError("the sensors are no dofs of the model; condense before reducing.")
+    return s

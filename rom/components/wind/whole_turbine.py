@@ -1,0 +1,202 @@
+"""The NREL 5 MW reference turbine as one mechanism: rods, rigid bodies, gear and shaft.
+
+The foot of the tower is the origin, the first axis points downwind and the third one up. Tower and
+blades are rods of `rom.components.wind.wind_turbine`; nacelle, hub and generator are rigid. The
+shaft between hub and gear twists; the gear drives the generator.
+
+Source:
+    Jonkman, Butterfield, Musial, Scott, Definition of a 5-MW reference wind turbine for offshore
+    system development, NREL/TP-500-38060, 2009.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom import rotation
+from rom.components.cosserat import body
+from rom.components.wind.blade_element import in_wind
+from rom.components.wind.wind_turbine import (
+    GEAR_RATIO,
+    GENERATOR_INERTIA,
+    HUB_INERTIA,
+    HUB_OVERHANG,
+    N_BLADES,
+    SHAFT_DAMPING,
+    SHAFT_STIFFNESS,
+    TOWER_HEIGHT,
+    blade,
+    tower,
+)
+from rom.errors import ConfigError
+from rom.mbs.elements.nonlinear import Assembly
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.results.solution import Solution
+from rom.model import Array
+
+SHAFT_HEIGHT = 1.96256  # from the top of the tower [m]
+SHAFT_TILT = np.radians(5.0)  # nose up [rad]
+CONE_ANGLE = np.radians(2.5)  # blades upwind, away from the tower [rad]
+HUB_MASS = 56_780.0  # kg
+NACELLE_MASS, NACELLE_CENTRE = 240_000.0, (1.9, 0.0, 1.75)  # kg, m from the top of the tower
+NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
+# kg; gear wheel and generator are part of the nacelle, which is lighter by as much
+WHEEL_MASS, GENERATOR_MASS = 1000.0, 1000.0
+WHEEL_INERTIA = 500.0  # kg m^2: of no weight beside the generator's 5e6 on the slow side
+STILL = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Turbine:
+    """A turbine as a mechanism.
+
+    Attributes:
+        mechanism: all of it; `slow`, the joint of gear wheel and nacelle, turns about the shaft.
+        blades: three rods.
+        tower: a rod, None for a stiff one.
+        axis: (3,) of the shaft, downwind.
+        hub: (3,) its centre [m].
+    """
+
+    mechanism: Mechanism
+    blades: tuple[Assembly, ...]
+    tower: Assembly | None
+    axis: Array
+    hub: Array
+
+    def turn_by(self, angle: Callable[[float], float], speed: Callable[[float], float]) -> None:
+        """Prescribe the angle [rad] and the speed [rad/s] of the gear wheel over time."""
+        self.mechanism.drive("speed", "slow", angle, rate=speed)
+
+    def turn_with(self, torque: Callable[[float, float, float], float]) -> None:
+        """Let a torque [N m] of (time, angle, speed) on the slow side turn the rotor."""
+        self.mechanism.motor("torque", "slow", torque)
+
+    def tip(self, solution: Solution, k: int) -> Array:
+        """(t, 3) deflection of the tip of blade k in axes of the hub [m].
+
+        Downwind, against the motion, outward.
+        """
+        start, end = self.blades[k].marker("start"), self.blades[k].marker("end")
+        A = rotation.matrix(self.blades[k].parts[0].p)
+        home = self.mechanism.design_point(end) - self.mechanism.design_point(start)
+        out = home / np.linalg.norm(home)
+        behind = np.cross(out, self.axis)
+        basis = np.array([np.cross(behind, out), behind, out]) @ A
+        arm = solution.position(end.body) - solution.position(start.body)
+        axes = solution.axes(start.body, start.place)
+        seen = np.einsum("tji,tj->ti", axes, arm) - A.T @ home
+        return seen @ basis.T
+
+
+def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
+    segments: int = 48,
+    *,
+    tower_segments: int = 16,
+    gravity: float = 9.80665,
+    tilt: float = SHAFT_TILT,
+    cone: float = CONE_ANGLE,
+    damped: bool = True,
+    wind: float | None = None,
+    speed: float = 0.0,
+    shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
+) -> Turbine:
+    """The turbine, its first blade up.
+
+    Args:
+        segments: of a blade.
+        tower_segments: of the tower; 0 for a stiff one.
+        gravity: its acceleration [m/s^2].
+        tilt: of the shaft, nose up [rad].
+        cone: of the blades, upwind [rad].
+        damped: whether blades have the viscosity of the definition.
+        wind: its speed along the first axis [m/s], see `rom.components.wind.blade_element`; None:
+            still.
+        speed: with which the rotor starts to turn [rad/s].
+        shaft: torsional stiffness [N m/rad] and damping [N m s/rad].
+
+    Raises:
+        ConfigError: for less than one segment of a blade.
+    """
+    if segments < 1 or tower_segments < 0:
+        raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
+                          hint="A blade has one or more, a stiff tower none.")  # fmt: skip
+    mech = Mechanism(gravity=(0.0, 0.0, -gravity))
+    top, standing = _tower(mech, tower_segments)
+    lean = rotation.matrix(rotation.exp([0.0, tilt, 0.0]))
+    axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER_HEIGHT + SHAFT_HEIGHT])
+    hub = hub - HUB_OVERHANG * axis
+    nacelle = _nacelle(mech, top)
+    turning = _train(mech, nacelle, (lean, hub, axis), shaft, speed)
+    one = body(blade(segments, damped=damped))
+    one = one if wind is None else in_wind(one, (wind, 0.0, 0.0))
+    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(N_BLADES))
+    return Turbine(mech, blades, standing, axis, hub)
+
+
+def _tower(mech: Mechanism, segments: int) -> tuple[Marker, Assembly | None]:
+    """The marker on top of the tower, and the tower."""
+    if segments == 0:
+        return mech.ground.marker((0.0, 0.0, TOWER_HEIGHT)), None
+    standing = mech.add_nonlinear("tower", body(tower(segments)))
+    mech.fixed("foot", mech.ground.marker(STILL), standing.marker("start"))
+    return standing.marker("end"), standing
+
+
+def _nacelle(mech: Mechanism, top: Marker) -> Part:
+    """Nacelle without gear wheel and generator, fixed on the tower.
+
+    Of its inertia only that about the tower is published; the others are the least a body can have.
+    """
+    mass = NACELLE_MASS - WHEEL_MASS - GENERATOR_MASS
+    at = np.array([0.0, 0.0, TOWER_HEIGHT]) + NACELLE_CENTRE
+    yaw = NACELLE_YAW - NACELLE_MASS * (NACELLE_CENTRE[0] ** 2 + NACELLE_CENTRE[1] ** 2)
+    part = mech.add_rigid("nacelle", mass=mass, inertia=(yaw / 2, yaw / 2, yaw), at=at)
+    mech.fixed("yaw", top, part.marker(-np.array(NACELLE_CENTRE)))
+    return part
+
+
+def _train(
+    mech: Mechanism,
+    nacelle: Part,
+    place: tuple[Array, Array, Array],
+    shaft: tuple[float, float],
+    speed: float,
+) -> Part:
+    """Gear wheel, generator and hub; the hub, which carries the blades."""
+    lean, hub, axis = place
+    behind = nacelle.at
+    bearing = nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
+    at = mech.design_point(bearing)
+    slow, fast = speed * axis, GEAR_RATIO * speed * axis
+    wheel = mech.add_rigid(
+        "wheel", mass=WHEEL_MASS, inertia=(WHEEL_INERTIA,) * 3, at=at, omega=slow
+    )
+    generator = mech.add_rigid(
+        "generator", mass=GENERATOR_MASS, inertia=(GENERATOR_INERTIA,) * 3, at=at, omega=fast
+    )
+    turning = mech.add_rigid(
+        "hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, at=hub, orientation=lean,
+        omega=(speed, 0.0, 0.0),
+    )  # fmt: skip
+    mech.revolute("slow", bearing, wheel.marker(STILL), axis=axis)
+    mech.revolute("fast", bearing, generator.marker(STILL), axis=axis)
+    mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
+    mech.revolute("shaft", wheel.marker(hub - at), turning.marker(STILL), axis=axis)
+    mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
+    return turning
+
+
+def _blade(mech: Mechanism, k: int, one: Any, hub: Part, place: Any) -> Assembly:
+    """Blade k on the hub."""
+    lean, centre, cone, speed = place
+    round_ = rotation.matrix(rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0]))
+    A = lean @ round_ @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
+    turning = A.T @ lean @ [speed, 0.0, 0.0]
+    added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
+    root = rotation.matrix(hub.p).T @ (mech.design_point(added.marker("start")) - centre)
+    mech.fixed(f"root {k + 1}", hub.marker(root), added.marker("start"))
+    return added

@@ -1,0 +1,73 @@
+"""Point masses and rigid bodies carried by an interface.
+
+A rigid body has the same kinetic energy as six point masses m/6 on its principal axes
+(equimomental system). Carried along by the mean motion of an interface they enter the mass matrix
+and all inertia integrals as six more nodes, with no formula of their own.
+"""
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from rom.eigen.verbs import mean_motion, rigid_motions
+from rom.errors import InterfaceError, MaterialError
+from rom.model import Array, Attachment, FEModel
+from rom.plausible import REACH, warn_outside
+
+
+def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
+    """Six points and masses with the mass, centre and inertia of the attachment.
+
+    Args:
+        attachment: mass [kg] and inertia [kg m^2].
+        origin: (3,) where the mass centre is when ``attachment.at`` is None [m].
+
+    Returns:
+        points (6, 3) [m] and masses (6,) [kg].
+
+    Raises:
+        MaterialError: if the mass is not positive or no real body has this inertia.
+    """
+    m, J = attachment.mass, np.asarray(attachment.inertia, dtype=float)
+    at = origin if attachment.at is None else np.asarray(attachment.at, dtype=float)
+    if not (np.isfinite(m) and m > 0):
+        raise MaterialError(f"attachment on {attachment.interface!r} has the mass {m:g} kg.")
+    second, axes = np.linalg.eigh(0.5 * np.trace(J) * np.eye(3) - J)  # integral of rho x x^T
+    if J.shape != (3, 3) or second.min() < -1e-9 * max(second.max(), 1e-300):
+        raise MaterialError(
+            f"attachment on {attachment.interface!r}: no body has this inertia; "
+            "one principal moment exceeds the sum of the two others."
+        )
+    arms = axes * np.sqrt(3 * np.maximum(second, 0.0) / m)
+    return at + np.vstack([arms.T, -arms.T]), np.full(6, m / 6)
+
+
+def carried_displacements(attachment: Attachment, model: FEModel) -> tuple[Array, Array, Array]:
+    """Points (6, 3), masses (6,) and the map (18, 3k) from interface dofs to their motion."""
+    if attachment.interface not in model.interfaces:
+        raise InterfaceError(
+            f"an attachment names the interface {attachment.interface!r}; "
+            f"the model has {sorted(model.interfaces)}."
+        )
+    interface = model.interfaces[attachment.interface]
+    points, masses = point_masses(attachment, interface.origin)
+    reach, size = np.abs(points - interface.origin).max(), np.ptp(model.points, axis=0).max()
+    warn_outside(REACH, float(reach / size), f"the attachment on {interface.name!r}")
+    return points, masses, rigid_motions(points - interface.origin) @ mean_motion(interface)
+
+
+def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
+    """Sparse (n_local, n) mass of all attachments, the rows of this process; None without any."""
+    if not model.attachments:
+        return None
+    dM: Any = csr_matrix((n_local, model.n_dofs))
+    for attachment in model.attachments:
+        _, masses, N = carried_displacements(attachment, model)
+        dofs = model.interfaces[attachment.interface].dofs
+        block = N.T @ (np.repeat(masses, 3)[:, None] * N)
+        mine = (dofs >= first) & (dofs < first + n_local)
+        rows = np.repeat(dofs[mine] - first, dofs.size)
+        columns = np.tile(dofs, int(mine.sum()))
+        dM = dM + csr_matrix((block[mine].ravel(), (rows, columns)), shape=dM.shape)
+    return dM

@@ -1,0 +1,279 @@
+"""The operator verbs all reductions are written on, and the lowest modes of a model.
+
+Rows of tall matrices belong to this process; small matrices are equal on all ranks. The SciPy
+implementation below holds all rows; ``rom.fe.operators.petsc`` distributes them.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import identity, kron
+
+from rom.errors import InterfaceError, ModelError
+from rom.model import Array, Index, Interface
+
+Weighted = tuple[float, list[tuple[float, Any]]]
+CLUSTER_RTOL = 1e-5  # relative distance of eigenvalues that belong to one space
+ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
+
+
+class Held(Protocol):
+    """A stiffness matrix with some dofs held, factored once."""
+
+    n_free: int
+
+    def __call__(self, F: Array) -> Array:
+        """Solve K_ii X_i = F_i for (n_local, k) loads; rows of held dofs come back zero."""
+
+
+class Mass(Protocol):
+    """What a scalar product with the mass needs of `Operators`."""
+
+    def apply_M(self, X: Array) -> Array:
+        """M X, (n_local, k)."""
+
+    def gram(self, X: Array, Y: Array) -> Array:
+        """X^T Y summed over the ranks."""
+
+
+class Operators(Protocol):
+    """Stiffness and mass of one body, wherever their rows live.
+
+    Attributes:
+        n: number of dofs of the whole model.
+        first: global number of this process's first row.
+        n_local: number of this process's rows.
+        last: True on the process that owns the end of the rows, and stays so after `transform`.
+        affordable: True when modes of the whole model cost a few factorisations, not hours.
+        rigid: (n_local, 6) rigid motions (three translations, three rotations about the origin of
+            coordinates), or None when there is no geometry.
+    """
+
+    n: int
+    first: int
+    n_local: int
+    last: bool
+    affordable: bool
+    rigid: Array | None
+
+    def apply_K(self, X: Array) -> Array:
+        """K X, (n_local, k)."""
+
+    def apply_M(self, X: Array) -> Array:
+        """M X, (n_local, k)."""
+
+    def gram(self, X: Array, Y: Array) -> Array:
+        """X^T Y summed over the ranks; any two arrays with equally distributed rows."""
+
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Held:
+        """Eliminate the held dofs (global numbers, equal on all ranks) and factor the rest.
+
+        With a shift [rad^2/s^2] the matrix factored is K - shift M, for answers at a frequency.
+
+        Raises:
+            InterfaceError: if a rigid motion stays free.
+            SolverError: if the shift is an eigenvalue to the last digit.
+            ResourceError: if the factor is predicted not to fit into memory.
+        """
+
+    def modes(
+        self,
+        held: npt.ArrayLike | Held,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
+    ) -> tuple[Array, Array]:
+        """Lowest m modes with the given dofs held: (omega (m,), Phi (n_local, m)).
+
+        Accepts what `hold` returned, to use its factor again; with ``finished`` nobody else will,
+        and its memory may be used for counting. Mass-normalised, ascending, largest
+        entry positive. The shift sigma is chosen from the model when not given. With nothing held
+        the six rigid motions come first with omega exactly zero.
+
+        Raises:
+            ModesMissedError: if the inertia count says a mode was skipped.
+        """
+
+    def transform(self, T: Any, rigid: Array) -> "Operators":
+        """The same body in new coordinates u = T a, with K_a = T^T K T and M_a = T^T M T.
+
+        Args:
+            T: sparse (n_local, n_a) rows of this process, global columns. Columns of kept dofs
+                stay on the rank that owns them, in their order; further columns come last, on the
+                last rank.
+            rigid: (n_local_a, 6) the rigid motions in a; its length is the size of this rank.
+        """
+
+    def expand(self, A: Array) -> Array:
+        """T A: from the coordinates of `transform` back to (rows of the parent, k)."""
+
+    def restrict(self, F: Array) -> Array:
+        """T^T F: loads (rows of the parent, k) in the coordinates of `transform`."""
+
+    def rows(self, X: Array, dofs: npt.ArrayLike) -> Array:
+        """X[dofs] for global dof numbers, (n_dofs, k) equal on all ranks."""
+
+    def plus_mass(self, dM: Any) -> "Operators":
+        """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
+
+    def product(self, A: Any, X: Array) -> Array:
+        """A X for a matrix with the layout of K, (n_local, k)."""
+
+    def varied(
+        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
+    ) -> "Operators":
+        """Another body on the same dofs: K' = k K + sum k_i K_i, M' = m M + sum m_i M_i.
+
+        Args:
+            stiffness: (k, [(k_i, K_i), ...]), matrices with the layout of K.
+            mass: (m, [(m_i, M_i), ...]).
+            rigid: (n_local, 6) its rigid motions; None if they are the same.
+        """
+
+
+def canonical_signs(Phi: Array) -> Array:
+    """Turn each column so that its largest entry is positive; the first of equals decides."""
+    for phi in Phi.T:
+        size = np.abs(phi)
+        if phi[np.argmax(size >= (1 - 1e-6) * size.max(initial=0.0))] < 0:
+            phi *= -1.0
+    return Phi
+
+
+def count_shift(lam: Array, m: int) -> tuple[int, float]:
+    """Where to count: the widest relative gap behind the m-th of some more eigenvalues.
+
+    Args:
+        lam: (k,) ascending eigenvalues, k > m, not all zero.
+        m: number of modes wanted.
+
+    Returns:
+        The number of eigenvalues below the gap and a shift inside it.
+    """
+    upper, lower = lam[m:], lam[m - 1 : -1]
+    j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), np.abs(lam[-1]) * 1e-12)))
+    return m + j, float(0.5 * (upper[j] + lower[j]))
+
+
+def whole_clusters(lam: Array, m: int) -> int:
+    """The least number of lowest modes, m or more, that cuts through no repeated eigenvalue.
+
+    One of two equal modes would prefer a direction that the structure does not have.
+
+    Args:
+        lam: (k,) ascending eigenvalues.
+        m: number of modes wanted, 1 <= m <= k.
+    """
+    while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER_RTOL * lam[m]:
+        m += 1
+    return m
+
+
+def orthonormal(ops: Mass, X: Array) -> Array:
+    """M-orthonormal columns with the span of X, in the order given (Gram-Schmidt, twice)."""
+    Q = np.zeros((X.shape[0], 0))
+    for k in range(X.shape[1]):
+        x = X[:, k : k + 1]
+        for _ in range(2):
+            x = x - Q @ ops.gram(Q, ops.apply_M(x))
+            x = x / np.sqrt(ops.gram(x, ops.apply_M(x)).item())
+        Q = np.hstack([Q, x])
+    return Q
+
+
+def given_rigid_motions(ops: Operators) -> Array:
+    """The (n_local, 6) rigid motions of a body.
+
+    Raises:
+        ModelError: if its operators were made without geometry.
+    """
+    if ops.rigid is None:
+        raise ModelError(
+            "the operators of the model do not know its rigid motions.",
+            hint="Make them with rigid=rom.eigen.verbs.rigid_motions(points).",
+        )
+    return ops.rigid
+
+
+def dofs_of(nodes: Index) -> Index:
+    """(3k,) dofs of nodes."""
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
+
+
+def rigid_motions(points: Array) -> Array:
+    """(3k, 6) displacements of k points: unit translations, unit rotations about the origin.
+
+    Args:
+        points: (k, 3) coordinates [m].
+    """
+    R = np.zeros((points.shape[0], 3, 6))
+    R[:, :, :3] = np.eye(3)
+    x, y, z = points.T
+    R[:, 1, 3], R[:, 2, 3] = -z, y
+    R[:, 0, 4], R[:, 2, 4] = z, -x
+    R[:, 0, 5], R[:, 1, 5] = -y, x
+    return R.reshape(-1, 6)
+
+
+def mean_motion(interface: Interface) -> Array:
+    """(6, 3k) translation and rotation of a surface, least squares over its area.
+
+    C = (R^T S R)^-1 R^T S with R the rigid motions about the origin of the interface and S the
+    surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2.
+
+    Raises:
+        InterfaceError: if the nodes lie on a line, whose rotation about itself no node feels.
+    """
+    x = interface.points - interface.origin
+    size = np.linalg.norm(x, axis=1).max(initial=0.0) or 1.0
+    R = rigid_motions(x / size)
+    SR = kron(interface.surface_mass, identity(3)) @ R
+    gram = R.T @ SR
+    spectrum = np.linalg.eigvalsh(gram)
+    if not spectrum[0] > ON_A_LINE * spectrum[-1]:
+        raise InterfaceError(
+            f"the {interface.nodes.size} nodes of interface {interface.name!r} lie on a line or in "
+            "one point: its rotation is undetermined.",
+            hint="Choose a surface with an area.",
+        )
+    return np.linalg.solve(gram, SR.T) / np.r_[np.ones(3), np.full(3, size)][:, None]
+
+
+def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
+    """Modal assurance criterion with the mass as weight, (k, l) in [0, 1].
+
+    Args:
+        ops: operators of the model the shapes belong to.
+        Phi: (n_local, k) shapes.
+        Psi: (n_local, l) shapes.
+    """
+    cross = ops.gram(Phi, ops.apply_M(Psi))
+    return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
+
+
+def residual_errors(
+    ops: Operators, inverse: Held, X: Array, *, seen_in: Operators | None = None
+) -> Array:
+    """(k,) frequency errors r^T K^-1 r / (2 x^T K x) of modes of a basis, r = K x - lambda M x.
+
+    Asymptotically exact, not a bound.
+
+    Args:
+        ops: operators of the model the shapes belong to.
+        inverse: stiffness, factored, of the dofs on which the basis leaves a residual.
+        X: (n_local, k) shapes.
+        seen_in: other coordinates of the same model, in which equilibrium is asked for and those
+            of ``inverse``.
+    """
+    KX, MX = ops.apply_K(X), ops.apply_M(X)
+    energy = np.diag(ops.gram(X, KX))
+    residual = KX - MX * (energy / np.diag(ops.gram(X, MX)))
+    if seen_in is not None:
+        ops, residual = seen_in, seen_in.restrict(residual)
+    return np.diag(ops.gram(residual, inverse(residual))) / (2 * energy)
+
+
+def _squares(ops: Operators, Phi: Array) -> Array:
+    return np.diag(ops.gram(Phi, ops.apply_M(Phi)))

@@ -1,0 +1,186 @@
+"""A mesh of tetrahedra as an input deck that CalculiX and Abaqus run.
+
+Regions become element sets, interfaces node sets and surfaces of one name, in the node order of
+`rom.fe.mesh.sources.abaqus`, which reads the deck back. CalculiX takes at most 20 characters for a
+number.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, InterfaceError, MeshError, TagError
+from rom.fe.mesh.cell_types import CELL_TYPES
+from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.sources.abaqus import SIDES
+from rom.fe.mesh.sources.deck import DECK_EDGES
+from rom.fe.mesh.topology import row_ids
+from rom.model import Index, Orthotropic
+from rom.names import ORIGIN_MARK, named
+
+STEPS = {
+    "frequencies": "*FREQUENCY\n{n}",
+    "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE",
+}
+ELEMENTS = {"tet4": "C3D4", "tet10": "C3D10"}
+NAME = re.compile(r"[A-Za-z][\w.-]{0,79}", re.ASCII)
+PER_LINE = 8  # numbers
+
+
+def input_deck(
+    mesh: SolidMesh,
+    *,
+    material: Any = None,
+    degree: int = 2,
+    fixed: Sequence[str] = (),
+    step: str = "frequencies",
+    n_modes: int = 20,
+) -> str:
+    """The text of a deck in SI: nodes, elements, sets, and with a material a step to run.
+
+    Stiffness is that of `rom.fe.model`, for straight elements and the same degree. The mass of
+    CalculiX is not: see `rom.io.matrices.calculix`.
+
+    Args:
+        mesh: tetrahedra, as `rom.fe.mesh.read.read_mesh` gives them.
+        material: `Material`, `Orthotropic`, or {region name: material}; None for the mesh alone.
+        degree: of the displacement: 1 for C3D4, 2 for C3D10.
+        fixed: interfaces held in all directions.
+        step: "frequencies", or "matrices" for stiffness and mass that `rom.read_model` reads.
+        n_modes: number of frequencies.
+
+    Raises:
+        ConfigError: for an unknown step, or a degree that is not 1 or 2.
+        InterfaceError: for a held interface that does not exist.
+        MaterialError: if the material is none, or names a region that does not exist.
+        MeshError: for hexahedra, or curved elements of degree 1.
+        TagError: if a region has no material, or a name is none for a deck.
+    """
+    if step not in STEPS:
+        raise ConfigError(f"the step {step!r} is unknown; known: {', '.join(STEPS)}.")
+    if missing := sorted(set(fixed) - set(mesh.facets)):
+        raise InterfaceError(
+            f"{named(missing)} cannot be held; the interfaces are {sorted(mesh.facets)}."
+        )
+    _check_names(mesh.region_names.values())
+    _check_names(mesh.facets)
+    mesh = _of_degree(mesh, degree)
+    parts = [*_nodes(mesh), *_elements(mesh), *_interfaces(mesh)]
+    if material is not None:
+        parts += [*_materials(mesh, material), *_step(fixed, STEPS[step].format(n=n_modes))]
+    return "\n".join(parts) + "\n"
+
+
+def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
+    if mesh.cell_type not in ELEMENTS:
+        raise MeshError(
+            f"cells of the type {mesh.cell_type} have other shape functions there.",
+            hint="Mesh with tetrahedra.",
+        )
+    if degree not in (1, 2):
+        raise ConfigError(f"degree = {degree!r}; decks have elements of degree 1 or 2.")
+    if degree == 1 and mesh.cell_type == "tet10":
+        raise MeshError("the mesh has curved edges, which elements of degree 1 do not.")
+    return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh
+
+
+def _with_edges(mesh: SolidMesh) -> SolidMesh:
+    """The same cells with a node amid each edge, numbered behind the corners."""
+    supports = np.array(CELL_TYPES["tet10"].supports[4:])
+    edges = np.sort(mesh.cells[:, supports], axis=2).reshape(-1, 2)
+    ends, place = np.unique(edges, axis=0, return_inverse=True)
+    cells = np.column_stack([mesh.cells, len(mesh.points) + place.reshape(-1, len(supports))])
+    points = np.vstack([mesh.points, mesh.points[ends].mean(axis=1)])
+    return replace(mesh, points=points, cells=cells, cell_type="tet10")
+
+
+def _nodes(mesh: SolidMesh) -> Iterator[str]:
+    yield f"** {ORIGIN_MARK}: lengths in m, forces in N, masses in kg"
+    yield "*NODE"
+    for k, (x, y, z) in enumerate(mesh.points, 1):
+        yield f"{k}, {x:.13e}, {y:.13e}, {z:.13e}"
+
+
+def _elements(mesh: SolidMesh) -> Iterator[str]:
+    position = {frozenset(s): k for k, s in enumerate(mesh.kind.supports)}
+    edges = DECK_EDGES["tet10"] if mesh.cell_type == "tet10" else ()
+    order = [0, 1, 2, 3, *(position[frozenset(edge)] for edge in edges)]
+    for tag, name in mesh.region_names.items():
+        yield f"*ELEMENT, TYPE={ELEMENTS[mesh.cell_type]}, ELSET={name}"
+        for k in np.flatnonzero(mesh.regions == tag):
+            yield ", ".join(map(str, [k + 1, *(mesh.cells[k, order] + 1)]))
+
+
+def _interfaces(mesh: SolidMesh) -> Iterator[str]:
+    sides = np.array(SIDES[4])
+    on_side = [[k for k, s in enumerate(mesh.kind.supports) if set(s) <= set(side)]
+               for side in SIDES[4]]  # fmt: skip
+    for name, facets in mesh.facets.items():
+        cell, side = _owners(mesh, facets[:, :3], sides)
+        nodes = np.unique(mesh.cells[cell[:, None], np.array(on_side)[side]]) + 1
+        yield f"*NSET, NSET={name}"
+        for k in range(0, nodes.size, PER_LINE):
+            yield ", ".join(map(str, nodes[k : k + PER_LINE]))
+        yield f"*SURFACE, NAME={name}, TYPE=ELEMENT"
+        yield from (f"{c + 1}, S{s + 1}" for c, s in zip(cell, side, strict=True))
+
+
+def _owners(mesh: SolidMesh, facets: Index, sides: Index) -> tuple[Index, Index]:
+    """A cell of each facet, and which of its sides the facet is."""
+    all_sides = mesh.cells[:, sides].reshape(-1, 3)
+    number, _ = row_ids(np.sort(np.vstack([all_sides, facets]), axis=1), len(mesh.points))
+    known, first = np.unique(number[: len(all_sides)], return_index=True)
+    place = first[np.searchsorted(known, number[len(all_sides) :])]
+    return place // len(sides), place % len(sides)
+
+
+def _materials(mesh: SolidMesh, material: Any) -> Iterator[str]:
+    from rom.fe.forms.material import by_region
+
+    solids = by_region(material, {name: tag for tag, name in mesh.region_names.items()})
+    for tag, name in mesh.region_names.items():
+        solid, turned = solids[tag], ""
+        yield f"*MATERIAL, NAME={name}"
+        if isinstance(solid, Orthotropic):
+            axes = np.asarray(solid.axes, dtype=np.float64)[:2].ravel()
+            turned = f", ORIENTATION={name}"
+            yield from _orthotropic(solid)
+        else:
+            yield f"*ELASTIC\n{_numbers((solid.E, solid.nu))}"
+        yield f"*DENSITY\n{_numbers((solid.rho,))}"
+        if turned:
+            yield f"*ORIENTATION, NAME={name}, SYSTEM=RECTANGULAR\n{_numbers(axes)}"
+        yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}{turned}"
+
+
+def _orthotropic(solid: Orthotropic) -> Iterator[str]:
+    yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
+    yield _numbers((*solid.E, *solid.nu, *solid.G[:2]))
+    yield _numbers(solid.G[2:])
+
+
+def _step(fixed: Sequence[str], kind: str) -> Iterator[str]:
+    if fixed:
+        yield "*BOUNDARY"
+        yield from (f"{name}, 1, 3" for name in fixed)
+    yield f"*STEP\n{kind}\n*NODE FILE\nU\n*END STEP"
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(f"{v:.13e}" for v in values)
+
+
+def _check_names(names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if not NAME.fullmatch(name):
+            raise TagError(
+                f"{name!r} is no name for a deck.",
+                hint="It begins with a letter, followed by at most 79 letters, digits, _, - or .",
+            )
+        if name.upper() in seen:
+            raise TagError(f"{name!r} is the name of another set: decks have no small letters.")
+        seen.add(name.upper())

@@ -1,0 +1,210 @@
+"""Meshes of solids: one record, whatever file they come from.
+
+A mesh is read and checked on one process as NumPy arrays, before dolfinx sees it. gmsh and meshio
+run in a process of their own (`rom.fe.mesh.child`), because hostile or broken files can crash them.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    ResourceError,
+    UnsafeFileError,
+)
+from rom.fe.mesh.child import read_apart
+from rom.fe.mesh.quality import straighten
+from rom.fe.mesh.repair import repair
+from rom.fe.mesh.solid import Arrays, SolidMesh
+from rom.fe.mesh.sources.readers import GEOMETRIES
+from rom.fe.mesh.validate import checked
+
+LARGEST_FILE = 2**32  # bytes; some ten million nodes
+READERS = {
+    ".geo": "geo",
+    ".py": "builder",
+    ".step": "step",
+    ".stp": "step",
+    ".msh": "msh",
+    ".inp": "abaqus",
+    ".bdf": "nastran",
+    ".nas": "nastran",
+    ".dat": "nastran",
+}
+
+
+@typed
+def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
+    path: str | Path,
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    faces: Mapping[str, Any] | None = None,
+    scale: float = 1.0,
+    order: int | None = None,
+    trust: bool = False,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
+) -> SolidMesh:
+    """Read or make a mesh and check it.
+
+    A ``.geo`` is a program; one that starts processes or writes files is refused. A ``.py`` can do
+    what its reader can do, and is run only with ``trust``.
+
+    Args:
+        path: ``.geo`` gmsh geometry; ``.py`` file with ``build(gmsh, **parameters)``; ``.step``;
+            ``.msh`` 2.2 or 4.1; Abaqus ``.inp``; Nastran ``.bdf``.
+        parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
+            ``build``, or ``lc`` (element size [m]) for ``.step``.
+        faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
+            around it, or a list of these; lengths in metres. {"face": "every"} names all faces
+            without a name "face 1", "face 2", ...
+        scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
+        order: degree of the geometry, 1 or 2, when the mesh is made here; None for the default.
+        trust: run a ``.py`` file.
+        time_limit: of meshing a geometry [s]; by default half an hour, 0 for none.
+        memory_limit: of meshing a geometry [bytes]; by default 80 % of the machine's, 0 for none.
+
+    Returns:
+        A mesh that passed `rom.fe.mesh.validate.validate`. Its warnings are also issued as
+        `RomWarning`.
+
+    Raises:
+        ConfigError: unknown suffix or parameter.
+        FileFormatError: the file is missing, cut, or not what its name promises.
+        UnsafeFileError: a geometry would do more than make a mesh, or is a ``.py`` not trusted.
+        MeshError: the cells do not form one solid.
+        TagError: a physical group is missing, doubled or ambiguous.
+        ResourceError: meshing exceeds its limit of time or memory.
+    """
+    path = Path(path)
+    reader = _reader(path)
+    request = {
+        "path": str(path.absolute()),
+        "reader": reader,
+        "parameters": dict(parameters or {}),
+        "faces": dict(faces or {}),
+        "order": order,
+    }
+    _check_request(path, request, scale)
+    _check_trust(path, reader, trust)
+    digest = _digest(path)
+    arrays, notes = read_apart(
+        request, where=str(path), size=path.stat().st_size,
+        time_limit=time_limit, memory_limit=memory_limit,
+    )  # fmt: skip
+    provenance = {"path": str(path), "sha256": digest, "scale": scale, **notes["provenance"]}
+    mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
+    if request["reader"] in GEOMETRIES:
+        mesh, straightened = straighten(repair(mesh))
+        remarks = [*remarks, *straightened]
+    if request["reader"] == "step" and scale != 1.0:
+        remarks = [*remarks, _scaled_twice(mesh.size, scale)]
+    return checked(mesh, remarks)
+
+
+def _scaled_twice(size: float, scale: float) -> str:
+    return (
+        f"a STEP file says its own unit and was read in metres, {size / scale:.4g} m long; "
+        f"scale={scale:g} on top makes it {size:.4g} m. Leave scale out unless the file is wrong."
+    )
+
+
+def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, Any]]:
+    """Share a mesh among the ranks.
+
+    Args:
+        mesh: on rank 0; what other ranks give is ignored. One that was not checked is checked.
+        comm: communicator; all its ranks must call.
+
+    Returns:
+        The dolfinx mesh, MeshTags with the region number of each cell, and MeshTags of the facets
+        of each named surface. Node i of the dolfinx mesh on this rank is node
+        ``geometry.input_global_indices[i]`` of the record.
+
+    Raises:
+        MeshError, TagError: on all ranks.
+    """
+    from rom.fe.mesh.distribute import distribute
+
+    return distribute(mesh, comm)
+
+
+def _solid(
+    arrays: Arrays, notes: dict[str, Any], provenance: dict[str, Any], scale: float
+) -> SolidMesh:
+    return SolidMesh(
+        points=arrays["points"] * scale,
+        cells=arrays["cells"],
+        cell_type=notes["cell_type"],
+        regions=arrays["regions"],
+        region_names={int(tag): name for tag, name in notes["region_names"].items()},
+        facets={name: arrays[f"facets {i}"] for i, name in enumerate(notes["facet_names"])},
+        provenance=provenance,
+        cell_ids=arrays["cell_ids"],
+    )
+
+
+def _reader(path: Path) -> str:
+    if path.is_dir():
+        raise FileFormatError("is a folder, not a mesh or geometry.", where=str(path))
+    if not path.is_file():
+        raise FileFormatError(
+            "there is no such file.", where=str(path), hint="Relative paths start where you are."
+        )
+    if path.stat().st_size > LARGEST_FILE:
+        raise UnsafeFileError(f"has more than {LARGEST_FILE / 2**30:g} GiB.", where=str(path))
+    try:
+        return READERS[path.suffix.lower()]
+    except KeyError:
+        raise ConfigError(
+            f"no reader for the suffix {path.suffix!r}; readable are {sorted(READERS)}.",
+            where=str(path),
+        ) from None
+
+
+def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
+    reader = request["reader"]
+    if request["parameters"] and reader not in GEOMETRIES:
+        raise ConfigError(
+            f"a finished mesh has no parameters, got {sorted(request['parameters'])}.",
+            where=str(path),
+        )
+    if request["faces"] and reader != "step":
+        raise ConfigError(
+            f"faces={sorted(request['faces'])} can be picked in a .step file only.",
+            where=str(path),
+            hint="Name physical surfaces in the geometry instead.",
+        )
+    if request["order"] not in (None, 1, 2) or (request["order"] and reader not in GEOMETRIES):
+        raise ConfigError(
+            f"order={request['order']!r}: the geometry has degree 1 or 2, and can be chosen only "
+            "when the mesh is made here.",
+            where=str(path),
+        )
+    if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):
+        raise ConfigError(f"scale={scale!r} must be a positive number.", where=str(path))
+
+
+def _check_trust(path: Path, reader: str, trust: bool) -> None:
+    if reader == "builder" and trust is not True:
+        raise UnsafeFileError(
+            "is a Python program, which can do to this machine whatever you can.",
+            where=str(path),
+            hint="Read it; if you trust it, run it with --trust or trust=True.",
+        )
+
+
+def _digest(path: Path) -> str:
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except PermissionError as error:
+        raise ResourceError(f"cannot be read: {error.strerror}.", where=str(path)) from error
+    except OSError as error:
+        raise FileFormatError(f"cannot be read: {error}.", where=str(path)) from error

@@ -1,0 +1,88 @@
+"""The record of a solid mesh: plain NumPy arrays, on one process."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.fe.mesh.cell_types import CELL_TYPES, CellType
+from rom.model import Array, Index, Integers
+
+MAX_SHOWN = 5  # culprits named in a message
+
+
+@dataclass(frozen=True, slots=True)
+class SolidMesh:
+    """A solid body cut into cells of one type.
+
+    Attributes:
+        points: (n, 3) node coordinates [m].
+        cells: (m, k) node numbers in gmsh order.
+        cell_type: "tet4", "tet10", "hex8" or "hex27".
+        regions: (m,) region number of each cell.
+        region_names: name of each region number.
+        facets: (f, kf) node numbers in gmsh order of the facets of each named surface; a facet may
+            belong to several surfaces.
+        provenance: where the mesh comes from: path, sha256, parameters, versions.
+        cell_ids: (m,) numbers of the cells in the file, for messages; None for 0, 1, 2, ...
+        warnings: what `rom.fe.mesh.validate.validate` found worth saying; None before it was asked.
+    """
+
+    points: Array
+    cells: Index
+    cell_type: str
+    regions: Index
+    region_names: dict[int, str]
+    facets: dict[str, Index]
+    provenance: dict[str, Any] = field(default_factory=dict)
+    cell_ids: Index | None = None
+    warnings: tuple[str, ...] | None = None
+
+    @property
+    def kind(self) -> CellType:
+        """Node order, faces and shape functions of the cells."""
+        return CELL_TYPES[self.cell_type]
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box [m]."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def corners(self) -> Index:
+        """(m, c) corner nodes of the cells."""
+        return self.cells[:, : self.kind.n_corners]
+
+
+def cell_names(mesh: SolidMesh, cells: Index) -> str:
+    """The numbers of the first few of some cells in their file, for messages."""
+    ids = cells if mesh.cell_ids is None else mesh.cell_ids[cells]
+    return ", ".join(map(str, ids[:MAX_SHOWN])) + (", ..." if len(ids) > MAX_SHOWN else "")
+
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+Read = tuple[Arrays, dict[str, Any]]  # arrays and notes
+
+
+def packed(
+    points: Array,
+    cells: Integers,
+    cell_type: str,
+    regions: Integers,
+    cell_ids: Integers,
+    **notes: Any,
+) -> Read:
+    """Arrays and notes in the form of `read`; ``facets`` and ``region_names`` among the notes."""
+    facets = notes.pop("facets")
+    arrays: Arrays = {
+        "points": np.asarray(points, dtype=float),
+        "cells": np.asarray(cells, dtype=np.int64),
+        "regions": np.asarray(regions, dtype=np.int64),
+        "cell_ids": np.asarray(cell_ids, dtype=np.int64),
+    }
+    for i, rows in enumerate(facets.values()):
+        arrays[f"facets {i}"] = np.asarray(rows, dtype=np.int64)
+    return arrays, notes | {"cell_type": cell_type, "facet_names": list(facets)}

@@ -1,0 +1,81 @@
+"""Geometries built by a Python file; runs in the child process."""
+
+import inspect
+import sys
+import traceback
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from rom.errors import ConfigError, FileFormatError, MeshError, RomError
+from rom.fe.mesh.sources.readers import Made
+from rom.names import named
+
+
+def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+    """Call ``build(gmsh, **parameters)`` of the file.
+
+    Returns:
+        The parameters used, and their defaults.
+
+    Raises:
+        FileFormatError: the file is no Python, or has no function build.
+        ConfigError: build has no parameter of that name, or needs one that was not given.
+        MeshError: build failed.
+    """
+    build = getattr(_load(path), "build", None)
+    if not callable(build):
+        raise FileFormatError(f"{path.name} has no function build(gmsh, **parameters).")
+    gmsh.model.add(path.stem)
+    defaults = _defaults(build)
+    values = _arguments(build, request["parameters"], path)
+    try:
+        build(gmsh, **values)
+    except (RomError, MemoryError):
+        raise
+    except Exception as error:
+        raise MeshError(f"build failed at {_place(error, path)}: {error}") from error
+    plain = {name: value for name, value in values.items() if isinstance(value, str | int | float)}
+    return plain, {name: x for name, x in defaults.items() if name in plain}
+
+
+def _load(path: Path) -> ModuleType:
+    sys.path.insert(0, str(path.parent))
+    loader = SourceFileLoader(path.stem, str(path))
+    module = ModuleType(path.stem)
+    try:
+        loader.exec_module(module)
+    except MemoryError:
+        raise
+    except Exception as error:
+        where = f"line {error.lineno}" if isinstance(error, SyntaxError) else _place(error, path)
+        raise FileFormatError(
+            f"the builder cannot be loaded, {where}: {type(error).__name__}: {error}."
+        ) from error
+    return module
+
+
+def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
+    known = list(inspect.signature(build).parameters.values())[1:]
+    names = [p.name for p in known if p.kind is not p.VAR_KEYWORD]
+    unknown = sorted(set(given) - set(names))
+    if unknown and len(names) == len(known):
+        raise ConfigError(
+            f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(names)}."
+        )
+    defaults = _defaults(build)
+    missing = sorted(set(names) - set(defaults) - set(given))
+    if missing:
+        raise ConfigError(f"{path.name} needs a value for the parameter {named(missing)}.")
+    return defaults | given
+
+
+def _defaults(build: Any) -> dict[str, Any]:
+    known = inspect.signature(build).parameters.values()
+    return {p.name: p.default for p in known if p.default is not p.empty}
+
+
+def _place(error: Exception, path: Path) -> str:
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+    return f"{path.name}, line {lines[-1]}" if lines else path.name

@@ -1,0 +1,241 @@
+"""From an open gmsh model to arrays: cells by region, facets by name; runs in the child process."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.errors import FileFormatError, MeshError, TagError
+from rom.fe.mesh.solid import Read, packed
+from rom.model import Index
+
+# gmsh element types
+SOLIDS = {4: "tet4", 5: "hex8", 11: "tet10", 12: "hex27", 17: "hex20"}
+NAMES = re.compile(rb'^\s*([0-3])\s+(\d+)\s+"([^"\r\n]*)"\s*$', re.MULTILINE)
+DIMENSIONS = ("point", "curve", "surface", "volume")
+Blocks = dict[int, tuple[Index, Index]]  # numbers and nodes of the elements of each volume
+Groups = dict[tuple[int, int], str]  # names by dimension and tag
+
+
+def declared_groups(path: Path) -> list[tuple[int, int, str]]:
+    """(dimension, tag, name) of all groups a ``.msh`` file declares, also of empty ones."""
+    with path.open("rb") as stream:
+        head = stream.read(2**20)
+    section = head.partition(b"$PhysicalNames")[2].partition(b"$EndPhysicalNames")[0]
+    return [(int(d), int(t), n.decode("utf-8", "replace")) for d, t, n in NAMES.findall(section)]
+
+
+def check_declared(gmsh: Any, declared: Path) -> None:
+    """Refuse what gmsh drops in silence: empty groups, and the second group of a name.
+
+    Raises:
+        TagError: naming the group.
+    """
+    present, groups = set(gmsh.model.getPhysicalGroups()), declared_groups(declared)
+    _check_names({(dim, tag): name for dim, tag, name in groups})
+    for dim, tag, name in groups:
+        if dim >= 2 and (dim, tag) not in present:
+            raise TagError(
+                f"the physical {DIMENSIONS[dim]} {name!r} is empty.",
+                hint="Check that it names surfaces or volumes that exist, and that the selection, "
+                "e.g. its bounding box, finds them with these parameters.",
+            )
+
+
+def version(path: Path) -> int:
+    """Main version of a ``.msh`` file; 0 when it does not tell."""
+    with path.open("rb") as stream:
+        found = re.search(rb"\$MeshFormat\s+(\d+)", stream.read(2**20))
+    return int(found[1]) if found else 0
+
+
+def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
+    """Arrays and notes of the mesh, as `rom.fe.mesh.sources.readers.read` returns them.
+
+    Args:
+        gmsh: the module, with a meshed model.
+        declared: ``.msh`` file whose header lists the names of the groups.
+        strict: named surfaces without a named volume are an error.
+        repeated: the file lists a facet once for each of its groups, as version 2 does.
+    """
+    check_declared(gmsh, declared)
+    groups = _group_names(gmsh)
+    tags, x, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags, kind="stable")
+    tags, points = tags[order].astype(np.int64), x.reshape(-1, 3)[order]
+    kind, blocks = _solids(gmsh)
+    region = _regions(gmsh, blocks, groups, strict=strict)
+    cells = np.vstack([nodes for _, nodes in blocks.values()])
+    counts = [len(ids) for ids, _ in blocks.values()]
+    facets = {
+        name: _rows(tags, _facets(gmsh, tag, name, repeated=repeated), f"surface {name!r}")
+        for (dim, tag), name in groups.items()
+        if dim == 2
+    }
+    return packed(
+        points,
+        _rows(tags, cells, "a cell"),
+        SOLIDS[kind],
+        np.repeat([region[volume] for volume in blocks], counts),
+        np.concatenate([ids for ids, _ in blocks.values()]),
+        facets=facets,
+        region_names=_region_names(groups),
+        warnings=_remarks(groups) if strict else [],
+    )
+
+
+def _group_names(gmsh: Any) -> Groups:
+    """{(dimension, tag): name}; nameless groups get one."""
+    names = {
+        (dim, tag): gmsh.model.getPhysicalName(dim, tag) or f"{DIMENSIONS[dim]}_{tag}"
+        for dim, tag in gmsh.model.getPhysicalGroups()
+    }
+    _check_names(names)
+    return names
+
+
+def _check_names(names: dict[tuple[int, int], str]) -> None:
+    """A name must stand for one group."""
+    seen: dict[str, str] = {}
+    for (dim, tag), name in names.items():
+        what = f"physical {DIMENSIONS[dim]} {tag}"
+        if name in seen:
+            raise TagError(
+                f"the name {name!r} stands for {seen[name]} and {what}.",
+                hint="Give each group its own name.",
+            )
+        seen[name] = what
+
+
+def _region_names(groups: dict[tuple[int, int], str]) -> dict[int, str]:
+    return {tag: name for (dim, tag), name in groups.items() if dim == 3} or {1: "body"}
+
+
+def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:
+    found = [
+        f"physical {DIMENSIONS[dim]} {name!r} is ignored: interfaces are surfaces."
+        for (dim, _), name in groups.items()
+        if dim < 2
+    ]
+    if not any(dim == 3 for dim, _ in groups):
+        found.append("no physical volume is named; the whole solid is the region 'body'.")
+    return found
+
+
+def _solids(gmsh: Any) -> tuple[int, Blocks]:
+    """Element type in gmsh, and element numbers and nodes of each volume."""
+    blocks, kinds = {}, set()
+    for _, volume in gmsh.model.getEntities(3):
+        types, ids, nodes = gmsh.model.mesh.getElements(3, volume)
+        kinds |= {int(t) for t in types}
+        if len(types) == 1:
+            blocks[volume] = ids[0].astype(np.int64), nodes[0].astype(np.int64)
+    _check_kinds(gmsh, kinds)
+    size = gmsh.model.mesh.getElementProperties(min(kinds))[3]
+    return kinds.pop(), {v: (ids, nodes.reshape(-1, size)) for v, (ids, nodes) in blocks.items()}
+
+
+def _check_kinds(gmsh: Any, kinds: set[int]) -> None:
+    if not kinds:
+        raise _no_solid(gmsh)
+    names = sorted(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
+    if len(kinds) > 1:
+        raise MeshError(
+            f"the cells are of several types, {names}; one mesh needs one type.",
+            hint="Mesh all volumes with tetrahedra, or all with hexahedra.",
+        )
+    if not kinds <= SOLIDS.keys():
+        raise MeshError(
+            f"cells of type {names[0]} are not supported.",
+            hint="Supported are tetrahedra and hexahedra of first and second order.",
+        )
+
+
+def _no_solid(gmsh: Any) -> MeshError:
+    types = gmsh.model.mesh.getElements(2)[1]
+    n = sum(len(ids) for ids in types)
+    if not n:
+        return MeshError(
+            "there are no volume cells: the geometry is not meshed.",
+            hint="Run gmsh -3, or give the .geo file.",
+        )
+    surfaces = [gmsh.model.getPhysicalName(2, tag) for _, tag in gmsh.model.getPhysicalGroups(2)]
+    return MeshError(
+        f"there are no volume cells, only {n} facets (named surfaces: {surfaces}).",
+        hint="A solid is needed. A file with physical groups holds only what is in one: add a "
+        "Physical Volume.",
+    )
+
+
+def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
+    """{volume: region number}; every volume in exactly one group, or no group at all."""
+    if not any(dim == 3 for dim, _ in groups):
+        if groups and strict and any(dim == 2 for dim, _ in groups):
+            raise TagError(
+                f"the surfaces {sorted(n for (d, _), n in groups.items() if d == 2)} are named, "
+                "but no volume is.",
+                hint='Add Physical Volume("body") = {...};',
+            )
+        return dict.fromkeys(blocks, 1)
+    return {volume: _region(gmsh, volume, blocks, groups) for volume in blocks}
+
+
+def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
+    tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
+    if min(tags, default=1) < 1:
+        raise TagError(
+            f"volume {volume} is in the physical group {min(tags)}: numbers of groups start at 1.",
+            hint="A volume has no other side; write both numbers without a minus.",
+        )
+    names = [groups[3, tag] for tag in tags]
+    if len(tags) > 1:
+        raise TagError(
+            f"volume {volume} is in the physical groups {names[0]!r} and {names[1]!r}.",
+            hint="Each part of the body has one material: one group per volume.",
+        )
+    if not tags:
+        others = sorted(name for (dim, _), name in groups.items() if dim == 3)
+        raise TagError(
+            f"volume {volume} with {len(blocks[volume][0])} cells is in no physical group, while "
+            f"{others} exist.",
+            hint="Put every volume into a group, or remove what does not belong to the body.",
+        )
+    return tags[0]
+
+
+def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> Index:
+    """(f, kf) node tags of a physical surface."""
+    found = []
+    for surface in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
+        groups = len(gmsh.model.getPhysicalGroupsForEntity(2, surface))
+        for kind, _, nodes in zip(*gmsh.model.mesh.getElements(2, surface), strict=True):
+            size = gmsh.model.mesh.getElementProperties(kind)[3]
+            rows = nodes.astype(np.int64).reshape(-1, size)
+            if groups > 1 and repeated:
+                _check_copies(rows, groups, name)
+            found.append(rows)
+    if not found:
+        raise TagError(f"the physical surface {name!r} has no facets.", hint="Mesh it.")
+    if len({rows.shape[1] for rows in found}) > 1:
+        raise MeshError(f"the physical surface {name!r} mixes facets of several types.")
+    return np.vstack(found)
+
+
+def _check_copies(rows: Index, groups: int, name: str) -> None:
+    """Without a copy of each facet for each group, gmsh has mixed up the groups."""
+    if len(np.unique(np.sort(rows, axis=1), axis=0)) * groups != len(rows):
+        raise TagError(
+            f"the facets of {name!r} share their elementary number with another group, and gmsh "
+            "cannot tell them apart.",
+            hint="Save the mesh in version 4.1, or give each surface its own elementary number.",
+        )
+
+
+def _rows(tags: Index, nodes: Index, what: str) -> Index:
+    """Positions of node tags among the sorted tags of all nodes."""
+    place = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
+    if not tags.size or not np.array_equal(tags[place], nodes):
+        missing = np.setdiff1d(nodes, tags)[:3].tolist()
+        raise FileFormatError(f"{what} names the nodes {missing}, which the file does not define.")
+    return place

@@ -1,0 +1,195 @@
+"""gmsh, opened with settings that give the same mesh every time; runs in the child process."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
+from rom.fe.mesh.solid import Read
+from rom.fe.mesh.sources import builder, step
+from rom.fe.mesh.sources.confinement import confine
+from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
+from rom.fe.mesh.sources.readers import Made
+from rom.fe.mesh.sources.script import check_script
+from rom.plausible import scaled_doubt
+
+HIGHEST_ORDER = 2  # of cells, see `rom.fe.mesh.sources.gmsh_groups.SOLIDS`
+HXT_ALGORITHM = 10  # Mesh.Algorithm3D whose meshes differ from run to run
+NO_MEMORY = re.compile("Out of memory|bad_alloc")
+# gmsh hands a file without this start to its script parser, which can run shell commands
+MSH_START = (b"$MeshFormat", b"$Comments")
+
+
+def run(request: dict[str, Any]) -> Read:
+    """Answer a request for ``.geo``, ``.py``, ``.step`` or ``.msh``; see `readers.read`."""
+    import gmsh
+
+    path, reader = Path(request["path"]), request["reader"]
+    with session(gmsh):
+        if reader != "builder":  # that is a program of its own, and trusted
+            confine(Path(request["folder"]))
+        declared = Path(request["folder"], "declared.msh")
+        with complaints(gmsh):
+            values, defaults = MAKERS[reader](gmsh, path, request)
+        if reader == "msh":
+            declared = path
+        else:
+            _generate(gmsh, request, declared)
+        step.pick(gmsh, request["faces"])
+        repeated = reader == "msh" and version(path) == 2
+        arrays, notes = collect(gmsh, declared, strict=reader != "step", repeated=repeated)
+        notes["provenance"] = {
+            "gmsh": gmsh.option.getString("General.Version"),
+            "parameters": values,
+            "gmsh_warnings": _log(gmsh, "Warning"),
+        }
+        doubts = (scaled_doubt(name, values[name], x) for name, x in defaults.items())
+        notes["warnings"] = [*notes["warnings"], *filter(None, doubts)]
+        return arrays, notes
+
+
+@contextmanager
+def session(gmsh: Any) -> Iterator[None]:
+    """Run gmsh without the user's own settings, silent, on one thread."""
+    gmsh.initialize([], False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("General.NumThreads", 1)
+        gmsh.option.setNumber("Mesh.Algorithm3D", 1)
+        gmsh.logger.start()
+        yield
+    finally:
+        gmsh.finalize()
+
+
+@contextmanager
+def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[None]:
+    """Turn gmsh's exceptions into errors with its own words, file and line."""
+    try:
+        yield
+    except RomError:
+        raise
+    except MemoryError:
+        raise
+    except Exception as error:  # gmsh raises bare Exception
+        messages = _log(gmsh, "Error") or [str(error)]
+        if NO_MEMORY.search(messages[0]):
+            raise MemoryError from error
+        text = re.sub(r"'[^']*/([^'/]*)'", r"'\1'", messages[0]).rstrip(".")
+        text = f"gmsh says: {text}." if text else "gmsh cannot read it: the file is damaged."
+        raise kind(text, hint="Open the file in gmsh to see more.") from error
+
+
+def _log(gmsh: Any, kind: str) -> list[str]:
+    lines = [line for line in gmsh.logger.get() if line.startswith(kind)]
+    return [line.partition(":")[2].strip() for line in lines[:20]]
+
+
+def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+    if not path.read_bytes().endswith((b"\n", b"\r")):
+        raise FileFormatError(
+            "the last line does not end, and gmsh would drop it in silence.",
+            hint="Add a newline at the end of the file.",
+        )
+    check_script(path)
+    gmsh.open(str(path))
+    known = geo_parameters(gmsh)
+    chosen = {_full_name(name, known, path): v for name, v in request["parameters"].items()}
+    for name, value in chosen.items():
+        if isinstance(known[name], str):
+            gmsh.onelab.setString(name, [_text(name, value, path)])
+        else:
+            gmsh.onelab.setNumber(name, [_number(name, value, path)])
+    if chosen:
+        gmsh.clear()
+        # the file was readable with its own values, so the new ones are at fault
+        with complaints(gmsh, ConfigError):
+            gmsh.open(str(path))
+    values = geo_parameters(gmsh)
+    return values, {name: known[name] for name in chosen if name in values}
+
+
+def geo_parameters(gmsh: Any) -> dict[str, Any]:
+    """Parameters of the open geometry that can be set from outside, with their values."""
+    names = [n for n in gmsh.onelab.getNames() if not n.startswith(("Gmsh", "ONELAB", "0Modules"))]
+    values = {}
+    for name in sorted(names):
+        found = list(gmsh.onelab.getNumber(name)) or gmsh.onelab.getString(name)
+        values[name] = found[0] if len(found) else None
+    return values
+
+
+def _full_name(name: str, known: dict[str, Any], path: Path) -> str:
+    """Name as gmsh knows it; ``L`` also finds ``Geometry/L`` when there is only one."""
+    if name in known:
+        return name
+    ends = [full for full in known if full.rpartition("/")[2] == name]
+    if len(ends) == 1:
+        return ends[0]
+    raise ConfigError(
+        f"{path.name} has no parameter {name!r}; its parameters are {sorted(known)}.",
+        hint='A .geo parameter can be set only if it has a name: x = {1.0, Name "x"}.',
+    )
+
+
+def _number(name: str, value: Any, path: Path) -> float:
+    if isinstance(value, bool | int | float) and value - value == 0:
+        return float(value)
+    raise ConfigError(f"parameter {name!r} of {path.name} must be a finite number, got {value!r}.")
+
+
+def _text(name: str, value: Any, path: Path) -> str:
+    if isinstance(value, str):
+        return value
+    raise ConfigError(f"parameter {name!r} of {path.name} must be a text, got {value!r}.")
+
+
+def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+    with path.open("rb") as stream:
+        start = stream.read(512)
+        stream.seek(max(path.stat().st_size - 512, 0))
+        end = stream.read().rstrip()
+    if not start.startswith(MSH_START):
+        kind = UnsafeFileError if start else FileFormatError
+        raise kind(
+            f"is not a gmsh mesh: it does not start with $MeshFormat but with {start[:20]!r}.",
+            hint="gmsh would run it as a script.",
+        )
+    if not end.splitlines()[-1].strip().startswith(b"$End"):
+        raise FileFormatError("is cut: the last section has no end.", hint="Write it again.")
+    # gmsh would also execute a file of the same name with .opt; beside this link there is none
+    link = Path(request["folder"], path.name)
+    link.symlink_to(path)
+    gmsh.merge(str(link))
+    return {}, {}
+
+
+def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
+    """Mesh the geometry, after noting the names of all its groups."""
+    if not gmsh.model.getEntities(3):
+        raise MeshError("the geometry has no volume: a solid is needed.")
+    gmsh.option.setNumber("General.NumThreads", 1)
+    if gmsh.option.getNumber("Mesh.Algorithm3D") == HXT_ALGORITHM:
+        gmsh.option.setNumber("Mesh.Algorithm3D", 1)
+    if request["order"]:
+        gmsh.option.setNumber("Mesh.ElementOrder", request["order"])
+    _check_order(gmsh.option.getNumber("Mesh.ElementOrder"))
+    gmsh.write(str(declared))
+    check_declared(gmsh, declared)
+    if not any(len(tags) for tags in gmsh.model.mesh.getElements(3)[1]):
+        with complaints(gmsh, MeshError):
+            gmsh.model.mesh.generate(3)
+
+
+def _check_order(order: float) -> None:
+    """Cells of high order take minutes to make, and no element here has them."""
+    if order > HIGHEST_ORDER:
+        raise MeshError(
+            f"Mesh.ElementOrder = {order:g}: cells have first or second order.",
+            hint="Leave the order out, or write Mesh.ElementOrder = 2.",
+        )
+
+
+MAKERS = {"geo": _geo, "builder": builder.make, "step": step.make, "msh": _msh}

@@ -1,0 +1,50 @@
+"""The readers, by name; runs in the child process of `rom.fe.mesh.child`."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rom.errors import FileFormatError, ResourceError, RomError
+from rom.fe.mesh.solid import Read
+
+GEOMETRIES = ("geo", "builder", "step")
+Made = tuple[dict[str, Any], dict[str, Any]]  # parameters used, defaults of some of them
+
+
+def read(request: dict[str, Any]) -> Read:
+    """Read or make the mesh a request asks for.
+
+    Returns:
+        Arrays ``points``, ``cells``, ``regions``, ``cell_ids`` and ``facets 0``, ``facets 1``, ...;
+        notes ``cell_type``, ``region_names``, ``facet_names``, ``provenance``, ``warnings``.
+    """
+    try:
+        return _reader(request["reader"])(request)
+    except (RomError, MemoryError):
+        raise
+    except ModuleNotFoundError as error:
+        raise ResourceError(
+            f"reading this file needs {error.name}, which is not installed.",
+            hint=f"On Debian: apt-get install python3-{error.name}.",
+        ) from error
+    # parsers raise whatever the broken line provokes, and meshio leaves the process
+    except (Exception, SystemExit) as error:
+        if request["reader"] in GEOMETRIES:
+            raise
+        raise FileFormatError(
+            f"is not a readable {request['reader']} file ({type(error).__name__}: {error})."
+        ) from error
+
+
+def _reader(name: str) -> Callable[[dict[str, Any]], Read]:
+    """The reading function; only its own libraries are loaded."""
+    if name == "abaqus":
+        from rom.fe.mesh.sources import abaqus
+
+        return lambda request: abaqus.read(request["path"])
+    if name == "nastran":
+        from rom.fe.mesh.sources import nastran
+
+        return lambda request: nastran.read(request["path"])
+    from rom.fe.mesh.sources import gmsh_session
+
+    return gmsh_session.run

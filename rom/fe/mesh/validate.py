@@ -1,0 +1,235 @@
+"""Checks of a mesh in NumPy, before dolfinx sees it.
+
+dolfinx 0.5 stops the whole process, hangs, or computes with NaN on several of the meshes refused
+here. Cells are named by their numbers in the file.
+"""
+
+import warnings as python_warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from rom.errors import MeshError, RomError, RomWarning, TagError
+from rom.fe.mesh.cell_types import CELL_TYPES
+from rom.fe.mesh.quality import check_shape
+from rom.fe.mesh.repair import repair
+from rom.fe.mesh.solid import MAX_SHOWN, SolidMesh, cell_names
+from rom.fe.mesh.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
+from rom.model import Mask
+from rom.names import check_text, named
+from rom.plausible import SIZE, far_doubt
+
+SIZE_LIMITS = (1e-60, 1e60)  # m; beyond, volumes times stiffness leave the range of numbers
+COINCIDENT_RTOL = 1e-9  # of the mesh's size
+
+
+def validate(mesh: SolidMesh) -> list[str]:
+    """Check that a mesh is one solid of valid cells with valid names.
+
+    Args:
+        mesh: as read, after `rom.fe.mesh.repair.repair`.
+
+    Returns:
+        Warnings: what is legal, but a careful user wants to know.
+
+    Raises:
+        MeshError: numbers out of range or not finite, degenerate, doubled, flat, inverted or
+            overlapping cells, several bodies, parts that meet only in an edge or a point.
+        TagError: a surface whose facets are not faces of the cells, a region without cells.
+    """
+    for check in (_check_names, _check_tables, _check_numbers, _check_cells):
+        check(mesh)
+    warnings = check_shape(mesh)
+    faces = faces_of(mesh.cells, mesh.kind, mesh.points.shape[0])
+    _check_faces(mesh, faces)
+    _check_connected(mesh, faces)
+    _check_facets(mesh, faces)
+    _check_regions(mesh)
+    return [*warnings, *_slits(mesh, faces), *_doubts(mesh)]
+
+
+def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -> None:
+    """Raise when any cell is bad, with their number and the first few."""
+    cells = np.flatnonzero(bad)
+    if cells.size:
+        raise MeshError(f"{text(cells.size)}: cells {cell_names(mesh, cells)}.", hint=hint)
+
+
+def _check_tables(mesh: SolidMesh) -> None:
+    if mesh.cell_type not in CELL_TYPES:
+        raise MeshError(
+            f"cells of type {mesh.cell_type!r} are not supported; {sorted(CELL_TYPES)} are."
+        )
+    kind, m = mesh.kind, mesh.cells.shape[0]
+    if not m:
+        raise MeshError("there are no volume cells: the geometry is not meshed.")
+    shapes = {
+        "points": (mesh.points.shape[1:], (3,)),
+        "cells": (mesh.cells.shape[1:], (kind.n_nodes,)),
+        "regions": (mesh.regions.shape, (m,)),
+    }
+    for name, (found, wanted) in shapes.items():
+        if found != wanted:
+            raise MeshError(f"{name} has rows of shape {found}, {kind.name} needs {wanted}.")
+    for name, rows in mesh.facets.items():
+        if rows.shape[1:] != (kind.nodes_per_face,) or not rows.size:
+            raise TagError(
+                f"surface {name!r} has {rows.shape[0]} facets of {rows.shape[1]} nodes; facets "
+                f"of {kind.name} have {kind.nodes_per_face}."
+            )
+
+
+def _check_numbers(mesh: SolidMesh) -> None:
+    n = mesh.points.shape[0]
+    outside = ((mesh.cells < 0) | (mesh.cells >= n)).any(axis=1)
+    _refuse(mesh, outside, lambda k: f"{k} cells name nodes outside 0 to {n - 1}", "")
+    bad = ~np.isfinite(mesh.points).all(axis=1)
+    if bad.any():
+        where, cells = mesh.points[bad.argmax()], np.flatnonzero(bad[mesh.cells].any(axis=1))
+        raise MeshError(
+            f"{bad.sum()} nodes have coordinates that are not finite, the first {where.tolist()}; "
+            f"they belong to cells {cell_names(mesh, cells)}."
+        )
+    size = np.ptp(mesh.points, axis=0).max()
+    if not SIZE_LIMITS[0] < size < SIZE_LIMITS[1]:
+        raise MeshError(f"the body has a size of {size:.3g} m.", hint="Check the scale.")
+    for name, rows in mesh.facets.items():
+        if rows.min() < 0 or rows.max() >= n:
+            raise TagError(f"surface {name!r} names nodes outside 0 to {n - 1}.")
+
+
+def _check_cells(mesh: SolidMesh) -> None:
+    ordered = np.sort(mesh.cells, axis=1)
+    _refuse(
+        mesh,
+        (ordered[:, 1:] == ordered[:, :-1]).any(axis=1),
+        lambda k: f"{k} cells use a node twice",
+        "Collapsed cells have no volume; mesh again.",
+    )
+    number, _ = row_ids(np.sort(mesh.corners, axis=1), mesh.points.shape[0])
+    _refuse(
+        mesh,
+        np.bincount(number)[number] > 1,
+        lambda k: f"{k} cells have the same corners as another one",
+        "Part of the body is there twice; remove the copy.",
+    )
+
+
+def _check_faces(mesh: SolidMesh, faces: Faces) -> None:
+    _refuse(
+        mesh,
+        (faces.count[faces.of_cell] > 2).any(axis=1),
+        lambda k: f"{k} cells share a face with more than one other cell",
+        "Cells overlap; fragment the volumes in the geometry.",
+    )
+    # at an inner face the two directions cancel when the cells lie on opposite sides
+    number = faces.of_cell.ravel()
+    total = np.bincount(number, weights=faces.sign.ravel(), minlength=faces.count.size)
+    folded = (faces.count == 2) & (total != 0)
+    _refuse(
+        mesh,
+        folded[faces.of_cell].any(axis=1),
+        lambda k: f"{k} cells lie on the same side of a common face: the mesh is folded",
+        "Mesh again with smaller elements, or repair the geometry.",
+    )
+
+
+def _check_connected(mesh: SolidMesh, faces: Faces) -> None:
+    n_parts, part = parts_by_face(faces)
+    if n_parts == 1:
+        return
+    n_loose = parts_by_node(mesh.corners)[0]
+    cells = np.sort(np.bincount(part))[::-1]
+    sizes = ", ".join(map(str, cells[:MAX_SHOWN])) + (", ..." if n_parts > MAX_SHOWN else "")
+    if n_loose == 1:
+        raise MeshError(
+            f"the mesh has {n_parts} parts ({sizes} cells) that meet only in an edge or a point: "
+            "they would move against each other like a hinge.",
+            hint="Let the parts share faces.",
+        )
+    same = _coincident_nodes(mesh, faces)
+    what = f"{same} nodes of them lie on nodes of others" if same else "they do not touch"
+    raise MeshError(
+        f"the mesh has {n_loose} parts ({sizes} cells) that are not connected; {what}.",
+        hint="One model is one body: fragment the volumes (BooleanFragments, Coherence) or merge "
+        "doubled nodes before meshing, or make a model of each part.",
+    )
+
+
+def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:
+    """Number of corners of the outer surface that have another one at the same place."""
+    skin = np.unique(faces.corners[faces.count == 1])
+    tree = cKDTree(mesh.points[skin])
+    return int(np.unique(tree.query_pairs(COINCIDENT_RTOL * mesh.size, output_type="ndarray")).size)
+
+
+def _slits(mesh: SolidMesh, faces: Faces) -> list[str]:
+    same = _coincident_nodes(mesh, faces)
+    if not same:
+        return []
+    return [
+        f"{same} nodes of the surface lie at the same place as another: the body has a slit of no "
+        "width there. Merge the nodes if that is not meant."
+    ]
+
+
+def _doubts(mesh: SolidMesh) -> list[str]:
+    """Size and place that digits or units speak against."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    distance = float(np.linalg.norm(0.5 * (low + high)))
+    found = (SIZE.doubt(mesh.size, "the mesh"), far_doubt(distance, mesh.size, "the mesh"))
+    return [text for text in found if text]
+
+
+def _check_facets(mesh: SolidMesh, faces: Faces) -> None:
+    n_faces, n = faces.count.size, mesh.points.shape[0]
+    for name, rows in mesh.facets.items():
+        corners = np.sort(rows[:, : mesh.kind.corners_per_face], axis=1)
+        both, _ = row_ids(np.vstack([np.sort(faces.corners, axis=1), corners]), n)
+        alien = ~np.isin(both[n_faces:], both[:n_faces])
+        if alien.any():
+            raise TagError(
+                f"{alien.sum()} of {alien.size} facets of surface {name!r} are not faces of any "
+                f"cell; the first has the nodes {rows[alien.argmax()].tolist()}.",
+                hint="The surface is not part of the meshed volume, or meshed on its own.",
+            )
+
+
+def _check_names(mesh: SolidMesh) -> None:
+    for what, names in (("a region", mesh.region_names.values()), ("a surface", mesh.facets)):
+        for name in names:
+            check_text(name, what, TagError)
+
+
+def _check_regions(mesh: SolidMesh) -> None:
+    used = {int(r) for r in np.unique(mesh.regions)}
+    if nameless := sorted(used - mesh.region_names.keys()):
+        raise TagError(f"there is no name for region {named(nameless)}, which has cells.")
+    if unused := sorted(name for tag, name in mesh.region_names.items() if tag not in used):
+        raise TagError(f"region {named(unused)} has no cells.")
+    names = list(mesh.region_names.values())
+    if double := sorted({name for name in names if names.count(name) > 1}):
+        raise TagError(f"the name {named(double)} stands for several regions.")
+
+
+def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:
+    """Repair and validate a mesh, e.g. one made by hand; issues its warnings as `RomWarning`.
+
+    Args:
+        mesh: as read or made.
+        remarks: warnings of the reader.
+
+    Raises:
+        MeshError, TagError: see `rom.fe.mesh.validate.validate`.
+    """
+    where = str(mesh.provenance.get("path", ""))
+    try:
+        mesh = repair(mesh)
+        found = (*remarks, *validate(mesh))
+    except RomError as error:
+        raise type(error)(error.message, where=error.where or where, hint=error.hint) from None
+    for text in found:
+        python_warnings.warn(f"{where}: {text}" if where else text, RomWarning, stacklevel=3)
+    return replace(mesh, warnings=found)

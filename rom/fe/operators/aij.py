@@ -1,0 +1,98 @@
+"""Sparse matrices of PETSc: from rows of SciPy, sums, and symmetry."""
+
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from rom.errors import ResourceError
+from rom.fe.operators.memory import THIN_FACTOR_RATIO, allowed_bytes, factor_bytes
+from rom.model import Index, Numbers
+
+N_COPIES = 20  # matrices as large as the one gathered that one rank then makes of it
+
+
+def symmetric(A: PETSc.Mat) -> csr_matrix:
+    """(A + A^T) / 2 as a SciPy matrix, on one process."""
+    starts, columns, values = A.getValuesCSR()
+    half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
+    return (half + half.T).tocsr()
+
+
+def symmetrized(A: PETSc.Mat) -> PETSc.Mat:
+    """(A + A^T) / 2: sums over thousands of rows differ in their last digits.
+
+    The pattern of T^T K T is symmetric; saying so saves most of the time of the sum.
+    """
+    B = PETSc.Mat()
+    A.transpose(B)
+    A.axpy(1.0, B, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+    A.scale(0.5)
+    B.destroy()
+    return A
+
+
+def weighted(A: PETSc.Mat, weight: float, parts: list[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
+    """Weight A + sum of the weighted parts; entries that are zero may be missing from A."""
+    B = A.copy()
+    B.scale(weight)
+    for c, part in parts:
+        B.axpy(c, part, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    return B
+
+
+def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
+    """The rows of this rank of a distributed matrix.
+
+    Args:
+        A: (n_local, columns) these rows.
+        sizes: ((local, all) rows, (local, all) columns).
+        comm: the ranks.
+    """
+    index = PETSc.IntType
+    csr = (A.indptr.astype(index), A.indices.astype(index), A.data)
+    matrix = PETSc.Mat().createAIJ(size=sizes, csr=csr, comm=comm)
+    matrix.assemble()
+    return matrix
+
+
+def gathered(A: PETSc.Mat) -> csr_matrix:
+    """All rows of a distributed square matrix, on every rank; symmetric to the last digit.
+
+    Raises:
+        ResourceError: on all ranks, if each of them having the whole and a factor of two such
+            matrices side by side would not fit.
+    """
+    comm, (n, _) = A.comm.tompi4py(), A.getSize()
+    starts, columns, values = A.getValuesCSR()
+    counts = np.array(comm.allgather(values.size))
+    need = THIN_FACTOR_RATIO * factor_bytes(2 * n) + 12.0 * N_COPIES * counts.sum()
+    there = allowed_bytes(comm)
+    if need > there:
+        raise ResourceError(
+            f"each of {comm.size} ranks needs all {n} dofs for itself, predicted to take "
+            f"{need / 2**30:.2f} GiB; {there / 2**30:.2f} GiB may be used by each.",
+            hint="Use fewer ranks, which share the memory, or a coarser mesh.",
+        )
+    lengths = _from_all(comm, np.diff(starts).astype(np.int64), None)
+    whole = csr_matrix(
+        (
+            _from_all(comm, 0.5 * values, counts),
+            _from_all(comm, columns.astype(np.int64), counts),
+            np.concatenate([[0], np.cumsum(lengths)]),
+        ),
+        shape=(n, n),
+    )
+    return (whole + whole.T).tocsr()
+
+
+def _from_all(comm: MPI.Comm, mine: Numbers, counts: Index | None) -> Numbers:
+    """The arrays of all ranks in their order, one after the other."""
+    if counts is None:
+        counts = np.array(comm.allgather(mine.size))
+    every = np.empty(counts.sum(), dtype=mine.dtype)
+    comm.Allgatherv(np.ascontiguousarray(mine), (every, counts))
+    return every

@@ -1,0 +1,70 @@
+"""Counting eigenvalues by the inertia of K - sigma M, so that no mode is missed."""
+
+from typing import Any
+
+from petsc4py import PETSc
+
+import numpy as np
+
+from rom.eigen.verbs import count_shift
+from rom.errors import ModesMissedError
+from rom.fe.operators.factor import Factor
+from rom.model import Array
+
+
+def verify_count(ops: Any, lam: Array, m: int, n_rigid: int, spent: Any = None) -> None:
+    """Compare the number of modes found with the inertia of K - sigma M (Sylvester).
+
+    Without a factor there is nothing to count; `davidson` searches for missed modes instead.
+
+    Args:
+        ops: `PETScOperators` of the body.
+        lam: eigenvalues found, ascending.
+        m: number of modes asked for.
+        n_rigid: rigid motions beside them.
+        spent: a factor of K that nobody needs any more and that gives its place.
+
+    Raises:
+        ModesMissedError: if the numbers differ.
+    """
+    if ops.solver.iterative:
+        return
+    found, sigma = count_shift(lam, m)
+    count = _count_below(ops, sigma, spent) - n_rigid
+    if count != found:
+        raise ModesMissedError(
+            f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
+            f"but the inertia of K - sigma M counts {count}.",
+            hint="Ask for more modes, or give another shift sigma.",
+        )
+
+
+def _count_below(ops: Any, sigma: float, spent: Any) -> int:
+    """Number of eigenvalues below sigma."""
+    A = ops.shifted(sigma)
+    if isinstance(spent, Factor) and spent.A == ops.K and _n_entries(A) == _n_entries(ops.K):
+        return _counted_in_place(ops.K, A, spent)
+    if spent is not None:
+        spent.release()
+    factor = Factor(A, definite=False, solver=ops.solver)
+    count = factor.negative_pivots()
+    factor.release()
+    A.destroy()
+    return count
+
+
+def _counted_in_place(K: PETSc.Mat, A: PETSc.Mat, factor: Factor) -> int:
+    """The values of A, whose pattern is that of K, go through the analysis of the factor of K."""
+    same, values = PETSc.Mat.Structure.SAME_NONZERO_PATTERN, K.copy()
+    A.copy(K, structure=same)
+    A.destroy()
+    factor.compute(definite=False)
+    count = factor.negative_pivots()
+    values.copy(K, structure=same)
+    values.destroy()
+    return count
+
+
+def _n_entries(A: PETSc.Mat) -> float:
+    """Number of entries on all ranks."""
+    return float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])

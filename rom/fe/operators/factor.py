@@ -1,0 +1,117 @@
+"""One MUMPS factorisation, used for many right-hand sides and for counting eigenvalues."""
+
+from petsc4py import PETSc
+
+import numpy as np
+
+from rom.errors import SolverError
+from rom.fe.operators.memory import allowed_bytes, give_back, too_large
+from rom.fe.operators.solver import DIRECT, Solver
+from rom.model import Array
+
+BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
+PIVOT_THRESHOLD = 0.01  # the default of MUMPS
+MEMORY_ERRORS = (-8, -9, -11, -13, -19)  # INFOG(1) of MUMPS: work space or allocation too small
+
+
+class Factor:
+    """L D L^T of a symmetric PETSc matrix by MUMPS.
+
+    Args:
+        A: the matrix.
+        definite: promise that it is positive definite: no pivoting.
+        solver: says whether blocks of the factor are compressed, and where it lives.
+
+    Attributes:
+        ksp: the PETSc solver that holds the factor.
+        ok: False when MUMPS met a pivot it could not divide by.
+
+    Raises:
+        ResourceError: if MUMPS runs out of memory.
+    """
+
+    def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT):
+        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
+        self.A = A
+        self.ksp = PETSc.KSP().create(A.comm)
+        self.ksp.setOperators(A)
+        self.ksp.setType(PETSc.KSP.Type.PREONLY)
+        pc = self.ksp.getPC()
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        pc.setFactorSetUpSolverType()
+        self.factor = pc.getFactorMatrix()
+        self.factor.setMumpsIcntl(24, 1)  # needed by PETSc for the inertia
+        self.factor.setMumpsIcntl(13, 1)  # a root shared by ranks would not report its pivots
+        if solver.low_rank:
+            self.factor.setMumpsIcntl(35, 1)
+            self.factor.setMumpsCntl(7, solver.low_rank)
+        if solver.out_of_core:
+            self.factor.setMumpsIcntl(22, 1)
+        allowed = allowed_bytes(A.comm.tompi4py())
+        self.factor.setMumpsIcntl(23, max(int(allowed / 1e6), 1))  # obeyed after the analysis
+        self.compute(definite=definite)
+
+    def compute(self, *, definite: bool) -> None:
+        """Factor A; again when its values have changed, without a new analysis.
+
+        Raises:
+            ResourceError: if MUMPS runs out of memory.
+        """
+        self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
+        self.ksp.setUp()
+        self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
+        code = self.factor.getMumpsInfog(1)
+        if code in MEMORY_ERRORS:
+            need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
+            allowed = allowed_bytes(self.A.comm.tompi4py()) * self.A.comm.size
+            raise too_large(self.A.getSize()[0], need, allowed)
+        self.ok = code >= 0
+
+    def solve(self, F: Array) -> Array:
+        """A^-1 F for (n_local, k) right-hand sides, in blocks."""
+        X = np.empty(F.shape)
+        for first in range(0, F.shape[1], BLOCK_SIZE):
+            columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
+            B, Y = dense(F[:, columns], self.A), dense(np.zeros_like(F[:, columns]), self.A)
+            self.factor.matSolve(B, Y)
+            X[:, columns] = Y.getDenseArray()
+            B.destroy(), Y.destroy()
+        return X
+
+    def release(self) -> None:
+        """Give the memory back now; PETSc would wait until all ranks collect their garbage."""
+        self.ksp.destroy()
+        self.factor.destroy()
+        give_back()
+
+    def negative_pivots(self) -> int:
+        """Number of negative eigenvalues of A.
+
+        Raises:
+            SolverError: if the factorisation broke down.
+        """
+        if not self.ok:
+            raise SolverError("the matrix K - sigma M could not be factored to count modes.")
+        return int(self.factor.getInertia()[0])
+
+
+def dense(X: Array, A: PETSc.Mat) -> PETSc.Mat:
+    """(n_local, k) rows as a PETSc dense matrix with the row layout of the columns of A."""
+    n_local, n = A.getLocalSize()[1], A.getSize()[1]
+    sizes = ((n_local, n), (None, X.shape[1]))
+    matrix = PETSc.Mat().createDense(sizes, array=np.asfortranarray(X).T.ravel(), comm=A.comm)
+    matrix.assemble()
+    return matrix
+
+
+def dense_rows(A: PETSc.Mat, X: Array) -> Array:
+    """A X for (n_local, k) rows."""
+    if X.shape[1] == 0:
+        return np.zeros((A.getLocalSize()[0], 0))
+    B = dense(X, A)
+    Y = A.matMult(B)
+    out = Y.getDenseArray().copy()
+    B.destroy(), Y.destroy()
+    return out

@@ -1,0 +1,80 @@
+"""Lowest modes by SLEPc: Krylov-Schur, shift-invert with a MUMPS factor at hand."""
+
+from typing import Any
+
+from slepc4py import SLEPc
+
+import numpy as np
+
+from rom.errors import SolverError
+from rom.fe.operators.factor import Factor
+from rom.model import Array
+
+EIGENVALUE_RTOL = 1e-11  # SLEPc's residual, of the eigenvalue
+MAX_RESTARTS = 500
+
+
+def krylov_schur(
+    ops: Any, factor: Factor, sigma: float, deflated: Array, k: int
+) -> tuple[Array, Array]:
+    """The k eigenvalues next to the shift, ascending, and their mass-normalised modes.
+
+    Args:
+        ops: operators of the body.
+        factor: of K - sigma M.
+        sigma: the shift, below all eigenvalues sought.
+        deflated: (n_local, d) M-orthonormal modes to leave out.
+        k: number of modes sought.
+
+    Raises:
+        SolverError: if they do not converge.
+
+    Source:
+        Stewart, A Krylov-Schur algorithm for large eigenproblems, SIAM J. Matrix Anal. Appl. 23
+        (2002) 601, as implemented in SLEPc.
+    """
+    k = min(k, ops.n - deflated.shape[1])
+    solver = SLEPc.EPS().create(ops.comm)
+    solver.setOperators(ops.K, ops.M)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.setTarget(sigma)
+    solver.setDimensions(k, min(2 * k + 15, ops.n - deflated.shape[1]))
+    solver.setTolerances(EIGENVALUE_RTOL, MAX_RESTARTS)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    transform.setShift(sigma)
+    transform.setKSP(factor.ksp)
+    solver.setInitialSpace([vector(ops.K, ops.fixed)])  # depends on the place, not on the rank
+    if deflated.shape[1]:
+        solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
+    solver.solve()
+    pairs = mode_pairs(ops, solver, k)
+    solver.destroy()  # it refers to the factor, which could not be freed
+    return pairs
+
+
+def vector(A: Any, values: Array) -> Any:
+    """A PETSc vector with the layout of the columns of A."""
+    x = A.createVecRight()
+    x.array[:] = values
+    return x
+
+
+def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
+    """The k lowest eigenvalues a solver has found, and their mass-normalised modes."""
+    n_found = solver.getConverged()
+    if n_found < k:
+        raise SolverError(
+            f"only {n_found} of {k} modes converged (reason {solver.getConvergedReason()}).",
+            hint="Ask for fewer modes, or check the mesh for cells of extreme shape.",
+        )
+    lam = np.array([solver.getEigenvalue(i).real for i in range(n_found)])
+    x, Phi = ops.K.createVecRight(), np.zeros((ops.n_local, n_found))
+    for i in range(n_found):
+        solver.getEigenvector(i, x)
+        Phi[:, i] = x.array
+    order = np.argsort(lam)[:k]
+    Phi = Phi[:, order]
+    return lam[order], Phi / np.sqrt(np.diag(ops.gram(Phi, ops.apply_M(Phi))))

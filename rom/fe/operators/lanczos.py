@@ -1,0 +1,136 @@
+"""Lowest modes by shift-invert Lanczos in blocks.
+
+Solving for a block of right-hand sides costs about as much as solving for two or three single
+ones, because the factor is read from memory once. A Krylov method that asks for one solution at a
+time spends twice the factorisation on twenty modes; in blocks it takes half of it.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from rom.errors import SolverError
+from rom.fe.operators.iterative import Inverse
+from rom.model import Array
+
+BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
+MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
+MAX_RESTARTS = 20  # after which the method has failed
+EIGENVALUE_RTOL = 1e-10  # residual of an eigenvalue of the inverse
+SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
+
+
+class BlockLanczos:
+    """Krylov space of (K - sigma M)^-1 M, orthogonal to deflated columns.
+
+    Args:
+        ops: operators of the body.
+        factor: of K - sigma M.
+        sigma: the shift, below all eigenvalues sought.
+        deflated: (n_local, d) M-orthonormal modes to leave out.
+        k: number of modes sought.
+        spare: how many of them only need good eigenvalues.
+
+    Source:
+        Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
+        generalized eigenproblems, SIAM J. Matrix Anal. Appl. 15 (1994) 228; here with full
+        orthogonalisation, and the thick restart of Wu and Simon, ibid. 22 (2000) 602.
+    """
+
+    def __init__(
+        self, ops: Any, factor: Inverse, sigma: float, deflated: Array, k: int, spare: int = 0
+    ):
+        self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
+        self.tolerance = np.repeat([EIGENVALUE_RTOL, SPARE_EIGENVALUE_RTOL], [k - spare, spare])
+        self.n_deflated = deflated.shape[1]
+        shape = (ops.n_local, self.n_deflated + capacity(k))
+        self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
+        self.size = 0
+        self.T = np.zeros((0, 0))
+        self._append(deflated, ops.apply_M(deflated))
+        phases = np.arange(1.0, BLOCK_SIZE + 1.0)
+        start = np.cos(np.outer(ops.fixed, phases) + phases)  # depends on the place only
+        self._append(*self._orthonormal(start)[:2])
+
+    def solve(self) -> None:
+        """Let the space grow until the k leading pairs have converged.
+
+        Raises:
+            SolverError: if they do not.
+        """
+        for _ in range(MAX_RESTARTS):
+            while self.size + BLOCK_SIZE <= self.V.shape[1]:
+                if self._converged(self._grow()):
+                    return
+            self._restart()
+        raise SolverError(
+            f"{self.k} modes did not converge in {MAX_RESTARTS} restarts.",
+            hint="Ask for fewer modes, or check the mesh for cells of extreme shape.",
+        )
+
+    def pairs(self) -> tuple[Array, Array]:
+        """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""
+        theta, S = self._ritz(self.k)
+        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - BLOCK_SIZE] @ S
+
+    def _append(self, X: Array, MX: Array) -> None:
+        new = slice(self.size, self.size + X.shape[1])
+        self.V[:, new], self.MV[:, new] = X, MX
+        self.size = new.stop
+
+    def _grow(self) -> Array:
+        """One more block; returns its (p, p) coupling to the block before."""
+        load = self.MV[:, self.size - BLOCK_SIZE : self.size]
+        W, MW, H, R = self._orthonormal(self.factor.solve(load))
+        k, H = self.T.shape[0], H[self.n_deflated :]
+        self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
+        self._append(W, MW)
+        return R
+
+    def _orthonormal(self, W: Array) -> tuple[Array, Array, Array, Array]:
+        """W made M-orthonormal to the space, M W, its components in the space, and the rest.
+
+        When the space holds W already, round-off is left, orthogonal to it after the second pass:
+        a random block with which the search goes on.
+        """
+        V, MV = self.V[:, : self.size], self.MV[:, : self.size]
+        H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
+        for _ in range(2):
+            G = self.ops.gram(MV, W)
+            W = W - V @ G
+            H += G
+        MW = self.ops.apply_M(W)
+        for _ in range(2):
+            g, U = np.linalg.eigh(self.ops.gram(W, MW))
+            root = np.sqrt(np.maximum(g, 1e-30 * max(g[-1], np.finfo(float).tiny)))
+            W, MW = W @ (U / root), MW @ (U / root)
+            R = (U * root).T @ R
+        return W, MW, H, R
+
+    def _restart(self) -> None:
+        """Keep the leading Ritz vectors and the last block only."""
+        kept = self.k + BLOCK_SIZE
+        theta, S = self._ritz(kept)
+        ends = self.n_deflated + np.array([0, kept, kept + BLOCK_SIZE])
+        for V in (self.V, self.MV):
+            last = V[:, self.size - BLOCK_SIZE : self.size].copy()
+            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - BLOCK_SIZE] @ S
+            V[:, ends[1] : ends[2]] = last
+        self.size, self.T = ends[2], np.diag(theta)
+
+    def _converged(self, R: Array) -> bool:
+        """Whether the residuals of the k leading Ritz values are small."""
+        if self.T.shape[0] < self.k:
+            return False
+        theta, S = self._ritz(self.k)
+        residual = np.linalg.norm(R @ S[-BLOCK_SIZE:], axis=0)
+        return bool((residual <= self.tolerance * theta).all())
+
+    def _ritz(self, k: int) -> tuple[Array, Array]:
+        theta, S = np.linalg.eigh(self.T)
+        return theta[::-1][:k], S[:, ::-1][:, :k]
+
+
+def capacity(k: int) -> int:
+    """Columns the space of k modes may have."""
+    return k + MAX_EXTRA_BLOCKS * BLOCK_SIZE

@@ -1,0 +1,346 @@
+"""The operator verbs on PETSc, MUMPS and SLEPc, distributed over the ranks.
+
+Modes of a model in a given support come from SLEPc. The normal modes of a reduction, whose
+stiffness is factored already, come from our block Lanczos, which asks for many solutions at a time
+and needs half the time. A certificate thereby compares two eigensolvers that share no line.
+"""
+
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eigh
+from scipy.sparse import csr_matrix
+
+from rom.eigen.scipy import dof_set
+from rom.eigen.verbs import Weighted, orthonormal
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.fe.operators.aij import aij, gathered, weighted
+from rom.fe.operators.counting import verify_count
+from rom.fe.operators.factor import Factor, dense_rows
+from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
+from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
+from rom.fe.operators.krylov_schur import krylov_schur
+from rom.fe.operators.lanczos import BlockLanczos, capacity
+from rom.fe.operators.memory import check_factor_memory
+from rom.fe.operators.solver import DIRECT, Solver
+from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
+from rom.model import Array, Index
+
+N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
+MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
+SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
+
+
+class PETScOperators:
+    """Stiffness and mass of one body, rows distributed over the ranks.
+
+    Args:
+        K: (n, n) stiffness, PETSc AIJ, symmetric.
+        M: (n, n) mass with the same layout.
+        rigid: (n_local, 6) rigid motions; node by node, unless these are new coordinates.
+        T: (n_parent, n) map to the coordinates these came from.
+        fixed: (n_local,) vector that does not depend on the partition; made from the rigid motions
+            when not given.
+        parent: the operators in the coordinates these came from.
+        solver: how equations are solved.
+
+    Raises:
+        SolverError: if an entry is not finite.
+    """
+
+    def __init__(
+        self,
+        K: PETSc.Mat,
+        M: PETSc.Mat,
+        rigid: Array | None = None,
+        *,
+        T: PETSc.Mat | None = None,
+        fixed: Array | None = None,
+        parent: "PETScOperators | None" = None,
+        solver: Solver = DIRECT,
+    ):
+        self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
+        self.solver, self.affordable = solver, not solver.iterative
+        self.comm = K.comm.tompi4py()
+        self.n = K.getSize()[0]
+        self.first, end = K.getOwnershipRange()
+        self.n_local = end - self.first
+        self.last = self.comm.rank == self.comm.size - 1
+        for name, A in (("K", K), ("M", M)):
+            if not np.isfinite(A.norm()):
+                raise SolverError(f"{name} has an entry that is not finite.")
+        if fixed is None:
+            fixed = fixed_vector(self.comm, rigid, self.first, self.n_local)
+        self.fixed = fixed
+
+    def apply_K(self, X: Array) -> Array:
+        """K X."""
+        return dense_rows(self.K, X)
+
+    def apply_M(self, X: Array) -> Array:
+        """M X."""
+        return dense_rows(self.M, X)
+
+    def gram(self, X: Array, Y: Array) -> Array:
+        """X^T Y summed over the ranks."""
+        product = np.ascontiguousarray(X.T @ Y)
+        self.comm.Allreduce(MPI.IN_PLACE, product)
+        return product
+
+    def rows(self, X: Array, dofs: npt.ArrayLike) -> Array:
+        """X[dofs] on all ranks."""
+        dofs = np.asarray(dofs, dtype=np.int64)
+        out = np.zeros((dofs.size, X.shape[1]))
+        mine = (dofs >= self.first) & (dofs < self.first + self.n_local)
+        out[mine] = X[dofs[mine] - self.first]
+        self.comm.Allreduce(MPI.IN_PLACE, out)
+        return out
+
+    def all_finite(self, X: Array) -> bool:
+        """True when X is finite on every rank."""
+        return bool(self.comm.allreduce(bool(np.isfinite(X).all()), op=MPI.LAND))
+
+    def largest(self) -> float:
+        """Estimate of the largest eigenvalue from the diagonals."""
+        ratio = self.K.getDiagonal().array / self.M.getDiagonal().array
+        return float(self.comm.allreduce(ratio.max(initial=0.0), op=MPI.MAX))
+
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldPETSc:
+        """Eliminate the held dofs and factor the rest of K - shift M."""
+        return HeldPETSc(self, dof_set(dofs, self.n), shift)
+
+    def part(self, rows: Index) -> "PETScOperators":
+        """The body with all dofs held but these: numbers on this rank."""
+        dofs = self.first + rows
+        some = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=self.comm)
+        if self.n % 3 == 0 and self._whole_nodes(dofs):
+            some.setBlockSize(3)  # multigrid then aggregates nodes
+        K, M = (A.createSubMatrix(some, some) for A in (self.K, self.M))
+        return PETScOperators(K, M, fixed=self.fixed[rows], solver=self.solver)
+
+    def _whole_nodes(self, dofs: Index) -> bool:
+        """True when, on every rank, the dofs are all three of their nodes."""
+        mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
+        mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
+        return bool(self.comm.allreduce(mine, op=MPI.LAND))
+
+    def transform(self, T: Any, rigid: Array) -> "PETScOperators":
+        """The same body in the coordinates a of u = T a."""
+        from rom.fe.operators.tied import TiedOperators  # which is one of these itself
+
+        return TiedOperators(self, csr_matrix(T), rigid)
+
+    def expand(self, A: Array) -> Array:
+        """T A."""
+        return A if self.T is None else dense_rows(self.T, A)
+
+    def restrict(self, F: Array) -> Array:
+        """T^T F."""
+        if self.T is None:
+            return F
+        out = np.zeros((self.n_local, F.shape[1]))
+        x, y = self.T.createVecs()
+        for k, column in enumerate(F.T):
+            y.array[:] = column
+            self.T.multTranspose(y, x)
+            out[:, k] = x.array
+        return out
+
+    def plus_mass(self, dM: Any) -> "PETScOperators":
+        """The same body with the mass M + dM."""
+        sizes = ((self.n_local, self.n), (self.n_local, self.n))
+        M = self.M.copy()
+        M.axpy(1.0, aij(csr_matrix(dM), sizes, self.comm))
+        return self._like(self.K, M, self.rigid)
+
+    def gathered(self, A: PETSc.Mat) -> csr_matrix:
+        """All rows of a matrix with the layout of K, on every rank."""
+        return gathered(A)
+
+    def product(self, A: PETSc.Mat, X: Array) -> Array:
+        """A X."""
+        return dense_rows(A, X)
+
+    def varied(
+        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
+    ) -> "PETScOperators":
+        """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
+        K, M = weighted(self.K, *stiffness), weighted(self.M, *mass)
+        return self._like(K, M, self.rigid if rigid is None else rigid)
+
+    def solved_by(self, solver: Solver) -> "PETScOperators":
+        """The same body, its equations solved another way."""
+        return self._like(self.K, self.M, self.rigid, solver)
+
+    def _like(
+        self, K: PETSc.Mat, M: PETSc.Mat, rigid: Array | None, solver: Solver | None = None
+    ) -> "PETScOperators":
+        """Other matrices in the same coordinates."""
+        fields: dict[str, Any] = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
+        return PETScOperators(K, M, rigid, **fields, solver=solver or self.solver)
+
+    def modes(
+        self,
+        held: npt.ArrayLike | HeldPETSc,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
+    ) -> tuple[Array, Array]:
+        """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
+        in_blocks = isinstance(held, HeldPETSc)
+        if not isinstance(held, HeldPETSc):
+            if np.size(held) == 0:
+                return self._free_modes(m, sigma)
+            held, finished = self.hold(held), True
+        elif held.factor is None and held.n_free:
+            held.make()
+        if not 0 <= m <= held.n_free:
+            raise ConfigError(
+                f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
+                f"{held.n_free} interior dofs; ask for 0 to {held.n_free} modes."
+            )
+        lam, Phi = np.zeros(0), np.zeros((self.n_local, m))
+        if m:
+            how = {"in_blocks": in_blocks, "finished": finished}
+            lam, Phi[held.mine] = held.inner.supported_modes(m, held, **how)
+        return np.sqrt(lam), signed(self, Phi)
+
+    def supported_modes(
+        self, m: int, held: HeldPETSc, *, in_blocks: bool, finished: bool
+    ) -> tuple[Array, Array]:
+        """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
+        if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES)):
+            lam, Phi = self.all_modes()
+        else:
+            none = np.zeros((self.n_local, 0))
+            lam, Phi = self.lowest(m + N_SPARE_MODES, 0.0, held.factor, none, in_blocks=in_blocks)
+            if finished and not in_blocks:  # SLEPc has taken the factor's matrix for its own
+                held.release()
+            verify_count(self, lam, m, 0, held.factor if finished else None)
+            if finished and in_blocks:
+                held.release()
+        return lam[:m], settled(self, lam, Phi)[:, :m]
+
+    def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
+        if not 0 <= m <= self.n:
+            raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
+        R = np.zeros((self.n_local, 0)) if self.rigid is None else orthonormal(self, self.rigid)
+        n_elastic = max(m - R.shape[1], 0)
+        lam, Phi = self._elastic_modes(R, n_elastic, sigma)
+        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(np.maximum(lam, 0.0))])
+        return omega[:m], np.hstack([R, signed(self, Phi)])[:, :m]
+
+    def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
+        """The m modes above the rigid ones."""
+        n_rigid = R.shape[1]
+        if m == 0:
+            return np.zeros(0), np.zeros((self.n_local, 0))
+        if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES) + n_rigid):
+            lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
+        else:
+            sigma = -SHIFT_RATIO * self.first_elastic(R) if sigma is None else sigma
+            inverse = self.inverse(self.shifted(sigma), self.rigid)
+            lam, Phi = self.lowest(m + N_SPARE_MODES, sigma, inverse, R)
+            inverse.release()  # counting needs its memory
+            self._refuse_mechanisms(lam, n_rigid)
+            verify_count(self, lam, m, n_rigid)
+        return lam[:m], settled(self, lam, Phi)[:, :m]
+
+    def _refuse_mechanisms(self, lam: Array, n_rigid: int) -> None:
+        n_zero = int(np.count_nonzero(np.abs(lam) < RIGID_RTOL * self.largest()))
+        if n_rigid and n_zero:
+            raise ModelError(
+                f"at least {n_zero} more motions without stiffness than the six of a connected "
+                "body.",
+                hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
+            )
+
+    def inverse(self, A: PETSc.Mat, near_null: Array | None, n_columns: int = 0) -> Inverse:
+        """A^-1 of a positive definite matrix by the solver chosen.
+
+        Args:
+            A: the matrix.
+            near_null: (n_local, 6) rigid motions on its rows, which multigrid needs.
+            n_columns: dense columns of that length that will be kept beside a factor.
+
+        Raises:
+            ResourceError: if a factor would not fit.
+            ConfigError: if multigrid has no geometry to go by.
+        """
+        if self.solver.iterative:
+            if near_null is None:
+                raise ConfigError("the iterative solver needs the coordinates of the nodes.")
+            return multigrid(A, near_null)
+        if self.solver == DIRECT:
+            check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
+        factor = Factor(A, definite=True, solver=self.solver)
+        return refined(factor) if self.solver.low_rank and factor.ok else factor
+
+    def indefinite(self, shift: float) -> Factor:
+        """(K - shift M)^-1 for a shift among the eigenvalues.
+
+        Raises:
+            ConfigError: by iteration, which needs a positive definite matrix.
+            SolverError: if the shift is an eigenvalue.
+        """
+        if self.solver.iterative:
+            raise ConfigError(
+                "answers at a frequency above zero need a factor.",
+                hint='Use solver="direct" or "out-of-core", or frequencies=(0.0,).',
+            )
+        factor = Factor(self.shifted(shift), definite=False, solver=DIRECT)
+        if not factor.ok:
+            raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
+        return factor
+
+    def shifted(self, sigma: float) -> PETSc.Mat:
+        """K - sigma M."""
+        A = self.K.copy()
+        A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        return A
+
+    def lowest(
+        self, k: int, sigma: float, factor: Inverse, deflated: Array, *, in_blocks: bool = False
+    ) -> tuple[Array, Array]:
+        """The k eigenvalues above sigma beside the deflated columns, and their modes."""
+        if self.solver.iterative and isinstance(factor, ConjugateGradients):
+            return davidson(self, factor, deflated, k)
+        if not in_blocks and isinstance(factor, Factor):
+            return krylov_schur(self, factor, sigma, deflated, k)
+        space = BlockLanczos(self, factor, sigma, deflated, k, min(N_SPARE_MODES, k - 1))
+        space.solve()
+        return space.pairs()
+
+    def all_modes(self) -> tuple[Array, Array]:
+        """All eigenpairs of a small model, solved densely on every rank."""
+        E = np.eye(self.n)[self.first : self.first + self.n_local]
+        K, M = (self.rows(apply(E), np.arange(self.n)) for apply in (self.apply_K, self.apply_M))
+        lam, Phi = eigh(K, M)
+        return lam, Phi[self.first : self.first + self.n_local]
+
+    def first_elastic(self, R: Array) -> float:
+        """Estimate of the first elastic eigenvalue, for the choice of a shift.
+
+        With geometry, an upper bound; new coordinates leave its order of magnitude.
+        """
+        if self.parent is not None:
+            return self.parent.first_elastic(R)
+        if self.rigid is not None:
+            return first_elastic(self)
+        return self._by_inverse_iteration()
+
+    def _by_inverse_iteration(self) -> float:
+        """Smallest eigenvalue that is not zero, estimated without geometry."""
+        floor = RIGID_RTOL * self.largest()
+        factor = Factor(self.shifted(-1e-6 * self.largest()), definite=True, solver=self.solver)
+        X = self.fixed[:, None] ** np.arange(1.0, 9.0)
+        for _ in range(4):
+            X = factor.solve(self.apply_M(X))
+            X = np.linalg.solve(np.linalg.cholesky(self.gram(X, X)), X.T).T
+        lam = eigh(self.gram(X, self.apply_K(X)), self.gram(X, self.apply_M(X)), eigvals_only=True)
+        return float(max(lam[np.argmax(lam > floor)], floor))

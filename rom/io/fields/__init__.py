@@ -1,0 +1,1 @@
+"""Fields over meshes and motions for programs that draw: ParaView, glTF, UFF."""

@@ -1,0 +1,186 @@
+"""Mode shapes on the surface of a body, and meshes, for ParaView (VTK XML, unstructured grid)."""
+
+import base64
+from functools import partial
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from rom.arguments import AnySolution, typed, whole
+from rom.body.flexible import FlexibleBody
+from rom.body.recovery import von_mises
+from rom.errors import ConfigError
+from rom.io.files import write_whole
+from rom.model import Array, Index
+from rom.names import ORIGIN_MARK
+
+VTK_TRIANGLE = 5  # number of this cell type
+TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
+
+
+def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
+    """Write the outer surface with one displacement field per elastic coordinate.
+
+    Args:
+        body: a body with a surface.
+        path: file ending in ``.vtu``.
+
+    Raises:
+        ConfigError: if the body has no surface, or the place is not writable.
+    """
+    if body.surface is None:
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+    text = _document(body)
+    write_whole(path, lambda file: file.write(text.encode()))
+    return Path(path)
+
+
+@typed
+def write_stress(
+    body: FlexibleBody, q: Array, path: str | Path, *, accelerations: Array | None = None
+) -> Path:
+    """Write the outer surface with displacement, stress and von Mises stress.
+
+    Args:
+        body: a body reduced with ``stress=True``.
+        q: (r,) elastic coordinates.
+        path: file ending in ``.vtu``.
+        accelerations: see `rom.body.recovery.StressRecovery.accelerations`; None for statics.
+
+    Raises:
+        ConfigError: if the stress of the body cannot be recovered, q has another length, or the
+            place is not writable.
+    """
+    if body.stress is None or body.surface is None:
+        raise ConfigError(
+            f"the stress of body {body.name!r} cannot be recovered.",
+            hint="Reduce it with stress=True.",
+        )
+    text = _stressed(body, q, body.stress.field(q, accelerations))
+    write_whole(path, lambda file: file.write(text.encode()))
+    return Path(path)
+
+
+@typed
+def write_stress_history(
+    solution: AnySolution, body: str, path: str | Path, *, every: int = 1
+) -> Path:
+    """Write stress and displacement of a moving body as a series for ParaView.
+
+    In the axes of the body. The series is written last, so that it never names a missing file.
+
+    Args:
+        solution: a `rom.mbs.results.solution.Solution`.
+        body: name of a body reduced with ``stress=True``.
+        path: file ending in ``.pvd``; its instants go into a folder beside it with its stem.
+        every: take every so many instants.
+
+    Raises:
+        ConfigError: if the stress of the body cannot be recovered, or the place is not writable.
+    """
+    whole("every", every, 1)
+    path = Path(path)
+    if path.suffix != ".pvd":
+        raise ConfigError(f"{path} does not end in .pvd.")
+    part = solution.mechanism.part(body)
+    folder, lines = path.with_suffix(""), []
+    for k in range(0, solution.t.size, every):
+        stress = solution.stress(body, k)
+        folder.mkdir(parents=True, exist_ok=True)
+        file = folder / f"{folder.name}_{k:06d}.vtu"
+        text = _stressed(part.flexible, solution.elastic(body)[k], stress).encode()
+        write_whole(file, partial(_write, text))
+        name = quoteattr(f"{folder.name}/{file.name}")
+        lines.append(f'<DataSet timestep="{float(solution.t[k])!r}" file={name}/>')
+    series = "\n".join(
+        ['<VTKFile type="Collection" version="1.0"><Collection>', *lines, "</Collection></VTKFile>"]
+    )
+    write_whole(path, partial(_write, f"{series}\n".encode()))
+    return path
+
+
+def _write(text: bytes, file: Any) -> None:
+    file.write(text)
+
+
+def _stressed(body: FlexibleBody, q: Array, stress: Array) -> str:
+    surface = body.surface
+    assert surface is not None
+    fields = {
+        "stress xx yy zz yz xz xy [Pa]": stress,
+        "von Mises stress [Pa]": von_mises(stress),
+        "displacement [m]": (surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
+    }
+    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
+
+
+def _document(body: FlexibleBody) -> str:
+    surface = body.surface
+    assert surface is not None
+    shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
+    fields = {
+        f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
+        for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
+    }
+    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
+
+
+def grid(
+    points: Array,
+    cells: Index,
+    kind: int,
+    *,
+    at_points: dict[str, Any] | None = None,
+    at_cells: dict[str, Any] | None = None,
+) -> str:
+    """Text of a file with cells of one kind.
+
+    Args:
+        points: (n, 3) positions [m].
+        cells: (m, k) node numbers in VTK's order.
+        kind: VTK's number of the cell.
+        at_points: {name: (n,) or (n, c) values}.
+        at_cells: {name: (m,) or (m, c) values}.
+    """
+    m, k = cells.shape
+    topology = {
+        "connectivity": cells.ravel(),
+        "offsets": k * np.arange(1, m + 1),
+        "types": np.full(m, kind, dtype=np.uint8),
+    }
+    head = (
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64">'
+    )
+    return "\n".join(
+        [
+            head,
+            f"<!-- {ORIGIN_MARK} -->",
+            f'<UnstructuredGrid><Piece NumberOfPoints="{len(points)}" NumberOfCells="{m}">',
+            *_section("Points", {"points": points}),
+            *_section("Cells", topology),
+            *_section("PointData", at_points or {}),
+            *_section("CellData", at_cells or {}),
+            "</Piece></UnstructuredGrid></VTKFile>",
+            "",
+        ]
+    )
+
+
+def _section(name: str, arrays: dict[str, Any]) -> list[str]:
+    return [f"<{name}>", *(_array(key, values) for key, values in arrays.items()), f"</{name}>"]
+
+
+def _array(name: str, values: Any) -> str:
+    values = np.ascontiguousarray(values)
+    values = values.astype(values.dtype.newbyteorder("<"))
+    data = values.tobytes()
+    coded = base64.b64encode(len(data).to_bytes(8, "little") + data).decode()
+    kind = TYPES[values.dtype.str]
+    components = values.shape[1] if values.ndim == 2 else 1
+    return (
+        f'<DataArray type="{kind}" Name={quoteattr(name)} NumberOfComponents="{components}" '
+        f'format="binary">{coded}</DataArray>'
+    )

@@ -1,0 +1,142 @@
+"""Square matrices of other finite element programs, each in its own kind of file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from rom.errors import ConfigError, FileFormatError
+from rom.io.files import check_last_line, check_readable, write_whole
+from rom.io.matrices.calculix import STORED, read_stored_matrix
+from rom.io.matrices.dmig import Dofs, read_dmig, whole
+from rom.io.matrices.market import BANNER, read_market
+from rom.io.matrices.op4 import read_op4
+from rom.io.matrices.user_element import read_user_element
+
+HEAD_BYTES = 10_000  # among which a user element is announced
+
+
+@dataclass(frozen=True, slots=True)
+class NamedMatrix:
+    """A matrix of another program.
+
+    Attributes:
+        where: file and name, for messages.
+        A: (n, n) sparse, as written: of a symmetric one there may be one triangle only.
+        dofs: (n, 2) label and component 1 to 6 of each row; None for rows in the order of nodes.
+    """
+
+    where: str
+    A: csr_matrix
+    dofs: Dofs | None = None
+
+
+def read_matrix(source: Any) -> NamedMatrix:
+    """A square matrix: Matrix Market, Abaqus, CalculiX, OUTPUT4, or DMIG.
+
+    Args:
+        source: file, or (file, name) where it holds several: ``.mtx`` and ``.mm`` for Matrix Market
+            (told by its first line) or Abaqus text, matrices or a linear user element, the latter
+            also in ``.inp``; ``.sti`` and ``.mas`` for CalculiX, with
+            ``.dof`` beside, ``.op4`` for OUTPUT4, ``.bdf``, ``.dat``, ``.pch``, ``.dmig`` for DMIG
+            cards.
+
+    Raises:
+        ConfigError: for another ending, or if a name is needed or unknown.
+        FileFormatError: if the file is missing, cut, or holds no real square matrix.
+        UnsafeFileError: if it asks for more memory than its size can mean.
+    """
+    path, name = source if isinstance(source, tuple) else (source, None)
+    path = check_readable(path)
+    found = _all(path)
+    if name is None and len(found) > 1:
+        raise ConfigError(
+            f"{path} holds {sorted(found)}; name one.",
+            hint="Give (file, name), on the command line FILE:NAME.",
+        )
+    key = next(iter(found)) if name is None else name.upper()
+    if key not in found:
+        raise ConfigError(f"{path} has no matrix {name!r}; it holds {sorted(found)}.")
+    A, dofs = found[key]
+    if A.shape[0] != A.shape[1]:
+        raise FileFormatError(f"the matrix {key} is {A.shape[0]} x {A.shape[1]}.", where=str(path))
+    return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs)
+
+
+def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
+    """Write the lower triangle of a symmetric matrix as text that ``*MATRIX INPUT`` reads.
+
+    Args:
+        A: (n, n) dense or sparse.
+        dofs: (n, 2) node and component of each row.
+        path: file to write.
+
+    Raises:
+        ConfigError: if the place is not writable.
+    """
+    found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
+    lines = [
+        f"{dofs[i, 0]},{dofs[i, 1]}, {dofs[j, 0]},{dofs[j, 1]}, {v:.16e}"
+        for i, j, v in zip(found.row, found.col, found.data, strict=True)
+        if i >= j and v
+    ]
+    text = "\n".join(lines) + "\n"
+    write_whole(path, lambda file: file.write(text.encode("ascii")))
+    return Path(path)
+
+
+def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
+    ending = path.suffix.lower()
+    if ending == ".op4":
+        return {name: (A, None) for name, A in read_op4(path).items()}
+    if ending in (".bdf", ".dat", ".pch", ".dmig"):
+        return dict(read_dmig(path))
+    if ending in STORED:
+        A, dofs = read_stored_matrix(path)
+        return {"": (_finite(A, path), dofs)}
+    if ending not in (".mtx", ".mm", ".inp"):
+        raise ConfigError(
+            f"{path} has the ending {ending!r}; known: .mtx, .mm, .inp, .sti, .mas, "
+            ".op4, .bdf, .dat, .pch, .dmig."
+        )
+    with path.open("rb") as file:
+        start = file.read(HEAD_BYTES)
+    if ending == ".inp" or b"*USER ELEMENT" in start.upper():
+        return dict(read_user_element(path))
+    return {
+        "": (_finite(read_market(path), path), None) if start.startswith(BANNER) else _abaqus(path)
+    }
+
+
+def _abaqus(path: Path) -> tuple[Any, Dofs]:
+    """Lines ``node, component, node, component, value`` of ``*MATRIX GENERATE`` output."""
+    check_last_line(path)
+    rows = []
+    with path.open(encoding="ascii", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if not line.strip() or line.startswith("*"):
+                continue
+            words = line.replace(",", " ").split()
+            try:
+                if len(words) != 5:
+                    raise ValueError(f"{len(words)} numbers instead of 5")
+                rows.append([*(whole(word) for word in words[:4]), float(words[4])])
+            except ValueError as error:
+                where = f"{path}, line {number}"
+                raise FileFormatError(f"this is no entry: {error}.", where=where) from error
+    if not rows:
+        raise FileFormatError("the file holds no entry.", where=str(path))
+    table = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 2)
+    dofs, place = np.unique(table, axis=0, return_inverse=True)
+    i, j = place.reshape(-1, 2).T
+    values = np.array([row[4] for row in rows])
+    A = coo_matrix((values, (i, j)), shape=(len(dofs),) * 2).tocsr()
+    return _finite(A, path), dofs
+
+
+def _finite(A: Any, path: Path) -> Any:
+    if not np.isfinite(A.data).all():
+        raise FileFormatError("a number is not finite.", where=str(path))
+    return A

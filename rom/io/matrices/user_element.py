@@ -1,0 +1,207 @@
+"""Linear user elements of Abaqus: reduced matrices as one element between labelled nodes.
+
+``*USER ELEMENT, LINEAR`` lists the components of the first node, then lines ``place, components``
+from which place on others hold; ``*MATRIX, TYPE=`` holds the upper triangle column by column. The
+comment ``** ELEMENT NODES`` names the nodes. CalculiX writes the same for ``*SUBSTRUCTURE MATRIX
+OUTPUT``, with a place of its own for each row.
+
+CalculiX 2.20 writes the rows of the retained nodes as they are, without condensing what was left
+out (its boundary columns are filled for frequency steps alone).
+
+Source:
+    Abaqus keywords guide, *USER ELEMENT and *MATRIX; CalculiX 2.20, writesubmatrix.f, mafillsm.f.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix, tril
+
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.io.files import check_last_line, write_whole
+from rom.io.matrices.dmig import Dofs, whole
+from rom.model import Array
+from rom.names import ORIGIN_MARK
+
+MOST_NODES = 100_000
+PER_LINE = 4
+NODE_LIST = "ELEMENT NODES"
+
+
+@dataclass(slots=True)
+class _Element:
+    """What was read of an element so far."""
+
+    n_nodes: int = 0
+    labels: list[int] = field(default_factory=list)
+    lists: list[tuple[int, list[int]]] = field(default_factory=list)  # place, components from there
+    values: dict[str, list[float]] = field(default_factory=dict)
+
+
+def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
+    """{"STIFFNESS", "MASS", ...: (lower triangle (n, n), (n, 2) node and component)}.
+
+    Raises:
+        FileFormatError: naming the line, if the file is missing, damaged or cut, or has no element
+            of this kind.
+        UnsafeFileError: if it claims more nodes than a dense matrix can have.
+    """
+    path = Path(path)
+    check_last_line(path)
+    element, keyword, kind = _Element(), "", ""
+    with path.open(encoding="latin1") as file:
+        for number, line in enumerate(file, 1):
+            try:
+                if line.startswith("**"):
+                    keyword = _comment(element, keyword, line)
+                elif line.startswith("*"):
+                    keyword, kind = _keyword(element, line)
+                elif line.strip():
+                    _data(element, keyword, kind, line.replace(",", " ").split())
+            except ValueError as error:
+                where = f"{path}, line {number}"
+                raise FileFormatError(f"this is no user element: {error}.", where=where) from error
+    return _matrices(element, str(path))
+
+
+def write_user_element(
+    matrices: dict[str, Any], dofs: Dofs, path: str | Path, *, nodes: dict[int, Array]
+) -> Path:
+    """Write symmetric matrices as an element U1 between its nodes.
+
+    Args:
+        matrices: {type, e.g. "STIFFNESS": (n, n)}.
+        dofs: (n, 2) label and component of each row, node by node; component 0 becomes 1.
+        path: file to write.
+        nodes: {label: (3,) position}; nodes without one, as those of modes, lie at the origin.
+
+    Raises:
+        ConfigError: if the place is not writable.
+    """
+    text = "\n".join(_document(matrices, np.asarray(dofs), nodes)) + "\n"
+    write_whole(path, lambda file: file.write(text.encode("ascii")))
+    return Path(path)
+
+
+def _comment(element: _Element, keyword: str, line: str) -> str:
+    """Labels stand in comments behind the one that announces them."""
+    if NODE_LIST in line.upper():
+        element.labels = []
+        return NODE_LIST
+    if keyword == NODE_LIST:
+        element.labels += [whole(word) for word in re.findall(r"\d+", line)]
+    return keyword
+
+
+def _keyword(element: _Element, line: str) -> tuple[str, str]:
+    words = [" ".join(word.split()).upper() for word in line.split(",")]
+    options = dict(word.replace(" =", "=").replace("= ", "=").partition("=")[::2] for word in words)
+    if words[0] == "*USER ELEMENT":
+        if element.n_nodes:
+            raise ValueError("there is a second one in the file")
+        if "LINEAR" not in options or "UNSYMM" in options:
+            raise ValueError("it is not linear and symmetric")
+        element.n_nodes = whole(options.get("NODES", ""))
+    kind = options.get("TYPE", "") if words[0] == "*MATRIX" else ""
+    if words[0] == "*MATRIX":
+        if kind in element.values:
+            raise ValueError(f"it has two matrices {kind!r}")
+        element.values[kind] = []
+    return words[0], kind
+
+
+def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
+    if keyword == "*MATRIX":
+        element.values[kind] += [float(word.replace("D", "E").replace("d", "e")) for word in words]
+    elif keyword in ("*USER ELEMENT", NODE_LIST):
+        numbers = [whole(word) for word in words]
+        place, components = (numbers[0], numbers[1:]) if element.lists else (1, numbers)
+        after = element.lists[-1][0] if element.lists else 0
+        if not after < place <= element.n_nodes or not set(components) <= set(range(1, 7)):
+            raise ValueError("places ascend up to NODES, and components are 1 to 6")
+        element.lists.append((place, components))
+
+
+def _matrices(element: _Element, where: str) -> dict[str, tuple[csr_matrix, Dofs]]:
+    if element.n_nodes > MOST_NODES:
+        raise UnsafeFileError(f"an element of {element.n_nodes} nodes is not read.", where=where)
+    if element.n_nodes < 1 or not element.lists or not element.values:
+        raise FileFormatError("there is no linear user element with matrices.", where=where)
+    dofs = _dofs(element, where)
+    n = len(dofs)
+    found = {}
+    for kind, values in element.values.items():
+        if len(values) != n * (n + 1) // 2 or not np.isfinite(values).all():
+            raise FileFormatError(
+                f"the matrix {kind} has {len(values)} numbers; the upper triangle of {n} rows has "
+                f"{n * (n + 1) // 2}, all finite.",
+                where=where,
+                hint="Write the file again; it is cut or changed.",
+            )
+        A = np.zeros((n, n))
+        A[np.tril_indices(n)] = values  # rows of this triangle are columns of the other
+        found[kind] = csr_matrix(A), dofs
+    return found
+
+
+def _dofs(element: _Element, where: str) -> Dofs:
+    labels = element.labels or list(range(1, element.n_nodes + 1))
+    if len(labels) != element.n_nodes:
+        raise FileFormatError(
+            f"{len(labels)} nodes are named, but the element has {element.n_nodes}.", where=where
+        )
+    ends = [place for place, _ in element.lists[1:]] + [element.n_nodes + 1]
+    rows = [
+        (labels[k - 1], component)
+        for (place, components), end in zip(element.lists, ends, strict=True)
+        for k in range(place, end)
+        for component in components
+    ]
+    dofs = np.array(rows, dtype=np.int64).reshape(-1, 2)
+    if len(np.unique(dofs, axis=0)) < len(dofs):
+        raise FileFormatError("a component of a node comes twice.", where=where)
+    return dofs
+
+
+def _document(matrices: dict[str, Any], dofs: Dofs, nodes: dict[int, Array]) -> Iterator[str]:
+    labels = list(dict.fromkeys(dofs[:, 0].tolist()))
+    components = {label: dofs[dofs[:, 0] == label, 1].tolist() for label in labels}
+    if [label for label in labels for _ in components[label]] != dofs[:, 0].tolist():
+        raise ConfigError("the rows of a user element are ordered node by node.")
+    yield f"** {ORIGIN_MARK}"
+    yield "*NODE"
+    yield from (f"{k}, " + _row(nodes.get(k, np.zeros(3))) for k in labels)
+    yield f"*USER ELEMENT, TYPE=U1, NODES={len(labels)}, LINEAR"
+    yield f"** {NODE_LIST}"
+    yield from (f"** {line}" for line in _wrapped(labels))
+    before: list[int] = []
+    for place, node in enumerate(labels, 1):
+        now = [max(component, 1) for component in components[node]]
+        if now != before:
+            yield ", ".join(map(str, now if place == 1 else [place, *now]))
+        before = now
+    for kind, A in matrices.items():
+        yield f"*MATRIX, TYPE={kind}"
+        yield from _rows(tril(A).toarray()[np.tril_indices(len(dofs))])
+    yield "*ELEMENT, TYPE=U1, ELSET=BODY"
+    yield from _wrapped([1, *labels])
+    yield "*UEL PROPERTY, ELSET=BODY"
+
+
+def _wrapped(numbers: list[int]) -> Iterator[str]:
+    lines = [numbers[k : k + PER_LINE] for k in range(0, len(numbers), PER_LINE)]
+    for k, line in enumerate(lines):
+        yield ", ".join(map(str, line)) + ("," if k + 1 < len(lines) else "")
+
+
+def _rows(values: Array) -> Iterator[str]:
+    for k in range(0, len(values), PER_LINE):
+        yield _row(values[k : k + PER_LINE])
+
+
+def _row(values: Iterable[float]) -> str:
+    return ", ".join(f"{v:.13e}" for v in values)

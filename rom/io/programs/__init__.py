@@ -1,0 +1,1 @@
+"""Bodies for other multibody programs, one module each."""

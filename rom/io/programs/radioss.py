@@ -1,0 +1,59 @@
+"""A statically reduced body as flexible body ``/FXBODY`` of OpenRadioss, a punch file ``.pch``.
+
+Its reader takes KAAX and MAAX as DMIG cards in fields of 16 characters and nothing else: no nodes,
+no damping, no modes. Every label is a node of its model; three must not lie on one line.
+
+Source:
+    Radioss reference guide, /FXBODY; what OpenRadioss reads from each line.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from rom.body.flexible import FlexibleBody
+from rom.errors import ConfigError
+from rom.io.matrices.dmig import write_dmig
+from rom.io.programs.interface_form import interface_form
+
+MIN_POINTS = 3
+COLLINEAR_RTOL = 1e-6  # second over first singular value of points on one line
+
+
+def write_radioss(
+    body: FlexibleBody, path: str | Path, *, nodes: Mapping[str, int] | None = None
+) -> Path:
+    """Write stiffness and mass of the interfaces, six components each, ten digits.
+
+    Args:
+        body: reduced by `rom.Guyan`, with at least three interfaces of six coordinates.
+        path: file to write, ending in ``.pch``.
+        nodes: {interface: label of its node in OpenRadioss}; 1, 2, … in their order if not given.
+
+    Raises:
+        ConfigError: if the body keeps modes, has too few interfaces or all on a line, a label is
+            missing or not a number of a node, or the place is not writable.
+        ModelError: if the shapes of the body do not let its interfaces move one by one.
+    """
+    form = interface_form(body)
+    if form.omega.size:
+        raise ConfigError(
+            f"body {body.name!r} has {form.omega.size} modes; OpenRadioss reads interfaces alone.",
+            hint="Reduce it with rom.Guyan().",
+        )
+    points = np.array([form.points[k] for k in sorted(form.points)])
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if len(points) < MIN_POINTS or spread[1] < COLLINEAR_RTOL * spread[0]:
+        raise ConfigError(
+            f"body {body.name!r} has {len(points)} interfaces, {form.names}; OpenRadioss needs "
+            f"{MIN_POINTS} that do not lie on one line."
+        )
+    labels = dict(nodes) if nodes else {name: k for k, name in enumerate(form.names, 1)}
+    if set(labels) != set(form.names) or len(set(labels.values())) < len(labels):
+        raise ConfigError(f"nodes {labels} are not one for each interface of {form.names}.")
+    if not all(0 < label < 10**10 for label in labels.values()):
+        raise ConfigError(f"labels of nodes have 1 to 10 digits, got {labels}.")
+    dofs = form.dofs.copy()
+    dofs[:, 0] = np.repeat([labels[name] for name in form.names], 6)
+    return write_dmig({"KAAX": form.K, "MAAX": form.M}, dofs, path)

@@ -1,0 +1,164 @@
+"""A flexible body as Standard Input Data, and back."""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom.body.flexible import FlexibleBody, Marker
+from rom.body.reference import skew_tensor
+from rom.body.stiffening import (
+    ANGULAR,
+    CENTRIFUGAL,
+    LINEAR,
+    PRODUCTS,
+    SecondOrder,
+    interface_loads,
+)
+from rom.errors import ConfigError
+from rom.io.sid.dialect import by_mode, first
+from rom.io.sid.format import StandardInput, Taylor
+from rom.model import Array
+
+EPS = -skew_tensor()  # of Levi-Civita
+STIFFENING_RTOL = 1e-9  # share of Me below which the trace of Oe1 counts as inertia alone
+
+
+def standard_input(body: FlexibleBody) -> StandardInput:
+    """The blocks of a body, its geometric stiffness included; interfaces become nodes.
+
+    Left out is what SID has no place for: terms of second order in J and Gr, surface and stress.
+
+    Args:
+        body: with r elastic coordinates; its geometric stiffness acts on Oe1 (rotation), Ct1 and
+            Cr1 (acceleration), phi1 and psi1 (forces and moments on the nodes).
+    """
+    K = {load: np.asarray(A) for load, A in body.K_geo.items()}
+    SecondOrder.of(body)  # refuses loads that are not known
+    hertz = body.omega / (2 * np.pi)
+    return StandardInput(
+        title=f"{body.name}, {body.reference} frame, {body.units}",
+        name=body.name,
+        mass=body.mass,
+        coordinates=tuple(f"Eigen Mode {k + 1:4d} : {f:.6g} Hz" for k, f in enumerate(hertz)),
+        nodes={name: _node(marker, K) for name, marker in body.markers.items()},
+        blocks=_inertia(body, K) | _elasticity(body),
+    )
+
+
+def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
+    r, X, S = body.n_modes, body.Ibar_kl, body.S_kl
+    dot = np.einsum("aak->k", X)
+    C4 = X.transpose(2, 1, 0) - dot[:, None, None] * np.eye(3)  # (r, 3, 3)
+    cross = np.einsum("cab,abji->jic", EPS, S)  # integral of phi_j x phi_i
+    Oe0 = np.stack([_product(X, a, b) for a, b in PRODUCTS], axis=1)
+    Oe1 = np.stack([_product(S, a, b) for a, b in PRODUCTS], axis=-1)  # (r, r, 6), by j and i
+    cross = 0.5 * (cross - cross.swapaxes(0, 1))  # to the last digit: it must do no work
+    return {
+        "mdCM": Taylor(body.first_moment[:, None], body.S.T[:, :, None]),
+        "J": Taylor(body.inertia, -(C4 + C4.swapaxes(1, 2))),
+        "Ct": Taylor(body.S.T, _loads(K, LINEAR, r)),
+        "Cr": Taylor(np.einsum("cab,abk->kc", EPS, X), cross + _loads(K, ANGULAR, r, zero=True)),
+        "Gr": Taylor(-2 * _by_axis(C4)),
+        "Ge": Taylor(2 * _by_axis(cross)),
+        "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL, r, zero=True)),
+    }
+
+
+def _product(X: Array, a: int, b: int) -> Array:
+    """Share of the product omega_a omega_b in the integral of phi . omega x (omega x X)."""
+    return X[a, a] - np.einsum("cc...->...", X) if a == b else X[a, b] + X[b, a]
+
+
+def _by_axis(A: Array) -> Array:
+    """(n, 3 r) columns axis by axis from (r, n, 3)."""
+    return A.transpose(1, 2, 0).reshape(A.shape[1], -1)
+
+
+def _loads(K: dict[str, Array], names: tuple[str, ...], r: int, *, zero: bool = False) -> Any:
+    """(r, r, k) geometric stiffness of k loads; None where there is none, unless zeros serve."""
+    if not zero and not any(name in K for name in names):
+        return None
+    return np.stack([K.get(name, np.zeros((r, r))) for name in names], axis=-1)
+
+
+def _elasticity(body: FlexibleBody) -> dict[str, Taylor]:
+    return {
+        "Me": Taylor(body.M),
+        "ksigma": Taylor(np.zeros((body.n_modes, 1))),
+        "Ke": Taylor(body.K),
+        "De": Taylor(body.D),
+    }
+
+
+def _node(marker: Marker, K: dict[str, Array]) -> dict[str, Taylor]:
+    """A force moves with the node: the work on displacements of second order, K_l = -l . psi."""
+    r, loads = marker.translation.shape[1], interface_loads(marker.name)
+    motion = _loads(K, loads, r)  # (j, i, 6)
+    shift = turn = None
+    if motion is not None:
+        shift, turn = -motion[..., :3].swapaxes(1, 2), -motion[..., 3:].swapaxes(1, 2)
+    tilt = np.einsum("abc,bk->kac", EPS, marker.rotation)
+    return {
+        "origin": Taylor(marker.point[:, None], marker.translation.T[:, :, None]),
+        "phi": Taylor(marker.translation, shift),
+        "psi": Taylor(marker.rotation, turn),
+        "AP": Taylor(np.eye(3), tilt if tilt.any() else None),
+    }
+
+
+def sid_body(record: StandardInput) -> FlexibleBody:
+    """The flexible body of Standard Input Data without geometric stiffness.
+
+    Oe1 adds stiffening to inertia, which then cannot be told apart; such a file serves programs
+    that take its blocks as they are.
+
+    Raises:
+        ConfigError: if the blocks contain geometric stiffness.
+    """
+    b, r = record.blocks, record.n_modes
+    Me, Oe1, Cr1 = b["Me"].M0, first(b["Oe"], r), first(b["Cr"], r)
+    excess = np.abs(Oe1[:, :, :3].sum(axis=2) + 2 * Me).max(initial=0.0)
+    if excess > STIFFENING_RTOL * np.abs(Me).max(initial=0.0) or first(b["Ct"], r).any():
+        raise ConfigError(
+            f"the SID of {record.name!r} has geometric stiffness in Oe, where it cannot be told "
+            "from inertia.",
+            hint="Export it without geometric stiffness.",
+        )
+    C4 = -0.5 * by_mode(b["Gr"].M0)
+    trace = np.einsum("kaa->k", C4)
+    odd = np.einsum("cab,jic->abji", EPS, 0.5 * (Cr1 - Cr1.swapaxes(0, 1)))
+    K = b["Ke"].M0
+    lam = eigh(K, Me, eigvals_only=True) if r else np.zeros(0)
+    return FlexibleBody(
+        name=record.name,
+        mass=record.mass,
+        first_moment=b["mdCM"].M0[:, 0],
+        inertia=b["J"].M0,
+        S=b["Ct"].M0.T,
+        Ibar_kl=(C4 - 0.5 * trace[:, None, None] * np.eye(3)).transpose(2, 1, 0),
+        S_kl=_even(Oe1, Me) + 0.5 * odd,
+        K=K,
+        D=b["De"].M0,
+        markers={name: _marker(name, node) for name, node in record.nodes.items()},
+        omega=np.sqrt(np.maximum(lam, 0.0)),
+        labels=record.coordinates,
+        reference="as in its SID",
+        provenance={"from": record.title},
+    )
+
+
+def _even(Oe1: Array, Me: Array) -> Array:
+    """(3, 3, r, r) part of S_kl that is symmetric in its axes."""
+    even = np.zeros((3, 3, *Me.shape))
+    for k, (a, c) in enumerate(PRODUCTS):
+        part = Oe1[:, :, k] + Me if a == c else 0.5 * Oe1[:, :, k]
+        even[a, c] = even[c, a] = 0.5 * (part + part.T)
+    return even
+
+
+def _marker(name: str, node: dict[str, Taylor]) -> Marker:
+    point, translation, rotation = node["origin"].M0[:, 0], node["phi"].M0, node["psi"].M0
+    lever = -np.einsum("abc,b->ac", EPS, point)
+    hold = np.block([[np.eye(3), lever, translation], [np.zeros((3, 3)), np.eye(3), rotation]])
+    return Marker(name, point, translation, rotation, "rbe2", hold)

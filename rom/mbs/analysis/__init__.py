@@ -1,0 +1,6 @@
+"""Answers without a time integration.
+
+Rest, tangents and modes: `equilibrium`, `linearize`, `campbell`, `response`, `steady_motion`,
+`sensitivity`, `inverse_dynamics`; `local_equations`, `tangent`, `moving_axes` and
+`quadratic_eigen` are what they are made of.
+"""

@@ -1,0 +1,131 @@
+"""Natural frequencies over the speed of rotation, each mode followed by its shape."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
+
+from rom.arguments import typed, unit_vector, whole
+from rom.errors import ConfigError
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.linearize import Linearization, linearize
+from rom.mbs.mechanism import Mechanism
+from rom.model import Array
+
+FREQUENCY_WEIGHT = 0.1  # weight of the relative change of frequency beside that of the shape
+
+
+@dataclass(frozen=True)
+class Campbell:
+    """Modes over speed.
+
+    Attributes:
+        speeds: (s,) [rad/s].
+        eigenvalues: (s, m) [rad/s]; a column follows one mode.
+        mac: (s - 1, m) likeness of its shapes at neighbouring speeds, 1 for the same shape; below
+            a half the speeds are too far apart to be sure of it, or two modes share a frequency.
+    """
+
+    speeds: Array
+    eigenvalues: Array
+    mac: Array
+
+    @property
+    def frequencies(self) -> Array:
+        """(s, m) [Hz]."""
+        return self.eigenvalues.imag / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """(s, m) share of critical damping; negative where a motion grows."""
+        size = np.abs(self.eigenvalues)
+        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
+
+    def crossings(self, order: float = 1.0) -> tuple[tuple[int, float], ...]:
+        """(mode, speed [rad/s]) where a mode meets a multiple of the speed, between the speeds.
+
+        Modes count from zero. Positions are interpolated linearly: take speeds close enough.
+        """
+        gap = self.eigenvalues.imag - order * self.speeds[:, None]
+        found = []
+        for k in range(gap.shape[1]):
+            for i in np.flatnonzero((gap[:-1, k] * gap[1:, k] < 0) | (gap[1:, k] == 0)):
+                share = gap[i, k] / (gap[i, k] - gap[i + 1, k])
+                step = self.speeds[i + 1] - self.speeds[i]
+                found.append((k, float(self.speeds[i] + share * step)))
+        return tuple(found)
+
+
+@typed
+def campbell(
+    mechanism: Mechanism | Callable[[float], Any],
+    speeds: npt.ArrayLike,
+    *,
+    n: int | None = None,
+    axis: npt.ArrayLike = (0.0, 0.0, 1.0),
+    about: npt.ArrayLike = (0.0, 0.0, 0.0),
+    frame: Any = "body",
+) -> Campbell:
+    """Follow the natural frequencies over the speed of rotation.
+
+    Args:
+        mechanism: the mechanism, which turns as a whole and takes its equilibrium at each speed;
+            or a function of the speed that returns a mechanism already turning, or a pair of
+            mechanism and state.
+        speeds: (s,) [rad/s], at least two, in order; above zero if the mechanism as a whole
+            turns freely, for then nothing holds it at speed zero.
+        n: number of modes to keep, lowest at the first speed first; None for all. Motions that
+            are free at all speeds are left out.
+        axis: (3,) axis of the rotation of a mechanism as a whole, world.
+        about: (3,) a point on it [m].
+        frame: axes for small motions, see `linearize`: "world" for rotors in bearings.
+
+    Raises:
+        ConfigError: for wrong speeds or a wrong mechanism.
+        ModelError, SolverError: see `equilibrium` and `linearize`.
+    """
+    speeds = np.asarray(speeds, dtype=float)
+    if speeds.ndim != 1 or speeds.size < 2 or not np.all(np.diff(speeds) > 0):
+        raise ConfigError(f"speeds = {speeds.tolist()} must be at least two growing numbers.")
+    axis = unit_vector("axis", axis)
+    if n is not None:
+        whole("n", n, 1)
+    found = [_at(mechanism, speed, axis, about, frame) for speed in speeds]
+    orders: list[Any] = [np.arange(found[0].eigenvalues.size)]
+    likeness = []
+    for one, two in pairwise(found):
+        follow, mac = _follow(one, two, orders[-1])
+        orders.append(follow)
+        likeness.append(mac)
+    values = np.array([x.eigenvalues[order] for x, order in zip(found, orders, strict=True)])
+    kept = np.flatnonzero(np.abs(values).max(axis=0) > 0)[:n]
+    return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept])
+
+
+def _at(mechanism: Any, speed: float, axis: Array, about: Any, frame: Any) -> Linearization:
+    if isinstance(mechanism, Mechanism):
+        state = equilibrium(mechanism, spin=speed * axis, about=about)
+        return linearize(mechanism, state, frame=frame)
+    made = mechanism(float(speed))
+    one, state = made if isinstance(made, tuple) else (made, None)
+    return linearize(one, state, frame=frame)
+
+
+def _follow(one: Linearization, two: Linearization, order: Array) -> tuple[Array, Array]:
+    """Modes of ``two`` that continue those of ``one`` in this order, and their likeness."""
+    if one.eigenvalues.size != two.eigenvalues.size:
+        raise ConfigError(
+            f"the mechanism has {one.eigenvalues.size} modes at one speed and "
+            f"{two.eigenvalues.size} at the next: it must stay the same."
+        )
+    a, b = one.shapes[:, order] / one.scale[:, None], two.shapes / one.scale[:, None]
+    sizes = np.outer(np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0))
+    mac = np.abs(a.conj().T @ b) ** 2 / np.maximum(sizes, 1e-300) ** 2
+    w, u = one.eigenvalues.imag[order][:, None], two.eigenvalues.imag
+    change = np.abs(w - u) / np.maximum(w + u, 1e-300)
+    row, column = linear_sum_assignment(mac - FREQUENCY_WEIGHT * change, maximize=True)
+    return column, mac[row, column]

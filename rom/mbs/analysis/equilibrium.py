@@ -1,0 +1,224 @@
+"""Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
+
+import warnings
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.arguments import finite, typed, whole
+from rom.errors import ConfigError, ModelError, RomError, RomWarning, SolverError
+from rom.mbs.analysis.local_equations import Instant, instant
+from rom.mbs.analysis.tangent import Tangent, sizes
+from rom.mbs.equations.packing import Packed
+from rom.mbs.integrate.consistent_start import assembled, initial_state
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.state import State
+from rom.model import Array
+
+MAX_PASSES = 60
+MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
+MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
+CORRECTION_TOL = 1e-12  # of the last correction
+STALLED_TOL = 1e-7  # below it, corrections that no longer shrink are round-off
+
+
+@typed
+def equilibrium(
+    mechanism: Mechanism,
+    state: State | None = None,
+    *,
+    t: float | None = None,
+    steps: int = 1,
+    spin: npt.ArrayLike | None = None,
+    about: npt.ArrayLike = (0.0, 0.0, 0.0),
+) -> State:
+    """Find where forces, reactions and the inertia of a steady rotation balance.
+
+    Gravity, loads and Python forces grow in steps, which are halved where Newton's method fails.
+    Where the potential curves downwards corrections follow the force, so that the search leaves
+    unstable positions unless it starts on one.
+
+    Args:
+        mechanism: bodies, joints, forces; drives hold their values at time t.
+        state: where the search starts; None for the position in which the bodies were added.
+        t: time at which drives and loads are taken [s]; None for that of the state.
+        steps: number of load steps.
+        spin: (3,) angular velocity of the whole mechanism, world [rad/s]; None for rest.
+        about: (3,) a point on the axis of the spin [m].
+
+    Returns:
+        A state for `linearize` and for ``simulate(..., state=...)``, with the reactions.
+
+    Raises:
+        ConfigError: for a wrong argument.
+        ModelError: naming the body that can still move although no force opposes, or the joint
+            that cannot be closed.
+        SolverError: naming the body out of balance, or the open joint, where Newton failed.
+
+    Warns:
+        RomWarning: if the equilibrium at rest is unstable.
+
+    Source:
+        Newton's method on the tangent space of the constraints, with the absolute values of the
+        negative curvatures: Nocedal and Wright, Numerical Optimization, chapter 3.4.
+    """
+    whole("steps", steps, 1, MOST_STEPS)
+    now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
+    search = _Search(now, _spinning(now, spin), finite("about", about, (3,)))
+    found, done, width = search.start(state), 0.0, 1.0 / steps
+    while done < 1.0:
+        load = min(done + width, 1.0)
+        try:
+            found = search.settle(found, load if load < 1.0 - 1e-9 else 1.0)
+        except SolverError:
+            width /= 2
+            if width < MIN_LOAD_STEP / steps:
+                raise
+            continue
+        done = load if load < 1.0 - 1e-9 else 1.0
+    search.judge(found)
+    return found
+
+
+def _spinning(now: Instant, spin: Any) -> Array:
+    turn = np.zeros(3) if spin is None else finite("spin", spin, (3,))
+    rolls = now.packed.system.rows.kind == ROLL
+    if turn.any() and rolls.any():
+        name = now.packed.row_owner[int(np.argmax(rolls))]
+        raise ModelError("what rolls has no equilibrium while it spins.", where=name)
+    return turn
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The search at one time, for one spin about a point of its axis."""
+
+    now: Instant
+    spin: Array
+    about: Array
+
+    def start(self, state: State | None) -> State:
+        """The state to start from, its joints closed."""
+        packed, W = self.now.packed, self.now.W
+        first = initial_state(packed, self.now.t)
+        if state is None:
+            return self.steady(replace(first, lam=0 * first.lam))
+        if np.size(state.q) != packed.q.size or np.size(state.lam) != first.lam.size:
+            raise ConfigError(
+                f"the state has {np.size(state.q)} coordinates and {np.size(state.lam)} "
+                f"constraints; this mechanism has {packed.q.size} and {first.lam.size}."
+            )
+        if state.base is not None:
+            W.base[:] = state.base
+        q = assembled(packed, W, np.asarray(state.q, dtype=float))
+        return self.steady(replace(first, q=q, lam=state.lam.copy()))
+
+    def steady(self, state: State) -> State:
+        """The state with the velocities and accelerations of the steady rotation."""
+        bodies, v, a = self.now.packed.system.bodies, 0 * state.v, 0 * state.a
+        if self.spin.any():
+            for q_at, at in zip(bodies.q_at, bodies.v_at, strict=True):
+                v[at : at + 3] = np.cross(self.spin, state.q[q_at : q_at + 3] - self.about)
+                a[at : at + 3] = np.cross(self.spin, v[at : at + 3])
+                v[at + 3 : at + 6] = rotation.matrix(state.q[q_at + 3 : q_at + 7]).T @ self.spin
+        return replace(state, t=self.now.t, v=v, a=a, algorithmic=None)
+
+    def settle(self, state: State, load: float) -> State:
+        """Equilibrium at a share of the loads.
+
+        Raises:
+            SolverError: if Newton's method fails.
+        """
+        now, last = self.now.scaled(load), np.inf
+        for _ in range(MAX_PASSES):
+            tangent = Tangent.of(now, state)
+            step, dlam = tangent.correction()
+            size, factor = sizes(now.packed, step)
+            if not np.isfinite(size):
+                break
+            q = now.shifted(state.q, factor * step)
+            now.evaluate(q, state.v)
+            now.W.base[:] = now.W.x
+            state = self.steady(replace(state, q=q, lam=state.lam + factor * dlam))
+            state = replace(state, base=now.W.base.copy())
+            if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
+                return state
+            last = size
+        raise _failure(now, state, load)
+
+    def judge(self, state: State) -> None:
+        """Refuse free motions, and warn of unstable ones."""
+        tangent = Tangent.of(self.now.scaled(1.0), state)
+        squares, V = np.linalg.eigh(tangent.curvature)
+        still = np.flatnonzero(np.abs(squares) <= tangent.none(squares))
+        free = [k for k in still if not self.along_spin(tangent, state, V[:, k])]
+        if free:
+            motion = tangent.Z @ V[:, free[0]]
+            raise ModelError(
+                f"{_described(self.now.packed, motion)} and no force opposes "
+                f"({len(free)} free motions): there is no unique equilibrium.",
+                hint="Hold it by a joint or a spring, or give its place by a drive.",
+            )
+        if squares.size and squares[0] < 0.0 and not self.spin.any():
+            motion = tangent.Z @ V[:, 0]
+            warnings.warn(
+                f"the equilibrium is unstable: {_described(self.now.packed, motion)} and falls "
+                f"away at a rate of {np.sqrt(-squares[0]):.3g} 1/s.",
+                RomWarning,
+                stacklevel=3,
+            )
+
+    def along_spin(self, tangent: "Tangent", state: State, y: Array) -> bool:
+        """Whether a free motion is the steady rotation itself."""
+        motion, v = tangent.T @ tangent.Z @ y / self.now.probe(), state.v / self.now.probe()
+        return bool(abs(motion @ v) > (1 - 1e-6) * np.linalg.norm(motion) * np.linalg.norm(v) > 0)
+
+
+def _described(packed: Packed, motion: Array) -> str:
+    """The body that moves most, and how."""
+    bodies = packed.system.bodies
+    sizes = []
+    for b, at in enumerate(bodies.v_at):
+        shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
+        sizes.append((shift @ shift + packed.length**2 * turn @ turn) * bodies.mass[b])
+    b = int(np.argmax(sizes))
+    at = bodies.v_at[b]
+    if not sizes[b] > 0.0:  # frames on interfaces that are held stay where they are
+        bent = [np.abs(motion[at + 6 : at + 6 + r]).max(initial=0.0)
+                for at, r in zip(bodies.v_at, bodies.r, strict=True)]  # fmt: skip
+        return f"body {packed.names[int(np.argmax(bent))]!r} deforms"
+    shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
+    turns = np.linalg.norm(turn) * packed.length > 1e-6 * np.linalg.norm(shift)
+    direction = turn if turns else shift
+    direction = direction / direction[np.argmax(np.abs(direction))]
+    axis = ", ".join(f"{x:.3g}" for x in np.round(direction, 6) + 0.0)
+    verb = "turns about its own axis" if turns else "slides along"
+    return f"body {packed.names[b]!r} {verb} ({axis})"
+
+
+def _failure(now: Instant, state: State, load: float) -> RomError:
+    """Why Newton's method failed: an open joint, a body that nothing holds, or lack of balance."""
+    packed, tangent = now.packed, Tangent.of(now, state)
+    gap = np.abs(tangent.gap) / packed.row_scale
+    if gap.size and gap.max() > 1e-6:
+        k = int(np.argmax(gap))
+        what = f"joint {packed.row_owner[k]!r} stays open by {gap[k]:.3g} of the size"
+    else:
+        loose = tangent.driven()
+        if loose is not None:
+            return ModelError(
+                f"{_described(packed, loose)}, pushed by forces that nothing balances.",
+                hint="Hold it by a joint or a spring, or give its place by a drive.",
+            )
+        force = np.abs(tangent.unbalanced())
+        starts = packed.system.bodies.v_at
+        b = int(np.searchsorted(starts, int(np.argmax(force)), side="right")) - 1
+        what = f"body {packed.names[b]!r} stays out of balance, by {force.max():.3g} N or N m"
+    return SolverError(
+        f"no equilibrium found at {load:.3g} of the loads: {what}.",
+        hint="Start nearer to it (state=...) or take more load steps.",
+    )

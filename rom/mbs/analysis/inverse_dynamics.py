@@ -1,0 +1,117 @@
+"""Inverse dynamics: loads of a motion that drives prescribe entirely, without integration."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import typed
+from rom.errors import ConfigError, ModelError
+from rom.mbs.equations.equations import evaluate, retract
+from rom.mbs.equations.packing import Packed, pack
+from rom.mbs.equations.python_laws import Law, MotorLaw, apply_laws, laws
+from rom.mbs.integrate.consistent_start import (
+    assembled,
+    fitting_velocity,
+    initial_state,
+    with_accelerations,
+)
+from rom.mbs.kernels.system import ROLL, Work, workspace
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.signals import first_failure, sample_all
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
+from rom.model import Array
+
+DIFFERENCE_SPACING = 1e-4  # of drives without derivatives, relative to the duration
+
+
+@typed
+def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
+    """Positions, velocities, accelerations and all loads of a mechanism that is driven entirely.
+
+    At each time the joints and drives give the position, their derivatives velocities and
+    accelerations, and M a + h - Q + G^T lam = 0 the reactions and what the drives must supply.
+
+    Args:
+        mechanism: rigid bodies with as many drives as the joints leave free motions.
+        t: (n_t,) times [s], ascending and so close that each position is nearest to the one before.
+
+    Returns:
+        The motion, to be asked like one that was simulated: ``reaction``, ``drive_load``,
+        ``interface_loads``.
+
+    Raises:
+        ConfigError: for times that do not ascend.
+        ModelError: if motions stay free, or joints and drives contradict each other.
+        SolverError: if a drive or load is not finite.
+    """
+    if not isinstance(mechanism, Mechanism):
+        raise ConfigError(f"{mechanism!r} is no Mechanism.")
+    times = np.array(t, dtype=float)
+    if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0).all():
+        raise ConfigError(f"t must hold at least two ascending times, got {np.shape(t)}.")
+    packed = pack(mechanism)
+    span, spacing = (times[0], times[-1]), DIFFERENCE_SPACING * (times[-1] - times[0])
+    state = initial_state(packed, times[0], spacing)
+    _refuse_free(packed, state)
+    signals = sample_all(packed.signals, times, span, spacing)
+    good, failure = first_failure(packed.signals, times, signals, span, spacing)
+    if good < times.size:
+        raise failure
+    W = workspace(packed.system, len(packed.signals))
+    W.base[:] = state.base
+    forces, states, powers = laws(mechanism, packed), [], []
+    for k, x in enumerate(times):
+        W.signal[:] = signals[k]
+        state = _next(packed, W, forces, state, float(x))
+        states.append(state)
+        powers.append(W.power.copy())
+    return _solution(mechanism, packed, states, np.array(powers), signals)
+
+
+def _next(
+    packed: Packed, W: Work, forces: tuple[Law | MotorLaw, ...], last: State, t: float
+) -> State:
+    """The state at a time, found from the one before."""
+    h, q = t - last.t, np.empty_like(last.q)
+    retract(packed.system, last.q, h * last.v + 0.5 * h * h * last.a, q)
+    q = assembled(packed, W, q)
+    v = fitting_velocity(packed, W, q, last.v)
+    evaluate(packed.system, W, q, v)
+    apply_laws(forces, W, t)
+    return with_accelerations(packed, W, replace(last, t=t, q=q, v=v))
+
+
+def _refuse_free(packed: Packed, state: State) -> None:
+    free = packed.v.size - state.rank
+    elastic = int(packed.system.bodies.r.sum())
+    rolls = packed.system.rows.kind == ROLL
+    if free:
+        what = f"{elastic} of them elastic; " if elastic else ""
+        raise ModelError(
+            f"{free} motions are not prescribed by joints and drives ({what}inverse dynamics "
+            "needs none).",
+            hint="Add drives, or simulate the motion: its solution answers the same questions.",
+        )
+    if rolls.any():
+        raise ModelError(
+            "rolling prescribes velocities, not positions: simulate the motion.",
+            where=packed.row_owner[int(np.argmax(rolls))],
+        )
+
+
+def _solution(
+    mechanism: Mechanism, packed: Packed, states: list[State], powers: Array, signals: Array
+) -> Solution:
+    def rows(name: str) -> Any:
+        return np.array([getattr(state, name) for state in states])
+
+    t, work = rows("t"), np.zeros_like(powers)
+    work[1:] = np.cumsum(0.5 * np.diff(t)[:, None] * (powers[1:] + powers[:-1]), axis=0)
+    statistics = {"steps": t.size - 1, "rank": states[0].rank}
+    status = f"Prescribed from t = {t[0]:g} s to {t[-1]:g} s."
+    q, v, a, lam = (rows(name) for name in ("q", "v", "a", "lam"))
+    moved = mechanism, packed, t, q, v, a, lam
+    return Solution(*moved, work, rows("base"), signals, statistics, status, states[-1])

@@ -1,0 +1,283 @@
+"""Small motions around any state of a mechanism: frequencies, damping, shapes."""
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.errors import ConfigError, ModelError, RomWarning
+from rom.mbs.analysis.local_equations import (
+    DIFFERENCE_STEP,
+    Instant,
+    consistent,
+    free_motions,
+    instant,
+    of_unit_mass,
+)
+from rom.mbs.analysis.moving_axes import chosen, small_motions
+from rom.mbs.analysis.quadratic_eigen import modes, phases
+from rom.mbs.equations.packing import Packed
+from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.results.state import State
+from rom.model import Array
+
+PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]
+STEADY_RTOL = 1e-11  # change of free motions that do not change
+ZERO_FREQUENCY_RTOL = 2e-7  # round-off of a frequency, of the highest one
+DIFFERENCED_ZERO_RTOL = 1e-5  # the same where tangents are differences
+DRIFT_RTOL = 1e-3  # change of the matrices in a radian from which they count as periodic
+
+
+@typed
+@dataclass(frozen=True)
+class Linearization:
+    """Linear equations M y'' + C y' + K y = f of the motions that the joints allow.
+
+    Attributes:
+        state: where.
+        M, C, K: (f, f) mass, damping with gyroscopic terms, stiffness with geometric and
+            centrifugal terms, for the coordinates y of the free motions; M is the unit matrix.
+        basis: (n, f) variation of all coordinates, counted as in `State.v`, per y.
+        test: (n, f) virtual motions that project forces; the basis unless there is friction.
+        round_off: share of the highest frequency below which others count as zero.
+        scale: (n,) small motion of each coordinate, as many rad as sizes of the mechanism.
+        packed: the arrays of the mechanism.
+        H: (k, 6, 6 + R) twist of all markers per velocity of their body.
+    """
+
+    state: State
+    M: Array
+    C: Array
+    K: Array
+    basis: Array
+    test: Array
+    round_off: float
+    scale: Array
+    packed: Packed
+    H: Array
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array, Array]:
+        roots, V, every = modes(self.C, self.K, self.round_off)
+        return roots, V * phases(self.basis @ V / self.scale[:, None]), every
+
+    @property
+    def eigenvalues(self) -> Array:
+        """(f,) complex, one per mode [rad/s]; of a pair of real ones the larger."""
+        return self._modes[0]
+
+    @property
+    def frequencies(self) -> Array:
+        """(f,) ascending [Hz]; 0 for motions that are free, or do not oscillate.
+
+        Below the share ``round_off`` of the highest one nothing can be told from zero.
+        """
+        return self.eigenvalues.imag / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """(f,) share of critical damping, negative where a motion grows; 0 for free motions."""
+        size = np.abs(self.eigenvalues)
+        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
+
+    @property
+    def shapes(self) -> Array:
+        """(n, f) modes in all coordinates, counted as in `State.v`; unit modal mass.
+
+        Complex where damping or rotation shifts phases. The largest part, in rad
+        or sizes of the mechanism, is real and positive.
+        """
+        return self.basis @ self.vectors
+
+    @property
+    def vectors(self) -> Array:
+        """(f, f) modes in the coordinates y."""
+        return self._modes[1]
+
+    @property
+    def stable(self) -> bool:
+        """Whether no motion grows exponentially."""
+        every = self._modes[2]
+        return bool(every.real.max(initial=0.0) <= self.round_off * np.abs(every).max(initial=0.0))
+
+    def motion(self, marker: Marker) -> Array:
+        """(6, f) small translation and rotation of a marker, in the world, per coordinate y."""
+        return self.jacobian(marker) @ self.basis
+
+    def jacobian(self, marker: Marker) -> Array:
+        """(6, n) small translation and rotation of a marker, in the world, per coordinate."""
+        packed = self.packed
+        if marker not in packed.markers:
+            raise ConfigError(
+                f"{marker!r} is not a marker of the mechanism.",
+                hint="Name it when the body is added, and take it from the part: part.marker(...).",
+            )
+        k = packed.row(marker)
+        J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
+        if b >= 0:
+            at, r = packed.system.bodies.v_at[b], packed.system.bodies.r[b]
+            J[:, at : at + 6 + r] = self.H[k, :, : 6 + r]
+        return J
+
+    def __str__(self) -> str:
+        lines = ["mode  frequency [Hz]  damping ratio"]
+        for k, (f, d) in enumerate(zip(self.frequencies, self.damping_ratios, strict=True)):
+            lines.append(f"{k + 1:4d}  {f:14.6g}  {d:13.4g}")
+        return "\n".join(lines)
+
+
+@typed
+def linearize(
+    mechanism: Mechanism, state: State | None = None, *, t: float | None = None, frame: Any = "body"
+) -> Linearization:
+    """Linearise the equations of motion around a state, at rest or moving.
+
+    Variations of the state that satisfy the joints obey M y'' + C y' + K y = 0. K holds the
+    stiffness of bodies and forces, the geometric stiffness of joints and loads, and what
+    rotation and acceleration add; C holds dampers and gyroscopic terms. Around a state that moves,
+    the coefficients are constant if everything turns as one in the axes of ``frame``.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        state: coordinates and velocities, from `equilibrium`, ``sol.final`` or None for the start;
+            accelerations and reactions are computed.
+        t: time at which drives and loads are taken [s]; None for that of the state.
+        frame: axes in which small motions of a body are counted: "body" for what turns as a whole
+            (blades), "world" for axisymmetric rotors that spin in bearings; or {body: frame}.
+
+    Raises:
+        ConfigError: for a state of another mechanism or a wrong frame.
+        ModelError: naming the joint that the state does not satisfy, or one that rolls while it
+            moves.
+        SolverError: if the equations are singular there.
+
+    Warns:
+        RomWarning: if the coefficients change with time: frequencies are then those of an instant.
+
+    Source:
+        Variation of the equations of motion on R^3 x SO(3) x R^r, as in Bruels and Cardona,
+        Mech. Mach. Theory 48 (2012) 121, projected on the tangent space of the constraints.
+    """
+    time = (0.0 if state is None else state.t) if t is None else t
+    now = instant(mechanism, time)
+    world = chosen(frame, now.packed.names)
+    state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
+    _refuse_rolling(now.packed, state)
+    return _reduced(now, state, world)
+
+
+def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearization:
+    """Matrices for the motions the joints leave, and a warning if they change with time."""
+    T, scale = small_motions(now.packed.system, state, world)[0], now.probe()
+    _, G, M = now.gradient(state.q, state.v)
+    Z = of_unit_mass(free_motions(G @ T, scale, state.rank), T.T @ M @ T)
+    path = _Path(now, state, world, Z)
+    found = _matrices(now, state, world, path)
+    rate = path.rate
+    if state.v.any():
+        later = path.later()
+        moved_on = _matrices(now, later.state, world, later)
+        size = max(np.abs(found.K).max(initial=0.0), rate * np.abs(found.C).max(initial=0.0))
+        change = max(np.abs(found.K - moved_on.K).max(initial=0.0),
+                     rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
+        size = max(float(size), rate**2)
+        if change > DRIFT_RTOL * PROBE_ANGLE * size:
+            warnings.warn(
+                f"the linear equations change with time, by {change / PROBE_ANGLE / size:.2g} of "
+                "their size per radian: these frequencies are those of one instant.",
+                RomWarning,
+                stacklevel=4,
+            )
+    return found
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The free motions, of unit mass, and how they follow the joints as these move."""
+
+    now: Instant
+    state: State
+    world: tuple[bool, ...]
+    Z: Array
+
+    @cached_property
+    def rate(self) -> float:
+        """Speed of the mechanism in radians, or sizes, per second."""
+        size = self.now.probe() / DIFFERENCE_STEP
+        v, a = np.abs(self.state.v) / size, np.abs(self.state.a) / size
+        return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
+
+    def at(self, h: float) -> tuple[Array, Array]:
+        """Coordinates a time h later, and the free motions there nearest to the present ones."""
+        q = self.now.shifted(self.state.q, h * self.state.v + 0.5 * h * h * self.state.a)
+        _, G, M = self.now.gradient(q, self.state.v)
+        there = replace(self.state, q=q)
+        T = small_motions(self.now.packed.system, there, self.world)[0]
+        mass = T.T @ M @ T
+        N = of_unit_mass(free_motions(G @ T, self.now.probe(), self.state.rank), mass)
+        U, _, V = np.linalg.svd(N.T @ mass @ self.Z)
+        return q, N @ (U @ V)
+
+    def rates(self) -> tuple[Array, Array]:
+        """First and second time derivative of the free motions."""
+        if self.rate == 0.0 or not self.Z.size:
+            return 0 * self.Z, 0 * self.Z
+        h = PROBE_ANGLE / self.rate
+        _, before = self.at(-h)
+        _, after = self.at(h)
+        change = max(np.abs(after - self.Z).max(), np.abs(before - self.Z).max())
+        if change < STEADY_RTOL * np.abs(self.Z).max():
+            return 0 * self.Z, 0 * self.Z
+        return (after - before) / (2 * h), (after - 2 * self.Z + before) / h**2
+
+    def later(self) -> "_Path":
+        """The same a little later."""
+        h = PROBE_ANGLE / self.rate
+        q, Z = self.at(h)
+        v = fitting_velocity(self.now.packed, self.now.W, q, self.state.v + h * self.state.a)
+        self.now.evaluate(q, v)
+        state = with_accelerations(self.now.packed, self.now.W, replace(self.state, q=q, v=v))
+        return replace(self, state=state, Z=Z)
+
+
+def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) -> Linearization:
+    T, T1, T2, T3 = small_motions(now.packed.system, state, world)
+    Z, (Zd, Zdd) = path.Z, path.rates()
+    M, Cv, Kq = now.matrices(state)
+    H, basis = now.W.H.copy(), T @ Z
+    test = _virtual(now, state, basis)
+    acceleration = T @ Zdd + T2 @ Zd + T3 @ Z
+    M2 = test.T @ M @ basis
+    C2 = test.T @ (M @ (2 * T @ Zd + T2 @ Z) + Cv @ basis)
+    K2 = test.T @ (M @ acceleration + Cv @ (T @ Zd + T1 @ Z) + Kq @ basis)
+    test = np.linalg.solve(M2, test.T).T
+    C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
+    M2, noise = np.eye(len(K2)), ZERO_FREQUENCY_RTOL if now.exact(state) else DIFFERENCED_ZERO_RTOL
+    return Linearization(state, M2, C2, K2, basis, test, noise, now.probe(), now.packed, H)
+
+
+def _virtual(now: Instant, state: State, basis: Array) -> Array:
+    """Motions in which the reactions do no work; friction adds to what reactions do."""
+    friction = now.packed.system.actions.friction
+    if not friction[:, 1].any():
+        return basis
+    R = now.reactions(state)
+    return basis - np.linalg.lstsq(R.T, R.T @ basis, rcond=1e-9)[0]
+
+
+def _refuse_rolling(packed: Packed, state: State) -> None:
+    """At rest, what rolls without sliding is held like by any other joint."""
+    rolls = packed.system.rows.kind == ROLL
+    if rolls.any() and state.v.any():
+        name = packed.row_owner[int(np.argmax(rolls))]
+        raise ModelError(
+            "a rolling joint binds velocities, not positions: it can be linearised at rest only.",
+            where=name,
+            hint="rom.steady_motion has the eigenvalues of steady rolling.",
+        )

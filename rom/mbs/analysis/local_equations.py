@@ -1,0 +1,244 @@
+"""How the equations of motion change around one state, and which motions the joints leave."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.equations.equations import (
+    balance,
+    evaluate,
+    linearize_constraints,
+    retract,
+    slopes,
+)
+from rom.mbs.equations.packing import Packed, pack
+from rom.mbs.equations.python_laws import Law, MotorLaw, apply_laws, laws
+from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
+from rom.mbs.kernels.system import ROLL, Work, workspace
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.signals import first_failure, sample_all
+from rom.mbs.results.state import State
+from rom.model import Array
+
+# central differences: rotations in rad, displacements in sizes of the mechanism
+DIFFERENCE_STEP = 1e-5
+DIFFERENCE_SPACING = 1e-6  # of drives [s]
+ELASTIC_TURN = 1e-4  # rotation of a marker by deformation, up to which tangents are exact [rad]
+GAP_RTOL = 1e-7  # of the mechanism's size
+VELOCITY_RTOL = 1e-3  # a time integration leaves far less
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A mechanism at one time, ready to be asked for its equations at any coordinates.
+
+    Attributes:
+        packed: the mechanism.
+        W: memory.
+        t: time [s].
+        laws: forces of Python functions.
+        signal: (s, 3) drives and loads at that time.
+        load: factor of gravity, of loads and of forces of Python functions.
+    """
+
+    packed: Packed
+    W: Work
+    t: float
+    laws: tuple[Law | MotorLaw, ...]
+    signal: Array
+    load: float = 1.0
+
+    def scaled(self, load: float) -> "Instant":
+        """The same with another factor of the loads; the memory is shared."""
+        vectors = [k for k, signal in enumerate(self.packed.signals) if signal.width == 3]
+        self.W.signal[vectors] = load * self.signal[vectors]
+        return replace(self, load=load)
+
+    @property
+    def system(self) -> Any:
+        """The arrays of the mechanism, gravity and loads times their factor."""
+        s = self.packed.system
+        forces = s.forces._replace(load=self.load * s.forces.load)
+        bodies = s.bodies._replace(gravity=self.load * s.bodies.gravity)
+        spread = s.spread._replace(amplitude=self.load * s.spread.amplitude)
+        return s._replace(bodies=bodies, forces=forces, spread=spread)
+
+    def evaluate(self, q: Array, v: Array) -> None:
+        """Everything that depends on coordinates and velocities, Python forces included."""
+        evaluate(self.packed.system, self.W, q, v)
+        apply_laws(self.laws, self.W, self.t)
+        self.W.user[:] *= self.load
+
+    def residual(self, q: Array, v: Array, a: Array, lam: Array) -> Array:
+        """(n,) equations of motion M a + h - Q + G^T lam."""
+        self.evaluate(q, v)
+        balance(self.system, self.W, q, v, a, lam)
+        return self.W.residual.copy()
+
+    def gradient(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        """(m,) gaps of the constraints, their gradient (m, n), and the mass matrix (n, n)."""
+        linearize_constraints(self.packed.system, self.W, q, v)
+        return self.W.value.copy(), self.W.G.copy(), self.W.S.copy()
+
+    def damping(self, state: State) -> Array:
+        """(n, n) derivative of the residual by the velocities."""
+        q, v, a, lam = state.q, state.v, state.a, state.lam
+        if self.laws:
+            step = self.probe()
+            return difference(lambda dv: self.residual(q, v + dv, a, lam), step)
+        self.residual(q, v, a, lam)
+        slopes(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
+        return self.W.S.copy()
+
+    def stiffness(self, state: State) -> Array:
+        """(n, n) derivative of the residual by the coordinates, rotations in the body frame."""
+        q, v, a, lam = state.q, state.v, state.a, state.lam
+        if not self.exact(state):
+            return difference(
+                lambda dq: self.residual(self.shifted(q, dq), v, a, lam), self.probe()
+            )
+        self.residual(q, v, a, lam)
+        slopes(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
+        return self.W.Kt.copy()
+
+    def exact(self, state: State) -> bool:
+        """Whether the tangents of the time integration are exact enough at this state.
+
+        They leave out how laws in Python change, how the rates that forces depend on change with
+        the position, and what finite elastic rotations of markers do to moments.
+        """
+        s, stiff = self.packed.system, self.W.theta
+        self.evaluate(state.q, state.v)
+        by_rate = s.forces.spring[:, 1].any() or s.forces.turn[:, 1].any() or s.bushings.i.size
+        by_rate = by_rate or s.contacts.i.size or s.actions.motor_at.size
+        by_rate = by_rate or s.actions.friction_at.size or s.actions.stop_at.size
+        by_rate = by_rate or s.nonlinear.address.size
+        rests = not state.v.any() or not by_rate
+        return bool(not self.laws and rests and np.abs(stiff).max(initial=0.0) < ELASTIC_TURN)
+
+    def matrices(self, state: State) -> tuple[Array, Array, Array]:
+        """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
+        C, K = self.damping(state), self.stiffness(state)
+        return self.gradient(state.q, state.v)[2], C, K
+
+    def reactions(self, state: State) -> Array:
+        """(n, m) derivative of the residual by the multipliers; friction may depend on them."""
+        q, v, a = state.q, state.v, state.a
+        step = np.full(state.lam.size, DIFFERENCE_STEP * np.abs(state.lam).max(initial=0.0) or 1.0)
+        return difference(lambda d: self.residual(q, v, a, state.lam + d), step)
+
+    def shifted(self, q: Array, delta: Array) -> Array:
+        """(n_q,) coordinates q after the small motion delta (n,)."""
+        out = np.empty_like(q)
+        retract(self.packed.system, q, np.ascontiguousarray(delta), out)
+        return out
+
+    def probe(self) -> Array:
+        """(n,) small motion of each coordinate for differences."""
+        bodies, length = self.packed.system.bodies, self.packed.length
+        step = np.full(self.packed.v.size, DIFFERENCE_STEP)
+        for b, at in enumerate(bodies.v_at):
+            r, mass = bodies.r[b], bodies.mass[b]
+            step[at : at + 3] *= length
+            modal = np.diag(bodies.M[bodies.flex[b]])[:r]
+            step[at + 6 : at + 6 + r] *= length * np.sqrt(mass / modal)
+        return step
+
+
+def difference(f: Any, step: Array) -> Array:
+    """Central differences of f by the entries of its argument, as columns."""
+    columns = [(f(e) - f(-e)) / (2 * e[k]) for k, e in enumerate(np.diag(step))]
+    return np.array(columns).reshape(step.size, -1).T
+
+
+def instant(mechanism: Any, t: float) -> Instant:
+    """The mechanism with its drives and loads at time t.
+
+    Raises:
+        ConfigError: if it is no Mechanism, or t is not finite.
+        SolverError: if a drive or load is not finite.
+    """
+    if not isinstance(mechanism, Mechanism):
+        raise ConfigError(f"{mechanism!r} is no Mechanism.")
+    if not np.isfinite(t):
+        raise ConfigError(f"t = {t!r} is no time.")
+    packed = pack(mechanism, whole=True)
+    W = workspace(packed.system, len(packed.signals))
+    table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), DIFFERENCE_SPACING)
+    good, failure = first_failure(packed.signals, np.array([t]), table)
+    if not good:
+        raise failure
+    W.signal[:] = table[0]
+    return Instant(packed, W, float(t), laws(mechanism, packed), table[0])
+
+
+def consistent(now: Instant, state: Any) -> State:
+    """The state with velocities, accelerations and multipliers that belong together.
+
+    Raises:
+        ConfigError: if the state belongs to another mechanism.
+        ModelError: naming the joint that is open, or whose velocity contradicts it.
+    """
+    packed, W = now.packed, now.W
+    sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
+    needed = (packed.q.size, packed.v.size, W.value.size)
+    if not isinstance(state, State) or sizes != needed:
+        raise ConfigError(
+            f"the state has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
+            "constraints; this mechanism has {}, {} and {}.".format(*needed),
+            hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
+        )
+    if state.base is not None:
+        W.base[:] = state.base
+    value, G, _ = now.gradient(state.q, state.v)
+    rolls = packed.system.rows.kind == ROLL
+    _check(packed, np.where(rolls, 0.0, value) / packed.row_scale, GAP_RTOL, "stays open by")
+    v = fitting_velocity(packed, W, state.q, state.v)
+    size = (np.abs(G) @ np.maximum(np.abs(v), np.abs(state.v))).max(initial=0.0)
+    if size > 0.0:
+        _check(packed, G @ (v - state.v) / size, VELOCITY_RTOL, "contradicts the velocities by")
+    state = replace(state, v=v, t=now.t)
+    now.evaluate(state.q, state.v)
+    return with_accelerations(packed, W, state)
+
+
+def _check(packed: Packed, miss: Array, limit: float, what: str) -> None:
+    if not miss.size or np.abs(miss).max() <= limit:
+        return
+    k = int(np.argmax(np.abs(miss)))
+    raise ModelError(
+        f"the state does not fit the mechanism at this time: {packed.row_owner[k]!r} {what} "
+        f"{abs(miss[k]):.3g} (relative).",
+        where=packed.row_owner[k],
+        hint="Take a state of the same mechanism and give its time t.",
+    )
+
+
+def free_motions(G: Array, scale: Array, rank: int) -> Array:
+    """(n, n - rank) motions that the constraints G allow, orthonormal when divided by ``scale``."""
+    A = G * scale
+    norms = np.linalg.norm(A, axis=1)
+    V = (
+        np.linalg.svd(A / np.where(norms > 0, norms, 1.0)[:, None])[2]
+        if rank
+        else np.eye(len(scale))
+    )
+    return scale[:, None] * V[rank:].T
+
+
+def of_unit_mass(Z: Array, mass: Array) -> Array:
+    """The same motions, combined so that Z^T mass Z is the unit matrix.
+
+    Raises:
+        SolverError: if the mass matrix is not positive definite.
+    """
+    try:
+        L = np.linalg.cholesky(Z.T @ mass @ Z)
+    except np.linalg.LinAlgError as error:
+        raise SolverError(
+            "the mass matrix is not positive definite: a body is deformed beyond what its linear "
+            "shapes can describe."
+        ) from error
+    return np.linalg.solve(L, Z.T).T

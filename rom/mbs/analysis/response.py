@@ -1,0 +1,152 @@
+"""Response of a linearised mechanism to harmonic forces and to harmonic motion of a drive."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import typed
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.analysis.linearize import Linearization, linearize
+from rom.mbs.analysis.local_equations import instant
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.results.state import State
+from rom.model import Array
+
+# reciprocal condition number of the dynamic stiffness from which a response counts as infinite
+RECIPROCAL_CONDITION_TOL = 1e-13
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Steady motion of one marker under a harmonic force on another.
+
+    Attributes:
+        frequencies: (f,) [Hz].
+        receptance: (f, 6, 6) complex; translation [m] and rotation [rad] of the marker, world,
+            per force [N] and moment [N m].
+    """
+
+    frequencies: Array
+    receptance: Any
+
+    @property
+    def mobility(self) -> Any:
+        """(f, 6, 6) velocities per force."""
+        return 2j * np.pi * self.frequencies[:, None, None] * self.receptance
+
+    @property
+    def accelerance(self) -> Any:
+        """(f, 6, 6) accelerations per force."""
+        return 2j * np.pi * self.frequencies[:, None, None] * self.mobility
+
+
+@typed
+def frequency_response(
+    mechanism: Mechanism,
+    state: State | None,
+    frequencies: npt.ArrayLike,
+    *,
+    force: Marker,
+    motion: Marker,
+    frame: Any = "body",
+) -> FrequencyResponse:
+    """Respond to a harmonic force, linearly around a state.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        state: from `equilibrium`; None for the start.
+        frequencies: (f,) of the force [Hz].
+        force: marker on which force and moment act, in the world.
+        motion: marker whose motion is wanted.
+        frame: see `linearize`.
+
+    Raises:
+        ConfigError: for an unknown marker or a wrong frequency.
+        SolverError: naming the frequency at which the response is infinite.
+    """
+    f = _checked(frequencies)
+    around = linearize(mechanism, state, frame=frame)
+    load = (around.jacobian(force) @ around.test).T
+    found = around.motion(motion) @ _solved(around, f, np.broadcast_to(load, (f.size, *load.shape)))
+    return FrequencyResponse(f, found)
+
+
+@typed
+def transmissibility(
+    mechanism: Mechanism,
+    state: State | None,
+    frequencies: npt.ArrayLike,
+    *,
+    drive: str,
+    motion: Marker,
+) -> Array:
+    """Motion of a marker while a drive shakes the mechanism around a state of rest.
+
+    Args:
+        mechanism: bodies, joints, forces, and the drive.
+        state: from `equilibrium`; None for the start.
+        frequencies: (f,) of the drive [Hz].
+        drive: name of the drive.
+        motion: marker whose motion is wanted.
+
+    Returns:
+        (f, 6) complex; translation and rotation of the marker, world, per unit of the drive.
+
+    Raises:
+        ConfigError: for an unknown drive or marker, or a wrong frequency.
+        ModelError: if the mechanism moves, or the joints do not let the drive move.
+        SolverError: naming the frequency at which the response is infinite.
+    """
+    f = _checked(frequencies)
+    around = linearize(mechanism, state)
+    if drive not in mechanism.drives:
+        raise ConfigError(f"no drive {drive!r}; the mechanism has {sorted(mechanism.drives)}.")
+    if around.state.v.any():
+        raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
+    now = instant(mechanism, around.state.t)
+    now.W.base[:] = around.state.base
+    M, C, K = now.matrices(around.state)
+    enforced = _forced(
+        now.gradient(around.state.q, around.state.v)[1], now.packed, drive, now.probe()
+    )
+    s = 2j * np.pi * f[:, None]
+    load = -(s**2 * (M @ enforced) + s * (C @ enforced) + K @ enforced) @ around.test
+    y = _solved(around, f, load[:, :, None])[:, :, 0]
+    return (y @ around.basis.T + enforced) @ around.jacobian(motion).T
+
+
+def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:
+    """(n,) smallest motion that moves the drive by one unit and no other joint."""
+    unit = np.zeros(G.shape[0])
+    unit[packed.rows_of(drive)] = 1.0
+    enforced = scale * np.linalg.lstsq(G * scale, unit, rcond=1e-9)[0]
+    if np.abs(G @ enforced - unit).max() > 1e-8:
+        raise ModelError("the other joints do not let this drive move.", where=drive)
+    return enforced
+
+
+def _checked(frequencies: npt.ArrayLike) -> Array:
+    f = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if f.ndim != 1 or not f.size or not np.isfinite(f).all() or (f < 0).any():
+        raise ConfigError(f"frequencies = {frequencies!r} must be a list of numbers from zero on.")
+    return f
+
+
+def _solved(around: Linearization, f: Array, load: Array) -> Array:
+    """Amplitudes of the coordinates for the loads (f, n, k)."""
+    w = 2 * np.pi * f[:, None, None]
+    A = around.K - w**2 * around.M + 1j * w * around.C
+    size = np.sqrt(np.maximum(np.abs(np.diagonal(A, axis1=1, axis2=2)), 1e-300))
+    scaled = A / size[:, :, None] / size[:, None, :]
+    singular = 1 / np.linalg.cond(scaled) if A.shape[1] else np.ones(f.size)
+    if singular.min() < RECIPROCAL_CONDITION_TOL:
+        k = int(np.argmin(singular))
+        raise SolverError(
+            f"the response at {f[k]:.9g} Hz is infinite: a free motion, or a resonance that "
+            "nothing damps.",
+            hint="Leave this frequency out, add damping, or hold the mechanism.",
+        )
+    return np.linalg.solve(A, load)

@@ -1,0 +1,309 @@
+"""How results change with the parameters of a mechanism."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from inspect import signature
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import positive, shortened, typed
+from rom.errors import ConfigError, ModelError
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.linearize import Linearization, linearize
+from rom.mbs.analysis.local_equations import Instant, instant
+from rom.mbs.analysis.tangent import Tangent
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.state import State
+from rom.model import Array
+
+DIFFERENCE_STEP = 1e-4  # of a parameter, relative to its size
+# steps that are tried where the result is a motion, and the relative error that ends the search
+MAX_STEP, MAX_HALVINGS, ERROR_RTOL = 5e-2, 9, 1e-9
+SEPARATE_RTOL = 1e-6  # distance of eigenvalues from which on each has its own derivative
+Builder = Callable[..., Mechanism]
+Output = Callable[[Mechanism, State], Any]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of a result.
+
+    Attributes:
+        names: the k parameters.
+        value: (...) the result.
+        derivative: (..., k) its derivatives, unit of the result per unit of the parameter.
+        error: (k,) estimated error of the derivatives relative to their size; zeros where they
+            follow from equations at the solution.
+    """
+
+    names: tuple[str, ...]
+    value: Any
+    derivative: Any
+    error: Array
+
+    def __getitem__(self, name: str) -> Any:
+        """(...) derivative by one parameter."""
+        if name not in self.names:
+            raise ConfigError(f"no parameter {name!r}; there are {list(self.names)}.")
+        return self.derivative[..., self.names.index(name)]
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Equilibria of a mechanism along one parameter, to first order.
+
+    Attributes:
+        step: of the parameter.
+        sides: mechanism, instant and state at minus and plus one step.
+    """
+
+    step: float
+    sides: tuple[tuple[Mechanism, Instant, State], ...]
+
+    def slope(self, f: Callable[[Mechanism, Instant, State], Any]) -> Any:
+        """Total derivative of a quantity by the parameter."""
+        before, after = (np.asarray(f(*side)) for side in self.sides)
+        return (after - before) / (2 * self.step)
+
+
+@typed
+def equilibrium_sensitivity(
+    build: Builder, parameters: Mapping[str, float], output: Output, **options: Any
+) -> Sensitivity:
+    """Derivatives of what an equilibrium at rest looks like, by the implicit function theorem.
+
+    With r(q, lam, p) = 0 and the joints closed, Phi(q, p) = 0::
+
+        [K  G^T] [dq/dp  ]     [dr/dp  ]
+        [G   0 ] [dlam/dp] = - [dPhi/dp]
+
+    No second equilibrium is sought. The right-hand side is a difference between two mechanisms in
+    the same position.
+
+    Args:
+        build: function of the parameters by name that returns the mechanism, always with the same
+            bodies and joints.
+        parameters: {name: value}.
+        output: function of a mechanism and a state; returns a number or an array.
+        options: of `equilibrium`.
+
+    Raises:
+        ConfigError: for wrong parameters, or mechanisms of different size.
+        ModelError: if the equilibrium spins, or is not unique.
+    """
+    values = _checked(parameters, build=build)
+    mechanism, state = _rest(build, values, options)
+    value = np.asarray(output(mechanism, state))
+    if value.dtype.kind not in "iufc":
+        raise ConfigError(f"output gives {shortened(value)}; a number or an array is needed.")
+    paths = [_path(build, values, name, state) for name in values]
+    slopes = [path.slope(lambda mech, _, at: output(mech, at)) for path in paths]
+    return _collected(values, value, slopes)
+
+
+@typed
+def frequency_sensitivity(
+    build: Builder, parameters: Mapping[str, float], **options: Any
+) -> Sensitivity:
+    """Derivatives of the eigenvalues of small motions about an equilibrium at rest.
+
+    With E(s) = [s^2 M + s C + K, G^T; G, 0], its right vector x and its left vector y::
+
+        ds/dp = - y^H (dE/dp) x / y^H (dE/ds) x
+
+    The matrices change with the parameter and with the equilibrium that moves with it.
+
+    Args:
+        build: as in `equilibrium_sensitivity`.
+        parameters: {name: value}.
+        options: of `equilibrium`.
+
+    Returns:
+        ``value`` (f,) complex eigenvalues [rad/s] in the order of `linearize`: imaginary parts are
+        2 pi times frequencies.
+
+    Raises:
+        ConfigError, ModelError: as `equilibrium_sensitivity`; ModelError for equal eigenvalues,
+            which have no derivatives of their own.
+
+    Source:
+        Murthy and Haftka, Derivatives of eigenvalues and eigenvectors of a general complex matrix,
+        Int. J. Numer. Meth. Engng. 26 (1988) 293.
+    """
+    values = _checked(parameters, build=build)
+    mechanism, state = _rest(build, values, options)
+    now, linear = instant(mechanism, state.t), linearize(mechanism, state)
+    here = _matrices(mechanism, now, state)
+    triples = [_vectors(here, linear, k) for k in range(linear.eigenvalues.size)]
+    slopes = []
+    for name in values:
+        change = _path(build, values, name, state).slope(_matrices)
+        slopes.append(np.array([_rate(here, change, *triple) for triple in triples]))
+    return _collected(values, linear.eigenvalues, slopes)
+
+
+@typed
+def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, float]) -> Sensitivity:
+    """Derivatives of the result of a simulation, by central differences with a chosen step.
+
+    Steps are halved; the two results of each pair are combined to fourth order, and the pair that
+    agrees best wins: round-off, and steps of the integration that jump, then do not spoil it.
+
+    Args:
+        result: function of the parameters by name that returns a number or an array, for example
+            ``lambda length: rom.simulate(pendulum(length), ...).position("bob")[-1]``.
+        parameters: {name: value}.
+
+    Raises:
+        ConfigError: for wrong parameters, or results of different shape.
+
+    Source:
+        Ridders, Accurate computation of F'(x) and F'(x)F''(x), Adv. Eng. Software 4 (1982) 75.
+    """
+    values = _checked(parameters, result=result)
+    found = [_ridders(result, values, name) for name in values]
+    value = np.asarray(result(**values), dtype=float)
+    whole = _collected(values, value, [slope for slope, _ in found])
+    return replace(whole, error=np.array([error for _, error in found]))
+
+
+def _checked(parameters: Mapping[str, float], **called: Callable[..., Any]) -> dict[str, float]:
+    """The parameters, if there are some and a function takes them by name."""
+    if not parameters:
+        raise ConfigError(f"parameters = {parameters!r} is no {{name: value}}.")
+    for name, function in called.items():
+        try:
+            signature(function).bind(**parameters)
+        except TypeError as error:
+            raise ConfigError(
+                f"{name} does not take the parameters {sorted(parameters)}: {error}."
+            ) from error
+        except ValueError:  # written in C, without a signature
+            continue
+    return dict(parameters)
+
+
+def _collected(values: dict[str, float], value: Array, slopes: list[Array]) -> Sensitivity:
+    return Sensitivity(tuple(values), value, np.stack(slopes, axis=-1), np.zeros(len(slopes)))
+
+
+def _rest(
+    build: Builder, values: dict[str, float], options: dict[str, Any]
+) -> tuple[Mechanism, State]:
+    mechanism = build(**values)
+    state = equilibrium(mechanism, **options)
+    if state.v.any():
+        raise ModelError("sensitivities are those of an equilibrium at rest; this one spins.")
+    return mechanism, state
+
+
+def _path(build: Builder, values: dict[str, float], name: str, state: State) -> _Path:
+    """The equilibria one step of a parameter before and after, by the implicit function theorem."""
+    step = DIFFERENCE_STEP * (abs(values[name]) or 1.0)
+    sides = []
+    for sign in (-1, 1):
+        mechanism = build(**{**values, name: values[name] + sign * step})
+        now = instant(mechanism, state.t)
+        if (now.packed.q.size, now.W.value.size) != (state.q.size, state.lam.size):
+            raise ConfigError(f"the mechanism has other bodies or joints for another {name!r}.")
+        now.W.base[:] = state.base
+        sides.append((sign, mechanism, now))
+    tangent = Tangent.of(instant(build(**values), state.t), state)
+    forces, gaps = ([f(now) for _, _, now in sides] for f in _balance_of(state))
+    change = _answer(tangent, (forces[1] - forces[0]) / 2, (gaps[1] - gaps[0]) / 2)
+    moved = []
+    for sign, mechanism, now in sides:
+        q = now.shifted(state.q, sign * change[0])
+        moved.append((mechanism, now, replace(state, q=q, lam=state.lam + sign * change[1])))
+    return _Path(step, tuple(moved))
+
+
+def _balance_of(state: State) -> tuple[Callable[[Instant], Array], Callable[[Instant], Array]]:
+    """Forces out of balance, and gaps, of another mechanism in the same position."""
+    return (
+        lambda now: now.residual(state.q, state.v, state.a, state.lam),
+        lambda now: now.gradient(state.q, state.v)[0],
+    )
+
+
+def _answer(tangent: Tangent, force: Array, gap: Array) -> tuple[Array, Array]:
+    """Change of coordinates (n,) and multipliers (m,) that balances a force and closes a gap."""
+    scale = tangent.now.probe()
+    A = tangent.G * scale
+    rows = np.maximum(np.linalg.norm(A, axis=1), 1e-300)
+    shift = np.linalg.lstsq(A / rows[:, None], -gap / rows, rcond=1e-9)[0] * scale
+    force = tangent.T.T @ force
+    K = tangent.Z.T @ tangent.K @ tangent.Z
+    shift = shift - tangent.Z @ np.linalg.solve(K, tangent.Z.T @ (force + tangent.K @ shift))
+    reaction = np.linalg.lstsq(A.T, -(force + tangent.K @ shift) * scale, rcond=1e-9)[0]
+    return tangent.T @ shift, reaction
+
+
+def _matrices(_: Mechanism, now: Instant, state: State) -> Array:
+    """(3, n + m, n + m) coefficients of s^2, s and 1 in E(s)."""
+    M, C, K = now.matrices(state)
+    G = now.gradient(state.q, state.v)[1]
+    n, m = M.shape[0], G.shape[0]
+    E = np.zeros((3, n + m, n + m))
+    E[0, :n, :n], E[1, :n, :n], E[2, :n, :n] = M, C, K
+    E[2, :n, n:], E[2, n:, :n] = G.T, G
+    return E
+
+
+def _vectors(E: Array, linear: Linearization, k: int) -> tuple[complex, Array, Array]:
+    """Eigenvalue k with its right and left vector.
+
+    Raises:
+        ModelError: if another eigenvalue is equal.
+    """
+    s, every = linear.eigenvalues[k], linear.eigenvalues
+    others = np.delete(every, k)
+    near = np.abs(others - s).min(initial=np.inf)
+    if near < SEPARATE_RTOL * np.abs(every).max():
+        raise ModelError(
+            f"two eigenvalues are equal ({abs(s):.6g} rad/s): neither has a derivative of its own.",
+            hint="Let the parameters break the symmetry a little.",
+        )
+    n = linear.basis.shape[0]
+    full = np.array([s**2, s, 1.0]) @ E.reshape(3, -1)
+    full = full.reshape(E.shape[1:])
+    U, _, V = np.linalg.svd(s**2 * linear.M + s * linear.C + linear.K)
+    right, left = linear.basis @ V[-1].conj(), linear.test @ U[:, -1]
+    A, block = full[n:, :n], full[:n, :n]
+    above = np.linalg.lstsq(A.T, -block @ right, rcond=1e-9)[0]
+    below = np.linalg.lstsq(A.T, -block.conj().T @ left, rcond=1e-9)[0]
+    return s, np.concatenate([right, above]), np.concatenate([left, below])
+
+
+def _rate(E: Array, change: Array, s: complex, x: Array, y: Array) -> complex:
+    """Derivative of an eigenvalue."""
+    projected_change = y.conj() @ (s**2 * change[0] + s * change[1] + change[2]) @ x
+    return -projected_change / (y.conj() @ (2 * s * E[0] + E[1]) @ x)
+
+
+def _ridders(
+    result: Callable[..., Any], values: dict[str, float], name: str
+) -> tuple[Array, float]:
+    """Derivative by one parameter, and its estimated relative error."""
+    step = positive("step", MAX_STEP * (abs(values[name]) or 1.0))
+    best, error, last = np.zeros(0), np.inf, None
+    for _ in range(MAX_HALVINGS):
+        ends = [np.asarray(result(**{**values, name: values[name] + x})) for x in (-step, step)]
+        if ends[0].shape != ends[1].shape:
+            raise ConfigError(f"the result has another shape for another {name!r}.")
+        slope = (ends[1] - ends[0]) / (2 * step)
+        if last is not None:
+            better = slope + (slope - last[0]) / 3
+            size = max(float(np.abs(better).max(initial=0.0)), 1e-300)
+            if last[1] is not None:
+                miss = float(np.abs(better - last[1]).max(initial=0.0)) / size
+                if miss < error:
+                    best, error = better, miss
+                if error < ERROR_RTOL or miss > 10 * error:
+                    break
+            last = (slope, better)
+        else:
+            last = (slope, None)
+        step /= 2
+    return best, error

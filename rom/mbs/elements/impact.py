@@ -1,0 +1,123 @@
+"""Laws of compliant impact: stiffness from Hertz, damping from the coefficient of restitution."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from rom.arguments import number, positive
+from rom.errors import ConfigError
+from rom.plausible import FRICTION, warn_outside
+
+
+@dataclass(frozen=True, slots=True)
+class Impact:
+    """Force of penetration: stiffness depth^exponent (1 + damping d(depth)/dt), never pulling.
+
+    With a coefficient of restitution e at the speed of impact v the factor d = damping v solves
+    d (1 + e) = ln((1 + d) / (1 - d e)), whatever stiffness, exponent and mass; for little loss it
+    is 3 (1 - e) / 2. Slower impacts lose less.
+
+    Args:
+        stiffness: [N/m^exponent], or [N m/rad^exponent] on an angle.
+        exponent: 1 for linear, 3/2 for Hertz.
+        damping: factor of the closing speed [s/m]; or give the next two.
+        restitution: speed after over speed before, above 0 and at most 1.
+        impact_speed: at which that holds [m/s].
+        mu: coefficient of friction at the touching point.
+        transition_speed: sliding speed over which friction changes its sign [m/s]; implicit steps
+            that change the sliding speed by much more do not converge.
+
+    Raises:
+        ConfigError: for numbers no contact has.
+
+    Source:
+        Hunt, Crossley, J. Appl. Mech. 42 (1975) 440; integrated exactly in `damping_of`.
+    """
+
+    stiffness: float
+    exponent: float = 1.5
+    damping: float = 0.0
+    restitution: float | None = None
+    impact_speed: float | None = None
+    mu: float = 0.0
+    transition_speed: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "exponent", "transition_speed"):
+            positive(name, getattr(self, name))
+        for name in ("damping", "mu"):
+            if number(name, getattr(self, name)) < 0.0:
+                raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
+        warn_outside(FRICTION, self.mu)
+        if self.exponent < 1.0:
+            raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
+        if (self.restitution is None) != (self.impact_speed is None):
+            raise ConfigError(
+                f"restitution = {self.restitution} needs the impact speed at which it holds, "
+                f"got impact_speed = {self.impact_speed}, and the other way round."
+            )
+        if self.restitution is not None:
+            if self.damping:
+                raise ConfigError(f"damping = {self.damping:g} and restitution exclude each other.")
+            factor = damping_of(self.restitution, positive("impact_speed", self.impact_speed))
+            object.__setattr__(self, "damping", factor)
+
+
+def checked_law(name: str, law: Any) -> Impact:
+    """The law, if it is one.
+
+    Raises:
+        ConfigError: if it is not.
+    """
+    if not isinstance(law, Impact):
+        raise ConfigError(
+            f"law of {name!r} is {law!r}; a rom.mbs.elements.impact.Impact is needed."
+        )
+    return law
+
+
+def damping_of(restitution: float, speed: float) -> float:
+    """Damping factor [s/m] that gives a coefficient of restitution at a speed of impact [m/s].
+
+    Raises:
+        ConfigError: if the coefficient is not above 0 and at most 1.
+    """
+    e = number("restitution", restitution)
+    if not 0.0 < e <= 1.0:
+        raise ConfigError(f"restitution = {e:g} is outside (0, 1].")
+    if e > 1.0 - 1e-9:
+        return 0.0
+
+    def missing(d: float) -> float:
+        return d * (1.0 + e) - np.log1p(d) + np.log1p(-d * e)
+
+    first = 1.5 * (1.0 - e * e) / (1.0 + e**3)  # where two terms of the series vanish
+    low = first
+    while missing(low) <= 0.0:
+        low *= 0.5
+    return float(brentq(missing, low, (1.0 - 1e-15) / e, xtol=1e-15, rtol=1e-14)) / speed
+
+
+def hertz_stiffness(E1: float, nu1: float, E2: float, nu2: float, radius: float) -> float:
+    """Stiffness k of F = k depth^(3/2) between spheres [N/m^1.5].
+
+    Args:
+        E1: Young's modulus of one [Pa].
+        nu1: its Poisson's ratio.
+        E2: Young's modulus of the other [Pa].
+        nu2: its Poisson's ratio.
+        radius: 1 / (1 / R1 + 1 / R2); of the sphere alone against a plane [m].
+
+    Raises:
+        ConfigError: for numbers no material has.
+
+    Source:
+        Johnson, Contact Mechanics, 1985, equation 4.23.
+    """
+    for name, nu in (("nu1", nu1), ("nu2", nu2)):
+        if not -1.0 < number(name, nu) <= 0.5:
+            raise ConfigError(f"{name} = {nu:g} is outside (-1, 0.5].")
+    soft = (1 - nu1**2) / positive("E1", E1) + (1 - nu2**2) / positive("E2", E2)
+    return 4 / 3 * np.sqrt(positive("radius", radius)) / soft

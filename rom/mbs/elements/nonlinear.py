@@ -1,0 +1,220 @@
+"""Non-linear flexible bodies in a mechanism: frames with inertia, and laws between them.
+
+What such a body tells: frames (position, axes, lumped mass and inertia), elements with their laws,
+places for markers, and which frames share their origin. Each frame becomes a body of the mechanism
+with the same joints, forces, statics and linearisation as others have; the elimination goes along
+them, at a cost that grows with their number only.
+
+The law of an element of k frames is a compiled function of C,
+
+``void law(const double *numbers, const double *pose, int64 wanted, double *answer, double *space)``
+
+with ``pose`` (k, 13): position (3) [m] and velocity of the origin in the world, quaternion and
+angular velocity in the axes of the frame, in the order of position, quaternion, velocity, angular
+velocity. It writes, with n = 6 k and the rows force in the world, moment in the frame: stored
+energy [J]; lost power [W]; (n,) forces of energy and damping that resist the motion; and, if
+``wanted`` is not zero, (n, n) their derivative by displacements in the world and rotations in the
+frame; (n, n) their derivative by the velocities. ``space`` is memory for
+`rom.mbs.kernels.system.SPACE` numbers. Such a function is made with ``numba.cfunc`` or by any
+compiler.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.arguments import finite, start_pose, typed
+from rom.errors import ConfigError, ModelError
+from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.parts.joints import Joint
+from rom.model import Array, Index
+
+# of a law, as numba.cfunc takes it
+LAW_SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
+QUATERNION_ATOL = 1e-9  # difference of a quaternion from unit length
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Frames of a body with the inertia lumped at them; axes of the body.
+
+    Attributes:
+        x: (n, 3) origins [m].
+        p: (n, 4) unit quaternions, frame to body.
+        mass: (n,) [kg].
+        inertia: (n, 3) principal moments about the origin, axes of the frame [kg m^2].
+    """
+
+    x: Array
+    p: Array
+    mass: Array
+    inertia: Array
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Elements with one law.
+
+    Attributes:
+        address: of the law in memory.
+        frames: (e, k) frames that each element connects.
+        numbers: (e, c) what the law knows of each element.
+        law: kept so that the compiled code lives as long as the elements.
+    """
+
+    address: int
+    frames: Index
+    numbers: Array
+    law: Any = None
+
+
+class NonlinearBody(Protocol):
+    """A flexible body of any kinematics."""
+
+    @property
+    def frames(self) -> Frames:
+        """Where the body is at the start, and its inertia."""
+
+    @property
+    def elements(self) -> Sequence[Elements]:
+        """What acts between the frames."""
+
+    @property
+    def places(self) -> Mapping[str, int]:
+        """Frames at which markers have names."""
+
+    @property
+    def coincident(self) -> Sequence[tuple[int, int]]:
+        """Pairs of frames with one origin, which turn each for itself."""
+
+
+@typed
+@dataclass(frozen=True)
+class Assembly:
+    """A non-linear body in a mechanism: frame k is the body ``name.k``.
+
+    Attributes:
+        name: name in the mechanism.
+        body: what was added.
+        parts: the bodies of its frames.
+    """
+
+    name: str
+    body: NonlinearBody
+    parts: tuple[Part, ...]
+
+    def marker(self, place: str | int) -> Marker:
+        """Handle of a named place, or of the origin of a frame, counted from 0 or the end.
+
+        Raises:
+            ConfigError: listing the places.
+        """
+        frame = self.body.places.get(place) if isinstance(place, str) else place
+        if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
+            raise ConfigError(
+                f"body {self.name!r} has no marker {place!r}; it has "
+                f"{sorted(self.body.places)} and frames 0 to {len(self.parts) - 1}."
+            )
+        if not -len(self.parts) <= frame < len(self.parts):
+            raise ConfigError(f"body {self.name!r} has {len(self.parts)} frames, no {frame}.")
+        return self.parts[frame].marker((0.0, 0.0, 0.0))
+
+    @property
+    def reach(self) -> float:
+        """Length of the line through all frames [m]."""
+        return float(sum(np.linalg.norm(b.at - a.at) for a, b in pairwise(self.parts)))
+
+
+@typed
+class NonlinearBodies:
+    """The non-linear bodies of a `rom.mbs.mechanism.Mechanism`."""
+
+    parts: dict[str, Part]
+    joints: dict[str, Joint]
+    nonlinear: dict[str, Assembly]
+    spherical: Callable[..., None]
+    _check_new: Callable[[str], None]
+
+    def add_nonlinear(
+        self,
+        name: str,
+        body: NonlinearBody,
+        *,
+        at: npt.ArrayLike = (0.0, 0.0, 0.0),
+        orientation: npt.ArrayLike | None = None,
+        velocity: npt.ArrayLike | None = None,
+        omega: npt.ArrayLike | None = None,
+    ) -> Assembly:
+        """Add a non-linear flexible body, e.g. a rod; see `rom.components.cosserat.body`.
+
+        Args:
+            name: name of the body; its frames become bodies ``name.0``, ``name.1``, ...
+            body: see `NonlinearBody`.
+            at: (3,) origin of the body at the start, world [m].
+            orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+            velocity: (3,) of that origin, world [m/s].
+            omega: (3,) angular velocity of the body as a whole, axes of the body [rad/s].
+
+        Raises:
+            ConfigError: for a name in use, a wrong shape or a number that is not finite.
+            ModelError: naming a frame without mass or inertia.
+        """
+        self._check_new(name)
+        _check(name, body)
+        pose = start_pose(at, orientation, velocity, omega)
+        parts = tuple(_frame_part(f"{name}.{k}", body.frames, k, pose)
+                      for k in range(len(body.frames.x)))  # fmt: skip
+        for part in parts:
+            self._check_new(part.name)
+        assembly = Assembly(name, body, parts)
+        self.parts.update({part.name: part for part in parts})
+        self.nonlinear[name] = assembly
+        for a, b in body.coincident:
+            self.spherical(f"{name}.{a} and {b}", assembly.marker(a), assembly.marker(b))
+        return assembly
+
+
+def _frame_part(name: str, frames: Frames, k: int, pose: tuple[Array, ...]) -> Part:
+    """The body of frame k, moved with the pose of the whole."""
+    at, p, velocity, omega = pose
+    A, J = rotation.matrix(p), frames.inertia[k]
+    arm = A @ frames.x[k]
+    turned = rotation.matrix(frames.p[k]).T @ omega
+    second = 0.5 * J.sum() * np.eye(3) - np.diag(J)
+    moving = velocity + np.cross(A @ omega, arm), turned
+    p = rotation.multiply(p, frames.p[k])
+    return Part(name, float(frames.mass[k]), np.zeros(3), second, at + arm, p, *moving)
+
+
+def _check(name: str, body: Any) -> None:
+    missing = [x for x in ("frames", "elements", "places", "coincident") if not hasattr(body, x)]
+    if missing:
+        raise ConfigError(
+            f"body {name!r} is {body!r}, which has no {', '.join(missing)}.",
+            hint="Make one with rom.components.cosserat.body; reduced ones go to add_flexible.",
+        )
+    frames, n = body.frames, len(body.frames.x)
+    for key, shape in (("x", (n, 3)), ("p", (n, 4)), ("mass", (n,)), ("inertia", (n, 3))):
+        finite(f"{key} of {name}", getattr(frames, key), shape)
+    without = (frames.mass <= 0.0) | (frames.inertia <= 0.0).any(axis=1)
+    if without.any():
+        raise ModelError(
+            f"frame {int(np.argmax(without))} of {n} has mass {frames.mass[np.argmax(without)]:g} "
+            f"kg and inertia {frames.inertia[np.argmax(without)].tolist()} kg m^2: each must be "
+            "positive in a motion.",
+            where=name,
+        )
+    if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > QUATERNION_ATOL:
+        raise ModelError("a quaternion of a frame has not the length one.", where=name)
+    for group in body.elements:
+        if group.frames.ndim != 2 or len(group.frames) != len(group.numbers):
+            raise ModelError("elements and their numbers differ in number.", where=name)
+        if group.frames.min(initial=0) < 0 or group.frames.max(initial=0) >= n:
+            raise ModelError(f"an element connects a frame beyond the {n} there are.", where=name)
+        if not group.address:
+            raise ModelError("elements have no compiled law.", where=name)

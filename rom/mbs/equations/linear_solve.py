@@ -1,0 +1,188 @@
+"""The linear equations [S G^T; G 0] of a step or an instant: filled, factorised, solved.
+
+By blocks along the graph of the mechanism where that is quicker, as a whole matrix otherwise, and
+also where a block is singular for itself.
+"""
+
+import math
+
+from rom.mbs.equations.elimination import eliminate, fill_blocks, substitute
+from rom.mbs.kernels.algebra import back_substitute, factorise
+from rom.mbs.kernels.compiled import copy, inner, kernel
+from rom.mbs.kernels.markers import own_block
+
+
+@inner
+def border(W, rank):
+    """Project the constraint gradient on the range W.U_lu: W.UG, and its copy W.UGT."""
+    m, wide = W.G.shape
+    for k in range(rank):
+        for j in range(wide):
+            W.UG[k, j] = W.G[k, j] if rank == m else 0.0
+        if rank < m:
+            for p in range(m):
+                u = W.U_lu[k, p]
+                for j in range(wide):
+                    W.UG[k, j] += u * W.G[p, j]
+        for j in range(wide):
+            W.UGT[k, j] = W.UG[k, j]
+
+
+@inner
+def set_scaling(s, W, rank):
+    """Scales with which masses and gradients have size one."""
+    bodies, graph, d, n = s.bodies, s.graph, W.scaling, W.residual.size
+    for b in range(bodies.mass.size):
+        block = own_block(s, b, W.S)
+        for i in range(6 + bodies.r[b]):
+            d[bodies.v_at[b] + i] = 1.0 / math.sqrt(block[i, i]) if block[i, i] > 0.0 else 1.0
+    for k in range(rank):
+        total = 0.0
+        for j in range(0 if graph.compact else n):
+            total += (W.UG[k, j] * d[j]) ** 2
+        for p in range(4 if graph.compact else 0):
+            b = graph.body[k, p]
+            for q in range(6 + bodies.r[b] if b >= 0 else 0):
+                total += (W.UG[k, graph.at[k, p] + q] * d[bodies.v_at[b] + q]) ** 2
+        d[n + k] = 1.0 / math.sqrt(total) if total > 0.0 else 1.0
+
+
+@inner
+def fill(W, rank):
+    """Write [S, UG^T; UGT, 0], scaled, into W.lu from whole matrices."""
+    n, d = W.residual.size, W.scaling
+    for i in range(n):
+        for j in range(n):
+            W.lu[i, j] = W.S[i, j] * d[i] * d[j]
+    for k in range(rank):
+        for l in range(rank):
+            W.lu[n + k, n + l] = 0.0
+        for j in range(n):
+            W.lu[n + k, j] = W.UGT[k, j] * d[n + k] * d[j]
+            W.lu[j, n + k] = W.UG[k, j] * d[n + k] * d[j]
+
+
+@inner
+def fill_from_blocks(s, W):
+    """The same from blocks."""
+    bodies, graph, n, d = s.bodies, s.graph, W.residual.size, W.scaling
+    W.lu[:] = 0.0
+    for b in range(bodies.mass.size):
+        for e in range(graph.first[b], graph.first[b + 1]):
+            t, u = bodies.v_at[b], bodies.v_at[graph.other[e]]
+            for i in range(6 + bodies.r[b]):
+                for j in range(6 + bodies.r[graph.other[e]]):
+                    W.lu[t + i, u + j] = W.S[graph.x[e] + i, graph.y[e] + j] * d[t + i] * d[u + j]
+    for k in range(s.rows.kind.size):
+        for p in range(4):
+            b = graph.body[k, p]
+            for q in range(6 + bodies.r[b] if b >= 0 else 0):
+                j = bodies.v_at[b] + q
+                W.lu[n + k, j] = W.UGT[k, graph.at[k, p] + q] * d[n + k] * d[j]
+                W.lu[j, n + k] = W.UG[k, graph.at[k, p] + q] * d[n + k] * d[j]
+
+
+@inner
+def factorise_bordered(s, W, rank):
+    """Factorise [S, UG^T; UGT, 0]; False when it is singular."""
+    n = W.residual.size
+    set_scaling(s, W, rank)
+    W.by_blocks[0] = s.graph.compact
+    if s.graph.compact:
+        fill_blocks(s, W)
+        if eliminate(s.graph.plan, W.factor, W.pivot, W.spare):
+            return True
+        if W.lu.shape[0] < n + rank:
+            return False
+        W.by_blocks[0] = 0
+        fill_from_blocks(s, W)
+    else:
+        fill(W, rank)
+    return factorise(W.lu, n + rank, W.pivot)
+
+
+@inner
+def solve_bordered(s, W, rank, x, lam):
+    """Solve for x (n,) and lam (m,); W.rhs[:n] and W.part (m,) hold the right-hand side."""
+    m, n = W.G.shape[0], W.residual.size
+    for i in range(n):
+        W.rhs[i] *= W.scaling[i]
+    for k in range(rank):
+        total = W.part[k]
+        if rank < m:
+            total = 0.0
+            for p in range(m):
+                total += W.U_lu[k, p] * W.part[p]
+        W.rhs[n + k] = total * W.scaling[n + k]
+    if W.by_blocks[0]:
+        substitute(s.graph.plan, W.factor, W.pivot, W.rhs, W.spare)
+    else:
+        back_substitute(W.lu, n + rank, W.pivot, W.rhs)
+    for i in range(n):
+        x[i] = W.rhs[i] * W.scaling[i]
+    for p in range(m):
+        lam[p] = W.rhs[n + p] * W.scaling[n + p] if rank == m else 0.0
+        if rank < m:
+            for k in range(rank):
+                lam[p] += W.U_lu[k, p] * W.scaling[n + k] * W.rhs[n + k]
+
+
+@kernel
+def gradient_times(s, W, x, absolute, out):
+    """Set out (m,) to G x, or to the sums of absolute values, G as last evaluated."""
+    graph = s.graph
+    for k in range(s.rows.kind.size):
+        out[k] = 0.0
+        for p in range(4):
+            b = graph.body[k, p]
+            for q in range(6 + s.bodies.r[b] if b >= 0 else 0):
+                term = W.G[k, graph.at[k, p] + q] * x[s.bodies.v_at[b] + q]
+                out[k] += abs(term) if absolute else term
+
+
+@kernel
+def mass_diagonal(s, W, out):
+    """Set out (n,) to the diagonal of W.S."""
+    for b in range(s.bodies.mass.size):
+        block = own_block(s, b, W.S)
+        for i in range(block.shape[0]):
+            out[s.bodies.v_at[b] + i] = block[i, i]
+
+
+@kernel
+def weigh(s, W, weight):
+    """Set W.S to the diagonal matrix with the inverse squares of the weights (n,)."""
+    W.S[:] = 0.0
+    for b in range(s.bodies.mass.size):
+        block = own_block(s, b, W.S)
+        for i in range(block.shape[0]):
+            block[i, i] = weight[s.bodies.v_at[b] + i] ** -2
+
+
+@kernel
+def factorised(s, W, least):
+    """Factorise [S G^T; G 0] by blocks; whether no pivot of a joint is below ``least``."""
+    P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
+    border(W, m)
+    set_scaling(s, W, m)
+    fill_blocks(s, W)
+    W.by_blocks[0] = 1
+    if not eliminate(P, W.factor, W.pivot, W.spare):
+        return False
+    W.spare[:] = 0.0
+    for i in range(m):
+        W.spare[P.position[n + i]] = 1.0
+    for k in range(P.size.size):
+        for i in range(P.size[k]):
+            diagonal = W.factor[P.pivot[k] + i * (P.size[k] + 1)]
+            if W.spare[P.start[k]] == 1.0 and not abs(diagonal) > least:
+                return False
+    return True
+
+
+@kernel
+def least_motion(s, W, gap, out):
+    """Set out (n,) to the motion x with G x = gap and the least x^T S x, factorised before."""
+    W.rhs[:] = 0.0
+    copy(gap, W.part)
+    solve_bordered(s, W, gap.size, out, W.dlam)

@@ -1,0 +1,11 @@
+"""Time integration.
+
+`simulation` is the entry and `run` the loop; `consistent_start` and `step_memory` begin;
+`generalized_alpha`, `bdf`, `index2`, `dop853` and `radau_start` take steps, of `fixed_step` or
+`adaptive_step`; `events`, `event_end` and `release` interrupt.
+"""
+
+from rom.lazy import front
+
+__all__ = ["METHODS", "RTOL", "simulate"]
+__getattr__ = front(__name__, "simulation", __all__)

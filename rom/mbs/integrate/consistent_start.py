@@ -1,0 +1,277 @@
+"""The start of a motion: positions that fit, velocities that fit, accelerations."""
+
+import warnings
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ModelError, RomWarning, SolverError
+from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
+from rom.mbs.equations.linear_solve import (
+    factorised,
+    gradient_times,
+    least_motion,
+    mass_diagonal,
+    weigh,
+)
+from rom.mbs.equations.packing import Packed
+from rom.mbs.kernels.system import ROLL, Work, workspace
+from rom.mbs.parts.signals import first_failure, sample_all
+from rom.mbs.results.state import Memory, State  # noqa: F401  under its old name
+from rom.model import Array, Integers
+
+# relative singular value below which a constraint counts as a copy of others: assembled
+# mechanisms show 1e-12 and less, independent constraints 1e-4 and more
+RANK_TOLERANCE = 1e-8
+# a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh more
+ELASTIC_WEIGHT = 1e8
+GAP_TOLERANCE = 1e-9
+MAX_ASSEMBLY = 60
+
+
+def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> State:
+    """Positions and velocities nearest to the given ones that satisfy all joints and drives.
+
+    Rigid motions are corrected before deformations.
+
+    Args:
+        packed: the mechanism.
+        t: start time [s].
+        spacing: of finite differences of drives [s].
+
+    Raises:
+        ModelError: naming the joint that cannot be satisfied.
+        SolverError: if a drive or load is not finite at the start.
+    """
+    table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
+    good, failure = first_failure(packed.signals, np.array([t]), table)
+    if not good:
+        raise failure
+    return _start(packed, table[0], t)
+
+
+def _start(packed: Packed, signal: Array, t: float) -> State:
+    """The state at the start, by whole matrices if the rank of the constraints needs them."""
+    W = workspace(packed.system, len(packed.signals))
+    W.signal[:] = signal
+    if packed.by_blocks and not _independent(packed, W, packed.q):
+        return _start(packed.whole(), signal, t)
+    q = assembled(packed, W, packed.q)
+    if packed.by_blocks and not _independent(packed, W, q):
+        return _start(packed.whole(), signal, t)
+    rank = W.value.size if packed.by_blocks else _rank(packed, W, q)
+    _check_start(packed, W, q, rank)
+    v = fitting_velocity(packed, W, q, packed.v)
+    return with_accelerations(packed, W, State(t, q, v, v * 0, np.zeros(W.value.size), rank))
+
+
+def _independent(packed: Packed, W: Work, q: Array) -> bool:
+    """Whether the elimination by blocks meets no joint that could repeat others."""
+    linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
+    weigh(packed.system, W, _weights(packed, W))
+    return bool(factorised(packed.system, W, RANK_TOLERANCE**1.5))
+
+
+def with_accelerations(packed: Packed, W: Work, state: State) -> State:
+    """The state with consistent accelerations and multipliers.
+
+    Raises:
+        SolverError: if the equations of motion are singular there.
+    """
+    a, lam = np.zeros(state.v.size), np.zeros(state.lam.size)
+    y = np.concatenate([state.q, state.v, np.zeros(3)])
+    if not rates(packed.system, W, y, state.rank, True, a, lam, np.zeros_like(y)):
+        raise SolverError(f"the equations of motion are singular at t = {state.t:.9g} s.")
+    return replace(state, a=a, lam=lam, base=W.base.copy())
+
+
+def assembled(packed: Packed, W: Work, q: Array) -> Array:
+    """Coordinates that satisfy the constraints, by weighted Gauss-Newton corrections.
+
+    Raises:
+        ModelError: naming the joint with the largest gap that remains.
+    """
+    q, v = q.copy(), np.zeros(packed.v.size)
+    if not W.value.size:
+        return q
+    scale, held = packed.row_scale, np.flatnonzero(packed.system.rows.kind != ROLL)
+    weight = None
+    for _ in range(MAX_ASSEMBLY):
+        linearize_constraints(packed.system, W, q, v)
+        weight = _weights(packed, W) if weight is None else weight
+        step = -_least_change(packed, W, W.value, weight, held)
+        largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
+        retract(packed.system, q.copy(), _limited(packed, step), q)
+        if largest < 1e-15 or not np.isfinite(largest):
+            break
+        if largest < 1e-12 and np.abs(W.value / scale).max() < 1e-14:
+            break
+    evaluate(packed.system, W, q, v)
+    _check_gap(packed, W.value / scale)
+    return q
+
+
+def _limited(packed: Packed, step: Array) -> Array:
+    """The step, shortened to half a radian and to the size of the mechanism."""
+    largest = 0.0
+    for t in packed.system.bodies.v_at:
+        turn, shift = (float(np.linalg.norm(step[i : i + 3])) for i in (t + 3, t))
+        largest = max(largest, turn / 0.5, shift / packed.length)
+    return step / max(largest, 1.0)
+
+
+def _check_gap(packed: Packed, gap: Array) -> None:
+    k = int(np.argmax(np.abs(gap)))
+    if not np.isfinite(gap).all() or abs(gap[k]) > GAP_TOLERANCE:
+        raise ModelError(
+            f"the mechanism cannot be assembled: {packed.row_owner[k]!r} stays open by "
+            f"{abs(gap[k]) * packed.length:.3g} m (size {packed.length:.3g} m), or as a rotation "
+            f"by {abs(gap[k]):.3g} rad.",
+            where=packed.row_owner[k],
+            hint="Joints contradict each other: check positions, axes and drives.",
+        )
+
+
+def _weights(packed: Packed, W: Work) -> Array:
+    """(n,) inverse square root of what a unit of each velocity coordinate costs."""
+    bodies = packed.system.bodies
+    mass = np.zeros(packed.v.size)
+    mass_diagonal(packed.system, W, mass)
+    for b, t in enumerate(bodies.v_at):
+        mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
+        mass[t + 6 : t + 6 + bodies.r[b]] *= ELASTIC_WEIGHT
+    return 1 / np.sqrt(mass)
+
+
+def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Integers) -> Array:
+    """Solution x of G x = gap in some rows, all by blocks, with the least weighted norm."""
+    if packed.by_blocks:
+        x = np.zeros(weight.size)
+        weigh(packed.system, W, weight)
+        if not factorised(packed.system, W, 0.0):
+            raise SolverError("constraints that were independent became dependent.")
+        least_motion(packed.system, W, gap, x)
+        return x
+    scale = packed.row_scale[rows]
+    G, gap = W.G[rows] / scale[:, None], gap[rows] / scale
+    rows = np.linalg.norm(G * weight, axis=1)
+    rows = np.where(rows > 0, rows, 1.0)
+    A = G * weight / rows[:, None]
+    return weight * np.linalg.lstsq(A, gap / rows, rcond=RANK_TOLERANCE)[0]
+
+
+def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
+    """The velocities nearest to v that satisfy joints and drives.
+
+    Raises:
+        ModelError: naming a joint or drive that contradicts others.
+    """
+    if not W.value.size:
+        return v.copy()
+    linearize_constraints(packed.system, W, q, v)
+    weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
+    now, size, every = np.zeros_like(wanted), np.zeros_like(wanted), np.arange(wanted.size)
+    for _ in range(2):  # the second pass removes the round-off of the first
+        gradient_times(packed.system, W, v, False, now)
+        v = v + _least_change(packed, W, wanted - now, weight, every)
+    gradient_times(packed.system, W, v, False, now)
+    gradient_times(packed.system, W, v, True, size)
+    miss, size = np.abs(now - wanted), size + np.abs(wanted)
+    size = np.maximum(size, 1e-3 * size.max())  # rows at rest hold nothing but round-off
+    k = int(np.argmax(miss / np.maximum(size, 1e-300)))
+    if miss[k] > 1e-8 * size[k]:
+        raise ModelError(
+            f"the velocities of joints and drives contradict each other: "
+            f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
+            where=packed.row_owner[k],
+        )
+    return v
+
+
+def _prescribed(packed: Packed, W: Work, derivative: int) -> Array:
+    signal = packed.system.rows.signal
+    if not W.signal.shape[0]:
+        return np.zeros(signal.size)
+    return np.where(signal >= 0, W.signal[np.maximum(signal, 0), derivative], 0.0)
+
+
+def _singular(packed: Packed, W: Work, q: Array) -> tuple[Array, Array]:
+    """Left singular vectors (m, m) and relative singular values of the scaled constraints."""
+    linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
+    A = W.G * _weights(packed, W)
+    norms = np.linalg.norm(A, axis=1)
+    A = A / np.where(norms > 0, norms, 1.0)[:, None]
+    U, s, _ = np.linalg.svd(A)
+    s = np.concatenate([s, np.zeros(U.shape[1] - s.size)])
+    return U, s / s.max()
+
+
+def _rank(packed: Packed, W: Work, q: Array) -> int:
+    """Number of independent constraints; warns of redundant ones by the names of their joints."""
+    m = W.value.size
+    if not m:
+        return 0
+    U, s = _singular(packed, W, q)
+    rank = int((s > RANK_TOLERANCE).sum())
+    if rank < m:
+        share = np.abs(U[:, rank:]).max(axis=1)
+        names = dict.fromkeys(o for o, x in zip(packed.row_owner, share, strict=True) if x > 1e-6)
+        _refuse_shared_friction(packed, names)
+        warnings.warn(
+            f"{m - rank} of {m} constraints repeat others; joints {', '.join(names)} share loads "
+            "that only their deformation could divide. The motion is exact, the reactions are "
+            "those of least norm.",
+            RomWarning,
+            stacklevel=5,
+        )
+    return rank
+
+
+def _refuse_shared_friction(packed: Packed, names: Any) -> None:
+    actions = packed.system.actions
+    for first in actions.load_first[actions.friction[:, 1] != 0.0]:
+        if packed.row_owner[first] in names:
+            raise ModelError(
+                "friction depends on the load of a joint that shares it with others as only "
+                "their deformation could decide.",
+                where=packed.row_owner[first],
+                hint="Let the joints repeat nothing, or give friction a constant level (coulomb).",
+            )
+
+
+def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
+    """Refuse a start in a singular position, where the rank is less than beside it.
+
+    Raises:
+        ModelError: if a small motion along the free directions raises the rank.
+    """
+    if rank == W.value.size or rank == 0:
+        return
+    _singular(packed, W, q)
+    weight = _weights(packed, W)
+    free = np.linalg.svd(W.G * weight)[2][rank:]
+    if not free.size:
+        return
+    step = weight * free.sum(axis=0)
+    reach = max(_largest_turn(packed, step), 1e-300)
+    beside = np.empty_like(q)
+    retract(packed.system, q, step * (1e-2 / reach), beside)
+    try:
+        beside = assembled(packed, W, beside)
+    except ModelError:
+        return
+    raised = int((_singular(packed, W, beside)[1] > RANK_TOLERANCE).sum())
+    if raised > rank:
+        raise ModelError(
+            f"the mechanism starts in a singular position: {rank} independent constraints there, "
+            f"{raised} beside it; its motion could branch.",
+            hint="Start from a position in which the parts are not all in line.",
+        )
+
+
+def _largest_turn(packed: Packed, step: Array) -> float:
+    bodies: Any = packed.system.bodies
+    turns = [np.linalg.norm(step[t + 3 : t + 6]) for t in bodies.v_at]
+    shifts = [np.linalg.norm(step[t : t + 3]) / packed.length for t in bodies.v_at]
+    return float(max(*turns, *shifts))

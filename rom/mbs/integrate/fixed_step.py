@@ -1,0 +1,201 @@
+"""Implicit methods with steps of one length: compiled steps in chunks, or around Python forces."""
+
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.errors import RomError, SolverError
+from rom.mbs.equations.python_laws import Law, apply_laws, laws
+from rom.mbs.integrate import generalized_alpha as alpha
+from rom.mbs.integrate.event_end import kept_before_the_end
+from rom.mbs.integrate.events import Noted
+from rom.mbs.integrate.generalized_alpha import Step
+from rom.mbs.integrate.radau_start import first_steps
+from rom.mbs.integrate.run import Record, standing_at
+from rom.mbs.integrate.step_memory import begin, copied, recall, remember
+from rom.mbs.kernels.system import Work
+from rom.mbs.parts.signals import padded, sampled
+from rom.mbs.results.state import State
+from rom.model import Array
+
+# seconds between looks at the keyboard and the progress line
+CHUNK_SECONDS = 0.2
+LARGEST_CHUNK = 4096
+
+
+def run_implicit(record: Record, W: Work, state: State) -> None:
+    """Fill the record by generalised-alpha or BDF with steps of one length."""
+    forces, settings = laws(record.mechanism, record.packed), record.settings
+    step, state = begin(record, W, state, forces, settings.h)
+    none = np.zeros((0, len(record.packed.signals), 3))
+    alpha.advance(record.packed.system, W, step, state.rank, none, 1, space(W, step, 1))
+    record.start(state, step.work)
+    record.clock = perf_counter()
+    done, chunk, n = settings.begun, 16, settings.steps
+    if step.bdf.size != 3 and not step.count[alpha.HAS_FACTOR]:
+        with standing_at(record, record.given):
+            done = _first(record, W, step, forces)
+    while done < n and not record.stopped:
+        clock = perf_counter()
+        taken = _chunk(record, W, step, forces, done, min(chunk, n - done))
+        done += taken
+        spent = max(perf_counter() - clock, 1e-6)
+        chunk = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
+        record.pause()
+    if n % settings.save_every and not record.stopped:
+        record.keep(
+            record.t,
+            *(x[None].copy() for x in (step.q, step.v, step.vd, step.lam, step.work, W.base)),
+        )
+
+
+def _first(record: Record, W: Work, step: Step, forces: tuple[Law, ...]) -> int:
+    """Take the steps before a multistep method can begin; returns how many there were."""
+    t, rows = first_steps(record, W, step)
+    step.count[alpha.STEPS_BEFORE] = 0
+    if not record.watch:
+        every = record.settings.save_every
+        rows = tuple(x[every - 1 :: every] for x in rows)
+    _note(record, W, step, forces, t, rows)
+    return t.size
+
+
+def space(W: Work, step: Step, rows: int) -> tuple[Array, ...]:
+    """Arrays for q, v, vd, lam, work and base of so many instants."""
+    return tuple(
+        np.zeros((rows, x.size)) for x in (step.q, step.v, step.vd, step.lam, step.work, W.base)
+    )
+
+
+def _chunk(
+    record: Record, W: Work, step: Step, forces: tuple[Law, ...], done: int, count: int
+) -> int:
+    """Take up to ``count`` steps and keep what is to be saved; returns how many were taken."""
+    packed, settings = record.packed, record.settings
+    t = settings.time(np.arange(done + 1, done + count + 1))
+    table, failure = sampled(packed.signals, padded(t), settings.span, settings.spacing, settings.h)
+    good = min(len(table), count)
+    every = 1 if record.watch else settings.save_every
+    out = space(W, step, (done + good) // every - done // every)
+    step.count[alpha.STEPS_BEFORE] = before = step.count[alpha.STEPS]
+    mark = Mark(copied(step), record.final, record.noted)
+    try:
+        try:
+            answer = _advance(record, W, step, forces, (t, table[:good], out))
+        finally:
+            taken = int(step.count[alpha.STEPS] - before)
+            _note(record, W, step, forces, t[:taken], out)
+        if record.stopped:
+            return taken
+        if answer != alpha.CONVERGED:
+            raise failed_step(record, W, step, answer, t[taken])
+    except BaseException:
+        _retrace(record, W, mark, forces, (t, table[:good], out))
+        raise
+    if failure is not None and good < count:
+        raise failure
+    return taken
+
+
+class Mark(NamedTuple):
+    """Where a chunk began: step memory, state and events there."""
+
+    T: Step
+    state: State
+    noted: Noted | None
+
+
+def _retrace(
+    record: Record, W: Work, mark: Mark, forces: tuple[Law, ...], chunk: tuple[Array, ...]
+) -> None:
+    """Repeat the good steps of a chunk that failed, to stand behind the last as if it ended there.
+
+    The step that failed has changed the factorisation and more of what the next one starts from.
+    Laws that answer differently the second time leave the run where the chunk began.
+    """
+    times, table, out = chunk
+    k, step, begin = int(np.searchsorted(times, record.t, side="right")), mark.T, mark.state
+    noted = record.watch.noted() if record.watch else None
+    record.reach(record.given if begin.memory is None else begin, mark.noted)
+    if not k:
+        return
+    W.base[:] = begin.base
+    if begin.memory is not None:
+        recall(begin.memory, W, step)
+    try:
+        spare = tuple(np.empty_like(x) for x in out)
+        answer = _advance(record, W, step, forces, (times, table[:k], spare))
+    except (RomError, KeyboardInterrupt):
+        return
+    if answer == alpha.CONVERGED:
+        record.counts = counts(step)
+        record.reach(_state(record, W, step), noted)
+
+
+def _advance(record: Record, W: Work, step: Step, forces: tuple[Law, ...], chunk: tuple) -> int:
+    """Run a chunk, calling Python forces whenever they are asked for; says how it ended."""
+    times, table, out = chunk
+    settings, rank, system = record.settings, record.final.rank, record.packed.system
+    answer = alpha.NEEDS_LAWS
+    while answer == alpha.NEEDS_LAWS:
+        clock = perf_counter()
+        every = 1 if record.watch else settings.save_every
+        answer = alpha.advance(system, W, step, rank, table, every, out)
+        record.compiled += perf_counter() - clock
+        if answer == alpha.NEEDS_LAWS:
+            apply_laws(
+                forces, W, float(times[step.count[alpha.STEPS] - step.count[alpha.STEPS_BEFORE]])
+            )
+    return answer
+
+
+def counts(step: Step) -> dict[str, int]:
+    """Steps, Newton iterations and factorisations so far."""
+    names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
+    names["factorisations"] = alpha.FACTORISATIONS
+    return {name: int(step.count[k]) for name, k in names.items()}
+
+
+def _note(
+    record: Record, W: Work, step: Step, forces: tuple[Law, ...], t: Array, out: tuple[Array, ...]
+) -> None:
+    """Keep the saved steps of a chunk, finished or not."""
+    record.counts = counts(step)
+    done = int(step.count[alpha.STEPS_BEFORE])
+    saved = np.arange(done + 1, done + t.size + 1) % record.settings.save_every == 0
+    if record.watch and kept_before_the_end(record, W, forces, t, out, saved):
+        return
+    if saved.any():
+        chosen = saved if record.watch else slice(saved.sum())
+        record.keep(t[saved], *(x[: t.size][chosen] for x in out))
+    if t.size:
+        record.t = float(t[-1])
+    record.reach(_state(record, W, step))
+
+
+def _state(record: Record, W: Work, step: Step) -> State:
+    """The last state with all that the next step depends on."""
+    arrays = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
+    memory = remember(record.settings, W, step, int(step.count[alpha.STEPS]))
+    before = None if record.settings.method == "bdf" else step.a.copy()
+    return State(record.t, *arrays, record.final.rank, before, W.base.copy(), memory)
+
+
+def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> SolverError:
+    """The error that says why a step did not succeed."""
+    what = {
+        alpha.FAILED: f"Newton did not converge in {alpha.MAX_PASSES} corrections",
+        alpha.NOT_FINITE: "the motion is no longer finite",
+        alpha.SINGULAR: "the iteration matrix is singular",
+    }[int(answer)]
+    culprit = ""
+    if W.value.size and np.isfinite(W.value).any():
+        k = int(np.nanargmax(np.abs(W.value)))
+        culprit = f"; the largest gap is {abs(W.value[k]):.3g} in {record.packed.row_owner[k]!r}"
+    return SolverError(
+        f"{what} at t = {t:.9g} s (last increment {step.size[0]:.3g} of the size){culprit}.",
+        hint=f"Take a smaller step than {step.method[0]:.3g} s; if that does not help, the "
+        "mechanism is near a singular position or a force is too stiff. The motion up to there "
+        "is kept in error.solution.",
+    )

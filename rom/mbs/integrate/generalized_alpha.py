@@ -1,0 +1,378 @@
+"""Generalised-alpha on R^3 x SO(3) x R^r, constraints on position level (index 3).
+
+BDF shares its steps. Stabilised, both keep the constraints of the velocities too (index 2).
+
+Source:
+    Bruels, Cardona, Arnold, Lie group generalized-alpha time integration of constrained flexible
+    multibody systems, Mech. Mach. Theory 48 (2012) 121. Scaling of the multipliers: Bottasso,
+    Bauchau, Cardona, SIAM J. Sci. Comput. 29 (2007) 397.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.mbs.elements.joint_kernels import load_columns
+from rom.mbs.equations.equations import (
+    drive_power,
+    evaluate,
+    least_multipliers,
+    residual,
+    retract,
+    tangents,
+)
+from rom.mbs.equations.linear_solve import border, factorise_bordered, solve_bordered
+from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
+from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
+from rom.mbs.kernels.algebra import dot, range_basis, row, scale, spatial_tangent, unit, vec
+from rom.mbs.kernels.compiled import copy, inner, kernel
+from rom.mbs.kernels.constraints import constraint_gradient
+from rom.mbs.kernels.coordinates import follow_coordinates
+from rom.mbs.kernels.markers import own_block
+from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH
+from rom.model import Array, Index
+
+# what a corrector pass says
+UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
+# entries of Step.count
+#
+(
+    STEPS,
+    ITERATIONS,
+    FACTORISATIONS,
+    LAST_ITERATIONS,
+    HAS_FACTOR,
+    STEP_PASSES,
+    STEPS_BEFORE,
+    USES_LAWS,
+    LAWS_ASKED,
+    BOTH_LEVELS,
+) = range(10)
+MAX_PASSES = 25
+ROUND_OFF = 4e-16
+# share of the round-off of positions that increments are brought to: velocities and accelerations
+# feel an increment over the step and over its square, and their errors add up to momentum
+INCREMENT_SHARE = 1e-3
+# gap in a joint, in rad or lengths of the mechanism, that may remain: the norm of increments hardly
+# sees a light body that spins fast
+JOINT_GAP_TOL = 1e-11
+
+
+class Step(NamedTuple):
+    """State, the trial state of the step under way, and the method.
+
+    Attributes:
+        q, v, a, vd, lam: coordinates, velocities, algorithmic and true accelerations,
+            multipliers at the last accepted instant.
+        q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
+        work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
+        lost: (3,) the powers at the last accepted instant.
+        count: (10,) steps, iterations, factorisations, iterations of the last step, whether a
+            factorisation is at hand, pass of the present step, steps when the present chunk
+            began, whether Python forces are to be asked for, whether they have been, whether
+            constraints hold for positions and velocities both.
+        size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
+            largest gap in a joint before the last increment.
+        method: (5,) h, beta, gamma, alpha_m, alpha_f.
+        bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
+            BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one
+            velocity, and ``psi`` the last increment until the next step begins.
+        past: (2, order - 1, n) for BDF of other orders: earlier positions as seen from the last
+            accepted instant, see `rom.mbs.integrate.bdf`, and velocities.
+        drift: (n,) part of the increment of such a step that closes gaps.
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    vd: Array
+    lam: Array
+    q1: Array
+    v1: Array
+    vd1: Array
+    lam1: Array
+    psi: Array
+    work: Array
+    lost: Array
+    count: Index
+    size: Array
+    method: Array
+    bdf: Array
+    past: Array
+    drift: Array
+
+
+def coefficients(h: float, rho_inf: float) -> Array:
+    """(5,) h, beta, gamma, alpha_m, alpha_f of the method with spectral radius rho_inf."""
+    alpha_m, alpha_f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
+    gamma = 0.5 + alpha_f - alpha_m
+    return np.array([h, 0.25 * (gamma + 0.5) ** 2, gamma, alpha_m, alpha_f])
+
+
+def bdf_coefficients(h: float, before: float) -> tuple[Array, Array]:
+    """(5,) and (3,) method and weights of BDF after a step of length ``before``.
+
+    The order is two, or one if there was no step before (0). The five numbers make an increment
+    move velocities and accelerations as the weights do.
+    """
+    r = h / before if before else 0.0
+    weights = np.array([(1 + 2 * r) / (1 + r), -(1 + r), r * r / (1 + r)]) / h
+    c0h = weights[0] * h
+    return np.array([h, 1 / c0h**2, 1 / c0h, 0.0, 0.0]), weights
+
+
+@inner
+def predict(s, step):
+    """Trial state with the accelerations and multipliers of the last step."""
+    h, beta, gamma, alpha_m, _ = step.method
+    c0, c1, c2 = step.bdf[0], step.bdf[1], step.bdf[-1]
+    for i in range(0 if is_multistep(step) else step.v.size):
+        step.vd1[i] = step.vd[i]
+        if c0 > 0.0:
+            step.v1[i] = (step.vd[i] - c1 * step.v[i] - c2 * step.a[i]) / c0
+            step.psi[i] = (step.v1[i] + c2 * step.psi[i]) / c0
+        else:
+            a1 = (step.vd[i] - alpha_m * step.a[i]) / (1 - alpha_m)
+            step.v1[i] = step.v[i] + h * ((1 - gamma) * step.a[i] + gamma * a1)
+            step.psi[i] = h * step.v[i] + h * h * ((0.5 - beta) * step.a[i] + beta * a1)
+    step.drift[:] = 0.0
+    if is_multistep(step):
+        predict_multistep(s, step)
+    copy(step.lam, step.lam1)
+    step.size[0] = step.size[4] = 0.0
+    if step.count[LAST_ITERATIONS] > 4:
+        step.count[HAS_FACTOR] = 0
+    retract(s, step.q, step.psi, step.q1)
+
+
+@inner
+def turn_columns(s, W, step, rank):
+    """Add Kt to S and turn UGT, rotations counted in increments of the rotation vector psi."""
+    bodies, graph = s.bodies, s.graph
+    for b in range(bodies.mass.size):
+        for e in range(graph.first[b], graph.first[b + 1]):
+            first = graph.x[e]
+            psi = vec(step.psi, bodies.v_at[graph.other[e]] + 3)
+            turn_rows(W.Kt, first, first + 6 + bodies.r[b], graph.y[e] + 3, psi)
+        if not graph.compact:
+            turn_rows(W.UGT, 0, rank, bodies.v_at[b] + 3, vec(step.psi, bodies.v_at[b] + 3))
+    for k in range(rank if graph.compact else 0):
+        for p in range(4):
+            if graph.body[k, p] >= 0:
+                psi = vec(step.psi, bodies.v_at[graph.body[k, p]] + 3)
+                turn_rows(W.UGT, k, k + 1, graph.at[k, p] + 3, psi)
+    for i in range(W.S.shape[0]):
+        for j in range(W.S.shape[1]):
+            W.S[i, j] += W.Kt[i, j]
+
+
+@inner
+def turn_rows(A, first, last, at, psi):
+    """Count three columns of some rows of A in increments of the rotation vector psi."""
+    back = scale(-1.0, psi)
+    x = spatial_tangent(back, unit(0))
+    y = spatial_tangent(back, unit(1))
+    z = spatial_tangent(back, unit(2))
+    for i in range(first, last):
+        k = row(A, i, at)
+        A[i, at], A[i, at + 1], A[i, at + 2] = dot(k, x), dot(k, y), dot(k, z)
+
+
+@inner
+def factorise_step(s, W, step, rank):
+    """Factorise beta h^2 (M beta' + C gamma' + K), bordered; `tangents` first."""
+    for b in range(s.bodies.mass.size):
+        block = own_block(s, b, W.S)
+        for i in range(block.shape[0]):
+            W.weight[s.bodies.v_at[b] + i] = block[i, i] / (mass_factor(step) * step.size[3])
+    if rank < step.lam.size:
+        range_basis(W.G, rank, W.remainder, W.U_lu)
+    border(W, rank)
+    turn_columns(s, W, step, rank)
+    load_columns(s, W, step.lam1, rank)
+    step.count[FACTORISATIONS] += 1
+    step.count[HAS_FACTOR] = 1
+    return factorise_bordered(s, W, rank)
+
+
+@inner
+def mass_factor(step):
+    """Derivative of beta h^2 times the acceleration by the increment."""
+    return (1 - step.method[3]) / (1 - step.method[4])
+
+
+@inner
+def increment_norm(W, step):
+    """Mass-weighted length of the increment, relative to the size of the mechanism."""
+    total = 0.0
+    for i in range(W.delta.size):
+        total += W.weight[i] * W.delta[i] ** 2
+    return math.sqrt(total) / step.size[1]
+
+
+@inner
+def increment_goal(W, step):
+    """Increment that no longer matters: a fraction of what the acceleration moves in a step.
+
+    And the round-off of the positions.
+    """
+    total, reach, h = 0.0, 0.0, step.method[0]
+    for i in range(step.vd1.size):
+        total += W.weight[i] * step.vd1[i] ** 2
+    for i in range(step.q1.size):
+        reach = max(reach, abs(step.q1[i]))
+    floor = ROUND_OFF * (1.0 + reach / step.size[1])
+    return max(
+        step.size[2] * h * h * math.sqrt(total) / step.size[1], INCREMENT_SHARE * floor
+    ), floor
+
+
+@inner
+def correct(s, W, step, rank):
+    """One Newton correction for the residual at hand; says how it went."""
+    h, beta, gamma, _, _ = step.method
+    n, bh2, lead = step.v.size, beta * h * h, beta * h / gamma
+    for i in range(n):
+        W.rhs[i] = -bh2 * W.residual[i]
+    if step.count[BOTH_LEVELS] == 1:
+        velocity_gaps(s, W, W.part)
+    gap = 0.0
+    for k in range(step.lam.size):
+        gap = max(gap, row_gap(s, W, step, k))
+        # a velocity moves gamma / (beta h) as fast as the increment that removes it
+        if step.count[BOTH_LEVELS] == 1:
+            W.part[k] *= -lead
+        else:
+            W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
+    solve_bordered(s, W, rank, W.delta, W.dlam)
+    for i in range(n):
+        step.vd1[i] += mass_factor(step) / bh2 * W.delta[i]
+        step.v1[i] += gamma / (beta * h) * W.delta[i]
+        step.psi[i] += W.delta[i]
+    for k in range(step.lam.size):
+        step.lam1[k] += W.dlam[k] / bh2
+    size = increment_norm(W, step)
+    if step.count[BOTH_LEVELS] == 1:
+        close_gaps(s, W, n, rank, lead)
+        size += increment_norm(W, step)
+        for i in range(n):
+            step.psi[i] += W.delta[i]
+            step.drift[i] += W.delta[i]
+    if is_multistep(step):
+        follow_increment(s, step)
+    retract(s, step.q, step.psi, step.q1)
+    step.count[STEP_PASSES] += 1
+    step.count[ITERATIONS] += 1
+    return verdict(W, step, size, gap)
+
+
+@inner
+def row_gap(s, W, step, k):
+    """Gap of constraint k as far as increments close it, in rad or lengths of the mechanism."""
+    kind = s.rows.kind[k]
+    if step.count[BOTH_LEVELS] == 1 or kind == ROLL:
+        return 0.0
+    is_length = kind in (POINT, ALONG, DISTANCE, TOUCH)
+    return abs(W.value[k]) / (step.size[1] if is_length else 1.0)
+
+
+@inner
+def verdict(W, step, size, gap):
+    """Judge the increment just applied by its size and by how fast increments and gaps shrink."""
+    last, wider = step.size[0], step.size[4]
+    step.size[0], step.size[4] = size, gap
+    if not math.isfinite(size):
+        return NOT_FINITE
+    goal, floor = increment_goal(W, step)
+    shrink = size / last if last > 0.0 else 1.0
+    closed = gap * min(1.0, gap / wider if wider > 0.0 else 1.0) <= JOINT_GAP_TOL
+    closing = shrink < 1.0 and size * shrink / (1.0 - shrink) <= goal
+    if size <= INCREMENT_SHARE * floor or (closing and closed):
+        return CONVERGED
+    if shrink > 0.5 and size < 100 * floor and step.count[STEP_PASSES] > 3:
+        return CONVERGED
+    if step.count[STEP_PASSES] >= MAX_PASSES:
+        return FAILED
+    if last > 0.0 and shrink > 0.2:
+        step.count[HAS_FACTOR] = 0
+    return UNFINISHED
+
+
+@inner
+def accept(s, W, step, rank):
+    """Make the trial state the present one, multipliers of least norm, and add up the work."""
+    h, _, _, alpha_m, alpha_f = step.method
+    if step.count[BOTH_LEVELS] == 1:
+        fit_velocities(s, W, step, rank)
+    if is_multistep(step):
+        keep_past(s, step)
+    for i in range(step.v.size):
+        rate = (1 - alpha_f) * step.vd1[i] + alpha_f * step.vd[i]
+        step.a[i] = step.v[i] if step.bdf[0] > 0.0 else (rate - alpha_m * step.a[i]) / (1 - alpha_m)
+    copy(step.q1, step.q)
+    copy(step.v1, step.v)
+    copy(step.vd1, step.vd)
+    copy(step.lam1, step.lam)
+    if rank < step.lam.size:
+        constraint_gradient(s, W)
+        least_multipliers(W, rank, step.lam)
+    follow_coordinates(W)
+    drive_power(s, W, step.lam)  # the last correction moved the multipliers
+    for k in range(3):
+        step.work[k] += 0.5 * h * (W.power[k] + step.lost[k])
+        step.lost[k] = W.power[k]
+    step.count[STEPS] += 1
+    step.count[LAST_ITERATIONS] = step.count[STEP_PASSES]
+    step.count[STEP_PASSES] = 0
+
+
+@kernel
+def advance(s, W, step, rank, signals, every, out):
+    """Take one step per row of ``signals``; save every so many. Says how the last one went.
+
+    ``out`` holds arrays for q, v, vd, lam, work and base with one row per saved instant. When
+    forces of Python functions are to be asked for, step.count[USES_LAWS] is 1: then it returns
+    NEEDS_LAWS with everything evaluated, and goes on from there in the next call, which has the
+    same arguments.
+    """
+    h, beta, gamma, _, _ = step.method
+    c = (mass_factor(step), gamma * h, beta * h * h)
+    while step.count[STEPS] - step.count[STEPS_BEFORE] < signals.shape[0]:
+        if step.count[LAWS_ASKED] == 0:
+            if step.count[STEP_PASSES] == 0:
+                copy(signals[step.count[STEPS] - step.count[STEPS_BEFORE]], W.signal)
+                predict(s, step)
+            evaluate(s, W, step.q1, step.v1)
+            if step.count[USES_LAWS] == 1:
+                step.count[LAWS_ASKED] = 1
+                return NEEDS_LAWS
+        step.count[LAWS_ASKED] = 0
+        residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
+        if step.count[HAS_FACTOR] == 0:
+            tangents(s, W, step.v1, step.vd1, step.lam1, c)
+            constraint_gradient(s, W)
+            if not factorise_step(s, W, step, rank):
+                return SINGULAR
+        answer = correct(s, W, step, rank)
+        if answer > CONVERGED:
+            return answer
+        if answer == CONVERGED:
+            accept(s, W, step, rank)
+            if step.count[STEPS] % every == 0:
+                save(
+                    W, step, out, step.count[STEPS] // every - step.count[STEPS_BEFORE] // every - 1
+                )
+    return CONVERGED
+
+
+@inner
+def save(W, step, out, at):
+    """Copy the present state to a row of the output arrays."""
+    Q, V, A, L, X, B = out
+    copy(W.base, B[at])
+    copy(step.q, Q[at])
+    copy(step.v, V[at])
+    copy(step.vd, A[at])
+    copy(step.lam, L[at])
+    copy(step.work, X[at])

@@ -1,0 +1,262 @@
+"""A folder in which a motion is kept while it is computed, and from which the run goes on.
+
+Parts of the motion and the state behind the last of them are written at times, each file whole or
+not at all: whatever ends the process, the motion up to the last part can be read, and a run that
+goes on from there has the bits of one that was never interrupted.
+"""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.errors import ConfigError, FileFormatError
+from rom.io.archive import Kind, digest, read_archive, write_archive
+from rom.mbs.equations.packing import Packed
+from rom.mbs.integrate.events import Noted
+from rom.mbs.results.checkpoint import KIND as STATE
+from rom.mbs.results.checkpoint import packed_state, unpacked_state
+from rom.mbs.results.state import Memory, State
+from rom.model import Array
+
+SCHEMA_NAME, VERSION = "rom-motion", (1, 0)
+COLUMNS = ("t", "q", "v", "a", "lam", "work", "base")
+PART = Kind({SCHEMA_NAME: VERSION}, "part of a motion", COLUMNS)
+STATE_FILE = "state.npz"
+EVENTS_PREFIX = "events/"
+# seconds of stepping between two parts, and how many times longer than it takes to write one
+MIN_INTERVAL, WRITE_TIME_FACTOR = 1.0, 60.0
+# of the time spent so far: what a long run risks, so that it does not leave thousands of parts
+MAX_LOSS_RATIO = 1 / 500
+# of a system: addresses differ between processes, the graph follows from the rest
+PASSING = {"graph", "address", "motor"}
+
+Block = tuple[Array, ...]
+
+
+class Kept(NamedTuple):
+    """What was read: from where steps are counted, the state and its memory, blocks, events."""
+
+    origin: float | None
+    taken: int
+    state: State
+    memory: Memory
+    blocks: list[Block]
+    noted: Noted | None
+
+
+@typed
+@dataclass
+class Keeping:
+    """The folder of one run.
+
+    Attributes:
+        folder: made when the first part is written.
+        resume: whether to go on with what it holds.
+        made_from: digests of what the mechanism was made from, by name; what differs when the run
+            is to go on is refused by this name.
+    """
+
+    folder: Path
+    resume: bool = False
+    made_from: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.folder = Path(self.folder)
+        self._parts, self._blocks = 0, 0
+        self._first = self._next = perf_counter()
+        self._manifest: dict[str, Any] = {}
+
+    @property
+    def state(self) -> Path:
+        """The file to go on from."""
+        return self.folder / STATE_FILE
+
+    def check(self) -> None:
+        """Refuse to write over a motion, or to go on with none; to be asked early.
+
+        Raises:
+            ConfigError: saying which.
+        """
+        if self.state.exists() and not self.resume:
+            raise ConfigError(
+                f"{self.folder} holds the motion of a run that did not come to its end.",
+                hint="Go on with it by --resume (resume=True), or remove the folder.",
+            )
+        if self.resume and not self.state.exists():
+            raise ConfigError(
+                f"there is nothing to resume: {self.folder} holds no motion.",
+                hint="A run that came to its end leaves none, nor does one that ended within its "
+                "first steps. Leave out --resume.",
+            )
+
+    def begin(self, origin: float | None, taken: int, digests: Mapping[str, str]) -> None:
+        """Tell what the run is; to be called before `read` and `write`.
+
+        Args:
+            origin: time the steps are counted from [s], None for the start of the run.
+            taken: steps since then.
+            digests: of arguments and mechanism by name.
+
+        Raises:
+            ConfigError: as `check`.
+        """
+        self.check()
+        counted = [None if origin is None else float(origin).hex(), taken]
+        self._manifest = {"counted": counted, "digests": {**self.made_from, **digests}}
+        self._first = perf_counter()
+        self._next = self._first + MIN_INTERVAL
+
+    def read(self) -> Kept:
+        """What is there.
+
+        Raises:
+            ConfigError: if it is of another run.
+            FileFormatError: if a file is damaged.
+        """
+        manifest, arrays = read_archive(self.state, STATE)
+        try:
+            digests, (origin, taken) = manifest["digests"], manifest["counted"]
+            self._parts = int(manifest["parts"])
+            origin = None if origin is None else float.fromhex(origin)
+            noted = _noted(manifest["signs"], arrays)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise FileFormatError(
+                f"the manifest lacks or misstates {error}.", where=str(self.state)
+            ) from error
+        self._refuse_others(digests)
+        state = unpacked_state(manifest, arrays, self.state)
+        if state.memory is None:
+            raise FileFormatError("the state has no memory of its run.", where=str(self.state))
+        parts = (self._part(k) for k in range(1, self._parts + 1))
+        blocks = _joined(list(parts), state.t)
+        self._blocks = len(blocks)
+        return Kept(origin, int(taken), state, state.memory, blocks, noted)
+
+    def _refuse_others(self, digests: Mapping[str, str]) -> None:
+        ours = self._manifest["digests"]
+        names = [name for name in {**ours, **digests} if ours.get(name) != digests.get(name)]
+        if names:
+            raise ConfigError(
+                f"the interrupted run in {self.folder} had another {names[0]}: it cannot go on.",
+                hint="Resume it with what it was begun with; t_end alone may differ. Or remove "
+                "the folder to begin anew.",
+            )
+
+    def _part(self, k: int) -> Block:
+        _, arrays = read_archive(self._path(k), PART)
+        return tuple(arrays[name] for name in COLUMNS)
+
+    def _path(self, k: int) -> Path:
+        return self.folder / f"part-{k:06d}.npz"
+
+    def due(self, now: float) -> bool:
+        """Whether it is time to write."""
+        return now >= self._next
+
+    def write(self, blocks: Sequence[Block], state: State, noted: Noted | None) -> None:
+        """Write what is new since the last time; the state last, which counts the parts.
+
+        Args:
+            blocks: all pieces of the motion.
+            state: behind them.
+            noted: the events up to there.
+
+        Raises:
+            ConfigError: if the folder cannot be made.
+            ResourceError: if the disk is full.
+        """
+        begun, count = perf_counter(), len(blocks)
+        if state.memory is None:
+            return  # there is nothing yet that would not begin anew
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigError(f"{self.folder} cannot be made: {error.strerror}.") from error
+        parts = self._parts
+        if count > self._blocks:
+            parts += 1
+            columns = zip(*blocks[self._blocks :], strict=True)
+            arrays = dict(zip(COLUMNS, map(np.concatenate, columns), strict=True))
+            manifest = {"schema": SCHEMA_NAME, "version": list(VERSION)}
+            write_archive(self._path(parts), manifest, arrays, "the motion")
+        manifest, arrays = packed_state(state)
+        signs = None if noted is None else [[k, float(x)] for k, x in noted.signs.items()]
+        more = self._manifest | {"parts": parts, "signs": signs}
+        events = {} if noted is None else _arrays(noted)
+        write_archive(self.state, manifest | more, arrays | events, "the state")
+        self._parts, self._blocks = parts, count
+        now = perf_counter()
+        pause = max(
+            MIN_INTERVAL, WRITE_TIME_FACTOR * (now - begun), MAX_LOSS_RATIO * (now - self._first)
+        )
+        self._next = now + pause
+
+    def remove(self) -> None:
+        """Remove what was kept, once the motion is written elsewhere."""
+        self.state.unlink(missing_ok=True)
+        # and what a kill in the middle of writing has left of them
+        for path in (*self.folder.glob("part-*.npz"), *self.folder.glob(".*.npz.*.part")):
+            path.unlink()
+        if self.folder.is_dir() and not any(self.folder.iterdir()):
+            self.folder.rmdir()
+
+
+def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
+    """Digests by which a run is known: one of each argument, and one of the mechanism."""
+    hashed = hashlib.sha256(repr((packed.names, packed.row_owner)).encode())
+    hashed.update(repr([signal.name for signal in packed.signals]).encode())
+    for A in (*_numbers(packed.system), packed.q, packed.v):
+        hashed.update(digest(A).encode())
+    return {name: repr(value) for name, value in arguments.items()} | {
+        "mechanism": hashed.hexdigest()
+    }
+
+
+def _numbers(table: Any) -> list[Array]:
+    """All arrays of nested tables that are the same in every process."""
+    found: list[Array] = []
+    for name, value in table._asdict().items():
+        if name not in PASSING:
+            found += _numbers(value) if hasattr(value, "_asdict") else [np.asarray(value)]
+    return found
+
+
+def _joined(blocks: list[Block], end: float) -> list[Block]:
+    """The blocks up to a time; what a failed step had kept gives way to what came instead."""
+    found: list[Block] = []
+    for block in reversed(blocks):
+        found += [until(block, end)]
+        end = np.nextafter(min(end, block[0][0]), -np.inf)
+    return [block for block in reversed(found) if block[0].size]
+
+
+def until(block: Block, t: float) -> Block:
+    """The instants of a block up to a time."""
+    return tuple(A[block[0] <= t] for A in block)
+
+
+def _arrays(noted: Noted) -> dict[str, Array]:
+    """What happened, by the names of the events."""
+    out = {}
+    for k, (name, items) in enumerate(noted.found.items()):
+        for part, what in enumerate(("t", "q", "v")):
+            rows = [item[part] for item in items[: noted.counts[name]]]
+            if rows:
+                out[f"{EVENTS_PREFIX}{k}/{what}"] = np.array(rows, dtype=float)
+    return out
+
+
+def _noted(signs: Sequence[tuple[str, float]] | None, arrays: Mapping[str, Array]) -> Noted | None:
+    if signs is None:
+        return None
+    found: dict[str, list[tuple[float, Array, Array]]] = {}
+    for k, (name, _) in enumerate(signs):
+        columns = [arrays.get(f"{EVENTS_PREFIX}{k}/{what}", ()) for what in ("t", "q", "v")]
+        found[name] = [(float(t), q, v) for t, q, v in zip(*columns, strict=True)]
+    return Noted(dict(signs), {name: len(items) for name, items in found.items()}, found)

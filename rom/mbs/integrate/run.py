@@ -1,0 +1,367 @@
+"""Settings of a run, and the record it fills."""
+
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom.errors import ConfigError, ResourceError
+from rom.mbs.equations.packing import Packed
+from rom.mbs.integrate.bdf import LARGEST_ORDER
+from rom.mbs.integrate.events import Noted, Watch
+from rom.mbs.integrate.keeping import Keeping, until
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.signals import Span, padded, sampled
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
+from rom.memory import free_bytes
+from rom.model import Array
+
+# a million steps a second, as the fastest mechanisms take, for eleven days
+MAX_STEPS = 10**12
+# of a time that was written in decimals
+ROUND_OFF = 1e-12
+# first step of chosen length, relative to the duration
+FIRST_STEP_RATIO = 1e-4
+# place of the works in a block, behind the time; the array by which a memory knows its state
+WORK_ROW, RUN_KEY = 4, "of"
+TOLERANCES = (1e-14, 1e-2)  # of the Newton iteration: round-off, and no solution at all
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Checked arguments of `rom.mbs.integrate.simulation.simulate`."""
+
+    t_start: float
+    t_end: float
+    dt: float | None
+    save_every: int
+    rho_inf: float
+    tolerance: float
+    rtol: float
+    atol: float
+    progress: bool
+    method: str = "generalized-alpha"
+    origin: float | None = None
+    taken: int = 0
+    order: int = 2
+    stabilised: bool = False
+    begun: int = 0  # steps of this very run that were taken before it was interrupted
+
+    def __post_init__(self):
+        numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
+        for name in numbers:
+            value = getattr(self, name)
+            if name == "dt" and value is None and self.method != "dop853":
+                continue
+            if not _is_finite(value):
+                raise ConfigError(f"{name} = {value!r} is not a finite number.")
+        if not isinstance(self.progress, bool):
+            raise ConfigError(f"progress = {self.progress!r} is neither True nor False.")
+        if self.t_end <= self.t_start:
+            raise ConfigError(f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.")
+        for name in ("dt", "tolerance", "rtol", "atol"):
+            if getattr(self, name) is not None and getattr(self, name) <= 0.0:
+                raise ConfigError(f"{name} = {getattr(self, name):g} must be positive.")
+        if not TOLERANCES[0] <= self.tolerance <= TOLERANCES[1]:
+            raise ConfigError(
+                f"tolerance = {self.tolerance:g} is outside {TOLERANCES[0]:g} to {TOLERANCES[1]:g}."
+            )
+        if not 0.0 <= self.rho_inf <= 1.0:
+            raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
+        if int(self.save_every) != self.save_every or self.save_every < 1:
+            raise ConfigError(f"save_every = {self.save_every!r} is not a positive whole number.")
+        self._check_kind()
+        self._check_steps()
+
+    def _check_steps(self) -> None:
+        """Steps must be told apart by the clock, and come to an end."""
+        if self.dt is not None and not (self.t_end - self.t_start) / self.dt <= MAX_STEPS:
+            raise ConfigError(
+                f"dt = {self.dt:g} s takes {(self.t_end - self.t_start) / self.dt:.3g} steps to "
+                f"t_end = {self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
+                hint="Take longer steps. They need to resolve what moves, not more.",
+            )
+        end = max(abs(self.t_start), abs(self.t_end))
+        step = FIRST_STEP_RATIO * (self.t_end - self.t_start) if self.dt is None else self.dt
+        if end + step == end or not np.isfinite(self.t_end - self.t_start):
+            what = "the first step" if self.dt is None else "dt"
+            raise ConfigError(
+                f"{what} = {step:g} s is lost beside t = {end:g} s: numbers have sixteen digits.",
+                hint="Take longer steps, or count the time from the start of the run.",
+            )
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What makes a run the one it is, beside its end."""
+        names = ("t_start", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every", "order")
+        values = {name: getattr(self, name) for name in names}
+        exact = {name: None if x is None else float(x).hex() for name, x in values.items()}
+        return {"method": self.method, **exact, "stabilised": self.stabilised}
+
+    def check_room(self, packed: Packed) -> None:
+        """Refuse to keep more instants than memory holds, before any of them is computed.
+
+        Raises:
+            ResourceError: with their number and size.
+        """
+        rows = 2 + (0 if self.dt is None else self.steps // int(self.save_every))
+        signals, followed = len(packed.signals), packed.system.coordinates.kind.size
+        wide = 4 + packed.q.size + 2 * packed.v.size + packed.system.rows.kind.size + followed
+        # the blocks, joined, and the prescribed functions beside them
+        need, there = 8.0 * rows * (2 * wide + 3 * signals), free_bytes()
+        if need > there:
+            raise ResourceError(
+                f"keeping {rows:.4g} instants takes {need / 2**30:.4g} GiB; {there / 2**30:.4g} "
+                "GiB are free.",
+                hint=f"Keep fewer of them, e.g. save_every = {int(need / there) + 1} times "
+                f"{int(self.save_every)}, or take longer steps.",
+            )
+
+    def _check_kind(self) -> None:
+        """Order and stabilisation must be offered by the method."""
+        if isinstance(self.order, bool) or self.order not in range(1, LARGEST_ORDER + 1):
+            raise ConfigError(f"order = {self.order!r} is not 1, 2, 3, 4 or 5.")
+        if self.order != 2 and self.method != "bdf":
+            raise ConfigError(
+                f"{self.method} has one order; order = {self.order} is for bdf only.",
+                hint='Leave it out, or take method="bdf".',
+            )
+        if self.order != 2 and self.dt is None:
+            raise ConfigError(
+                f"bdf of order {self.order} needs steps of one length dt; steps of chosen length "
+                "have order two."
+            )
+        if not isinstance(self.stabilised, bool):
+            raise ConfigError(f"stabilised = {self.stabilised!r} is neither True nor False.")
+        if self.stabilised and self.method == "dop853":
+            raise ConfigError(
+                "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
+                "to the tolerance of its steps."
+            )
+
+    @property
+    def kind(self) -> str:
+        """What a memory must be of to go on with it."""
+        fixed = self.dt is not None or self.method == "dop853"
+        return self.method if fixed else f"{self.method}, steps of chosen length"
+
+    @property
+    def both(self) -> bool:
+        """Whether constraints hold for positions and velocities both."""
+        return self.stabilised or self.order != 2
+
+    @property
+    def span(self) -> Span:
+        """Start and end time [s]."""
+        return self.t_start, max(self.t_end, self.time(self.steps))
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of at most dt; 1 if their length is not fixed."""
+        if self.dt is None:
+            return 1
+        return max(1, int(np.ceil((self.t_end - self.t_start) / self.dt - 1e-6)))
+
+    @property
+    def h(self) -> float:
+        """Length of a step [s]: dt itself if the duration is a multiple of it."""
+        duration = self.t_end - self.t_start
+        if self.dt is None:
+            return duration
+        round_off = 1e-13 * duration + 1e-15 * (abs(self.t_start) + abs(self.t_end))
+        return (
+            self.dt if abs(self.steps * self.dt - duration) < round_off else duration / self.steps
+        )
+
+    @property
+    def spacing(self) -> float:
+        """Spacing of the finite differences of prescribed functions [s]."""
+        if self.dt is None:
+            return 1e-4 * (self.t_end - self.t_start)
+        return max(self.h, 1e-4 * (self.t_end - self.t_start)) if self.steps > 4 else 0.05 * self.h
+
+    def time(self, step: Any) -> Any:
+        """Time after so many steps [s]; the same number in a run and in its continuation."""
+        origin = self.t_start if self.origin is None else self.origin
+        return origin + self.h * (self.taken + step)
+
+    def after(self, state: State | None) -> "Settings":
+        """The settings of a run that goes on from a state.
+
+        Steps of one length are counted from the first one. Steps of chosen length go on with the
+        length they had, which belongs to the whole duration.
+        """
+        memory = None if state is None else state.memory
+        if memory is None or memory.method != self.kind:
+            return self
+        if RUN_KEY in memory.arrays:
+            same = self.t_start == state.t and np.array_equal(memory.arrays[RUN_KEY], of(state))
+            whole = self.dt is None or memory.h == replace(self, t_start=memory.origin).h
+            if same and whole:
+                return replace(self, t_start=memory.origin, begun=memory.taken)
+        elif memory.h == self.h and memory.origin + memory.h * memory.taken == self.t_start:
+            return replace(self, origin=memory.origin, taken=memory.taken)
+        return self
+
+
+def of(state: State) -> Array:
+    """What a state must still be for a memory that is more than a factorisation to fit."""
+    return np.concatenate([[state.t], state.q, state.v])
+
+
+def _is_finite(value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number of more than 308 digits
+        return False
+
+
+def line(text: str) -> None:
+    """Write text over the line of progress on stderr; an empty one clears it."""
+    sys.stderr.write(f"\r{text:<60}" if text else f"\r{'':<60}\r")
+    sys.stderr.flush()
+
+
+@dataclass
+class Record:
+    """What a run has produced so far.
+
+    Attributes:
+        mechanism, packed, settings: of the run.
+        clock: when the stepping began, assembly and compilation done.
+        blocks: saved pieces (t, q, v, a, lam, work, base).
+        t: time reached.
+        final: last state reached.
+        given: state the run began from.
+        statistics: counts, and seconds in compiled code.
+        watch: over the events of the mechanism, None if it has none.
+        noted: what the watch knew at ``final``.
+        keeping: folder that is written while the run lasts, or None.
+    """
+
+    mechanism: Mechanism
+    packed: Packed
+    settings: Settings
+    clock: float
+    blocks: list[tuple[Array, ...]] = field(default_factory=list)
+    t: float = 0.0
+    final: State | None = None
+    given: State | None = None
+    compiled: float = 0.0
+    counts: dict[str, int] = field(default_factory=dict)
+    shown_at: float = 0.0
+    watch: Watch | None = None
+    noted: Noted | None = None
+    keeping: Keeping | None = None
+
+    def keep(self, t: Array, *arrays: Array) -> None:
+        """Add saved instants."""
+        self.blocks.append((np.atleast_1d(t), *arrays))
+
+    def start(self, state: State, work: Array) -> None:
+        """Save the first instant, unless the run goes on behind what it kept already."""
+        self.t = state.t
+        if not self.blocks:
+            arrays = (state.q, state.v, state.a, state.lam, work, state.base)
+            self.keep(np.array([state.t]), *(x[None].copy() for x in arrays))
+        if self.watch and self.noted is None:
+            self.watch.begin(state.q, state.v)
+        elif self.watch:
+            self.watch.recall(self.noted)
+        self.reach(state)
+
+    def stand_still(self, state: State) -> None:
+        """Let the motion kept before be all of it, up to the end that is asked for."""
+        end = self.settings.t_end
+        end += ROUND_OFF * abs(end)
+        self.blocks = [until(block, end) for block in self.blocks]
+        self.final = state
+        if self.watch and self.noted:
+            found = {k: [x for x in items if x[0] <= end] for k, items in self.noted.found.items()}
+            counts = {k: len(items) for k, items in found.items()}
+            self.watch.recall(Noted(self.noted.signs, counts, found))
+
+    def reach(self, state: State, noted: Noted | None = None) -> None:
+        """Note the last state, from which a run could go on, and the events up to there."""
+        self.final = state
+        self.noted = noted or (self.watch.noted() if self.watch else None)
+
+    def keep_last(self) -> None:
+        """Save the last state of a run that ends early, if it lies behind what was saved."""
+        f = self.final
+        if f.memory is None or not f.t > self.blocks[-1][0][-1]:
+            return
+        arrays = f.memory.arrays
+        work = arrays["y"][-3:] if "y" in arrays else arrays["work"]
+        self.keep(np.array([f.t]), *(x[None].copy() for x in (f.q, f.v, f.a, f.lam, work, f.base)))
+
+    @property
+    def stopped(self) -> float | None:
+        """Time of the event that ended the run."""
+        return self.watch.stop[1] if self.watch and self.watch.stop else None
+
+    def pause(self) -> None:
+        """Between two steps: report the time on stderr and write what is to be kept, at times."""
+        now = perf_counter()
+        if self.keeping is not None and self.keeping.due(now):
+            self.keeping.write(self.blocks, self.final, self.noted)
+        if self.settings.progress and now - self.shown_at > 0.2:
+            self.shown_at = now
+            span = self.settings.t_end - self.settings.t_start
+            share = (self.t - self.settings.t_start) / span
+            line(f"t = {self.t:.6g} s  {100 * share:3.0f} %  {now - self.clock:.0f} s")
+
+    def solution(self, status: str, *, failed: bool = False) -> Solution:
+        """The motion so far.
+
+        Args:
+            status: how it ended.
+            failed: prescribed functions that fail now are not a number where they do.
+        """
+        if self.settings.progress:
+            line("")
+        t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
+        arrays[WORK_ROW] -= arrays[WORK_ROW][0]
+        signals = np.full((t.size, len(self.packed.signals), 3), np.nan)
+        table, failure = sampled(
+            self.packed.signals, padded(t), self.settings.span, self.settings.spacing
+        )
+        if failure is not None and not failed:
+            raise failure
+        signals[: len(table)] = table[: t.size]
+        return Solution(
+            *(self.mechanism, self.packed, t, *arrays, signals, self._statistics(), status),
+            *(self.final, {} if self.watch is None else self.watch.occurrences),
+        )
+
+    def _statistics(self) -> dict[str, Any]:
+        total = perf_counter() - self.clock
+        return {
+            **self.counts,
+            "rank": self.final.rank,
+            "redundant": self.final.lam.size - self.final.rank,
+            "seconds": total,
+            "seconds_compiled": self.compiled,
+            "share_outside": 1.0 - self.compiled / total,
+            "steps_per_second": self.counts.get("steps", 0) / total,
+        }
+
+
+@contextmanager
+def standing_at(record: Record, state: State) -> Iterator[None]:
+    """Let a run that fails inside stand at a state with which it can be repeated from there."""
+    noted = record.noted
+    try:
+        yield
+    except BaseException:
+        record.reach(state, noted)
+        raise

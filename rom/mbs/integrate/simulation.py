@@ -1,0 +1,217 @@
+"""Simulate a mechanism in time."""
+
+import sys
+from contextlib import suppress
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, RomWarning
+from rom.interruption import terminable
+from rom.mbs.equations.packing import Packed, pack
+from rom.mbs.integrate.adaptive_step import run_variable
+from rom.mbs.integrate.consistent_start import initial_state
+from rom.mbs.integrate.dop853 import run_explicit
+from rom.mbs.integrate.events import watch_of
+from rom.mbs.integrate.fixed_step import run_implicit
+from rom.mbs.integrate.generalized_alpha import advance
+from rom.mbs.integrate.keeping import Keeping, digests_of
+from rom.mbs.integrate.run import Record, Settings
+from rom.mbs.kernels import compiled
+from rom.mbs.kernels.system import workspace
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
+from rom.mbs.results.validity import warn_of_limits
+
+METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run_explicit}
+# tolerance of variable steps, of the explicit method and of implicit ones
+RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
+
+
+@typed
+def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
+    mechanism: Mechanism,
+    *,
+    t_end: float,
+    dt: float | None = None,
+    method: str = "generalized-alpha",
+    rho_inf: float = 0.9,
+    tolerance: float = 1e-9,
+    rtol: float | None = None,
+    atol: float = 1e-12,
+    progress: bool = False,
+    save_every: int = 1,
+    t_start: float | None = None,
+    state: State | None = None,
+    order: int = 2,
+    stabilised: bool = False,
+    keep: Keeping | None = None,
+) -> Solution:
+    """Move the mechanism from the start to ``t_end``.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        t_end: end time [s].
+        dt: time step of an implicit method, output interval of dop853 [s]; shortened a little if
+            the duration is not a multiple of it. None lets an implicit method choose its steps by
+            ``rtol``; ask the solution for times in between by ``solution.at``.
+        method: "generalized-alpha" (implicit, second order, for everything), "bdf" (implicit,
+            second order or as ``order`` says, damps all that the step does not resolve), or
+            "dop853" (explicit, eighth order, variable step: references for smooth, not too stiff
+            motion).
+        rho_inf: spectral radius of generalised-alpha at infinite frequency: 1 keeps energy, but
+            reactions then collect round-off over many steps; 0 removes what the time step does
+            not resolve in one step.
+        tolerance: of the Newton iteration, relative to what the accelerations move in one step.
+        rtol: relative tolerance of variable steps. dop853 keeps it in every step (1e-12);
+            implicit methods let the errors of all steps add up to it (1e-4), lengths relative to
+            the size of the mechanism, velocities to the largest so far, weighted by mass.
+        atol: absolute tolerance of dop853.
+        progress: report on stderr.
+        save_every: keep every so many steps.
+        t_start: start time [s]; None for 0, or for the time of ``state``.
+        state: state of an earlier run of the same mechanism to go on from, e.g. ``sol.final``.
+            The same method then gives the same bits as a run without a stop, unless it needs
+            derivatives of drives that have none; ``keep`` gives them always.
+        order: of bdf, 1 to 5, with steps dt. Above two, vibrations of little damping that the
+            step resolves poorly can grow. Its first ``order - 1`` steps are Radau's.
+        stabilised: let an implicit method keep the constraints of the velocities to round-off,
+            which it else leaves to its truncation error: multipliers of their own close the gaps
+            of the positions (index 2, after Gear, Gupta and Leimkuhler). BDF of an order other
+            than two always does.
+        keep: folder in which the motion is kept while it is computed, every second or so, and
+            from which a run that was ended by anything goes on to the same bits:
+            ``keep=rom.Keeping("run.parts")``, then ``rom.Keeping("run.parts", resume=True)``. With
+            ``t_end`` before the time reached this reads the motion without moving on.
+
+    Returns:
+        The motion, start and end included.
+
+    Raises:
+        ConfigError: for a wrong argument, or a function that takes or gives the wrong thing.
+        ModelError: if joints contradict each other.
+        SolverError: naming time and culprit, a function of the user too, whatever it raised.
+        ResourceError: if what would be kept exceeds the memory, or the memory ran out.
+        InterruptedRun: after Ctrl-C or SIGTERM; the caller decides what then. This and every
+            other error that ends a motion has ``error.solution``: the motion up to there, None if
+            it never started. ``error.solution.final`` is the state to go on from.
+
+    Warns:
+        RomWarning: if a body left the range of small elastic deformation, or turned faster than
+            it can without geometric stiffness.
+    """
+    if method not in METHODS:
+        raise ConfigError(f"no method {method!r}; there are {sorted(METHODS)}.")
+    if t_start is None:
+        t_start = 0.0 if state is None else state.t
+    rtol = RTOL[method] if rtol is None else rtol
+    numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
+    settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
+    settings, packed = settings.after(state), pack(mechanism)
+    settings.check_room(packed)
+    if progress and not compiled.compiled_before(advance):
+        sys.stderr.write("compile the integrator, once on this machine: one or two minutes\n")
+    record = Record(mechanism, packed, settings, perf_counter(), given=state, keeping=keep)
+    with terminable():
+        try:
+            return _moved(record, t_start)
+        except BaseException as raised:
+            error = _translated(raised, record)
+            error.solution = _rescued(error, record)
+            if error is raised:
+                raise
+            raise error from raised
+
+
+def _moved(record: Record, t_start: float) -> Solution:
+    """The motion of a record that stands at its start."""
+    if record.keeping is not None:
+        _go_on(record, record.keeping)
+    settings, packed = record.settings, record.packed
+    if record.given is None:
+        record.given = initial_state(packed, t_start, settings.spacing)
+    state = record.given
+    _check_fit(state, packed)
+    if packed.by_blocks and state.rank < state.lam.size:
+        record.packed = packed = packed.whole()
+    record.watch = watch_of(record.mechanism, packed, t_start)
+    run = run_variable if settings.dt is None else METHODS[settings.method]
+    if record.blocks and state.t >= settings.t_end:
+        record.stand_still(state)
+    else:
+        run(record, workspace(packed.system, len(packed.signals)), state)
+    stopped = "" if record.watch is None else record.watch.sentence
+    solution = record.solution(stopped or f"Reached t = {settings.t_end:g} s.")
+    warn_of_limits(solution)
+    return solution
+
+
+def _go_on(record: Record, keeping: Keeping) -> None:
+    """Let the record stand where an interrupted run left what it kept.
+
+    Raises:
+        ConfigError: if that was another run, or another end would change its steps.
+    """
+    settings = record.settings
+    digests = digests_of(record.packed, settings.arguments)
+    keeping.begin(settings.origin, settings.taken, digests)
+    if not keeping.resume:
+        return
+    kept = keeping.read()
+    memory, begun = kept.memory, kept.memory.taken - kept.taken
+    if settings.dt is not None and kept.state.t < settings.t_end and memory.h != settings.h:
+        raise ConfigError(
+            f"t_end = {settings.t_end:g} s would change the steps of the interrupted run from "
+            f"{memory.h:.9g} s to {settings.h:.9g} s: it cannot go on.",
+            hint=f"Take its own t_end, or a multiple of {memory.h:.9g} s.",
+        )
+    record.settings = replace(settings, origin=kept.origin, taken=kept.taken, begun=begun)
+    record.given, record.blocks, record.noted = kept.state, kept.blocks, kept.noted
+
+
+def _translated(raised: BaseException, record: Record) -> Any:
+    """The error by which a run ends."""
+    if isinstance(raised, KeyboardInterrupt):
+        return InterruptedRun(
+            f"interrupted at t = {record.t:.6g} s of {record.settings.t_end:g} s.",
+            hint="The motion up to there is kept in error.solution.",
+        )
+    if isinstance(raised, MemoryError):
+        return ResourceError(
+            f"the memory ran out at t = {record.t:.6g} s.",
+            hint="Keep fewer instants (save_every). The motion up to there is kept in "
+            "error.solution.",
+        )
+    return raised
+
+
+def _rescued(error: BaseException, record: Record) -> Solution | None:
+    """The motion up to an error, which is written too if it is to be kept."""
+    if not record.blocks or record.final is None:
+        return None
+    with suppress(RomError):  # for one, because the disk is full: the first error counts
+        if record.keeping is not None:
+            record.keeping.write(record.blocks, record.final, record.noted)
+    record.keep_last()
+    interrupted = isinstance(error, InterruptedRun)
+    solution = record.solution(f"{'' if interrupted else 'Stopped: '}{error}", failed=True)
+    with suppress(RomError, RomWarning):
+        warn_of_limits(solution)
+    return solution
+
+
+def _check_fit(state: Any, packed: Packed) -> None:
+    """Compiled code does not look at the size of its arrays, so this is the place to do it."""
+    followed = packed.system.coordinates.kind.size
+    base = np.zeros(followed) if state.base is None else state.base
+    q, v, lam, angles = (np.size(x) for x in (state.q, state.v, state.lam, base))
+    needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size, followed)
+    if (q, v, lam, angles) != needed:
+        raise ConfigError(
+            f"the state has {q} coordinates and {v} velocities, {lam} constraints and {angles} "
+            "followed joint coordinates; this mechanism has {}, {}, {} and {}.".format(*needed)
+        )

@@ -1,0 +1,223 @@
+"""Step memory of the implicit methods at the start of a run."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rom.errors import SolverError
+from rom.mbs.equations.equations import evaluate, linearize_constraints, retract
+from rom.mbs.equations.linear_solve import factorised, gradient_times, least_motion
+from rom.mbs.equations.python_laws import Law, apply_laws
+from rom.mbs.integrate import generalized_alpha as alpha
+from rom.mbs.integrate.bdf import multistep_coefficients
+from rom.mbs.integrate.consistent_start import with_accelerations
+from rom.mbs.integrate.generalized_alpha import Step
+from rom.mbs.integrate.run import Record, Settings
+from rom.mbs.kernels.system import ROLL, Work
+from rom.mbs.parts.signals import sample_all
+from rom.mbs.results.state import Memory, State
+from rom.model import Array
+
+# what belongs to the factorised iteration matrix, by blocks or whole
+FACTOR = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
+# counts of a whole run
+SINCE = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
+
+
+def begin(
+    record: Record, W: Work, state: State, forces: tuple[Law, ...], h: float
+) -> tuple[Step, State]:
+    """Step memory at the start for a first step of length h, consistent to second order.
+
+    Generalised-alpha begins with its acceleration-like variable, BDF with a step before the start
+    as the Taylor series has it.
+    """
+    settings, n = record.settings, state.v.size
+    bdf, jerk = settings.method == "bdf" and settings.order == 2, None
+    method, weights = _method(settings, h)
+    if state.base is not None:
+        W.base[:] = state.base
+    goes_on = fits(state.memory, method, weights)
+    if weights.size != 3 and not goes_on:  # further instants of the start follow
+        state = accelerated(record, W, state, forces, 0.0, 0 * state.v)
+        state = replace(state, algorithmic=0 * state.v)
+    elif not goes_on and (bdf or state.algorithmic is None):
+        state, jerk = measured(record, W, state, forces, h)
+    zeros = [np.zeros(k) for k in (state.q.size, n, n, state.lam.size, n)]
+    size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass, 0.0])
+    v, before, rise = state.v, state.algorithmic, np.zeros(n) if jerk is None else jerk
+    if goes_on:
+        before = v
+    elif bdf:
+        ahead = h**2 * across(record, W, state, shift_ahead(record, state, method, rise))
+        before, v = v - h * state.a + h**2 / 2 * rise + ahead, v + ahead
+        zeros[4][:] = h * (state.v - h / 2 * state.a + h**2 / 6 * rise)
+        for t in record.packed.system.bodies.v_at + 3:  # the term of Magnus
+            w, wd = state.v[t : t + 3], state.a[t : t + 3]
+            zeros[4][t : t + 3] += h**3 / 12 * np.cross(w, wd)
+    elif before is None:
+        before = state.a + (method[3] - method[4]) * h * rise
+        if jerk is not None:
+            v = v + h**2 * across(record, W, state, shift_ahead(record, state, method, jerk))
+        state = replace(state, algorithmic=before)
+    copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
+    count, work = np.zeros(10, dtype=np.int64), np.zeros(3)
+    count[alpha.USES_LAWS], count[alpha.BOTH_LEVELS] = bool(forces), settings.both
+    power = _power(record, W, state, forces)
+    past = np.zeros((2, weights.size - 2, n))
+    step = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
+    if goes_on:
+        recall(state.memory, W, step)
+    if goes_on and settings.begun:
+        W.base[:] = state.base
+        go_on(state.memory, step)
+    return step, state if goes_on else replace(state, memory=None)
+
+
+def _method(settings: Settings, h: float) -> tuple[Array, Array]:
+    """The five numbers of the method, and its weights if it is BDF."""
+    if settings.method != "bdf":
+        return alpha.coefficients(h, settings.rho_inf), np.zeros(3)
+    if settings.order == 2:
+        return alpha.bdf_coefficients(h, h)
+    return multistep_coefficients(h, settings.order)
+
+
+def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Array:
+    """Velocity that a method is ahead, over h^2, before it is taken across constraints.
+
+    None if the constraints hold for the velocities too.
+    """
+    if record.settings.both:
+        return 0 * jerk
+    _, beta, _, alpha_m, alpha_f = method
+    bdf = record.settings.method == "bdf"
+    shift = (-1 / 3 if bdf else 1 / 6 - beta - 0.5 * (alpha_m - alpha_f)) * jerk
+    for t in record.packed.system.bodies.v_at:
+        shift[t + 3 : t + 6] += np.cross(state.v[t + 3 : t + 6], state.a[t + 3 : t + 6]) / 12
+    return shift
+
+
+def across(record: Record, W: Work, state: State, shift: Array) -> Array:
+    """The part of a velocity, or of each column, that changes the gaps of the constraints."""
+    linearize_constraints(record.packed.system, W, state.q, state.v)
+    if record.packed.by_blocks:
+        return _across_by_blocks(record, W, shift)
+    A = W.G @ np.linalg.solve(W.S, W.G.T)
+    rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
+    y = np.linalg.lstsq(A, np.where(rolling, 0.0, (W.G @ shift).T).T, rcond=1e-10)[0]
+    return np.linalg.solve(W.S, W.G.T @ y)
+
+
+def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
+    """The same from the blocks of masses and gradients at hand."""
+    system, columns = record.packed.system, np.atleast_2d(shift.T)
+    gap, out = np.zeros(W.value.size), np.zeros_like(columns)
+    if not factorised(system, W, 0.0):
+        raise SolverError("the equations of motion are singular where constraints are met.")
+    for column, motion in zip(columns, out, strict=True):
+        gradient_times(system, W, np.ascontiguousarray(column), False, gap)
+        least_motion(system, W, gap, motion)
+    return out.T.reshape(shift.shape)
+
+
+def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
+    """All that the next step depends on and the state does not tell."""
+    names = (*FACTOR, "factor" if W.by_blocks[0] else "lu")
+    arrays = {name: getattr(W, name).copy() for name in names}
+    arrays["method"], arrays["bdf"] = step.method.copy(), step.bdf.copy()
+    arrays["before"], arrays["psi"], arrays["past"] = (
+        step.a.copy(),
+        step.psi.copy(),
+        step.past.copy(),
+    )
+    arrays["count"] = step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]]
+    arrays["work"], arrays["lost"] = step.work.copy(), step.lost.copy()
+    arrays["counts"] = step.count[list(SINCE)]
+    origin = settings.t_start if settings.origin is None else settings.origin
+    return Memory(settings.kind, settings.h, origin, settings.taken + steps, arrays)
+
+
+def recall(memory: Memory, W: Work, step: Step) -> None:
+    """Go on with the factorisation of an earlier run that `fits`."""
+    step.a[:], step.psi[:] = memory.arrays["before"], memory.arrays["psi"]
+    step.past[:] = memory.arrays.get("past", step.past)
+    for name in (*FACTOR, "factor" if memory.arrays["by_blocks"][0] else "lu"):
+        getattr(W, name)[:] = memory.arrays[name]
+    step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]] = memory.arrays["count"]
+
+
+def go_on(memory: Memory, step: Step) -> None:
+    """Count steps and works on from those of a run that was interrupted."""
+    step.work[:], step.lost[:] = memory.arrays["work"], memory.arrays["lost"]
+    step.count[list(SINCE)] = memory.arrays["counts"]
+
+
+def copied(step: Step) -> Step:
+    """A step memory of its own with the same content."""
+    return Step(*(x.copy() for x in step))
+
+
+def fits(memory: Memory | None, method: Array, weights: Array) -> bool:
+    """Whether what is remembered belongs to the same method and step."""
+    kept = {} if memory is None else memory.arrays
+    same = (
+        np.array_equal(kept.get("method", ()), method),
+        np.array_equal(kept.get("bdf"), weights),
+    )
+    return all(same)
+
+
+def _power(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> Array:
+    """(3,) powers of drives, forces and dampers at a state."""
+    system = record.packed.system
+    signals_at(record, W, state.t)
+    evaluate(system, W, state.q, state.v)
+    apply_laws(forces, W, state.t)
+    with_accelerations(record.packed, W, state)
+    return W.power.copy()
+
+
+def signals_at(record: Record, W: Work, t: float) -> None:
+    """Set the prescribed functions to their values at a time."""
+    span, spacing = record.settings.span, record.settings.spacing
+    W.signal[:] = sample_all(record.packed.signals, np.array([t]), span, spacing)[0]
+
+
+def measured(
+    record: Record, W: Work, state: State, forces: tuple[Law, ...], h: float
+) -> tuple[State, Array | None]:
+    """Accelerations at a start and their rate; None if a step does not resolve it.
+
+    The algorithmic acceleration of generalised-alpha belongs to the time
+    t + (alpha_m - alpha_f) h. Together with a velocity shifted by a multiple of h^2 across the
+    constraints, as the method itself would have it after many steps, the multipliers converge
+    with second order from the first step on.
+
+    Source:
+        Arnold, Bruels, Cardona, Error analysis of generalized-alpha Lie group time integration
+        methods for constrained mechanical systems, Numer. Math. 129 (2015) 149.
+    """
+    at_rest = np.zeros_like(state.v)
+    state = accelerated(record, W, state, forces, 0.0, at_rest)
+    probe = 0.02 * h
+    jerk = (accelerated(record, W, state, forces, probe, at_rest).a - state.a) / probe
+    ahead = accelerated(record, W, state, forces, h, jerk)
+    # vibrations that the step does not resolve have no Taylor series over it
+    if np.linalg.norm(ahead.a - state.a - h * jerk) > np.linalg.norm(h * jerk):
+        return state, None
+    return state, jerk
+
+
+def accelerated(
+    record: Record, W: Work, state: State, forces: tuple[Law, ...], shift: float, jerk: Array
+) -> State:
+    """The state with its accelerations, some time later by its Taylor series."""
+    system = record.packed.system
+    signals_at(record, W, state.t + shift)
+    q = np.empty_like(state.q)
+    retract(system, state.q, shift * state.v + shift**2 * (state.a / 2 + shift * jerk / 6), q)
+    later = replace(state, q=q, v=state.v + shift * (state.a + shift * jerk / 2))
+    evaluate(system, W, later.q, later.v)
+    apply_laws(forces, W, state.t + shift)
+    return with_accelerations(record.packed, W, later)

@@ -1,0 +1,5 @@
+"""Compiled mechanics, and the arrays it works on.
+
+`system` and `plan` are the arrays, `algebra` small matrices, `inertia`, `second_order`, `markers`,
+`constraints`, `rolling` and `coordinates` the mechanics; `compiled` guards the cache.
+"""

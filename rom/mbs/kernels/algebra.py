@@ -1,0 +1,286 @@
+"""Compiled algebra of 3-vectors (tuples of three numbers), rotations and dense systems."""
+
+import math
+
+from rom.mbs.kernels.compiled import inner
+
+
+@inner
+def vec(x, at):
+    """Three entries of a vector from position ``at``."""
+    return x[at], x[at + 1], x[at + 2]
+
+
+@inner
+def col(A, j):
+    """Column j of a (3, m) array."""
+    return A[0, j], A[1, j], A[2, j]
+
+
+@inner
+def row(A, i, at):
+    """Three entries of row i of a matrix from column ``at``."""
+    return A[i, at], A[i, at + 1], A[i, at + 2]
+
+
+@inner
+def add(a, b):
+    """Sum a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inner
+def sub(a, b):
+    """Difference a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inner
+def scale(s, a):
+    """Multiple s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@inner
+def dot(a, b):
+    """Scalar product a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inner
+def cross(a, b):
+    """Vector product a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inner
+def mv(A, x):
+    """Product A x of a (3, 3) array."""
+    return (
+        A[0, 0] * x[0] + A[0, 1] * x[1] + A[0, 2] * x[2],
+        A[1, 0] * x[0] + A[1, 1] * x[1] + A[1, 2] * x[2],
+        A[2, 0] * x[0] + A[2, 1] * x[1] + A[2, 2] * x[2],
+    )
+
+
+@inner
+def turn(E, i, x):
+    """Product E[i] x of a (k, 3, 3) array."""
+    return (
+        E[i, 0, 0] * x[0] + E[i, 0, 1] * x[1] + E[i, 0, 2] * x[2],
+        E[i, 1, 0] * x[0] + E[i, 1, 1] * x[1] + E[i, 1, 2] * x[2],
+        E[i, 2, 0] * x[0] + E[i, 2, 1] * x[1] + E[i, 2, 2] * x[2],
+    )
+
+
+@inner
+def mtv(A, x):
+    """Product A^T x of a (3, 3) array."""
+    return (
+        A[0, 0] * x[0] + A[1, 0] * x[1] + A[2, 0] * x[2],
+        A[0, 1] * x[0] + A[1, 1] * x[1] + A[2, 1] * x[2],
+        A[0, 2] * x[0] + A[1, 2] * x[1] + A[2, 2] * x[2],
+    )
+
+
+@inner
+def put(x, at, a):
+    """Add a to three entries of a vector."""
+    x[at] += a[0]
+    x[at + 1] += a[1]
+    x[at + 2] += a[2]
+
+
+@inner
+def place(A, i, j, s, a):
+    """Add s a to a column of a matrix: rows i to i + 2 of column j."""
+    A[i, j] += s * a[0]
+    A[i + 1, j] += s * a[1]
+    A[i + 2, j] += s * a[2]
+
+
+@inner
+def place_row(A, i, j, s, a):
+    """Add s a to a row of a matrix: columns j to j + 2 of row i."""
+    A[i, j] += s * a[0]
+    A[i, j + 1] += s * a[1]
+    A[i, j + 2] += s * a[2]
+
+
+@inner
+def unit(j):
+    """Unit vector j."""
+    return 1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0
+
+
+@inner
+def unit_twist(p):
+    """Velocities and angular velocities of two markers in unit motion p of twelve."""
+    zero, x = (0.0, 0.0, 0.0), unit(p % 3)
+    if p < 3:
+        return x, zero, zero, zero
+    if p < 6:
+        return zero, x, zero, zero
+    return (zero, zero, x, zero) if p < 9 else (zero, zero, zero, x)
+
+
+@inner
+def rotation(q, at, A):
+    """Write the matrix of the quaternion q[at:at+4], scaled to unit length, into A."""
+    e0, e1, e2, e3 = q[at], q[at + 1], q[at + 2], q[at + 3]
+    s = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
+    A[0, 0], A[1, 1], A[2, 2] = (
+        1 - s * (e2 * e2 + e3 * e3),
+        1 - s * (e1 * e1 + e3 * e3),
+        1 - s * (e1 * e1 + e2 * e2),
+    )
+    A[0, 1], A[1, 0] = s * (e1 * e2 - e0 * e3), s * (e1 * e2 + e0 * e3)
+    A[0, 2], A[2, 0] = s * (e1 * e3 + e0 * e2), s * (e1 * e3 - e0 * e2)
+    A[1, 2], A[2, 1] = s * (e2 * e3 - e0 * e1), s * (e2 * e3 + e0 * e1)
+
+
+@inner
+def turned(q, at, theta, out):
+    """Write q[at:at+4] o exp(theta), of unit length, into out[at:at+4]."""
+    angle = math.sqrt(dot(theta, theta))
+    half = 0.5 * angle
+    s = math.sin(half) / angle if angle > 1e-4 else 0.5 - angle * angle / 48
+    f0, (f1, f2, f3) = math.cos(half), scale(s, theta)
+    e0, e1, e2, e3 = q[at], q[at + 1], q[at + 2], q[at + 3]
+    p0 = e0 * f0 - e1 * f1 - e2 * f2 - e3 * f3
+    p1 = e0 * f1 + e1 * f0 + e2 * f3 - e3 * f2
+    p2 = e0 * f2 - e1 * f3 + e2 * f0 + e3 * f1
+    p3 = e0 * f3 + e1 * f2 - e2 * f1 + e3 * f0
+    n = 1.0 / math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
+    out[at], out[at + 1], out[at + 2], out[at + 3] = p0 * n, p1 * n, p2 * n, p3 * n
+
+
+@inner
+def tangent_coefficients(x):
+    """Coefficients c1, c2 of the tangent operator of SO(3) for x = angle^2, and c1'/a, c2'/a.
+
+    c1 = (1 - cos a) / a^2, c2 = (a - sin a) / a^3; power series where the quotients cancel.
+    """
+    if x < 0.05:
+        c1 = 1 / 2 - x * (1 / 24 - x * (1 / 720 - x * (1 / 40320 - x / 3628800)))
+        c2 = 1 / 6 - x * (1 / 120 - x * (1 / 5040 - x * (1 / 362880 - x / 39916800)))
+        d1 = -2 * (1 / 24 - x * (2 / 720 - x * (3 / 40320 - x * 4 / 3628800)))
+        d2 = -2 * (1 / 120 - x * (2 / 5040 - x * (3 / 362880 - x * 4 / 39916800)))
+        return c1, c2, d1, d2
+    a = math.sqrt(x)
+    c1, c2 = (1 - math.cos(a)) / x, (a - math.sin(a)) / (a * x)
+    return c1, c2, (math.sin(a) / a - 2 * c1) / x, (c1 - 3 * c2) / x
+
+
+@inner
+def spatial_tangent(theta, x):
+    """Angular velocity of exp(theta) seen from its base, for the rate x of theta."""
+    c1, c2, _, _ = tangent_coefficients(dot(theta, theta))
+    once = cross(theta, x)
+    return add(x, add(scale(c1, once), scale(c2, cross(theta, once))))
+
+
+@inner
+def spatial_tangent_rate(theta, x):
+    """Rate of `spatial_tangent` applied to the constant x while theta moves with rate x."""
+    _, c2, d1, d2 = tangent_coefficients(dot(theta, theta))
+    once, along = cross(theta, x), dot(theta, x)
+    curved = add(scale(d1 * along, once), scale(d2 * along, cross(theta, once)))
+    return add(curved, scale(c2, cross(x, once)))
+
+
+@inner
+def factorise(A, n, pivot):
+    """LU factors in place of the leading (n, n) block; False when a pivot vanishes.
+
+    Rows without an entry in the pivot column are left alone: joints couple few bodies.
+    """
+    for k in range(n):
+        best, p = abs(A[k, k]), k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > best:
+                best, p = abs(A[i, k]), i
+        pivot[k] = p
+        if not best > 1e-300:
+            return False
+        if p != k:
+            for j in range(n):
+                A[k, j], A[p, j] = A[p, j], A[k, j]
+        inverse = 1.0 / A[k, k]
+        for i in range(k + 1, n):
+            if A[i, k] != 0.0:
+                f = A[i, k] * inverse
+                A[i, k] = f
+                for j in range(k + 1, n):
+                    A[i, j] -= f * A[k, j]
+    return True
+
+
+@inner
+def back_substitute(A, n, pivot, x):
+    """Solve in place with the factors of `factorise`."""
+    for k in range(n):
+        p = pivot[k]
+        if p != k:
+            x[k], x[p] = x[p], x[k]
+    for i in range(n):
+        s = x[i]
+        for j in range(i):
+            s -= A[i, j] * x[j]
+        x[i] = s
+    for i in range(n - 1, -1, -1):
+        s = x[i]
+        for j in range(i + 1, n):
+            s -= A[i, j] * x[j]
+        x[i] = s / A[i, i]
+
+
+@inner
+def range_basis(G, rank, remainder, U):
+    """Orthonormal basis of the range of G (m, n), written to the rows of U (rank, m).
+
+    Columns of G are taken in the order of what is left of them, and cleaned twice. ``remainder``
+    (n, m) is working memory.
+    """
+    m, n = G.shape
+    best, p = -1.0, 0
+    for j in range(n):
+        size = 0.0
+        for i in range(m):
+            remainder[j, i] = G[i, j]
+            size += G[i, j] * G[i, j]
+        if size > best:
+            best, p = size, j
+    for k in range(rank):
+        for i in range(m):
+            U[k, i] = remainder[p, i]
+        clean(U, k)
+        best, p = -1.0, 0
+        for j in range(n):
+            s, size = 0.0, 0.0
+            for i in range(m):
+                s += U[k, i] * remainder[j, i]
+            for i in range(m):
+                x = remainder[j, i] - s * U[k, i]
+                remainder[j, i] = x
+                size += x * x
+            if size > best:
+                best, p = size, j
+
+
+@inner
+def clean(U, k):
+    """Make row k of U orthogonal to the rows before it and of unit length."""
+    m = U.shape[1]
+    for j in range(k):
+        s = 0.0
+        for i in range(m):
+            s += U[j, i] * U[k, i]
+        for i in range(m):
+            U[k, i] -= s * U[j, i]
+    s = 0.0
+    for i in range(m):
+        s += U[k, i] * U[k, i]
+    s = 1.0 / math.sqrt(s)
+    for i in range(m):
+        U[k, i] *= s

@@ -1,0 +1,283 @@
+"""Constraint rows: residual, gradient, convective term and stiffness."""
+
+import math
+
+from rom.mbs.kernels.algebra import add, cross, dot, place, row, scale, sub, turn, unit
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.rolling import rolling_row, rolling_stiffness
+from rom.mbs.kernels.system import ALONG, ANGLE, COUPLING, DISTANCE, NORMAL, POINT, ROLL, TOUCH
+
+
+@inner
+def wrapped(angle):
+    """The angle moved by whole turns into [-pi, pi]."""
+    return angle - 2 * math.pi * math.floor(angle / (2 * math.pi) + 0.5)
+
+
+@inner
+def set_gradient(g, k, Pi, Oi, Pj, Oj):
+    """Gradient of row k in the twists of both markers, from its four vectors."""
+    for p in range(3):
+        g[k, p], g[k, 3 + p], g[k, 6 + p], g[k, 9 + p] = Pi[p], Oi[p], Pj[p], Oj[p]
+
+
+@inner
+def normal_rates(a, b, Oi, Oj, ci, cj):
+    """First and second time derivative of a . b, for axes a of i and b of j.
+
+    O are angular velocities, c angular accelerations at zero accelerations of the coordinates.
+    """
+    da, db, axb = cross(Oi, a), cross(Oj, b), cross(a, b)
+    first = dot(axb, sub(Oi, Oj))
+    second = dot(axb, sub(ci, cj)) + 2 * dot(da, db)
+    return first, second + dot(cross(Oi, da), b) + dot(a, cross(Oj, db))
+
+
+@inner
+def angle_state(a, c, b, Oi, Oj, ci, cj):
+    """Angle of b seen in the axes (a, c), its rate, convective term and the torque axis.
+
+    The torque axis is the gradient of the angle in the rotation of marker j.
+    """
+    x, y = dot(a, b), dot(c, b)
+    n = x * x + y * y
+    w = sub(scale(x, c), scale(y, a))
+    axis = scale(1 / n, cross(b, w))
+    dx, ddx = normal_rates(a, b, Oi, Oj, ci, cj)
+    dy, ddy = normal_rates(c, b, Oi, Oj, ci, cj)
+    rate = (x * dy - y * dx) / n
+    second = (x * ddy - y * ddx - 2 * rate * (x * dx + y * dy)) / n
+    return math.atan2(y, x), rate, second, axis
+
+
+@inner
+def row_states(rows, W):
+    """Residual, gradient and convective term of all constraint rows."""
+    zero = (0.0, 0.0, 0.0)
+    for k in range(rows.kind.size):
+        i, j, kind = rows.i[k], rows.j[k], rows.kind[k]
+        if kind == COUPLING:
+            coupling_row(rows, k, W)
+            continue
+        if kind in (TOUCH, ROLL):
+            rolling_row(rows, k, W)
+            continue
+        Oi, Oj, qi, qj = row(W.V, i, 3), row(W.V, j, 3), row(W.conv, i, 3), row(W.conv, j, 3)
+        gap = sub(row(W.P, j, 0), row(W.P, i, 0))
+        pull = sub(row(W.conv, j, 0), row(W.conv, i, 0))
+        target = rows.offset[k]
+        if rows.signal[k] >= 0:
+            target += W.signal[rows.signal[k], 0]
+        a = row(rows.a, k, 0)
+        if kind == POINT:
+            W.value[k], W.gamma[k] = dot(a, gap) - target, dot(a, pull)
+            set_gradient(W.g, k, scale(-1.0, a), zero, a, zero)
+            continue
+        if kind == DISTANCE:
+            slide = sub(row(W.V, j, 0), row(W.V, i, 0))
+            W.value[k], e, W.gamma[k] = distance_state(gap, slide, pull)
+            W.value[k] -= target
+            set_gradient(W.g, k, scale(-1.0, e), zero, e, zero)
+            continue
+        a = turn(W.E, i, a)
+        if kind == ALONG:
+            da = cross(Oi, a)
+            slide = sub(row(W.V, j, 0), row(W.V, i, 0))
+            swing = add(cross(qi, a), cross(Oi, da))
+            W.value[k] = dot(a, gap) - target
+            W.gamma[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+            set_gradient(W.g, k, scale(-1.0, a), cross(a, gap), a, zero)
+            continue
+        b = turn(W.E, j, row(rows.b, k, 0))
+        if kind == NORMAL:
+            axb = cross(a, b)
+            W.value[k] = dot(a, b) - target
+            W.gamma[k] = normal_rates(a, b, Oi, Oj, qi, qj)[1]
+            set_gradient(W.g, k, zero, axb, zero, scale(-1.0, axb))
+        else:
+            c = turn(W.E, i, row(rows.c, k, 0))
+            angle, _, gamma, axis = angle_state(a, c, b, Oi, Oj, qi, qj)
+            W.value[k], W.gamma[k] = wrapped(angle - target), gamma
+            set_gradient(W.g, k, zero, scale(-1.0, axis), zero, axis)
+
+
+@inner
+def distance_state(gap, slide, pull):
+    """Length of the gap, its direction and the convective term of its second derivative."""
+    length = math.sqrt(dot(gap, gap))
+    e = scale(1.0 / length, gap)
+    rate = dot(e, slide)
+    return length, e, dot(e, pull) + (dot(slide, slide) - rate * rate) / length
+
+
+@inner
+def coupling_row(rows, k, W):
+    """Row k as the weighted sum of two joint coordinates, which are evaluated first."""
+    W.value[k], W.gamma[k] = -rows.offset[k], 0.0
+    for side in range(2):
+        at, factor = rows.at[k, side], rows.factor[k, side]
+        W.value[k] += factor * W.x[at]
+        W.gamma[k] += factor * W.xc[at]
+        for p in range(12):
+            W.g[k, 12 * side + p] = factor * W.xg[at, p]
+
+
+@inner
+def column_of(graph, k, b):
+    """First column in G of body b in constraint row k, which moves it."""
+    for p in range(3):
+        if graph.body[k, p] == b:
+            return graph.at[k, p]
+    return graph.at[k, 3]
+
+
+@inner
+def block_of(graph, b, c):
+    """Number of the block of bodies b and c.
+
+    Raises:
+        IndexError: if the graph does not know that something couples them.
+    """
+    low, high = graph.first[b], graph.first[b + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if graph.other[middle] < c:
+            low = middle + 1
+        else:
+            high = middle
+    if low == graph.first[b + 1] or graph.other[low] != c:
+        raise IndexError("a force couples two bodies that share no joint and no pair of markers")
+    return low
+
+
+@inner
+def constraint_gradient(s, W):
+    """Assemble G (m, n), the gradient of all rows in the velocities."""
+    bodies, markers, rows, G, graph = s.bodies, s.markers, s.rows, W.G, s.graph
+    for k in range(rows.kind.size):
+        for t in range(G.shape[1]):
+            G[k, t] = 0.0
+        for side, m in enumerate((rows.i[k], rows.j[k], rows.k[k], rows.l[k])):
+            b = markers.body[m] if m >= 0 else -1
+            if b < 0:
+                continue
+            t, H = column_of(graph, k, b), W.H[m]
+            for p in range(6):
+                w = W.g[k, 6 * side + p]
+                if w != 0.0:
+                    for q in range(6 + bodies.r[b]):
+                        G[k, t + q] += w * H[p, q]
+
+
+@inner
+def constraint_wrench(s, W, lam):
+    """Add the constraint forces -lam g to the wrenches on the markers."""
+    rows = s.rows
+    for k in range(rows.kind.size):
+        for p in range(6):
+            W.wrench[rows.i[k], p] -= lam[k] * W.g[k, p]
+            W.wrench[rows.j[k], p] -= lam[k] * W.g[k, 6 + p]
+        if rows.k[k] >= 0:
+            for p in range(6):
+                W.wrench[rows.k[k], p] -= lam[k] * W.g[k, 12 + p]
+                W.wrench[rows.l[k], p] -= lam[k] * W.g[k, 18 + p]
+
+
+@inner
+def add_cross_product(Q, i, j, c, a, b):
+    """Add c skew(a) skew(b) to Q from (i, j)."""
+    for k in range(3):
+        place(Q, i, j + k, c, cross(a, cross(b, unit(k))))
+
+
+@inner
+def place_relative(Q, at, p, c, x):
+    """Add the block column c x of a quantity that acts on j - i, with opposite signs on both."""
+    place(Q, at, at + p, c, x)
+    place(Q, at, 6 + at + p, -c, x)
+    place(Q, 6 + at, at + p, -c, x)
+    place(Q, 6 + at, 6 + at + p, c, x)
+
+
+@inner
+def row_stiffness(kind, a, b, gap, axis, c, Q):
+    """Add c times the derivative of the gradient of one constraint row to Q (12, 12).
+
+    The order is position and small rotation, in the world, of marker i, then of marker j. The
+    term of an angle holds where the two axes that its joint keeps parallel are parallel.
+    """
+    if kind == ALONG:
+        for p in range(3):
+            x = cross(a, unit(p))
+            place(Q, 0, 3 + p, c, x)
+            place(Q, 6, 3 + p, -c, x)
+            place(Q, 3, p, -c, x)
+            place(Q, 3, 6 + p, c, x)
+        add_cross_product(Q, 3, 3, c, gap, a)
+    elif kind == NORMAL:
+        add_cross_product(Q, 3, 3, c, b, a)
+        add_cross_product(Q, 3, 9, -c, a, b)
+        add_cross_product(Q, 9, 3, -c, b, a)
+        add_cross_product(Q, 9, 9, c, a, b)
+    elif kind == DISTANCE:
+        length = math.sqrt(dot(gap, gap))
+        e = scale(1.0 / length, gap)
+        for p in range(3):
+            place_relative(Q, 0, p, c / length, sub(unit(p), scale(e[p], e)))
+    elif kind == ANGLE:
+        for p in range(3):
+            x = cross(axis, unit(p))
+            place(Q, 3, 3 + p, c, x)
+            place(Q, 9, 3 + p, -c, x)
+
+
+@inner
+def pair_stiffness(s, W, i, j, S):
+    """Add H^T Q H of a pair of markers to S."""
+    bodies, markers, Q, QH = s.bodies, s.markers, W.Q, W.QH
+    width = W.H.shape[2]
+    for side in range(2):
+        m = i if side == 0 else j
+        b = markers.body[m]
+        n = 6 + bodies.r[b] if b >= 0 else 0
+        for p in range(12):
+            for q in range(n):
+                total = 0.0
+                for x in range(6):
+                    total += Q[p, 6 * side + x] * W.H[m, x, q]
+                QH[p, width * side + q] = total
+    for block in range(4):
+        row, column = block // 2, block % 2
+        mr, mc = (i if row == 0 else j), (i if column == 0 else j)
+        br, bc = markers.body[mr], markers.body[mc]
+        if br < 0 or bc < 0:
+            continue
+        e = block_of(s.graph, br, bc)
+        first, left = s.graph.x[e], s.graph.y[e]
+        for p in range(6 + bodies.r[br]):
+            for q in range(6 + bodies.r[bc]):
+                total = 0.0
+                for x in range(6):
+                    total += W.H[mr, x, p] * QH[6 * row + x, width * column + q]
+                S[first + p, left + q] += total
+
+
+@inner
+def constraint_stiffness(s, W, lam, c, S):
+    """Add c times the derivative of G^T lam, with the marker Jacobians constant, to S."""
+    rows = s.rows
+    for joint in range(rows.joint_i.size):
+        W.Q[:] = 0.0
+        found = False
+        for at in range(s.graph.joint_first[joint], s.graph.joint_first[joint + 1]):
+            k = s.graph.joint_rows[at]
+            if rows.kind[k] != POINT and lam[k] != 0.0:
+                i, j = rows.i[k], rows.j[k]
+                a, b = turn(W.E, i, row(rows.a, k, 0)), turn(W.E, j, row(rows.b, k, 0))
+                gap = sub(row(W.P, j, 0), row(W.P, i, 0))
+                row_stiffness(rows.kind[k], a, b, gap, row(W.g, k, 9), c * lam[k], W.Q)
+                if rows.kind[k] in (TOUCH, ROLL):
+                    rolling_stiffness(rows, k, W, c * lam[k])
+                found = True
+        if found:
+            pair_stiffness(s, W, rows.joint_i[joint], rows.joint_j[joint], S)

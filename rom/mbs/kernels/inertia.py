@@ -1,0 +1,237 @@
+"""Inertia of one body in its floating frame: residual, mass matrix and analytic tangents.
+
+With P = X + sum q_k phi_k, and S(U, V) the integral of rho U V^T, the inertia is exact to second
+order in the elastic coordinates. The rows are force in the world, moment about the origin of the
+body in the body frame, and generalised force of each elastic coordinate.
+"""
+
+from rom.mbs.kernels.algebra import (
+    add,
+    col,
+    cross,
+    dot,
+    mtv,
+    mv,
+    place,
+    place_row,
+    put,
+    rotation,
+    scale,
+    sub,
+    unit,
+    vec,
+)
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.integrals import contract, dual, times, trace, transposed_times
+from rom.mbs.kernels.second_order import bent_integrals, bent_push, bent_stiffness, bent_twist
+
+
+@inner
+def body_states(bodies, W, q, v):
+    """Orientation and inertia integrals of the deformed bodies at the coordinates q."""
+    for b in range(bodies.mass.size):
+        f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
+        rotation(q, at + 3, W.A[b])
+        shape_integrals(bodies, W, b, q, v)
+        SP, Ct, SPd, J = W.SP[b], W.Ct[b], W.SPd[b], W.J[b]
+        if bodies.stiffened[b] == 1:
+            bent_integrals(bodies, W, b, q, v)
+        for i in range(3):
+            moment, rate = bodies.first[b, i], 0.0
+            for k in range(r):
+                moment += 0.5 * (bodies.S[f, i, k] + Ct[i, k]) * q[at + 7 + k]
+                rate += Ct[i, k] * v[vt + 6 + k]
+            W.d[b, i], W.dd[b, i] = moment, rate
+            for j in range(3):
+                total = 0.0
+                for k in range(r):
+                    total += v[vt + 6 + k] * SP[k, 3 * i + j]
+                SPd[i, j] = total
+        minus_trace = -(J[0, 0] + J[1, 1] + J[2, 2])
+        for i in range(3):
+            J[i, i] += minus_trace
+
+
+@inner
+def shape_integrals(bodies, W, b, q, v):
+    """Integrals with the shapes alone; W.J becomes minus the integral of rho P P^T."""
+    f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
+    SP, Sd, Ct, J = W.SP[b], W.Sd[b], W.Ct[b], W.J[b]
+    for k in range(r):
+        for p in range(9):
+            SP[k, p] = bodies.S1[f, k, p]
+            Sd[k, p] = 0.0
+        for i in range(3):
+            Ct[i, k] = bodies.S[f, i, k]
+    contract(bodies.S2[f], q, at + 7, r, W.line, SP)
+    contract(bodies.S2[f], v, vt + 6, r, W.line, Sd)
+    for i in range(3):
+        for j in range(3):
+            total = bodies.second[b, i, j]
+            for k in range(r):
+                total += q[at + 7 + k] * (bodies.S1[f, k, 3 * j + i] + SP[k, 3 * i + j])
+            J[i, j] = -total
+
+
+@inner
+def body_residuals(bodies, W, q, v, a):
+    """Add inertia, gravity, elastic and damping forces of all bodies to W.residual.
+
+    The power lost in damping is added to W.power[2].
+
+    Source:
+        Shabana, Dynamics of Multibody Systems, chapter 5; in the inertia integrals of Zwoelfer
+        and Gerstmayr, Acta Mechanica 232 (2021).
+    """
+    for b in range(bodies.mass.size):
+        f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
+        w, dw, d, dd = vec(v, vt + 3), vec(a, vt + 3), vec(W.d[b], 0), vec(W.dd[b], 0)
+        a_minus_g = mtv(W.A[b], sub(vec(a, vt), vec(bodies.gravity, 0)))
+        force = add(scale(bodies.mass[b], a_minus_g), add(cross(dw, d), cross(w, cross(w, d))))
+        force = add(force, scale(2.0, cross(w, dd)))
+        SPd = W.SPd[b]
+        spread = SPd[0, 0] + SPd[1, 1] + SPd[2, 2]
+        moment = add(cross(d, a_minus_g), mv(W.J[b], dw))
+        moment = add(moment, cross(w, mv(W.J[b], w)))
+        moment = add(moment, scale(2.0, sub(scale(spread, w), mtv(SPd, w))))
+        for k in range(r):
+            s, da = W.SP[b, k], a[vt + 6 + k]
+            S_k, Cr_k = col(W.Ct[b], k), dual(s, 0)
+            force, moment = add(force, scale(da, S_k)), add(moment, scale(da, Cr_k))
+            total = dot(S_k, a_minus_g) + dot(Cr_k, dw) + 2.0 * dot(w, dual(W.Sd[b, k], 0))
+            total += dot(w, times(s, w)) - dot(w, w) * trace(s, 0)
+            damping = 0.0
+            for l in range(r):
+                total += bodies.M[f, k, l] * a[vt + 6 + l] + bodies.K[f, k, l] * q[at + 7 + l]
+                damping += bodies.C[f, k, l] * v[vt + 6 + l]
+            W.residual[vt + 6 + k] += total + damping
+            W.power[2] += damping * v[vt + 6 + k]
+        if bodies.stiffened[b] == 1:
+            force = add(force, bent_push(W, b, r, v, vt))
+            moment = add(moment, bent_twist(W, b, r, v, vt))
+        put(W.residual, vt, mv(W.A[b], force))
+        put(W.residual, vt + 3, moment)
+
+
+@inner
+def body_mass(bodies, W, b, c, S):
+    """Add c times the mass matrix of body b to its block S."""
+    f, r = bodies.flex[b], bodies.r[b]
+    d, A, J = vec(W.d[b], 0), W.A[b], W.J[b]
+    for j in range(3):
+        S[j, j] += c * bodies.mass[b]
+        lever = mv(A, cross(unit(j), d))
+        place(S, 0, 3 + j, c, lever)
+        place_row(S, 3 + j, 0, c, lever)
+        for i in range(3):
+            S[3 + i, 3 + j] += c * J[i, j]
+    for k in range(r):
+        e = 6 + k
+        S_world, Cr_k = mv(A, col(W.Ct[b], k)), dual(W.SP[b, k], 0)
+        place(S, 0, e, c, S_world)
+        place_row(S, e, 0, c, S_world)
+        place(S, 3, e, c, Cr_k)
+        place_row(S, e, 3, c, Cr_k)
+        for l in range(r):
+            S[e, 6 + l] += c * bodies.M[f, k, l]
+
+
+@inner
+def body_damping(bodies, W, b, v, c, S):
+    """Add c times the derivative of the residual of body b by its velocities to its block S."""
+    f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
+    w, d, dd, A, J = vec(v, t + 3), vec(W.d[b], 0), vec(W.dd[b], 0), W.A[b], W.J[b]
+    SPd = W.SPd[b]
+    spread = SPd[0, 0] + SPd[1, 1] + SPd[2, 2]
+    for j in range(3):
+        e = unit(j)
+        force = sub(add(scale(dot(w, d), e), scale(d[j], w)), scale(2.0 * w[j], d))
+        place(S, 0, 3 + j, c, mv(A, add(force, scale(2.0, cross(e, dd)))))
+        moment = add(cross(w, mv(J, e)), cross(e, mv(J, w)))
+        moment = add(moment, scale(2.0, sub(scale(spread, e), mtv(SPd, e))))
+        place(S, 3, 3 + j, c, moment)
+    for k in range(r):
+        s, e = W.SP[b, k], 6 + k
+        place(S, 0, e, c, mv(A, scale(2.0, cross(w, col(W.Ct[b], k)))))
+        spin = sub(scale(trace(s, 0), w), transposed_times(s, w))
+        place(S, 3, e, c, scale(2.0, spin))
+        row = add(times(s, w), transposed_times(s, w))
+        row = add(row, scale(2.0, dual(W.Sd[b, k], 0)))
+        place_row(S, e, 3, c, sub(row, scale(2.0 * trace(s, 0), w)))
+        for l in range(r):
+            coriolis = 2.0 * dot(w, dual(bodies.S2[f, l], 9 * k))
+            S[e, 6 + l] += c * (bodies.C[f, k, l] + coriolis)
+        if bodies.stiffened[b] == 1:
+            place(S, 0, e, c, mv(A, scale(2.0, vec(W.Td[b, k], 0))))
+            place(S, 3, e, c, scale(2.0, dual(W.T1d[b, k], 0)))
+
+
+@inner
+def body_stiffness(bodies, W, b, v, a, c, S):
+    """Add c times the derivative of the residual of body b by its coordinates to its block S.
+
+    Rotations are perturbed in the body frame: dA = A skew(dtheta).
+    """
+    r, t = bodies.r[b], bodies.v_at[b]
+    w, dw, d, A = vec(v, t + 3), vec(a, t + 3), vec(W.d[b], 0), W.A[b]
+    a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
+    pull = add(cross(dw, d), add(cross(w, cross(w, d)), scale(2.0, cross(w, vec(W.dd[b], 0)))))
+    for k in range(r):
+        pull = add(pull, scale(a[t + 6 + k], col(W.Ct[b], k)))
+    if bodies.stiffened[b] == 1:
+        pull = add(pull, bent_push(W, b, r, v, t))
+    for j in range(3):
+        e = unit(j)
+        turned_a_minus_g = cross(a_minus_g, e)
+        place(S, 0, 3 + j, c, mv(A, cross(e, pull)))
+        place(S, 3, 3 + j, c, cross(d, turned_a_minus_g))
+        for k in range(r):
+            S[6 + k, 3 + j] += c * dot(col(W.Ct[b], k), turned_a_minus_g)
+    elastic_stiffness(bodies, W, b, v, a, c, S)
+    if bodies.stiffened[b] == 1:
+        bent_stiffness(bodies, W, b, v, a, c, S)
+
+
+@inner
+def elastic_stiffness(bodies, W, b, v, a, c, S):
+    """The columns of `body_stiffness` that belong to the elastic coordinates."""
+    f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
+    w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
+    a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
+    for k in range(r):
+        for p in range(9):
+            W.Sa[k, p] = 0.0
+    contract(bodies.S2[f], a, t + 6, r, W.line, W.Sa)
+    for l in range(r):
+        s, e, S_l = W.SP[b, l], 6 + l, col(W.Ct[b], l)
+        place(S, 0, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))
+        tr = 2.0 * trace(s, 0)
+        Jdw = sub(scale(tr, dw), add(times(s, dw), transposed_times(s, dw)))
+        Jw = sub(scale(tr, w), add(times(s, w), transposed_times(s, w)))
+        moment = add(add(cross(S_l, a_minus_g), Jdw), cross(w, Jw))
+        moment = sub(moment, dual(W.Sa[l], 0))
+        Sd = W.Sd[b, l]
+        spin = sub(scale(trace(Sd, 0), w), times(Sd, w))
+        place(S, 3, e, c, add(moment, scale(2.0, spin)))
+        for k in range(r):
+            s2 = bodies.S2[f, l, 9 * k : 9 * k + 9]
+            softening = dot(w, times(s2, w)) - dot(w, w) * trace(s2, 0)
+            S[6 + k, e] += c * (bodies.K[f, k, l] + softening + dot(dw, dual(s2, 0)))
+
+
+@inner
+def body_energy(bodies, W, b, q, v):
+    """Kinetic, strain and gravity energy of body b."""
+    f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
+    w, d, A = vec(v, vt + 3), vec(W.d[b], 0), W.A[b]
+    u = mtv(A, vec(v, vt))
+    momentum = add(scale(0.5 * bodies.mass[b], u), add(cross(w, d), vec(W.dd[b], 0)))
+    kinetic = dot(u, momentum) + 0.5 * dot(w, mv(W.J[b], w))
+    strain = 0.0
+    for k in range(r):
+        kinetic += v[vt + 6 + k] * dot(w, dual(W.SP[b, k], 0))
+        for l in range(r):
+            kinetic += 0.5 * v[vt + 6 + k] * v[vt + 6 + l] * bodies.M[f, k, l]
+            strain += 0.5 * q[at + 7 + k] * q[at + 7 + l] * bodies.K[f, k, l]
+    centre = add(scale(bodies.mass[b], vec(q, at)), mv(A, d))
+    return kinetic, strain, -dot(vec(bodies.gravity, 0), centre)

@@ -1,0 +1,78 @@
+"""Which bodies touch each other, where their blocks are stored, and how they are eliminated.
+
+Bodies and groups of constraint rows are the nodes of a graph; joints and forces are its edges. An
+elimination plan removes one node after the other, leaf to root, so that the work and the memory of
+a chain or tree grow with its length only. `rom.mbs.equations.graph` makes both tables, once for a
+mechanism.
+"""
+
+from typing import NamedTuple
+
+from rom.model import Index
+
+
+class Plan(NamedTuple):
+    """Elimination of k nodes, each coupled to later nodes with c unknowns together.
+
+    The factor is one vector. Of each node it holds the pivot (d, d), the block to its right
+    (d, c) and the block below (c, d), all by rows.
+
+    Attributes:
+        position: (n + m,) place of each velocity and multiplier in the order of elimination.
+        size, wide: (k,) numbers d and c of each node; start: (k,) its first place.
+        pivot, right, below: (k,) where its blocks begin in the factor.
+        next_first: (k + 1,), next: later nodes coupled to each node; shift: their first columns.
+        pair_first: (k,), target, stride: where a product of two of them is subtracted, and the
+            distance of its rows.
+        block_to, block_stride: (e,) the same for the blocks of two bodies.
+        row_to, row_back, row_stride: (m, 4) where the gradient of a constraint row goes, as a row
+            and as a column, and the distance of the entries of the column.
+        memory: (1,) length of the factor.
+    """
+
+    position: Index
+    size: Index
+    wide: Index
+    start: Index
+    pivot: Index
+    right: Index
+    below: Index
+    next_first: Index
+    next: Index
+    shift: Index
+    pair_first: Index
+    target: Index
+    stride: Index
+    block_to: Index
+    block_stride: Index
+    row_to: Index
+    row_back: Index
+    row_stride: Index
+    memory: Index
+
+
+class Graph(NamedTuple):
+    """Where the entries of two bodies, or of a row and a body, are stored.
+
+    Attributes:
+        compact: 1 if only blocks are stored and eliminated by the plan, 0 for whole matrices.
+        first: (b + 1,), other: (e,) bodies that each body is coupled to, itself included,
+            ascending; x, y: (e,) first row and column of their block in Work.S and Work.Kt.
+        own: (b,) block of each body with itself.
+        body: (m, 4) different bodies that a constraint row moves, -1 for none; at: (m, 4) their
+            first column in Work.G.
+        joint_first: (p + 1,), joint_rows: (m,) constraint rows of each joint.
+        plan: of the elimination; empty for whole matrices.
+    """
+
+    compact: int
+    first: Index
+    other: Index
+    x: Index
+    y: Index
+    own: Index
+    body: Index
+    at: Index
+    joint_first: Index
+    joint_rows: Index
+    plan: Plan

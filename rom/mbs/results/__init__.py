@@ -1,0 +1,5 @@
+"""What a motion leaves.
+
+`state` is one instant, `solution` all of them, with `interpolation` between; `recomputed` and
+`interface_loads` follow from it; `audit` and `validity` judge it, `checkpoint` saves it.
+"""

@@ -1,0 +1,117 @@
+"""Is a computed motion believable? Conservation, constraints, Newton, size of deformations."""
+
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.validity import MAX_DEFORMATION, deformation, softening
+from rom.model import Report, Row
+
+# limits; energy counts relative to the largest amount of energy that was exchanged
+ENERGY_RTOL = 1e-2
+GAP_RTOL = 1e-9
+QUATERNION_ATOL = 1e-12
+MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
+MAX_MEAN_CORRECTIONS = 8.0
+
+
+@typed
+def audit(solution: Solution) -> Report:
+    """Check a motion.
+
+    Energy and its drift, momentum of free mechanisms, gaps in the joints relative to the size of
+    the mechanism, length of the quaternions, Newton corrections per step, and the largest elastic
+    displacement relative to the size of its body: beyond a tenth, linear elasticity in a floating
+    frame is no longer to be trusted. A body without geometric stiffness may not turn so fast that
+    centrifugal force uses up its stiffness.
+
+    Geometric stiffness enters through the kinetic energy and the work of forces, see
+    `rom.mbs.kernels.second_order`: the balance of energy holds with it as it does without.
+
+    Args:
+        solution: what `rom.simulate` returned.
+
+    Returns:
+        Report with a row per check.
+    """
+    rows = [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
+    return Report(f"audit of {solution.t[-1] - solution.t[0]:g} s of motion", tuple(rows))
+
+
+def _row(quantity: str, value: float, limit: float) -> Row:
+    return Row(quantity, float(value), f"<= {limit:g}", bool(value <= limit))
+
+
+def _energy(solution: Solution) -> list[Row]:
+    e = solution.energy
+    parts = (e.kinetic, e.strain, e.potential, e.drives, e.forces, e.damping)
+    turnover = max(np.ptp(part) for part in parts)
+    scale = max(turnover, np.abs(e.kinetic).max(), np.abs(e.strain).max(), 1e-300)
+    rows = [_row("energy balance / energy", np.abs(e.balance).max() / scale, ENERGY_RTOL)]
+    if solution.t.size > 3:
+        t = solution.t - solution.t.mean()
+        slope = (t @ e.balance) / (t @ t) * np.ptp(solution.t)
+        rows.append(_row("drift of energy / energy", abs(slope) / scale, ENERGY_RTOL))
+    return rows
+
+
+def _momentum(solution: Solution) -> list[Row]:
+    mechanism = solution.mechanism
+    grounded = any(m.body == "ground" for j in mechanism.joints.values() for m in j.markers)
+    pushed = bool(mechanism.loads or mechanism.spread_loads or np.any(mechanism.gravity))
+    pushed = pushed or any(u.j is None for u in mechanism.user_forces.values())
+    groups = [group for rod in mechanism.nonlinear.values() for group in rod.body.elements]
+    pushed = pushed or any(group.frames.shape[1] == 1 for group in groups)
+    between = (mechanism.springs, mechanism.user_forces, mechanism.bushings, mechanism.contacts)
+    for law in (law for laws in between for law in laws.values()):
+        pushed = pushed or "ground" in (law.i.body, law.j.body if law.j else "")
+    if grounded or pushed:
+        return []
+    # what starts at rest has no momentum as a whole: its parts have, as much as their energy allows
+    packed, rows = solution.packed, []
+    moving = max(np.sqrt(2 * packed.mass * solution.energy.kinetic.max()), 1e-300)
+    for name, p, arm in zip(
+        ("linear", "angular"), solution.momentum, (1.0, packed.length), strict=True
+    ):
+        size = max(np.abs(p).max(), moving * arm)
+        rows.append(
+            _row(f"change of {name} momentum", np.abs(p - p[0]).max() / size, MOMENTUM_RTOL)
+        )
+    return rows
+
+
+def _joints(solution: Solution) -> list[Row]:
+    if not solution.lam.shape[1]:
+        return []
+    packed = solution.packed
+    rolling = packed.system.rows.kind == ROLL
+    gap = np.abs(solution.gap / packed.row_scale)
+    rows = [_row("largest gap in a joint / size", gap[:, ~rolling].max(initial=0.0), GAP_RTOL)]
+    if rolling.any():
+        speed = max(np.sqrt(2 * solution.energy.kinetic.max() / packed.mass), 1e-300)
+        slip = np.abs(solution.gap[:, rolling]).max() / speed
+        rows.append(_row("largest slip of what rolls / speed", slip, GAP_RTOL))
+    return rows
+
+
+def _numbers(solution: Solution) -> list[Row]:
+    norms = [
+        np.abs(np.linalg.norm(solution.orientation(name), axis=1) - 1).max()
+        for name in solution.packed.names
+    ]
+    rows = [_row("quaternion length - 1", max(norms), QUATERNION_ATOL)]
+    statistics: dict[str, Any] = solution.statistics
+    if "iterations" in statistics:
+        mean = statistics["iterations"] / max(statistics["steps"], 1)
+        rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
+    for name, part in solution.mechanism.parts.items():
+        if not part.r:
+            continue
+        bent, share = deformation(solution, name), softening(solution, name)
+        rows.append(_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION))
+        if share:
+            rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
+    return rows

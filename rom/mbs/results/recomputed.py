@@ -1,0 +1,89 @@
+"""Quantities along a motion, evaluated again from coordinates and velocities."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rom.mbs.elements.bushing_kernels import bushing_energy
+from rom.mbs.elements.contact import contact_energy
+from rom.mbs.elements.joint_kernels import stop_energy
+from rom.mbs.elements.nonlinear_kernels import nonlinear_energy
+from rom.mbs.elements.springs_loads_kernels import spring_energy
+from rom.mbs.equations.equations import evaluate
+from rom.mbs.kernels.algebra import add, cross, mtv, mv, put, scale, vec
+from rom.mbs.kernels.compiled import copy, inner, kernel
+from rom.mbs.kernels.inertia import body_energy
+from rom.mbs.kernels.integrals import dual
+from rom.mbs.kernels.system import workspace
+from rom.model import Array
+
+
+class Tracks(NamedTuple):
+    """One row per instant.
+
+    Attributes:
+        position, axes, twist: (n_t, 3), (n_t, 3, 3), (n_t, 6) of one marker.
+        reaction: (n_t, 6) force and moment of some constraint rows on their second marker.
+        energy: (n_t, 3) kinetic, strain, potential [J].
+        momentum: (n_t, 6) linear, and angular about the world origin.
+        gap: (n_t, m) constraint residuals.
+    """
+
+    position: Array
+    axes: Array
+    twist: Array
+    reaction: Array
+    energy: Array
+    momentum: Array
+    gap: Array
+
+
+def follow(solution: Any, marker: int, rows: Any) -> Tracks:
+    """Evaluate one marker, some constraint rows and the totals along a solution."""
+    packed, n = solution.packed, solution.t.size
+    shapes = ((n, 3), (n, 3, 3), (n, 6), (n, 6), (n, 3), (n, 6), solution.lam.shape)
+    tracks = Tracks(*(np.zeros(shape) for shape in shapes))
+    W = workspace(packed.system, len(packed.signals))
+    motion = (solution.q, solution.v, solution.lam, solution.base, solution.signals)
+    track(packed.system, W, motion, marker, rows, tracks)
+    return tracks
+
+
+@kernel
+def track(s, W, motion, marker, rows, out):
+    """Fill the tracks."""
+    Q, V, L, base, signals = motion
+    for k in range(Q.shape[0]):
+        copy(signals[k], W.signal)
+        copy(base[k], W.base)
+        evaluate(s, W, Q[k], V[k])
+        copy(W.P[marker], out.position[k])
+        copy(W.E[marker], out.axes[k])
+        copy(W.V[marker], out.twist[k])
+        copy(W.value, out.gap[k])
+        for row in rows:
+            for p in range(6):
+                out.reaction[k, p] -= L[k, row] * W.g[row, 6 + p]
+        out.energy[k, 1] = spring_energy(s, W) + stop_energy(s, W)
+        out.energy[k, 1] += bushing_energy(s, W) + contact_energy(s, W)
+        out.energy[k, 1] += nonlinear_energy(s, W, Q[k], V[k])
+        for b in range(s.bodies.mass.size):
+            kinetic, strain, height = body_energy(s.bodies, W, b, Q[k], V[k])
+            out.energy[k, 0] += kinetic
+            out.energy[k, 1] += strain
+            out.energy[k, 2] += height
+            body_momentum(s.bodies, W, b, Q[k], V[k], out.momentum[k])
+
+
+@inner
+def body_momentum(bodies, W, b, q, v, out):
+    """Add linear momentum, and angular momentum about the world origin, of body b."""
+    t, r, A = bodies.v_at[b], bodies.r[b], W.A[b]
+    w, d, u = vec(v, t + 3), vec(W.d[b], 0), mtv(A, vec(v, t))
+    linear = add(scale(bodies.mass[b], u), add(cross(w, d), vec(W.dd[b], 0)))
+    angular = add(cross(d, u), mv(W.J[b], w))
+    for k in range(r):
+        angular = add(angular, scale(v[t + 6 + k], dual(W.SP[b, k], 0)))
+    p = mv(A, linear)
+    put(out, 0, p)
+    put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))

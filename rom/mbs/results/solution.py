@@ -1,0 +1,312 @@
+"""What a run leaves behind, and the questions it answers."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed, vector
+from rom.errors import ConfigError
+from rom.mbs.equations.packing import Packed
+from rom.mbs.kernels.system import WORK
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.signals import sample_all
+from rom.mbs.results.interface_loads import marker_loads, of_body
+from rom.mbs.results.interpolation import Point, between
+from rom.mbs.results.recomputed import Tracks, follow
+from rom.mbs.results.state import State
+from rom.model import Array
+from rom.notebook import html_table, listed
+from rom.rotation import matrix
+
+
+@dataclass(frozen=True)
+class Occurrences:
+    """When an event happened.
+
+    Attributes:
+        t: (k,) times [s].
+        q, v: (k, n_q), (k, n) coordinates and velocities then.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies and works over time, each (n_t,) [J]; works count from the start.
+
+    Attributes:
+        kinetic: of all bodies.
+        strain: elastic energy of bodies, springs, bushings, stops and contacts.
+        potential: of gravity.
+        drives: work done by drives and motors.
+        forces: work done by forces, torques and user forces.
+        damping: work lost in dampers, friction and impacts.
+    """
+
+    kinetic: Array
+    strain: Array
+    potential: Array
+    drives: Array
+    forces: Array
+    damping: Array
+
+    @property
+    def total(self) -> Array:
+        """Mechanical energy: kinetic, strain and potential."""
+        return self.kinetic + self.strain + self.potential
+
+    @property
+    def balance(self) -> Array:
+        """Mechanical energy gained minus work put in; zero for an exact motion."""
+        supplied = self.drives + self.forces - self.damping
+        return self.total - self.total[0] - supplied
+
+
+@typed
+@dataclass(frozen=True)
+class Solution:
+    """Motion of a mechanism.
+
+    Attributes:
+        mechanism: what moved.
+        packed: its arrays.
+        t: (n_t,) times [s].
+        q, v, a: (n_t, n_q), (n_t, n), (n_t, n) coordinates, velocities, accelerations, see
+            `rom.mbs.results.state.State`.
+        lam: (n_t, m) constraint multipliers.
+        work: (n_t, 3) work of drives, of forces, lost in dampers [J].
+        base: (n_t, c) joint coordinates that forces or couplings act on, angles counted over
+            whole turns [m, or rad].
+        signals: (n_t, s, 3) prescribed functions of time.
+        statistics: steps, iterations, times.
+        status: one sentence on how the run ended.
+        final: the last state, from which a run can go on.
+        events: when each event of the mechanism happened, by name.
+    """
+
+    mechanism: Mechanism
+    packed: Packed
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    lam: Array
+    work: Array
+    base: Array
+    signals: Array
+    statistics: dict[str, Any]
+    status: str
+    final: State
+    events: dict[str, Occurrences] = field(default_factory=dict)
+    _tracks: dict[Any, Tracks] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"Solution({self.t.size} instants, {self.t[0]:g} to {self.t[-1]:g} s, bodies "
+            f"{listed(self.packed.names)}: {self.status})"
+        )
+
+    def _repr_html_(self) -> str:
+        plain = [(key, x) for key, x in self.statistics.items() if isinstance(x, int | float | str)]
+        happened = [
+            (f"event {name}", f"{len(found.t)} times") for name, found in self.events.items()
+        ]
+        rows = [
+            ("time [s]", f"{self.t[0]:g} to {self.t[-1]:g}"),
+            ("instants", self.t.size),
+            ("bodies", listed(self.packed.names)),
+            ("joints and drives", listed(dict.fromkeys(self.packed.row_owner))),
+            *plain,
+            *happened,
+        ]
+        return html_table(f"Motion. {self.status}", ("", ""), rows)
+
+    def at(self, t: Any) -> "Solution":
+        """The motion at other times, with everything that can be asked of a solution.
+
+        Cubic Hermite polynomials between the saved instants, see `rom.mbs.results.interpolation`;
+        multipliers, works and followed joint coordinates are linear there.
+
+        Args:
+            t: a time or (k,) times within the motion [s].
+
+        Raises:
+            ConfigError: for a time outside of it.
+        """
+        t = vector("t", t)
+        outside = ~((t >= self.t[0]) & (t <= self.t[-1]))
+        if outside.any():
+            raise ConfigError(
+                f"t = {t[outside][0]:g} s is not within the motion from {self.t[0]:g} s to "
+                f"{self.t[-1]:g} s."
+            )
+        left = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.t.size - 2)
+        rows = zip(left, t, strict=True)
+        curves = (
+            between(self.packed.system, self._point(k), self._point(k + 1), x) for k, x in rows
+        )
+        q, v, a = (np.array(x) for x in zip(*curves, strict=True))
+        share = ((t - self.t[left]) / (self.t[left + 1] - self.t[left]))[:, None]
+        lines = (self.lam, self.work, self.base)
+        lam, work, base = (x[left] + share * (x[left + 1] - x[left]) for x in lines)
+        span, spacing = (self.t[0], self.t[-1]), 0.01 * (self.t[-1] - self.t[0]) / (self.t.size - 1)
+        signals = sample_all(self.packed.signals, t, span, spacing)
+        motion = {"q": q, "v": v, "a": a, "lam": lam, "work": work, "base": base}
+        return replace(self, t=t, **motion, signals=signals, _tracks={})
+
+    def _point(self, k: int) -> Point:
+        return Point(self.t[k], self.q[k], self.v[k], self.a[k])
+
+    def position(self, body: str, marker: Any = None) -> Array:
+        """(n_t, 3) position of a marker, or of the body origin [m]."""
+        if marker is None:
+            at = self._start_of(body)
+            return self.q[:, at : at + 3]
+        return self._track(body, marker).position
+
+    def velocity(self, body: str, marker: Any = None) -> Array:
+        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]."""
+        if marker is None:
+            at = self._start_of(body, velocity=True)
+            return self.v[:, at : at + 3]
+        return self._track(body, marker).twist[:, :3]
+
+    def axes(self, body: str, marker: Any) -> Array:
+        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included."""
+        return self._track(body, marker).axes
+
+    def orientation(self, body: str) -> Array:
+        """(n_t, 4) quaternion of the body frame."""
+        at = self._start_of(body)
+        return self.q[:, at + 3 : at + 7]
+
+    def omega(self, body: str) -> Array:
+        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]."""
+        at = self._start_of(body, velocity=True)
+        return self.v[:, at + 3 : at + 6]
+
+    def elastic(self, body: str) -> Array:
+        """(n_t, r) elastic coordinates."""
+        at = self._start_of(body)
+        return self.q[:, at + 7 : at + 7 + self.mechanism.part(body).r]
+
+    def stress(self, body: str, instant: int) -> Array:
+        """(p, 6) stress xx, yy, zz, yz, xz, xy on the surface of a flexible body [Pa].
+
+        In the axes of the body; modes that its reduction left out follow its inertia without
+        delay, if the body knows them.
+
+        Args:
+            body: name of a body reduced with ``stress=True``.
+            instant: row of ``t``.
+
+        Raises:
+            ConfigError: if the stress of the body cannot be recovered.
+        """
+        part: Any = self.mechanism.part(body)
+        recovery = getattr(part.flexible, "stress", None) if part.r else None
+        if recovery is None:
+            raise ConfigError(
+                f"the stress of body {body!r} cannot be recovered.",
+                hint="Reduce it with stress=True.",
+            )
+        q, moving = self.elastic(body)[instant], None
+        if recovery.inertial is not None:
+            at, A = self._start_of(body, velocity=True), matrix(self.orientation(body)[instant])
+            a = self.a[instant, at : at + 6 + part.r]
+            a_minus_g = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
+            moving = recovery.accelerations(a_minus_g, a[3:6], self.omega(body)[instant], a[6:])
+        found: Array = recovery.field(q, moving)
+        return found
+
+    def reaction(self, name: str) -> Array:
+        """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.
+
+        The moment is about the second marker. A drive is counted apart from its joint.
+        """
+        rows = self.packed.rows_of(name)
+        if not rows.size:
+            raise ConfigError(
+                f"no joint or drive {name!r}; there are {sorted(set(self.packed.row_owner))}."
+            )
+        return self._follow(rows=rows).reaction
+
+    def drive_load(self, name: str) -> Array:
+        """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
+        if name not in self.mechanism.drives:
+            raise ConfigError(f"no drive {name!r}; there are {sorted(self.mechanism.drives)}.")
+        load: Array = -self.lam[:, self.packed.rows_of(name)[0]]
+        return load
+
+    def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
+        """Loads on each marker of a body: joints, drives, springs, contacts, loads together.
+
+        With gravity they are all that moves the body; on an interface of a flexible body they are
+        the load history for a stress or fatigue analysis of the part.
+
+        Args:
+            body: name of a body, or "ground".
+            frame: axes, of the "world" or of the "body".
+
+        Returns:
+            {marker: (n_t, 6) force [N] and moment about the marker [N m]}, without markers that
+            carry nothing.
+
+        Raises:
+            ConfigError: for an unknown body or frame.
+        """
+        self.mechanism.part(body)
+        if frame not in ("world", "body"):
+            raise ConfigError(f"frame is {frame!r}; it is 'world' or 'body'.")
+        return of_body(self, body, self._marker_loads, frame)
+
+    @cached_property
+    def _marker_loads(self) -> tuple[Array, Array]:
+        return marker_loads(self)
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Energies and works over time."""
+        energy = self._follow().energy
+        works = {name: self.work[:, k] for k, name in enumerate(WORK)}
+        return Energy(energy[:, 0], energy[:, 1], energy[:, 2], **works)
+
+    @cached_property
+    def gap(self) -> Array:
+        """(n_t, m) residuals of the constraints [m, or 1]."""
+        return self._follow().gap
+
+    @cached_property
+    def momentum(self) -> tuple[Array, Array]:
+        """(n_t, 3) linear momentum and (n_t, 3) angular momentum about the world origin."""
+        tracks = self._follow()
+        return tracks.momentum[:, :3], tracks.momentum[:, 3:]
+
+    def _follow(self, marker: int = 0, rows: Any = ()) -> Tracks:
+        key = (marker, tuple(rows))
+        if key not in self._tracks:
+            self._tracks[key] = follow(self, marker, np.array(rows, dtype=np.int64))
+        return self._tracks[key]
+
+    def _start_of(self, body: str, *, velocity: bool = False) -> int:
+        if body not in self.packed.names:
+            raise ConfigError(f"no body {body!r}; the mechanism has {sorted(self.packed.names)}.")
+        bodies = self.packed.system.bodies
+        starts = bodies.v_at if velocity else bodies.q_at
+        return int(starts[self.packed.names.index(body)])
+
+    def _track(self, body: str, place: Any) -> Tracks:
+        self._start_of(body)
+        marker = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
+        if marker not in self.packed.markers:
+            raise ConfigError(
+                f"the point {marker.place} of body {body!r} was not a marker of the run.",
+                hint="Name it when the body is added.",
+            )
+        return self._follow(self.packed.row(marker))

@@ -1,0 +1,55 @@
+"""A mechanism at one instant, and what a method remembers beside it."""
+
+from dataclasses import dataclass, field
+
+from rom.arguments import typed
+from rom.model import Array
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What an implicit method remembers beside the state: with it, a run goes on bit for bit.
+
+    Attributes:
+        method: name of the method.
+        h: length of the last step [s].
+        origin: time from which steps are counted [s].
+        taken: steps since then.
+        arrays: the factorised iteration matrix and what belongs to it.
+    """
+
+    method: str
+    h: float
+    origin: float
+    taken: int
+    arrays: dict[str, Array] = field(repr=False)
+
+
+@typed
+@dataclass(frozen=True)
+class State:
+    """A mechanism at one instant.
+
+    Attributes:
+        t: time [s].
+        q: (n_q,) per body: origin (3), quaternion (4), elastic coordinates (r).
+        v: (n,) per body: velocity of the origin, world (3), angular velocity, body frame (3),
+            elastic rates (r).
+        a: (n,) rates of v.
+        lam: (m,) multipliers of the constraints.
+        rank: number of independent constraints.
+        algorithmic: (n,) acceleration-like variable of generalised-alpha, None at a fresh start.
+        base: (c,) joint coordinates that forces or couplings act on, angles counted over whole
+            turns; None: as measured.
+        memory: of the method that arrived here; None at a fresh start.
+    """
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    lam: Array
+    rank: int
+    algorithmic: Array | None = None
+    base: Array | None = None
+    memory: Memory | None = None

@@ -1,0 +1,124 @@
+"""Does a motion stay where linear elasticity in a floating frame holds? If not, it says so."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom import rotation
+from rom.errors import RomWarning
+from rom.mbs.kernels.system import ANGLE
+from rom.mbs.results.solution import Solution
+from rom.model import Array
+
+# of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
+MAX_DEFORMATION = 0.1
+
+
+def warn_of_limits(solution: Solution) -> None:
+    """Warn of bodies that left small deformations, or turned too fast for stiffness or step."""
+    _warn_of_lost_turns(solution)
+    for name, part in solution.mechanism.parts.items():
+        if not part.r:
+            continue
+        share, bent = softening(solution, name), deformation(solution, name, surface=False)
+        if share >= 1.0:
+            top = np.linalg.norm(solution.omega(name), axis=1).max()
+            _warn(
+                f"body {name!r} turned at {top:.3g} rad/s; at {top / share:.3g} rad/s centrifugal "
+                "force has used up the stiffness of a body without geometric stiffness, which this "
+                "one lacks: its deformation is wrong. Reduce it with stiffening=True."
+            )
+        if bent > MAX_DEFORMATION:
+            _warn(
+                f"body {name!r} deformed by {bent:.2g} of its size and left the range of small "
+                "elastic deformation; its motion is no longer to be trusted. Divide it into "
+                "several bodies, or look for a load or drive that is too large."
+            )
+
+
+def _warn_of_lost_turns(solution: Solution) -> None:
+    """Angles of joints are followed from step to step, which cannot tell more than half a turn."""
+    steps = solution.statistics.get("steps", 0)
+    if not steps:
+        return
+    h = (solution.t[-1] - solution.t[0]) / steps
+    C, body = solution.packed.system.coordinates, solution.packed.system.markers.body
+    for k in np.flatnonzero(C.kind == ANGLE):
+        i, j = int(body[C.i[k]]), int(body[C.j[k]])
+        if h * (_top(solution, i) + _top(solution, j)) < np.pi:
+            continue
+        rate = np.linalg.norm(_spin(solution, j) - _spin(solution, i), axis=1)
+        rate = rate[np.isfinite(rate)].max(initial=0.0)
+        if rate * h >= np.pi:
+            names = [solution.packed.names[b] if b >= 0 else "ground" for b in (i, j)]
+            _warn(
+                f"body {names[1]!r} turned by {rate * h:.3g} rad a step against {names[0]!r}: the "
+                "angle of their joint loses whole turns beyond pi, and with it the spring, motor, "
+                f"gear or stop that acts on it is wrong. Take steps below {np.pi / rate:.3g} s."
+            )
+
+
+def _top(solution: Solution, body: int) -> float:
+    """Largest angular speed of a body, -1 for the ground."""
+    if body < 0:
+        return 0.0
+    omega = solution.omega(solution.packed.names[body])
+    return float(np.nanmax(np.linalg.norm(omega, axis=1), initial=0.0))
+
+
+def _spin(solution: Solution, body: int) -> Array:
+    """(n_t, 3) angular velocity of a body in the world, -1 for the ground."""
+    if body < 0:
+        return np.zeros((solution.t.size, 3))
+    name = solution.packed.names[body]
+    axes = (rotation.matrix(p) for p in solution.orientation(name))
+    return np.array([A @ w for A, w in zip(axes, solution.omega(name), strict=True)])
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, RomWarning, stacklevel=4)
+
+
+def softening(solution: Solution, name: str) -> float:
+    """Largest angular speed over the one that makes K - omega^2 (M - S_ee) singular.
+
+    S_ee is the mass along the axis. Zero for a body with geometric stiffness, which rotation
+    stiffens more than it softens.
+    """
+    part = solution.mechanism.parts[name]
+    body, omega = part.flexible, solution.omega(name)
+    omega = omega[np.isfinite(omega).all(axis=1)]
+    if body.K_geo or not omega.size:
+        return 0.0
+    w = omega[np.argmax(np.linalg.norm(omega, axis=1))]
+    pull = w @ w * np.asarray(body.M) - np.einsum("a,abkl,b->kl", w, body.S_kl, w)
+    try:
+        largest = eigh(0.5 * (pull + pull.T), body.K, eigvals_only=True)[-1]
+    except np.linalg.LinAlgError:  # a shape without stiffness
+        return 0.0
+    return float(np.sqrt(max(largest, 0.0)))
+
+
+def deformation(solution: Solution, name: str, *, surface: bool = True) -> float:
+    """Largest elastic displacement relative to the size of the body.
+
+    Args:
+        solution: the motion.
+        name: of the body.
+        surface: look at all points of the outer surface, not only at the interfaces.
+    """
+    part: Any = solution.mechanism.parts[name]
+    body, q = part.flexible, solution.elastic(name)
+    shapes: list[Array] = [np.asarray(m.translation) for m in body.markers.values()]
+    drawn = getattr(body, "surface", None)
+    if surface and drawn is not None:
+        shapes += [np.asarray(drawn.shape).reshape(-1, 3, part.r)]
+    table = np.concatenate([np.zeros((1, 3, part.r)), *(s.reshape(-1, 3, part.r) for s in shapes)])
+    size = body.size if hasattr(body, "size") else solution.packed.length
+    largest = 0.0
+    for block in np.array_split(q, max(1, q.shape[0] * table.size // 10_000_000)):
+        u = np.einsum("pak,tk->tpa", table, block)
+        largest = max(largest, np.linalg.norm(u, axis=2).max(initial=0.0))
+    return largest / size

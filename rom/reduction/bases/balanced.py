@@ -1,0 +1,171 @@
+"""Second-order balanced truncation: what is both moved by the input and felt at the output."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr, solve_continuous_lyapunov, svd
+
+from rom.arguments import typed, whole
+from rom.eigen.verbs import Operators
+from rom.errors import ConfigError, ModelError, ResourceError
+from rom.model import Array, Basis, Index
+from rom.reduction.bases.fixed_interface import constraint_modes
+from rom.reduction.bases.free_interface import numbered
+
+MAX_COORDINATES = 600  # a Lyapunov equation of twice the size is solved in seconds up to here
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class BalancedTruncation:
+    """Constraint modes, and those combinations of fixed-interface modes that the interfaces know.
+
+    Of a pool of fixed-interface modes with modal damping, moved by accelerations of the interfaces
+    and felt by their reactions, the combinations with the largest singular values stay.
+    The projection is one-sided, so that stiffness and mass stay symmetric and frequencies upper
+    bounds.
+
+    Attributes:
+        n_modes: number of combinations kept.
+        pool: number of fixed-interface modes to choose from; None for three times as many.
+        damping_ratio: modal damping of the pool, for the choice only.
+
+    Source:
+        Chahlaoui, Lemonnier, Vandendorpe and Van Dooren, Second-order balanced truncation, Linear
+        Algebra Appl. 415 (2006) 373.
+    """
+
+    n_modes: int
+    pool: int | None = None
+    damping_ratio: float = 0.01
+
+    def __post_init__(self) -> None:
+        whole("n_modes", self.n_modes)
+        if self.pool is not None:
+            whole("pool", self.pool)
+            if self.pool < self.n_modes:
+                raise ConfigError(f"pool = {self.pool} is less than n_modes = {self.n_modes}.")
+        if not 0.0 < self.damping_ratio < 1.0:
+            raise ConfigError(f"damping_ratio = {self.damping_ratio!r} is not between 0 and 1.")
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis; interface columns first.
+
+        Raises:
+            ConfigError: without an interface, or for a pool beyond the dofs.
+            ResourceError: for a pool too large for dense equations.
+            InterfaceError: if the interfaces leave a rigid motion free.
+        """
+        if boundary.size == 0:
+            raise ConfigError("the method holds the interfaces of the body, and none is given.")
+        held = ops.hold(boundary)
+        Psi_b = constraint_modes(ops, held, boundary)
+        pool = min(3 * self.n_modes if self.pool is None else self.pool, held.n_free)
+        if self.n_modes > held.n_free:
+            raise ConfigError(f"n_modes = {self.n_modes}, but {held.n_free} dofs are free.")
+        omega, Phi = ops.modes(held, pool)
+        if not omega.size:
+            return Basis(Psi_b, omega, labels)
+        L = ops.gram(Phi, ops.apply_M(Psi_b))  # participation: how interfaces drive the modes
+        K, D = np.diag(omega**2), np.diag(2 * self.damping_ratio * omega)
+        S, R = _gramian_factors(K, np.eye(pool), D, L, L.T * omega**2)
+        X = R @ svd(S.T @ R)[2].T
+        V = qr(X[:, : self.n_modes], mode="economic")[0]
+        lam, Y = np.linalg.eigh(V.T @ K @ V)
+        names = numbered("balanced", lam.size)
+        return Basis(np.hstack([Psi_b, Phi @ V @ Y]), np.sqrt(lam), (*labels, *names))
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrderSystem:
+    """M x'' + D x' + K x = B u, y = C x.
+
+    Attributes:
+        K, M, D: (n, n) stiffness, mass, damping.
+        B: (n, p) input.
+        C: (q, n) output.
+        singular_values: of the system it was reduced from, descending; roots of the eigenvalues
+            of position controllability times velocity observability.
+    """
+
+    K: Array
+    M: Array
+    D: Array
+    B: Array
+    C: Array
+    singular_values: Array
+
+
+@typed
+def second_order_balanced_truncation(
+    K: Array, M: Array, D: Array, B: Array, C: Array, r: int
+) -> SecondOrderSystem:
+    """Reduce a small second-order system to its r most controllable and observable positions.
+
+    Args:
+        K: (n, n) stiffness of a stable system.
+        M: (n, n) mass.
+        D: (n, n) damping.
+        B: (n, p) input.
+        C: (q, n) position output.
+        r: number of coordinates kept.
+
+    Raises:
+        ConfigError: if the shapes or r do not fit.
+        ResourceError: for more than 600 coordinates.
+        ModelError: if the system is not stable.
+
+    Source:
+        Chahlaoui, Lemonnier, Vandendorpe and Van Dooren, Linear Algebra Appl. 415 (2006) 373.
+    """
+    K, M, D, B, C = (np.atleast_2d(np.asarray(A, dtype=float)) for A in (K, M, D, B, C))
+    n = K.shape[0]
+    if any(A.shape != (n, n) for A in (K, M, D)) or B.shape[0] != n or C.shape[1] != n:
+        raise ConfigError(
+            f"shapes do not fit: K {K.shape}, M {M.shape}, D {D.shape}, B {B.shape}, C {C.shape}."
+        )
+    whole("r", r)
+    if not 1 <= r <= n:
+        raise ConfigError(f"r = {r}, but the system has {n} coordinates.")
+    S, R = _gramian_factors(K, M, D, B, C)
+    U, sigma, Vt = svd(S.T @ R)
+    if sigma[r - 1] <= np.finfo(float).eps * sigma[0]:
+        raise ConfigError(
+            f"r = {r}, but only {np.count_nonzero(sigma > np.finfo(float).eps * sigma[0])} "
+            "coordinates are both controllable and observable."
+        )
+    right = R @ Vt[:r].T / np.sqrt(sigma[:r])
+    left = S @ U[:, :r] / np.sqrt(sigma[:r])  # left^T right = 1
+    M_inverse = np.linalg.inv(M)
+    K_r, D_r = (left.T @ M_inverse @ A @ right for A in (K, D))
+    return SecondOrderSystem(K_r, np.eye(r), D_r, left.T @ M_inverse @ B, C @ right, sigma)
+
+
+def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[Array, Array]:
+    """Factors of Gramians: velocity observability S S^T, position controllability R R^T."""
+    n = K.shape[0]
+    if n > MAX_COORDINATES:
+        raise ResourceError(
+            f"{n} coordinates make a dense Lyapunov equation of {2 * n}; it is refused above "
+            f"{MAX_COORDINATES}.",
+            hint="Reduce with CraigBampton first, or choose a smaller pool.",
+        )
+    scale = np.sqrt(np.linalg.norm(np.linalg.solve(M, K), 2))  # of time, for the conditioning
+    A = np.block(
+        [[np.zeros((n, n)), np.eye(n)],
+         [-np.linalg.solve(M, K) / scale**2, -np.linalg.solve(M, D) / scale]]
+    )  # fmt: skip
+    if np.linalg.eigvals(A).real.max() >= 0.0:
+        raise ModelError("the system is not stable: its Gramians do not exist.")
+    b = np.vstack([np.zeros_like(B), np.linalg.solve(M, B) / scale**2])
+    c = np.hstack([C, np.zeros_like(C)])
+    P = solve_continuous_lyapunov(A, -b @ b.T)[:n, :n]
+    Q = solve_continuous_lyapunov(A.T, -c.T @ c)
+    return _factor(Q[n:, n:] / scale**3), _factor(P * scale)
+
+
+def _factor(P: Array) -> Array:
+    """F with P = F F^T of a semi-definite P."""
+    lam, V = np.linalg.eigh(0.5 * (P + P.T))
+    F: Array = V * np.sqrt(np.maximum(lam, 0.0))
+    return F

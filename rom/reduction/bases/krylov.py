@@ -1,0 +1,91 @@
+"""Moment matching: a rational Krylov space that is exact at chosen frequencies."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rom.arguments import typed, whole
+from rom.eigen.verbs import Operators
+from rom.errors import ConfigError, SolverError
+from rom.model import Basis, Index
+from rom.reduction.bases.fixed_interface import unit_motions
+from rom.reduction.bases.free_interface import numbered, without_dependent
+
+RESONANCE_RTOL = 1e-8  # distance of a frequency from a mode
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class MomentMatching:
+    """Constraint modes, and the answers to moving interfaces at chosen frequencies.
+
+    At s = (2 pi f)^2 the interior follows the interfaces by (K_ii - s M_ii) x = -(K_ib - s M_ib);
+    x and its first derivatives with respect to s join the constraint modes. By Galerkin's
+    symmetry the dynamic stiffness that the interfaces feel is matched to twice as many
+    derivatives. Statics stays exact because the constraint modes stay.
+
+    Attributes:
+        frequencies: (k,) where to be exact [Hz]; 0 is allowed and costs no other factor.
+        order: blocks of vectors per frequency, 1 or more.
+
+    Source:
+        Grimme, Krylov projection methods for model reduction, thesis, Urbana-Champaign (1997);
+        for second-order systems Bai and Su, SIAM J. Sci. Comput. 26 (2005) 1692.
+    """
+
+    frequencies: tuple[float, ...] = (0.0,)
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        whole("order", self.order, 1)
+        f = np.asarray(self.frequencies, dtype=float)
+        if not f.size:
+            raise ConfigError("MomentMatching needs a frequency.")
+        if not (np.isfinite(f) & (f >= 0)).all() or np.unique(f).size < f.size:
+            raise ConfigError(
+                f"frequencies = {self.frequencies!r}: needed are different numbers from 0 Hz."
+            )
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis; interface columns first, then combinations that are modes of the inner part.
+
+        Raises:
+            ConfigError: without an interface.
+            InterfaceError: if the interfaces leave a rigid motion free.
+            SolverError: if a frequency is a natural one of the body with its interfaces held.
+        """
+        if boundary.size == 0:
+            raise ConfigError("the method holds the interfaces of the body, and none is given.")
+        E = unit_motions(ops, boundary)
+        blocks, Psi_b = [], E - ops.hold(boundary)(ops.apply_K(E))
+        for f in self.frequencies:
+            s = (2 * np.pi * f) ** 2
+            held = ops.hold(boundary, s)
+            X = Psi_b
+            if s:
+                _refuse_resonance(ops, held, s, f)
+                X = E - held(ops.apply_K(E) - s * ops.apply_M(E))
+                blocks.append(X - Psi_b)
+            for _ in range(self.order - (s > 0)):
+                X = held(ops.apply_M(X))
+                blocks.append(X)
+        inner, _ = without_dependent(ops, np.hstack(blocks))
+        K = ops.gram(inner, ops.apply_K(inner))
+        lam, V = np.linalg.eigh(0.5 * (K + K.T))
+        names = numbered("moment", lam.size)
+        return Basis(np.hstack([Psi_b, inner @ V]), np.sqrt(lam), (*labels, *names))
+
+
+def _refuse_resonance(ops: Operators, held: object, s: float, f: float) -> None:
+    """Two inverse iterations find an eigenvalue that is as close as round-off."""
+    X = np.sin(1.0 + np.arange(ops.first, ops.first + ops.n_local))[:, None]
+    for _ in range(2):
+        X = held(ops.apply_M(X))  # type: ignore[operator]
+        X = X / np.sqrt(ops.gram(X, ops.apply_M(X)).item())
+    gap = ops.gram(X, ops.apply_K(X)).item() - s
+    if abs(gap) < RESONANCE_RTOL * s:
+        raise SolverError(
+            f"{f:g} Hz is a natural frequency of the body with its interfaces held: its answer "
+            "there is infinite.",
+            hint="Choose a frequency beside it.",
+        )

@@ -1,0 +1,132 @@
+"""Reduction methods as small records: what `rom.reduce` is asked to do."""
+
+import warnings
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from rom.arguments import typed, whole
+from rom.eigen.verbs import Held, Operators, whole_clusters
+from rom.errors import ConfigError, RomWarning
+from rom.model import Array, Basis, Index
+from rom.reduction.bases.fixed_interface import constraint_modes
+from rom.reduction.bases.selection import enough_modes
+
+FIRST_BATCH = 16  # modes computed first when a frequency limit is given
+
+
+class Method(Protocol):
+    """What `rom.reduce` needs of a method."""
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates; boundary columns first."""
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class Guyan:
+    """Constraint modes alone: exact statics, mass condensed to the interfaces.
+
+    Source:
+        Guyan, Reduction of stiffness and mass matrices, AIAA J. 3 (1965) 380.
+    """
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates."""
+        return CraigBampton(n_modes=0).basis(ops, boundary, labels)
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class CraigBampton:
+    """Constraint modes of the interface coordinates and fixed-interface normal modes.
+
+    Attributes:
+        n_modes: number of fixed-interface modes; a repeated frequency is kept whole.
+        f_max: alternatively, keep all fixed-interface modes up to this frequency [Hz].
+        tol: with f_max, keep instead the fewest modes whose estimated error of every natural
+            frequency of the free body up to f_max is at most this, e.g. 1e-3.
+
+    Source:
+        Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
+    """
+
+    n_modes: int | None = None
+    f_max: float | None = None
+    tol: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.n_modes is None) == (self.f_max is None):
+            raise ConfigError("CraigBampton needs either n_modes or f_max.")
+        if self.n_modes is not None:
+            whole("n_modes", self.n_modes)
+        if self.f_max is not None and not (np.isfinite(self.f_max) and self.f_max > 0):
+            raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
+        if self.tol is not None and (self.f_max is None or not 0 < self.tol < 1):
+            raise ConfigError(
+                f"tol = {self.tol!r} is a relative error between 0 and 1, and needs f_max."
+            )
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates; boundary columns first.
+
+        Raises:
+            ConfigError: without any interface.
+            InterfaceError: if the interfaces leave a rigid motion free.
+            ModesMissedError: if the inertia count says that a mode was skipped.
+        """
+        if boundary.size == 0:
+            raise ConfigError(
+                "Craig-Bampton holds the interfaces of the body, and none is given.",
+                hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
+            )
+        held = ops.hold(boundary)
+        Psi_b = constraint_modes(ops, held, boundary)
+        if self.tol is None or self.f_max is None:
+            omega, Phi = self._normal_modes(ops, held)
+        else:
+            band = 2 * np.pi * self.f_max
+            omega, Phi = enough_modes(ops, held, Psi_b, band, self.tol, FIRST_BATCH)
+        normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
+        return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal))
+
+    def _normal_modes(self, ops: Operators, held: Held) -> tuple[Array, Array]:
+        if self.n_modes is not None:
+            if self.n_modes > held.n_free:
+                raise ConfigError(
+                    f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
+                )
+            return _lowest(ops, held, int(self.n_modes))
+        limit = 2 * np.pi * (np.inf if self.f_max is None else self.f_max)
+        m = min(FIRST_BATCH, held.n_free)
+        omega, Phi = ops.modes(held, m)
+        while omega.size and omega[-1] <= limit and m < held.n_free:
+            m = min(2 * m, held.n_free)
+            omega, Phi = ops.modes(held, m)
+        keep = int(np.searchsorted(omega, limit, side="right"))
+        return omega[:keep], Phi[:, :keep]
+
+
+def _lowest(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
+    """The lowest fixed-interface modes, and those beyond that share the last frequency.
+
+    Which member of a repeated frequency comes first is an accident of round-off; a basis that cut
+    it in two would differ from run to run.
+    """
+    if n_modes == 0:
+        return ops.modes(held, 0)
+    n, keep = n_modes, n_modes
+    while keep == n and n < held.n_free:  # the last frequency may go on beyond the modes computed
+        n = min(n + 1 if n == n_modes else n + 4, held.n_free)
+        omega, Phi = ops.modes(held, n, finished=True)
+        keep = whole_clusters(omega**2, n_modes)
+    if n == n_modes:  # there are no others
+        return ops.modes(held, n, finished=True)
+    if keep > n_modes and ops.first == 0:
+        message = (
+            f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share the "
+            f"frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
+        )
+        warnings.warn(RomWarning(message), stacklevel=4)
+    return omega[:keep], Phi[:, :keep]

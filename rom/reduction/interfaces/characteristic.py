@@ -1,0 +1,132 @@
+"""Few functions for the full interfaces of one body, computed from its own constraint modes."""
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import eigh, null_space, orth
+from scipy.sparse import identity, kron
+
+from rom.arguments import typed, whole
+from rom.eigen.verbs import Operators, given_rigid_motions, rigid_motions, whole_clusters
+from rom.errors import ConfigError
+from rom.model import Array, Interface
+from rom.reduction.bases.method import Guyan, Method
+from rom.reduction.interfaces.polynomial import orthonormal_in
+
+if TYPE_CHECKING:
+    from rom.reduction.interfaces.records import Connection
+
+log = logging.getLogger("rom")
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class Characteristic:
+    """A method whose full interfaces follow characteristic constraint modes.
+
+    With the constraint modes Psi_b of the full interfaces, K_bb = Psi_b^T K Psi_b and M_bb alike,
+    the lowest modes of K_bb chi = lambda M_bb chi are the motions of the interfaces that matter at
+    low frequency. Every interface takes its part of them after the six rigid motions; interfaces
+    of other kinds are held meanwhile and keep their coordinates. All constraint modes are solved
+    once to find the functions, which costs what polynomials spare. Two bodies would choose
+    different functions for an interface they share: couple full ones, `Assembly.reduced`.
+
+    Attributes:
+        method: what reduces the body then, for example ``CraigBampton(20)``.
+        n: number of functions of every full interface, six rigid motions among them.
+
+    Source:
+        Castanier, Tan and Pierre, Characteristic constraint modes for component mode synthesis,
+        AIAA J. 39 (2001) 1182.
+    """
+
+    method: Method
+    n: int
+
+    def __post_init__(self) -> None:
+        whole("n", self.n, 6, reason="the rigid motions count")
+
+    def kinds(self, connection: "Connection", interfaces: dict[str, Any]) -> dict[str, Any]:
+        """The kinds of all interfaces, functions in the place of "full".
+
+        Args:
+            connection: the model in the coordinates of its interfaces.
+            interfaces: {name: kind} it was made with.
+
+        Raises:
+            ConfigError: without a full interface, or if n exceeds the dofs of one.
+            InterfaceError: if the interfaces leave a rigid motion free.
+        """
+        names = [name for name, tie in connection.ties.items() if tie.label == "full"]
+        if not names:
+            raise ConfigError(
+                "Characteristic reduces full interfaces, and none is given.",
+                hint='Name one, for example interfaces={"pin_a": "full"}.',
+            )
+        sizes = [connection.parts[name].size for name in names]
+        if self.n > min(sizes):
+            raise ConfigError(
+                f"n = {self.n}, but interface {names[int(np.argmin(sizes))]!r} has {min(sizes)} "
+                "coordinates."
+            )
+        ops, full = connection.ops, np.concatenate([connection.parts[name] for name in names])
+        basis = Guyan().basis(ops, connection.boundary, connection.labels)
+        rigid = ops.rows(given_rigid_motions(ops), connection.boundary[full])
+        lam, chi = _interface_modes(ops, basis.Psi[:, full], rigid)
+        ends, found = np.cumsum(sizes)[:-1], {}
+        for name, part, R in zip(names, np.split(chi, ends), np.split(rigid, ends), strict=True):
+            m = self._number(part, R)
+            kept = whole_clusters(lam, m) if m else 0
+            found[name] = CharacteristicFunctions(part[:, :kept])
+            if kept > m and ops.first == 0:
+                repeated = np.sqrt(lam[m - 1]) / (2 * np.pi)
+                log.info("interface %r: more than %d functions, %.4g Hz is repeated", name, self.n,
+                         repeated)  # fmt: skip
+        return interfaces | found
+
+    def _number(self, part: Array, rigid: Array) -> int:
+        """How many modes give an interface n functions; mirrored ends see some modes twice."""
+        X = np.hstack([rigid, part])
+        X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+        m = self.n - 6
+        while m < part.shape[1] and np.linalg.matrix_rank(X[:, : 6 + m], tol=1e-8) < self.n:
+            m += 1
+        return m
+
+
+def _interface_modes(ops: Operators, Psi: Array, rigid: Array) -> tuple[Array, Array]:
+    """Eigenvalues and modes (b, b - 6) of the interfaces that are M-orthogonal to rigid motion."""
+    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+    R = orth(rigid / np.linalg.norm(rigid, axis=0), rcond=1e-9)
+    Z = null_space(R.T @ M)
+    lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    return lam, Z @ V
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CharacteristicFunctions:
+    """Motions of one interface in the modes of all.
+
+    Attributes:
+        values: (3k, m) displacements of the dofs of the surface.
+    """
+
+    values: Array
+
+    def functions(self, interface: Interface) -> Array:
+        """(3k, n) rigid motions, then the modes; orthonormal over the area, none dependent."""
+        S = kron(interface.surface_mass, identity(3), format="csr")
+        motions = rigid_motions(interface.points - interface.points.mean(axis=0))
+        return orthonormal_in(S, np.hstack([motions, self.values]))
+
+
+class GivenFunctions(CharacteristicFunctions):
+    """Functions that are orthonormal over the area already, and taken as they are."""
+
+    __slots__ = ()
+
+    def functions(self, interface: Interface) -> Array:
+        """(3k, m) the values."""
+        return self.values

@@ -1,0 +1,130 @@
+"""Interfaces as coordinates: which few numbers stand for the many dofs of a surface.
+
+Each kind is a sparse map u = T a that is applied to K and M once. Everything after it (reduction,
+modes, certificate) sees an ordinary model whose interface coordinates are dofs of their own.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from rom.eigen.verbs import Operators, given_rigid_motions, rigid_motions
+from rom.errors import InterfaceError
+from rom.model import FEModel, Index, Interface
+from rom.names import named
+from rom.reduction.interfaces.kinds import tie
+from rom.reduction.interfaces.records import Connection, Tie
+
+
+def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Connection:
+    """Write a model in the coordinates of its interfaces.
+
+    Args:
+        ops: operators of the model in nodal dofs.
+        model: supplies the interfaces.
+        interfaces: {name: kind}; "full" keeps every dof, "rbe2" makes the surface rigid (six
+            coordinates), "rbe3" adds six coordinates that follow the area-weighted mean motion of
+            the surface and leave it deformable; `Polynomial`, `FourierLegendre` and `Snapshots`
+            let the surface follow orthogonal functions.
+
+    Raises:
+        InterfaceError: if a name is unknown, two interfaces share nodes, or a surface cannot carry
+            the functions asked for.
+        ConfigError: if a kind is unknown.
+        ResourceError: if an averaging interface has too many dofs.
+    """
+    chosen = found(model, interfaces)
+    _refuse_shared_nodes(chosen)
+    ties = {i.name: tie(i, interfaces[i.name]) for i in chosen}
+    if not any(t.removed.size for t in ties.values()):
+        return _connection(ops, ties, [interface.dofs for interface in chosen])
+    return _connection(_transform(ops, chosen, ties), ties, _numbers(ops.n, chosen, ties))
+
+
+def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
+    """The interfaces of these names.
+
+    Raises:
+        InterfaceError: listing those that do not exist and those that do.
+    """
+    names = list(names)
+    if unknown := [name for name in names if name not in model.interfaces]:
+        raise InterfaceError(
+            f"there is no interface {named(unknown)}; the model has {sorted(model.interfaces)}.",
+            hint="Interfaces are the named physical surfaces of the geometry.",
+        )
+    return [model.interfaces[name] for name in names]
+
+
+def _refuse_shared_nodes(interfaces: list[Interface]) -> None:
+    for i, one in enumerate(interfaces):
+        for other in interfaces[:i]:
+            shared = np.intersect1d(one.nodes, other.nodes).size
+            if shared:
+                raise InterfaceError(
+                    f"interfaces {other.name!r} and {one.name!r} share {shared} nodes; "
+                    "two rigid or averaged surfaces cannot both rule one node.",
+                    hint="Leave a gap between the surfaces, or make them one physical surface.",
+                )
+
+
+def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) -> Operators:
+    """Kept dofs keep their order and their rank; masters come last, on the last rank."""
+    removed = np.sort(np.concatenate([t.removed for t in ties.values()]))
+    mine = np.arange(ops.first, ops.first + ops.n_local)
+    stays = ~np.isin(mine, removed)
+    n_masters = sum(t.n_masters for t in ties.values())
+    n_kept = ops.n - removed.size
+    rows, columns, values = [np.flatnonzero(stays)], [_renumber(mine[stays], removed)], []
+    values.append(np.ones(rows[0].size))
+    first_master = n_kept
+    for t in ties.values():
+        here = (t.removed >= ops.first) & (t.removed < ops.first + ops.n_local)
+        row = t.removed[here] - ops.first
+        masters = first_master + np.arange(t.n_masters)
+        for block, column in (
+            (t.by_masters, masters),
+            (t.by_kept, _renumber(t.kept, removed)),
+        ):
+            rows.append(np.repeat(row, column.size))
+            columns.append(np.tile(column, row.size))
+            values.append(block[here].ravel())
+        first_master += t.n_masters
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    T = csr_matrix(coo_matrix(entries, shape=(ops.n_local, n_kept + n_masters)))
+    T.eliminate_zeros()
+    rigid = [given_rigid_motions(ops)[stays]]
+    if ops.last:
+        moved = [i for i in chosen if ties[i.name].n_masters]
+        rigid += [ties[i.name].coordinates @ rigid_motions(i.points) for i in moved]
+    return ops.transform(T, np.vstack(rigid))
+
+
+def _renumber(dofs: Index, removed: Index) -> Index:
+    return dofs - np.searchsorted(removed, dofs)
+
+
+def _numbers(n: int, chosen: list[Interface], ties: dict[str, Tie]) -> list[Index]:
+    """Numbers of the interface coordinates after the removed dofs are gone."""
+    removed = np.sort(np.concatenate([t.removed for t in ties.values()]))
+    numbers, first_master = [], n - removed.size
+    for interface in chosen:
+        m = ties[interface.name].n_masters
+        if m:
+            numbers.append(first_master + np.arange(m))
+            first_master += m
+        else:
+            numbers.append(_renumber(interface.dofs, removed))
+    return numbers
+
+
+def _connection(ops: Operators, ties: dict[str, Tie], numbers: list[Index]) -> Connection:
+    parts, labels, first = {}, [], 0
+    for (name, t), dofs in zip(ties.items(), numbers, strict=True):
+        parts[name] = first + np.arange(dofs.size)
+        labels += [f"{name} {t.label} {what}" for what in t.names]
+        first += dofs.size
+    boundary = np.concatenate(numbers) if numbers else np.zeros(0, dtype=np.int64)
+    return Connection(ops, boundary, parts, tuple(labels), ties)

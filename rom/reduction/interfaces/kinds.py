@@ -1,0 +1,140 @@
+"""Kinds of interfaces: how a few coordinates c = L u govern the dofs u of a surface."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.sparse import identity, kron
+
+from rom.eigen.verbs import mean_motion, rigid_motions
+from rom.errors import ConfigError, ResourceError
+from rom.model import Array, Interface
+from rom.reduction.interfaces.characteristic import CharacteristicFunctions
+from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
+from rom.reduction.interfaces.records import Tie
+from rom.reduction.interfaces.snapshots import Snapshots, snapshot_functions
+
+RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
+RECORDS = (Polynomial, FourierLegendre, Snapshots, CharacteristicFunctions)
+KNOWN_KINDS = (
+    '"full", "rbe2", "rbe3", rom.Polynomial(order) or "polynomial:3", '
+    'rom.FourierLegendre(harmonics, order) or "fourier:3,2", rom.Snapshots(values, n=…)'
+)
+
+
+def tie(interface: Interface, kind: Any) -> Tie:
+    """The tie of an interface of that kind.
+
+    Raises:
+        ConfigError: if the kind is unknown.
+        InterfaceError: if the surface cannot carry it.
+        ResourceError: if an averaging interface has too many dofs.
+    """
+    kind = parsed(interface.name, kind)
+    if kind == "full":
+        return _full(interface)
+    if kind == "rbe2":
+        R = rigid_motions(interface.points - interface.origin)
+        return _stiff(interface, "rbe2", SIX, mean_motion(interface), R)
+    if kind == "rbe3":
+        return _averaged(interface)
+    if isinstance(kind, Snapshots):
+        return _found(interface, "snapshots", snapshot_functions(kind, interface))
+    if isinstance(kind, CharacteristicFunctions):
+        return _found(interface, "characteristic", kind.functions(interface))
+    Q = interface_functions(kind, interface)
+    names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
+    L = np.kron((interface.surface_mass @ Q).T, np.eye(3))
+    return _stiff(interface, _label(kind), tuple(names), L, np.kron(Q, np.eye(3)))
+
+
+SIX = ("ux", "uy", "uz", "rx", "ry", "rz")
+NO_DOFS = np.zeros(0, dtype=np.int64)
+
+
+def _full(interface: Interface) -> Tie:
+    n = interface.dofs.size
+    names = tuple(f"node {k // 3} u{'xyz'[k % 3]}" for k in range(n))
+    nothing = np.zeros((0, 0))
+    return Tie("full", names, identity(n, format="csr"), NO_DOFS, nothing, NO_DOFS, nothing)
+
+
+def _stiff(
+    interface: Interface, label: str, names: tuple[str, ...], coordinates: Array, shapes: Array
+) -> Tie:
+    """All dofs of the surface follow from its coordinates."""
+    none = np.zeros((shapes.shape[0], 0))
+    return Tie(label, names, coordinates, interface.dofs, shapes, NO_DOFS, none)
+
+
+def _found(interface: Interface, word: str, Q: Array) -> Tie:
+    """Computed functions with all three directions, the six rigid motions first."""
+    mean_motion(interface)  # refuses surfaces whose rotation is undetermined
+    names = (
+        *(f"rigid {j + 1}" for j in range(6)),
+        *(f"{word} {j}" for j in range(7, Q.shape[1] + 1)),
+    )
+    L = (kron(interface.surface_mass, identity(3), format="csr") @ Q).T
+    return _stiff(interface, f"{word}:{Q.shape[1]}", names, L, Q)
+
+
+def _averaged(interface: Interface) -> Tie:
+    """Six well-chosen dofs of the surface follow from the mean motion and the other dofs.
+
+    C_d u_d + C_r u_r = c gives u_d = C_d^-1 c - C_d^-1 C_r u_r; pivoted QR chooses d so that C_d
+    is well conditioned.
+    """
+    if interface.dofs.size > RBE3_DOFS:
+        raise ResourceError(
+            f"interface {interface.name!r} has {interface.dofs.size} dofs; averaging couples all "
+            f"of them, which is refused above {RBE3_DOFS}.",
+            hint='Use "rbe2", or a coarser mesh on this surface.',
+        )
+    C = mean_motion(interface)
+    size = np.ptp(interface.points, axis=0).max()
+    scaled = C * np.r_[np.ones(3), np.full(3, size)][:, None]
+    _, _, pivots = qr(scaled, mode="economic", pivoting=True)
+    d, r = np.sort(pivots[:6]), np.sort(pivots[6:])
+    inverse = np.linalg.inv(C[:, d])
+    dofs = interface.dofs
+    return Tie("rbe3", SIX, C, dofs[d], inverse, dofs[r], -inverse @ C[:, r])
+
+
+def _label(kind: Polynomial | FourierLegendre) -> str:
+    if isinstance(kind, Polynomial):
+        return f"polynomial:{kind.order}"
+    return f"fourier:{kind.harmonics},{kind.order}"
+
+
+def by_name(interfaces: Any) -> dict[str, Any]:
+    """The kinds of interfaces as a dictionary.
+
+    Raises:
+        ConfigError: if they are no mapping from names to kinds.
+    """
+    if not isinstance(interfaces, Mapping):
+        raise ConfigError(
+            f"interfaces = {interfaces!r} tells no interface its kind.",
+            hint='Give a dictionary, for example {"bore": "rbe2"}.',
+        )
+    return dict(interfaces)
+
+
+def parsed(name: str, kind: Any) -> Any:
+    """The kind of an interface as a record, or one of the words "full", "rbe2", "rbe3".
+
+    Raises:
+        ConfigError: if it is unknown.
+    """
+    if isinstance(kind, RECORDS) or kind in ("full", "rbe2", "rbe3"):
+        return kind
+    if kind == "polynomial":
+        return Polynomial()
+    if isinstance(kind, str):
+        word, _, numbers = kind.partition(":")
+        family = {"polynomial": (Polynomial, 1), "fourier": (FourierLegendre, 2)}.get(word)
+        values = numbers.split(",")
+        if family and len(values) == family[1] and all(v.strip().isdecimal() for v in values):
+            return family[0](*map(int, values))
+    raise ConfigError(f"interface {name!r} has the kind {kind!r}; known kinds: {KNOWN_KINDS}.")

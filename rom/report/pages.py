@@ -1,0 +1,301 @@
+"""Reports in one HTML file: of a body, of a component or mechanism file, of a finished run."""
+
+import csv
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.child import scratch
+from rom.config.document import read_document
+from rom.errors import FileFormatError, RomError
+from rom.model import Report, Row
+from rom.report import html
+from rom.report.run import RECORD_FILE, versions
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+    from rom.config.mechanism import MechanismFile
+
+Sections = dict[str, Sequence[str]]
+N_FREQUENCIES = 6
+SHOWN = ("path", "sha256", "parameters", "scale", "material", "degree", "solver", "K", "M", "units")
+BODY = ("body", "mass [kg]", "elastic coordinates", "markers")
+ENERGIES = ("kinetic", "strain", "potential", "total")
+
+
+def describe(
+    source: Path, *, command: str = "", version: str = "", **meshing: Any
+) -> tuple[str, Sections]:
+    """Title and sections of a report, for `rom.report.html.write_report`.
+
+    Args:
+        source: a body file, a component or mechanism file, or the folder of a run.
+        command: what was typed, for the record.
+        version: of rom, for the record.
+        meshing: ``trust``, ``time_limit``, ``memory_limit`` of `rom.read_component`.
+
+    Raises:
+        RomError: if the source is none of these; what cannot be drawn is said in the report.
+    """
+    made = {"rom": version} | versions()
+    if source.is_dir():
+        return of_run(source)
+    if source.suffix.lower() == ".toml":
+        if "bodies" in read_document(source).data:
+            from rom.config.mechanism import read_mechanism
+
+            return of_mechanism(read_mechanism(source, **meshing), how(command, made))
+        from rom.config.component import read_component
+
+        component = read_component(source, **meshing)
+        written = html.source(source.read_text(encoding="utf-8"))
+        title, sections = of_body(component.body(), how(command, made))
+        return title, sections | {"The file": [written]}
+    from rom.io.native import load
+
+    return of_body(load(source), how(command, made))
+
+
+def how(command: str, made: dict[str, str]) -> list[str]:
+    """Command and versions."""
+    return [
+        html.source(command),
+        html.table(("", "version"), list(made.items()), "What the numbers were made with."),
+    ]
+
+
+def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
+    """A flexible body: what it is, mass, frequencies, interfaces, checks, pictures."""
+    from rom.checks.gates import check
+
+    sections: Sections = {
+        "What it is": [html.paragraph(_sentence(body)), *_mode_picture(body)],
+        "Mass properties": [_mass_table(body)],
+        "Frequencies": _frequency_blocks(body),
+        "Interfaces": [_interface_table(body)],
+        "Checks": [html.checks(check(body), "What `rom check` says.")],
+        "How it was made": [*made, *_provenance(body)],
+    }
+    return f"Flexible body {body.name}", sections
+
+
+def _sentence(body: "FlexibleBody") -> str:
+    reduction = body.provenance.get("reduction", {})
+    full = f" from {reduction['full dofs']} dofs" if "full dofs" in reduction else ""
+    method = f" by {reduction['method']}" if "method" in reduction else ""
+    evidence = "carries no certificate"
+    if body.certificate is not None:
+        evidence = "has a certificate that " + ("holds" if body.certificate.ok else "FAILS")
+    return (
+        f"{body.name} is a flexible body of {body.mass:.5g} kg and {1e3 * body.size:.4g} mm, "
+        f"reduced{full} to {body.n_modes} elastic coordinates{method}; its frame follows "
+        f"{body.reference}. It {evidence}."
+    )
+
+
+def _mass_table(body: "FlexibleBody") -> str:
+    import numpy as np
+
+    c = body.first_moment / body.mass
+    central = body.inertia - body.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    rows: list[tuple[Any, ...]] = [("mass [kg]", body.mass, "", "")]
+    rows += [("mass centre [m]", *map(float, c))]
+    rows += [(f"inertia, {axis} [kg m^2]", *map(float, central[k])) for k, axis in enumerate("xyz")]
+    return html.table(("", "x", "y", "z"), rows, "Inertia about the mass centre, body axes.")
+
+
+def _frequency_blocks(body: "FlexibleBody") -> list[str]:
+    comparison = {
+        support: found
+        for support, found in body.provenance.get("comparison", {}).items()
+        if found.get("full")
+    }
+    if not comparison:
+        free = body.frequencies(N_FREQUENCIES + 6)[6:]
+        rows = [(k + 1, float(f)) for k, f in enumerate(free)]
+        caption = "Elastic frequencies of the reduced body, free. The file compares with no mesh."
+        return [html.table(("mode", "reduced [Hz]"), rows, caption)]
+    header = ("support", "mode", "full [Hz]", "reduced [Hz]", "error", "MAC")
+    rows_ = [
+        (support, k + 1, float(full), float(reduced), f"{reduced / full - 1:.1e}",
+         float(found["mac"][k]) if k < len(found.get("mac", ())) else "")
+        for support, found in comparison.items()
+        for k, (full, reduced) in enumerate(zip(found["full"], found["reduced"], strict=True))
+    ]  # fmt: skip
+    caption = "Natural frequencies of the full model and of the body, rigid motions left out."
+
+    def draw(path: Path) -> None:
+        from rom.view.figures.curves import frequencies
+
+        frequencies(comparison, path, title=f"Reduced against full {body.name}")
+
+    return [html.table(header, rows_, caption), *drawn(draw, "Errors of the frequencies.")]
+
+
+def _interface_table(body: "FlexibleBody") -> str:
+    rows = [(m.name, m.kind, *map(float, m.point)) for m in body.markers.values()]
+    header = ("interface", "kind", "x [m]", "y [m]", "z [m]")
+    return html.table(header, rows, "Where joints and forces act, in the axes of the geometry.")
+
+
+def _mode_picture(body: "FlexibleBody") -> list[str]:
+    def draw(path: Path) -> None:
+        from rom.view.scenes.mode_shapes import mode_shapes
+
+        mode_shapes(body, path)
+
+    return drawn(draw, "Its lowest elastic modes.")
+
+
+def _provenance(body: "FlexibleBody") -> list[str]:
+    known = {key: body.provenance[key] for key in SHOWN if key in body.provenance}
+    known |= {
+        f"{name}, when the body was made": version
+        for name, version in dict(body.provenance.get("versions", {})).items()
+    }
+    if "seconds to reduce" in body.provenance:
+        known["seconds to reduce"] = body.provenance["seconds to reduce"]
+    if not known:
+        return [html.paragraph("The body file does not say what it was made from.")]
+    rows = [(key, str(value)) for key, value in known.items()]
+    return [html.table(("", "made from"), rows, "What the body file says of its origin.")]
+
+
+def of_mechanism(file: "MechanismFile", made: list[str]) -> tuple[str, Sections]:
+    """A mechanism as it starts; nothing is moved."""
+    mechanism = file.mechanism()
+    bodies = [
+        (name, "flexible" if part.r else "rigid", float(part.mass), part.r, ", ".join(part.names))
+        for name, part in mechanism.parts.items()
+    ]
+    header = ("body", "kind", "mass [kg]", "elastic coordinates", "markers")
+    total = sum(part.mass for part in mechanism.parts.values())
+    words = (
+        f"{file.name} has {len(bodies)} bodies of together {total:.5g} kg and "
+        f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
+    )
+
+    def draw(path: Path) -> None:
+        from rom.view.scenes.mechanisms import start
+
+        how = {key: file.values["output"][key] for key in ("view", "up")
+               if key in file.values["output"]}  # fmt: skip
+        start(mechanism, path, title=f"Mechanism {file.name}", **how)
+
+    sections: Sections = {
+        "What it is": [html.paragraph(words), *drawn(draw, "As its bodies are placed.")],
+        "Bodies": [html.table(header, bodies, "Bodies, and the names joints may use.")],
+        "Joints and forces": [_connection_table(file)],
+    }
+    flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
+    for name, body in flexible.items():
+        sections[f"Body {name}"] = [
+            html.paragraph(_sentence(body)), *_frequency_blocks(body), _interface_table(body)
+        ]  # fmt: skip
+    written = file.document.path.read_text(encoding="utf-8")
+    return f"Mechanism {file.name}", sections | {
+        "How it was made": [*made, html.source(written)]
+    }  # fmt: skip
+
+
+def _connection_table(file: "MechanismFile") -> str:
+    from rom.config.mechanism_keys import SECTIONS
+
+    rows = []
+    for section in SECTIONS:
+        for name, values in file.values[section].items():
+            ends = values.get("between") or [values[k] for k in ("marker",) if k in values]
+            where = [f"{body}.{m}" if isinstance(m, str) else f"{body} {m}" for body, m in ends]
+            where += [values[key] for key in ("joint", "joint1", "joint2") if key in values]
+            rows.append((name, values.get("kind", section.rstrip("s")), " and ".join(where)))
+    return html.table(("name", "kind", "at"), rows, "Joints, drives and forces.")
+
+
+def of_run(folder: Path) -> tuple[str, Sections]:
+    """The folder that `rom simulate` leaves."""
+    record = _record(folder)
+    bodies = [
+        (name, b["mass"], b["elastic coordinates"], ", ".join(b["markers"]))
+        for name, b in record["bodies"].items()
+    ]
+    audit = Report(record["audit"]["title"], tuple(Row(*row) for row in record["audit"]["rows"]))
+    words = f"{record['name']} was moved for {record['t_end']:g} s in {record['steps']} steps. "
+    pictures = [
+        html.picture(folder / name, caption)
+        for name, caption in (
+            ("motion.gif", "The motion."),
+            ("instants.png", "Four instants."),
+            ("curves.png", "Histories, as asked for."),
+        )
+        if name in record["files"] and (folder / name).is_file()
+    ]
+    return f"Motion of {record['name']}", {
+        "What it is": [html.paragraph(words + record["status"]), *pictures],
+        "Bodies and joints": [
+            html.table(BODY, bodies, "Bodies."),
+            html.table(("joint", "kind"), list(record["joints"].items()), "Joints."),
+        ],
+        "Checks": [html.checks(audit, "Is the computed motion believable?")],
+        "Energy": _energy(folder, record),
+        "How it was made": [
+            *how(record["command"], record["versions"]),
+            *([html.source(record["source"])] if record["source"] else []),
+        ],
+    }  # fmt: skip
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    path = folder / RECORD_FILE
+    try:
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if record["schema"] != "rom-run" or record["version"][0] != 1:
+            raise FileFormatError(f"version {record['version']} is not known.", where=str(path))
+        wanted = ("name", "files", "bodies", "joints", "audit", "status", "steps", "t_end")
+        missing = [k for k in (*wanted, "command", "versions", "source") if k not in record]
+    except FileNotFoundError:
+        raise FileFormatError(
+            f"there is no {RECORD_FILE}: this is not the folder of a run.", where=str(folder),
+            hint="rom simulate FILE.toml -o FOLDER makes one.",
+        ) from None  # fmt: skip
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise FileFormatError(f"is no record of a run: {error}.", where=str(path)) from None
+    if missing:
+        raise FileFormatError(f"the record says nothing of {', '.join(missing)}.", where=str(path))
+    return record
+
+
+def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
+    """Energies over time from the table of the motion."""
+    path = folder / "motion.csv"
+    if not path.is_file():
+        kept = record["files"][0] if record["files"] else "no file"
+        return [html.paragraph(f"The motion is kept in {kept}, without energies over time.")]
+    import numpy as np
+
+    with path.open(newline="", encoding="utf-8") as file:
+        head = next(csv.reader(file))
+        numbers = np.loadtxt(file, delimiter=",", ndmin=2)
+    curves = {name: numbers[:, head.index(f"{name} [J]")] for name in ENERGIES}
+    rows = [(f"{name} [J]", float(y[0]), float(y.min()), float(y.max()), float(y[-1]))
+            for name, y in curves.items()]  # fmt: skip
+
+    def draw(target: Path) -> None:
+        from rom.view.figures.curves import history
+
+        words = f"Energies of {record['name']}: motion, deformation, height, and their sum."
+        history(numbers[:, 0], [("energy [J]", curves)], target, title="Energy", caption=words)
+
+    header = ("energy", "start", "lowest", "highest", "end")
+    return [*drawn(draw, "Energies over time."), html.table(header, rows, "Energies.")]
+
+
+def drawn(draw: Callable[[Path], object], caption: str) -> list[str]:
+    """A picture; or, where none can be made, a sentence that says why."""
+    with scratch("report") as folder:
+        path = folder / "picture.png"
+        try:
+            draw(path)
+            return [html.picture(path, caption)]
+        except RomError as error:
+            return [html.paragraph(f"No picture here: {error.message}")]

@@ -1,0 +1,1 @@
+"""What pictures are drawn on: pages, scenes, and the process that draws."""

@@ -1,0 +1,99 @@
+"""Child process: draws the scene in a folder with VTK and leaves the pixels there.
+
+Started by `rom.view.canvas.offscreen` as ``python -m rom.view.canvas.draw FOLDER``.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+OVERSAMPLING = 2  # pictures are drawn larger and averaged: smooth edges on every driver
+EDGE_OFFSET = 2e-3  # of the picture's height, towards the eye; parallel projection does not show it
+CREASE_ANGLE = 35.0  # from which an edge stays sharp in shading [degree]
+
+
+def main(folder: Path) -> None:
+    """Draw every frame of the scene."""
+    import pyvista
+
+    scene = json.loads((folder / "scene.json").read_text())
+    with np.load(folder / "arrays.npz", allow_pickle=False) as file:
+        arrays = dict(file)
+    width, height = scene["size"]
+    plotter: Any = pyvista.Plotter(
+        off_screen=True, window_size=[OVERSAMPLING * width, OVERSAMPLING * height]
+    )
+    plotter.set_background("white")
+    aim(plotter, scene, arrays)
+    moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
+    for k in range(len(scene["actors"])):
+        add(plotter, scene, arrays, k, 0)
+    n = max(len(arrays[f"points {k}"]) for k in range(len(scene["actors"])))
+    pictures = np.empty((n, height, width, 3), dtype=np.uint8)
+    for frame in range(n):
+        for k in moving if frame else ():
+            add(plotter, scene, arrays, k, frame)
+        plotter.render()
+        fine = plotter.screenshot(return_img=True)[..., :3].astype(np.uint16)
+        blocks = fine.reshape(height, OVERSAMPLING, width, OVERSAMPLING, 3).sum(axis=(1, 3))
+        pictures[frame] = (blocks + OVERSAMPLING**2 // 2) // OVERSAMPLING**2
+    np.save(folder / "pictures.npy", pictures)
+    plotter.close()
+
+
+def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
+    """Set the camera; its clipping range holds all frames, VTK's own would be that of the first."""
+    focus, toward = arrays["focus"], arrays["toward"]
+    actors = range(len(scene["actors"]))
+    depth = max(abs((arrays[f"points {k}"] - focus) @ toward).max() for k in actors)
+    depth = 1.01 * depth + 0.01 * scene["height"]
+    reach = depth + scene["height"]
+    plotter.camera_position = [tuple(focus + reach * toward), tuple(focus), tuple(arrays["up"])]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = 0.5 * scene["height"]
+    plotter.camera.clipping_range = (reach - depth, reach + depth)
+
+
+def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, frame: int) -> None:
+    """Add an actor, or replace it by the one of the next frame."""
+    style, values = scene["actors"][k], arrays.get(f"values {k}")
+    points = arrays[f"points {k}"][frame]
+    if arrays[f"cells {k}"].shape[1] < 3:  # lines and dots lie in front of the faces they are on
+        points = points + EDGE_OFFSET * scene["height"] * arrays["toward"].astype(np.float32)
+    grid = _grid(points, arrays[f"cells {k}"])
+    look: dict[str, Any] = {
+        "opacity": style["opacity"],
+        "reset_camera": False,
+        "render": False,
+        "name": f"{k}",
+    }
+    if values is None:
+        look["color"] = style["colour"]
+    else:
+        grid.point_data["value"] = values[min(frame, len(values) - 1)]
+        look |= {"scalars": "value", "cmap": scene["colours"], "clim": scene["limits"]}
+        look["show_scalar_bar"] = False
+    if arrays[f"cells {k}"].shape[1] < 3:
+        look |= {"lighting": False, "line_width": OVERSAMPLING * style["width"]}
+        look |= {"point_size": OVERSAMPLING * style["width"], "render_points_as_spheres": True}
+    else:
+        grid = grid.compute_normals(
+            feature_angle=CREASE_ANGLE, split_vertices=True, cell_normals=False
+        )
+        look |= {"smooth_shading": True, "ambient": 0.4, "diffuse": 0.65, "specular": 0.1}
+    plotter.add_mesh(grid, **look)
+
+
+def _grid(points: Any, cells: Any) -> Any:
+    import pyvista
+
+    counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
+    given: dict[str, Any] = {{1: "verts", 2: "lines", 3: "faces"}[cells.shape[1]]: counted}
+    return pyvista.PolyData(points, **given)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,85 @@
+"""Draws scenes in a child process, because VTK does not live together with dolfinx."""
+
+import json
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.child import Ended, python, run, scratch
+from rom.errors import ConfigError, ResourceError
+from rom.view.canvas.scene import Actor, Camera
+
+Image = npt.NDArray[np.uint8]
+COLOUR_MAP = "viridis"
+INSTALL_COMMAND = "pip install 'fenicsx-rom[view]'"
+
+
+def render(
+    actors: Sequence[Actor], camera: Camera, *, limits: tuple[float, float] = (0.0, 1.0)
+) -> Image:
+    """Draw all frames of a scene.
+
+    Args:
+        actors: what is seen; those with one frame stay while the others move.
+        camera: from where.
+        limits: values at the ends of the colour map.
+
+    Returns:
+        (f, height, width, 3) pixels.
+
+    Raises:
+        ResourceError: if pyvista is missing.
+        ConfigError: if it cannot draw on this machine.
+    """
+    require("pyvista")
+    with scratch("view") as folder:
+        write_scene(folder, actors, camera, limits)
+        done = run(python("rom.view.canvas.draw", str(folder)))
+        pictures = folder / "pictures.npy"
+        if done.code or not pictures.exists():
+            raise child_failure(done)
+        return np.load(pictures, allow_pickle=False)
+
+
+def require(package: str) -> None:
+    """Make sure that a package for pictures is there.
+
+    Raises:
+        ResourceError: naming it.
+    """
+    if find_spec(package) is None:
+        raise ResourceError(
+            f"pictures need {package}, which is not installed.", hint=f"{INSTALL_COMMAND}."
+        )
+
+
+def write_scene(
+    folder: Path, actors: Sequence[Actor], camera: Camera, limits: tuple[float, float]
+) -> None:
+    """Leave a scene where a child process finds it."""
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "focus": camera.focus,
+        "toward": camera.toward,
+        "up": camera.up,
+    }
+    for k, actor in enumerate(actors):
+        arrays |= {f"points {k}": actor.points.astype(np.float32), f"cells {k}": actor.cells}
+        if actor.values is not None:
+            arrays[f"values {k}"] = actor.values.astype(np.float32)
+    np.savez(folder / "arrays.npz", **arrays)
+    style = [{"colour": a.colour, "width": a.width, "opacity": a.opacity} for a in actors]
+    scene = {"height": camera.height, "size": camera.size, "limits": limits, "actors": style}
+    (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOUR_MAP}))
+
+
+def child_failure(done: Ended) -> ConfigError:
+    """What a child process that did not end well has said."""
+    how = f"signal {-done.code}" if done.code < 0 else f"code {done.code}"
+    return ConfigError(
+        f"the process that draws ended with {how}: {done.last}.",
+        hint="`rom doctor` tests drawing without a screen and says what to install.",
+    )

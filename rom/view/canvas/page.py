@@ -1,0 +1,124 @@
+"""Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left."""
+
+import io
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rom.errors import ConfigError
+from rom.io.files import check_writable, write_whole
+from rom.view.canvas.offscreen import COLOUR_MAP, Image, require
+from rom.view.canvas.scene import TEXT_COLOUR
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI = 150
+TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
+LINE_HEIGHT = 26  # of small text [pixel]
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "text.color": TEXT_COLOUR,
+    "axes.labelcolor": TEXT_COLOUR,
+    "axes.edgecolor": "#5c636e",
+    "xtick.color": TEXT_COLOUR,
+    "ytick.color": TEXT_COLOUR,
+    "axes.linewidth": 0.8,
+}
+
+
+def sheet(width: int, height: int) -> "Figure":
+    """A white sheet of that many pixels.
+
+    Raises:
+        ConfigError: if matplotlib is missing.
+    """
+    require("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def styled() -> Any:
+    """Context in which axes and words get the look of the house."""
+    require("matplotlib")
+    from matplotlib import rc_context
+
+    return rc_context(STYLE)
+
+
+def checked(path: str | Path, *endings: str) -> Path:
+    """The path, if pictures of that ending are made and it can be written.
+
+    Raises:
+        ConfigError: naming the endings, or what is wrong with the folder.
+    """
+    path = check_writable(path)
+    if path.suffix.lower() not in endings:
+        known = " or ".join(endings)
+        raise ConfigError(f"{path}: the ending {path.suffix!r} is unknown.", hint=f"Use {known}.")
+    return path
+
+
+def area(figure: "Figure", left: float, top: float, width: float, height: float) -> Any:
+    """Axes in a rectangle given in pixels from the top left corner."""
+    w, h = figure.get_size_inches() * DPI
+    return figure.add_axes((left / w, 1 - (top + height) / h, width / w, height / h))
+
+
+def place(figure: "Figure", image: Image, left: float, top: float) -> Any:
+    """Put a picture on the sheet, pixel for pixel."""
+    height, width = image.shape[:2]
+    axes = area(figure, left, top, width, height)
+    axes.set_axis_off()
+    return axes.imshow(image, aspect="auto", interpolation="nearest")
+
+
+def words(figure: "Figure", text: str, left: float, top: float, **options: Any) -> Any:
+    """Write text whose upper left corner is at a pixel."""
+    w, h = figure.get_size_inches() * DPI
+    look: dict[str, Any] = {"size": BODY_SIZE, "va": "top", "color": TEXT_COLOUR} | options
+    return figure.text(left / w, 1 - top / h, text, **look)
+
+
+def caption(text: str, width: int) -> tuple[str, int]:
+    """The text broken into lines that fit into so many pixels, and its height."""
+    letters = int(width / (SMALL_SIZE * DPI / 72 * 0.545))
+    lines = textwrap.wrap(text, letters)
+    return "\n".join(lines), LINE_HEIGHT * len(lines)
+
+
+def colour_bar(
+    figure: "Figure",
+    limits: tuple[float, float],
+    label: str,
+    rectangle: tuple[float, float, float, float],
+) -> None:
+    """Horizontal colour bar with its scale below; the rectangle is that of the bar."""
+    axes = area(figure, *rectangle)
+    axes.imshow(
+        np.linspace(0, 1, 512)[None], aspect="auto", cmap=COLOUR_MAP, extent=(*limits, 0.0, 1.0)
+    )
+    axes.set_yticks([])
+    axes.tick_params(labelsize=SMALL_SIZE, pad=3, length=4)
+    axes.locator_params(axis="x", nbins=6)
+    axes.set_title(label, size=SMALL_SIZE, pad=6)
+
+
+def pixels(figure: "Figure") -> Image:
+    """(height, width, 3) the finished sheet."""
+    figure.canvas.draw()
+    return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
+
+
+def save(figure: "Figure", path: Path) -> Path:
+    """Write the sheet as PNG, whole or not at all."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": "rom"})
+    write_whole(path, lambda file: file.write(buffer.getvalue()))
+    return path

@@ -1,0 +1,1 @@
+"""Pictures of curves and plane fields."""

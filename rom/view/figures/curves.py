@@ -1,0 +1,284 @@
+"""Curves over time, and how far reduced frequencies are from full ones."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import typed
+from rom.deprecated import path_came_first
+from rom.errors import ConfigError
+from rom.view.canvas import page
+
+PAGE_WIDTH, PANEL_HEIGHT = 1400, 330  # pixel
+LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
+MARKERS = ("o", "s", "^", "D", "v", "x")
+GREY = "#5c636e"
+LEGEND_COLUMNS = 5  # of a wide legend
+MAX_TICKS = 10  # sizes that have room for a tick each
+MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
+
+
+@path_came_first(1, 2, 0)
+@typed
+def history(
+    t: npt.ArrayLike,
+    panels: Sequence[tuple[str, dict[str, Any]]],
+    path: str | Path,
+    *,
+    title: str,
+    caption: str,
+    over: str | None = None,
+) -> Path:
+    """Draw quantities over time, or over something else, one panel below the other.
+
+    Args:
+        t: (n,) time [s], or values of what is named by ``over``.
+        panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
+            (times, values) is drawn as points.
+        path: picture to write, .png.
+        title: heading.
+        caption: what a stranger has to know.
+        over: label of the horizontal axis, with its unit, when that is not time.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    t = np.asarray(t, dtype=float)
+    unit, factor = ("ms", 1e3) if np.ptp(t) < 1.0 and over is None else ("s", 1.0)
+    with page.styled():
+        figure, areas = _panels(len(panels), title, caption)
+        for axes, (label, curves) in zip(areas, panels, strict=True):
+            for k, (name, values) in enumerate(curves.items()):
+                pair = isinstance(values, tuple)
+                x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
+                if y.shape != x.shape:
+                    raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
+                look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
+                look |= {"ls": "none", "marker": "o", "ms": 7} if pair else {}
+                axes.plot(factor * x, y, label=name, **look)
+            axes.set_ylabel(label, size=page.BODY_SIZE)
+            axes.set_xlim(factor * t[0], factor * t[-1])
+            if len(curves) > 2:
+                axes.margins(y=0.3)  # room for the legend
+            finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
+        for axes in areas[:-1]:
+            axes.set_xticklabels([])
+        areas[-1].set_xlabel(over or f"time [{unit}]", size=page.BODY_SIZE)
+        return page.save(figure, path)
+
+
+@path_came_first(1, 0)
+@typed
+def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> Path:
+    """Draw the relative errors of reduced frequencies in several supports.
+
+    Args:
+        comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
+        path: picture to write, .png.
+        title: heading.
+
+    Raises:
+        ConfigError: without a comparison, or if pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    comparison = {support: table for support, table in comparison.items() if table["full"]}
+    if not comparison:
+        raise ConfigError("there is no comparison of frequencies to draw.")
+    caption = (
+        "Relative error of the natural frequencies of the reduced body against the full finite "
+        "element model, for each support of its interfaces; the dashed line is 0.1 %. Reduced "
+        "frequencies are never below full ones."
+    )
+    with page.styled():
+        figure, (axes,) = _panels(1, title, caption)
+        longest = 0
+        for k, (support, table) in enumerate(comparison.items()):
+            full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
+            error = np.maximum(np.abs(reduced / full - 1), MIN_ERROR)
+            longest = max(longest, full.size)
+            look: dict[str, Any] = {"color": LINES[k % len(LINES)]}
+            look["marker"] = MARKERS[k % len(MARKERS)]
+            look |= {"ls": "--" if k % 2 else "-", "ms": max(4, 10 - 2 * k)}  # curves may coincide
+            axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
+        axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")
+        axes.set_xticks(range(1, longest + 1))
+        axes.set_xlabel("elastic mode", size=page.BODY_SIZE)
+        axes.set_ylabel("relative error", size=page.BODY_SIZE)
+        finish(axes, legend=True)
+        return page.save(figure, path)
+
+
+@path_came_first(1, 0)
+@typed
+def convergence(
+    panels: Sequence[tuple[str, dict[str, tuple[Any, Any]]]],
+    path: str | Path,
+    *,
+    xlabel: str,
+    title: str,
+    caption: str,
+) -> Path:
+    """Draw errors that fall with the size of a model, on logarithmic axes.
+
+    Args:
+        panels: (label of the axis, {name: (sizes (n,), errors (n,))}) from top to bottom; errors
+            at or below round-off are drawn at 1e-12.
+        path: picture to write, .png.
+        xlabel: what the sizes count.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    with page.styled():
+        figure, areas = _panels(len(panels), title, caption)
+        for axes, (label, curves) in zip(areas, panels, strict=True):
+            for k, (name, (sizes, errors)) in enumerate(curves.items()):
+                x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
+                if x.shape != y.shape:
+                    raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
+                look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
+                axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
+            axes.set_ylabel(label, size=page.BODY_SIZE)
+            _near_ticks(axes)
+            finish(axes, legend=True)
+        _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
+        for axes in areas[:-1]:
+            axes.set_xticklabels([])
+        areas[-1].set_xlabel(xlabel, size=page.BODY_SIZE)
+        return page.save(figure, path)
+
+
+@path_came_first(1, 0)
+@typed
+def campbell(
+    diagram: Any,
+    path: str | Path,
+    *,
+    orders: Sequence[float] = (1.0,),
+    names: Sequence[str] = (),
+    title: str,
+    caption: str,
+) -> Path:
+    """Draw natural frequencies over the speed of rotation, with multiples of the speed.
+
+    A ring marks where a mode meets a multiple of the speed. A second panel shows the damping,
+    unless there is none.
+
+    Args:
+        diagram: what `rom.campbell` returned.
+        path: picture to write, .png.
+        orders: multiples of the speed to draw.
+        names: one per mode, in the order of the columns; without names modes are numbered.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if there is not one name per mode, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    f, damping = diagram.frequencies, 100 * diagram.damping_ratios
+    if names and len(names) != f.shape[1]:
+        raise ConfigError(f"{len(names)} names for {f.shape[1]} modes.")
+    labels = names or [f"mode {k + 1}" for k in range(f.shape[1])]
+    turns = 30 * diagram.speeds / np.pi
+    damped = np.abs(damping).max(initial=0.0) > 1e-3
+    with page.styled():
+        figure, areas = _panels(2 if damped else 1, title, caption)
+        for k, label in enumerate(labels):
+            look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.6}
+            areas[0].plot(turns, f[:, k], label=label, **look)
+            if damped:
+                areas[1].plot(turns, damping[:, k], label=label, **look)
+        _multiples(areas[0], diagram, turns, orders)
+        for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
+            axes.set_ylabel(label, size=page.BODY_SIZE)
+            axes.set_xlim(turns[0], turns[-1])
+            finish(axes, legend=False)
+        areas[0].legend(
+            fontsize=page.SMALL_SIZE,
+            framealpha=0.9,
+            edgecolor="none",
+            loc="upper left",
+            ncol=LEGEND_COLUMNS,
+        )
+        for axes in areas[:-1]:
+            axes.set_xticklabels([])
+        areas[-1].set_xlabel("speed [1/min]", size=page.BODY_SIZE)
+        return page.save(figure, path)
+
+
+def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
+    """Rays of the orders, each named where it leaves the picture, and rings where modes meet."""
+    rows = -(
+        -(diagram.frequencies.shape[1] + 1) // LEGEND_COLUMNS
+    )  # of the legend, above all modes
+    top = (1.06 + 0.1 * rows) * diagram.frequencies.max()
+    axes.set_ylim(0.0, top)
+    for k, order in enumerate(orders):
+        end = min(turns[-1], 60 * top / order)
+        label = "multiples of the speed" if k == 0 else None
+        axes.plot([turns[0], end], [order * turns[0] / 60, order * end / 60], color=GREY, lw=0.9,
+                  label=label)  # fmt: skip
+        where = {"xytext": (5, 0), "ha": "left", "va": "center"}
+        if end < turns[-1]:
+            where = {"xytext": (0, 3), "ha": "center", "va": "bottom"}
+        axes.annotate(f"{order:g}x", (end, order * end / 60), textcoords="offset points",
+                      color=GREY, size=page.SMALL_SIZE, **where)  # fmt: skip
+        for _, speed in diagram.crossings(order):
+            at = 30 * speed / np.pi
+            axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
+
+
+def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
+    """One horizontal axis for all panels, with ticks at the sizes themselves if they are few."""
+    ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
+    low, high = ticks[0] / 1.15, ticks[-1] * 1.15
+    if ticks.size > MAX_TICKS:
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+        ticks = np.outer(decades, [1, 2, 5]).ravel()
+        ticks = ticks[(ticks >= low) & (ticks <= high)]
+    for axes in areas:
+        axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
+        axes.minorticks_off()
+        axes.set_xlim(low, high)
+
+
+def _near_ticks(axes: Any) -> None:
+    """Ticks at 1, 2 and 5 where the values span too little for powers of ten."""
+    low, high = axes.get_ylim()
+    if high < 100 * low:
+        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+        ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
+        ticks = ticks[(ticks >= low) & (ticks <= high)]
+        axes.set_yticks(ticks, [f"{y:g}" for y in ticks])
+
+
+def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
+    text, below = page.caption(caption, PAGE_WIDTH - 60)
+    height = 80 + n * (PANEL_HEIGHT + 25) + 60 + below + 25
+    figure = page.sheet(PAGE_WIDTH, height)
+    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    areas = [
+        page.area(figure, 150, 85 + k * (PANEL_HEIGHT + 25), PAGE_WIDTH - 190, PANEL_HEIGHT)
+        for k in range(n)
+    ]
+    page.words(figure, text, 30, height - below - 20, size=page.SMALL_SIZE)
+    return figure, areas
+
+
+def finish(axes: Any, *, legend: bool, loc: str = "best") -> None:
+    """Grid, spines and legend of the house."""
+    axes.tick_params(labelsize=page.SMALL_SIZE)
+    axes.grid(color="#dfe3e8", lw=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    if legend:
+        axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none", loc=loc)

@@ -1,0 +1,147 @@
+"""Drawings in a plane: fields with their level curves, linkages, walls of blocks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.deprecated import path_came_first
+from rom.errors import ConfigError
+from rom.model import Array
+from rom.view.canvas import page
+from rom.view.canvas.offscreen import COLOUR_MAP
+from rom.view.figures.curves import LINES, MARKERS
+
+PAGE_WIDTH = 1400  # [pixel]
+COLUMN_GAP = 120  # [pixel]
+ROW_GAP = 150  # [pixel]
+BAR_WIDTH = 60  # of a colour bar [pixel]
+STONE_COLOUR, EDGE_COLOUR = "#d9d2c3", "#5c636e"
+
+
+@typed
+@dataclass
+class Drawing:
+    """One drawing, from back to front.
+
+    Attributes:
+        title: what it shows.
+        x, y: labels of the axes with their units.
+        extent: (left, right, bottom, top) of the drawing; None for what it holds.
+        shade: (n, m) values over the extent, first index along x; or None.
+        label: what the colours of the shade or the polygons mean.
+        polygons: (k, 2) outlines, filled.
+        values: (number of polygons,) what their colours mean, or None for the colour of stone.
+        curves: {label: list of (k, 2) curves}; labels that start with "_" stay out of the legend.
+        points: {label: (k, 2) points}.
+        equal: the same scale along x and y.
+    """
+
+    title: str
+    x: str
+    y: str
+    extent: tuple[float, float, float, float] | None = None
+    shade: Array | None = None
+    label: str = ""
+    polygons: Sequence[Array] = ()
+    values: Array | None = None
+    curves: dict[str, list[Array]] = field(default_factory=dict)
+    points: dict[str, Array] = field(default_factory=dict)
+    equal: bool = True
+
+
+@path_came_first(1, 0)
+@typed
+def plane(
+    drawings: Sequence[Drawing],
+    path: str | Path,
+    *,
+    title: str,
+    caption: str,
+    columns: int = 2,
+    height: int = 480,
+) -> Path:
+    """Draw things in a plane, side by side.
+
+    Args:
+        drawings: row by row, from the top left.
+        path: picture to write, .png.
+        title: heading.
+        caption: what a stranger has to know.
+        columns: drawings in a row.
+        height: of each drawing [pixel].
+
+    Raises:
+        ConfigError: without a drawing, or if pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    if not drawings:
+        raise ConfigError("there is nothing to draw.")
+    rows = -(-len(drawings) // columns)
+    text, below = page.caption(caption, PAGE_WIDTH - 60)
+    width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
+    with page.styled():
+        tall = 110 + rows * (height + ROW_GAP) + below + 10
+        figure = page.sheet(PAGE_WIDTH, tall)
+        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        for k, drawing in enumerate(drawings):
+            row, column = divmod(k, columns)
+            left = 95 + column * (width + COLUMN_GAP)
+            narrow = BAR_WIDTH if drawing.label else 0
+            axes = page.area(figure, left, 110 + row * (height + ROW_GAP), width - narrow, height)
+            _draw(figure, axes, drawing)
+        page.words(figure, text, 30, tall - below - 20, size=page.SMALL_SIZE)
+        return page.save(figure, path)
+
+
+def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
+    axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
+    axes.set_xlabel(drawing.x, size=page.SMALL_SIZE)
+    axes.set_ylabel(drawing.y, size=page.SMALL_SIZE)
+    axes.tick_params(labelsize=page.SMALL_SIZE)
+    if drawing.shade is not None:
+        image = axes.imshow(
+            drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP, aspect="auto"
+        )
+        bar = figure.colorbar(image, ax=axes, fraction=0.05, pad=0.03)
+        bar.set_label(drawing.label, size=page.SMALL_SIZE)
+        bar.ax.tick_params(labelsize=page.SMALL_SIZE)
+    _fill(figure, axes, drawing)
+    for k, (label, curves) in enumerate(drawing.curves.items()):
+        for n, curve in enumerate(curves):
+            colour = "white" if drawing.shade is not None else LINES[k % len(LINES)]
+            look = {"color": colour, "lw": 1.0 if drawing.shade is not None else 2.0, "zorder": 3}
+            axes.plot(*curve.T, label=label if n == 0 else f"_{label}", **look)
+    for k, (label, points) in enumerate(drawing.points.items()):
+        look = {"color": LINES[(k + 1) % len(LINES)], "edgecolor": "white", "zorder": 4}
+        axes.scatter(*points.T, s=48, marker=MARKERS[k % len(MARKERS)], label=label, **look)
+    if drawing.extent is not None:
+        axes.set_xlim(drawing.extent[:2])
+        axes.set_ylim(drawing.extent[2:])
+    if drawing.equal:
+        axes.set_aspect("equal", adjustable="box" if drawing.shade is not None else "datalim")
+    if axes.get_legend_handles_labels()[0]:
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
+        axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=2, **place)
+
+
+def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
+    """Draw polygons, and their colour bar when they have values."""
+    if not len(drawing.polygons):
+        return
+    from matplotlib.collections import PolyCollection
+
+    look: dict[str, Any] = {"edgecolor": EDGE_COLOUR, "linewidth": 0.8}
+    if drawing.values is None:
+        axes.add_collection(PolyCollection(drawing.polygons, facecolor=STONE_COLOUR, **look))
+    else:
+        values = np.asarray(drawing.values, dtype=float)
+        blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOUR_MAP, **look)
+        axes.add_collection(blocks)
+        bar = figure.colorbar(blocks, ax=axes, fraction=0.05, pad=0.03)
+        bar.set_label(drawing.label, size=page.SMALL_SIZE)
+        bar.ax.tick_params(labelsize=page.SMALL_SIZE)
+    axes.autoscale_view()

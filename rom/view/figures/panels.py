@@ -1,0 +1,134 @@
+"""Several small diagrams on one sheet: paths, curves, points and bars."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.deprecated import path_came_first
+from rom.errors import ConfigError
+from rom.view.canvas import page
+from rom.view.figures.curves import LINES, PAGE_WIDTH, finish
+
+# pixel, of a diagram and around it
+PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
+GUIDE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
+Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
+
+
+@typed
+@dataclass(frozen=True)
+class Panel:
+    """One diagram.
+
+    Attributes:
+        title: what it shows.
+        xlabel, ylabel: labels of the axes with their units; a sketch has none, and no axes.
+        curves: {name: (x (n,), y (n,))} drawn as lines; thin, without legend, if the name starts
+            with "_".
+        points: {name: (x (n,), y (n,))} drawn as small circles over them.
+        bars: {name: (low, high)} horizontal bars from low to high, from top to bottom.
+        equal: the same scale along both axes.
+        log: logarithmic scales along both axes.
+    """
+
+    title: str
+    xlabel: str
+    ylabel: str = ""
+    curves: Mapping[str, Line] = field(default_factory=dict)
+    points: Mapping[str, Line] = field(default_factory=dict)
+    bars: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    equal: bool = False
+    log: bool = False
+
+
+@path_came_first(1, 0)
+@typed
+def panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str, caption: str) -> Path:
+    """Draw rows of diagrams.
+
+    Args:
+        rows: diagrams from top to bottom, and from left to right in each row.
+        path: picture to write, .png.
+        title: heading.
+        caption: what a stranger has to know.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    with page.styled():
+        text, below = page.caption(caption, PAGE_WIDTH - 60)
+        step = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN
+        total = 65 + len(rows) * step + below + 25
+        figure = page.sheet(PAGE_WIDTH, total)
+        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        for i, row in enumerate(rows):
+            width = (PAGE_WIDTH - 2 * RIGHT_MARGIN) / len(row)
+            for j, panel in enumerate(row):
+                left = RIGHT_MARGIN + j * width + LEFT_MARGIN + (90 if panel.bars else 0)
+                right = RIGHT_MARGIN + (j + 1) * width - RIGHT_MARGIN
+                area = page.area(
+                    figure, left, 65 + i * step + TOP_MARGIN, right - left, PANEL_HEIGHT
+                )
+                _draw(area, panel, (right - left, PANEL_HEIGHT))
+        page.words(figure, text, 30, total - below - 20, size=page.SMALL_SIZE)
+        return page.save(figure, path)
+
+
+def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
+    for k, (name, line) in enumerate(panel.curves.items()):
+        look = {"color": LINES[k % len(LINES)], "lw": 1.4, "ls": "--" if k % 2 else "-"}
+        look = GUIDE if name.startswith("_") else look
+        axes.plot(*_paired(name, line), label=name, **look)
+    for name, line in panel.points.items():
+        look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
+        axes.plot(*_paired(name, line), "o", label=name, **look)
+    if panel.bars:
+        _draw_bars(axes, panel.bars)
+    axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
+    axes.set_xlabel(panel.xlabel, size=page.SMALL_SIZE)
+    axes.set_ylabel(panel.ylabel, size=page.SMALL_SIZE)
+    named = sum(not name.startswith("_") for name in (*panel.curves, *panel.points))
+    low, high = axes.get_ylim()
+    room = 0.11 * (named + 0.5)  # for the legend above all lines
+    if panel.log:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+    elif named and not panel.bars:
+        axes.set_ylim(low, high + room * (high - low))
+    if not (panel.xlabel or panel.ylabel):
+        axes.set_axis_off()
+    if panel.equal:
+        _same_scale(axes, shape)
+    finish(axes, legend=named > 0, loc="upper left")
+
+
+def _same_scale(axes: Any, shape: tuple[float, float]) -> None:
+    """Widen the shorter axis until a metre is as long on both; the shape is that of the area."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    metre = (np.ptp(limits, axis=1) / shape).max()
+    half = 0.5 * metre * np.array(shape)
+    x, y = limits.mean(axis=1)
+    axes.set_xlim(x - half[0], x + half[0])
+    axes.set_ylim(y - half[1], y + half[1])
+
+
+def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]]) -> None:
+    low, high = np.array(list(bars.values()), dtype=float).T
+    axes.barh(np.arange(len(bars)), high - low, left=low, height=0.6, color=LINES[0])
+    axes.axvline(0.0, color="#22262b", lw=0.8)
+    axes.set_yticks(np.arange(len(bars)), list(bars))
+    axes.use_sticky_edges = False
+    axes.margins(x=0.06)
+    axes.invert_yaxis()
+
+
+def _paired(name: str, line: Line) -> Line:
+    x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
+    if x.shape != y.shape:
+        raise ConfigError(f"{name!r} has {y.size} values for {x.size} places.")
+    return x, y

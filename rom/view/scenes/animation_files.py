@@ -1,0 +1,113 @@
+"""Motions as three-dimensional films that other programs play and turn around."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.arguments import AnySolution, typed
+from rom.errors import ConfigError
+from rom.io.fields.gltf import MovingMesh, write_glb
+from rom.io.fields.vtkhdf import write_vtkhdf
+from rom.model import Array
+from rom.names import named
+from rom.view.canvas.page import checked
+from rom.view.canvas.solids import Mesh
+from rom.view.scenes.film import bars, placed, shades_of
+
+METAL = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bodies
+ELASTIC = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.63, 0.51))
+
+
+@typed
+def write_animation(
+    solution: AnySolution,
+    path: str | Path,
+    *,
+    shapes: dict[str, Mesh] | None = None,
+    frames: int = 200,
+    seconds: float | None = 4.0,
+    magnify: float = 1.0,
+    up: npt.ArrayLike | None = None,
+) -> Path:
+    """Write a motion as a film in space.
+
+    Args:
+        solution: a `rom.mbs.results.solution.Solution`.
+        path: ``.glb`` (glTF 2.0 binary) for browsers, slides and Blender; ``.vtkhdf`` for ParaView,
+            with the displacement relative to the floating frame as a field.
+        shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body; without one
+            it is drawn as bars between its markers.
+        frames: number of instants, evenly over the saved ones.
+        seconds: how long the ``.glb`` lasts; None for the true time.
+        magnify: deformations are drawn so many times larger than they are.
+        up: (3,) upright direction; None for against gravity, or z without gravity.
+
+    Raises:
+        ConfigError: for an unknown body or ending, a length of time or a number of frames that
+            cannot be, a direction of length zero, or a place that is not writable.
+        ResourceError: if h5py is missing for ``.vtkhdf``.
+    """
+    path = checked(path, ".glb", ".vtkhdf")
+    shapes = shapes or {}
+    unknown = set(shapes) - set(solution.mechanism.parts)
+    if unknown:
+        known = sorted(solution.mechanism.parts)
+        raise ConfigError(f"shapes: no body {named(sorted(unknown))}; there are {known}.")
+    if min(frames, solution.t.size) < 2 or (seconds is not None and not 0 < seconds < np.inf):
+        raise ConfigError(f"no film has {frames} frames in {seconds} s.")
+    steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
+    bodies = _bodies(solution, steps, shapes, magnify)
+    t = solution.t[steps]
+    if path.suffix.lower() == ".vtkhdf":
+        return _surfaces(bodies, t, path, magnify)
+    times = t - t[0]
+    if seconds is not None:
+        times *= seconds / times[-1]
+    title = "motion" if magnify == 1.0 else f"motion, deformation drawn {magnify:g} times larger"
+    return write_glb(bodies, times, path, up=_up(solution, up), title=title)
+
+
+def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) -> list[MovingMesh]:
+    bodies, elastic, shades = [], 0, shades_of(solution.mechanism)
+    for name, part in solution.mechanism.parts.items():
+        surface = getattr(part.flexible, "surface", None)
+        if surface is not None:
+            points, triangles, modes = surface.points, surface.triangles, magnify * surface.shape
+            q, colour = solution.elastic(name)[steps], ELASTIC[elastic % len(ELASTIC)]
+            elastic += 1
+        else:
+            points, triangles = shapes[name] if name in shapes else bars(part)
+            modes, q = np.zeros((3 * len(points), 0)), np.zeros((len(steps), 0))
+            colour = METAL[shades[name]]
+        pose = solution.position(name)[steps], solution.orientation(name)[steps]
+        mesh = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+        bodies.append(MovingMesh(name, *mesh, *pose, modes, q, colour))
+    return bodies
+
+
+def _surfaces(bodies: list[MovingMesh], t: Array, path: Path, magnify: float) -> Path:
+    """All bodies as one surface in the world."""
+    points, triangles, moved, numbers, count = [], [], [], [], 0
+    for number, body in enumerate(bodies):
+        u = (body.q @ body.shapes.T).reshape(len(t), -1, 3)
+        turned = (body.origin, np.array([rotation.matrix(p) for p in body.orientation]))
+        points.append(placed(body.points + u, turned))
+        moved.append(placed(u, (0 * body.origin, turned[1])) / magnify)
+        triangles.append(body.triangles + count)
+        numbers.append(np.full((len(t), len(body.points)), float(number)))
+        count += len(body.points)
+    fields = {"displacement [m]": np.hstack(moved), "body": np.hstack(numbers)}
+    return write_vtkhdf(np.hstack(points), np.vstack(triangles), t, path, fields=fields)
+
+
+def _up(solution: Any, up: npt.ArrayLike | None) -> Array:
+    if up is None:
+        gravity = np.asarray(solution.mechanism.gravity, dtype=float)
+        return -gravity if gravity.any() else np.array([0.0, 0.0, 1.0])
+    direction = np.asarray(up, dtype=float)
+    if direction.shape != (3,) or not (np.isfinite(direction).all() and direction.any()):
+        raise ConfigError(f"up = {up!r} is no direction.")
+    return direction

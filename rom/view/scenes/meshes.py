@@ -1,0 +1,89 @@
+"""Picture of a finite element mesh with its interfaces."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import typed
+from rom.errors import ConfigError
+from rom.model import FEModel
+from rom.view.canvas import page
+from rom.view.canvas.offscreen import render
+from rom.view.canvas.scene import TEXT_COLOUR, Actor, aimed, directed_edges
+
+PAGE_WIDTH = 1500  # [pixel]
+PART_COLOUR, EDGE_COLOUR = "#c9d1da", "#6b7480"
+MARKED = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")  # one per interface
+
+
+@typed
+def mesh(
+    model: FEModel,
+    path: str | Path,
+    *,
+    title: str = "Mesh",
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+) -> Path:
+    """Draw the outer surface of a model, its elements and, in colour, its interfaces.
+
+    Args:
+        model: the model.
+        path: picture to write, .png.
+        title: heading.
+        view: (3,) direction from the body to the eye; None: mainly along its shortest extent.
+        up: (3,) upright direction; None: across its longest extent.
+
+    Raises:
+        ConfigError: if the model has no surface, or pictures cannot be made here.
+    """
+    path = page.checked(path, ".png")
+    actors = mesh_actors(model)
+    image = render(actors, aimed(actors[0].points, PAGE_WIDTH, view=view, up=up))[0]
+    with page.styled():
+        return page.save(_sheet(model, image, title), path)
+
+
+def mesh_actors(model: FEModel) -> list[Actor]:
+    """The outer surface, its elements, and its interfaces in colour.
+
+    Raises:
+        ConfigError: if the model has no surface.
+    """
+    if model.surface is None:
+        raise ConfigError("the model has no surface to draw.", hint="Give it a `SurfaceMesh`.")
+    points, triangles = model.points[model.surface.nodes], model.surface.triangles
+    edges = np.unique(np.sort(directed_edges(triangles)[0], axis=1), axis=0)
+    actors = [Actor(points[None], triangles, colour=PART_COLOUR)]
+    actors.append(Actor(points[None], edges, colour=EDGE_COLOUR, width=0.6))
+    place = {int(node): k for k, node in enumerate(model.surface.nodes)}
+    for k, interface in enumerate(model.interfaces.values()):
+        on = np.zeros(len(points), dtype=bool)
+        on[[place[int(node)] for node in interface.nodes if int(node) in place]] = True
+        patch = triangles[on[triangles].all(axis=1)]
+        actors.append(Actor(points[None], patch, colour=MARKED[k % len(MARKED)]))
+    return actors
+
+
+def _sheet(model: FEModel, image: Any, title: str) -> Any:
+    size = np.ptp(model.points, axis=0) * 1e3
+    words = (
+        f"Finite element mesh: {model.n_dofs} displacement dofs, "
+        f"{size[0]:.4g} mm x {size[1]:.4g} mm x {size[2]:.4g} mm. Lines join neighbouring nodes of "
+        "the outer surface; coloured surfaces are the interfaces, through which the body touches "
+        "the rest of the mechanism."
+    )
+    text, height = page.caption(words, PAGE_WIDTH - 60)
+    top = image.shape[0] + 90
+    figure = page.sheet(PAGE_WIDTH, top + 50 + height + 20)
+    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    page.place(figure, image, 0, 80)
+    left = 30
+    for k, name in enumerate(model.interfaces):
+        page.words(figure, "\u25a0", left, top, color=MARKED[k % len(MARKED)], size=page.TITLE_SIZE)
+        page.words(figure, name, left + 30, top + 3, size=page.BODY_SIZE)
+        left += 60 + 16 * len(name)
+    page.words(figure, text, 30, top + 45, size=page.SMALL_SIZE, color=TEXT_COLOUR)
+    return figure

@@ -1,0 +1,140 @@
+"""A window to turn things around in; its process never loads dolfinx.
+
+Run as ``python -m rom.view.scenes.window FOLDER`` it shows the scenes that `show` has left there:
+the arrow keys go from one to the next, the mouse turns them, q closes the window.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.child import python, run, scratch
+from rom.errors import ConfigError
+from rom.view.canvas.draw import add, aim
+from rom.view.canvas.offscreen import child_failure, require, write_scene
+from rom.view.canvas.scene import Actor, aimed, sharp_edges
+from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
+
+WINDOW_WIDTH = 1200  # [pixel]
+N_FRAMES, FRAME_PAUSE = 24, 40  # of one period of a mode; between frames [ms]
+KEYS_HELP = "arrow keys: next and last; mouse: turn; q: close"
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is seen at one time: a title, and actors that stay or move."""
+
+    title: str
+    actors: list[Actor]
+
+
+def has_display() -> bool:
+    """Whether a window can be opened: on Linux by what the desktop says."""
+    if sys.platform.startswith("linux"):
+        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return True
+
+
+def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
+    """The lowest elastic modes of a body, moving.
+
+    Raises:
+        ConfigError: if the body has no surface.
+        InterfaceError: if an interface is unknown.
+    """
+    if body.surface is None:
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+    omega, V = body.modes(fixed=fixed)
+    X, size = body.surface.points, np.ptp(body.surface.points, axis=0).max()
+    sine = np.sin(2 * np.pi * np.arange(N_FRAMES) / N_FRAMES)[:, None, None]
+    scenes = []
+    for i, k in enumerate(np.flatnonzero(omega > 0)[:n]):
+        u = displacement(body, V[:, k])
+        length = np.linalg.norm(u, axis=1)
+        moved = X + AMPLITUDE_RATIO * size / length.max() * sine * u
+        edges = sharp_edges(X, body.surface.triangles)
+        surface = Actor(moved, body.surface.triangles, (length / length.max())[None])
+        title = f"{body.name}, mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
+        scenes.append(Scene(title, [surface, Actor(X[None], edges, colour="#7c828c")]))
+    return scenes
+
+
+def show(scenes: Sequence[Scene]) -> None:
+    """Open a window and wait until it is closed.
+
+    Raises:
+        ConfigError: if pyvista is missing, or no window opens here.
+    """
+    require("pyvista")
+    with scratch("view") as folder:
+        leave(scenes, folder)
+        done = run(python("rom.view.scenes.window", str(folder)))
+        if done.code:
+            raise child_failure(done)
+
+
+def leave(scenes: Sequence[Scene], folder: Path) -> None:
+    """Write the scenes where the process of the window finds them."""
+    for k, scene in enumerate(scenes):
+        (folder / str(k)).mkdir()
+        seen = np.concatenate([actor.points.reshape(-1, 3) for actor in scene.actors])
+        write_scene(folder / str(k), scene.actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
+    (folder / "titles.json").write_text(json.dumps([scene.title for scene in scenes]))
+
+
+class Window:
+    """The scenes of a folder on a plotter of pyvista."""
+
+    def __init__(self, folder: Path, *, off_screen: bool = False) -> None:
+        import pyvista
+
+        self.folder, self.at, self.frame = folder, 0, 0
+        self.titles = json.loads((folder / "titles.json").read_text())
+        self.plotter: Any = pyvista.Plotter(
+            off_screen=off_screen, window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4]
+        )
+        self.plotter.background_color = pyvista.Color("white")
+        self.go(0)
+
+    def go(self, step: int) -> None:
+        """Show the scene so many further on."""
+        self.at, self.frame = (self.at + step) % len(self.titles), 0
+        folder = self.folder / str(self.at)
+        self.scene = json.loads((folder / "scene.json").read_text())
+        with np.load(folder / "arrays.npz", allow_pickle=False) as file:
+            self.arrays = dict(file)
+        self.plotter.clear_actors()
+        for k in range(len(self.scene["actors"])):
+            add(self.plotter, self.scene, self.arrays, k, 0)
+        text = (
+            f"{self.titles[self.at]}\n{KEYS_HELP}" if len(self.titles) > 1 else self.titles[self.at]
+        )
+        self.plotter.add_text(text, font_size=10, color="#20242a", name="title", render=False)
+        if not step:
+            aim(self.plotter, self.scene, self.arrays)
+
+    def tick(self, *_: Any) -> None:
+        """Show the next frame of what moves."""
+        self.frame += 1
+        for k in range(len(self.scene["actors"])):
+            n = len(self.arrays[f"points {k}"])
+            if n > 1:
+                add(self.plotter, self.scene, self.arrays, k, self.frame % n)
+        self.plotter.render()
+
+    def open(self) -> None:
+        """Until it is closed."""
+        self.plotter.add_key_event("Right", lambda: self.go(1))
+        self.plotter.add_key_event("Left", lambda: self.go(-1))
+        self.plotter.add_timer_event(max_steps=10**9, duration=FRAME_PAUSE, callback=self.tick)
+        self.plotter.show()
+
+
+if __name__ == "__main__":
+    Window(Path(sys.argv[1])).open()
