@@ -3,7 +3,7 @@
 # under build/. Needs root and 4 GB; the second run starts at once.
 #
 #   sudo .ci/newer_dolfinx.sh                         the tests that need dolfinx
-#   sudo .ci/newer_dolfinx.sh tests/test_fe_modes.py  these tests
+#   sudo .ci/newer_dolfinx.sh tests/fe/test_fe_modes.py  these tests
 set -eu
 cd "$(dirname "$0")/.."
 system="$PWD/build/debian13"

@@ -166,8 +166,8 @@ view.convergence(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
-# mass is that of columns with eight sides; below the seats their mesh is a little rounder.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# The mass is that of columns with eight sides; below the seats their mesh is a little rounder.
 
 octagon = 0.5 * 8 * np.sin(2 * np.pi / 8) * R**2
 volume = 2 * octagon * (H - t) + (L + 2 * a) * w * t

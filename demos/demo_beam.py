@@ -82,9 +82,9 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. Closed
-# forms are those of Euler and Bernoulli; shear and rotary inertia lower them by less than a per
-# cent at this slenderness.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# Closed forms are those of Euler and Bernoulli; shear and rotary inertia lower them by less than a
+# per cent at this slenderness.
 
 root_EI = np.sqrt(E * h**2 / (12 * rho)) / (2 * np.pi * L**2)
 results = {

@@ -133,7 +133,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 rod_1, solid_1, reduced_1, linear_1 = table[:, :, 0].T
 results = {

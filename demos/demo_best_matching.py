@@ -189,8 +189,8 @@ if first:
 # ## What to remember
 #
 # Best matching needs no inertial frame and no clock, and is what the mean-axis frame does to a
-# flexible body. `tests/test_demos.py` checks the numbers below: value, expected value, relative
-# tolerance.
+# flexible body. `tests/project/test_demos.py` checks the numbers below: value, expected value,
+# relative tolerance.
 
 results = {
     "mass [kg]": (model.mass(), 7850.0 * 1.0 * 0.05 * 0.03, 1e-9),

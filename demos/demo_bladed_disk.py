@@ -149,8 +149,8 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. Mass:
-# that of an annulus and of blades that taper linearly.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# Mass: that of an annulus and of blades that taper linearly.
 
 volume = np.pi * (0.15**2 - 0.06**2) * 0.016
 share = np.linspace(0.0, 1.0, 2001)[1::2]

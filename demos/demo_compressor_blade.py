@@ -141,9 +141,9 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
-# volume follows from the description of the geometry: parabolic profiles, platform, dovetail, whose
-# fillets add above the flanks what they take below; crowns add little.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# The volume follows from the description of the geometry: parabolic profiles, platform, dovetail,
+# whose fillets add above the flanks what they take below; crowns add little.
 
 z = np.linspace(0.0, 1.0, 2001)[1::2]
 chord, thick, edge = 0.045 - 0.005 * z, 0.0045 - 0.0021 * z, 0.0010

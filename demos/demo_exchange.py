@@ -111,9 +111,9 @@ if first:
 
     # ## What to remember
     #
-    # `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
-    # fall is that of a rigid rod, I theta'' = m g L/2 cos(theta), whose energy gives theta' at any
-    # angle; the bending of a falling beam is small.
+    # `tests/project/test_demos.py` checks the numbers below: value, expected value, relative
+    # tolerance. The fall is that of a rigid rod, I theta'' = m g L/2 cos(theta), whose energy gives
+    # theta' at any angle; the bending of a falling beam is small.
 
     EI = np.sqrt(E * h**2 / (12 * rho)) / (2 * np.pi * L**2)
     inertia = rho * b * h * L**3 / 3 + rho * b * h * L * h**2 / 12

@@ -120,8 +120,8 @@ view.plane(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. In four
-# postures the tool does not move at first whatever the motors do; each motor then feels
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# In four postures the tool does not move at first whatever the motors do; each motor then feels
 # (m1 + m2) l1^2 / 3.
 
 still = (2.0 + 1.0) * 0.3**2 / 3

@@ -85,8 +85,8 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
-# volume is that of the drawing; the meshes cut the corners of its circles.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# The volume is that of the drawing; the meshes cut the corners of its circles.
 
 L, W, H, t, z_s, l_s, t_r, b_f, h_f = 0.36, 0.20, 0.20, 0.008, 0.11, 0.030, 0.008, 0.040, 0.012
 volume = L * W * H - (L - 2 * t) * (W - 2 * t) * (H - t) + 4 * b_f**2 * (h_f + 0.75 * t)

@@ -132,8 +132,9 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. Bending
-# frequencies of a beam fall with the square of its length; taper and twist change that a little.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# Bending frequencies of a beam fall with the square of its length; taper and twist change that a
+# little.
 
 solid = np.pi * (0.15**2 - 0.06**2) * 0.015 + N * 0.07 * (0.012 * 0.0025 + 0.004 * 0.001 / 12)
 results = {

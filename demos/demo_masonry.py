@@ -113,7 +113,7 @@ view.plane(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 results = {
     "limit thickness over radius, closed form": (limit.ratio, 0.107478, 1e-5),

@@ -144,7 +144,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 medians = np.array([np.median(factors[s]) for s in SCATTER])
 largest = max(f.max() for f in factors.values())

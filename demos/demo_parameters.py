@@ -97,8 +97,8 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. Mass
-# and inertia are those of boxes at any thickness; frequencies are never below full ones.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# Mass and inertia are those of boxes at any thickness; frequencies are never below full ones.
 
 body = family.at(t=1.5)
 core, faces = 0.4 * 0.1 * 0.030 * 60.0, 0.4 * 0.1 * 0.004 * 2700.0

@@ -142,7 +142,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 v_expected = np.sqrt(G * SHARE * total * (2 - SHARE) / (1 - SHARE))
 results = {

@@ -158,8 +158,8 @@ view.convergence(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. In
-# pinned joints one free-free shape gives 22.3733 / sqrt(5).
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# In pinned joints one free-free shape gives 22.3733 / sqrt(5).
 
 results = {
     "square transformation, 1 + change": (1 + similarity, 1.0, 1e-8),

@@ -201,7 +201,7 @@ view.animate(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 turnover = np.ptp(energy.drives)
 results = {

@@ -141,7 +141,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 results = {
     "mass [kg]": (body.mass, 2500.0 * 4.5 * 3.5 * 0.25, 1e-9),

@@ -113,7 +113,7 @@ view.panels(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 slope = {k: np.log2(e[-2] / e[-1]) for k, e in errors.items()}
 results = {

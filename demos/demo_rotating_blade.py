@@ -167,7 +167,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 results = {
     "mass [kg]": (beam_model.mass(), rho * L * b * h, 1e-9),

@@ -133,7 +133,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 volume = np.pi / 4 * ((D**2 - 0.004**2) * L + WIDE * sum(d**2 - D**2 for d in DISCS.values()))
 results = {
     "mass [kg]": (24 * model.mass(), rho * volume, 1e-9),

@@ -126,8 +126,8 @@ view.flow(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. F1 for
-# plastic flow, F3 for elastic and modal work; F1 frequencies are too low.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# F1 for plastic flow, F3 for elastic and modal work; F1 frequencies are too low.
 
 results = {
     "tip of Cook's membrane, F3, 32 divisions": (membrane["F3", 32][3], 23.9035, 5e-5),

@@ -312,8 +312,8 @@ done("report")
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. The
-# mass of the crank is that of two discs with their hull, a journal and a pin.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# The mass of the crank is that of two discs with their hull, a journal and a pin.
 
 inclination = np.arcsin((0.028 - 0.022) / 0.04)
 web = (np.pi / 2 + inclination) * 0.028**2 + (np.pi / 2 - inclination) * 0.022**2

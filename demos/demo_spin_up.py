@@ -131,7 +131,7 @@ if first:
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 results = {
     "mass [kg]": (model.mass(), rhoA * L, 1e-9),

@@ -190,7 +190,7 @@ view.plane(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 x, y = straight.motion[:2]
 relieved, plain = (curves[name][1] for name in ("60 degrees, tips relieved",

@@ -122,8 +122,8 @@ view.updating(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance. Noise
-# averages out over many lines; the bias of a condensation does not.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# Noise averages out over many lines; the bias of a condensation does not.
 
 along = np.linalg.lstsq(bed.T, np.tile([1.0, 0, 0, 0, 0, 0], len(bed.points)), rcond=None)[0]
 spread = (best.p - true) / best.deviation[:6]

@@ -105,7 +105,7 @@ view.animate(
 
 # ## What to remember
 #
-# `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
 late = t > 30
 swing = [np.ptp(tip[late, 1]) / 2 for tip in tips]

@@ -128,7 +128,8 @@ view.panels(
 # ## What to remember
 #
 # The lag depends on the number of segments with second order: 0.252 m with 48, 0.250 m in the
-# limit. `tests/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
+# limit. `tests/project/test_demos.py` checks the numbers below: value, expected value, relative
+# tolerance.
 
 late = t > 30
 edge = runs[0].tip[late, 1]

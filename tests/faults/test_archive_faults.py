@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from damage import outcome
-from solid import block
 
 import rom
+from cases.files.damage import outcome
+from cases.solid import block
 from rom.io.archive import write_archive
 from rom.mbs.results.state import Memory, State
 

@@ -8,11 +8,11 @@ import sys
 import time
 
 import pytest
-from command import ROOT, environment
-from command import rom as command
-from solid import block
 
 import rom
+from cases.command import ROOT, environment
+from cases.command import rom as command
+from cases.solid import block
 from rom.cli.main import main
 from rom.cli.verbs import check
 

@@ -3,10 +3,9 @@
 import random
 
 import pytest
-from test_config_component import SOLID
-from test_config_mechanism import ALL, CRANK, PENDULUM
 
 import rom
+from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
 from rom.config.component import read_component
 from rom.config.mechanism import read_mechanism
 

@@ -2,17 +2,17 @@
 
 import os
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
-from damage import damaged, outcome
-from mbs_cases import random_body
 from scipy.io import mmwrite
 from scipy.sparse import random as random_matrix
-from solid import block
 
 import rom
+from cases.files.damage import damaged, outcome
+from cases.mbs.mechanisms import random_body
+from cases.paths import TESTS
+from cases.solid import block
 from rom.errors import ConfigError, FileFormatError
 from rom.io.export import read_body
 from rom.io.fields.universal import read_universal
@@ -25,7 +25,7 @@ from rom.io.matrices.user_element import read_user_element
 from rom.io.programs.openfast_reading import read_openfast
 from rom.io.sid.dialect import read_sid
 
-HERE = Path(__file__).parents[1] / "reference" / "foreign"
+HERE = TESTS / "reference" / "foreign"
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 MUTANTS = 60
 pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 
 def universal(binary):
     """Two functions as other programs write them."""
-    from test_universal import IM, RE, X, dataset, header
+    from cases.files.decks import IM, RE, X, dataset, header
 
     if not binary:
         return (dataset(5, 0, [X, RE, IM]) + dataset(6, 1, [RE, IM])).encode()
@@ -43,13 +43,13 @@ def universal(binary):
 
 
 def deck(_):
-    from test_foreign_matrices import DECK
+    from cases.files.decks import DECK
 
     return DECK.encode()
 
 
 def user_element(_):
-    from test_calculix import BY_HAND
+    from cases.files.decks import BY_HAND
 
     return BY_HAND.encode()
 

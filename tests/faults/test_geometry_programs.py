@@ -11,8 +11,8 @@ import warnings
 from pathlib import Path
 
 import pytest
-from command import rom as command
 
+from cases.command import rom as command
 from rom import child
 from rom.errors import (
     ConfigError,

@@ -13,8 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from command import environment
 
+from cases.command import environment
 from rom import child
 
 pytestmark = [

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cells import blocks_of, solid, write_msh
 
+from cases.files.cells import blocks_of, solid, write_msh
 from rom.errors import (
     ConfigError,
     FileFormatError,

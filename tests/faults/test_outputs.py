@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import ROOT
-from solid import block
 
 import rom
+from cases.command import ROOT
+from cases.solid import block
 from rom.cli.main import main
 from rom.cli.parser import VERBS, build_parser
 from rom.errors import ConfigError

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import ROOT, environment
-from solid import block
 
 import rom
+from cases.command import ROOT, environment
+from cases.solid import block
 from rom import child
 
 MODULES = (

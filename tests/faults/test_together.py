@@ -13,11 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import environment
-from command import rom as command
-from solid import block
 
 import rom
+from cases.command import environment
+from cases.command import rom as command
+from cases.paths import TESTS
+from cases.solid import block
 from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
 from rom.io.claim import LOCK_NAME, claimed
@@ -210,7 +211,7 @@ KERNELS = """
 import sys
 from pathlib import Path
 from rom.mbs.kernels.compiled import drop_stale_cache
-folder = Path(__file__).parent
+folder = TESTS
 for _ in range({drops}):
     drop_stale_cache(folder, folder / "__pycache__" / "stamp")
 import toy
@@ -248,7 +249,7 @@ def test_kernels_compiled_by_several_processes_at_once_work_and_are_kept(tmp_pat
 FORM = """
 import ufl
 from mpi4py import MPI
-from boxes import box
+from cases.boxes import box
 from rom.fe import jit
 from rom.fe.compat import assemble_matrix, lagrange
 mesh, _ = box(cells=(1, 1, 1))
@@ -265,7 +266,7 @@ def test_forms_compiled_by_two_processes_at_once_are_the_same(tmp_path):
     (tmp_path / "fenics").mkdir()
     (tmp_path / "fenics" / "rom.lock").write_text("")  # of a process that is gone
     env = environment(XDG_CACHE_HOME=str(tmp_path))
-    env["PYTHONPATH"] += f"{os.pathsep}{Path(__file__).parents[1]}"
+    env["PYTHONPATH"] += f"{os.pathsep}{TESTS}"
     run = [subprocess.Popen([sys.executable, "-c", FORM], env=env, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)
            for _ in range(2)]  # fmt: skip

@@ -3,9 +3,9 @@
 import json
 
 import numpy as np
-from damage import HOSTILE, WAYS
 
 import rom
+from cases.files.damage import HOSTILE, WAYS
 from generated.case import Silent, Warned, case, edit, write
 from generated.stock import MATRICES, STEEL
 from rom.errors import (

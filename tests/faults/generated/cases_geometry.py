@@ -1,9 +1,9 @@
 """Geometries are programs: they end, or are stopped by name; and damaged meshes crash nothing."""
 
 import numpy as np
-from cells import blocks_of, solid, write_msh
-from damage import WAYS
 
+from cases.files.cells import blocks_of, solid, write_msh
+from cases.files.damage import WAYS
 from generated.case import Silent, Warned, Works, case, edit, require, write
 from generated.stock import GEO, deck
 from rom.errors import (

@@ -1,9 +1,9 @@
 """Numbers that are no mistake of form and no physics: they are refused, or a warning names them."""
 
 import numpy as np
-from cells import blocks_of, solid, write_msh
 
 import rom
+from cases.files.cells import blocks_of, solid, write_msh
 from generated.case import Silent, Warned, Works, case, edit, require
 from generated.stock import STEEL, body, model, origin, pendulum
 from rom.errors import (

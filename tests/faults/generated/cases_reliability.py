@@ -3,8 +3,8 @@
 import os
 
 import numpy as np
-from cells import blocks_of, solid, write_msh
 
+from cases.files.cells import blocks_of, solid, write_msh
 from generated.case import Silent, Warned, Works, case, edit, require, write
 from generated.cases_code import compiled
 from generated.cases_reliability_models import MODES, one_thread, scaled

@@ -9,9 +9,9 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-from solid import block
 
 import rom
+from cases.solid import block
 from generated.case import Silent, Warned, Works, case, edit, require
 from generated.stock import KINDS, STEEL, body, model, on_ranks, origin, pendulum
 from rom.errors import (

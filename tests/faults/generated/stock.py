@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cells import blocks_of, solid, write_msh
 from scipy.io import mmwrite
-from solid import block
 
 import rom
+from cases.files.cells import blocks_of, solid, write_msh
+from cases.solid import block
 from rom.child import environment
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.op4 import write_op4

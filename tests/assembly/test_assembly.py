@@ -1,0 +1,131 @@
+"""Reduced bodies coupled on shared interfaces, against the whole in one piece."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.halves import COUPLED, FULL, ROOT, half, joined, study, whole
+from cases.solid import block
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Row
+
+
+@pytest.mark.parametrize("fixed", [(), (ROOT,), (ROOT, ("right", "tip"))])
+def test_two_halves_with_all_modes_are_the_whole(fixed):
+    """Conforming meshes, every dof of the cut kept."""
+    names = tuple(interface for _, interface in fixed)
+    found = joined("full").frequencies(12, fixed=fixed)
+    assert_allclose(found, whole(fixed=names), rtol=1e-8, atol=1e-6)
+    assert np.count_nonzero(found == 0.0) == (0 if fixed else 6)
+
+
+def test_shapes_of_both_halves_meet_at_the_cut():
+    assembly = joined("polynomial:2", n_modes=10)
+    omega, shapes = assembly.modes(8, fixed=(ROOT,))
+    assert omega.shape == (8,)
+    left, right = (assembly.bodies[name] for name in ("left", "right"))
+    ends = [left.marker("tip").hold @ shapes["left"], right.marker("root").hold @ shapes["right"]]
+    assert_allclose(ends[0], ends[1], atol=1e-9 * np.abs(ends[0]).max())
+    assert_allclose(left.marker("root").hold @ shapes["left"], 0, atol=1e-9 * np.abs(ends[0]).max())
+
+
+def test_errors_are_one_sided_and_fall_with_the_order_of_the_functions():
+    exact = whole()
+    steps = np.array([joined(f"polynomial:{p}", n_modes=30).frequencies(12, fixed=(ROOT,))
+                      for p in (1, 2, 4)])  # fmt: skip
+    assert (steps >= exact * (1 - 1e-9)).all()
+    assert (np.diff(steps, axis=0) <= 1e-9 * exact).all()
+    assert_allclose(steps[-1], exact, rtol=2e-3)
+
+
+def test_meshes_that_do_not_match_are_coupled_by_their_functions():
+    """Two and three cells across the cut: between the whole on either mesh, or 0.1 % above."""
+    coarse, fine = whole((8, 2, 2)), whole((8, 3, 3))
+    assembly = joined("polynomial:2", ((4, 2, 2), (4, 3, 3)), n_modes=40)
+    found = assembly.frequencies(6, fixed=(ROOT,))
+    assert (found > np.minimum(coarse, fine)[:6]).all()
+    assert (found < 1.001 * np.maximum(coarse, fine)[:6]).all()
+    assert (np.abs(fine / coarse - 1)[:6] < 0.1).all()
+
+
+def test_a_chain_of_four_is_coupled_in_any_order():
+    quarter = [
+        block(size=(0.25, 0.1, 0.08), cells=(3, 2, 2), origin=(0.25 * k, 0, 0)) for k in range(4)
+    ]
+    bodies = {
+        f"part {k}": rom.reduce(
+            model, method=rom.CraigBampton(15),
+            interfaces={"root": "rbe2" if k == 0 else "full", "tip": "full"}, certify=False,
+        )
+        for k, model in enumerate(quarter)
+    }  # fmt: skip
+    couplings = tuple(((f"part {k}", "tip"), (f"part {k + 1}", "root")) for k in range(3))
+    root = (("part 0", "root"),)
+    forward = rom.Assembly(bodies, couplings).frequencies(6, fixed=root)
+    shuffled = dict(reversed(bodies.items()))
+    backward = rom.Assembly(shuffled, couplings[::-1]).frequencies(6, fixed=root)
+    assert_allclose(backward, forward, rtol=1e-9)
+    model = block(size=(1.0, 0.1, 0.08), cells=(12, 2, 2))
+    exact = rom.modes(model, 6, fixed=("root",)).frequencies
+    assert_allclose(forward, exact, rtol=1e-3)
+    assert (forward >= exact * (1 - 1e-9)).all()
+
+
+def test_messages_for_couplings_that_cannot_be():
+    left, right = half("left", "full"), half("right", "full")
+    bodies = {"left": left, "right": right}
+    with pytest.raises(ConfigError, match="no body 'middle'"):
+        rom.Assembly(bodies, ((("middle", "tip"), ("right", "root")),))
+    with pytest.raises(InterfaceError, match="no interface 'top'"):
+        rom.Assembly(bodies, ((("left", "top"), ("right", "root")),))
+    with pytest.raises(ConfigError, match=r"couplings\[0\] = .* must be a row of 2"):
+        rom.Assembly(bodies, (("left", "tip", "right", "root"),))
+    with pytest.raises(InterfaceError, match=r"full with 27 .* polynomial:1 with 9: they"):
+        rom.Assembly(bodies | {"right": half("right", "polynomial:1")}, COUPLED)
+    with pytest.raises(InterfaceError, match="lie 1 m apart"):
+        rom.Assembly(bodies, ((("left", "root"), ("right", "tip")),))
+
+
+STUDY = {
+    "polynomial:1": (2.31e-2, 2.47e-3),
+    "polynomial:2": (2.94e-3, 3.3e-5),
+    "polynomial:3": (2.93e-3, 3.4e-6),
+    "polynomial:4": (3.00e-4, 3.4e-6),
+    "full": (2.98e-4, 9.0e-8),
+}
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("kind", STUDY)
+def test_study_of_interface_orders_on_two_blocks(kind):
+    bodies, couplings = study(kind)
+    assembly = rom.Assembly(bodies, couplings)
+    error = assembly.frequencies(10, fixed=(("left", "x0"),)) / FULL - 1
+    worst, first = STUDY[kind]
+    assert_allclose(error.max(), worst, rtol=5e-3)
+    assert_allclose(error[0], first, atol=6e-7, rtol=5e-3)  # digits of the full frequency
+
+
+def test_certificates_of_an_assembly_and_of_its_few_functions():
+    assembly = joined("full", n_modes=12)
+    assert not assembly.certificate.ok  # its bodies were reduced without
+    own = certify_of_parts(assembly)
+    rows = own.certificate.rows
+    assert own.certificate.ok
+    assert {line.quantity.partition(":")[0] for line in rows[:-1]} == {"left", "right"}
+    assert rows[-1].quantity.startswith("gap of coupled interfaces") and rows[-1].value > 0
+    assert assembly.reduced(20).certificate.ok
+    poor = assembly.reduced(2, fixed=(ROOT,)).certificate
+    assert [line.quantity for line in poor.failures] == [
+        "2 interface functions: worst error of 6 frequencies"
+    ]
+
+
+def certify_of_parts(assembly):
+    """The assembly of bodies that say of themselves that they are right."""
+    good = rom.Report("certificate", (Row("mass", 0.0, "<= 1e-09", True),))
+    bodies = {name: replace(body, certificate=good) for name, body in assembly.bodies.items()}
+    return rom.Assembly(bodies, assembly.couplings)

@@ -1,0 +1,163 @@
+"""What the benchmarks measure is what they say they measure."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+import rom
+from cases.paths import ROOT
+from rom.bench import benchmarks, wheel
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ResourceError
+
+SIZE = np.array([0.16, 0.02, 0.012])
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return benchmarks.bar(tuple(SIZE), (16, 2, 1))
+
+
+def test_the_bar_has_the_mass_centre_and_inertia_of_a_bar(bar):
+    m = 7850.0 * SIZE.prod()
+    R = rigid_motions(bar.points - SIZE / 2)
+    expected = np.diag([m, m, m, *(m / 12 * ((SIZE**2).sum() - SIZE**2))])
+    assert_allclose(R.T @ (bar.M @ R), expected, atol=1e-12 * m)
+    assert np.abs(bar.K @ R).max() < 1e-14 * abs(bar.K).max()
+
+
+def test_the_energy_of_any_constant_strain_is_that_of_steel(bar):
+    A = np.random.default_rng(3).normal(size=(3, 3))
+    e = 0.5 * (A + A.T)
+    voigt = np.array([e[0, 0], e[1, 1], e[2, 2], 2 * e[1, 2], 2 * e[0, 2], 2 * e[0, 1]])
+    u = (bar.points @ A.T).ravel()
+    energy = SIZE.prod() * voigt @ benchmarks.STEEL.stiffness @ voigt
+    assert_allclose(u @ (bar.K @ u), energy, rtol=1e-11)
+
+
+def test_the_bar_vibrates_like_a_bar(bar):
+    """Free bending about both axes below the slender beam, and close to it; stretching above."""
+    f = rom.modes(bar, 13).frequencies[6:]
+    slender = 22.373285 * benchmarks.STEEL.wave_speed * SIZE[[2, 1]] / np.sqrt(12) / SIZE[0] ** 2
+    assert_allclose(f[:2], slender / (2 * np.pi), rtol=0.06)
+    assert np.all(f[:2] < slender / (2 * np.pi))
+    assert_allclose(f[6], benchmarks.STEEL.wave_speed / (2 * SIZE[0]), rtol=2e-3)
+
+
+def test_the_ends_of_the_bar_are_its_interfaces(bar):
+    for name, x in (("root", 0.0), ("tip", SIZE[0])):
+        face = bar.interfaces[name]
+        assert_allclose(face.origin, [x, SIZE[1] / 2, SIZE[2] / 2], atol=1e-12)
+        assert_allclose(face.area, SIZE[1] * SIZE[2], rtol=1e-12)
+        y, z = face.points[:, 1], face.points[:, 2]
+        exact = SIZE[1] ** 3 / 3 * SIZE[2] ** 2 / 2  # integral of y^2 z
+        assert_allclose(y @ face.surface_mass @ (y * z), exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["full", "polynomial:4"])
+def test_a_bed_under_the_interfaces_is_that_of_the_full_model(bar, kind):
+    """Ten frequencies of the bar with springs under both ends, from all its dofs by LAPACK."""
+    K, M = bar.K.toarray(), bar.M.toarray()
+    for face in bar.interfaces.values():
+        K[np.ix_(face.dofs, face.dofs)] += benchmarks.BED * np.kron(
+            face.surface_mass.toarray(), np.eye(3)
+        )
+    exact = np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * np.pi)
+    kinds = dict.fromkeys(bar.interfaces, kind)
+    body = rom.reduce(bar, method=rom.CraigBampton(40), interfaces=kinds, certify=False)
+    f = benchmarks._on_a_bed(body, bar)
+    assert np.all(f > exact * (1 - 1e-9))
+    assert_allclose(f, exact, rtol=1e-3)
+
+
+def test_the_integrator_is_measured_without_fenicsx():
+    """After one turn of 1000 steps that compiles, and on a rod of twenty normal modes."""
+    code = (
+        "import sys; sys.modules.update(dict.fromkeys(['dolfinx', 'petsc4py', 'gmsh', 'mpi4py']))\n"
+        "from rom.bench.benchmarks import integrator\n"
+        "for figure in integrator(turns=2): print(figure.case, figure.quantity, figure.value > 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=600, check=False,
+    )  # fmt: skip
+    case = "26 elastic coordinates, 2000 steps"
+    expected = [f"{case} steps per second True", f"{case} share outside compiled code True"]
+    assert done.stdout.splitlines() == expected, done.stderr
+
+
+def test_chains_of_all_lengths_are_measured():
+    """One figure for each length, of as many elastic coordinates, and how the cost grew."""
+    figures = list(benchmarks.chain((2, 12, 24)))
+    cases = [f"{n} links of 14 modes" for n in (2, 12, 24)] + ["24 against 12 links"]
+    assert [figure.case for figure in figures] == cases
+    assert all(figure.value > 0.0 for figure in figures)
+
+
+def test_other_programs_reduce_the_same_model(bar, tmp_path):
+    """The script that other programs run, here with SciPy: its body has our frequencies."""
+    from rom.bench.peers.compare import SCRIPT
+    from rom.bench.peers.ours import save_matrices
+
+    file = tmp_path / "matrices.npz"
+    save_matrices(bar, str(file), tuple(benchmarks.KINDS))
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), str(file), "superlu", "rbe2", "8"],
+        capture_output=True, text=True, timeout=600, check=True,
+    )  # fmt: skip
+    found = json.loads(done.stdout)
+    body = rom.reduce(bar, method=rom.CraigBampton(8), interfaces=benchmarks.KINDS, certify=False)
+    assert_allclose(found["frequencies"], body.frequencies()[6:16], rtol=1e-8)
+    assert found["seconds"] > 0.0
+
+
+def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
+    from rom.bench.peers import compare
+
+    monkeypatch.setattr(compare, "ENVIRONMENT", tmp_path / "peers")
+    monkeypatch.setattr(compare, "PACKAGES", ("no-such-package-anywhere==0",))
+    with pytest.raises(ResourceError, match=r"the environment .* could not be made"):
+        compare.interpreter()
+    assert not (tmp_path / "peers" / "complete").exists()
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("size", [30e3, 100e3])
+def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    from rom.fe.mesh.read import read_mesh
+
+    solid = read_mesh(benchmarks.geometry("beam"), parameters=benchmarks._beam(size))
+    edges = solid.cells[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
+    n_edges = len(np.unique(np.sort(edges.reshape(-1, 2), axis=1), axis=0))
+    n_dofs = 3 * (len(np.unique(solid.cells[:, :4])) + n_edges)  # one node more on each edge
+    assert_allclose(n_dofs, size, rtol=0.1)
+
+
+@pytest.mark.fenicsx
+def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
+    pytest.importorskip("dolfinx", reason="the sector is meshed")
+    coarse = wheel.WHEEL | {"lc": 0.02, "lc_blade": 0.02}
+    figures = {f.quantity.split(":")[0]: f.value for f in benchmarks.wheel(3, coarse)}
+    assert 1e-8 < figures["reduced sector above sector"] < 1e-3
+    assert figures["sector against wheel"] < 1e-8
+    assert all(value > 0.0 for value in figures.values())
+
+
+def test_compiled_loops_are_timed_on_motions_that_are_right():
+    """A short arch that rests on its abutments, postures near an isotropic one, a coarse bar."""
+    figures = {
+        f"{f.case.split(',')[0]}: {f.quantity}": f for f in benchmarks.loops(10, 400, 120, 10)
+    }
+    assert [f.aim for f in figures.values()][::2] == ["below 30", "below 2", "below 20"]
+    assert all(f.value > 0 for f in figures.values())
+    assert figures["arch of 10 blocks: fastest stone"].value < 1e-4
+    assert figures["five-bar linkage: best index of isotropy"].value == pytest.approx(1, abs=1e-3)
+    assert 5.5 < figures["Taylor's bar: radius of its foot"].value < 7.1

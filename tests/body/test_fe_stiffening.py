@@ -1,0 +1,292 @@
+"""Geometric stiffness of solids: rotating beams, buckling, and the same loads by another road."""
+
+import os
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, eigvalsh
+
+import rom
+from cases.beam import gauss_hermite, hermite_beam
+from cases.ranks.environment import ENVIRONMENT
+from rom.body.prestress import _turning, centrifugal
+from rom.body.rotating import rotating_matrices
+from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR, interface_loads
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ConfigError, ModelError, RomWarning
+from rom.reduction.interfaces.connection import connect
+from rom.workflow import operators
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.filterwarnings("ignore:.*fixed-interface modes are kept"),
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+]
+E, RHO, L, B, H = 70e9, 2700.0, 1.0, 0.03, 0.02
+AREA, STIFFNESS = B * H, E * B * H**3 / 12
+UNIT = np.sqrt(STIFFNESS / (RHO * AREA * L**4))  # rad/s of a dimensionless frequency of one
+ENDS = {"root": "rbe2", "tip": "rbe2"}
+# first flapwise frequency by speed: exact Euler-Bernoulli beam, and the same solid clamped at its
+# root by 40 x 2 x 2 quadratic hexahedra, from an independent program
+TABLE = {
+    0: (3.51601527, 3.52316), 1: (3.68164681, 3.68866), 2: (4.13731957, 4.14407),
+    3: (4.79727853, 4.80381), 5: (6.44954475, 6.45604), 10: (11.2023278, 11.20984),
+    12: (13.1701505, 13.17808),
+}  # fmt: skip
+
+
+def solid(degree=2, nu=0.3, attachments=(), **sizes):
+    parameters = {"L": L, "b": B, "h": H, "hex": 1, "nx": 40, "ny": 2, "nz": 2} | sizes
+    return rom.fe.model(
+        "meshes/beam.geo", material=rom.Material(E=E, nu=nu, rho=RHO), degree=degree,
+        parameters=parameters, attachments=attachments,
+    )  # fmt: skip
+
+
+def stiffened(model, interfaces=ENDS, reference="root", n_modes=8):
+    return rom.reduce(
+        model, method=rom.CraigBampton(n_modes), interfaces=interfaces, reference=reference,
+        stiffening=True, certify=False,
+    )  # fmt: skip
+
+
+def rotating(body, eta, axis=(0, 0, 1)):
+    found = body.rotating_frequencies(eta * UNIT, axis, fixed=("root",), at=(0, 0, 0))
+    return found * 2 * np.pi / UNIT
+
+
+@pytest.fixture(scope="module")
+def blade():
+    """Clamped at its root, the frame of the whole body away from it."""
+    return stiffened(solid(), {"root": "rbe2"}, reference="mean-axis", n_modes=20)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return solid(nx=12, ny=1, nz=1)
+
+
+@pytest.fixture(scope="module")
+def body(model):
+    return stiffened(model)
+
+
+@pytest.mark.parametrize("eta", TABLE)
+def test_a_rotating_solid_has_the_published_frequencies(blade, eta):
+    """D3: axis along z, flapwise along z; the lag branch crosses the flap branch above 4."""
+    exact, by_solids = TABLE[eta]
+    found = rotating(blade, eta)[:2]
+    flap = found[np.argmin(abs(found - exact))]
+    assert_allclose(flap, exact, rtol=2.5e-3)
+    assert_allclose(flap, by_solids, rtol=1e-4)
+
+
+def test_the_lag_mode_feels_softening_and_coriolis(blade):
+    """Without Coriolis force the independent program's value; with it, lower: lag stretches.
+
+    Coriolis force of the lag velocity stretches the bar quasi-statically, u'' = 2 omega w' rho / E,
+    which the energy of the axial motion takes from the lag motion.
+    """
+    root = blade.with_reference("root")
+    K, G = rotating_matrices(root, np.array([0.0, 0.0, 10 * UNIT]), np.zeros(3))
+    assert_allclose(G, -G.T, atol=1e-12 * np.abs(G).max())
+    assert_allclose(np.sqrt(eigh(K, root.M)[0][0]) / UNIT, 6.60313, rtol=1e-4)
+    lam, V = eigh(K, root.M)
+    push = G @ V[:, 0]
+    lowered = lam[0] / (1 + push @ np.linalg.solve(K, push))  # quasi-static answer of all others
+    assert_allclose(rotating(blade, 10)[0] * UNIT, np.sqrt(lowered), rtol=1e-4)
+    assert rotating(blade, 10)[0] < 6.595
+
+
+def test_southwell_bounds_hold_at_every_speed(blade):
+    """String from below; from above the Rayleigh quotient of the mode at rest, 1.1933 eta^2."""
+    at_rest, alpha = rotating(blade, 0)[0], 1.193336 * 1.0025
+    for eta in (0.5, 2, 4, 8, 16, 30):
+        squares = rotating(blade, eta)[:4] ** 2
+        inside = (at_rest**2 + eta**2 < squares) & (squares < at_rest**2 + alpha * eta**2)
+        assert inside.any()
+
+
+def test_the_second_mode_follows_the_table(blade):
+    found = rotating(blade, 10)
+    assert_allclose(found[np.argmin(abs(found - 33.64))], 33.6403659, rtol=2.5e-3)
+
+
+def test_a_column_buckles_under_eulers_load(body):
+    """The tip pressed towards the root: pi^2 EI / 4 L^2 about the weaker axis."""
+    lam = eigvalsh(body.K_geo["tip f_x"], body.K).max()
+    assert_allclose(1 / lam, np.pi**2 * STIFFNESS / (4 * L**2), rtol=8e-3)
+
+
+def test_a_column_buckles_under_its_own_weight(body):
+    """Greenhill: rho A g L^3 / EI = 7.8373; acceleration along x presses on the root."""
+    lam = -eigvalsh(body.K_geo["a_x"], body.K).min()
+    assert_allclose(RHO * AREA * L**3 / STIFFNESS / lam, 7.8373, rtol=1.2e-2)
+
+
+def test_a_deep_cantilever_tips_over_sideways():
+    """Prandtl and Michell: P L^2 = 4.0126 sqrt(EI GJ) for a force at the tip along the height."""
+    deep = stiffened(solid(nu=0.0, b=0.004, h=0.05, nx=24, ny=1, nz=2), n_modes=16)
+    tip, compliance = deep.marker("tip"), np.linalg.inv(deep.K)
+    weak, twist = (1 / (row @ compliance @ row) for row in (tip.translation[1], tip.rotation[0]))
+    assert_allclose(weak * L**3 / 3, E * 0.05 * 0.004**3 / 12, rtol=2e-3)
+    lam = np.abs(eigvalsh(deep.K_geo["tip f_z"], deep.K)).max()
+    assert_allclose(1 / lam, 4.0126 * np.sqrt(weak * L**3 / 3 * twist * L) / L**2, rtol=0.03)
+
+
+def test_unit_loads_with_the_root_held_by_the_full_model(model, body):
+    """The frame on the root turns inertia relief into reactions: the same stress, held directly."""
+    ops, c = operators(model), connect(operators(model), model, ENDS)
+    fields = np.hstack([-rigid_motions(model.points), centrifugal(model.points)])
+    force = ops.apply_M(fields)
+    tip = np.zeros((c.ops.n, 6))
+    tip[c.held(("tip",)), np.arange(6)] = 1.0
+    held = c.ops.hold(c.held(("root",)))
+    U = c.ops.expand(held(np.hstack([c.ops.restrict(force), tip])))
+    Psi = c.ops.expand(rom.CraigBampton(8).basis(c.ops, c.boundary, c.labels).Psi)
+    rows = (3 * model.surface.nodes[:, None] + np.arange(3)).ravel()
+    Psi = Psi @ np.linalg.lstsq(Psi[rows], body.surface.shape, rcond=None)[0]
+    K = model.stresses.geometric_stiffness(U, Psi)
+    face = model.interfaces["tip"]
+    p = (ops.apply_K(U) - np.hstack([force, np.zeros((ops.n, 6))]))[face.dofs]
+    moment = np.einsum("nal,nb->lab", p.reshape(-1, 3, 18), face.points - face.origin)
+    K += _turning(moment, body.marker("tip").rotation)
+    for load, A in zip((*LINEAR, *ANGULAR, *CENTRIFUGAL, *interface_loads("tip")), K, strict=True):
+        assert_allclose(body.K_geo[load], A, atol=1e-6 * np.abs(A).max(), err_msg=load)
+
+
+@pytest.mark.parametrize("reference", ["tip", ("root", "tip")])
+def test_there_and_back_to_another_frame(model, body, reference):
+    back = body.with_reference(reference).with_reference("root")
+    assert set(back.K_geo) == set(body.K_geo)
+    sign = np.sign(np.sum(back.surface.shape * body.surface.shape, axis=0))
+    for load, A in body.K_geo.items():
+        assert_allclose(
+            sign[:, None] * back.K_geo[load] * sign, A, atol=1e-8 * np.abs(A).max(), err_msg=load
+        )
+        assert np.array_equal(A, A.T)
+    free = body.with_reference("mean-axis")
+    assert not {*LINEAR, *ANGULAR} & set(free.K_geo)  # inertia relief: no stress
+    seen = (rotating(b.with_reference(reference), 8.0) for b in (body, free))
+    assert_allclose(*seen, rtol=1e-7)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_a_rod_pulled_by_its_own_rotation(degree):
+    """Stretch L (tan k / k - 1), k = omega L sqrt(rho / E), of a bar without Poisson effect."""
+    sizes = {"b": 0.2, "h": 0.2, "nx": 6 if degree == 3 else 12, "ny": 1, "nz": 1}
+    rod = stiffened(solid(degree, nu=0.0, **sizes), n_modes=12)
+    w = np.array([0.0, 0.0, 0.3 / L * np.sqrt(E / RHO)])
+    rod.K_geo.clear()  # stretch stiffens at the order of the strain, which the formula leaves out
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        K = rotating_matrices(rod, w, np.zeros(3))[0]
+    X = rod.Ibar_kl
+    q = np.linalg.solve(K, np.einsum("a,aak->k", w @ w - w**2, X))
+    stretch = (rod.marker("tip").translation @ q)[0]
+    assert_allclose(stretch, L * (np.tan(0.3) / 0.3 - 1), rtol=1e-3)
+
+
+def test_stiffening_does_not_need_the_modes_that_carry_the_load(model):
+    """Only the first lag and flap mode are kept, and the tension is still exact."""
+    few = stiffened(model, {"root": "rbe2"}, n_modes=2)
+    (lag, flap), at_rest = rotating(few, 3)[::-1], rotating(few, 0)
+    assert few.n_modes == 2
+    assert_allclose(min(lag, flap) ** 2 - at_rest[0] ** 2, 1.193336 * 9, rtol=5e-3)
+    assert_allclose(max(lag, flap) ** 2 - at_rest[1] ** 2, 0.193336 * 9, rtol=5e-2)
+
+
+def test_a_mass_beyond_the_tip_pulls_like_a_pendulum():
+    """Point mass on a rigid arm: a beam of Hermite elements whose tip turns the arm out."""
+    m, arm, eta = 0.5 * RHO * AREA * L, 0.25 * L, 4.0
+    mass = rom.Attachment("tip", m, 1e-9 * np.eye(3), at=(L + arm, 0, 0))
+    body = stiffened(solid(nu=0.0, nx=20, ny=1, nz=1, attachments=(mass,)), {"root": "rbe2"})
+    K, M = hermite_beam()
+    x, weight, _, slopes = gauss_hermite(40, 1.0)
+    reach, turn = np.zeros(82), np.zeros(82)
+    reach[-2:], turn[-1] = (1.0, 0.25), 1.0
+    M += 0.5 * np.outer(reach, reach)
+    tension = 0.5 * (1 - x**2) + 0.5 * 1.25
+    pull = (slopes.T * (weight * tension)) @ slopes + 0.5 * 1.25 * 0.25 * np.outer(turn, turn)
+    exact = np.sqrt(eigvalsh((K + eta**2 * pull)[2:, 2:], M[2:, 2:])[:2])
+    found = rotating(body, eta)
+    for value in exact:
+        assert np.abs(found / value - 1).min() < 2e-3
+
+
+@pytest.mark.parametrize("kind", ["full", "rbe3", "polynomial:2"])
+def test_the_kind_of_the_support_hardly_matters(model, kind):
+    """A deformable root held everywhere is the rigid one; an averaged one is a little softer."""
+    rigid = stiffened(model, {"root": "rbe2"}, n_modes=12)
+    other = stiffened(model, {"root": kind}, n_modes=12)
+    tolerance = 1e-2 if kind == "rbe3" else 1e-3
+    assert_allclose(rotating(other, 6)[:3], rotating(rigid, 6)[:3], rtol=tolerance)
+
+
+def test_the_command_line_stiffens_too(tmp_path):
+    from rom.cli.main import main
+
+    path = tmp_path / "beam.rom.npz"
+    asked = "reduce meshes/beam.geo -p lc=0.1 --E 70e9 --nu 0.3 --rho 2700 -i root=rbe2 -m 2 -q"
+    assert main([*asked.split(), "--stiffening", "--no-certificate", "-o", str(path)]) == 0
+    assert "omega_z^2" in rom.load(path).K_geo
+
+
+def test_messages(body, model):
+    with pytest.raises(ConfigError, match="no finite elements, from which alone geometric"):
+        stiffened(replace(model, stresses=None))
+    free = rom.reduce(model, method=rom.FreeFree(6), interfaces=ENDS, certify=False)
+    with pytest.raises(ModelError, match="free-free modes only"):
+        free.rotating_frequencies(10.0, (0, 0, 1), fixed=("root",))
+    with pytest.raises(ConfigError, match="needs a support"):
+        body.rotating_frequencies(10.0, (0, 0, 1), fixed=())
+    with pytest.raises(ConfigError, match="axis "):
+        body.rotating_frequencies(10.0, (0, 0, 0), fixed=("root",))
+    bare = rom.reduce(
+        model, method=rom.CraigBampton(4), interfaces=ENDS, reference="root", certify=False
+    )
+    with pytest.warns(RomWarning, match="softens it only"):
+        bare.rotating_frequencies(1.0, (0, 0, 1), fixed=("root",))
+    with pytest.warns(RomWarning, match="used up its stiffness"):
+        rotating(bare, 6.0)
+    bare.K_geo["sideways"] = np.eye(bare.n_modes)
+    with pytest.raises(ConfigError, match="unknown load 'sideways'"):
+        bare.with_reference("tip")
+
+
+SCRIPT = """
+import sys, numpy as np, rom
+mass = rom.Attachment("tip", 0.4, np.diag([1e-3, 2e-3, 2e-3]), at=(0.45, 0.0, 0.02))
+model = rom.fe.model("meshes/beam.geo", material=rom.Material(E=70e9, nu=0.3, rho=2700.0),
+                     parameters={"L": 0.4, "lc": 0.025}, attachments=(mass,))
+body = rom.reduce(model, method=rom.CraigBampton(6), reference="root", stiffening=True,
+                  interfaces={"root": "rbe2", "tip": "rbe3"}, certify=False)
+if model.operators.first == 0:
+    rom.save(body, sys.argv[1])
+"""
+
+
+@pytest.mark.mpi
+def test_the_number_of_processes_does_not_matter(tmp_path):
+    bodies = []
+    for n in (1, 2, 3):
+        path = tmp_path / f"{n}.rom.npz"
+        command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-c", SCRIPT, path]
+        done = subprocess.run(
+            command, env=os.environ | ENVIRONMENT, timeout=600, capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+        assert path.exists(), done.stderr
+        bodies.append(rom.load(path))
+    one = bodies[0]
+    assert len(one.K_geo) == 6 + 6 + 6
+    for many in bodies[1:]:
+        assert set(many.K_geo) == set(one.K_geo)
+        for load, A in one.K_geo.items():
+            assert_allclose(many.K_geo[load], A, atol=1e-9 * np.abs(A).max(), err_msg=load)

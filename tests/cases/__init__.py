@@ -1,0 +1,1 @@
+"""What several tests share; a test file imports no other test file."""

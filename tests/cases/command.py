@@ -1,0 +1,20 @@
+"""Running the command line as a user does, also under mpirun."""
+
+import os
+import subprocess
+import sys
+
+from cases.paths import ROOT
+
+
+def environment(**more):
+    path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH", ""))))
+    return os.environ | {"PYTHONPATH": path, "OMPI_MCA_mpi_yield_when_idle": "1"} | more
+
+
+def rom(*arguments, n=1, timeout=180, **options):
+    """Finished process of ``rom …``, on n ranks."""
+    launcher = ["mpirun", "--oversubscribe", "-n", str(n)] if n > 1 else []
+    command = [*launcher, sys.executable, "-m", "rom", *map(str, arguments)]
+    options = {"env": environment(), "capture_output": True, "text": True, "check": False} | options
+    return subprocess.run(command, timeout=timeout, **options)

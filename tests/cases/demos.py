@@ -1,0 +1,47 @@
+"""The demos, and what they leave behind."""
+
+from cases.paths import ROOT
+
+DEMOS = sorted((ROOT / "demos").glob("demo_*.py"))
+
+
+LEFT_BEHIND = {
+    "demo_assembly": {"assembly_errors.png"},
+    "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
+    "demo_bent_blade": {"bent_blade.png"},
+    "demo_best_matching": {"best_matching.png"},
+    "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
+    "demo_compressor_blade": {"compressor_blade.png"},
+    "demo_hand": {"hand.png", "hand_control.png"},
+    "demo_exchange": {
+        "beam.SID_FEM", "beam.csv", "beam.dat", "beam.dmig", "beam.fem", "beam.glb", "beam.inp",
+        "beam.mat", "beam.op4", "beam.py", "beam.vtu",
+    },
+    "demo_isotropy": {"isotropy.png"},
+    "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
+    "demo_lost_tip": {"lost_tip.png"},
+    "demo_masonry": {"masonry.png"},
+    "demo_mistuning": {"mistuning.png"},
+    "demo_parameters": {"parameters.png"},
+    "demo_reference_conditions": {"reference_conditions.png"},
+    "demo_pendulum_chain": {"pendulum_chain.png"},
+    "demo_rockfall": {"rockfall.png"},
+    "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
+    "demo_rotor": {"rotor_modes.png", "rotor_whirl.png"},
+    "demo_robot_arm": {"robot_arm.png", "robot_arm.gif"},
+    "demo_satellite": {"satellite.png", "satellite.gif"},
+    "demo_rolling_wheel": {"rolling_wheel.png"},
+    "demo_updating": {"updating.png"},
+    "demo_whole_turbine": {"whole_turbine.gif", "whole_turbine.png"},
+    "demo_sheet": {"sheet.png", "taylor_bar.gif"},
+    "demo_slider_crank": {
+        "crank_mesh.png", "frames.png", "instants.png", "motion.png", "report.html",
+        "rod.rom.npz", "rod.vtu", "rod_frequencies.png", "rod_mesh.png", "rod_modes.png",
+        "slider_crank.gif",
+    },
+    "demo_spin_up": {"spin_up.png"},
+    "demo_wind_turbine": {
+        "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
+    },
+    "demo_transmission": {"transmission.png", "transmission_fields.png"},
+}  # fmt: skip

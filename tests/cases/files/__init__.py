@@ -1,0 +1,1 @@
+"""Files, meshes and texts that tests write, damage and read."""

@@ -1,0 +1,560 @@
+"""A legal call of every public callable, from small objects that are made once."""
+
+import inspect
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib.util import find_spec
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from scipy.io import mmwrite
+
+import rom
+import rom.view
+from cases.mbs.mechanisms import rotor
+from cases.solid import STEEL, block, composite
+from cases.wheels import beam_ring, bladed_model, bladed_ring
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import rigid_motions
+from rom.mbs.elements.impact import Impact
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
+from rom.reduction.interfaces.connection import connect
+
+X, Y, Z = np.eye(3)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+TOGETHER = ((("a", "tip"), ("b", "root")),)
+FENICSX = find_spec("dolfinx") is not None
+# classes that are public without standing in rom: what public functions return and take
+ALSO = {"Solution": Solution, "State": State}
+KEPT = {"RomError", "RomWarning"} | {
+    name for name in rom.__all__ if rom.MODULES[name] == "errors"
+}  # what is raised takes anything
+# of a public class, for `rom.simulate` alone, which fills the folder of a motion by them
+INNER = {"Keeping.begin", "Keeping.due", "Keeping.write"}
+# (callable, argument) -> wrong values that would be legal and cost time
+SKIPPED = {
+    ("equilibrium", "steps"): {"million"},
+    ("spin_up", "n_states"): {"million"},
+    ("spin_up", "speed"): {"million"},
+    ("simulate", "t_end"): {"million", "1e300", "1.5"},
+}
+
+
+@dataclass(frozen=True)
+class Call:
+    """A public callable with legal arguments, all by name."""
+
+    make: Callable[[], tuple[Callable[..., Any], dict[str, Any]]]
+    arguments: tuple[str, ...]
+    skipped: frozenset[tuple[str, str]]
+
+
+@cache
+def model():
+    return block(cells=(3, 1, 1))
+
+
+@cache
+def body():
+    return rom.reduce(model(), method=rom.CraigBampton(3), interfaces=KINDS, certify=False)
+
+
+@cache
+def bodies():
+    """Two bodies in a row."""
+    second = block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
+    return {
+        "a": body(),
+        "b": rom.reduce(second, method=rom.Guyan(), interfaces=KINDS, certify=False),
+    }
+
+
+@cache
+def free():
+    """The same for coupling by forces."""
+    second = block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
+    return {
+        "a": rom.substructure(model(), n_modes=1, interfaces=KINDS),
+        "b": rom.substructure(second, n_modes=1, interfaces=KINDS),
+    }
+
+
+@cache
+def regions():
+    return composite(
+        {"web": STEEL, "rest": STEEL}, lambda c: "web" if c[0] < 1 else "rest", cells=(3, 1, 1)
+    )
+
+
+@cache
+def family():
+    return rom.reduce_parametric(
+        regions(), parameters={"E": rom.YoungsModulus("web", 0.9, 1.1)}, method=rom.CraigBampton(2),
+        interfaces=KINDS, certify=False, tol=0.1,
+    )  # fmt: skip
+
+
+def mechanism():
+    """A pendulum with a flexible body welded to it, a slider and a wheel."""
+    mech = rom.Mechanism()
+    marks = {"a": (0, 0, 0.5), "b": (0, 0, -0.5), "c": (0, 0, 0)}
+    arm = mech.add_rigid("arm", mass=1.0, inertia=(1, 1, 1), at=(0, 0, -0.5), markers=marks)
+    ground = mech.ground.marker((0, 0, 0))
+    mech.revolute("hinge", ground, arm.marker("a"), axis=X)
+    beam = mech.add_flexible("beam", body(), at=(0, 0, -1.0))
+    mech.fixed("weld", arm.marker("b"), beam.marker("root"))
+    return mech
+
+
+def driven(*, free=True):
+    """A mass on a spring along x, on a table that a drive shakes; the mass may be driven too."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    for name in ("table", "mass"):
+        part = mech.add_rigid(name, mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                              markers={"c": (0, 0, 0), "d": (1, 0, 0)})  # fmt: skip
+        mech.prismatic(f"rail of {name}", mech.ground.marker((0, 0, 0)), part.marker("c"), axis=X)
+    mech.drive("shaker", "rail of table", lambda t: 0.0 * t)
+    if not free:
+        mech.drive("second", "rail of mass", lambda t: 0.0 * t)
+    one, two = (mech.parts[name] for name in ("table", "mass"))
+    mech.spring_damper("spring", one.marker("c"), two.marker("d"), stiffness=100.0, damping=1.0)
+    return mech
+
+
+@cache
+def solution():
+    return rom.simulate(mechanism(), t_end=2e-3, dt=1e-3)
+
+
+@cache
+def ring():
+    return bladed_ring(4)
+
+
+@cache
+def spinning():
+    return beam_ring(6, per_sector=3, EA=1e3, rotary=0.1)
+
+
+@cache
+def wheel():
+    """What only finite elements can make: the sector of a bladed wheel."""
+    made = bladed_model(6, degree=1, cells=(4, 2, 2, 2), blade=(1, 3))
+    sector = rom.rotating_sector(
+        rom.CyclicSector.from_model(made, fixed=("bore",), regions=("blade",)), made
+    )
+    parts = rom.substructured_sector(sector, made, n_modes=1, n_blade_modes=1)
+    heated = rom.Heat(1e-5, 1.0)
+    run_up = rom.spin_up(
+        rom.CyclicSector.from_model(made, fixed=("bore",)), made, speed=10.0, n_states=2
+    )
+    return SimpleNamespace(model=made, sector=sector, parts=parts, heat=heated, run_up=run_up)
+
+
+@cache
+def blade():
+    return rom.reduced_blade(wheel().parts, wheel().model, n_modes=1)
+
+
+@cache
+def reduced_run_up():
+    return wheel().run_up.reduced(1)
+
+
+@cache
+def mistuned():
+    return rom.mistuned_wheel(ring(), 1)
+
+
+@cache
+def waves():
+    return rom.cyclic_modes(ring(), 1, 1)
+
+
+@cache
+def bladed():
+    return rom.bladed_wheel(wheel().parts, 2)
+
+
+def operators():
+    return SciPyOperators(model().K, model().M, rigid_motions(model().points))
+
+
+def files():
+    """Make the files that a call reads, once in the folder of the test."""
+    if os.path.exists("M.mtx"):
+        return
+    rom.save(body(), "body.rom.npz")
+    rom.save_state(solution().final, "state.npz")
+    rom.export(body(), "body.SID_FEM")
+    for name in "KM":
+        mmwrite(f"{name}.mtx", getattr(model(), name))
+
+
+def spring(stiffness):
+    """A mechanism of one parameter."""
+    mech = driven()
+    one, two = (mech.parts[name] for name in ("table", "mass"))
+    mech.spring_damper("more", one.marker("c"), two.marker("d"), stiffness=stiffness)
+    return mech
+
+
+def marked(mech=None):
+    """A mechanism and one of its markers."""
+    mech = driven() if mech is None else mech
+    return mech, mech.parts["mass"].marker("c")
+
+
+DEFAULTS = {  # argument -> legal value
+    "acceleration": lambda: X,
+    "body": body,
+    "boundary": lambda: np.arange(12),
+    "fixed": lambda: ("root",),
+    "heat": lambda: wheel().heat,
+    "interfaces": lambda: KINDS,
+    "labels": lambda: tuple(f"{k}" for k in range(12)),
+    "law": lambda: Impact(stiffness=1.0),
+    "mechanism": driven,
+    "method": rom.Guyan,
+    "model": model,
+    "n": lambda: 1,
+    "n_blade_modes": lambda: 1,
+    "n_modes": lambda: 1,
+    "ops": operators,
+    "sector": lambda: wheel().sector,
+    "share": lambda: 0.5,
+    "solution": solution,
+    "state": lambda: None,
+    "title": lambda: "title",
+    "caption": lambda: "caption",
+    "blades": lambda: [blade()] * 6,
+}
+ONE = {"diameter": lambda: 1}
+WHEEL = {"model": lambda: wheel().model}
+GIVEN = {  # callable -> legal values of its own
+    "bladed_wheel": {"sector": lambda: wheel().parts, "n_waves": lambda: 2},
+    "campbell": {"mechanism": lambda: lambda speed: rotor(speed), "speeds": lambda: [1.0, 2.0]},
+    "check": {"record": body},
+    "craig_bampton": {"K": lambda: model().K, "M": lambda: model().M},
+    "cyclic_modes": {"sector": ring, "diameter": lambda: 1},
+    "equilibrium_sensitivity": {
+        "build": lambda: spring,
+        "parameters": lambda: {"stiffness": 2.0},
+        "output": lambda: lambda mech, state: state.q[0],
+    },
+    "export": {"path": lambda: "out.SID_FEM"},
+    "frequency_response": {
+        "frequencies": lambda: [1.0],
+        "force": lambda: marked()[1],
+        "motion": lambda: marked()[1],
+    },
+    "frequency_sensitivity": {"build": lambda: spring, "parameters": lambda: {"stiffness": 2.0}},
+    "heated": WHEEL | {"fixed": lambda: ("bore",)},
+    "heated_sector": WHEEL,
+    "held_solid": WHEEL | {"fixed": lambda: ("bore",)},
+    "inverse_dynamics": {"mechanism": lambda: driven(free=False), "t": lambda: [0.0, 1e-3]},
+    "linearize": {},
+    "load": {"path": lambda: "body.rom.npz"},
+    "load_state": {"path": lambda: "state.npz"},
+    "mistuned_wheel": {"sector": ring},
+    "modes": {"m": lambda: 1},
+    "motion_sensitivity": {
+        "result": lambda: lambda stiffness: 2 * stiffness,
+        "parameters": lambda: {"stiffness": 2.0},
+    },
+    "read_component": {"path": lambda: "body.toml"},
+    "read_mechanism": {"path": lambda: "mechanism.toml"},
+    "read_model": {
+        "K": lambda: "K.mtx",
+        "M": lambda: "M.mtx",
+        "nodes": lambda: (np.arange(1, 17), model().points),
+        "interfaces": lambda: {"root": [1, 2, 3, 4]},
+    },
+    "read_sid": {"path": lambda: "body.SID_FEM"},
+    "reduce_parametric": {
+        "model": regions,
+        "parameters": lambda: {"E": rom.YoungsModulus("web", 0.9, 1.1)},
+    },
+    "reduced_blade": WHEEL | {"sector": lambda: wheel().parts},
+    "release": {"state": lambda: rom.equilibrium(driven())},
+    "rotating_sector": WHEEL,
+    "save": {"path": lambda: "out.rom.npz"},
+    "save_state": {"path": lambda: "out.npz", "state": lambda: solution().final},
+    "second_order_balanced_truncation": {
+        "K": lambda: np.diag([1.0, 2.0]),
+        "M": lambda: np.eye(2),
+        "D": lambda: 0.1 * np.eye(2),
+        "B": lambda: np.ones((2, 1)),
+        "C": lambda: np.ones((1, 2)),
+        "r": lambda: 1,
+    },
+    "simulate": {"t_end": lambda: 1e-3, "dt": lambda: 1e-3},
+    "spin_up": WHEEL | {"speed": lambda: 10.0, "n_states": lambda: 2},
+    "substructured_sector": WHEEL,
+    "supported_sector": {
+        "face": lambda: wheel().model.interfaces["bore"], "across": lambda: 1.0
+    },
+    "surface_load": {"pressure": lambda: 1.0},
+    "thermal_buckling": WHEEL | {"fixed": lambda: ("bore",)},
+    "transmissibility": {
+        "frequencies": lambda: [1.0], "drive": lambda: "shaker", "motion": lambda: marked()[1]
+    },
+    "travelling_modes": {"sector": spinning, "diameter": lambda: 2, "speed": lambda: 0.1},
+    "wheel_campbell": {"sector": spinning, "diameter": lambda: 2, "speeds": lambda: [0.1, 0.2]},
+    "write_animation": {"path": lambda: "out.glb", "frames": lambda: 2},
+    "write_body_fmu": {"path": lambda: "nowhere/out.fmu"},
+    "write_fmu": {"path": lambda: "out.fmu", "script": lambda: "none.py", "dt": lambda: 1e-3},
+    "write_history": {"path": lambda: "out.csv"},
+    "write_report": {"path": lambda: "out.html", "sections": lambda: {"numbers": ["text"]}},
+    "write_stress": {"path": lambda: "out.vtu", "q": lambda: np.zeros(body().n_modes)},
+    "write_stress_history": {"path": lambda: "out.pvd", "body": lambda: "beam"},
+    # methods
+    "Assembly.reduced": {"n_interface": lambda: 3},
+    "Basis.project": {"A": lambda: np.eye(2)},
+    "BladedWheel.of_blades": {"Phi": lambda: bladed().modes([blade()] * 6)[1]},
+    "BladedWheel.waves": {"speed": lambda: 0.0},
+    "BladedWheel.response": {
+        "force": lambda: np.zeros(blade().Psi.shape[0]), "engine_order": lambda: 1,
+        "omega": lambda: [1.0], "damping": lambda: 0.01, "at": lambda: [0],
+    },
+    "BladedWheel.amplification": {
+        "force": lambda: np.ones(blade().Psi.shape[0]), "engine_order": lambda: 1,
+        "omega": lambda: [1.0], "damping": lambda: 0.01, "at": lambda: [0],
+    },
+    "BodyFamily.with_reference": {"reference": lambda: "root"},
+    "Characteristic.kinds": {"connection": lambda: connect(operators(), model(), {"root": "full"})},
+    "CyclicSector.from_model": WHEEL,
+    "CyclicSector.*": {"diameter": lambda: 1, "shapes": lambda: waves().shapes},
+    "FlexibleBody.with_reference": {"reference": lambda: "root"},
+    "FlexibleBody.rotating_frequencies": {"speed": lambda: 1.0, "axis": lambda: Z},
+    "FlexibleBody.marker": {"name": lambda: "root"},
+    "FlexibleBody.in_units": {"units": lambda: "mm-t-s"},
+    "Material.from_units": {
+        "units": lambda: "mm-t-s", "E": lambda: 210e3, "nu": lambda: 0.3, "rho": lambda: 7.85e-9
+    },
+    "Orthotropic.from_units": {
+        "units": lambda: "mm-t-s", "E": lambda: (1e3,) * 3, "nu": lambda: (0.3,) * 3,
+        "G": lambda: (4e2,) * 3, "rho": lambda: 1e-9,
+    },
+    "FourierLegendre.functions": {"interface": lambda: model().interfaces["root"]},
+    "Polynomial.functions": {"interface": lambda: model().interfaces["root"]},
+    "Heat.on": WHEEL,
+    "Heat.described": {"share": lambda: 0.5},
+    "MistunedWheel.*": {
+        "deviations": lambda: np.zeros(4), "force": lambda: [0.0, 1.0, 0.0],
+        "engine_order": lambda: 1, "omega": lambda: [1.0], "damping": lambda: 0.01,
+        "at": lambda: [1],
+    },
+    "ModalDamping.matrix": {},
+    "ReducedSpinUp.at": {"speed": lambda: 5.0},
+    **{f"{kind}.{name}": {"speed": lambda: 5.0} | diameter
+       for kind in ("SpinUp", "ReducedSpinUp")
+       for name, diameter in (("modes", ONE), ("waves", ONE), ("weights", {}))},
+    "SpinUp.at": {"speed": lambda: 5.0},
+    "SpinUp.displacement": {"speed": lambda: 5.0},
+    "Solution.*": {
+        "body": lambda: "arm", "t": lambda: 1e-3, "marker": lambda: "a", "instant": lambda: 0,
+        "name": lambda: "hinge",
+    },
+    "Solution.drive_load": {"name": lambda: "shaker"},
+}  # fmt: skip
+READERS = {"load", "load_state", "read_model", "read_sid"}  # of files that must be there
+NEEDS = {  # callables whose arguments only finite elements can make
+    "BladedWheel", "Heat.on", "ReducedBlade", "ReducedSpinUp", "SpinUp", "bladed_wheel", "heated",
+    "heated_sector", "held_solid", "reduce_sector", "reduced_blade", "rotating_sector", "spin_up",
+    "substructured_sector", "supported_sector", "thermal_buckling", "CyclicSector.from_model",
+}  # fmt: skip
+OBJECTS = {  # class -> an object of it: legal arguments of the class, and owner of its methods
+    "Assembly": lambda: rom.Assembly(bodies(), TOGETHER),
+    "Attachment": lambda: rom.Attachment("tip", 1.0),
+    "BalancedTruncation": lambda: rom.BalancedTruncation(1),
+    "Basis": lambda: rom.Basis(np.eye(2), np.ones(1), ("a", "b")),
+    "BladedWheel": bladed,
+    "BodyFamily": family,
+    "Characteristic": lambda: rom.Characteristic(rom.Guyan(), 6),
+    "CraigBampton": lambda: rom.CraigBampton(1),
+    "CyclicModes": waves,
+    "CyclicSector": ring,
+    "Density": lambda: rom.Density(None, 0.9, 1.1),
+    "DualAssembly": lambda: rom.DualAssembly(free(), TOGETHER),
+    "EnhancedCraigBampton": lambda: rom.EnhancedCraigBampton(1),
+    "FEModel": model,
+    "FlexibleBody": body,
+    "FourierLegendre": lambda: rom.FourierLegendre(1, 1),
+    "FreeFree": lambda: rom.FreeFree(1),
+    "FreeSubstructure": lambda: free()["a"],
+    "Guyan": rom.Guyan,
+    "Heat": lambda: rom.Heat(1e-5, 1.0),
+    "Herting": lambda: rom.Herting(1),
+    "Interface": lambda: model().interfaces["root"],
+    "Keeping": lambda: rom.Keeping("kept"),
+    "Layered": lambda: rom.Layered(((0.0, 1.0),), model().K, model().K, model().K),
+    "Material": lambda: STEEL,
+    "MistunedWheel": mistuned,
+    "ModalDamping": lambda: rom.ModalDamping(0.01),
+    "Modes": lambda: rom.modes(model(), 1),
+    "MomentMatching": rom.MomentMatching,
+    "Orthotropic": lambda: rom.Orthotropic((1e9,) * 3, (0.3,) * 3, (4e8,) * 3, 1e3),
+    "Polynomial": lambda: rom.Polynomial(1),
+    "Rayleigh": rom.Rayleigh,
+    "ReducedBlade": blade,
+    "ReducedSpinUp": reduced_run_up,
+    "Region": lambda: rom.Region(model().K, model().M),
+    "Report": lambda: rom.Report("title"),
+    "Rubin": lambda: rom.Rubin(1),
+    "Snapshots": lambda: rom.Snapshots(np.eye(12), n=6),
+    "SpinUp": lambda: wheel().run_up,
+    "SpreadLoad": lambda: rom.mass_load(body(), X),
+    "SteadyMotion": lambda: rom.steady_motion(driven()),
+    "SurfaceMesh": lambda: model().surface,
+    "Thickness": lambda: rom.Thickness(None, 0.9, 1.1),
+    "TravellingModes": lambda: rom.travelling_modes(spinning(), 2, 1, speed=0.1),
+    "WheelCampbell": lambda: rom.wheel_campbell(spinning(), 2, 1, speeds=[0.1, 0.2]),
+    "WithLoads": lambda: rom.WithLoads(rom.Guyan()),
+    "YoungsModulus": lambda: rom.YoungsModulus(None, 0.9, 1.1),
+    "Mechanism": rom.Mechanism,
+    "Solution": solution,
+    "Solution.drive_load": lambda: rom.simulate(driven(), t_end=2e-3, dt=1e-3),
+    "State": lambda: solution().final,
+}
+JOIN = {
+    "name": lambda mech: "new",
+    "m1": lambda mech: mech.ground.marker((0, 0, 0)),
+    "m2": lambda mech: mech.parts["arm"].marker("a"),
+    "axis": lambda mech: X,
+    "normal": lambda mech: Z,
+    "joint": lambda mech: "hinge",
+    "joint1": lambda mech: "hinge",
+    "joint2": lambda mech: "slide",
+    "marker": lambda mech: mech.parts["arm"].marker("a"),
+    "stiffness": lambda mech: 1.0,
+    "function": lambda mech: lambda t, *motion: 0.0 * t,
+    "law": lambda mech: Impact(stiffness=1.0),
+    "radius": lambda mech: 0.1,
+    "radius1": lambda mech: 0.1,
+    "radius2": lambda mech: 0.2,
+    "vector": lambda mech: X,
+    "part": lambda mech: mech.parts["beam"],
+    "load": lambda mech: rom.mass_load(body(), X),
+    "transition_speed": lambda mech: 0.1,
+    "ratio": lambda mech: 2.0,
+    "pitch": lambda mech: 0.1,
+    "axis1": lambda mech: X,
+    "axis2": lambda mech: Y,
+    "mass": lambda mech: 1.0,
+    "inertia": lambda mech: (1, 1, 1),
+    "at": lambda mech: (0, 0, 0),
+    "body": lambda mech: body(),
+}  # of the methods of a mechanism
+JOIN_OWN = {
+    ("motor", "law"): lambda mech: lambda t, x, v: 0.0,
+    ("stop", "lower"): lambda mech: -1.0,
+    ("part", "name"): lambda mech: "arm",
+    ("add_nonlinear", "body"): lambda mech: None,
+    ("bushing", "stiffness"): lambda mech: np.ones(6),
+}
+
+
+def parameters(function):
+    """Parameters that may be given by name, in order."""
+    variable = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    every = inspect.signature(function).parameters.values()
+    return [p for p in every if p.kind not in variable and p.name not in ("self", "cls")]
+
+
+def given(label, function):
+    """Legal arguments of a function."""
+    owner = label.partition(".")[0]
+    own = {**GIVEN.get(f"{owner}.*", {}), **GIVEN.get(label, {})}
+    needed = [p.name for p in parameters(function) if p.default is p.empty]
+    return {
+        name: (own[name] if name in own else DEFAULTS[name])()
+        for name in {*needed, *GIVEN.get(label, ())}
+    }
+
+
+@cache
+def owner(name):
+    return OBJECTS[name]()
+
+
+def of_function(label, function):
+    def make():
+        solution()  # compiles what is not yet: no part of the time that a call may take
+        if label in READERS:
+            files()
+        return function, given(label, function)
+
+    return make
+
+
+def of_class(name, kind):
+    def make():
+        made = owner(name)
+        known = {p.name for p in parameters(kind)}
+        return kind, {f.name: getattr(made, f.name) for f in fields(kind) if f.name in known}
+
+    return make
+
+
+def of_method(label):
+    name, _, method = label.partition(".")
+
+    def make():
+        function = getattr(owner(label if label in OBJECTS else name), method)
+        return function, given(label, function)
+
+    return make
+
+
+def of_mechanism(method):
+    def make():
+        mech = mechanism()
+        cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+        mech.prismatic("slide", mech.ground.marker((0, 0, 0)), cart.marker((0, 0, 0)), axis=X)
+        function = getattr(mech, method)
+        needed = [p.name for p in parameters(function) if p.default is p.empty]
+        needed += [name for of, name in JOIN_OWN if of == method and name not in needed]
+        return function, {
+            n: JOIN_OWN.get((method, n), JOIN[n] if n in JOIN else None)(mech) for n in needed
+        }
+
+    return make
+
+
+def methods(kind):
+    """Public methods of a class that take arguments."""
+    for name in dir(kind):
+        member = inspect.getattr_static(kind, name)
+        plain = isinstance(member, classmethod | staticmethod) or inspect.isfunction(member)
+        if not name.startswith("_") and plain and parameters(getattr(kind, name)):
+            yield name
+
+
+@cache
+def calls():
+    """Every public callable by name, with a legal call of it."""
+    public = {name: getattr(rom, name) for name in rom.__all__ if name not in KEPT} | ALSO
+    found = {}
+    for name, thing in public.items():
+        if not inspect.isclass(thing):
+            found[name] = (thing, of_function(name, thing))
+            continue
+        if parameters(thing):
+            found[name] = (thing, of_class(name, thing))
+        for method in methods(thing):
+            if f"{name}.{method}" in INNER:
+                continue
+            made = of_mechanism(method) if name == "Mechanism" else of_method(f"{name}.{method}")
+            found[f"{name}.{method}"] = (getattr(thing, method), made)
+    return {
+        label: Call(made, tuple(p.name for p in parameters(thing)),
+                    frozenset((a, kind) for (of, a), kinds in SKIPPED.items() if of == label
+                              for kind in kinds))
+        for label, (thing, made) in found.items()
+        if FENICSX or not NEEDS & {label, label.partition(".")[0]}
+    }  # fmt: skip

@@ -1,0 +1,1 @@
+"""Mechanisms and bodies with a known motion."""

@@ -1,0 +1,87 @@
+"""Mechanisms whose motion several tests follow."""
+
+import json
+
+import numpy as np
+
+from cases.mbs.mechanisms import random_body, slider_crank
+from cases.paths import TESTS
+from rom.mbs.mechanism import Mechanism
+
+G = 9.81
+
+
+def ball(height=1.0, speed=0.0):
+    mech = Mechanism(gravity=(0, 0, -G))
+    mech.add_rigid("ball", mass=2.0, inertia=(1, 1, 1), at=(0, 0, height), velocity=(0.3, 0, speed))
+    return mech
+
+
+def falling(terminal=True):
+    mech = ball()
+    mech.event("floor", lambda t, x: x.position("ball")[2], direction=-1, terminal=terminal)
+    return mech
+
+
+def pendulum(angle=1.2):
+    """A ball of 1 kg and 0.1 kg m^2 on a massless rod of 1 m, held by a hinge."""
+    mech = Mechanism(gravity=(0, -G, 0))
+    at = np.array([np.sin(angle), -np.cos(angle), 0])
+    bob = mech.add_rigid(
+        "bob", mass=1.0, inertia=(0.1,) * 3, at=at, markers={"pin": -at, "tip": (0, 0, 0)}
+    )
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=(0, 0, 1))
+    return mech
+
+
+PARTS = ("t", "q", "v", "a", "lam", "base")
+
+
+def swing():
+    """A flexible body on a ball joint, pulled by a load and by a law in Python."""
+    mech = Mechanism()
+    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    place = mech.design_point(body.marker("a"))
+    mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
+    mech.force("pull", body.marker("b"), lambda t: (0.3 * t**3, 0, np.sin(t)))
+    mech.user_force("drag", lambda t, a: (-0.1 * a.velocity, (0, 0, 0)), body.marker("b"))
+    return mech
+
+
+def wound_drive():
+    """A crank whose drive has no derivatives, whose joints repeat each other, and a coil."""
+    mech = slider_crank()
+    mech.drives.clear()
+    mech.drive("motor", "main", lambda t: 50 * t + 0.3 * t**3)
+    mech.rotational_spring("coil", "main", stiffness=2.0)
+    return mech
+
+
+TOP = json.loads((TESTS / "reference" / "heavy_top.json").read_text())
+
+
+def heavy_top():
+    mech = Mechanism(gravity=(0, 0, -TOP["gravity"]))
+    centre, omega = np.array(TOP["centre"]), np.array(TOP["omega"])
+    top = mech.add_rigid(
+        "top",
+        mass=TOP["mass"],
+        inertia=TOP["inertia"],
+        at=centre,
+        markers={"tip": -centre},
+        velocity=np.cross(omega, centre),
+        omega=omega,
+    )
+    mech.spherical("tip", mech.ground.marker((0, 0, 0)), top.marker("tip"))
+    return mech
+
+
+def free_crank():
+    """A slider-crank that falls and turns freely."""
+    mech = slider_crank(gravity=G)
+    mech.drives.clear()
+    return mech
+
+
+def errors(sol, exact, names=("q", "v", "a", "lam")):
+    return [np.abs(getattr(sol, x) - getattr(exact, x)).max() for x in names]

@@ -1,0 +1,45 @@
+"""Tangents by differences."""
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+from cases.mbs.mechanisms import residual_at, tangents_at
+from rom.mbs.equations.equations import retract
+
+GRAVITY = np.array([0.3, -9.0, 2.0])
+
+
+def difference(f, n, step=1e-6):
+    """Central differences of f by n parameters, as columns."""
+    columns = [(f(step * e) - f(-step * e)) / (2 * step) for e in np.eye(n)]
+    return np.array(columns).T
+
+
+def shifted(packed, q, delta):
+    out = np.empty_like(q)
+    retract(packed.system, q, delta, out)
+    return out
+
+
+def check_tangents(packed, W, state, motions, tolerance):
+    """Mass, velocity and position blocks along the columns of ``motions``.
+
+    The change of a damper's velocity with the position is left out of the iteration matrix: the
+    position block is compared without dampers.
+    """
+    s, (q, v, a, lam) = packed.system, state
+    zero = np.zeros(v.size)
+
+    def at(dq, dv, da):
+        residual_at(s, W, shifted(packed, q, dq), v + dv, a + da, lam)
+        return W.residual.copy()
+
+    C = difference(lambda x: at(zero, x, zero), v.size)
+    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
+    s.forces.spring[:, 1] = s.forces.turn[:, 1] = 0.0
+    M = difference(lambda x: at(zero, zero, x), v.size)
+    K = difference(lambda x: at(motions @ x, zero, zero), motions.shape[1])
+    tangents_at(s, W, q, v, a, lam, (1.0, 0.0, 1.0))
+    assert_allclose(W.S, M, atol=1e-7 * np.abs(M).max())
+    assert_allclose(W.Kt @ motions, K, atol=tolerance * np.abs(K).max())

@@ -1,0 +1,74 @@
+"""Run by test_fe_mpi.py under mpirun: a model, its modes, interfaces and surface into one file."""
+
+import sys
+
+from mpi4py import MPI
+
+import numpy as np
+from dolfinx.mesh import meshtags
+
+import rom
+from cases.boxes import box
+from rom.errors import MaterialError, ParallelError
+from rom.fe.elasticity import assemble
+from rom.fe.parallel import collective, install_abort_hook, on_root, together
+
+COMM = MPI.COMM_WORLD
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+
+
+def model(path, cells, degree):
+    mesh, tags = box((1.0, 0.2, 0.13), cells, "tetrahedron")
+    both = np.union1d(tags["x1"].indices, tags["y1"].indices).astype(np.int32)
+    tags["corner"] = meshtags(mesh, 2, both, np.ones(both.size, dtype=np.int32))
+    made = assemble(mesh, None, tags, material=STEEL, degree=degree)
+    free = rom.modes(made, 14)
+    fixed = rom.modes(made, 8, fixed=("x0",))
+    tied = rom.modes(made, 10, interfaces={"x0": "rbe2", "x1": "rbe2"})
+    out = {"free": free.frequencies, "fixed": fixed.frequencies, "tied": tied.frequencies}
+    shapes = {"free": free.shapes[:, 6:], "fixed": fixed.shapes, "tied": tied.shapes[:, 6:]}
+    out["mass"] = made.mass()
+    for name, face in made.interfaces.items():
+        out[f"points {name}"] = face.points
+        out[f"mass {name}"] = face.surface_mass.toarray()
+        out[f"origin {name}"] = face.origin
+        for key, columns in shapes.items():
+            out[f"{key} shapes {name}"] = made.operators.rows(columns, face.dofs)
+    out["surface"] = made.points[made.surface.nodes]
+    out["triangles"] = made.surface.triangles
+    same = COMM.allgather([made.points.tobytes(), made.interfaces["x0"].nodes.tobytes()])
+    assert all(other == same[0] for other in same), "ranks differ"
+    if COMM.rank == 0:
+        np.savez(path, **out)
+
+
+def fail(kind):
+    install_abort_hook()
+    if kind == "one":
+        if COMM.rank == COMM.size - 1:
+            raise MaterialError("rho = 0 on one rank.")
+        COMM.Barrier()
+    elif kind == "bug":
+        if COMM.rank == COMM.size - 1:
+            raise IndexError("nobody foresaw this")
+        COMM.Barrier()
+    elif kind == "together":
+        with collective(COMM):
+            if COMM.rank == COMM.size - 1:
+                raise MaterialError("rho = 0 on the last rank.")
+    elif kind == "all":
+        try:
+            together(COMM, lambda: [0.0][COMM.rank])
+        except ParallelError as error:
+            n = COMM.allreduce(1)
+            if COMM.rank == 0:
+                raise MaterialError(f"{n} ranks met: {error}") from error
+            COMM.Barrier()
+    elif kind == "root":
+        on_root(COMM, lambda: 1 / 0)
+
+
+if sys.argv[1] == "model":
+    model(sys.argv[2], tuple(map(int, sys.argv[3].split(","))), int(sys.argv[4]))
+else:
+    fail(sys.argv[2])

@@ -1,0 +1,444 @@
+"""The command line: verbs, answers for people and programs, exit codes, start-up time."""
+
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.command import environment
+from cases.command import rom as command
+from cases.files.schema import errors
+from cases.files.step_box import step_box
+from cases.solid import block
+from rom.cli.answer import Answer, table, to_json
+from rom.cli.main import main
+from rom.cli.parser import VERBS, build_parser
+from rom.cli.schemas import schema
+from rom.cli.verbs import check
+from rom.errors import RomWarning
+
+STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
+NAMES = [module.__name__.rpartition(".")[2] for module in VERBS]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """A body made without FEniCSx."""
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(block(), method=rom.CraigBampton(60), interfaces=kinds, reference="root")
+    assert body.certificate.ok
+    return rom.save(body, tmp_path_factory.mktemp("body") / "rod.rom.npz")
+
+
+@pytest.fixture
+def geometry(monkeypatch):
+    """The geometries of the project, by the short names the README uses."""
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    from cases.command import ROOT
+
+    monkeypatch.chdir(ROOT)
+    return "meshes/beam.geo"
+
+
+def answer(capsys, *arguments):
+    """The JSON object a verb prints."""
+    assert main([*map(str, arguments), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is True and errors(found, schema(str(arguments[0]))) == []
+    return found
+
+
+def test_verbs_are_those_of_the_design():
+    design = "doctor mesh modes reduce check export simulate view report swing bench completion"
+    assert design.split() == NAMES
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("rom ex", ["export"]), ("rom -q reduce --ref", ["--reference"]), ("rom check rod", [])],
+)
+def test_bash_completes_verbs_and_options_and_leaves_files_alone(words, expected, capsys, tmp_path):
+    assert main(["completion", "bash"]) == 0
+    (tmp_path / "rom.bash").write_text(capsys.readouterr().out)
+    ask = f"source rom.bash; COMP_WORDS=({words}); COMP_CWORD={len(words.split()) - 1}; _rom"
+    done = subprocess.run(
+        ["bash", "-c", f'{ask}; echo "${{COMPREPLY[@]}}"'],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == expected
+
+
+def test_help_answers_within_half_a_second():
+    """Processor time: the claim is about the program, not about a busy machine."""
+    seconds = []
+    for _ in range(3):
+        start = resource.getrusage(resource.RUSAGE_CHILDREN)
+        done = command("--help")
+        end = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds.append(end.ru_utime + end.ru_stime - start.ru_utime - start.ru_stime)
+    assert done.returncode == 0
+    for verb in NAMES:
+        assert f"\n    {verb} " in done.stdout
+    assert min(seconds) < 0.5
+
+
+@pytest.mark.parametrize("verb", NAMES)
+def test_help_of_a_verb_has_examples_that_parse(verb, capsys):
+    with pytest.raises(SystemExit) as end:
+        main([verb, "--help"])
+    assert end.value.code == 0
+    text = capsys.readouterr().out
+    assert "exit codes:" in text and "--json" in text
+    examples = text.partition("examples:\n")[2].replace("\\\n", " ").splitlines()
+    commands = [line.partition("rom ")[2].partition("#")[0] for line in examples if "rom " in line]
+    assert commands
+    for line in commands:
+        assert build_parser().parse_args(line.split()).verb == verb
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"rom {rom.__version__}\n"
+
+
+def test_check_prints_the_certificate_and_passes(file, capsys):
+    assert main(["check", str(file)]) == 0
+    out, err = capsys.readouterr()
+    assert "free: worst error of 6 frequencies" in out and "FAILED" not in out
+    assert err == ""
+
+
+def test_a_failed_gate_is_exit_code_5_in_both_forms(tmp_path, capsys):
+    """Three modes cannot carry six frequencies to 1e-3."""
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    poor = rom.reduce(block(), method=rom.CraigBampton(1), interfaces=kinds, reference="root")
+    path = rom.save(poor, tmp_path / "poor.rom.npz")
+    assert main(["check", str(path)]) == 5
+    assert capsys.readouterr().err.startswith("error: free: worst error of 6 frequencies = ")
+    assert main(["check", str(path), "--json"]) == 5
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is False and found["failed"]
+    rows = {row["quantity"]: row["ok"] for row in found["report"]["rows"]}
+    assert rows["free: worst error of 6 frequencies"] is False
+
+
+def test_json_of_check_holds_the_numbers_of_the_report(file, capsys):
+    report = rom.check(rom.load(file))
+    rows = answer(capsys, "check", file)["report"]["rows"]
+    assert [row["quantity"] for row in rows] == [row.quantity for row in report.rows]
+    assert_allclose([row["value"] for row in rows], [row.value for row in report.rows])
+
+
+def test_export_writes_what_the_ending_asks_for(file, tmp_path, capsys):
+    found = answer(capsys, "export", file, tmp_path / "rod.vtu")
+    assert found["output"] == str(tmp_path / "rod.vtu")
+    assert (tmp_path / "rod.vtu").read_text().startswith("<VTKFile")
+
+
+def test_simulate_writes_a_film_and_a_history_when_asked(file, tmp_path, capsys):
+    found = answer(
+        capsys, "simulate", file, "--hinge", "root", "--t-end", 0.004, "--dt", 4e-4, "-q",
+        "--film", "glb", "--history", "csv", "-o", tmp_path,
+    )  # fmt: skip
+    names = ("body.glb", "body.history.csv", "run.json")
+    assert found["also"] == [str(tmp_path / name) for name in names]
+    assert (tmp_path / "body.glb").read_bytes()[:4] == b"glTF"
+    assert "hinge force x [N]" in (tmp_path / "body.history.csv").read_text().splitlines()[0]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "body.csv", *names,
+    }  # fmt: skip
+
+
+def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
+    """Tip of a stiff pendulum released at rest: y = -alpha L t^2 / 2, alpha = m g c / I.
+
+    Valid while the angle is small, 0.012 rad here; the bar of 1 m also sags by up to 2e-4 m.
+    """
+    folder = tmp_path / "out"
+    found = answer(
+        capsys, "simulate", file, "--hinge", "root", "--axis=0,0,-1", "--gravity=0,-9.81,0",
+        "--t-end", 0.04, "--dt", 4e-4, "-q", "-o", folder,
+    )  # fmt: skip
+    assert found["audit"]["ok"] and found["steps"] == 100
+    lines = (folder / "body.csv").read_text().splitlines()
+    assert lines[0].startswith("t [s],root x [m],root y [m],root z [m],tip x [m],tip y [m]")
+    table_ = np.genfromtxt(lines[1:], delimiter=",")
+    body = rom.load(file)
+    assert table_.shape == (101, 7 + body.n_modes)
+    lever, reach = body.first_moment[0], body.marker("tip").point[0] - body.marker("root").point[0]
+    fall = -0.5 * 9.81 * lever / body.inertia[2, 2] * reach * table_[:, 0] ** 2
+    assert_allclose(table_[:, 5] - table_[0, 5], fall, atol=2e-4)
+    assert fall[-1] < -0.01
+    assert_allclose(table_[:, 1:4] - table_[0, 1:4], 0.0, atol=1e-12)
+
+
+def test_bench_lists_its_benchmarks(capsys):
+    from rom.bench.benchmarks import BENCHMARKS
+
+    assert list(answer(capsys, "bench", "--list")["benchmarks"]) == list(BENCHMARKS)
+
+
+def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):
+    from rom.bench import benchmarks
+
+    def one():
+        """One."""
+        yield benchmarks.Figure("one", "30 dofs", "ratio", 2.5, "", "below 3")
+
+    monkeypatch.setattr(benchmarks, "BENCHMARKS", {"one": one})
+    assert main(["bench"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split() == [
+        "one,", "30", "dofs:", "ratio", "2.5", "below", "3",
+    ]  # fmt: skip
+    assert main(["bench", "two"]) == 2
+
+
+def test_common_options_may_stand_before_the_verb(file, capsys):
+    assert main(["--json", "-q", "check", str(file)]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"] is True
+
+
+def warned(monkeypatch, text="E looks like GPa."):
+    def run(args):
+        warnings.warn(text, RomWarning, stacklevel=1)
+        warnings.warn(text, RomWarning, stacklevel=1)
+        return Answer({"value": float("nan"), "array": np.arange(2)}, "done")
+
+    monkeypatch.setattr(check, "run", run)
+
+
+def test_warnings_are_said_once_and_go_into_the_json(monkeypatch, capsys):
+    warned(monkeypatch)
+    assert main(["check", "x"]) == 0
+    assert capsys.readouterr() == ("done\n", "warning: E looks like GPa.\n")
+    assert main(["check", "x", "-q", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["warnings"] == ["E looks like GPa."]
+    assert found["value"] is None and found["array"] == [0, 1]
+
+
+def test_quiet_silences_warnings_and_progress(monkeypatch, capsys):
+    warned(monkeypatch)
+    assert main(["-q", "check", "x"]) == 0
+    assert capsys.readouterr() == ("done\n", "")
+
+
+def test_strict_turns_a_warning_into_exit_code_5(monkeypatch, capsys):
+    warned(monkeypatch)
+    assert main(["check", "x", "--strict"]) == 5
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines() == [
+        "error: E looks like GPa.", "hint: Without --strict this is a warning.",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("option", "seen"), [("-q", []), ("", ["info"]), ("-v", ["info", "debug"])]
+)
+def test_progress_goes_to_stderr(option, seen, monkeypatch, capsys):
+    import logging
+
+    def run(args):
+        logging.getLogger("rom").info("info")
+        logging.getLogger("rom").debug("debug")
+        return Answer({}, "done")
+
+    monkeypatch.setattr(check, "run", run)
+    assert main(list(filter(None, ["check", "x", option]))) == 0
+    out, err = capsys.readouterr()
+    assert (out, err.split()) == ("done\n", seen)
+
+
+def test_a_closed_pipe_is_silent():
+    """As in ``rom check | head -1``: the reader leaves before the answer."""
+    code = "import sys; from rom.cli.speech import say; from rom.cli.verbs import check\n"
+    code += "from rom.cli.answer import Answer; from rom.cli.main import main\n"
+    code += "check.run = lambda args: Answer({}, 'done')\nsys.exit(main(['check', 'x']))"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], env=environment(), stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )  # fmt: skip
+    process.stdout.close()  # long before the answer
+    assert process.wait(timeout=180) == 0
+    assert process.stderr.read() == b""
+
+
+def test_table_aligns_names_left_and_numbers_right():
+    text = table(("name", "value"), [("a", "1.5"), ("long name", "22")])
+    assert text.splitlines() == ["name       value", "a            1.5", "long name     22"]
+
+
+def test_json_is_strict():
+    found = json.loads(
+        to_json({"a": [np.inf, np.float64(2.5)], "b": np.array([1.0, np.nan]), 3: "µ"})
+    )
+    assert found == {"a": [None, 2.5], "b": [1.0, None], "3": "µ"}
+
+
+@pytest.mark.fenicsx
+def test_mesh_says_what_is_inside(geometry, tmp_path, capsys):
+    """The beam is 1 m x 0.05 m x 0.03 m; flat faces, so that its volume is exact."""
+    found = answer(capsys, "mesh", geometry, "-p", "lc=0.04", "--save", tmp_path / "b.vtu")
+    assert_allclose(found["volume"], 1.5e-3, rtol=1e-12)
+    assert_allclose(found["box"], [[0, 1], [-0.025, 0.025], [-0.015, 0.015]], atol=1e-12)
+    assert set(found["interfaces"]) == {"root", "tip"}
+    assert found["regions"]["body"]["cells"] == found["cells"]
+    pyvista = pytest.importorskip("pyvista", reason="VTK comes with the pictures")
+    grid = pyvista.read(tmp_path / "b.vtu")
+    assert (grid.n_cells, grid.n_points) == (found["cells"], found["nodes"])
+    assert_allclose(grid.volume, 1.5e-3, rtol=1e-6)
+    assert set(grid.cell_data["region"]) == {1}
+
+
+@pytest.mark.fenicsx
+def test_mesh_lists_the_faces_of_a_step_file(tmp_path, capsys):
+    step_box(tmp_path / "box.step", 20, 10, 10)
+    found = answer(capsys, "mesh", tmp_path / "box.step", "-p", "lc=0.01", "--faces")["interfaces"]
+    assert sorted(found) == [f"face {k}" for k in range(1, 7)]
+    middles = sorted(tuple(round(x, 9) for x in face["middle"]) for face in found.values())
+    assert middles == [(0.0, 0.005, 0.005), (0.01, 0.0, 0.005), (0.01, 0.005, 0.0),
+                       (0.01, 0.005, 0.01), (0.01, 0.01, 0.005), (0.02, 0.005, 0.005)]  # fmt: skip
+
+
+@pytest.mark.fenicsx
+def test_a_step_file_in_millimetres_with_a_picked_face(tmp_path, capsys):
+    """A box of 20 x 10 x 10 mm; STEP files carry their unit, so that no scale is needed."""
+    step_box(tmp_path / "box.step", 20, 10, 10)
+    command = ("mesh", tmp_path / "box.step", "-p", "lc=0.005", "--face", "end=0.02,0.005,0.005")
+    found = answer(capsys, *command)
+    assert_allclose(found["volume"], 2e-6, rtol=1e-9)
+    assert list(found["interfaces"]) == ["end"] and found["interfaces"]["end"]["facets"] > 4
+    assert_allclose(answer(capsys, *command[:4], "--scale", "2")["volume"], 16e-6, rtol=1e-9)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8", "hex27"])
+def test_volumes_and_vtk_order_of_every_cell_type(kind, tmp_path):
+    """VTK's own volume of each cell is the one computed here only with the right node order."""
+    from cases.files.cells import solid
+    from rom.fe.mesh.summary import cell_volumes, vtk_cells
+    from rom.io.fields.vtu import grid
+
+    pyvista = pytest.importorskip("pyvista", reason="VTK comes with the pictures")
+    mesh = solid(kind, (2, 1, 1), (2.0, 1.0, 1.5))
+    (tmp_path / "b.vtu").write_text(grid(mesh.points, *vtk_cells(mesh)))
+    read = pyvista.read(tmp_path / "b.vtu")
+    ours = cell_volumes(mesh)
+    assert_allclose(ours.sum(), 3.0, rtol=1e-12)
+    assert_allclose(read.compute_cell_sizes()["Volume"], ours, rtol=1e-6)
+    assert_allclose([np.ptp(c.points, axis=0).max() for c in read.cell], spans(mesh), rtol=1e-6)
+
+
+def spans(mesh):
+    return np.ptp(mesh.points[mesh.cells], axis=1).max(axis=1)
+
+
+@pytest.mark.fenicsx
+def test_a_curved_cell_has_its_exact_volume():
+    """One brick with the middle of its top face lifted by h: h times the integral of the bubble.
+
+    The shape function of that node integrates to (2/3)^2 over the face of the unit cube, times 1/6
+    through the height.
+    """
+    from dataclasses import replace
+
+    from cases.files.cells import solid
+    from rom.fe.mesh.summary import cell_volumes
+
+    cube = solid("hex27", (1, 1, 1), (1.0, 1.0, 1.0))
+    points = cube.points.copy()
+    top = np.argmin(np.abs(points - [0.5, 0.5, 1.0]).sum(axis=1))
+    points[top, 2] += 0.1
+    lifted = cell_volumes(replace(cube, points=points)).sum()
+    assert_allclose(lifted, 1 + 0.1 * (2 / 3) ** 2, rtol=1e-12)
+
+
+@pytest.mark.fenicsx
+def test_modes_prints_the_frequencies_of_the_model(geometry, capsys):
+    """Cantilever of Euler and Bernoulli, weak axis: 25.0 Hz within one per cent."""
+    found = answer(capsys, "modes", geometry, *STEEL, "-n", 3, "--fixed", "root")
+    height, rate = 0.03, 1.8751040687119611**2
+    beam = rate / (2 * np.pi) * height * np.sqrt(210e9 / 12 / 7850.0)
+    assert_allclose(found["frequencies"][0], beam, rtol=0.01)
+    assert_allclose(found["mass"], 7850 * 1.5e-3, rtol=1e-10)
+
+
+@pytest.mark.fenicsx
+def test_reduce_then_check_then_export(geometry, tmp_path, capsys):
+    path = tmp_path / "beam.rom.npz"
+    found = answer(
+        capsys, "reduce", geometry, *STEEL, "-i", "root=rbe2", "-i", "tip=rbe3", "-m", 24,
+        "--reference", "root,tip", "--damping-ratio", 0.01, "--name", "beam", "-o", path,
+    )  # fmt: skip
+    body = rom.load(path)
+    assert found["certificate"]["ok"] and answer(capsys, "check", path)["report"]["ok"]
+    assert (body.name, body.reference) == ("beam", "pins root tip")
+    assert_allclose(np.diag(body.D), 0.02 * body.omega, rtol=1e-9)
+    assert_allclose(found["frequencies"], body.omega / (2 * np.pi))
+    answer(capsys, "export", path, tmp_path / "beam.vtu")
+
+
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+def test_two_ranks_print_one_answer_with_the_same_numbers(geometry):
+    arguments = ("modes", geometry, *STEEL, "-n", 8, "--fixed", "root", "--json", "-q")
+    one, two = (command(*arguments, n=n) for n in (1, 2))
+    assert one.returncode == two.returncode == 0, two.stderr
+    a, b = json.loads(one.stdout), json.loads(two.stdout)
+    assert_allclose(b["frequencies"], a["frequencies"], rtol=1e-9)
+
+
+def test_fixed_interfaces_may_be_written_with_blanks():
+    args = build_parser().parse_args(["modes", "x.geo", *STEEL, "--fixed", "a, b,"])
+    assert args.fixed == ("a", "b")
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(
+    ("options", "label", "n_modes"),
+    [
+        (("--method", "rubin", "-m", 30), "free 30", 15 + 30),
+        (("--method", "herting", "-m", 25), "free 25", 15 + 25),
+        (("--f-max", 700, "--tol", 1e-3), "fixed-interface", None),
+        (("--method", "moment-matching", "--at", "0,300", "-m", 1), "moment", None),
+        (("--method", "balanced", "-m", 12, "--gravity-shapes"), "balanced", 9 + 12 + 3),
+    ],
+)
+def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, options, label, n_modes):
+    """A rigid end and one with linear functions: 6 and 9 coordinates."""
+    path = tmp_path / "beam.rom.npz"
+    kinds = ("-i", "root=rbe2", "-i", "tip=polynomial:1")
+    found = answer(
+        capsys, "reduce", geometry, *STEEL, *kinds, *options, "--no-certificate", "-o", path
+    )
+    body = rom.load(path)
+    assert body.provenance["reduction"]["columns"][-1].startswith(label)
+    assert n_modes is None or found["n_modes"] == n_modes
+    # the ends are hardly stiffer than those of the full model
+    full = answer(capsys, "modes", geometry, *STEEL, "-n", 7)["frequencies"]
+    assert body.frequencies(7)[6] == pytest.approx(full[6], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--method", "guyan", "-m", 3),
+        ("--method", "rubin", "--f-max", 10),
+        ("--tol", 1e-3),
+        ("--at", 5),
+        ("--characteristic", 8),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(options, tmp_path, capsys):
+    steel = ("reduce", "meshes/beam.geo", *STEEL, "-i", "root=rbe2", "-o", tmp_path / "b.npz")
+    assert main([*map(str, steel), *map(str, options)]) == 2
+    assert capsys.readouterr().err.startswith("error: ")

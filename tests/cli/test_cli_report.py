@@ -1,0 +1,120 @@
+"""rom report: one HTML file that says what something is, without network."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.files.reports import read
+from cases.files.toml_files import CRANK, PENDULUM
+from cases.solid import block
+from rom.cli.main import main
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+
+
+@pytest.fixture(scope="module")
+def rod(tmp_path_factory):
+    body = rom.reduce(block(cells=(6, 1, 1)), method=rom.CraigBampton(40), interfaces=KINDS,
+                      reference="root", name="bar <1>")  # fmt: skip
+    return rom.save(body, tmp_path_factory.mktemp("rod") / "rod.rom.npz")
+
+
+@pytest.fixture
+def folder(rod, tmp_path, monkeypatch):
+    (tmp_path / "rod.rom.npz").symlink_to(rod)
+    (tmp_path / "crank.toml").write_text(CRANK)
+    (tmp_path / "pendulum.toml").write_text(PENDULUM)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def reported(*words):
+    """The report, after a look at what it links to: nothing but the data of its pictures."""
+    assert main(["report", *words, "-o", "r.html", "-q"]) == 0
+    reader = read(Path("r.html"))
+    assert all(link.startswith("data:image/") for link in reader.links)
+    assert "://" not in Path("r.html").read_text()
+    return reader
+
+
+def without_pictures(monkeypatch):
+    from rom.errors import ResourceError
+    from rom.view.canvas import offscreen, page
+
+    def refuse(package):
+        raise ResourceError(f"pictures need {package}, which is not installed.")
+
+    monkeypatch.setattr(page, "require", refuse)
+    monkeypatch.setattr(offscreen, "require", refuse)
+
+
+def test_a_body_is_described_with_its_numbers(folder):
+    """Mass, centre, frequencies of both models, interfaces, checks, command."""
+    pytest.importorskip("pyvista", reason="VTK comes with the pictures")
+    reader = reported("rod.rom.npz")
+    body = rom.load("rod.rom.npz")
+    assert len(reader.links) == 2  # modes, and errors of frequencies
+    full = body.provenance["comparison"]["free"]["full"]
+    for words in ("bar <1>", f"{body.mass:.5g}", f"{full[0]:.5g}", "root", "tip", "rbe2",
+                  "rom report rod.rom.npz -o r.html", rom.__version__, "CraigBampton",
+                  "asymmetry of K", "has a certificate that holds"):  # fmt: skip
+        assert words in reader.text, words
+    assert "FAILS" not in reader.text
+
+
+def test_inertia_is_that_about_the_mass_centre(folder, monkeypatch):
+    """A bar of 1 m: m (a^2 + b^2) / 12 along each axis."""
+    without_pictures(monkeypatch)
+    text = reported("rod.rom.npz").text
+    m = 7850 * 1.0 * 0.1 * 0.08
+    assert f"{m * (0.1**2 + 0.08**2) / 12:.5g}" in text
+    assert f"{m * (1 + 0.08**2) / 12:.5g}" in text and f"{m * (1 + 0.1**2) / 12:.5g}" in text
+    assert "No picture here: pictures need" in text
+
+
+def test_a_mechanism_is_described_as_it_starts(folder, monkeypatch):
+    without_pictures(monkeypatch)
+    text = reported("crank.toml").text
+    for words in ("Mechanism crank", "3 bodies", "4 joints", "revolute", "crank.pin and rod.root",
+                  "drive", "main bearing", "ground.end", "[bodies.slider]"):  # fmt: skip
+        assert words in text, words
+
+
+def test_a_finished_run_is_described(folder, monkeypatch):
+    without_pictures(monkeypatch)
+    assert main(["simulate", "pendulum.toml", "--t-end", "0.1", "-q", "-o", "out"]) == 0
+    text = reported("out").text
+    record = json.loads((folder / "out" / "run.json").read_text())
+    for words in ("pendulum", "200 steps", "Reached t = 0.1 s.", "pivot", "revolute",
+                  "rom simulate pendulum.toml --t-end 0.1 -q -o out", "[simulation]",
+                  *(row[0] for row in record["audit"]["rows"])):  # fmt: skip
+        assert words in text, words
+    numbers = np.genfromtxt(folder / "out" / "motion.csv", delimiter=",", names=True)
+    gained = float(numbers["kinetic_J"][-1])
+    assert f"{gained:.5g}" in text
+    assert_allclose(gained, 2 * 9.81 * -numbers["bob_position_y_m"][-1], rtol=1e-4)
+
+
+def test_a_body_on_its_hinge_is_described_too(folder, monkeypatch):
+    without_pictures(monkeypatch)
+    words = ["simulate", "rod.rom.npz", "--hinge", "root", "--t-end", "1e-3", "--dt", "1e-4"]
+    assert main([*words, "-q", "-o", "swing"]) in (0, 5)
+    text = reported("swing").text
+    for words in ("Motion of bar <1>", "hinge", "revolute", "10 steps", "bar <1>.csv"):
+        assert words in text, words
+
+
+def test_what_is_no_run_is_refused(folder, capsys):
+    (folder / "empty").mkdir()
+    (folder / "broken").mkdir()
+    (folder / "broken" / "run.json").write_text('{"schema": "rom-run", "version": [1, 0]}')
+    for name, words in (("empty", "there is no run.json"), ("broken", "says nothing of name"),
+                        ("nope.npz", "nope.npz")):  # fmt: skip
+        assert main(["report", name, "-o", "r.html"]) == 3
+        assert words in capsys.readouterr().err
+    assert main(["report", "rod.rom.npz", "-o", "r.txt"]) == 2
+    assert not (folder / "r.html").exists()

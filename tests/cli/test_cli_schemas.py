@@ -1,0 +1,106 @@
+"""What --json prints is what its schema says, for answers, failures and errors of every verb."""
+
+import json
+from dataclasses import asdict
+
+import pytest
+
+import rom
+from cases.files.schema import errors
+from cases.files.toml_files import PENDULUM
+from cases.solid import block
+from rom.bench.benchmarks import Figure
+from rom.cli.main import main
+from rom.cli.parser import VERBS
+from rom.cli.schemas import schema
+from rom.doctor.finding import Finding
+
+NAMES = [module.__name__.rpartition(".")[2] for module in VERBS]
+ANSWERS = {
+    "check": ["check", "rod.rom.npz"],
+    "check, with a failed gate": ["check", "poor.rom.npz"],
+    "check of another format": ["check", "rod.SID_FEM"],
+    "export": ["export", "rod.rom.npz", "x.vtu"],
+    "simulate": ["simulate", "rod.rom.npz", "--hinge", "root", "--t-end", "1e-3", "--dt", "1e-4",
+                 "--history", "csv", "-o", "out"],
+    "simulate, a file": ["simulate", "pendulum.toml", "--t-end", "0.01", "-o", "out"],
+    "report": ["report", "out_of_before", "-o", "r.html"],
+    "bench": ["bench", "--list"],
+    "completion": ["completion", "bash"],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("schemas")
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    model = block(cells=(4, 1, 1))
+    for name, m in (("rod", 24), ("poor", 1)):
+        body = rom.reduce(model, method=rom.CraigBampton(m), interfaces=kinds, reference="root")
+        rom.save(body, path / f"{name}.rom.npz")
+    rom.export(body, path / "rod.SID_FEM")
+    (path / "pendulum.toml").write_text(PENDULUM)
+    arguments = ["simulate", path / "pendulum.toml", "--t-end", "0.01", "-q", "-o"]
+    assert main([*map(str, arguments), str(path / "out_of_before")]) == 0
+    return path
+
+
+def checked(arguments, capsys):
+    """The object printed, after a look at its schema."""
+    main([*arguments, "--json", "-q"])
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema(arguments[0])) == []
+    return found
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.parametrize("case", ANSWERS)
+def test_an_answer_is_as_its_schema_says(case, folder, capsys, monkeypatch):
+    monkeypatch.chdir(folder)
+    capsys.readouterr()
+    found = checked(ANSWERS[case], capsys)
+    assert "error" not in found and found["ok"] is ("failed" not in found)
+    assert ("failed" in found) >= ("failed gate" in case)
+
+
+def test_records_that_take_long_to_make_fit_too():
+    """Every field of a finding of the doctor and of a figure of the benchmarks."""
+    finding = asdict(Finding("topic", "name", "1.0", "missing", "install it"))
+    figure = asdict(Figure("reduction", "30 dofs", "ratio", 1.5))
+    for verb, data in (
+        ("doctor", {"rom": "1", "findings": [finding]}),
+        ("bench", {"figures": [figure]}),
+    ):
+        assert errors({"ok": True, **data, "warnings": []}, schema(verb)) == []
+
+
+@pytest.mark.parametrize("verb", NAMES)
+def test_every_verb_prints_its_schema_and_its_errors_fit(verb, capsys):
+    with pytest.raises(SystemExit) as end:
+        main([verb, "--json-schema"])
+    assert end.value.code == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == schema(verb)
+    assert main([verb, "--json", "--no-such-option"]) == 2
+    error = json.loads(capsys.readouterr().out)
+    assert errors(error, printed) == [] and error["exit_code"] == 2
+
+
+def test_every_key_is_explained():
+    def explained(part):
+        assert part.get("description"), part
+        for inner in (*part.get("properties", {}).values(), part.get("items")):
+            if inner:
+                explained(inner)
+
+    for verb in NAMES:
+        for part in schema(verb)["anyOf"]:
+            explained(part)
+
+
+def test_the_checker_finds_what_is_wrong(capsys):
+    good = {"ok": True, "shell": "bash", "text": "x", "warnings": []}
+    assert errors(good, schema("completion")) == []
+    for wrong in ({"shell": 3}, {"more": 1}, {"ok": None}, {"warnings": [1]}):
+        assert errors(good | wrong, schema("completion"))
+    assert errors({key: x for key, x in good.items() if key != "text"}, schema("completion"))

@@ -1,0 +1,95 @@
+"""From a STEP file to a picture of the part swinging, by one command."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.command import rom as run_rom
+from cases.files.schema import errors
+from cases.files.step_box import step_box
+from cases.solid import block
+from rom.cli.schemas import schema
+from rom.cli.verbs import swing
+from rom.errors import ConfigError, RomWarning
+
+L, B, H = 1.0, 0.1, 0.08
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return rom.reduce(
+        block(size=(L, B, H)), method=rom.CraigBampton(6), interfaces={"root": "rbe2"},
+        reference="root",
+    )  # fmt: skip
+
+
+def test_a_bar_swings_as_the_rigid_pendulum_does(bar):
+    """From the horizontal: T = 4 K(sin 45°) sqrt(I / (m g L / 2)), K = 1.854074677."""
+    plan = swing.planned(bar, "root")
+    assert plan.gravity == (0.0, 0.0, -9.81)
+    assert_allclose(np.abs(plan.axis), (0, 1, 0), atol=1e-12)
+    inertia_over_mass = (L**2 + H**2) / 12 + L**2 / 4
+    exact = 4 * 1.854074677 * np.sqrt(inertia_over_mass / (9.81 * L / 2))
+    assert plan.t_end == pytest.approx(exact, rel=1e-5)
+
+
+def test_gravity_may_be_given_and_must_not_pass_through_the_hinge(bar):
+    plan = swing.planned(bar, "root", (0, -1.62, 0), 0.5)
+    assert plan.t_end == 0.5 and plan.gravity == (0, -1.62, 0)
+    assert_allclose(np.abs(plan.axis), (0, 0, 1), atol=1e-12)
+    with pytest.raises(ConfigError, match=r"nothing would swing.*across the part"):
+        swing.planned(bar, "root", (9.81, 0, 0))
+
+
+def test_a_single_stiff_interface_has_a_certificate_without_gaps(bar):
+    """Its constraint modes are rigid motions, whose stiffness is round-off of either sign."""
+    assert all(np.isfinite(row.value) for row in bar.certificate.rows)
+    assert not any("in K" in row.quantity for row in bar.certificate.failures)
+
+
+def test_deformations_are_magnified_until_they_are_seen(bar):
+    q = np.zeros((3, bar.n_modes))
+    largest = np.linalg.norm(bar.surface.shape[:, 0].reshape(-1, 3), axis=1).max()
+    for drawn, factor in ((0.04, 1.0), (0.02, 2.0), (0.0099, 5.0), (2e-5, 2000.0), (0.2, 1.0)):
+        q[1, 0] = drawn * L / largest
+        assert swing.magnification(bar, q) == factor
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("12", ("hinge", {"hinge": 12})), ("0,0.5,-1", ("hinge", {"hinge": [0, 0.5, -1]})),
+     ("pin_a", ("pin_a", {}))],
+)  # fmt: skip
+def test_a_hinge_is_a_number_a_point_or_a_name(text, expected):
+    assert swing.hinge_of(text) == expected
+
+
+def test_half_a_point_is_refused():
+    with pytest.raises(ConfigError, match=r"--hinge.*three numbers"):
+        swing.hinge_of("0,1")
+
+
+@pytest.mark.fenicsx
+@pytest.mark.slow
+@pytest.mark.filterwarnings(f"ignore::{RomWarning.__module__}.RomWarning")
+def test_a_step_file_swings_on_the_face_chosen(tmp_path):
+    """A cantilever of 200 x 20 x 10 mm; Euler and Bernoulli are 1 % low, for the hinge is stiff."""
+    pytest.importorskip("dolfinx", reason="the part is made of finite elements")
+    pytest.importorskip("pyvista", reason="pictures need pyvista")
+    step_box(tmp_path / "bar.step", 200, 20, 10)
+    done = run_rom("swing", "bar.step", "--hinge", "0,0.01,0.005", "--material", "aluminium",
+                   "-m", 8, "--t-end", "0.02", "-o", "out", "--json", cwd=tmp_path,
+                   timeout=600)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert errors(found, schema("swing")) == []
+    assert found["mass"] == pytest.approx(2700 * 4e-5, rel=1e-9)
+    thin = 1.875104**2 / (2 * np.pi) * np.sqrt(70e9 * 0.01**2 / (12 * 2700)) / 0.2**2
+    assert found["frequencies"][0] == pytest.approx(thin, rel=0.02)
+    assert found["gravity"] == [0, 0, -9.81]
+    left = {path.name for path in (tmp_path / "out").iterdir()}
+    assert left == {"bar.rom.npz", "bar.png"} == {Path(f).name for f in found["files"]}

@@ -1,0 +1,526 @@
+"""Assumed-strain triangle: published problems, closed forms, and the reduction chain."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+from scipy.sparse.linalg import eigsh, spsolve
+
+import rom
+from cases.paths import PYTHONPATH, RANKS
+from cases.sheets import distorted
+from rom.components.assumed_strain import (
+    Metal,
+    equilibrium,
+    fly,
+    forces,
+    in_space,
+    mass,
+    rectangle,
+    sheet,
+    stiffness_by_sides,
+    tangent,
+)
+from rom.components.assumed_strain.space import bending
+from rom.errors import ConfigError, InterfaceError, MaterialError, MeshError, SolverError
+
+COOK = [(0, 0), (48, 44), (48, 60), (0, 44)]
+COOK_TABLE = {  # n: tip deflections of CST, F3, F1 with one diagonal, then with the other
+    2: (6.7425, 9.8182, 13.9666, 11.9928, 17.6347, 22.8291),
+    4: (11.2520, 18.8193, 22.3481, 18.2837, 22.7878, 24.5561),
+    8: (17.3312, 22.9361, 23.7635, 22.0224, 23.7672, 24.1947),
+    16: (21.5922, 23.7482, 23.9153, 23.4120, 23.9227, 24.0269),
+    32: (23.2751, 23.9035, 23.9465, 23.8155, 23.9518, 23.9823),
+}
+STEEL = Metal(210e9, 0.3, 7850.0)
+COPPER = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
+
+
+def dofs(where, axes=(0, 1)):
+    return (2 * np.flatnonzero(where)[:, None] + np.array(axes)).ravel()
+
+
+def cook(n, diagonal, load, **options):
+    """Sheet, dead loads on the right edge, held dofs, and the nodes at (48, 52) and (48, 60)."""
+    X, T = rectangle((n, n), COOK, diagonal)
+    right = np.flatnonzero(np.isclose(X[:, 0], 48))
+    right, f = right[np.argsort(X[right, 1])], np.zeros_like(X)
+    f[right, 1] = load / n
+    f[right[[0, -1]], 1] /= 2
+    seen = [int(np.abs(X - point).sum(axis=1).argmin()) for point in ((48, 52), (48, 60))]
+    return sheet(X, T, **options), f, dofs(np.isclose(X[:, 0], 0)), seen
+
+
+def solved(body, metal, f, held):
+    """Linear displacements (n, 2)."""
+    K, u = tangent(body, metal, body.points), np.zeros(f.size)
+    free = np.setdiff1d(np.arange(f.size), held)
+    u[free] = spsolve(K[free][:, free].tocsc(), f.ravel()[free])
+    return u.reshape(-1, 2)
+
+
+@pytest.mark.parametrize("n", COOK_TABLE)
+def test_cooks_membrane(n):
+    found = []
+    for diagonal in ("/", "\\"):
+        for element in ("CST", "F3", "F1"):
+            body, f, held, seen = cook(n, diagonal, 1.0, element=element)
+            found.append(solved(body, Metal(1.0, 1 / 3), f, held)[seen[0], 1])
+    assert_allclose(found, COOK_TABLE[n], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("n", "element", "expected"),
+    [(8, "CST", 2.5026), (16, "CST", 3.0770), (8, "F3", 3.2484), (16, "F3", 3.3648),
+     (32, "F3", 3.3894), (8, "F1", 3.3602), (16, "F1", 3.3886), (32, "F1", 3.3960)],
+)  # fmt: skip
+def test_cooks_membrane_bent_far(n, element, expected):
+    """St. Venant-Kirchhoff in plane strain, eight steps; last, what P2 elements give."""
+    body, f, held, seen = cook(n, "/", 40.0, element=element, state="plane strain")
+    x, _, iterations = equilibrium(body, Metal(240.565, 0.3, linear=True), f, held, steps=8)
+    assert (x - body.points)[seen[0], 1] == pytest.approx(expected, abs=1e-4)
+    assert iterations <= 4
+    if n == 32:
+        near, corner = (x - body.points)[seen]
+        tolerance = 4e-3 if element == "F1" else 1.2e-2
+        assert_allclose(near, [-1.6985, 3.3996], rtol=tolerance)
+        assert_allclose(corner, [-2.8611, 3.4722], rtol=tolerance)
+
+
+FREQUENCIES = {
+    (10, 1): (1704.1, 9550.1, 1056.1, 6318.8, 638.0, 3963.0),
+    (20, 2): (1119.3, 6617.1, 854.8, 5141.8, 763.8, 4610.1),
+    (40, 4): (906.8, 5425.6, 827.1, 4965.8, 806.9, 4844.4),
+}
+P2 = np.array([822.10, 4931.8])
+
+
+@pytest.mark.parametrize("n", FREQUENCIES)
+def test_frequencies_of_a_cantilever(n):
+    X, T = rectangle(n, [(0, 0), (100, 0), (100, 10), (0, 10)])
+    metal, found = Metal(2.1e4, 0.3, 8e-10), []
+    free = dofs(X[:, 0] > 1e-9)
+    for element in ("CST", "F3", "F1"):
+        body = sheet(X, T, element=element)
+        K, M = tangent(body, metal, X), mass(body, metal)
+        lam = eigsh(K[free][:, free], 2, M[free][:, free], sigma=0.0)[0]
+        found.append(np.sqrt(lam) / (2 * np.pi))
+    assert_allclose(np.concatenate(found), FREQUENCIES[n], atol=0.06)
+    if n[0] > 10:
+        error = np.abs(np.array(found) / P2 - 1)
+        assert np.all(error[1] < error[0] / 3)
+
+
+def test_fine_triangles_have_the_frequencies_of_quadratic_ones():
+    """Two of bending, one of stretching, two of bending, by another program and elements."""
+    X, T = rectangle((160, 16), [(0, 0), (100, 0), (100, 10), (0, 10)])
+    metal, free, found = Metal(2.1e4, 0.3, 8e-10), dofs(X[:, 0] > 1e-9), []
+    for element in ("F3", "F1"):
+        body = sheet(X, T, element=element)
+        K, M = tangent(body, metal, X), mass(body, metal)
+        lam = eigsh(K[free][:, free], 5, M[free][:, free], sigma=0.0)[0]
+        found.append(np.sqrt(lam) / (2 * np.pi))
+    quadratic = [822.10, 4931.8, 12823.3, 12990.2, 23606.2]
+    for f in found:
+        assert_allclose(f, quadratic, rtol=1.5e-3)
+    assert_allclose(found[0], quadratic, rtol=4e-4)
+
+
+@pytest.mark.parametrize("state", ["plane stress", "plane strain"])
+def test_patches_and_sides_give_the_same_stiffness(state):
+    """The gradient at a side is the mean of its two triangles, weighted by area: ES-FEM."""
+    X, T = distorted()
+    body, metal = sheet(X, T, state=state, thickness=0.3), Metal(1.0, 0.3)
+    K = stiffness_by_sides(body, metal).toarray()
+    assert_allclose(tangent(body, metal, X).toarray(), K, rtol=0, atol=2e-9)  # by differences
+    G, n = body.gradients[:, :, 0], 2 * len(X)
+    E, nu = (1.0, 0.3) if state == "plane stress" else (1 / (1 - 0.3**2), 0.3 / 0.7)
+    D = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
+    patches = np.zeros((n, n))
+    for e, p in np.ndindex(G.shape[:2]):
+        B = np.zeros((3, n))
+        for i, node in enumerate(body.patch[e]):
+            gx, gy = G[e, p, i]
+            B[:, 2 * node : 2 * node + 2] += [[gx, 0], [0, gy], [gy, gx]]
+        patches += body.weights[e, p] * B.T @ D @ B
+    assert_allclose(patches, K, rtol=0, atol=1e-13)
+    constant = sheet(X, T, element="CST").gradients[:, 0, 0]
+    u = np.random.default_rng(0).normal(size=len(X))
+    side = np.einsum("tsi,ti->ts", body.gradients[:, :, 0, :, 0], u[body.patch])
+    own = np.einsum("ti,ti->t", constant[..., 0], u[body.patch])
+    sides = [[frozenset((t[k - 1], t[k - 2])) for k in range(3)] for t in T]
+    for t, k in ((5, 0), (9, 1), (20, 2)):
+        both = [e for e in range(len(T)) if sides[t][k] in sides[e]]
+        mean = (own[both] * body.area[both]).sum() / body.area[both].sum()
+        assert side[t, k] == pytest.approx(mean, abs=1e-13)
+
+
+def test_processes_share_the_sides():
+    """Any number of shares adds up to the whole, even more shares than sides."""
+    body, metal = sheet(*distorted((2, 1))), Metal(1.0, 0.3)
+    K = stiffness_by_sides(body, metal)
+    for n in (2, 3, 12):
+        parts = [stiffness_by_sides(body, metal, share=(k, n)) for k in range(n)]
+        assert abs(sum(parts) - K).max() < 1e-15
+        assert abs(parts[0] - K).max() > 0.1
+
+
+@pytest.mark.fenicsx
+@pytest.mark.mpi
+def test_two_processes_find_the_frequencies_of_one(tmp_path):
+    """Each assembles its sides; the sum has the spectrum of the patches on one process."""
+    pytest.importorskip("mpi4py", reason="needs MPI")
+    script = RANKS / "sheet_under_mpi.py"
+    environment = {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "PYTHONPATH": PYTHONPATH,
+    }
+    subprocess.run(
+        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, str(script), str(tmp_path / "s")],
+        env=os.environ | environment, check=True, timeout=600,
+    )  # fmt: skip
+    found = np.load(tmp_path / "s.npz")
+    body, metal = sheet(*distorted((8, 6))), Metal(210e9, 0.3, 7850.0)
+    lam = np.linalg.eigvalsh(tangent(body, metal, body.points).toarray())
+    assert_allclose(found["spectrum"], lam, atol=1e-8 * lam[-1])
+    one = stiffness_by_sides(body, metal).toarray()
+    assert_allclose(found["spectrum"], np.linalg.eigvalsh(one), atol=1e-13 * lam[-1])
+    assert len(found["work"]) == 2 and found["work"].max() < 0.9 * np.count_nonzero(one)
+
+
+@pytest.mark.parametrize("element", ["F1", "F3", "CST"])
+@pytest.mark.parametrize("state", ["plane stress", "plane strain"])
+def test_uniform_deformation_loads_no_inner_node(element, state):
+    """The patch test, finite: large stretch and shear of a distorted mesh."""
+    X, T = distorted()
+    body = sheet(X, T, element=element, state=state)
+    f, _ = forces(body, Metal(10.0, 0.3), X @ np.array([[1.3, 0.2], [-0.4, 0.8]]))
+    inside = np.all((X > 1e-9) & (X < 1 - 1e-9), axis=1)
+    assert np.abs(f[inside]).max() < 1e-10 < np.abs(f[~inside]).max()
+    edges = [(X[:, axis] == side, axis, 2 * side - 1) for axis in (0, 1) for side in (0, 1)]
+    pulls = np.array([n * f[on & (X[:, 1 - axis] % 1 > 0)].sum(axis=0) for on, axis, n in edges])
+    assert_allclose(pulls[[0, 2]], pulls[[1, 3]], atol=1e-10)  # tractions of one uniform stress
+
+
+@pytest.mark.parametrize("element", ["F1", "F3"])
+def test_rotation_makes_no_force(element):
+    body = sheet(*distorted(), element=element)
+    x = body.points @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    assert np.abs(forces(body, Metal(10.0, 0.3, yield_stress=0.1), x)[0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("element", ["F1", "F3"])
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_only_rigid_motions_cost_nothing(element, n):
+    body = sheet(*distorted((n, n)), element=element)
+    lam = np.linalg.eigvalsh(tangent(body, Metal(1.0, 0.3), body.points).toarray())
+    assert np.abs(lam[:3]).max() < 1e-9 and lam[3] > 1e-4
+
+
+@pytest.mark.parametrize("element", ["F1", "F3"])
+@pytest.mark.parametrize("state", ["plane stress", "plane strain", "axisymmetric"])
+def test_the_tangent_is_the_derivative_of_the_forces(element, state):
+    """Hencky's law, far from the start, with its geometric part and beyond yield."""
+    X, T = distorted((2, 2))
+    X += (0.5, 0.0)
+    rng = np.random.default_rng(3)
+    for metal in (Metal(10.0, 0.3), Metal(10.0, 0.3, yield_stress=0.5, hardening=1.0)):
+        body = sheet(X, T, element=element, state=state)
+        x = X @ np.array([[1.2, 0.1], [-0.2, 0.9]]) + 0.02 * rng.normal(size=X.shape)
+        K, step = tangent(body, metal, x).toarray(), 1e-6
+        for dof in (0, 7, 8, 13):
+            up, down = x.copy(), x.copy()
+            up.reshape(-1)[dof] += step
+            down.reshape(-1)[dof] -= step
+            df = (forces(body, metal, up)[0] - forces(body, metal, down)[0]).ravel() / (2 * step)
+            assert np.abs(K[:, dof] - df).max() < 1e-6 * np.abs(K).max()
+
+
+def pulled(stretches, metal, state="plane stress"):
+    """Force per initial area along a bar in one direction, for a path of stretches."""
+    X, T = rectangle((2, 2), [(0, 0), (1, 0), (1, 1), (0, 1)])
+    body, history, found = sheet(X, T, state=state), None, []
+    low, right = dofs(X[:, 1] < 1e-9, (1,)), dofs(X[:, 0] > 1 - 1e-9, (0,))
+    left = dofs(X[:, 0] < 1e-9, (0,))
+    held = np.unique(np.concatenate([low, left, right]))
+    free, x = np.setdiff1d(np.arange(2 * len(X)), held), X.copy()
+    for stretch in stretches:
+        x[:, 0] *= stretch / x[:, 0].max()
+        for _ in range(30):
+            f, new = forces(body, metal, x, history)
+            if np.abs(f.ravel()[free]).max() < 1e-11 * metal.E:
+                break
+            K = tangent(body, metal, x, history)[free][:, free]
+            x.reshape(-1)[free] -= spsolve(K.tocsc(), f.ravel()[free])
+        history = new
+        found.append((f.ravel()[right].sum(), x[:, 1].max(), history[0, 0, 4]))
+    return np.array(found)
+
+
+def test_hencky_bar_follows_the_closed_form():
+    """T = E ln(stretch) on the current section times length; the force is T / stretch."""
+    stretches = np.array([1.05, 1.3, 1.8, 0.7])
+    force, width, _ = pulled(stretches, Metal(3.0, 0.3)).T
+    assert_allclose(force, 3.0 * np.log(stretches) / stretches, rtol=1e-9)
+    assert_allclose(width, stretches**-0.3, rtol=1e-9)
+
+
+def test_yield_of_a_bar_follows_the_closed_form():
+    """Beyond yield T = (sy + H e E / E) E / (E + H); unloading is elastic."""
+    E, sy, hard = 1000.0, 5.0, 50.0
+    strains = np.array([0.004, 0.02, 0.2, 0.198])
+    force, _, plastic = pulled(np.exp(strains), Metal(E, 0.3, 1.0, sy, hard)).T
+    T = E * (sy + hard * strains[:3]) / (E + hard)
+    T = np.r_[E * strains[0], T[1:], T[2] - E * 0.002]
+    assert_allclose(force * np.exp(strains), T, rtol=1e-7)
+    assert_allclose(plastic[1:], (strains - T / E)[1:], rtol=1e-6)
+
+
+def test_plastic_stress_turns_with_the_body():
+    """Simple shear beyond yield, then a turn: Cauchy stress turns, energy conjugates do not."""
+    X, T = distorted((2, 2))
+    metal, body = Metal(100.0, 0.3, 1.0, 1.0, 5.0), sheet(X, T, state="plane strain")
+    sheared = X @ np.array([[1.0, 0.0], [0.4, 1.0]])
+    f, history = forces(body, metal, sheared)
+    turn = np.array([[np.cos(1.1), np.sin(1.1)], [-np.sin(1.1), np.cos(1.1)]])
+    turned, other = forces(body, metal, sheared @ turn)
+    assert_allclose(turned, f @ turn, atol=1e-12)
+    assert_allclose(other, history, atol=1e-14)
+
+
+def test_a_thick_ring_under_pressure_is_that_of_lame():
+    """Axial symmetry in the linear limit: closed form, not in the list of problems."""
+    a, b, p = 1.0, 2.0, 1e-4
+    X, T = rectangle((24, 2), [(a, 0), (b, 0), (b, 0.1), (a, 0.1)])
+    metal, errors = Metal(1.0, 0.3), {}
+    bore = np.flatnonzero(np.isclose(X[:, 0], a))
+    f = np.zeros_like(X)
+    f[bore, 0] = 2 * np.pi * a * p * 0.05 * np.where(np.isclose(X[bore, 1] % 0.1, 0.05), 1, 0.5)
+    r = X[:, 0]
+    exact = p * a**2 / (b**2 - a**2) * (1.3 * 0.4 * r + 1.3 * b**2 / r)
+    for element in ("F1", "F3"):
+        body = sheet(X, T, element=element, state="axisymmetric")
+        u = solved(body, metal, f, dofs(np.ones(len(X)), (1,)))
+        errors[element] = np.abs(u[:, 0] / exact - 1).max()
+    assert max(errors.values()) < 4e-3
+
+
+def test_mass_is_that_of_the_solid():
+    X, T = distorted()
+    body = sheet(X, T, thickness=0.2)
+    assert mass(body, STEEL).sum() / 2 == pytest.approx(7850 * 0.2)
+    X, T = rectangle((3, 5), [(0, 0), (2, 0), (2, 3), (0, 3)])
+    body = sheet(X, T, state="axisymmetric")
+    assert mass(body, STEEL).sum() / 2 == pytest.approx(7850 * np.pi * 4 * 3)
+
+
+def test_explicit_motion_keeps_its_energy():
+    """A bar rings: its kinetic energy and the work of its forces cancel, its period is 4 L / c."""
+    L, metal = 1.0, Metal(100.0, 0.0, 1.0)
+    X, T = rectangle((40, 1), [(0, 0), (L, 0), (L, 0.02), (0, 0.02)])
+    body = sheet(X, T, element="F1")
+    v = np.zeros_like(X)
+    v[:, 0] = 1e-4 * np.sin(np.pi * X[:, 0] / 2)
+    held = np.concatenate([dofs(X[:, 0] < 1e-9), dofs(np.ones(len(X)), (1,))])
+    flight = fly(body, metal, v, held, 0.8, pictures=81)  # two periods
+    end = flight.x[:, np.argmax(X[:, 0]), 0] - L
+    period = 4 * L / 10
+    assert_allclose(
+        end, 1e-4 * np.sin(2 * np.pi * flight.t / period) * period / (2 * np.pi), atol=3e-8
+    )
+    quarter = fly(body, metal, v, held, period / 4, pictures=2)
+    kinetic = 0.5 * v.ravel() @ (mass(body, metal) @ v.ravel())
+    assert quarter.work == pytest.approx(kinetic, rel=5e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("element", "length", "foot", "plastic"),
+    [("CST", 21.325, 5.883, 3.17), ("F3", 21.319, 5.993, 1.70), ("F1", 21.448, 6.931, 2.87)],
+)
+def test_only_one_point_lets_the_foot_of_taylors_bar_flow(element, length, foot, plastic):
+    """Another program's explicit steps: incompressible flow locks what has more points."""
+    R, L = 3.2e-3, 32.4e-3
+    X, T = rectangle((5, 50), [(0, 0), (R, 0), (R, L), (0, L)])
+    body, v = sheet(X, T, element=element, state="axisymmetric"), np.zeros_like(X)
+    held = np.concatenate([dofs(X[:, 0] < 1e-9, (0,)), dofs(X[:, 1] < 1e-9, (1,))])
+    v[:, 1] = -227.0
+    flight = fly(body, COPPER, v, held, 80e-6, pictures=2)
+    r, z = flight.x[-1].max(axis=0) * 1e3
+    assert z == pytest.approx(length, rel=1e-3)
+    assert r == pytest.approx(foot, rel=0.025)
+    assert flight.plastic[-1].max() == pytest.approx(plastic, rel=0.02)
+
+
+@pytest.mark.slow
+def test_taylor_bar():
+    """Copper cylinder against a rigid wall at 227 m/s; plastic flow keeps the volume."""
+    R, L = 3.2e-3, 32.4e-3
+    X, T = rectangle((5, 50), [(0, 0), (R, 0), (R, L), (0, L)])
+    body = sheet(X, T, element="F1", state="axisymmetric")
+    held = np.concatenate([dofs(X[:, 0] < 1e-9, (0,)), dofs(X[:, 1] < 1e-9, (1,))])
+    v = np.zeros_like(X)
+    v[:, 1] = -227.0
+    flight = fly(body, COPPER, v, held, 80e-6)
+    end = flight.x[-1]
+    assert 21.2e-3 < end[:, 1].max() < 21.6e-3
+    assert 6.7e-3 < end[:, 0].max() < 7.1e-3
+    assert 2.5 < flight.plastic[-1].max() < 3.2
+    a, b, c = (end[T[:, k]] for k in range(3))
+    u, w = b - a, c - a  # single ones may turn over: only the mean of a patch counts
+    area = 0.5 * (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0])
+    now = 2 * np.pi * area @ end[T, 0].mean(axis=1)
+    assert now == pytest.approx(np.pi * R**2 * L, rel=0.03)
+    lumped = mass(body, COPPER).sum() / 2
+    assert flight.work == pytest.approx(0.5 * lumped * 227**2, rel=0.02)  # all was spent
+
+
+def strip(n=(40, 4), nu=0.3, thickness=0.002):
+    X, T = rectangle(n, [(0, 0), (0.4, 0), (0.4, 0.04), (0, 0.04)])
+    metal = Metal(210e9, nu, 7850.0)
+    body = sheet(X, T, thickness=thickness)
+    ends = {"root": np.flatnonzero(X[:, 0] < 0.0101), "tip": np.flatnonzero(X[:, 0] > 0.3899)}
+    return body, metal, in_space(body, metal, ends)
+
+
+def test_a_strip_bends_like_a_free_beam():
+    """Euler and Bernoulli; without Poisson's ratio the plate is the beam."""
+    body, metal, _ = strip(nu=0.0)
+    K, M = bending(body, metal).toarray(), mass(body, metal)[::2, ::2].toarray()
+    f = np.sqrt(np.abs(eigh(K, M, eigvals_only=True)[:5])) / (2 * np.pi)
+    unit = np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2 / (2 * np.pi)
+    assert np.all(f[:3] < 0.01)
+    assert_allclose(f[3:], np.array([4.730041, 7.853205]) ** 2 * unit, rtol=2e-4)
+
+
+def test_a_strip_twists_like_a_free_bar_and_bends_in_spite_of_poisson():
+    """Torsion with G J = G b t^3 / 3; a narrow strip bends with E I, its edges being free."""
+    body, metal, _ = strip()
+    K, M = bending(body, metal).toarray(), mass(body, metal)[::2, ::2].toarray()
+    f = np.sqrt(np.abs(eigh(K, M, eigvals_only=True)[:8])) / (2 * np.pi)
+    unit = np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2 / (2 * np.pi)
+    twist = np.sqrt(210e9 / 2.6 * 4 * 0.002**2 / 0.04**2 / 7850) / (2 * 0.4)
+    assert_allclose(f[3:5], np.array([4.730041, 7.853205]) ** 2 * unit, rtol=4e-3)
+    assert np.abs(f[5:] / twist - 1).min() < 0.03
+
+
+def test_crossed_diagonals_bend_too_easily_whatever_the_mesh():
+    """A limit of the element: energies of uniform curvature converge, yet inner nodes are loaded.
+
+    With diagonals along one direction the moments balance at each node, and frequencies converge.
+    """
+    D = 210e9 * 0.01**3 / 12 / (1 - 0.3**2)
+    for diagonal, energy, load in (("/", 0.91, 0.0), ("x", 0.97, 5.2)):
+        X, T = rectangle((12, 12), [(0, 0), (1, 0), (1, 1), (0, 1)], diagonal)
+        K = bending(sheet(X, T, thickness=0.01), STEEL)
+        w = X[:, 0] ** 2 / 2
+        inside = np.all((X > 0.17) & (X < 0.83), axis=1)
+        assert w @ K @ w / D == pytest.approx(energy, abs=2e-3)
+        assert np.abs((K @ w)[inside]).max() / D == pytest.approx(load, abs=1e-9)
+    unit = 4.730041**2 * np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2
+    for n in ((20, 2), (40, 4)):
+        for diagonal, ratio in (("/", 1.0), ("x", 0.8178)):
+            X, T = rectangle(n, [(0, 0), (0.4, 0), (0.4, 0.04), (0, 0.04)], diagonal)
+            body, metal = sheet(X, T, thickness=0.002), Metal(210e9, 0.0, 7850.0)
+            K, M = bending(body, metal), mass(body, metal)[::2, ::2]
+            lam = eigsh(K, 4, M, sigma=-1.0)[0]
+            assert np.sqrt(lam[-1]) / unit == pytest.approx(ratio, abs=2e-4)
+
+
+def test_a_sheet_in_space_has_six_rigid_motions():
+    X, T = distorted((3, 3))
+    model = in_space(sheet(X, T), Metal(1.0, 0.3), {"all": np.arange(len(X))})
+    lam = np.linalg.eigvalsh(model.K.toarray())
+    assert np.abs(lam[:6]).max() < 1e-9 and lam[6] > 1e-4
+    assert model.mass() == pytest.approx(1.0)
+
+
+def test_a_sheet_goes_through_the_reduction_chain():
+    """Craig-Bampton, certificate and file: the same as for any other finite elements."""
+    body, metal, model = strip()
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    full = rom.modes(model, 8, fixed=("root",), interfaces=kinds).frequencies
+    reduced = rom.reduce(model, method=rom.CraigBampton(30), interfaces=kinds, reference="root")
+    error = reduced.frequencies(8, fixed=("root",)) / full - 1
+    assert np.all((error > -1e-8) & (error < 1e-3))
+    assert reduced.certificate.ok, str(reduced.certificate)
+    assert rom.check(reduced).ok
+    # in its plane the cantilever behind the held rows is that of the plane matrices
+    K, M = tangent(body, metal, body.points), mass(body, metal)
+    free = dofs(body.points[:, 0] > 0.0101)
+    plane = eigsh(K[free][:, free], 1, M[free][:, free], sigma=0.0)[0]
+    held = rom.modes(model, 12, fixed=("root",)).frequencies
+    assert np.abs(held / (np.sqrt(plane[0]) / (2 * np.pi)) - 1).min() < 1e-8
+
+
+def test_plane_matrices_reduce_as_they_are():
+    """F3 on plain SciPy matrices: reduced above full, and close."""
+    X, T = rectangle((40, 4), [(0, 0), (100, 0), (100, 10), (0, 10)])
+    body, metal = sheet(X, T), Metal(2.1e4, 0.3, 8e-10)
+    K, M = tangent(body, metal, X), mass(body, metal)
+    ends = dofs((X[:, 0] < 1e-9) | (X[:, 0] > 100 - 1e-9))
+    basis = rom.craig_bampton(K, M, ends, 12)
+    left = np.isin(np.arange(len(basis.labels)), np.flatnonzero(X[ends // 2, 0] < 1e-9))
+    K_r, M_r = (basis.project(A)[np.ix_(~left, ~left)] for A in (K, M))
+    reduced = np.sqrt(eigh(K_r, M_r, eigvals_only=True)[:5]) / (2 * np.pi)
+    free = dofs(X[:, 0] > 1e-9)
+    full = np.sqrt(eigsh(K[free][:, free], 5, M[free][:, free], sigma=0.0)[0]) / (2 * np.pi)
+    assert np.all((reduced / full - 1 > -1e-9) & (reduced / full - 1 < 1e-3))
+
+
+CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
+SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: Metal(1.0, 0.5), MaterialError, "no solid is .*nu=0.5.* nu < 0.5"),
+        (lambda: Metal(-1.0, 0.3), MaterialError, "E, rho, yield_stress > 0"),
+        (lambda: Metal(1.0, 0.3, 1.0, 1.0, -2.0), MaterialError, "hardening=-2.0"),
+        (lambda: rectangle((0, 2), CORNERS), ConfigError, r"n = \(0, 2\)"),
+        (lambda: rectangle((1, 2), CORNERS, "y"), ConfigError, "diagonal = 'y'"),
+        (lambda: sheet(SMALL.points, SMALL.triangles + 5), MeshError, "nodes 5 to 13; there are 9"),
+        (lambda: sheet(SMALL.points.T, SMALL.triangles), MeshError, r"points \(2, 9\)"),
+        (lambda: sheet(*distorted((2, 2)), thickness=0.0), ConfigError, "thickness = 0.0 m"),
+        (lambda: sheet(SMALL.points - 2, SMALL.triangles, state="axisymmetric"), MeshError,
+         "radius of node 0 is -2 m"),
+        (lambda: sheet(np.nan * SMALL.points, SMALL.triangles), MeshError, "has the area nan"),
+        (lambda: forces(SMALL, SOFT, SMALL.points[:3]), ConfigError, r"shape \(3, 2\): \(9, 2\)"),
+        (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "finite numbers"),
+        (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities of the"),
+        (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
+        (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, "t_end = -1.0 s"),
+        (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "loads of the shape"),
+        (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "0 load"),
+    ],
+)  # fmt: skip
+def test_messages_name_what_is_wrong(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
+
+
+def test_wrong_input_is_named():
+    X, T = distorted((2, 2))
+    with pytest.raises(ConfigError, match="F2"):
+        sheet(X, T, element="F2")
+    with pytest.raises(MeshError, match="triangle 0 has the area"):
+        sheet(X, T[:, ::-1])
+    with pytest.raises(MeshError, match="belongs to 4"):
+        sheet(np.vstack([X, X[:1] - 1]), np.vstack([T, T[:1], T[:1]]))
+    with pytest.raises(ConfigError, match="plane strain"):
+        in_space(sheet(X, T, state="plane strain"), STEEL, {})
+    with pytest.raises(InterfaceError, match="'edge' has no triangle"):
+        in_space(sheet(X, T), STEEL, {"edge": np.flatnonzero(X[:, 0] < 1e-9)})
+    with pytest.raises(ConfigError, match="share 2 of 2"):
+        stiffness_by_sides(sheet(X, T), STEEL, share=(2, 2))
+    with pytest.raises(ConfigError, match="axisymmetric"):
+        stiffness_by_sides(sheet(X, T, state="axisymmetric"), STEEL)
+    body, f, held, _ = cook(2, "/", 1e6, state="plane strain")
+    with pytest.raises(SolverError, match="load step 1 of 1"):
+        equilibrium(body, Metal(240.0, 0.3), f, held)

@@ -1,0 +1,370 @@
+"""Non-linear bodies in a mechanism: rods against their own solvers, and a law of a stranger."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numba import carray, cfunc
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.mechanisms import residual_at, tangents_at
+from rom import rotation, view
+from rom.bench.models import bar
+from rom.components import cosserat
+from rom.components.cosserat import body, shape_of
+from rom.errors import ConfigError, ModelError
+from rom.mbs.elements.nonlinear import Elements, Frames
+from rom.mbs.equations.equations import retract
+from rom.mbs.equations.packing import pack
+from rom.mbs.integrate.consistent_start import initial_state
+from rom.mbs.kernels.system import workspace
+from rom.view.scenes.film import shades_of
+
+ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
+ORIGIN = (0.0, 0.0, 0.0)
+SECTION = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0,
+           "inertia": (1e-2, 2e-2, 3e-2)}  # fmt: skip
+
+
+def a_rod(n=12, **more):
+    """A rod along x whose plates have inertia, as its body has."""
+    rod = cosserat.straight(10.0, n, frame=ALONG_X, **(SECTION | more))
+    return rod._replace(inertia=body(rod).frames.inertia)
+
+
+def clamped(rod, gravity=ORIGIN):
+    mech = rom.Mechanism(gravity=gravity)
+    part = mech.add_nonlinear("rod", body(rod))
+    mech.fixed("clamp", mech.ground.marker(ORIGIN), part.marker("start"))
+    return mech, part
+
+
+def test_a_rod_in_a_mechanism_moves_as_its_own_integrator_says():
+    """Same scheme, other unknowns, elimination and code: 1e-8 after the tip went 7 m."""
+    rod = a_rod(viscosity=1e-3)
+    mech, part = clamped(rod)
+    mech.force("tip", part.marker("end"), (-5.0, 30.0, 10.0))
+    sol = rom.simulate(mech, t_end=2.0, dt=0.01, rho_inf=0.9)
+    other = cosserat.simulate(rod, 2.0, 0.01, load=cosserat.loads(rod, tip=(-5, 30, 10)))
+    assert np.linalg.norm(other.x[-1, -1] - rod.x[-1]) > 7
+    for k in (50, 200):
+        shape = shape_of(sol, "rod", k)
+        assert_allclose(shape.x, other.x[k], atol=1e-8)
+        assert_allclose(np.abs(np.sum(shape.p * other.p[k], axis=1)), 1.0, atol=1e-14)
+    assert_allclose(sol.energy.kinetic, other.energies()[:, 0], atol=1e-6)
+    assert_allclose(sol.energy.strain, other.energies()[:, 1], atol=1e-6)
+    assert sol.statistics["rank"] == 9
+    assert sol.packed.by_blocks
+
+
+def test_a_rod_swings_on_a_hinge_under_its_weight():
+    rod = a_rod()
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    part = mech.add_nonlinear("rod", body(rod))
+    mech.revolute("hinge", mech.ground.marker(ORIGIN), part.marker("start"), axis=(0, 1, 0))
+    sol = rom.simulate(mech, t_end=1.5, dt=0.01, rho_inf=0.9)
+    free = cosserat.clamped(rod)
+    free[0] = True  # the first axis of the section is the second of the world
+    load = cosserat.loads(rod, weight=(0, 0, -9.81))
+    other = cosserat.simulate(rod, 1.5, 0.01, load=load, free=free)
+    assert other.x[-1, -1, 2] < -7
+    assert_allclose(shape_of(sol, "rod").x, other.x[-1], atol=1e-8)
+
+
+def test_statics_and_frequencies_are_those_of_the_rod():
+    """Elastica P L^2 / EI = 2: deflection 0.493457 and shortening 0.160642 of the length."""
+    n = 80
+    rod = cosserat.straight(1.0, n, frame=ALONG_X, stretch=1e6, bend=1.0, mass=1.0,
+                            inertia=(1e-4, 1e-4, 2e-4))  # fmt: skip
+    rod = rod._replace(inertia=body(rod).frames.inertia)
+    mech, part = clamped(rod)
+    mech.force("tip", part.marker("end"), (0, 0, 2.0))
+    state = rom.equilibrium(mech)
+    x = state.q.reshape(-1, 7)[:-1, :3]
+    load = cosserat.loads(rod, tip=(0, 0, 2.0))
+    shape = cosserat.equilibrium(rod, load)
+    assert_allclose(x, shape.x, atol=1e-12)
+    assert_allclose([x[-1, 2], 1 - x[-1, 0]], [0.493457, 0.160642], rtol=3e-4)
+    theirs = cosserat.modes(rod, shape, 6, load=load).frequencies
+    assert_allclose(rom.linearize(mech, state).frequencies[:6], theirs, rtol=1e-7)
+
+
+def test_tangents_of_a_bent_and_moving_rod():
+    """The rate of viscous forces with the position is left out; without it all is exact."""
+    rng = np.random.default_rng(5)
+    for viscosity in (0.0, 0.02):
+        packed, W = bent_rod(rng, viscosity)
+        n, lam = packed.v.size, rng.normal(size=packed.system.rows.kind.size)
+        v = rng.normal(size=n) if viscosity else np.zeros(n)
+        a = rng.normal(size=n)
+
+        def by(direction, what, v=v, a=a, lam=lam, packed=packed, W=W):
+            out = []
+            for sign in (1, -1):
+                q, w = packed.q.copy(), v
+                if what == "q":
+                    retract(packed.system, packed.q, sign * 1e-6 * direction, q)
+                else:
+                    w = v + sign * 1e-6 * direction
+                residual_at(packed.system, W, q, w, a, lam)
+                out.append(W.residual.copy())
+            return (out[0] - out[1]) / 2e-6
+
+        tangents_at(packed.system, W, packed.q, v, a, lam, (0.0, 1.0, 1.0))
+        S, K = W.S.copy(), W.Kt.copy()
+        for _ in range(3):
+            d = rng.normal(size=n)
+            size = np.abs(S @ d).max() + np.abs(K @ d).max()
+            assert_allclose(S @ d, by(d, "v"), atol=1e-7 * size)
+            if not viscosity:
+                assert_allclose(K @ d, by(d, "q"), atol=1e-7 * size)
+
+
+def bent_rod(rng, viscosity):
+    rod = a_rod(3, viscosity=viscosity)
+    mech, _ = clamped(rod)
+    packed = pack(mech, whole=True)
+    q = packed.q.copy()
+    retract(packed.system, packed.q, 0.3 * rng.normal(size=packed.v.size), q)
+    packed.q[:] = q
+    return packed, workspace(packed.system, 0)
+
+
+def test_balance_of_energy_and_loss():
+    """What the weight gives up is motion, strain and heat; the error falls with the step."""
+    rod = a_rod(viscosity=0.05)
+    mech, part = clamped(rod, gravity=(0, 0, -9.81))
+    mech.add_rigid("bob", mass=3.0, inertia=(0.1, 0.1, 0.1), at=(10, 0, 0))
+    mech.spherical("ball", part.marker("end"), mech.part("bob").marker(ORIGIN))
+    miss = []
+    for dt in (0.01, 0.005):
+        sol = rom.simulate(mech, t_end=2.0, dt=dt, rho_inf=1.0)
+        turnover = np.ptp(sol.energy.potential)
+        miss.append(np.abs(sol.energy.balance).max() / turnover)
+        assert sol.energy.damping[-1] > 0.03 * turnover
+    assert miss[1] < 0.3 * miss[0]
+    assert miss[1] < 1e-3
+    assert rom.audit(sol).ok
+
+
+def test_a_free_rod_keeps_its_momentum():
+    rod = a_rod()
+    mech = rom.Mechanism(gravity=ORIGIN)
+    part = mech.add_nonlinear(
+        "rod", body(rod), at=(1, 2, 3), orientation=rotation.exp([0.3, 0.2, 0.1]),
+        velocity=(1, 0, -1), omega=(0.5, 1.5, 2.0),
+    )  # fmt: skip
+    drift = []
+    for dt in (0.01, 0.005):
+        sol = rom.simulate(mech, t_end=2.0, dt=dt, rho_inf=1.0)
+        drift.append(max(np.abs(p - p[0]).max() / np.abs(p).max() for p in sol.momentum))
+    assert drift[1] < 0.3 * drift[0]
+    assert drift[1] < 3e-5
+    A = rotation.matrix(rotation.exp([0.3, 0.2, 0.1]))
+    assert_allclose(sol.momentum[0][0], 10 * (np.array([1, 0, -1]) + np.cross(
+        A @ [0.5, 1.5, 2.0], A @ [5.0, 0, 0])), rtol=1e-12)  # fmt: skip
+    arm = part.parts[-1].at - part.parts[0].at
+    assert_allclose(arm, A @ [10, 0, 0], atol=1e-12)
+
+
+def test_a_rod_goes_on_where_a_reduced_solid_ends():
+    """A steel bar of one metre: half of it bricks in Craig-Bampton form, half a rod."""
+    size, E, rho = (0.5, 0.03, 0.02), 210e9, 7850.0
+    solid = rom.reduce(bar(size, (20, 2, 2)), method=rom.CraigBampton(6), certify=False,
+                       interfaces={"root": "rbe2", "tip": "rbe3"}, reference="root")  # fmt: skip
+    A, I = size[1] * size[2], np.array([size[1] * size[2] ** 3, size[2] * size[1] ** 3]) / 12
+    # axes of the section: y, z, along; a moment about y bends over z
+    section = {"stretch": E / 2.6 * A * np.array([5 / 6, 5 / 6, 2.6]),
+               "bend": (E * I[0], E * I[1], E / 2.6 * 0.196 * size[1] * size[2] ** 3),
+               "mass": rho * A, "inertia": rho * np.array([I[0], I[1], I.sum()])}  # fmt: skip
+    half = body(cosserat.straight(0.5, 48, frame=ALONG_X, **section))
+    whole = cosserat.straight(1.0, 96, frame=ALONG_X, **section)
+    expected = cosserat.modes(whole, cosserat.reference(whole), 4).frequencies
+    mech = rom.Mechanism(gravity=ORIGIN)
+    first = mech.add_flexible("bar", solid, at=-solid.marker("root").point)
+    mech.fixed("wall", mech.ground.marker(ORIGIN), first.marker("root"))
+    tip = mech.design_point(first.marker("tip"))
+    rod = mech.add_nonlinear("rod", half, at=tip)
+    mech.fixed("weld", first.marker("tip"), rod.marker("start"))
+    found = rom.linearize(mech, rom.equilibrium(mech)).frequencies[:4]
+    assert_allclose(found, expected, rtol=4e-3)
+
+
+def test_a_rod_that_hardly_bends_has_the_frequencies_of_the_reduced_solid():
+    """Cantilever of one metre, 30 x 20 mm: bricks in Craig-Bampton form against 192 segments."""
+    size, E, rho = (1.0, 0.03, 0.02), 210e9, 7850.0
+    solid = rom.reduce(bar(size, (40, 2, 2)), method=rom.CraigBampton(8), certify=False,
+                       interfaces={"root": "rbe3"})  # fmt: skip
+    A, I = size[1] * size[2], np.array([size[1] * size[2] ** 3, size[2] * size[1] ** 3]) / 12
+    rod = cosserat.straight(
+        1.0, 192, frame=ALONG_X, stretch=E / 2.6 * A * np.array([5 / 6, 5 / 6, 2.6]),
+        bend=(E * I[0], E * I[1], E / 2.6 * 0.196 * size[1] * size[2] ** 3), mass=rho * A,
+        inertia=rho * np.array([I[0], I[1], I.sum()]),
+    )  # fmt: skip
+    found = cosserat.modes(rod, cosserat.reference(rod), 5).frequencies
+    assert_allclose(found, solid.frequencies(fixed="root")[:5], rtol=3e-3)
+
+
+def test_restart_gives_the_same_bits():
+    rod = a_rod(5)
+    mech, part = clamped(rod)
+    mech.force("tip", part.marker("end"), (0, 20.0, 10.0))
+    one = rom.simulate(mech, t_end=0.4, dt=0.01)
+    half = rom.simulate(mech, t_end=0.2, dt=0.01)
+    rest = rom.simulate(mech, state=half.final, t_end=0.4, dt=0.01)
+    assert np.array_equal(one.q[-1], rest.q[-1])
+
+
+def test_plates_take_their_inertia_from_the_segments_beside_them():
+    rod = cosserat.straight(10.0, 5, **SECTION)
+    frames = body(rod).frames
+    assert_allclose(frames.inertia.sum(axis=0), rod.inertia.sum(axis=0), rtol=1e-14)
+    assert_allclose(frames.inertia[[0, 1]], np.outer([0.5, 1.5], SECTION["inertia"]), rtol=1e-12)
+    assert_allclose(frames.mass.sum(), 10.0, rtol=1e-14)
+    own = rod._replace(inertia=rod.inertia + 1.0)
+    assert_allclose(body(own).frames.inertia, own.inertia)
+
+
+def test_a_released_rod_starts_from_the_shape_in_which_it_was_held():
+    """A tip that is pulled and let go: its first acceleration is the pull over what it moves."""
+    rod = a_rod()
+    held, part = clamped(rod)
+    held.spherical("hand", held.ground.marker((9.5, 0.0, 2.0)), part.marker("end"))
+    rest = rom.equilibrium(held)
+    loose, _ = clamped(rod)
+    start = rom.release(loose, rest)
+    assert_allclose(start.q, rest.q, atol=1e-12)
+    assert start.lam.size == rest.lam.size - 3
+    sol = rom.simulate(loose, state=start, t_end=1.0, dt=0.002, rho_inf=0.9)
+    assert sol.energy.strain[0] > 1.0
+    assert np.abs(sol.energy.balance).max() < 0.02 * sol.energy.strain[0]
+    assert sol.position("rod.12")[-1, 2] < 1.5
+    again = rom.release(loose, sol.final)
+    assert_allclose(again.v, sol.final.v, atol=1e-8)
+    assert np.abs(again.v).max() > 0.1
+    assert again.t == sol.final.t
+    with pytest.raises(ConfigError, match="must be of type State"):
+        rom.release(loose, rest.q)
+    other, _ = clamped(a_rod(4))
+    with pytest.raises(ConfigError, match="their bodies differ"):
+        rom.release(other, rest)
+
+
+def test_pictures_of_a_rod_are_its_segments():
+    mech, part = clamped(a_rod(4))
+    boxes = view.sleeves(part, (0.2, 0.4))
+    assert list(boxes) == [f"rod.{k}" for k in range(6)]
+    points, _ = boxes["rod.2"]
+    assert_allclose(np.ptp(points, axis=0), [0.2, 0.4, 2.5])
+    assert_allclose(points.max(axis=0), [0.1, 0.2, 0.0], atol=1e-12)
+    assert len(set(shades_of(mech).values())) == 1
+    with pytest.raises(ConfigError, match=r"\(4, 2\) and positive"):
+        view.sleeves(part, np.ones((3, 2)))
+    with pytest.raises(ConfigError, match="positive"):
+        view.sleeves(part, (1.0, 0.0))
+
+
+@pytest.mark.parametrize("n", [50, 400])
+def test_memory_of_the_elimination_grows_with_the_rod(n):
+    mech, _ = clamped(cosserat.straight(10.0, n, **SECTION))
+    packed = pack(mech)
+    assert packed.by_blocks
+    assert packed.system.graph.plan.memory[0] < 130 * (n + 4)
+
+
+def test_elimination_along_the_rod_is_the_dense_solution():
+    """Accelerations and reactions of a bent rod in motion, both ways."""
+    mech, _ = clamped(a_rod(9, viscosity=1e-3), gravity=(1, 2, 3))
+    by_blocks, whole = pack(mech), pack(mech, whole=True)
+    assert by_blocks.by_blocks
+    assert not whole.by_blocks
+    rng = np.random.default_rng(11)
+    n = whole.v.size
+    free = np.ones(n)
+    free[:6] = free[-6:-3] = 0.0  # the clamp, and the place of the plate at the end
+    q = whole.q.copy()
+    d = 0.2 * rng.normal(size=n) * free
+    d[-6:-3] = d[-12:-9]
+    retract(whole.system, whole.q, d, q)
+    v = rng.normal(size=n) * free
+    v[-6:-3] = v[-12:-9]
+    one, two = (initial_state(replace(p, q=q.copy(), v=v.copy())) for p in (by_blocks, whole))
+    assert_allclose(one.q, q, atol=1e-12)
+    assert_allclose(one.a, two.a, atol=1e-9 * np.abs(two.a).max())
+    assert_allclose(one.lam, two.lam, atol=1e-9 * np.abs(two.lam).max())
+
+
+# ## A law from outside: a spring and a damper between two origins
+
+
+def spring(numbers, pose, wanted, answer, _space):
+    k, c, free = numbers[0], numbers[1], numbers[2]
+    s, out = carray(pose, (26,)), carray(answer, (302,))
+    out[:] = 0.0
+    gap, rate = s[13:16] - s[0:3], s[20:23] - s[7:10]
+    length = np.sqrt((gap * gap).sum())
+    e = gap / length
+    speed = (e * rate).sum()
+    out[0], out[1] = 0.5 * k * (length - free) ** 2, c * speed**2
+    tension = k * (length - free) + c * speed
+    for i in range(3):
+        out[2 + i], out[8 + i] = -tension * e[i], tension * e[i]
+        for j in range(3):
+            stiff = k * e[i] * e[j] + tension / length * ((i == j) - e[i] * e[j])
+            for a in range(2):
+                for b in range(2):
+                    sign = 1.0 if a == b else -1.0
+                    out[14 + 12 * (6 * a + i) + 6 * b + j] = sign * stiff
+                    out[158 + 12 * (6 * a + i) + 6 * b + j] = sign * c * e[i] * e[j]
+
+
+def two_masses():
+    frames = Frames(np.array([[0.0, 0, 0], [2.0, 0, 0]]), np.tile([1.0, 0, 0, 0], (2, 1)),
+                    np.array([1.0, 2.0]), np.full((2, 3), 0.1))  # fmt: skip
+    law = cfunc("void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))")(spring)
+    pair = Elements(law.address, np.array([[0, 1]]), np.array([[40.0, 0.3, 1.5]]), law)
+    return SimpleNamespace(frames=frames, elements=(pair,), places={"far": 1}, coincident=())
+
+
+def test_a_law_of_the_user_is_as_good_as_a_force_of_the_core():
+    mech = rom.Mechanism()
+    pair = mech.add_nonlinear("pair", two_masses())
+    mech.spherical("pivot", mech.ground.marker(ORIGIN), pair.marker(0))
+    own = rom.simulate(mech, t_end=2.0, dt=0.005)
+    mech = rom.Mechanism()
+    one = mech.add_rigid("one", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
+    two = mech.add_rigid("two", mass=2.0, inertia=(0.1,) * 3, at=(2, 0, 0))
+    mech.spherical("pivot", mech.ground.marker(ORIGIN), one.marker(ORIGIN))
+    ends = one.marker(ORIGIN), two.marker(ORIGIN)
+    mech.spring_damper("spring", *ends, stiffness=40, damping=0.3, free_length=1.5)
+    core = rom.simulate(mech, t_end=2.0, dt=0.005)
+    assert np.linalg.norm(core.q[-1, 7:10] - (2, 0, 0)) > 1
+    assert_allclose(own.q, core.q, atol=1e-9)
+    assert_allclose(own.energy.strain, core.energy.strain, atol=1e-8)
+    assert_allclose(own.energy.damping, core.energy.damping, atol=1e-8)
+
+
+def test_bad_bodies_are_named():
+    mech = rom.Mechanism()
+    with pytest.raises(ConfigError, match="'rod': body = 3 must be of type NonlinearBody"):
+        mech.add_nonlinear("rod", 3)
+    with pytest.raises(ModelError, match="without mass or inertia"):
+        body(cosserat.straight(1.0, 4, stretch=1.0, bend=1.0))
+    pair = two_masses()
+    pair.frames.mass[1] = 0.0
+    with pytest.raises(ModelError, match="frame 1 of 2 has mass 0 kg"):
+        mech.add_nonlinear("pair", pair)
+    pair.frames.mass[1] = 1.0
+    pair.elements[0].frames[0, 1] = 2
+    with pytest.raises(ModelError, match="beyond the 2"):
+        mech.add_nonlinear("pair", pair)
+    pair.elements[0].frames[0, 1] = 1
+    part = mech.add_nonlinear("pair", pair)
+    for place in ("near", True, 2, 1.0):
+        with pytest.raises(ConfigError, match=r"pair|place = "):
+            part.marker(place)
+    with pytest.raises(ConfigError, match="used twice"):
+        mech.add_rigid("pair", mass=1.0, inertia=(1, 1, 1), at=ORIGIN)
+    assert part.marker("far") == part.marker(1) == part.marker(-1)

@@ -1,0 +1,211 @@
+"""Inertia of planar linkages: closed forms, moving points, and the multibody core."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import rom
+from cases.mbs.mechanisms import simulate_quietly
+from cases.solid import block
+from rom import rotation
+from rom.components.linkages.dynamic_isotropy import (
+    christoffel,
+)
+from rom.components.linkages.two_dof_linkages import (
+    FiveBar,
+    TwoLink,
+    mechanism_inertia,
+    reduced_link,
+    rigid_link,
+    rod,
+)
+from rom.errors import ConfigError, ModelError
+from rom.mbs.mechanism import Mechanism
+
+FIVE = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
+TWO = TwoLink(rod(1.0, 0.5), rod(2.0, 0.4))
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """A slender steel block with faces "root" and "tip", its axis aside from its frame."""
+    return rom.reduce(
+        block(size=(0.3, 0.02, 0.02), cells=(6, 2, 2), origin=(0.1, -0.03, 0.0)),
+        method=rom.CraigBampton(n_modes=4),
+        interfaces={"root": "rbe2", "tip": "rbe2"},
+        certify=False,
+    )
+
+
+def two_link_closed_form(l1, lc1, m1, I1, lc2, m2, I2, q1, q2):  # noqa: PLR0913
+    """Inertia of the two-link chain in absolute angles."""
+    b = m2 * l1 * lc2 * np.cos(q1 - q2)
+    return np.array([[I1 + m1 * lc1**2 + m2 * l1**2, b], [b, I2 + m2 * lc2**2]])
+
+
+def test_two_link_chain_has_its_textbook_inertia():
+    A = TWO.inertia(0.4, 1.3)
+    exact = two_link_closed_form(0.5, 0.25, 1.0, 0.25 / 12, 0.2, 2.0, 0.32 / 12, 0.4, 1.3)
+    assert_allclose(A, exact, rtol=1e-14)
+    assert_allclose(np.diag(A), [0.583333, 0.106667], atol=1e-6)
+
+
+def test_a_mass_centre_aside_of_the_axis_couples_by_cosine_and_sine():
+    """Velocity of the centre: l1 e1' + (x e2' - y e2), primes for a quarter turn ahead."""
+    m, l1, x, y, J = 2.0, 0.5, 0.15, 0.08, 0.03
+    chain = TwoLink(rod(1.0, l1), rigid_link(m, 0.4, (x, y), J))
+    A, turn = chain.inertia(0.4, 1.3), 1.3 - 0.4
+    assert_allclose(A[0, 1], m * l1 * (x * np.cos(turn) - y * np.sin(turn)), rtol=1e-13)
+    assert_allclose(np.diag(A), [l1**2 / 3 + m * l1**2, J + m * (x**2 + y**2)], rtol=1e-13)
+
+
+def test_kinetic_energy_of_the_five_bar_from_moving_points():
+    """Uniform rods as three points (Simpson is exact for them), moved by finite differences."""
+    rng = np.random.default_rng(2)
+    q, rate, h = rng.uniform(0, 2 * np.pi, (20, 2)), rng.normal(size=(20, 2)), 1e-6
+    P = [FIVE.posture(*(q + s * h * rate).T) for s in (1, -1)]
+    V = (P[0] - P[1]) / (2 * h)
+    energy = 0.25 * (V[:, 2] ** 2).sum(axis=1)
+    for (i, j), m in {(0, 1): 2.0, (1, 2): 1.0, (2, 3): 1.0, (3, 4): 2.0}.items():
+        for point, share in ((V[:, i], 1), (V[:, i] + V[:, j], 1), (V[:, j], 1)):
+            energy += m / 12 * share * (point**2).sum(axis=1)
+    A = FIVE.inertia(*q.T)
+    assert_allclose(0.5 * np.einsum("ki,kij,kj->k", rate, A, rate), energy, rtol=1e-8)
+    assert (np.linalg.eigvalsh(A) > 0).all()
+
+
+def crank_of_the_core(mech, name, body, at, angle, first):
+    """Add a link to a mechanism: a rod (mass, length), or a flexible body with pins root, tip."""
+    A = rotation.matrix(np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)]))
+    at = np.array([*at, 0.0])
+    if isinstance(body, tuple):
+        mass, length = body
+        J, half = mass * length**2 / 12, np.array([length / 2, 0, 0])
+        part = mech.add_rigid(
+            name, mass=mass, inertia=(J / 100, J, J), at=at + A @ half, orientation=A,
+            markers={"root": -half, "tip": half},
+        )  # fmt: skip
+    else:
+        at = at - A @ body.marker("root").point
+        part = mech.add_flexible(name, body, at=at, orientation=A)
+    mech.revolute(f"{name} pin", first, part.marker("root"), axis=(0, 0, 1))
+    return part
+
+
+def five_bar_of_the_core(q, cranks, couplers, posture):
+    """The five-bar as a `rom.Mechanism`, drives "left" and "right" on its base joints."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    tips = []
+    for k, (pivot, elbow) in enumerate(((0, 1), (4, 3))):
+        o = mech.ground.marker((*posture[pivot], 0.0))
+        crank = crank_of_the_core(mech, f"crank {k}", cranks[k], posture[pivot], q[k], o)
+        arm = posture[2] - posture[elbow]
+        coupler = crank_of_the_core(
+            mech, f"coupler {k}", couplers[k], posture[elbow], np.arctan2(arm[1], arm[0]),
+            crank.marker("tip"),
+        )  # fmt: skip
+        tips.append(coupler.marker("tip"))
+        mech.drive(("left", "right")[k], f"crank {k} pin", lambda t: 0.0)
+    mech.revolute("tip", *tips, axis=(0, 0, 1))
+    ball = mech.add_rigid("ball", mass=0.5, inertia=(1e-9,) * 3, at=(*posture[2], 0.0))
+    mech.fixed("held", tips[0], ball.marker((0, 0, 0)))
+    return mech
+
+
+def test_closed_form_equals_the_mass_matrix_of_the_multibody_core():
+    for q in np.random.default_rng(3).uniform(0, 2 * np.pi, (4, 2)):
+        mech = five_bar_of_the_core(q, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q))
+        core = mechanism_inertia(mech, ("left", "right"))
+        assert_allclose(core, FIVE.inertia(*q), rtol=1e-7, atol=1e-9)
+
+
+def test_the_core_moves_to_other_angles():
+    """Angles count from where the bodies were added."""
+    q, turn = np.array([1.0, 2.0]), np.array([0.3, -0.2])
+    mech = five_bar_of_the_core(q, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q))
+    core = mechanism_inertia(mech, ("left", "right"), angles=turn)
+    assert_allclose(core, FIVE.inertia(*(q + turn)), rtol=1e-7)
+
+
+@pytest.mark.parametrize("elastic", ["held", "free"])
+def test_flexible_links_agree_with_the_core(bar, elastic):
+    """Rigid cranks of 0.3 m with reduced blocks as couplers, and the other way round."""
+    link = reduced_link(bar, "root", "tip")
+    for q in ([1.2, 1.6], [0.3, 1.2]):
+        five = FiveBar(0.5, (rod(0.4, 0.25), link), (link, rod(0.5, 0.35)), payload=0.5)
+        mech = five_bar_of_the_core(
+            q, [(0.4, 0.25), bar], [bar, (0.5, 0.35)], five.posture(*q)
+        )  # fmt: skip
+        core = mechanism_inertia(mech, ("left", "right"), elastic=elastic)
+        # the core measures the angle of a flexible crank on its root marker
+        assert_allclose(five.inertia(*q, elastic=elastic), core, rtol=1e-6, atol=1e-9)
+
+
+def test_free_links_feel_lighter_whatever_the_direction(bar):
+    link = reduced_link(bar, "root", "tip")
+    chain = TwoLink(link, link, payload=0.3)
+    held, free = (chain.inertia(0.3, 1.4, elastic=e) for e in ("held", "free"))
+    assert (np.linalg.eigvalsh(held - free) > 0).all() and (np.linalg.eigvalsh(free) > 0).all()
+    steel = rod(0.3 * 0.02**2 * 7850, 0.3)
+    J = steel.M[2, 2] + steel.M[0, 0] * 0.02**2 / 12
+    assert link.M[2, 2] == pytest.approx(J, rel=1e-9)
+    assert link.length == pytest.approx(0.3)
+
+
+def test_the_frame_of_a_flexible_coupler_is_a_matter_of_taste(bar):
+    link = reduced_link(bar, "root", "tip")
+    other = reduced_link(bar.with_reference(("root", "tip")), "root", "tip")
+    values = [
+        FiveBar(0.2, (rod(0.4, 0.25),) * 2, (one,) * 2).inertia(1.0, 2.2, elastic="free")
+        for one in (link, other)
+    ]
+    assert_allclose(*values, rtol=1e-10)
+
+
+def test_inertia_and_christoffel_symbols_reproduce_the_free_motion_of_the_core():
+    """Two equations of motion against fifty-odd with constraints, integrated by other means."""
+    q0, rate = np.array([1.0, 2.2]), np.array([3.0, -2.0])
+    mech = five_bar_of_the_core(q0, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q0))
+    mech.drives.clear()
+    step = 1e-7
+    for name, pair in {"crank 0": (0, 1), "crank 1": (4, 3)}.items():
+        P = [FIVE.posture(*(q0 + s * step * rate))[list(pair)].mean(axis=0) for s in (1, -1)]
+        part = mech.parts[name]
+        spin = rate[0 if name == "crank 0" else 1]
+        v = np.r_[(P[0] - P[1]) / (2 * step), 0.0]
+        mech.parts[name] = replace(part, velocity=v, omega=np.array([0, 0, spin]))
+    for name, pair in {"coupler 0": (1, 2), "coupler 1": (3, 2)}.items():
+        P = [FIVE.posture(*(q0 + s * step * rate))[list(pair)] for s in (1, -1)]
+        arm = [np.arctan2(*(p[1] - p[0])[::-1]) for p in P]
+        v = np.r_[(P[0] - P[1]).mean(axis=0) / (2 * step), 0.0]
+        spin = np.array([0, 0, (arm[0] - arm[1]) / (2 * step)])
+        mech.parts[name] = replace(mech.parts[name], velocity=v, omega=spin)
+    P = [FIVE.posture(*(q0 + s * step * rate))[2] for s in (1, -1)]
+    v = np.r_[(P[0] - P[1]) / (2 * step), 0.0]
+    mech.parts["ball"] = replace(mech.parts["ball"], velocity=v)
+    sol = simulate_quietly(mech, t_end=0.2, dt=0.01, method="dop853", rtol=1e-8, atol=1e-10)
+
+    def rhs(t, y):
+        force = np.einsum("ijk,j,k->i", christoffel(FIVE.inertia, y[:2]), y[2:], y[2:])
+        return np.r_[y[2:], np.linalg.solve(FIVE.inertia(*y[:2]), -force)]
+
+    y = solve_ivp(rhs, (0, 0.2), [*q0, *rate], "DOP853", sol.t, rtol=1e-9, atol=1e-11).y
+    tip = FIVE.posture(*y[:2])[:, 2]
+    assert np.ptp(tip, axis=0).min() > 0.01
+    assert_allclose(sol.position("ball")[:, :2], tip, atol=2e-6)
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(ModelError, match="no link has mass -1"):
+        rod(-1.0, 0.3)
+    with pytest.raises(ModelError, match=r"1.3 m apart; couplers of 0.3 m and 0.3 m do not meet"):
+        FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.3),) * 2).inertia(np.pi, [0.0, 1.0])
+    with pytest.raises(ConfigError, match='use "held" or "free"'):
+        TWO.inertia(0.0, 1.0, elastic="loose")
+    mech = Mechanism()
+    mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    with pytest.raises(ConfigError, match="are not two of the drives"):
+        mechanism_inertia(mech, ("left", "right"))

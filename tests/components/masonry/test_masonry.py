@@ -1,0 +1,383 @@
+"""Blocks in contact: closed forms of falling, sliding, rocking; arches at their limit; statics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+import rom
+from cases.solid import STEEL, block
+from rom.components.masonry.block_contact import SLIDES
+from rom.components.masonry.limits import Rock, arch, stands
+from rom.components.masonry.stones import (
+    Masonry,
+    polygon_moments,
+    reduced_stone,
+    simulate,
+    stone,
+    touching,
+)
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ConfigError, MaterialError, ModelError
+
+G = 9.81
+SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
+GROUND = np.array([[-10.0, -1.0], [10.0, -1.0], [10.0, 0.0], [-10.0, 0.0]])
+
+
+def box(width=1.0, height=1.0, at=(0.0, 0.0)):
+    return np.array([[0, 0], [width, 0], [width, height], [0, height]]) + np.asarray(at)
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def on_the_ground(*stones, friction=0.0, **options):
+    ground = stone(GROUND @ turned(options.pop("slope", 0.0)).T, **SOFT)
+    return Masonry((ground, *stones), (0,), 10 * SOFT["E"], friction, **options)
+
+
+def test_mass_of_a_block_is_that_of_finite_elements():
+    """A box of bricks moved by the six motions of a plane block: rigid ones, uniform strains."""
+    model = block(size=(0.6, 0.3, 0.2), cells=(3, 2, 1))
+    X, Y = (model.points - model.points.mean(axis=0))[:, :2].T
+    U = np.zeros((len(X), 3, 6))
+    U[:, 0, 0] = U[:, 1, 1] = 1.0
+    U[:, 0, 2], U[:, 1, 2], U[:, 0, 3], U[:, 1, 4] = -Y, X, X, Y
+    U[:, 0, 5], U[:, 1, 5] = Y / 2, X / 2
+    U = U.reshape(-1, 6)
+    one = stone(box(0.6, 0.3), E=STEEL.E, nu=STEEL.nu, rho=STEEL.rho, thickness=0.2,
+                state="plane strain")  # fmt: skip
+    assert_allclose(one.M, U.T @ (model.M @ U), atol=1e-10 * one.M.max())
+    assert_allclose(one.K, (U.T @ (model.K @ U))[3:, 3:], atol=1e-9 * one.K.max())
+
+
+def test_mass_of_a_skew_block_from_random_points():
+    """Couplings of rotation and strains need Sxy; the entries are integrals of T^T T."""
+    corners = np.array([[0, 0], [1.2, 0.1], [1.5, 0.9], [0.3, 0.7]])
+    one = stone(corners, **SOFT)
+    area, _, S = polygon_moments(corners)
+    rng, n = np.random.default_rng(0), 400_000
+    x = rng.uniform(corners.min(axis=0), corners.max(axis=0), (n, 2))
+    edge = np.roll(corners, -1, axis=0) - corners
+    left = [edge[k, 0] * (x[:, 1] - c[1]) - edge[k, 1] * (x[:, 0] - c[0]) > 0
+            for k, c in enumerate(corners)]  # fmt: skip
+    X, Y = (x[np.all(left, axis=0)] - one.centre).T
+    zero, unit = 0 * X, 1 + 0 * X
+    T = np.array([[unit, zero, -Y, X, zero, Y / 2], [zero, unit, X, zero, Y, X / 2]])
+    exact = 2000.0 * area * np.einsum("aik,ajk->ij", T, T) / X.size
+    assert_allclose(one.M, exact, atol=0.01 * one.M.max())
+    assert one.M[2, 3] == -2000.0 * S[0, 1] and abs(S[0, 1]) > 0.005
+
+
+def test_mean_axes_are_the_strains_orthogonal_to_rotation():
+    """The same vibration with rotation in the equations, and without it in a mean-axis frame."""
+    one = stone(np.array([[0, 0], [1.2, 0.1], [1.5, 0.9], [0.3, 0.7]]), **SOFT)
+    K = np.zeros((6, 6))
+    K[3:, 3:] = one.K
+    with_frame = np.sqrt(eigh(K, one.M, eigvals_only=True)[3:])
+    M = one.M[3:, 3:] - np.outer(one.M[2, 3:], one.M[2, 3:]) / one.M[2, 2]
+    assert_allclose(with_frame, np.sqrt(eigh(one.K, M, eigvals_only=True)), rtol=1e-9)
+    square = stone(box(), **SOFT)
+    assert_allclose(square.M[:3, 3:], 0.0, atol=1e-12 * square.M.max())
+
+
+@pytest.mark.parametrize(
+    ("Omega", "factor", "period"),
+    [(0.1, 0.997509, 1.0011), (0.5, 0.942809, 1.0273), (1.0, 0.816497, 1.0968)],
+)
+def test_vibrations_decay_by_the_factor_of_the_scheme(Omega, factor, period):
+    one = stone(box(), **SOFT)
+    lam, V = eigh(one.K, one.M[3:, 3:])
+    omega, q = np.sqrt(lam[0]), np.zeros((1, 6))
+    q[0, :2], q[0, 3:] = one.centre, 1e-6 * V[:, 0]
+    dt = Omega / omega
+    motion = simulate(Masonry((one,), (), 1e10, 0.0, (0.0, 0.0)), t_end=40 * dt, dt=dt, q=q)
+    p = (V[:, 0] @ one.M[3:, 3:]) @ motion.q[:, 0, 3:].T / 1e-6
+    r = (V[:, 0] @ one.M[3:, 3:]) @ motion.v[:, 0, 3:].T / 1e-6 / omega
+    # two rows of the propagation from two pairs of states
+    Z = np.array([p, r])
+    A = Z[:, 1:] @ np.linalg.pinv(Z[:, :-1])
+    z = np.linalg.eigvals(A)
+    assert_allclose(np.abs(z), (1 + Omega**2 / 2) ** -0.5, rtol=1e-9)
+    assert abs(z[0]) == pytest.approx(factor, abs=1e-6)
+    assert Omega / abs(np.angle(z[0])) == pytest.approx(period, abs=1e-4)
+
+
+def test_free_fall_is_exact():
+    motion = simulate(Masonry((stone(box(), **SOFT),), (), 1e10, 0.0, reach=10.0), t_end=1, dt=0.01)
+    assert motion.q[-1, 0, 1] - motion.q[0, 0, 1] == pytest.approx(-G / 2, rel=1e-13)
+    assert motion.v[-1, 0, 1] == pytest.approx(-G, rel=1e-13)
+    assert motion.cuts == 0
+
+
+@pytest.mark.parametrize(
+    ("phi", "tolerance"), [(0, 1e-12), (10, 1e-6), (20, 4e-6), (29, 0.03), (31, None)]
+)
+def test_a_block_slides_down_a_slope_of_30_degrees(phi, tolerance):
+    """Near the angle of friction the settling at the start, which sticks at times, counts."""
+    slope, mu = np.radians(30), np.tan(np.radians(phi))
+    one = stone(box() @ turned(slope).T, **SOFT)
+    motion = simulate(
+        on_the_ground(one, friction=mu, slope=slope), t_end=1, dt=2e-3, save_every=500
+    )
+    down = -(motion.q[-1, 1, :2] - motion.q[0, 1, :2]) @ turned(slope)[:, 0]
+    if tolerance is None:
+        assert 0 < down < 2e-4
+    else:
+        exact = G / 2 * (np.sin(slope) - np.cos(slope) * mu)
+        assert down == pytest.approx(exact, rel=tolerance)
+        C, law = motion.contacts, motion.masonry.law  # springs along slipping edges stay stretched
+        n = C.used[0]
+        drag = C.way[:n] * mu * C.force[:n]
+        assert n and (C.state[:n] == SLIDES).all()
+        assert_allclose(law.shear * C.slip[:n], drag, atol=1e-4 * 2000 * G)
+
+
+def test_friction_turns_round_with_the_motion():
+    """Thrown up the slope: deceleration g (sin + mu cos), then down with g (sin - mu cos)."""
+    slope, mu, speed = np.radians(30), np.tan(np.radians(20)), 2.0
+    one = stone(box() @ turned(slope).T, **SOFT)
+    up, down = (G * (np.sin(slope) + s * mu * np.cos(slope)) for s in (1, -1))
+    v = np.zeros((2, 6))
+    v[1, :2] = speed * turned(slope)[:, 0]
+    motion = simulate(on_the_ground(one, friction=mu, slope=slope), t_end=1, dt=5e-4, v=v)
+    way = (motion.q[:, 1, :2] - motion.q[0, 1, :2]) @ turned(slope)[:, 0]
+    assert way.max() == pytest.approx(speed**2 / (2 * up), rel=0.01)
+    exact = speed**2 / (2 * up) - down / 2 * (1 - speed / up) ** 2
+    assert way[-1] == pytest.approx(exact, abs=0.02 * speed**2 / (2 * up))
+
+
+def test_two_blocks_collide_with_their_momenta():
+    """Off centre and turned: momentum and angular momentum stay, energy does not grow."""
+    stones = [stone(box(), **SOFT), stone(box(at=(1.05, 0.4)) @ turned(0.02).T, **SOFT)]
+    v = np.zeros((2, 6))
+    v[:, 0] = 1.0, -2.0
+    model = Masonry(tuple(stones), (), 1e10, 0.3, (0.0, 0.0))
+    motion = simulate(model, t_end=0.1, dt=1e-4, v=v)
+    M = np.array([s.M for s in stones])
+    momentum = np.einsum("bij,tbj->tbi", M, motion.v)
+    assert np.abs(momentum[-1, 0] - momentum[0, 0]).max() > 1000
+    total = momentum[:, :, :2].sum(axis=1)
+    assert_allclose(total, total[:1].repeat(len(total), 0), atol=1e-9 * 6000)
+    r = motion.q[:, :, :2]
+    spin = (r[..., 0] * momentum[..., 1] - r[..., 1] * momentum[..., 0] + momentum[..., 2]).sum(
+        axis=1
+    )
+    assert abs(momentum[-1, 0, 2]) > 100
+    assert_allclose(spin, spin[0], atol=0.01 * abs(momentum[-1, 0, 2]))
+    E = motion.energy[1:]
+    assert np.diff(E).max() <= 1e-6 * E[0] and E[-1] < 0.99 * E[0]
+
+
+def test_column_under_its_own_weight():
+    """Uniform strain carries the mean stress rho g H / 2, the ground the weight."""
+    height = 4.0
+    motion = simulate(on_the_ground(stone(box(1.0, height), **SOFT)), t_end=2, dt=0.02, keep=0.0)
+    assert_allclose(
+        motion.stress()[1], [0, -2000 * G * height / 2, 0], atol=1e-6 * 2000 * G * height
+    )
+    ((_, force),) = motion.joints().values()
+    assert_allclose(force, [0, -2000 * G * height], atol=1e-6 * 2000 * G * height)
+
+
+def test_a_turned_block_keeps_its_stress():
+    """Elastic coordinates live in body axes: a block that turns by 90 degrees feels nothing."""
+    v = np.zeros((1, 6))
+    v[0, 2] = np.pi / 2
+    motion = simulate(
+        Masonry((stone(box(), **SOFT),), (), 1e10, 0.0, (0.0, 0.0)), t_end=1, dt=0.01, v=v
+    )
+    assert np.abs(motion.q[-1, 0, 3:]).max() < 1e-12
+    assert_allclose(motion.outlines()[0][0], [1.0, 0.0], atol=1e-9)
+    assert polygon_moments(motion.outlines()[0])[0] == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def rocking():
+    """A block of 1 m by 4 m, tilted by half its stability angle on its right corner, let go."""
+    found = {}
+    for dt in (4e-3, 1e-3):
+        alpha = np.arctan(0.25)
+        one = stone((box(1.0, 4.0, (-1.0, 0.0))) @ turned(-alpha / 2).T, E=1e10, nu=0.2, rho=2000.0)
+        ground = stone(GROUND, E=1e10, nu=0.2, rho=2000.0)
+        model = Masonry((ground, one), (0,), 20e10, 0.84)
+        found[dt] = simulate(model, t_end=1.0, dt=dt)
+    return found
+
+
+def quarter_period():
+    """Nonlinear: integral of d theta over the speed from the energy; p^2 = 3 g / (4 R)."""
+    alpha, p2 = np.arctan(0.25), 3 * G / (4 * np.hypot(0.5, 2.0))
+    s = np.linspace(0, 1, 20001)[1:] - 0.5 / 20000  # theta = theta0 (1 - s^2) removes the root
+    theta = alpha / 2 * (1 - s**2)
+    speed = np.sqrt(2 * p2 * (np.cos(alpha / 2) - np.cos(alpha - theta)))
+    return (alpha / 2 * 2 * s / speed).mean()
+
+
+def test_time_to_impact_of_a_rocking_block(rocking):
+    alpha, p = np.arctan(0.25), np.sqrt(3 * G / (4 * np.hypot(0.5, 2.0)))
+    assert p == pytest.approx(1.8892, abs=1e-4)
+    assert np.arccosh(2.0) / p == pytest.approx(0.69711, abs=1e-5)
+    assert quarter_period() == pytest.approx(0.69834, abs=1e-5)
+    for dt, motion in rocking.items():
+        angle = motion.q[:, 1, 2] - alpha / 2
+        k = np.argmax(angle > 0)
+        assert motion.t[k] == pytest.approx(0.69834, abs=dt), dt
+
+
+@pytest.mark.parametrize("dt", [4e-3, 1e-3])
+def test_impact_of_a_rocking_block_takes_as_much_as_housner_says_or_less(rocking, dt):
+    motion = rocking[dt]
+    alpha = np.arctan(0.25)
+    k = int(np.argmax(motion.q[:, 1, 2] > alpha / 2))
+    after = slice(k + round(0.02 / dt), k + round(0.1 / dt))
+    line = np.polyfit(motion.t[after] - motion.t[k], motion.v[after, 1, 2], 1)
+    ratio = line[1] / motion.v[k - 1, 1, 2]
+    assert 1 - 1.5 * np.sin(alpha) ** 2 == pytest.approx(0.9118, abs=1e-4)
+    assert 0.88 < ratio < 0.97
+
+
+@pytest.fixture(scope="module")
+def meshed():
+    """A steel box 0.6 x 0.3 x 0.2 m of finite elements, reduced so that it knows uniform stress."""
+    model = block(size=(0.6, 0.3, 0.2), cells=(6, 3, 2))
+    x = model.points - model.points.mean(axis=0)
+    nu, u = STEEL.nu, np.zeros((3, len(x), 3))
+    u[0] = x * (1, -nu, -nu)
+    u[1] = x * (-nu, 1, -nu)
+    u[2, :, 0], u[2, :, 1] = (1 + nu) * x[:, 1], (1 + nu) * x[:, 0]
+    loads = np.column_stack([model.K @ (s.ravel() / STEEL.E) for s in u])  # unit stresses
+    body = rom.reduce(
+        model, method=rom.WithLoads(rom.CraigBampton(6), loads), interfaces={"root": "full"},
+        certify=False,
+    )  # fmt: skip
+    return model, loads, body
+
+
+def test_a_meshed_stone_answers_uniform_stress_like_a_block_of_uniform_strain(meshed):
+    model, loads, body = meshed
+    corners = box(0.6, 0.3)
+    fine = reduced_stone(body, corners)
+    plain = stone(corners, E=STEEL.E, nu=STEEL.nu, rho=STEEL.rho, thickness=0.2)
+    body = body.with_reference("mean-axis")
+    outer = (3 * model.surface.nodes[:, None] + np.arange(3)).ravel()
+    force = body.surface.shape.T @ loads[outer]
+    moved = fine.shapes @ np.linalg.solve(fine.K, force)
+    simple = plain.shapes @ np.linalg.solve(plain.K, 0.6 * 0.3 * 0.2 * np.eye(3))
+    turn = np.column_stack([-(corners - plain.centre)[:, 1], (corners - plain.centre)[:, 0]])
+    for k in range(3):
+        gap = moved[:, :, k] - simple[:, :, k]
+        gap = gap - (gap * turn).sum() / (turn**2).sum() * turn
+        assert np.abs(gap).max() < 1e-8 * np.abs(simple[:, :, k]).max()
+    assert_allclose(fine.M[:3, :3], plain.M[:3, :3], rtol=1e-9, atol=1e-9)
+    assert_allclose(fine.centre, plain.centre, atol=1e-12)
+
+
+class UniformStrain:
+    """A basis of rigid motions and the three uniform strains in a plane."""
+
+    def __init__(self, points):
+        X, Y, _ = (points - points.mean(axis=0)).T
+        U = np.zeros((len(X), 3, 3))
+        U[:, 0, 0], U[:, 1, 1], U[:, 0, 2], U[:, 1, 2] = X, Y, Y / 2, X / 2
+        self.Psi = np.hstack([rigid_motions(points), U.reshape(-1, 3)])
+
+    def basis(self, ops, boundary, labels):
+        names = (*(f"rigid {k}" for k in range(6)), "strain xx", "strain yy", "strain xy")
+        return rom.Basis(self.Psi, np.zeros(0), names)
+
+
+def test_a_block_is_a_flexible_body_whose_modes_are_uniform_strains():
+    """Finite elements in the reduction of the core, mean axes; then both bounce off the ground."""
+    model = block(size=(0.6, 0.3, 0.2), cells=(3, 2, 1))
+    body = rom.reduce(
+        model, method=UniformStrain(model.points), interfaces={"root": "full"}, certify=False
+    )
+    corners = box(0.6, 0.3, (0.0, 0.0))
+    plain = stone(corners, E=STEEL.E, nu=STEEL.nu, rho=STEEL.rho, thickness=0.2,
+                  state="plane strain")  # fmt: skip
+    K = np.zeros((6, 6))
+    K[3:, 3:] = plain.K
+    omega = np.sqrt(eigh(K, plain.M, eigvals_only=True)[3:])
+    assert_allclose(2 * np.pi * body.frequencies()[6:], omega, rtol=1e-10)
+    assert np.abs(plain.M[2, 3:]).max() > 0.01 * plain.M[2, 2]  # its own frame is none of mean axes
+    films = []
+    for one in (plain, reduced_stone(body, corners)):
+        ground = stone(GROUND - [0, 0.002], **SOFT)
+        model = Masonry((ground, one), (0,), 10 * SOFT["E"], 0.4)
+        v = np.zeros((2, 6))
+        v[1, :3] = 0.3, -1.0, 0.5
+        motion = simulate(model, t_end=0.02, dt=2e-5, v=v, save_every=50)
+        films.append(np.array([motion.outlines(k)[1] for k in range(len(motion.t))]))
+    assert_allclose(films[1], films[0], rtol=0, atol=1e-8)  # frames differ at second order
+    assert films[0][-1, :, 1].mean() > films[0][:, :, 1].mean(axis=1).min() + 1e-3  # came back up
+
+
+def test_meshed_and_plain_stones_stand_on_each_other(meshed):
+    _, _, body = meshed
+    corners = box(0.6, 0.3)
+    plain = stone(box(0.6, 0.3, (0.0, 0.3)), E=STEEL.E, nu=STEEL.nu, rho=STEEL.rho, thickness=0.2)
+    ground = stone(GROUND, E=STEEL.E, nu=STEEL.nu, rho=STEEL.rho, thickness=0.2)
+    model = Masonry((ground, reduced_stone(body, corners), plain), (0,), 10 * STEEL.E * 0.2, 0.5)
+    motion = simulate(model, t_end=0.4, dt=0.02, keep=0.0, save_every=20)
+    weight = plain.M[0, 0] * G
+    joints = motion.joints()
+    assert_allclose(joints[0, 1][1], [0, -2 * weight], atol=1e-4 * weight)
+    assert_allclose(joints[1, 2][1], [0, -weight], atol=1e-4 * weight)
+    assert np.abs(motion.v[-1]).max() < 1e-12
+
+
+def test_stones_meet_corner_on_corner():
+    """Two bricks on two bricks, joints in line: four corners in a point, one edge parts each."""
+    one = Rock()
+    stones = [stone(GROUND, **SOFT)] + [
+        stone(box(at=(x, y)), **SOFT) for y in (0.0, 1.0) for x in (-1.0, 0.0)
+    ]
+    model = one.masonry(stones, (0,))
+    C = touching(model)
+    pairs = {tuple(sorted(p)) for p in C.who[:, [0, 2]].tolist()}
+    assert {(0, 1), (0, 2), (1, 2), (1, 3), (2, 4), (3, 4)} <= pairs
+    for k in np.flatnonzero((C.who[:, [0, 2]] == (1, 4)).all(axis=1)):
+        o = np.flatnonzero((C.who[:, [0, 2]] == (4, 1)).all(axis=1))
+        assert_allclose(C.along[o, 1:3], -C.along[[k], 1:3].repeat(len(o), 0), atol=1e-12)
+    assert stands(model)
+    motion = simulate(model, t_end=0.5, dt=5e-3, keep=0.0, save_every=100)
+    assert_allclose(motion.q[-1, :, :2], model.start()[:, :2], atol=5e-5)
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(ModelError, match=r"encloses -1 m2. List three corners or more, counter"):
+        stone(box()[::-1], **SOFT)
+    with pytest.raises(ConfigError, match="no arch has 1 voussoirs"):
+        arch(1, 5.0, 0.5)
+    one = Masonry((stone(box(), **SOFT),), (), 1e10, 0.0)
+    with pytest.raises(ConfigError, match=r"q has the shape \(2,\); the stones need \(1, 6\)"):
+        simulate(one, t_end=1.0, dt=0.1, q=[0.0, 1.0])
+    with pytest.raises(ConfigError, match="0 steps"):
+        simulate(one, t_end=0.0, dt=0.1)
+    for times in ({"t_end": np.nan, "dt": 0.1}, {"t_end": 1.0, "dt": -0.1}):
+        with pytest.raises(ConfigError, match="both must be positive"):
+            simulate(one, **times)
+    block, numbers = one.stones[0], {"E": 1e9, "nu": 0.2, "rho": 2000.0}
+    for wrong in ({"E": -1.0}, {"nu": 0.5}, {"rho": 0.0}, {"thickness": 0.0}):
+        with pytest.raises(MaterialError, match=f"{next(iter(wrong))} = .*E, rho, thickness > 0"):
+            stone(box(), **numbers | wrong)
+    with pytest.raises(ConfigError, match="'liquid' is no state"):
+        stone(box(), **numbers, state="liquid")
+    for wrong in ({"stiffness": -1e9}, {"friction": -0.1}):
+        with pytest.raises(ConfigError, match="needed are > 0, >= 0"):
+            replace(one, **wrong)
+    with pytest.raises(ConfigError, match=r"held are \(2,\) of the stones 0 to 1"):
+        Masonry((block, block), (2,), 1e9, 0.1)
+
+
+def test_a_corner_without_a_node_is_refused(meshed):
+    with pytest.raises(ModelError, match=r"no node of body .* at the corner \[0.61, 0.0\]"):
+        reduced_stone(meshed[2], box(0.61, 0.3))
+    with pytest.raises(ModelError, match="no surface"):
+        reduced_stone(replace(meshed[2], surface=None), box(0.6, 0.3))

@@ -1,0 +1,261 @@
+"""Geared shafts in journal bearings against closed forms, statics and finer steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, eigvals
+from scipy.optimize import brentq
+
+from cases.gear_unit import NODES, journal, unit
+from rom.components.gear_mesh import Correction, GearPair
+from rom.components.journal_bearing import equilibrium, stability
+from rom.components.transmission import (
+    Disc,
+    Shaft,
+    linearised,
+    mesh_response,
+    rest,
+    simulate,
+    threshold,
+    whirl,
+)
+from rom.errors import ModelError, SolverError
+
+E, NU, RHO = 206e9, 0.3, 7850.0
+HELIX = float(np.radians(12.5))
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return rest(unit())
+
+
+# --- shafts ---
+
+
+def test_a_free_shaft_has_the_frequencies_of_timoshenko():
+    """Bending of a hinged beam from its quartic; torsion and stretching from wave speeds."""
+    l, d = 1.0, 0.08
+    s = Shaft(np.linspace(0, l, 21), d)
+    M, K, _ = s.matrices()
+    free = np.setdiff1d(np.arange(s.n), [0, 1, 2, 5, 120, 121])
+    omega = np.sqrt(eigh(K[np.ix_(free, free)], M[np.ix_(free, free)], eigvals_only=True))
+    A, I, G = np.pi * d**2 / 4, np.pi * d**4 / 64, E / 2.6
+    kappa = 6 * (1 + NU) / (7 + 6 * NU)
+    for k in (1, 2, 3):
+        a = k * np.pi / l
+        b = 1 + a**2 * I / A * (1 + E / (kappa * G))
+        c = RHO * I / (kappa * G * A)
+        squared = (b - np.sqrt(b**2 - 4 * c * E * I * a**4 / (RHO * A))) / (2 * c)
+        assert np.abs(omega / np.sqrt(squared) - 1).min() < 1e-3
+    for modulus in (E, G):
+        assert np.abs(omega / (np.pi / 2 / l * np.sqrt(modulus / RHO)) - 1).min() < 4e-4
+
+
+def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias():
+    s = Shaft(NODES, 0.05, [Disc.of_ring(2, outer=0.3, inner=0.05, width=0.04)])
+    M, K, G = s.matrices()
+    n, speed = s.n, 500.0
+    A = np.block([[np.zeros((n, n)), np.eye(n)],
+                  [-np.linalg.solve(M, K), -speed * np.linalg.solve(M, G)]])  # fmt: skip
+    turn = np.zeros(n)
+    turn[3::6], turn[1::6] = 1.0, -(NODES - 0.1)
+    spin = np.zeros(n)
+    spin[5::6] = 1.0
+    ratio = (spin @ M @ spin) / (turn @ M @ turn)
+    values = eigvals(A)
+    assert np.abs(values - 1j * speed * ratio).min() < 5e-3 * speed * ratio
+    assert (
+        np.trace(M[0::6, 0::6])
+        < M[0::6, 0::6].sum()
+        == pytest.approx(RHO * np.pi / 4 * (0.05**2 * 0.2 + (0.3**2 - 0.05**2) * 0.04))
+    )
+
+
+def test_a_ring_has_the_inertias_of_a_ring():
+    solid = Disc.of_ring(0, outer=0.2, inner=0.0, width=1e-9)
+    assert solid.polar == pytest.approx(2 * solid.diametral) == pytest.approx(solid.mass * 0.005)
+    hole, ring = (Disc.of_ring(0, outer=d, inner=i, width=0.05) for d, i in ((0.1, 0), (0.2, 0.1)))
+    whole = Disc.of_ring(0, outer=0.2, inner=0.0, width=0.05)
+    for name in ("mass", "polar", "diametral"):
+        assert getattr(hole, name) + getattr(ring, name) == pytest.approx(getattr(whole, name))
+
+
+# --- statics ---
+
+
+def test_both_journals_rest_where_a_journal_alone_would(loaded):
+    """Half of the force of the teeth on each; friction turns some of the torque into heat."""
+    u, F = loaded.unit, loaded.forces.mesh.force
+    lone = equilibrium(journal(np.arctan2(F[1], F[0])), F[:2] / 2, speed=u.speed, viscosity=0.02)
+    for f in loaded.forces.films[:2]:
+        assert_allclose(f.motion[:2], lone.motion[:2], atol=2e-3 * 50e-6)
+    teeth = loaded.forces.mesh.load.sum()
+    assert teeth == pytest.approx(200 / u.mesh.pair.rb[0], rel=5e-3)
+    own = np.array([1, -1]) * (loaded.unit.wheels @ loaded.q)[6:8]
+    gear = loaded.forces.films[2].motion[:2]
+    bent = teeth * 0.2**3 / (48 * E * np.pi * 0.05**4 / 64)
+    assert np.hypot(*(own - gear)) == pytest.approx(bent, rel=0.15)  # and is sheared
+    assert loaded.forces.films[2].eccentricity > loaded.forces.films[0].eccentricity
+
+
+def test_rest_does_not_depend_on_the_way_there(loaded):
+    for way in ((0.2, 1.0), (0.05, 0.5, 1.4, 1.0)):
+        other = rest(loaded.unit, loads=way)
+        assert_allclose(other.q, loaded.q, atol=1e-8 * np.abs(loaded.q).max())
+    nearby = loaded.q * 0.97
+    assert_allclose(rest(loaded.unit, start=nearby).q, loaded.q, atol=1e-8 * np.abs(loaded.q).max())
+
+
+def test_relieved_teeth_are_closed_before_they_are_loaded(loaded):
+    """Gaps of 20 micrometres turn the gear, and leave the load where it was."""
+    cut = replace(loaded.unit.mesh, correction=Correction(crowning=1e-6, slope=4e-5))
+    late = rest(replace(loaded.unit, mesh=cut))
+    assert late.forces.mesh.load.sum() == pytest.approx(loaded.forces.mesh.load.sum(), rel=1e-3)
+    flat = replace(cut, correction=Correction(relief=(2e-5, 2e-5), extent=(0.02, 0.02)))
+    assert flat.least_gap(0.0) > 5e-6
+    moved = rest(replace(loaded.unit, mesh=flat)).q - loaded.q
+    turned = loaded.unit.mesh.pair.rb @ (loaded.unit.wheels @ moved)[[5, 11]]
+    assert turned > flat.least_gap(0.0)
+
+
+def test_what_goes_in_comes_out_or_heats_the_oil(loaded):
+    given, taken, heat = loaded.powers
+    assert heat > 100.0 and given - taken - heat == pytest.approx(0, abs=1e-8 * given)
+    assert taken == pytest.approx(200 * loaded.unit.speed, rel=1e-12)
+
+
+def test_derivatives_of_all_forces_are_exact(loaded):
+    u, q, rng = loaded.unit, loaded.q, np.random.default_rng(3)
+    v = 1e-3 * rng.normal(size=q.size)
+    f = u.forces(q, v, 0.0)
+    films = np.flatnonzero(np.vstack([rows[:4] for rows, _, _ in u.journals]).any(axis=0))
+    for _ in range(3):
+        d = 1e-9 * rng.normal(size=q.size)
+        by_q = u.forces(q - d, v, 0.0).force - u.forces(q + d, v, 0.0).force
+        by_v = u.forces(q, v - 1e3 * d, 0.0).force - u.forces(q, v + 1e3 * d, 0.0).force
+        assert_allclose(by_q[films] / 2, (f.stiffness @ d)[films], atol=1e-3 * np.abs(by_q).max())
+        assert_allclose(by_v[films] / 2e3, (f.damping @ d)[films], atol=1e-5 * np.abs(by_v).max())
+
+
+# --- whirl ---
+
+
+def test_a_stiff_unit_whirls_as_its_bearings_say():
+    """Constant force of helical teeth; a light load; the pinion's mode by Routh and Hurwitz."""
+    s = rest(unit(helix=HELIX, speed=100.0))
+    film = s.forces.films[0]
+    M, _, K = linearised(s)
+    assert_allclose(M, M.T, atol=1e-12)
+    assert np.abs(K - K.T).max() > 1e5  # films are not elastic
+    i = np.argmax(s.unit.journals[0][0][:2], axis=1)
+    alone = s.unit.matrices[1] + 0
+    assert_allclose((K - alone)[np.ix_(i, i)], film.stiffness[:2, :2], rtol=1e-9)
+    assert whirl(s).stable == bool(whirl(s).values.real.max() < 0)
+
+
+def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
+    """The pinion without teeth: a short stiff rotor of the critical mass, in its films."""
+    b, speed = journal(-np.pi / 2), 400.0
+    f = equilibrium(b, (0.0, -200.0), speed=speed, viscosity=0.02)
+    s = stability(f.stiffness[:2, :2], f.damping[:2, :2], speed)
+
+    def growth(mass):
+        K, C = f.stiffness[:2, :2], f.damping[:2, :2]
+        A = np.block([[np.zeros((2, 2)), np.eye(2)], [-K / mass, -C / mass]])
+        return eigvals(A).real.max()
+
+    found = brentq(growth, 0.5 * s.critical_mass, 2 * s.critical_mass, xtol=1e-10)
+    assert found == pytest.approx(s.critical_mass, rel=1e-9)
+    assert s.whirl_ratio == pytest.approx(0.5, abs=0.03)
+
+
+def test_fast_and_lightly_loaded_journals_whirl():
+    light = unit(torque=8.0, clearance=90e-6)
+    limit = threshold(light, 150.0, 2500.0, within=0.02)
+    below, above = (rest(replace(light, speed=k * limit)) for k in (0.96, 1.04))
+    assert whirl(below).stable and not whirl(above).stable
+    first = whirl(above).values[0]
+    ratios = np.abs(first.imag) / np.abs(above.unit.spins)
+    assert np.abs(ratios - 0.5).min() < 0.08  # the shaft is not rigid
+    with pytest.raises(ModelError, match=r"above the threshold: the journals whirl"):
+        simulate(above, periods=1)
+    with pytest.raises(ModelError, match="threshold is not between"):
+        threshold(light, 0.9 * limit, 0.95 * limit)
+
+
+# --- motion ---
+
+
+def test_teeth_of_constant_stiffness_excite_little():
+    """Overlap of one: only the middle of the load wanders along the face."""
+    p = GearPair((26, 157), 4e-3, 0.04, HELIX)
+    width = p.base_pitch / np.tan(p.base_helix)
+    s = rest(unit(helix=HELIX, width=width))
+    run = simulate(s, periods=0.5, steps=20)
+    assert np.ptp(run.teeth) < 0.05 * run.teeth[0]
+    assert np.abs(run.q - s.q).max() < 0.01 * np.abs(s.q).max()
+
+
+def test_steps_converge_to_a_reference_of_a_tenth_of_the_step(loaded):
+    """Through the loss and the gain of a pair of teeth."""
+    fine = simulate(loaded, periods=0.4, steps=1000)
+    coarse = simulate(loaded, periods=0.4, steps=100)
+    assert np.ptp(fine.teeth) > 0.2 * fine.teeth[0]
+    off = coarse.error - fine.error[::10]
+    assert np.abs(off).max() < 0.04 * np.ptp(fine.error)
+    rms = [np.std(r.teeth) for r in (coarse, fine)]
+    assert rms[0] == pytest.approx(rms[1], rel=0.02)
+    assert coarse.balance < 1e-6 and fine.balance < 1e-6
+    heat = fine.heat.mean() * fine.t[-1]
+    spent = -fine.work["films"][-1]
+    assert spent == pytest.approx(heat, rel=0.01)  # but for spin that films do not know
+    names = {"drive", "load", "films", "teeth", "shafts", "kinetic"}
+    assert names == set(fine.work)
+
+
+def test_the_response_to_the_mesh_is_where_a_motion_settles():
+    """To first order; the motion also feels that the stiffness changes while it vibrates."""
+    u = unit(torque=300.0, speed=150.0, loss=4e-5)
+    state = rest(u)
+    linear = mesh_response(state, harmonics=12)
+    run = simulate(state, periods=6, steps=50)
+    last = run.t > run.t[-1] - 2 * u.mesh_period
+    assert linear.frequency == pytest.approx(150 / (2 * np.pi) * 26)
+    assert linear.mean == pytest.approx(run.teeth[last].mean(), rel=0.01)
+    assert linear.error_rms == pytest.approx(np.std(run.error[last]), rel=0.2)
+    assert linear.load_factor - 1 == pytest.approx(np.std(run.teeth[last]) / linear.mean, rel=0.3)
+
+
+@pytest.mark.parametrize(("helix", "rel"), [(0.0, 0.15), (HELIX, 0.25)])
+def test_slow_units_have_the_error_of_their_teeth(helix, rel):
+    """The error is that of rest; but films resist the tilt of helical gears more when squeezed."""
+    p = GearPair((26, 157), 4e-3, 0.04, helix)
+    width = p.base_pitch / np.tan(p.base_helix) if helix else 0.04
+    u = replace(unit(speed=20.0, torque=50.0, helix=helix, width=width), viscosity=0.2)
+    linear = mesh_response(rest(u), harmonics=30, positions=128)
+    still = [rest(u, t) for t in 2 * np.pi / 26 * np.arange(16) / 16]
+    error = np.array([u.mesh.pair.rb @ (u.wheels @ s.q)[[5, 11]] for s in still])
+    assert linear.error_rms == pytest.approx(np.std(error), rel=rel)
+
+
+# --- what cannot be ---
+
+
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: unit(torque=-5.0), "contact is lost: a load of"),
+    (lambda: unit(speed=0.0), "must be positive"),
+    (lambda: Shaft([0.0, 0.0], 0.05), "no shaft has"),
+    (lambda: Shaft([0.0, 0.1], 0.05, [Disc(2, 1.0, 1.0, 1.0)]), "beyond the last of 2 nodes"),
+    (lambda: replace(unit(), pinion=replace(unit().pinion, bearings={9: None})), "beyond 5 nodes"),
+])  # fmt: skip
+def test_what_cannot_be_is_said(make, said):
+    with pytest.raises(ModelError, match=said):
+        make()
+
+
+def test_films_that_cannot_carry_are_named():
+    with pytest.raises(SolverError, match=r"does not come to rest under .* the thinnest film"):
+        rest(replace(unit(torque=5000.0), viscosity=2e-4))

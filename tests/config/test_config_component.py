@@ -1,0 +1,268 @@
+"""Component files: the body is that of the same words in Python; mistakes have file and line."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.command import ROOT
+from cases.files.schema import errors
+from cases.files.toml_files import SOLID
+from cases.solid import block
+from rom.cli.main import main
+from rom.cli.schemas import schema
+from rom.config.component import read_component
+from rom.errors import ConfigError, FileFormatError
+from rom.io.matrices.op4 import write_op4
+
+PART = """\
+name = "bar"
+
+[matrices]
+stiffness = "bar.op4:KAA"
+mass = "bar.op4:MAA"
+nodes = "bar.csv"
+
+[matrices.sets]
+root = [{root}]
+tip = [{tip}]
+
+[interfaces]
+root = "rbe2"
+tip = {{ kind = "rbe2" }}
+
+[reduction]
+modes = 6
+reference = ["root", "tip"]
+
+[damping]
+ratio = "1 %"
+
+[output]
+file = "bar.rom.npz"
+"""
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return block(cells=(6, 1, 1))
+
+
+@pytest.fixture
+def folder(bar, tmp_path, monkeypatch):
+    """A component whose matrices another program has left; no finite elements are needed."""
+    write_op4({"KAA": bar.K, "MAA": bar.M}, tmp_path / "bar.op4")
+    rows = [f"{k + 1}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(bar.points.tolist())]
+    (tmp_path / "bar.csv").write_text("\n".join(rows) + "\n")
+    labels = {
+        name: ", ".join(str(n + 1) for n in bar.interfaces[name].nodes) for name in ("root", "tip")
+    }
+    (tmp_path / "bar.toml").write_text(PART.format(**labels))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refusal(text, tmp_path):
+    (tmp_path / "part.toml").write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        read_component(tmp_path / "part.toml")
+    return str(refused.value).replace(f"{tmp_path}/", "")
+
+
+def test_the_body_is_that_of_python(folder, bar):
+    body = read_component("bar.toml").body()
+    same = rom.reduce(
+        bar, method=rom.CraigBampton(6), interfaces={"root": "rbe2", "tip": "rbe2"},
+        reference=("root", "tip"), damping=rom.ModalDamping(0.01), name="bar",
+    )  # fmt: skip
+    assert body.name == "bar" and body.reference == same.reference
+    assert_allclose(body.omega, same.omega, rtol=1e-7)
+    assert_allclose(np.diag(body.D), 0.02 * body.omega, rtol=1e-9)
+    assert_allclose(body.frequencies(4, fixed=("root",)), same.frequencies(4, fixed=("root",)),
+                    rtol=1e-7)  # fmt: skip
+
+
+def test_options_go_before_the_file(folder, capsys):
+    assert main(["reduce", "bar.toml", "-m", "3", "--name", "short", "--json", "-q"]) in (0, 5)
+    found = json.loads(capsys.readouterr().out)
+    assert found["name"] == "short" and found["output"] == "bar.rom.npz"
+    assert rom.load("bar.rom.npz").n_modes == found["n_modes"] == 3 + 6
+    assert main(["reduce", "bar.toml", "--f-max", "3e3", "--reference", "tip", "--no-certificate",
+                 "-o", "other.npz", "--json", "-q"]) == 0  # fmt: skip
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema("reduce")) == []
+    assert found["output"] == "other.npz" and found["certificate"] is None
+    assert "tip" in found["reference"] and "f_max=3000" in str(found["provenance"])
+
+
+def test_modes_of_a_component_have_the_interfaces_of_its_body(folder, bar, capsys):
+    assert main(["modes", "bar.toml", "--fixed", "root", "-n", "2", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    expected = rom.modes(bar, 2, fixed=("root",), interfaces=kinds).frequencies
+    assert_allclose(found["frequencies"], expected, rtol=1e-8)
+    assert found["fixed"] == ["root"]
+
+
+def test_an_option_without_a_key_is_refused(folder, capsys):
+    assert main(["modes", "bar.toml", "--scale", "1e-3"]) == 2
+    assert "--scale does not go with a .toml file" in capsys.readouterr().err
+
+
+def test_units_are_converted_for_the_geometry(tmp_path):
+    """A length becomes one of the geometry, here mm; a plain number goes there as it is."""
+    (tmp_path / "part.toml").write_text(SOLID)
+    part = read_component(tmp_path / "part.toml")
+    file, how = part.mesh
+    assert file == tmp_path / "part.geo"
+    assert how["scale"] == 1e-3 and how["parameters"]["n"] == 3
+    assert_allclose(how["parameters"]["lc"], 4.0, rtol=1e-15)
+    assert_allclose(how["parameters"]["angle"], np.pi / 2, rtol=1e-15)
+    assert part.material() == rom.Material(E=210e9, nu=0.3, rho=7850.0)
+
+
+def test_materials_by_region_and_orthotropic(tmp_path):
+    wood = 'E = ["12 GPa", 1e9, 1e9]\nnu = [0.3, 0.3, 0.3]\nG = [7e8, 7e8, 7e8]\nrho = 450\n'
+    steel = SOLID.partition("[material]\n")[2]
+    (tmp_path / "part.toml").write_text(f"[material.core]\n{wood}\n[material.skin]\n{steel}")
+    solids = read_component(tmp_path / "part.toml").material()
+    assert solids["skin"] == rom.Material(E=210e9, nu=0.3, rho=7850.0)
+    assert solids["core"].E == (12e9, 1e9, 1e9) and solids["core"].rho == 450
+
+
+def test_a_changed_value_stands_in_for_the_one_of_the_file(tmp_path):
+    (tmp_path / "part.toml").write_text(SOLID)
+    part = read_component(tmp_path / "part.toml", {("material", "E"): "70 GPa"})
+    assert part.material().E == 70e9
+
+
+MISTAKES = {
+    "wrong dimension": (
+        SOLID.replace('"210 GPa"', '"210 mm"'),
+        "part.toml:9: material.E: '210 mm' is a length; a pressure or stress [Pa] is wanted.",
+    ),
+    "misspelt key": (
+        SOLID.replace("nu =", "nuu ="),
+        "part.toml: 2 mistakes. line 8: nu is missing in [material]. "
+        "line 10: there is no key 'nuu' in [material].",
+    ),
+    "misspelt table": (
+        SOLID.replace("[geometry.", "[geometri."),
+        "part.toml:4: there is no key 'geometri'. Did you mean geometry?",
+    ),
+    "twice": (
+        SOLID.replace("nu = 0.3", 'E = "70 GPa"'),
+        "part.toml:10: 'material.E' is given twice, in lines 9 and 10. Keep one of them.",
+    ),
+    "no text": (SOLID.replace('"mm"', "mm"), "part.toml:3: this is no TOML: invalid value."),
+    "type": (SOLID.replace("nu = 0.3", "nu = true"),
+             "part.toml:10: material.nu = True is not a number."),
+    "list for a number": (SOLID.replace("nu = 0.3", "nu = [0.3]"), "needed is a number"),
+    "not finite": (SOLID.replace("nu = 0.3", "nu = nan"), "nu = nan is not a finite number"),
+    "table for a number": ("[material]\nE = { a = 1 }\nnu = 0.3\nrho = 1\n", "part.toml:2: "),
+    "number for a table": ("material = 3\n", "part.toml:1: material = 3: needed is a table"),
+    "kind": ('[interfaces]\nbore = { kind = "polynomal", order = 3 }\n',
+             "part.toml:2: interfaces.bore.kind = 'polynomal' does not exist. Did you mean "
+             "polynomial?"),
+    "kind missing": ("[interfaces]\nbore = { order = 3 }\n", "missing in [interfaces.bore]"),
+    "method": ('[reduction]\nmethod = "craig-bamton"\n', "Did you mean craig-bampton?"),
+    "negative count": ("[reduction]\nmodes = -1\n", "is not a whole number from 0"),
+    "half a mode": ("[reduction]\nmodes = 1.5\n", "is not a whole number from 0"),
+    "a mechanism": ("[bodies.a]\n", "part.toml:1: this is a mechanism; a component is needed"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
+    text, expected = MISTAKES[case]
+    assert expected in refusal(text, tmp_path)
+
+
+def test_missing_and_unreadable_files(tmp_path):
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe4"\n')
+    for name in ("no.toml", "latin.toml", "."):
+        with pytest.raises(FileFormatError):
+            read_component(tmp_path / name)
+    with pytest.raises(ConfigError, match="brackets in each other"):
+        refusal_text = "x = " + "[" * 500 + "]" * 500 + "\n"
+        (tmp_path / "deep.toml").write_text(refusal_text)
+        read_component(tmp_path / "deep.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "neither a geometry nor matrices"),
+        (SOLID + '[matrices]\nstiffness="a"\nmass="b"\nnodes="c.csv"\n', "both a geometry and"),
+        (SOLID, "the component has no interface"),
+        (SOLID + '[interfaces]\na = "rbe4"\n', "part.toml:13: interface 'a' has the kind 'rbe4'"),
+        (SOLID + '[interfaces]\na = "rbe2"\n[reduction]\nf_max = 10\nmethod = "rubin"\n',
+         "part.toml:14: f_max belongs to craig-bampton, not to rubin"),
+        (SOLID + '[interfaces]\na = "rbe2"\n[reduction]\nf_max = 10\nmodes = 3\n',
+         "craig-bampton has f_max: leave modes out"),
+        (SOLID + '[interfaces]\na = "rbe2"\n[damping]\nalpha = 1\nratio = 1\n',
+         "part.toml:14: [damping] needs either ratio"),
+        (SOLID.replace("nu = 0.3", "nu = 0.7") + '[interfaces]\na = "rbe2"\n',
+         "part.toml:8: nu = 0.7 is outside"),
+    ],
+)  # fmt: skip
+def test_what_contradicts_itself_is_told_before_anything_is_meshed(text, words, tmp_path):
+    (tmp_path / "part.toml").write_text(text)
+    part = read_component(tmp_path / "part.toml")
+    with pytest.raises(rom.RomError) as refused:
+        part.body() if "interface" in text or text == SOLID else part.model()
+    assert words in str(refused.value)
+
+
+def test_the_sample_describes_the_rod_of_the_demo():
+    part = read_component(ROOT / "meshes" / "connecting_rod.toml")
+    how = {"parameters": {"lc": 5.5e-3}, "faces": {}, "scale": 1.0}
+    how |= {"trust": False, "time_limit": None, "memory_limit": None}
+    assert part.mesh == (ROOT / "meshes" / "connecting_rod.geo", how)
+    assert part.material() == rom.Material(E=210e9, nu=0.3, rho=7850.0)
+    assert part.kinds == {"pin_a": "rbe2", "pin_b": "rbe2"}
+    assert part.values["reduction"]["reference"] == ("pin_a", "pin_b")
+    assert part.damping() == rom.ModalDamping(0.01) and part.name == "rod"
+
+
+@pytest.mark.fenicsx
+def test_the_sample_is_meshed_as_the_shell_changes_it(capsys, monkeypatch):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    monkeypatch.chdir(ROOT)
+    found = []
+    for size in ("0.012", "0.009"):
+        assert main(["mesh", "meshes/connecting_rod.toml", "-p", f"lc={size}", "--json", "-q"]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert set(found[0]["interfaces"]) == {"pin_a", "pin_b"}
+    assert found[0]["cells"] < found[1]["cells"]
+
+
+def keys_of(kind, seen):
+    """Names of all keys a kind knows, however deep."""
+    from rom.config.page import tables
+
+    for _, table in tables(kind):
+        for key in table.keys:
+            seen.add((key.name, key.about))
+            keys_of(key.kind, seen)
+    return seen
+
+
+def test_the_page_has_every_key_with_its_meaning():
+    from rom.config.component_keys import TABLE
+    from rom.config.mechanism_keys import TABLE as MECHANISM
+    from rom.config.page import page
+
+    samples = [(ROOT / name).read_text()
+               for name in ("meshes/connecting_rod.toml", "demos/slider_crank.toml")]  # fmt: skip
+    text = page(*samples)
+    known = keys_of(MECHANISM, keys_of(TABLE, set()))
+    assert len(known) > 120
+    for name, about in known:
+        meant = about.replace("[", "\\[").replace("]", "\\]")
+        row = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
+        assert any(meant in line for line in row), name
+    assert "| must be given | Young's modulus. |" in text and '"mean-axis"' in text
+    assert all(sample.strip() in text for sample in samples)

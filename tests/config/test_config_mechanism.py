@@ -1,0 +1,295 @@
+"""Mechanism files: the motion is that of the same words in Python, and of closed forms."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import ellipk
+
+import rom
+from cases.command import ROOT, environment
+from cases.files.toml_files import ALL, CRANK, PENDULUM
+from cases.solid import block
+from rom.cli.main import main
+from rom.config.document import parsed
+from rom.config.keys import Place
+from rom.config.laws import law_kind, law_of
+from rom.config.mechanism import read_mechanism
+from rom.errors import ConfigError
+
+
+@pytest.fixture(scope="module")
+def rod(tmp_path_factory):
+    body = rom.reduce(block(cells=(6, 1, 1)), method=rom.CraigBampton(4),
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
+                      damping=rom.ModalDamping(0.01), certify=False)  # fmt: skip
+    return rom.save(body, tmp_path_factory.mktemp("rod") / "rod.rom.npz")
+
+
+@pytest.fixture
+def folder(rod, tmp_path, monkeypatch):
+    (tmp_path / "rod.rom.npz").symlink_to(rod)
+    (tmp_path / "crank.toml").write_text(CRANK)
+    (tmp_path / "pendulum.toml").write_text(PENDULUM)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_pendulum_reaches_the_bottom_when_it_must(folder):
+    """From the horizontal at rest: after K(1/2) sqrt(I / m g L), with 2 m g L = I omega^2."""
+    inertia, moment = 0.025 + 2 * 0.5**2, 2 * 9.81 * 0.5
+    quarter = ellipk(0.5) * np.sqrt(inertia / moment)
+    changes = {("simulation", "t_end"): quarter, ("simulation", "dt"): "0.1 ms"}
+    file = read_mechanism("pendulum.toml", changes)
+    sol = file.simulate()
+    assert_allclose(sol.position("bob")[-1], [0.0, -0.5, 0.0], atol=2e-7)
+    assert_allclose(sol.omega("bob")[-1, 2], -np.sqrt(2 * moment / inertia), rtol=1e-6)
+
+
+def in_python(rod):
+    """The slider-crank of the file, word by word."""
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.05, 0, 0),
+                           markers={"shaft": (-0.05, 0, 0), "pin": (0.05, 0, 0)})  # fmt: skip
+    bar = mech.add_flexible("rod", rom.load(rod), at=(0.1, -0.05, -0.04))
+    slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=(1.1, 0, 0),
+                            markers={"pin": (0, 0, 0)})  # fmt: skip
+    z, T, speed = (0, 0, 1), 0.02, 40 * np.pi
+    ground = mech.ground
+    mech.revolute("main bearing", ground.marker((0, 0, 0)), crank.marker("shaft"), axis=z)
+    mech.revolute("crank pin", crank.marker("pin"), bar.marker("root"), axis=z)
+    mech.revolute("wrist pin", bar.marker("tip"), slider.marker("pin"), axis=z)
+    mech.prismatic("guide", ground.marker((1.1, 0, 0)), slider.marker("pin"), axis=(1, 0, 0))
+    w = 2 * np.pi / T
+    mech.drive(
+        "motor", "main bearing",
+        lambda t: speed * (t**2 / 2 / T + (np.cos(w * t) - 1) / w / (2 * np.pi)),
+        rate=lambda t: speed * (t / T - np.sin(w * t) / (2 * np.pi)),
+        acceleration=lambda t: speed / T * (1 - np.cos(w * t)),
+    )  # fmt: skip
+    mech.force("gas", slider.marker("pin"),
+               lambda t: np.array([-50.0 * np.sin(40 * np.pi * t), 0, 0]))  # fmt: skip
+    return mech
+
+
+def test_the_slider_crank_is_that_of_python(folder, rod):
+    sol = read_mechanism("crank.toml").simulate()
+    same = rom.simulate(in_python(rod), t_end=0.01, dt=1e-4, rho_inf=0.8)
+    assert_array_equal(sol.t, same.t)
+    for name in ("crank", "rod", "slider"):
+        assert_allclose(sol.position(name), same.position(name), rtol=0, atol=1e-12)
+    assert_allclose(sol.elastic("rod"), same.elastic("rod"), rtol=0, atol=1e-12)
+    scale = np.abs(same.reaction("crank pin")).max()
+    assert_allclose(sol.reaction("crank pin"), same.reaction("crank pin"), atol=1e-8 * scale)
+
+
+def test_simulate_leaves_a_folder_that_says_how_it_came_about(folder, capsys):
+    words = ["simulate", "pendulum.toml", "--t-end", "0.1", "--gravity=0,-1.62,0", "-o", "out"]
+    assert main([*words, "--json", "-q"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["output"] == "out/motion.csv" and found["steps"] == 200
+    assert found["also"] == ["out/run.json"]
+    head, *rows = (folder / "out" / "motion.csv").read_text().splitlines()
+    assert head.startswith("t [s],bob position x [m],bob position y [m]") and len(rows) == 201
+    fall = float(rows[-1].split(",")[2])  # y = -g m L^2 / I t^2 / 2 as long as it is level
+    assert_allclose(fall, -0.5 * 1.62 * 2 * 0.25 / (0.025 + 0.5) * 0.1**2, rtol=1e-3)
+    record = json.loads((folder / "out" / "run.json").read_text())
+    assert record["command"].startswith("rom simulate pendulum.toml --t-end 0.1")
+    assert record["versions"]["rom"] == rom.__version__ and record["source"] == PENDULUM
+    assert record["joints"] == {"pivot": "revolute"} and record["bodies"]["bob"]["mass"] == 2.0
+
+
+def test_a_film_and_another_form_of_the_table_when_the_file_asks(folder):
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    text = CRANK + '[output]\nfilm = "glb"\nhistory = "h5"\nmagnify = 20\n'
+    (folder / "c.toml").write_text(text)
+    assert main(["simulate", "c.toml", "--t-end", "2e-3", "-q", "-o", "out"]) in (0, 5)
+    assert {path.name for path in (folder / "out").iterdir()} == {
+        "motion.h5", "motion.glb", "run.json",
+    }  # fmt: skip
+    assert (folder / "out" / "motion.glb").read_bytes()[:4] == b"glTF"
+
+
+def test_a_column_to_plot_is_looked_for_before_the_run(folder, capsys):
+    text = PENDULUM + '[output]\nplot = ["bob position x", "pivto force x"]\n'
+    (folder / "p.toml").write_text(text)
+    assert main(["simulate", "p.toml", "-o", "out", "-q"]) == 2
+    err = capsys.readouterr().err
+    assert "p.toml:20: there is no column 'pivto force x' to plot" in err
+    assert "Did you mean pivot force x?" in err and not (folder / "out").exists()
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")  # its joints are anywhere
+def test_every_section_reaches_the_mechanism(folder):
+    (folder / "all.toml").write_text(ALL)
+    mech = read_mechanism("all.toml").mechanism()
+    body = rom.load("rod.rom.npz")
+    a, c = mech.parts["a"], body.first_moment / body.mass
+    assert a.r == 0 and a.mass == body.mass
+    assert_allclose(a.at, [-c[1], c[0], c[2]], atol=1e-12)  # turned by a quarter about z
+    assert_allclose(a.velocity, 2 * np.pi * np.array([-c[0], -c[1], 0]), atol=1e-12)
+    inertia = np.trace(a.second) * np.eye(3) - a.second  # of a box 1 m x 0.1 m x 0.08 m
+    box = a.mass / 12 * np.array([0.1**2 + 0.08**2, 1 + 0.08**2, 1 + 0.1**2])
+    assert_allclose(inertia, np.diag(box), rtol=1e-9, atol=1e-9)
+    assert_allclose(a.points["tip"], body.marker("tip").point - c, atol=1e-12)
+    x = body.marker("tip").point
+    assert_allclose(mech.design_point(a.marker("tip")), [-x[1], x[0], x[2]], atol=1e-12)
+    kinds = {"turn": "revolute", "slide": "prismatic", "ball": "distance", "gear": "coupling"}
+    assert {n: j.kind for n, j in mech.joints.items()} == kinds
+    assert mech.springs["s"].stiffness == 2000 and mech.springs["s"].free_length == 0.1
+    assert mech.springs["s"].damping == 3 and mech.turns["r"].free_angle == np.pi
+    assert mech.motors["t"].law(0.0, 0.0, 0.0) == 7.0
+    assert mech.motors["f"].law(0.5, 0.0, 0.0) == pytest.approx(1000.0)
+    assert_array_equal(np.diag(mech.bushings["u"].stiffness), [1e3, 2e3, 3e3, 1, 2, 3])
+    assert_array_equal(mech.loads["w"].vector, [0, 0, 1])
+    assert mech.frictions["d"].numbers[0] == 4 and mech.frictions["d"].numbers[-1] == 1e-3
+    assert mech.stops["e"].limits == ((1, np.pi / 4),)
+    assert mech.contacts["k"].radius[0] == 0.05 and mech.contacts["k"].law.exponent == 1.5
+
+
+def law(text, unit):
+    place = Place(parsed(f"law = {text}", "x"))
+    return law_of(law_kind(unit).read(place.document.data["law"], place.at("law")), place)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{ kind = "steady", rate = "60 rpm", start = "90 deg" }',
+        '{ kind = "run-up", rate = "60 rpm", duration = "0.5 s" }',
+        '{ kind = "ramp", from = 1, to = 3, start = 0.2, duration = 0.9 }',
+        '{ kind = "harmonic", amplitude = 2, frequency = "3 Hz", phase = 1, mean = 4 }',
+        '{ kind = "table", t = [0, 0.4, 1, 2], values = [0, 2, -1, 5] }',
+    ],
+)
+def test_rates_and_accelerations_are_derivatives(text):
+    """Else a drive does work its constraint knows nothing of."""
+    f, t, h = law(text, "rad"), np.linspace(0.03, 1.37, 29), 1e-4
+    assert_allclose(f.rate(t), (f.value(t + h) - f.value(t - h)) / (2 * h), rtol=1e-5, atol=2e-5)
+    second = (f.value(t + h) - 2 * f.value(t) + f.value(t - h)) / h**2
+    assert_allclose(f.acceleration(t), second, rtol=1e-4, atol=2e-3)
+
+
+def test_laws_have_the_values_they_say():
+    steady = law('{ kind = "steady", rate = "60 rpm", start = "90 deg" }', "rad")
+    assert_allclose(steady.value(2.0), 4.5 * np.pi)
+    up = law('{ kind = "run-up", rate = 10, duration = 0.5 }', "rad")
+    assert_allclose([up.rate(0.0), up.rate(0.5), up.value(1.5)], [0.0, 10.0, 12.5], atol=1e-14)
+    ramp = law('{ kind = "ramp", to = "3 N", start = 1, duration = 2 }', "N")
+    assert_allclose([ramp.value(0.0), ramp.value(2.0), ramp.value(9.0)], [0.0, 1.5, 3.0])
+    points = law('{ kind = "table", t = [0, 1, 2], values = ["1 mm", "2 mm", 0] }', "m")
+    assert_allclose([points.value(0.0), points.value(1.0)], [1e-3, 2e-3])
+    assert law('"3 kN"', "N").value(7.0) == 3000.0
+
+
+MISTAKES = {
+    "unknown marker": ('"bob.top"', '"bob.topp"',
+                       "p.toml:12: body 'bob' has no marker 'topp'. Did you mean top?"),
+    "unknown body": ('"bob.top"', '"bo.top"',
+                     "p.toml:12: there is no body 'bo'. Did you mean bob? Known: ground, bob."),
+    "no marker": ('"bob.top"', '"bob"', "p.toml:12: joints.pivot.between = 'bob' is no marker."),
+    "three markers": ('"bob.top"]', '"bob.top", "bob.top"]', "two markers are needed"),
+    "unknown kind": ('"revolute"', '"revolut"', "Did you mean revolute?"),
+    "missing axis": ("axis = [0, 0, 1]\n", "", "axis is missing in [joints.pivot]"),
+    "axis of two": ("[0, 0, 1]", "[0, 1]", "needed is a list 3"),
+    "no length": ("[0, 0, 1]", "[0, 0, 0]", "p.toml:10: axis of pivot has length zero"),
+    "inertia": ('["0.01 kg m^2", 0.02, 0.025]', "[1, 1, 9]",
+                "p.toml:4: bob: the largest principal moment"),
+    "mass": ('"2 kg"', '"2 m"', "p.toml:5: bodies.bob.mass: '2 m' is a length; a mass [kg]"),
+    "negative mass": ('"2 kg"', "-2", "bodies.bob.mass = -2 is not positive"),
+    "name with a dot": ("[bodies.bob]", '[bodies."b.c"]', "'b.c' is no name for a body"),
+    "no end": ('t_end = "0.5 s"\n', "", "t_end is missing in [simulation]"),
+    "method": ("rho_inf = 1", 'method = "bfd"', "Did you mean bdf?"),
+    "rho": ("rho_inf = 1", "rho_inf = 7", "rho_inf"),
+    "unknown section": ("[simulation]", "[springy.x]\n[simulation]", "Did you mean springs?"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
+    old, new, expected = MISTAKES[case]
+    assert old in PENDULUM
+    (tmp_path / "p.toml").write_text(PENDULUM.replace(old, new))
+    with pytest.raises(rom.RomError) as refused:
+        read_mechanism(tmp_path / "p.toml").simulate()
+    assert expected in str(refused.value).replace(f"{tmp_path}/", "")
+
+
+JOINTED = {
+    "unknown joint": ('[drives.m]\njoint = "pivto"\nlaw = 1\n',
+                      "there is no joint 'pivto'. Did you mean pivot?"),
+    "a way for an angle": ('[drives.m]\njoint = "pivot"\nlaw = "1 m"\n',
+                           "drives.m.law: '1 m' is a length; an angle [rad] is wanted"),
+    "rate of a way": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "steady", rate = "1 m/s" }\n',
+                      "is a speed; an angular speed [rad/s] is wanted"),
+    "neither": ('[drives.m]\njoint = "pivot"\nlaw = "1 kg"\n', "'1 kg' is a mass"),
+    "short table": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "table", t = [0, 0.1], values = '
+                    "[0, 1] }\n", "cover 0 s to 0.1 s; the run needs 0 s to 0.5 s"),
+    "table that falls": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "table", t = [0, 2, 1], '
+                         "values = [0, 1, 2] }\n", "do not ascend"),
+    "name twice": ('[drives.pivot]\njoint = "pivot"\nlaw = 1\n', "the name 'pivot' is used twice"),
+    "stop without limit": ('[stops.m]\njoint = "pivot"\nstiffness = 1\n', "has no limit"),
+    "missing file": ('[bodies.x]\nfile = "nope.rom.npz"\n', "nope.rom.npz"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", JOINTED)
+def test_a_mistake_of_a_connection_is_told(case, tmp_path):
+    more, expected = JOINTED[case]
+    (tmp_path / "p.toml").write_text(PENDULUM + more)
+    with pytest.raises(rom.RomError) as refused:
+        read_mechanism(tmp_path / "p.toml").mechanism()
+    assert expected in str(refused.value)
+    assert refused.value.where.partition("p.toml:")[2].partition(":")[0] in ("19", "20", "21")
+
+
+def test_markers_far_apart_are_warned_of(tmp_path):
+    """A wrong number in a file would else bend the mechanism before it starts."""
+    (tmp_path / "p.toml").write_text(PENDULUM.replace('"-500 mm"', '"-400 mm"'))
+    with pytest.warns(rom.errors.RomWarning, match=r"p.toml:10: .* 'pivot' are 0.1 m apart"):
+        read_mechanism(tmp_path / "p.toml").mechanism()
+
+
+def test_a_component_is_no_mechanism(tmp_path):
+    (tmp_path / "c.toml").write_text('[geometry]\nfile = "x.geo"\n')
+    with pytest.raises(ConfigError, match="this is a component; a mechanism is needed"):
+        read_mechanism(tmp_path / "c.toml")
+
+
+def test_it_moves_without_fenicsx_and_pictures(folder):
+    """A machine with NumPy, SciPy and Numba only reads and moves a mechanism file."""
+    heavy = ["dolfinx", "ufl", "petsc4py", "mpi4py", "gmsh", "pyvista", "matplotlib", "meshio"]
+    code = f"import sys; sys.modules.update(dict.fromkeys({heavy!r}))\n"
+    code += "from rom.cli.main import main\n"
+    code += "sys.exit(main(['simulate', 'crank.toml', '-q', '-o', 'out']))"
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), cwd=folder,
+                          capture_output=True, text=True, timeout=600, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (folder / "out" / "motion.csv").exists()
+
+
+@pytest.mark.fenicsx
+def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
+    """Its bodies are meshed and reduced, here coarsely; the rod stays as long as it is."""
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    for folder in ("meshes", "demos"):
+        (tmp_path / folder).mkdir()
+    for name in ("connecting_rod", "crank"):
+        (tmp_path / "meshes" / f"{name}.geo").symlink_to(ROOT / "meshes" / f"{name}.geo")
+        text = re.sub('lc = "[^"]*"', 'lc = "9 mm"', (ROOT / "meshes" / f"{name}.toml").read_text())
+        text = text.replace("modes = 20", "modes = 20\ncertificate = false")
+        (tmp_path / "meshes" / f"{name}.toml").write_text(text)
+    sample = tmp_path / "demos" / "slider_crank.toml"
+    sample.write_text((ROOT / "demos" / "slider_crank.toml").read_text())
+    sol = read_mechanism(sample, {("simulation", "t_end"): "0.4 ms"}).simulate()
+    steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+    model = rom.fe.model(ROOT / "meshes" / "crank.geo", material=steel, parameters={"lc": 9e-3})
+    crank = rom.mass_properties(model)
+    assert_allclose(sol.mechanism.parts["crank"].mass, crank.mass, rtol=1e-12)
+    assert_allclose(sol.mechanism.parts["crank"].at, crank.centre, atol=1e-12)
+    pins = sol.position("rod", "pin_b") - sol.position("rod", "pin_a")
+    assert_allclose(np.linalg.norm(pins, axis=1), 0.2, atol=1e-4)  # bores are polygons

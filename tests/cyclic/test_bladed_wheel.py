@@ -1,0 +1,242 @@
+"""Blades as substructures: the whole wheel of finite elements with the same blades."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import csr_matrix
+
+import rom
+from cases.wheels import bladed_model
+from rom.cyclic.blades.blade import cut, region, root_of
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import dofs_of
+from rom.errors import ConfigError, InterfaceError, ModelError
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+]
+N, ORDER, ZETA = 6, 2, 2e-3
+SIZES = {"cells": (6, 2, 3, 2), "blade": (2, 4)}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return bladed_model(N, **SIZES)
+
+
+@pytest.fixture(scope="module")
+def full(model):
+    return rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))
+
+
+@pytest.fixture(scope="module")
+def small(full, model):
+    return rom.substructured_sector(
+        full, model, n_modes=40, n_blade_modes=25, functions=rom.Polynomial(6),
+        root=rom.Polynomial(4),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def disk(small):
+    return rom.bladed_wheel(small, 12)
+
+
+@pytest.fixture(scope="module")
+def short():
+    """A sector whose blade is shorter, with the nodes of the others below it."""
+    return bladed_model(N, tip=0.15, **SIZES)
+
+
+def whole_wheel(full, changes, n_modes):
+    """Lowest modes of all finite elements, {sector: (dK, dM)} added to those that differ."""
+    nothing = (0 * full.K, 0 * full.M)
+    dK, dM = zip(*(changes.get(j, nothing) for j in range(N)), strict=True)
+    _, _, K, M = full.wheel([full.K + A for A in dK], [full.M + A for A in dM])
+    ops = SciPyOperators(K, M)
+    return ops.modes(ops.hold([]), n_modes)
+
+
+def peaks(u):
+    """(N,) largest amplitude of each blade."""
+    return np.linalg.norm(u, axis=-1).max(axis=0)
+
+
+def test_disk_and_blade_make_the_tuned_sector(full, small):
+    """Ten families at all nodal diameters within 0.1 %, never below."""
+    assert small.free.size < 0.2 * full.free.size
+    assert small.root_functions.shape[1] < small.root_points.shape[0]
+    for n in full.diameters:
+        exact, found = (rom.cyclic_modes(s, n, 10).omega for s in (full, small))
+        assert_allclose(found, exact, rtol=1e-3)
+        assert np.all(found > exact * (1 - 1e-9))
+
+
+def test_equal_blades_are_the_tuned_wheel(small, disk):
+    """With all waves of the disk nothing is lost between sector and wheel; with few, little."""
+    n_waves = small.free.size - small.root.size - small.cantilever.size
+    omega, Phi = rom.bladed_wheel(small, n_waves).modes([small.blade] * N)
+    families = [rom.cyclic_modes(small, n, 8) for n in small.diameters]
+    exact = np.sort(np.concatenate([np.repeat(f.omega, f.multiplicity) for f in families]))[:30]
+    assert Phi.shape[0] == N * small.free.size
+    assert_allclose(omega[:30], exact, rtol=1e-8)
+    few = disk.modes([small.blade] * N)[0][:30]
+    assert_allclose(few, exact, rtol=5e-4)
+    assert np.all(few > exact * (1 - 1e-9))
+    fewer = rom.bladed_wheel(small, 12, n_root=18)
+    assert fewer.roots.shape == (N, small.root.size, N * 18)
+    fewest = fewer.modes([small.blade] * N)[0][:30]
+    assert_allclose(fewest, few, rtol=3e-4)
+    assert np.all(fewest > few * (1 - 1e-9))
+
+
+def test_the_certificates_of_sector_and_wheel(small, disk):
+    """Against the full sector; half the stiffness of a blade is noticed."""
+    assert small.certificate.ok and disk.certificate.ok
+    weak = replace(small.blade, K=0.5 * small.blade.K)
+    assert not replace(disk, sector=replace(small, blade=weak)).certificate.ok
+
+
+def test_every_blade_may_be_another_one(model, full, small, disk, short):
+    """A fifth of the stiffness lost, a denser one, a shorter one: frequencies, response, factor."""
+    (K, M), (K_short, M_short) = region(model, "blade"), region(short, "blade")
+    changes = {1: (-0.2 * K, 0 * M), 3: (0.05 * K, 0.1 * M), 4: (K_short - K, M_short - M)}
+    omega, Phi = whole_wheel(full, changes, 48)
+    blades = [small.blade] * N
+    blades[1] = small.blade.varied(stiffness=-0.2)
+    blades[3] = small.blade.varied(stiffness=0.05, density=0.1)
+    blades[4] = rom.reduced_blade(small, short, n_modes=25)
+    found = disk.modes(blades)[0]
+    assert_allclose(found[:36], omega[:36], rtol=1e-3)
+    assert np.all(found[:36] > omega[:36] * (1 - 1e-9))
+    fewer = rom.bladed_wheel(small, 12, n_root=18).modes(blades)[0]
+    assert_allclose(fewer[:36], omega[:36], rtol=1e-3)
+    tip = 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))
+    force = np.zeros(full.n)
+    force[tip : tip + 3] = 0.3, 0.2, 1.0
+    sweep = np.linspace(0.9, 1.1, 801) * omega[2]
+    load = Phi.T @ np.kron(np.exp(1j * ORDER * full.angle * np.arange(N)), force[full.free])
+    gap = omega**2 - sweep[:, None] ** 2 + 2j * ZETA * sweep[:, None] * omega
+    rows = np.searchsorted(full.free, tip + np.arange(3))
+    exact = ((load / gap) @ Phi.T).reshape(len(sweep), N, -1)[:, :, rows]
+    drive = {"engine_order": ORDER, "omega": sweep, "damping": ZETA, "at": tip + np.arange(3)}
+    seen = disk.response(blades, force, **drive)
+    assert_allclose(peaks(seen), peaks(exact), rtol=5e-3)
+    eye = np.eye(full.n)[tip : tip + 3]
+    again = disk.response(blades, [force] * N, **drive | {"at": [eye] * N})
+    assert_allclose(again, seen, rtol=1e-9)
+    tuned = peaks(disk.response([small.blade] * N, force, **drive))
+    assert_allclose(tuned, tuned[0], rtol=1e-6)
+    assert_allclose(disk.amplification(blades, force, **drive), peaks(seen).max() / tuned[0])
+
+
+def test_cantilever_frequencies_that_deviate(model, full, small, disk):
+    """K + g d(omega^2) g^T of all finite elements, with eta = g^T u: roots leave eta alone."""
+    K, M = region(model, "blade")
+    inner, nodes = cut(full.K, K, "blade")
+    delta = np.array([0.04, -0.06, 0.0, 0.03])
+    blade = small.blade.varied(cantilever=delta)
+    assert_allclose(blade.omega[:4], (1 + delta) * small.blade.omega[:4])
+    assert_allclose(blade.omega[4:], small.blade.omega[4:])
+    root, phi = dofs_of(nodes), small.blade.Psi[:, small.root.size :][:, :4]
+    follow = np.linalg.solve(K[inner][:, inner].toarray(), K[inner][:, root].toarray())
+    G = np.zeros((full.n, 4))
+    G[inner] = M[inner][:, inner] @ phi[inner]
+    G[root] = follow.T @ G[inner]
+    d = small.blade.omega[:4] ** 2 * ((1 + delta) ** 2 - 1)
+    omega, _ = whole_wheel(full, {2: (csr_matrix(G * d @ G.T), 0 * M)}, 24)
+    blades = [small.blade] * N
+    blades[2] = blade
+    assert_allclose(disk.modes(blades)[0][:24], omega, rtol=1e-3)
+    tuned = disk.modes([small.blade] * N)[0]
+    assert abs(omega / tuned[:24] - 1).max() > 0.01
+
+
+def test_a_blade_that_lost_most_of_its_stiffness(full, small, disk):
+    """Tuned modes do not contain what it does: a substructure does, and shows where it moves."""
+    delta = np.zeros(N)
+    delta[4] = -0.8
+    omega, _ = whole_wheel(full, {4: (-0.8 * full.regions["blade"], 0 * full.M)}, 18)
+    blades = [small.blade] * N
+    blades[4] = small.blade.varied(stiffness=-0.8)
+    apart = abs(disk.modes(blades)[0][:18] / omega - 1).max()
+    by_tuned_modes = abs(rom.mistuned_wheel(full, 3).modes(delta)[0][:18] / omega - 1).max()
+    assert apart < 3e-4
+    assert by_tuned_modes > 0.03
+    share = disk.energies(blades, 3)
+    assert_allclose(share.sum(axis=1), 1.0)
+    assert share[0].argmax() == 4
+    assert share[0, 4] > 0.9
+
+
+def test_a_blade_of_another_mesh_fits_on_the_root(model, small, disk):
+    """Other nodes on the root, and a model of the blade alone, are the same blade."""
+    finer = bladed_model(N, cells=(6, 2, 3, 3), blade=(2, 4))
+    other = rom.reduced_blade(small, finer, n_modes=25)
+    assert_allclose(other.omega[:8], small.blade.omega[:8], rtol=5e-3)
+    assert_allclose(
+        disk.modes([other] * N)[0][:12], disk.modes([small.blade] * N)[0][:12], rtol=2e-3
+    )
+    K, M = region(model, "blade")
+    inner, nodes = cut(model.K, K, "blade")
+    mine = np.union1d(inner, dofs_of(nodes))
+    places = np.searchsorted(mine[::3] // 3, nodes)
+    alone = rom.FEModel(K[mine][:, mine], M[mine][:, mine], model.points[mine[::3] // 3])
+    alone = replace(alone, interfaces={"root": root_of(alone, places)})
+    found = rom.reduced_blade(small, alone, n_modes=25, blade=None, root="root")
+    for A, B in ((found.K, small.blade.K), (found.M, small.blade.M)):
+        assert_allclose(abs(A), abs(B), atol=1e-6 * abs(B).max())
+    assert_allclose(disk.modes([found] * N)[0], disk.modes([small.blade] * N)[0], rtol=1e-6)
+
+
+def test_wrong_arguments_are_named(model, full, small, disk):
+    few = {"n_modes": 2, "n_blade_modes": 2}
+    with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade', 'disk'\]"):
+        rom.substructured_sector(full, model, blade="wing", **few)
+    with pytest.raises(ConfigError, match="the full sector and the model"):
+        rom.substructured_sector(small, model, **few)
+    with pytest.raises(InterfaceError, match="'disk' reaches a cyclic face"):
+        rom.substructured_sector(full, model, blade="disk", **few)
+    with pytest.raises(InterfaceError, match="no interface 'foot'"):
+        rom.reduced_blade(small, model, n_modes=2, blade=None, root="foot")
+    moved = replace(model, points=model.points + 0.01)
+    with pytest.raises(InterfaceError, match=r"root of this blade ends up to 0\.01 m"):
+        rom.reduced_blade(small, moved, n_modes=2)
+    with pytest.raises(ConfigError, match="each must be a number above -1"):
+        small.blade.varied(stiffness=-1.0)
+    with pytest.raises(ConfigError, match="26 deviations"):
+        small.blade.varied(cantilever=np.zeros(26))
+    with pytest.raises(ConfigError, match=r"5 blades, with .* give 6 with 57"):
+        disk.modes([small.blade] * 5)
+    with pytest.raises(ConfigError, match="n_waves = 1000"):
+        rom.bladed_wheel(small, 1000)
+    with pytest.raises(ConfigError, match="n_root = 58: a root has 1 to 57"):
+        rom.bladed_wheel(small, 2, n_root=58)
+    drive = {"engine_order": 1, "omega": [1.0], "damping": 1e-3, "at": [0]}
+    alike, force = [small.blade] * N, np.zeros(full.n)
+    tip = 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))
+    with pytest.raises(ConfigError, match=r"damping = 0\.0"):
+        disk.response(alike, force, **drive | {"damping": 0.0})
+    with pytest.raises(ConfigError, match="not those of blade 0"):
+        disk.response(alike, force, **drive)
+    with pytest.raises(ConfigError, match=r"blade 0 has the shape \(3,\)"):
+        disk.response(alike, np.ones(3), **drive)
+    with pytest.raises(ConfigError, match="a list of 2 forces or places: give 6"):
+        disk.response(alike, [force, force], **drive)
+    with pytest.raises(ConfigError, match="dofs that are not its own"):
+        disk.response(alike, force + 1.0, **drive)
+    with pytest.raises(ConfigError, match="does not move the tuned wheel"):
+        disk.amplification(alike, force, **drive | {"at": [tip]})
+    soft = replace(small.blade, K=-small.blade.K)
+    with pytest.raises(ModelError, match="without stiffness"):
+        disk.modes([soft] * N)
+
+
+def test_dofs_of_nodes_count_three_per_node_in_the_order_of_the_axes():
+    """The convention of every file and matrix: dof 3 * node + axis."""
+    assert dofs_of(np.array([2, 0])).tolist() == [6, 7, 8, 0, 1, 2]

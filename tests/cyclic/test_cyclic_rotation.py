@@ -1,0 +1,175 @@
+"""Rotating wheels: Bryan's ring, Lamb and Southwell's disc, rigid motions, and the whole wheel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eig, eigh
+from scipy.sparse import csr_matrix
+
+import rom
+from cases.wheels import beam_ring, bladed_model, mass_ring
+from rom.cyclic.rotation import divergence_speed, rotation_matrices
+from rom.errors import ConfigError, ModelError, ModesMissedError
+
+N, SPEED = 6, 900.0
+ALUMINIUM = {"E": 70e9, "nu": 0.3, "rho": 2700.0}
+needs_fenicsx = pytest.mark.fenicsx
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+]
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+@pytest.mark.parametrize("speed", [0.05, -0.05])
+def test_waves_of_a_ring_split_as_bryan_found(n, speed):
+    """Seen from the ring by 4 n Omega / (n^2 + 1); those that run back are the faster ones."""
+    waves = rom.travelling_modes(beam_ring(24, 12, EA=1e6, rotary=1e-6), n, 2, speed=speed)
+    assert list(waves.direction) == [1, -1]
+    assert_allclose(np.diff(waves.omega), 4 * n * abs(speed) / (n**2 + 1), rtol=3e-3)
+    assert waves.forward[0] < waves.backward[0]
+    split = np.diff(waves.at_rest * 2 * np.pi)  # an observer at rest sees the others faster
+    assert_allclose(split, -2 * n * abs(speed) + np.diff(waves.omega), rtol=1e-9)
+
+
+def test_lumped_waves_are_the_spectrum_of_the_whole_ring():
+    held = replace(beam_ring(6, 4, EA=1e3, rotary=0.1), held=np.array([0, 1]))
+    K, M, G = (A.toarray() for A in held.wheel(held.coriolis))
+    speed, one, zero = 0.8, np.eye(K.shape[0]), np.zeros(K.shape)
+    companion = np.block([[zero, one], [-K, -speed * G]])
+    whole = eig(companion, np.block([[one, zero], [zero, M]]), right=False)
+    exact = np.sort(whole.imag[whole.imag > 0])
+    found = [rom.travelling_modes(held, d, 8, speed=speed) for d in held.diameters]
+    found = np.sort(np.concatenate([waves.omega for waves in found]))[:16]
+    assert_allclose(found, exact[:16], rtol=1e-9)
+
+
+def test_a_wheel_whose_support_softens_diverges():
+    """Springs k against Omega^2 m: stiffness ends at sqrt(k / m)."""
+    ring = mass_ring(6, k=4.0e4, m=0.4)
+    at_rest = replace(ring, centrifugal=-ring.M, coriolis=csr_matrix((2, 2)))
+    for n in (0, 2):
+        exact = np.sqrt((4.0e4 + 4 * 0.7e5 * np.sin(np.pi * n / 6) ** 2) / 0.4)
+        assert_allclose(divergence_speed(at_rest, n), exact, rtol=1e-9)
+    stiffer = replace(at_rest, centrifugal=ring.M)
+    assert divergence_speed(stiffer, 0) == np.inf
+    slow, fast = 0.99 * np.sqrt(1e5), 1.01 * np.sqrt(1e5)
+    assert rom.travelling_modes(at_rest, 0, 1, speed=slow).omega[0] > 0
+    assert rom.cyclic_modes(at_rest, 0, 1, speed=slow).omega[0] > 0
+    for call in (rom.travelling_modes, rom.cyclic_modes):
+        with pytest.raises(ModelError, match=r"319\.\d+ rad/s .*instability"):
+            call(at_rest, 0, 1, speed=fast)
+
+
+def test_wrong_arguments_are_named():
+    ring = beam_ring(6, 4)
+    with pytest.raises(ConfigError, match=r"at rest are cyclic_modes"):
+        rom.travelling_modes(ring, 2, 2, speed=0.0)
+    for call in (rom.travelling_modes, rom.cyclic_modes):
+        with pytest.raises(ConfigError, match="speed = nan"):
+            call(ring, 2, 2, speed=np.nan)
+    with pytest.raises(ConfigError, match="n = 49 must be a whole number from 1 to 24"):
+        rom.travelling_modes(ring, 2, 49, speed=1.0)
+    with pytest.raises(ConfigError, match="no matrices of rotation"):
+        rom.travelling_modes(mass_ring(6), 2, 1, speed=1.0)
+    with pytest.raises(ModelError, match="nothing holds"):
+        divergence_speed(replace(mass_ring(6, k=0.0), centrifugal=csr_matrix((2, 2))), 0)
+
+
+@pytest.fixture(scope="module")
+def model():
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    return bladed_model(N, degree=1, cells=(4, 2, 2, 2), material=rom.Material(**ALUMINIUM))
+
+
+@pytest.fixture(scope="module")
+def free(model):
+    return rom.rotating_sector(rom.CyclicSector.from_model(model), model)
+
+
+@needs_fenicsx
+def test_a_free_wheel_floats_nods_and_precesses(model, free):
+    """Seen from the wheel, what rests in space circles back; the axis precesses as Euler says."""
+    waves = rom.travelling_modes(free, 1, 4, speed=SPEED)
+    whole = rom.mass_properties(bladed_model(N, N, degree=1, cells=(4, 2, 2, 2),
+                                             material=rom.Material(**ALUMINIUM)))  # fmt: skip
+    A, _, C = np.sort(np.diag(whole.inertia))
+    assert_allclose(waves.omega[0], (C / A - 1) * SPEED, rtol=1e-5)
+    assert list(waves.direction) == [1, -1, -1, -1]
+    assert_allclose(waves.omega[1:], SPEED, rtol=1e-5)
+    assert_allclose(waves.at_rest[2], 0.0, atol=1e-5 * SPEED)
+
+
+@needs_fenicsx
+def test_coriolis_and_cyclic_symmetry_are_the_whole_wheel(model):
+    """The whole wheel meshed; its stress and its motion from its own matrices."""
+    whole = bladed_model(N, N, degree=1, cells=(4, 2, 2, 2), material=rom.Material(**ALUMINIUM))
+    sector = rom.rotating_sector(rom.CyclicSector.from_model(model, fixed=("bore",)), model)
+    x, held = whole.points * (1, 1, 0), whole.interfaces["bore"].dofs
+    free_dofs = np.setdiff1d(np.arange(whole.n_dofs), held)
+    u = whole.operators.hold(held)((whole.M @ x.ravel())[:, None])[:, 0]
+    G, soft = rotation_matrices(whole.M, np.array([0.0, 0.0, 1.0]))
+    C = whole.stresses.prestress(u) - soft
+    M, G, K = (A[free_dofs][:, free_dofs].toarray()
+               for A in (whole.M, SPEED * G, whole.K + SPEED**2 * C))  # fmt: skip
+    lam, Phi = eigh(K, M, subset_by_index=(0, 60))  # 60 modes hold the lowest waves to 1e-5
+    G = Phi.T @ G @ Phi
+    one, zero = np.eye(lam.size), np.zeros((lam.size, lam.size))
+    exact = eig(np.block([[zero, one], [-np.diag(lam), -G]]), right=False).imag
+    exact = np.sort(exact[exact > 0])[:18]
+    found = [rom.travelling_modes(sector, d, 8, speed=SPEED).omega for d in sector.diameters]
+    found = np.sort(np.concatenate(found))[:18]
+    assert_allclose(found, exact, rtol=2e-5)
+    without = [rom.cyclic_modes(sector, d, 6, speed=SPEED) for d in sector.diameters]
+    without = np.sort(np.concatenate([np.repeat(m.omega, m.multiplicity) for m in without]))
+    assert_allclose(without[:18], np.sqrt(lam[:18]), rtol=1e-9)
+
+
+@needs_fenicsx
+def test_a_reduced_wheel_rotates_like_the_full_one(model):
+    sector = rom.rotating_sector(rom.CyclicSector.from_model(model, fixed=("bore",)), model)
+    small = rom.reduce_sector(sector, n_modes=40, functions=rom.Polynomial(3))
+    for n in (0, 1, 3):
+        full, found = (rom.travelling_modes(s, n, 4, speed=5e3) for s in (sector, small))
+        assert_allclose(found.omega, full.omega, rtol=2e-3)
+        assert_allclose(found.direction, full.direction)
+
+
+@needs_fenicsx
+def test_a_membrane_spins_as_lamb_and_southwell_found():
+    """omega^2 / Omega^2 for n diameters and s circles; a disc of 1/1000 has little else."""
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    E, rho, nu = 200e9, 7800.0, 0.3
+    speed = 0.05 * np.sqrt(E / rho)
+    model = bladed_model(
+        8, bore=0.02, rim=1.0, tip=1.0, width=0.001, cells=(3, 4, 0, 1),
+        material=rom.Material(E=E, nu=nu, rho=rho),
+    )  # fmt: skip
+    disc = rom.rotating_sector(rom.CyclicSector.from_model(model), model)
+    for n, s, tolerance in ((0, 1, 0.01), (2, 0, 0.003), (3, 0, 0.01), (1, 1, 0.02)):
+        exact = ((n + 2 * s) * (n + 2 * s + 2) * (3 + nu) - n**2 * (1 + 3 * nu)) / 8
+        found = (rom.travelling_modes(disc, n, 8, speed=speed).omega / speed) ** 2
+        assert_allclose(found[np.argmin(abs(found - exact))], exact, rtol=tolerance)
+
+
+@needs_fenicsx
+def test_only_solids_that_are_known_can_rotate(model):
+    sector = rom.CyclicSector.from_model(model)
+    with pytest.raises(ConfigError, match="no finite elements"):
+        rom.rotating_sector(sector, replace(model, stresses=None))
+    with pytest.raises(ConfigError, match="carries 1 attachments"):
+        rom.rotating_sector(sector, replace(model, attachments=(rom.Attachment("bore", 1.0),)))
+
+
+def test_a_missed_wave_is_noticed():
+    from rom.cyclic.travelling import _verify
+
+    held = replace(beam_ring(6, 4, EA=1e3, rotary=0.1), held=np.array([0, 1]))
+    T = held.harmonic(1)
+    M, G, K = (csr_matrix(T.conj().T @ A @ T) for A in (held.M, held.coriolis, held.K))
+    lam = np.array([1j, -1j]) * rom.travelling_modes(held, 1, 1, speed=1.0).omega[0]
+    lam = np.r_[lam, lam * 30]
+    with pytest.raises(ModesMissedError, match="one direction were found below"):
+        _verify(M, G, K, lam, np.eye(M.shape[0], 4, dtype=complex), 2)

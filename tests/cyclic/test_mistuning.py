@@ -1,0 +1,139 @@
+"""Blades that differ: the whole wheel, exactly; Whitehead's bound; finite elements."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+import rom
+from cases.wheels import bladed_model, bladed_ring
+from rom.cyclic.blades.mistuning import whitehead
+from rom.errors import ConfigError, ModelError
+
+FORCE = np.array([0.0, 1.0, 0.0])
+SWEEP = {"engine_order": 3, "omega": np.linspace(5.4e3, 6.4e3, 201), "damping": 1e-3, "at": [1]}
+
+
+def spread(rng, shape, width=0.05):
+    return rng.uniform(-width, width, shape)
+
+
+def whole_wheel(ring, delta):
+    """Frequencies and modes of the wheel assembled with its own blades."""
+    K_j = [ring.K + d * ring.regions["blade"] for d in delta]
+    _, M, K = ring.wheel(K_j)
+    lam, Phi = eigh(K.toarray(), M.toarray())
+    return np.sqrt(lam), Phi
+
+
+@pytest.mark.parametrize("N", [2, 5, 8])
+def test_all_families_give_the_whole_wheel(N):
+    ring, delta = bladed_ring(N), spread(np.random.default_rng(N), N, 0.3)
+    exact, _ = whole_wheel(ring, delta)
+    omega, _ = rom.mistuned_wheel(ring, 2).modes(delta)
+    assert_allclose(omega, exact, rtol=1e-10)
+
+
+@pytest.mark.parametrize("order", [0, 2, 3, 11])
+def test_the_response_is_that_of_the_whole_wheel(order):
+    """Same modal damping, forces with the phase of the engine order on each blade."""
+    N, zeta = 8, 2e-3
+    ring, delta = bladed_ring(N), spread(np.random.default_rng(1), N, 0.1)
+    sweep = np.array([1.0e3, 5.7e3, 6.1e3, 6.3e3])
+    omega, Phi = whole_wheel(ring, delta)
+    phase = np.exp(1j * order * ring.angle * np.arange(N))
+    load = Phi.T @ np.kron(phase, FORCE[ring.free])
+    gap = omega**2 - sweep[:, None] ** 2 + 2j * zeta * sweep[:, None] * omega
+    exact = ((load / gap) @ Phi.T).reshape(len(sweep), N, -1)[:, :, list(ring.free).index(1)]
+    found = rom.mistuned_wheel(ring, 2).response(
+        delta, FORCE, engine_order=order, omega=sweep, damping=zeta, at=[1]
+    )
+    assert_allclose(found[:, :, 0], exact, rtol=1e-9, atol=1e-12 * abs(exact).max())
+
+
+def test_the_certificate_compares_with_a_wheel_of_other_blades():
+    """All blades 5 % stiffer or softer is again one sector, which is solved without the waves."""
+    wheel = rom.mistuned_wheel(bladed_ring(12), 2)
+    assert wheel.certificate.ok and len(wheel.certificate.rows) == 4
+    wrong = replace(wheel, blade=0.5 * wheel.blade).certificate
+    assert not wrong.ok
+
+
+def test_equal_blades_amplify_nothing():
+    wheel = rom.mistuned_wheel(bladed_ring(12), 2)
+    assert_allclose(wheel.amplification(np.zeros((2, 12)), FORCE, **SWEEP), [1.0, 1.0])
+    shifted = wheel.modes(np.full(12, 0.02))[0]
+    exact, _ = whole_wheel(bladed_ring(12, k_blade=1.02 * 4.3e5), np.zeros(12))
+    assert_allclose(shifted, exact, rtol=1e-10)
+
+
+def test_random_blades_amplify_up_to_whiteheads_bound():
+    N = 12
+    wheel = rom.mistuned_wheel(bladed_ring(N), 2)
+    factors = wheel.amplification(spread(np.random.default_rng(3), (400, N), 0.04), FORCE, **SWEEP)
+    assert factors.shape == (400,)
+    assert 1.3 < factors.max() < 1.02 * whitehead(N)
+    assert 1.0 < np.median(factors) < factors.max()
+    assert_allclose(whitehead(16), 2.5)
+
+
+def test_batches_and_norms_do_not_matter(monkeypatch):
+    wheel = rom.mistuned_wheel(bladed_ring(6), 2)
+    deltas = spread(np.random.default_rng(2), (7, 6))
+    whole = wheel.amplification(deltas, FORCE, **SWEEP)
+    monkeypatch.setattr("rom.cyclic.blades.mistuning.AT_ONCE", 1)
+    assert_allclose(wheel.amplification(deltas, FORCE, **SWEEP), whole, rtol=1e-12)
+    rows = np.array([[0.0, 0.6, 0.0], [0.0, 0.8, 0.0]])
+    assert_allclose(wheel.amplification(deltas, FORCE, **SWEEP | {"at": rows}), whole, rtol=1e-12)
+
+
+def test_wrong_arguments_are_named():
+    wheel = rom.mistuned_wheel(bladed_ring(6), 1)
+    with pytest.raises(ConfigError, match=r"6 numbers above -1"):
+        wheel.modes(np.zeros(5))
+    with pytest.raises(ConfigError, match=r"6 numbers above -1"):
+        wheel.modes(np.full(6, -1.5))
+    with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade'\]"):
+        rom.mistuned_wheel(bladed_ring(6), 1, blade="wing")
+    with pytest.raises(ConfigError, match=r"force has the shape \(2,\)"):
+        wheel.amplification(np.zeros(6), np.ones(2), **SWEEP)
+    with pytest.raises(ConfigError, match=r"damping = 0\.0 must be a positive"):
+        wheel.amplification(np.zeros(6), FORCE, **SWEEP | {"damping": 0.0})
+    with pytest.raises(ConfigError, match="does not move the tuned wheel"):
+        wheel.amplification(np.zeros(6), 0 * FORCE, **SWEEP)
+    weak = replace(wheel, blade=50 * wheel.blade)
+    with pytest.raises(ModelError, match="without stiffness"):
+        weak.modes(np.full(6, -0.9))
+
+
+@pytest.mark.fenicsx
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.filterwarnings("ignore:Number of integration points")
+def test_a_mistuned_wheel_of_finite_elements():
+    """Frequencies and peaks of the whole wheel within 1 %, from full and from reduced sectors."""
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    N, order, zeta = 6, 2, 2e-3
+    model = bladed_model(N, degree=1, cells=(4, 2, 3, 2))
+    sector = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))
+    delta = spread(np.random.default_rng(5), N, 0.08)
+    omega, Phi = whole_wheel(sector, delta)
+    tip = int(np.argmax(np.hypot(*model.points[:, :2].T)))
+    force = np.zeros(sector.n)
+    force[3 * tip + 2] = 1.0
+    sweep = np.linspace(0.94, 1.05, 600) * omega[N // 2]
+    load = Phi.T @ np.kron(np.exp(1j * order * sector.angle * np.arange(N)), force[sector.free])
+    gap = omega**2 - sweep[:, None] ** 2 + 2j * zeta * sweep[:, None] * omega
+    place = list(sector.free).index(3 * tip + 2)
+    exact = ((load / gap) @ Phi.T).reshape(len(sweep), N, -1)[:, :, place]
+    small = rom.reduce_sector(sector, n_modes=40, functions=rom.Polynomial(4))
+    for one, tolerance in ((sector, 1e-3), (small, 1e-2)):
+        wheel = rom.mistuned_wheel(one, 3)
+        assert_allclose(wheel.modes(delta)[0][: 2 * N], omega[: 2 * N], rtol=0.02 * tolerance)
+        f, rows = (force, [3 * tip + 2])
+        if one is small:
+            f, rows = small.Psi.T @ force, small.Psi[[3 * tip + 2]]
+        found = wheel.response(delta, f, engine_order=order, omega=sweep, damping=zeta, at=rows)
+        peaks = abs(found[:, :, 0]).max(axis=0)
+        assert_allclose(peaks, abs(exact).max(axis=0), rtol=tolerance)

@@ -1,0 +1,216 @@
+"""The doctor: right about what works, what is missing, what is slow, and what is left behind."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from cases.command import environment
+from cases.command import rom as command
+from rom.doctor.caches import damaged_files
+from rom.doctor.core import abilities, better
+from rom.doctor.libraries import PACKAGES, fenicsx
+from rom.doctor.machine import blas, light
+from rom.doctor.pictures import pictures
+
+OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
+REFERENCE = "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"
+WHEEL = "/x/site-packages/numpy.libs/libscipy_openblas64_-8fb3d286.so"
+MODULES = {"MPI": "mpi4py", "PETSc": "petsc4py", "SLEPc": "slepc4py", "dolfinx": "dolfinx",
+           "gmsh": "gmsh", "meshio": "meshio", "h5py": "h5py"}  # fmt: skip
+
+
+def examine(tmp_path, *options, fakes=None):
+    """Findings by name, exit code and stderr of a doctor that sees some fake modules."""
+    for name, text in (fakes or {}).items():
+        (tmp_path / f"{name}.py").write_text(text)
+    done = command("doctor", "--json", *options, env=environment(PYTHONPATH=str(tmp_path)))
+    assert done.stdout, done.stderr
+    found = {f["name"]: f for f in json.loads(done.stdout)["findings"]}
+    return found, done.returncode, done.stderr
+
+
+def test_the_doctor_is_right_about_this_machine_within_15_seconds(tmp_path):
+    start = time.perf_counter()
+    found, code, stderr = examine(tmp_path)
+    assert time.perf_counter() - start < 15
+    for name, module in MODULES.items():
+        there = importlib.util.find_spec(module) is not None
+        assert found[name]["state"] == ("ok" if there else "missing"), found[name]
+    there = importlib.util.find_spec("pyvista") is not None
+    assert found["pyvista"]["state"] == ("ok" if there else "missing")
+    assert (code, stderr) == (0, "")
+    for name in ("python", "numpy", "scipy", "numba", "library", "memory", "cores"):
+        assert found[name]["state"] in ("ok", "note")
+        assert found[name]["value"]
+
+
+@pytest.mark.fenicsx
+def test_versions_are_those_the_libraries_report(tmp_path):
+    dolfinx = pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    from petsc4py import PETSc
+
+    found, _, _ = examine(tmp_path)
+    assert found["dolfinx"]["value"] == dolfinx.__version__
+    version = ".".join(map(str, PETSc.Sys.getVersion()))
+    assert found["PETSc"]["value"].startswith(f"{version} (float64")
+    assert found["MUMPS"]["value"][0] in "56"
+
+
+def test_what_is_missing_is_named_with_the_line_to_type(tmp_path):
+    """Exit code 0: an environment without FEniCSx is a legal one."""
+    gone = [*MODULES.values(), "pyvista", "vtk"]
+    text = 'raise ModuleNotFoundError("No module named {0!r}", name={0!r})\n'
+    found, code, _ = examine(tmp_path, fakes={name: text.format(name) for name in gone})
+    assert code == 0
+    for name, package in PACKAGES.items():
+        assert found[name]["state"] == "missing"
+        assert found[name]["advice"] == f"sudo apt-get install {package}"
+    assert found["pyvista"]["state"] == "missing" and "pip install" in found["pyvista"]["advice"]
+
+
+def test_a_library_that_crashes_does_not_take_the_doctor_with_it(tmp_path):
+    found, code, stderr = examine(tmp_path, fakes={"gmsh": "import os\nos.abort()\n"})
+    assert code == 5
+    assert found["gmsh"]["state"] == "broken" and found["gmsh"]["value"] == "crashed (SIGABRT)"
+    assert "gmsh is broken: crashed" in stderr
+
+
+def test_a_library_for_another_numpy_gets_the_cure(tmp_path):
+    broken = "raise ValueError('numpy.dtype size changed, may indicate binary incompatibility')\n"
+    found, code, _ = examine(tmp_path, fakes={"h5py": broken})
+    assert code == 5
+    assert found["h5py"]["state"] == "broken" and '"numpy<1.25"' in found["h5py"]["advice"]
+
+
+def test_libraries_after_a_crash_are_not_called_missing():
+    found = {f.name: f for f in fenicsx({"MPI": {"version": "4"}}, "crashed (SIGSEGV)")}
+    assert found["MPI"].state == "ok"
+    assert found["dolfinx"].state == "broken" and found["dolfinx"].value == "crashed (SIGSEGV)"
+
+
+@pytest.mark.parametrize(
+    ("mapped", "state"),
+    [([OPENBLAS], "ok"), ([REFERENCE], "note"), ([WHEEL], "ok"), ([WHEEL, REFERENCE], "note"),
+     (["/usr/lib/x86_64-linux-gnu/libmkl_rt.so"], "ok")],
+)  # fmt: skip
+def test_the_slow_reference_blas_is_told_from_fast_ones(mapped, state):
+    """With NumPy from a wheel it is PETSc's BLAS that counts."""
+    library, *_, speed = blas(["/usr/lib/libc.so.6", *mapped])
+    assert library.state == state
+    assert ("libopenblas0-pthread" in library.advice) == (state == "note")
+    assert float(speed.value.split()[0]) > 0.1
+
+
+def test_blas_of_this_process_is_found():
+    library, *_ = blas([])
+    assert "not found" not in library.value
+
+
+@pytest.mark.parametrize(
+    ("core", "flags", "wanted"),
+    [("Prescott", "sse2 avx2 fma avx512f avx512bw avx512dq avx512vl", "SkylakeX"),
+     ("Prescott", "sse2 avx2 fma avx512f", "Haswell"), ("Prescott", "sse2", ""),
+     ("Zen", "sse2 avx2 fma", ""), ("", "sse2 avx2 fma", "")],
+)  # fmt: skip
+def test_a_processor_that_openblas_does_not_know_is_named(core, flags, wanted):
+    assert better(core, set(flags.split())) == wanted
+
+
+def test_the_abilities_of_a_processor_are_read_from_its_first_core(tmp_path):
+    told = tmp_path / "cpuinfo"
+    told.write_text("processor\t: 0\nflags\t\t: fpu avx2\n\nprocessor\t: 1\nflags\t\t: fma\n")
+    assert abilities(told) == {"fpu", "avx2"}
+    assert abilities(tmp_path / "nothing") == set()
+
+
+def test_a_mistaken_openblas_is_reported_with_its_cure(monkeypatch):
+    from rom.doctor import machine
+
+    monkeypatch.setattr(machine, "taken_for", lambda: "Prescott")
+    monkeypatch.setattr(machine, "abilities", lambda: {"avx2", "fma"})
+    note = next(finding for finding in blas([OPENBLAS]) if finding.name == "processor")
+    assert (note.state, note.advice[-7:]) == ("note", "Haswell")
+
+
+def test_a_missing_light_library_is_essential(monkeypatch):
+    from importlib.metadata import PackageNotFoundError
+
+    def version(name):
+        if name == "numba":
+            raise PackageNotFoundError(name)
+        return "1.0"
+
+    monkeypatch.setattr("rom.doctor.machine.version", version)
+    states = {f.name: f.state for f in light()}
+    assert states["numba"] == "broken" and states["numpy"] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("picture", "ending", "state"),
+    [({"window": "vtkEGLRenderWindow", "contrast": 50.0, "seconds": 1.0}, "", "ok"),
+     ({"window": "vtkEGLRenderWindow", "contrast": 0.0, "seconds": 1.0}, "", "broken"),
+     (None, "crashed (SIGSEGV)", "broken")],
+)  # fmt: skip
+def test_a_blank_picture_or_a_crash_is_a_broken_display(picture, ending, state):
+    answers = {"pyvista": {"version": "1"}, "vtk": {"version": "9"}}
+    found = pictures(answers | ({"picture": picture} if picture else {}), ending)
+    assert found[-1].name == "drawing off-screen" and found[-1].state == state
+
+
+def old(path, data=b"x", age=3600):
+    path.write_bytes(data)
+    then = time.time() - age
+    os.utime(path, (then, then))
+    return path
+
+
+@pytest.mark.fenicsx
+def test_forms_left_by_a_killed_compilation_are_found_and_removed(tmp_path):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    cache = tmp_path / "fenics"
+    cache.mkdir()
+    stale = old(cache / "libffcx_forms_dead.c")
+    done = old(cache / "libffcx_forms_done.c")
+    old(cache / "libffcx_forms_done.c.cached")
+    young = old(cache / "libffcx_forms_young.c", age=0)
+    settings = environment(XDG_CACHE_HOME=str(tmp_path))
+
+    def forms(*options):
+        found = json.loads(command("doctor", "--json", *options, env=settings).stdout)["findings"]
+        return next(f for f in found if f["name"] == "compiled forms")
+
+    first = forms()
+    assert first["state"] == "note" and first["value"] == f"1 damaged files, e.g. {stale}"
+    assert first["advice"] == "rom doctor --fix" and stale.exists()
+    young.unlink()
+    assert "1 damaged files removed" in forms("--fix")["value"]
+    assert not stale.exists() and done.exists()
+    assert forms()["state"] == "ok"
+
+
+def test_half_written_files_of_numba_are_found(tmp_path):
+    """A real cache, then its files cut, emptied, or left as temporary ones."""
+    numba = pytest.importorskip("numba")
+    source = tmp_path / "compiled.py"
+    source.write_text(
+        "import numba\n@numba.njit(cache=True)\ndef f(x):\n    return x + 1\nf(1.0)\n"
+    )
+    subprocess.run([sys.executable, source], check=True, timeout=60,
+                   env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)})  # fmt: skip
+    made = sorted(tmp_path.rglob("*.nb[ic]"))
+    assert len(made) == 2, numba.__version__
+    assert not list(damaged_files(tmp_path))
+    for path in made:
+        whole = path.read_bytes()
+        for part in (whole[:-1], whole[: len(whole) // 2], b""):
+            path.write_bytes(part)
+            assert list(damaged_files(tmp_path)) == [path]
+        path.write_bytes(whole)
+    left = old(tmp_path / "f.1.nbc.tmp.0a1b")
+    (tmp_path / "g.1.nbc.tmp.0a1c").write_bytes(b"")
+    assert list(damaged_files(tmp_path)) == [left]

@@ -1,0 +1,184 @@
+"""The operator verbs: one test file over both implementations."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+from scipy.sparse import csr_matrix, random
+
+from cases.operators import KINDS
+from cases.solid import block
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import count_shift, mac, orthonormal
+from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
+
+
+@pytest.fixture(scope="module")
+def model():
+    return block(cells=(12, 3, 2), origin=(0.4, 0.1, 0.0))
+
+
+@pytest.fixture(scope="module")
+def exact(model):
+    return eigh(model.K.toarray(), model.M.toarray())
+
+
+@pytest.fixture(params=KINDS)
+def make(request):
+    return request.param
+
+
+def test_products_and_gram(make, model):
+    ops, X = make(model), np.random.default_rng(0).normal(size=(model.n_dofs, 5))
+    assert_allclose(ops.apply_K(X), model.K @ X, rtol=1e-12, atol=1e-3)
+    assert_allclose(ops.apply_M(X), model.M @ X, rtol=1e-12)
+    assert_allclose(ops.gram(X, X), X.T @ X, rtol=1e-12)
+    assert_allclose(ops.rows(X, [7, 3]), X[[7, 3]])
+
+
+def test_held_solve_is_the_inverse_of_the_submatrix(make, model):
+    ops, held = make(model), model.interfaces["root"].dofs
+    F = np.random.default_rng(1).normal(size=(model.n_dofs, 40))  # more than one block
+    X = ops.hold(held)(F)
+    free = np.setdiff1d(np.arange(model.n_dofs), held)
+    expected = np.linalg.solve(model.K.toarray()[np.ix_(free, free)], F[free])
+    assert_allclose(X[free], expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
+    assert not X[held].any()
+
+
+def test_held_modes_are_those_of_the_submatrix(make, model):
+    ops, held = make(model), model.interfaces["root"].dofs
+    free = np.setdiff1d(np.arange(model.n_dofs), held)
+    K, M = (A.toarray()[np.ix_(free, free)] for A in (model.K, model.M))
+    expected = np.sqrt(eigh(K, M, eigvals_only=True)[:9])
+    omega, Phi = ops.modes(ops.hold(held), 9)
+    assert_allclose(omega, expected, rtol=1e-9)
+    assert_allclose(Phi.T @ (model.M @ Phi), np.eye(9), atol=1e-9)
+    assert_allclose(ops.modes(held, 9)[0], omega, rtol=1e-12)
+    assert np.all(Phi.max(axis=0) >= -Phi.min(axis=0) * (1 - 1e-6))
+
+
+def test_free_modes_begin_with_six_exact_zeros(make, model, exact):
+    omega, Phi = make(model).modes((), 14)
+    assert_allclose(omega[:6], 0.0, atol=0.0)
+    assert_allclose(omega[6:], np.sqrt(exact[0][6:14]), rtol=1e-9)
+    assert_allclose(Phi.T @ (model.M @ Phi), np.eye(14), atol=1e-8)
+
+
+@pytest.mark.parametrize("shift", [1e-2, 1.0, 30.0])
+def test_no_shift_loses_a_mode(make, model, exact, shift):
+    """Shift-invert without deflation loses rigid modes at large shifts and reports convergence."""
+    omega, _ = make(model).modes((), 10, sigma=-shift * exact[0][6])
+    assert_allclose(omega[6:], np.sqrt(exact[0][6:10]), rtol=1e-8)
+
+
+def test_a_mode_that_was_skipped_is_noticed(make, model, monkeypatch):
+    """The solver is made to overlook one mode; the inertia count must tell."""
+    ops = make(model)
+    if isinstance(ops, SciPyOperators):
+        import rom.eigen.scipy as module
+
+        whole = module.eigsh
+
+        def forgetful(*args, **kwargs):
+            lam, Phi = whole(*args, **kwargs)
+            keep = np.delete(np.argsort(lam), 2)
+            return lam[keep], Phi[:, keep]
+
+        monkeypatch.setattr(module, "eigsh", forgetful)
+    else:
+        whole_petsc = type(ops).lowest
+
+        def forgetful_petsc(self, *args, **kwargs):
+            lam, Phi = whole_petsc(self, *args, **kwargs)
+            return np.delete(lam, 2), np.delete(Phi, 2, axis=1)
+
+        monkeypatch.setattr(type(ops), "lowest", forgetful_petsc)
+    root = model.interfaces["root"].dofs
+    for held in (root, ops.hold(root), ()):
+        with pytest.raises(
+            ModesMissedError, match=r"modes were found below .* Hz, but the inertia"
+        ):
+            ops.modes(held, 12)
+
+
+def test_new_coordinates_transform_both_matrices(make, model):
+    ops = make(model)
+    T = csr_matrix(random(model.n_dofs, 50, density=0.1, random_state=3))
+    small = ops.transform(T, np.zeros((50, 6)))
+    A = np.random.default_rng(2).normal(size=(50, 4))
+    assert_allclose(small.expand(A), T @ A, atol=1e-12)
+    assert_allclose(small.apply_M(A), T.T @ (model.M @ (T @ A)), atol=1e-10)
+    assert_allclose(small.apply_K(A), T.T @ (model.K @ (T @ A)), rtol=1e-9, atol=1e-2)
+
+
+def test_more_mass_is_added(make, model):
+    dM = csr_matrix(([2.0], ([5], [5])), shape=(model.n_dofs,) * 2)
+    X = np.eye(model.n_dofs, 8)
+    change = make(model).plus_mass(dM).apply_M(X) - model.M @ X
+    assert_allclose(change[5, 5], 2.0)
+    assert_allclose(np.abs(change).sum(), 2.0)
+
+
+def test_all_dofs_held_leaves_nothing_to_solve(make, model):
+    ops = make(model)
+    held = ops.hold(np.arange(model.n_dofs))
+    assert held.n_free == 0
+    assert not held(np.ones((model.n_dofs, 2))).any()
+    omega, Phi = ops.modes(held, 0)
+    assert omega.size == 0
+    assert Phi.shape == (model.n_dofs, 0)
+
+
+def test_a_hinge_is_not_a_support(make, model):
+    """Two held nodes leave the rotation about their line free."""
+    nodes = model.interfaces["root"].nodes[:2]
+    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    with pytest.raises(InterfaceError, match="the 6 boundary dofs leave a rigid motion free"):
+        make(model).hold(dofs)
+
+
+def test_two_separate_bodies_are_a_mechanism(make, model):
+    from scipy.sparse import block_diag
+
+    import rom
+
+    two = rom.FEModel(
+        block_diag([model.K, model.K], "csr"),
+        block_diag([model.M, model.M], "csr"),
+        np.vstack([model.points, model.points + np.array([0.0, 5.0, 0.0])]),
+    )
+    with pytest.raises(ModelError, match="more motions without stiffness than the six"):
+        make(two).modes((), 9)
+
+
+def test_messages_for_too_many_modes_and_broken_numbers(make, model):
+    ops = make(model)
+    with pytest.raises(ConfigError, match="interior dofs; ask for 0 to"):
+        ops.modes(model.interfaces["root"].dofs, 10**5)
+    with pytest.raises(ConfigError, match="boundary dof 9999999 is outside"):
+        ops.hold([9999999])
+    import rom
+
+    M = model.M.copy()
+    M.data[4] = np.nan
+    with pytest.raises(SolverError, match="M has an entry that is not finite"):
+        make(rom.FEModel(model.K, M, model.points))
+
+
+def test_the_count_is_made_in_the_widest_gap():
+    lam = np.array([1.0, 4.0, 4.0 + 1e-9, 4.1, 9.0])
+    assert count_shift(lam, 2) == (4, 6.55)
+    assert count_shift(lam, 1) == (4, 6.55) or count_shift(lam, 1) == (1, 2.5)
+
+
+def test_mac_is_one_for_equal_and_zero_for_other_modes(make, model, exact):
+    ops, Phi = make(model), exact[1][:, 6:9]
+    assert_allclose(mac(ops, Phi, -3.0 * Phi), np.eye(3), atol=1e-9)
+
+
+def test_rigid_motions_far_from_the_origin_stay_orthonormal(make):
+    far = block(cells=(2, 1, 1), origin=(1e4, -1e4, 1e4))
+    ops = make(far)
+    R = orthonormal(ops, ops.rigid)
+    assert_allclose(R.T @ (far.M @ R), np.eye(6), atol=1e-9)

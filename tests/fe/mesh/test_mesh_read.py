@@ -1,0 +1,272 @@
+"""Reading and making meshes through gmsh: formats, names, parameters, provenance."""
+
+import hashlib
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from cases.files.cells import blocks_of, solid, write_msh
+from cases.measures import areas
+from cases.paths import ROOT
+from rom.errors import ConfigError, RomWarning, TagError
+from rom.fe.mesh.quality import scaled_jacobian
+from rom.fe.mesh.read import read_mesh
+
+gmsh = pytest.importorskip("gmsh", reason="gmsh is not installed")
+pytestmark = pytest.mark.fenicsx
+
+MESHES = ROOT / "meshes"
+TWO_BODIES = """
+SetFactory("OpenCASCADE");
+Box(1) = {0, 0, 0, 1, 1, 1};
+Box(2) = {1, 0, 0, 1, 1, 1};
+Coherence;
+Physical Volume("steel", 7) = {1};
+Physical Volume("liner", 3) = {2};
+Physical Surface("root", 11) = Surface In BoundingBox{-0.1, -0.1, -0.1, 0.1, 1.1, 1.1};
+Physical Surface("skin", 12) = Surface In BoundingBox{-0.1, -0.1, -0.1, 2.1, 1.1, 0.1};
+Physical Surface("both", 13) = {Surface In BoundingBox{-0.1, -0.1, -0.1, 0.1, 1.1, 1.1},
+  Surface In BoundingBox{-0.1, -0.1, -0.1, 2.1, 1.1, 0.1}};
+Mesh.MeshSizeMin = 0.5; Mesh.MeshSizeMax = 0.5;
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The same two-body mesh in all versions of .msh, and a box in STEP."""
+    folder = tmp_path_factory.mktemp("meshes")
+    (folder / "two.geo").write_text(TWO_BODIES)
+    gmsh.initialize([], False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.Algorithm3D", 1)
+        gmsh.open(str(folder / "two.geo"))
+        gmsh.model.mesh.generate(3)
+        for version in (2.2, 4.1):
+            for binary in (0, 1):
+                gmsh.option.setNumber("Mesh.MshFileVersion", version)
+                gmsh.option.setNumber("Mesh.Binary", binary)
+                gmsh.write(str(folder / f"{version}-{binary}.msh"))
+        gmsh.clear()
+        gmsh.model.occ.addBox(0, 0, 0, 100, 20, 10)  # STEP from here is in millimetres
+        hole = gmsh.model.occ.addCylinder(50, 10, 0, 0, 0, 10, 4)
+        gmsh.model.occ.cut([(3, 1)], [(3, hole)])
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(folder / "plate.step"))
+    finally:
+        gmsh.finalize()
+    return folder
+
+
+def volumes(mesh):
+    """Volume of each region of straight tetrahedra."""
+    a, b, c, d = np.moveaxis(mesh.points[mesh.corners], 1, 0)
+    volume = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
+    return {name: volume[mesh.regions == tag].sum() for tag, name in mesh.region_names.items()}
+
+
+@pytest.mark.parametrize("name", ["two.geo", "2.2-0.msh", "2.2-1.msh", "4.1-0.msh", "4.1-1.msh"])
+def test_every_version_gives_the_same_regions_and_overlapping_surfaces(folder, name):
+    """dolfinx's own reader keeps one tag of a facet in two groups, in silence."""
+    mesh = read_mesh(folder / name)
+    assert mesh.region_names == {7: "steel", 3: "liner"}
+    assert volumes(mesh) == pytest.approx({"steel": 1.0, "liner": 1.0}, rel=1e-12)
+    assert areas(mesh) == pytest.approx({"root": 1.0, "skin": 2.0, "both": 3.0}, rel=1e-12)
+    assert mesh.warnings == ()
+
+
+def test_a_geometry_gives_the_same_mesh_every_time(folder):
+    first, second = read_mesh(folder / "two.geo"), read_mesh(folder / "two.geo")
+    assert_array_equal(first.points, second.points)
+    assert_array_equal(first.cells, second.cells)
+
+
+def test_provenance_tells_file_parameters_and_version():
+    path = MESHES / "beam.geo"
+    mesh = read_mesh(path, parameters={"L": 0.5})
+    assert mesh.provenance["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert mesh.provenance["path"] == str(path)
+    assert mesh.provenance["parameters"]["L"] == 0.5
+    assert mesh.provenance["parameters"]["h"] == 0.03  # a default
+    assert mesh.provenance["gmsh"].startswith("4.")
+    assert np.ptp(mesh.points[:, 0]) == pytest.approx(0.5)
+
+
+def test_scale_turns_millimetres_into_metres(folder):
+    mesh = read_mesh(folder / "4.1-0.msh", scale=1e-3)
+    assert volumes(mesh)["steel"] == pytest.approx(1e-9, rel=1e-12)
+    assert mesh.size == pytest.approx(1e-3 * np.sqrt(6.0))
+    assert mesh.provenance["scale"] == 1e-3
+
+
+def test_order_two_puts_the_mid_side_nodes_on_the_curved_surface():
+    """The middle of a straight edge lies up to 1 % of the radius inside the crank pin."""
+    radius = 0.015
+    straight = read_mesh(MESHES / "crank.geo")
+    edges = straight.points[straight.facets["pin"][:, :2]].mean(axis=1)
+    assert np.hypot(*(edges[:, :2] - (0.04, 0.0)).T).min() < 0.99 * radius
+    curved = read_mesh(MESHES / "crank.geo", order=2)
+    nodes = curved.points[np.unique(curved.facets["pin"])]
+    assert curved.cell_type == "tet10"
+    assert_allclose(np.hypot(*(nodes[:, :2] - (0.04, 0.0)).T), radius, rtol=1e-9)
+
+
+@pytest.mark.parametrize("start", [1, 0, 10**6])
+def test_node_numbers_with_gaps_give_the_same_mesh(tmp_path, start):
+    """dolfinx takes the numbers for positions: wrong coordinates, or a crash."""
+    mesh = solid()
+    ids = start + 3 * np.arange(len(mesh.points)) + 7
+    blocks, names = blocks_of(mesh)
+    found = read_mesh(write_msh(tmp_path / "gaps.msh", mesh.points, blocks, names, ids))
+    assert_allclose(found.points, mesh.points)
+    assert_array_equal(found.cells, mesh.cells)
+    assert_array_equal(found.facets["tip"], mesh.facets["tip"])
+
+
+def test_cells_keep_their_numbers_in_the_file(tmp_path):
+    mesh = solid()
+    blocks, names = blocks_of(mesh)
+    blocks = blocks[::-1]  # facets first: the cells start at 17
+    found = read_mesh(write_msh(tmp_path / "box.msh", mesh.points, blocks, names))
+    assert found.cell_ids.min() == 17 and found.cell_ids.max() == 16 + len(mesh.cells)
+
+
+def test_no_physical_groups_is_one_region_and_a_warning(tmp_path):
+    mesh = solid()
+    path = write_msh(tmp_path / "plain.msh", mesh.points, [("tet4", 0, 1, mesh.cells)])
+    with pytest.warns(RomWarning, match="no physical volume is named"):
+        found = read_mesh(path)
+    assert found.region_names == {1: "body"} and set(found.regions) == {1}
+    assert "plain.msh" not in found.warnings[0] and len(found.warnings) == 1
+
+
+def test_physical_curves_are_ignored_with_a_warning(tmp_path):
+    (tmp_path / "c.geo").write_text(TWO_BODIES + 'Physical Curve("edge", 5) = {1};\n')
+    with pytest.warns(RomWarning, match="physical curve 'edge' is ignored"):
+        read_mesh(tmp_path / "c.geo")
+
+
+def test_user_settings_do_not_change_the_mesh(folder, tmp_path, monkeypatch):
+    """gmsh reads .gmshrc of the home folder unless told not to."""
+    (tmp_path / ".gmshrc").write_text("Mesh.MeshSizeFactor = 0.3;\n")
+    (tmp_path / ".gmsh-options").write_text("Mesh.MeshSizeFactor = 0.3;\n")
+    before = read_mesh(folder / "two.geo")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert len(read_mesh(folder / "two.geo").cells) == len(before.cells)
+
+
+def test_a_short_parameter_name_finds_the_long_one(tmp_path):
+    named = 'DefineConstant[q = {1, Name "Geometry/q"}];\nBox(2) = {1, 0, 0, q'
+    text = TWO_BODIES.replace("Box(2) = {1, 0, 0, 1", named)
+    (tmp_path / "named.geo").write_text(text.replace("2.1, 1.1, 0.1", "q + 1.1, 1.1, 0.1"))
+    mesh = read_mesh(tmp_path / "named.geo", parameters={"q": 3.0})
+    assert np.ptp(mesh.points[:, 0]) == pytest.approx(4.0)
+
+
+BUILDER = """
+def build(gmsh, length=1.0, *, lc=0.5):
+    gmsh.model.occ.addBox(0, 0, 0, length, 1, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.setPhysicalName(3, gmsh.model.addPhysicalGroup(3, [1]), "body")
+    gmsh.model.setPhysicalName(2, gmsh.model.addPhysicalGroup(2, [1]), "root")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", lc)
+"""
+
+
+def test_a_builder_gets_its_parameters(tmp_path):
+    (tmp_path / "bar.py").write_text(BUILDER)
+    mesh = read_mesh(tmp_path / "bar.py", parameters={"length": 2.0}, trust=True)
+    assert volumes(mesh) == pytest.approx({"body": 2.0})
+    assert areas(mesh) == pytest.approx({"root": 1.0})
+    assert mesh.provenance["parameters"] == {"length": 2.0, "lc": 0.5}
+
+
+def test_step_is_read_in_metres_and_faces_are_picked(folder):
+    faces = {
+        "left": (0.0, 0.01, 0.005),  # a point on the face
+        "bore": (0.046, 0.0101, 0.0049),  # a point near the cylinder
+        "ends": [[-1e-3, -1e-3, -1e-3, 1e-3, 0.03, 0.02], [0.1, 0.011, 0.004]],  # a box, a point
+    }
+    mesh = read_mesh(folder / "plate.step", parameters={"lc": 0.004}, faces=faces)
+    assert_allclose(np.ptp(mesh.points, axis=0), (0.1, 0.02, 0.01), rtol=1e-6)
+    found = areas(mesh)
+    assert found["left"] == pytest.approx(2e-4, rel=1e-9)
+    assert found["ends"] == pytest.approx(4e-4, rel=1e-9)
+    assert found["bore"] == pytest.approx(2 * np.pi * 0.004 * 0.01, rel=0.05)
+    assert mesh.region_names == {1: "body"} and mesh.warnings == ()
+
+
+@pytest.mark.parametrize(("lc", "culprit"), [(1e-6, "lc = 1e-06 m"), (0, "lc = 0"), ("a", "'a'")])
+def test_impossible_element_size_is_refused(folder, lc, culprit):
+    """Metres and millimetres mixed up would mesh for hours."""
+    with pytest.raises(ConfigError) as caught:
+        read_mesh(folder / "plate.step", parameters={"lc": lc})
+    assert culprit in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("face", "culprit"),
+    [
+        ((1.0, 1.0, 1.0), "the nearest face is"),
+        ((0.0, 0.0, 0.005), "equally near"),
+        (99, "no face at 99"),
+        ([0, 0, 0, 1e-5, 1e-5, 1e-5], "no face at"),
+        ((1.0, 2.0), "a point (3) or a box (6)"),
+        ("left", "a point (3) or a box (6)"),
+    ],
+)
+def test_a_face_that_is_not_there_is_named(folder, face, culprit):
+    with pytest.raises((TagError, ConfigError)) as caught:
+        read_mesh(folder / "plate.step", faces={"pin": face})
+    assert "'pin'" in str(caught.value) and culprit in str(caught.value)
+
+
+def test_faces_named_in_the_step_file_are_found(folder, tmp_path):
+    """gmsh does not read these names; the bore is the seventh face, x = 0 the first."""
+    parts = (folder / "plate.step").read_text().split("ADVANCED_FACE(''")
+    text = parts[0]
+    for number, part in enumerate(parts[1:], 1):
+        text += f"ADVANCED_FACE('{({1: 'left', 7: 'bore'}).get(number, '')}'" + part
+    (tmp_path / "named.step").write_text(text)
+    mesh = read_mesh(tmp_path / "named.step", parameters={"lc": 0.004})
+    assert set(mesh.facets) == {"left", "bore"}
+    assert areas(mesh)["left"] == pytest.approx(2e-4, rel=1e-9)
+    r = np.hypot(*(mesh.points[np.unique(mesh.facets["bore"]), :2] - (0.05, 0.01)).T)
+    assert_allclose(r, 0.004, rtol=1e-6)
+
+
+def test_hexahedra_of_both_orders():
+    for order, kind, nodes in ((1, "hex8", 5 * 3 * 3), (2, "hex27", 9 * 5 * 5)):
+        mesh = read_mesh(MESHES / "beam.geo", parameters={"hex": 1, "nx": 4}, order=order)
+        assert (mesh.cell_type, len(mesh.cells), len(mesh.points)) == (kind, 16, nodes)
+        assert scaled_jacobian(mesh).min() > 0
+
+
+def test_reading_is_silent(capfd, folder):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_mesh(folder / "two.geo")
+        read_mesh(folder / "plate.step")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "culprit"),
+    [
+        ({"parameters": {"lcc": 1.0}}, "no parameter 'lcc'"),
+        ({"parameters": {"L": np.nan}}, "'L'"),
+        ({"parameters": {"L": [1.0]}}, "'L'"),
+        ({"parameters": {"L": object()}}, "numbers or text"),
+        ({"order": 3}, "order=3"),
+        ({"scale": -1.0}, "scale=-1.0"),
+        ({"faces": {"pin": (0, 0, 0)}}, "'pin'"),
+    ],
+)
+def test_wrong_options_are_refused(options, culprit):
+    with pytest.raises(ConfigError) as caught:
+        read_mesh(MESHES / "beam.geo", **options)
+    assert culprit in str(caught.value)
+    if "lcc" in culprit:
+        assert "['L', 'b', 'h', 'hex', 'lc', 'nx', 'ny', 'nz']" in str(caught.value)

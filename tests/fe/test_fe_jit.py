@@ -1,0 +1,114 @@
+"""The cache of compiled forms survives killed runs, read-only folders and planted options."""
+
+import os
+import time
+
+import pytest
+
+from cases.command import environment
+from rom.errors import RomWarning
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = pytest.mark.fenicsx
+
+from mpi4py import MPI  # noqa: E402
+
+from rom.fe import jit  # noqa: E402
+
+NAME = "libffcx_forms_0123456789abcdef0123456789abcdef01234567"
+
+
+def test_what_a_killed_compilation_left_is_removed(tmp_path):
+    finished, killed = tmp_path / f"{NAME}a.c", tmp_path / f"{NAME}b.c"
+    for source in (finished, killed):
+        source.write_text("int x;")
+    finished.with_suffix(".c.cached").write_text("")
+    long_ago = time.time() - 3600
+    os.utime(killed, (long_ago, long_ago))
+    assert jit.clear_stale_cache(tmp_path) == [killed]
+    assert finished.exists()
+    assert not killed.exists()
+
+
+def test_a_compilation_under_way_is_waited_for(tmp_path):
+    source = tmp_path / f"{NAME}.c"
+    source.write_text("int x;")
+    start = time.perf_counter()
+    assert jit.clear_stale_cache(tmp_path, age=0.5) == [source]
+    assert time.perf_counter() - start > 0.3
+
+
+def test_a_form_whose_compilation_was_killed_is_compiled_again(tmp_path, monkeypatch):
+    """Without the clearing, dolfinx waits for the library and gives up."""
+    import ufl
+
+    from cases.boxes import box
+    from rom.fe.compat import assemble_matrix, lagrange
+
+    monkeypatch.setattr(jit, "cache_directory", lambda: tmp_path)
+    mesh, _ = box(cells=(1, 1, 1))
+    with jit.compiling(MPI.COMM_SELF):
+        V = lagrange(mesh, 1)
+        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+        first = assemble_matrix(u[2] * v[2] * ufl.dx).norm()
+    sources = list(tmp_path.glob("libffcx_forms_*.c"))
+    assert sources
+    for source in sources:
+        source.with_suffix(".c.cached").unlink()
+        os.utime(source, (1e9, 1e9))
+    with jit.compiling(MPI.COMM_SELF):
+        assert assemble_matrix(u[2] * v[2] * ufl.dx).norm() == first
+
+
+@pytest.mark.parametrize(
+    "name", ["dolfinx_jit_parameters.json", "dolfinx_jit_options.json", "ffcx_parameters.json",
+             "ffcx_options.json"],
+)  # fmt: skip
+def test_option_files_of_the_working_folder_are_not_read(tmp_path, name):
+    """Not even as JSON; in a process of its own, for dolfinx keeps what it has read once."""
+    import subprocess
+    import sys
+
+    (tmp_path / name).write_text("no JSON")
+    code = (
+        "from rom.fe import jit; import dolfinx.jit, ffcx\n"
+        "from mpi4py import MPI\n"
+        "with jit.compiling(MPI.COMM_SELF): pass\n"
+        "for module in (dolfinx.jit, ffcx):\n"
+        "    for get in ('get_parameters', 'get_options'): getattr(module, get, dict)()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment(),
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_cache_that_cannot_be_written_is_replaced(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    monkeypatch.setattr(jit, "cache_directory", lambda: blocked / "fenics")
+    with pytest.warns(RomWarning, match="cannot be written"):
+        path = jit.usable_cache()
+    assert path.is_dir()
+
+
+def test_a_missing_library_is_named_with_its_package(monkeypatch):
+    import sys
+
+    import rom.fe
+    from rom.errors import ConfigError
+
+    for name in ("elasticity", "region"):
+        monkeypatch.delitem(sys.modules, f"rom.fe.{name}", raising=False)
+    monkeypatch.setitem(sys.modules, "ufl", None)
+    with pytest.raises(ConfigError, match=r"import of ufl halted.*apt-get install python3-dolfinx"):
+        rom.fe.model("rod.geo", material=None)
+    monkeypatch.undo()
+
+
+def test_asking_for_rom_fe_starts_no_mpi():
+    """The process that runs gmsh imports from this package under mpirun."""
+    import subprocess
+    import sys
+
+    code = "import rom.fe.mesh, sys; sys.exit('mpi4py' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

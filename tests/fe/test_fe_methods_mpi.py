@@ -1,0 +1,39 @@
+"""Every method gives the same frequencies on one, two and three processes."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from cases.paths import RANKS, ROOT
+from cases.ranks.environment import ENVIRONMENT
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
+SCRIPT = RANKS / "methods_under_mpi.py"
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    folder, frequencies = tmp_path_factory.mktemp("methods"), {}
+    for n in (1, 2, 3):
+        file = folder / f"{n}.json"
+        done = subprocess.run(
+            ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, str(SCRIPT), str(file)],
+            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
+            cwd=ROOT,
+        )  # fmt: skip
+        assert file.exists(), done.stderr
+        frequencies[n] = json.loads(file.read_text())
+    return frequencies
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_every_method_is_blind_to_the_number_of_processes(found, n):
+    assert len(found[1]) == 14
+    for name, one in found[1].items():
+        many = np.array(found[n][name])
+        assert len(one) >= 4, name
+        assert many == pytest.approx(np.array(one), rel=1e-9), name

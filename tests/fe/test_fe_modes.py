@@ -1,0 +1,221 @@
+"""Factorisation, shifts, counts and refusals of the PETSc operators."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+import rom
+from cases.boxes import box, faces_held
+from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, ResourceError
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = pytest.mark.fenicsx
+
+from rom.fe.elasticity import assemble  # noqa: E402
+from rom.fe.operators import lanczos, memory, petsc, spectrum  # noqa: E402
+
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+
+
+def beam(cells=(10, 2, 2), size=(1.0, 0.1, 0.08), degree=1):
+    mesh, tags = box(size, cells)
+    return assemble(mesh, None, tags, material=STEEL, degree=degree)
+
+
+@pytest.fixture(scope="module")
+def small():
+    return beam()
+
+
+@pytest.fixture(scope="module")
+def exact(small):
+    return eigh(small.K.toarray(), small.M.toarray(), eigvals_only=True)
+
+
+@pytest.mark.parametrize("shift", [-1e4, -1e6, -2.6e7, -1e8])
+def test_the_297_dof_beam_keeps_its_six_rigid_motions(small, exact, shift, monkeypatch):
+    """Without deflation Krylov-Schur finds 5, 3 or 2 of the six at these shifts, and is content."""
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    assert small.n_dofs == 297
+    omega, _ = small.operators.modes((), 8, sigma=shift)
+    assert_allclose(omega[:6], 0.0, atol=0.0)
+    assert_allclose(omega[6:] ** 2, exact[6:8], rtol=1e-8)
+
+
+@pytest.mark.parametrize(("sigma", "count"), [(1e3, 6), (3e7, 8), (1e9, 14)])
+def test_inertia_counts_the_modes_below_a_shift(small, exact, sigma, count):
+    """The counts of the dense solver; K - sigma M is indefinite."""
+    count = int(np.count_nonzero(exact < sigma))
+    assert small.operators.indefinite(sigma).negative_pivots() == count
+
+
+def test_free_modes_are_those_of_the_dense_solver_and_clean(monkeypatch):
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    model = beam((12, 3, 2))
+    lam = eigh(model.K.toarray(), model.M.toarray(), eigvals_only=True)
+    omega, Phi = model.operators.modes((), 20)
+    assert_allclose(omega[6:] ** 2, lam[6:20], rtol=1e-9)
+    assert_allclose(Phi.T @ (model.M @ Phi), np.eye(20), atol=1e-9)
+    rest = model.K @ Phi - (model.M @ Phi) * omega**2
+    assert np.linalg.norm(rest, axis=0)[6:].max() < 1e-7 * np.linalg.norm(model.K @ Phi[:, 6:])
+
+
+def test_a_restart_of_the_krylov_space_loses_nothing(monkeypatch):
+    model = beam((14, 4, 3))
+    held = model.operators.hold(model.interfaces["x0"].dofs)
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    expected, _ = model.operators.modes(held, 30)
+    monkeypatch.setattr(lanczos, "MAX_EXTRA_BLOCKS", 6)
+    found, _ = model.operators.modes(held, 30)
+    assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_slepc_and_our_block_lanczos_find_the_same_modes(monkeypatch):
+    """Dofs held go to SLEPc, a stiffness factored before to blocks; shapes and signs agree."""
+    model, called = beam((14, 4, 3)), []
+    for name in ("krylov_schur", "BlockLanczos"):
+        real = getattr(petsc, name)
+        monkeypatch.setattr(petsc, name, lambda *a, _n=name, _r=real: called.append(_n) or _r(*a))
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    dofs = model.interfaces["x0"].dofs
+    omega, Phi = model.operators.modes(dofs, 25)
+    block_omega, block_Phi = model.operators.modes(model.operators.hold(dofs), 25)
+    assert called == ["krylov_schur", "BlockLanczos"]
+    assert_allclose(block_omega, omega, rtol=1e-10)
+    assert_allclose(block_Phi, Phi, atol=1e-7 * np.abs(Phi).max())
+
+
+def test_counting_in_the_place_of_the_factor_leaves_the_stiffness_as_it_was(monkeypatch):
+    model = beam((10, 3, 3))
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    held = model.operators.hold(model.interfaces["x0"].dofs)
+    before = held.inner.K.norm()
+    first, _ = model.operators.modes(held, 12, finished=True)
+    assert held.inner.K.norm() == before
+    again, _ = model.operators.modes(held, 12, finished=True)
+    assert_allclose(again, first, rtol=1e-12)
+
+
+def diagonal_operators(lam):
+    from petsc4py import PETSc
+
+    from scipy.sparse import diags, identity
+
+    n = lam.size
+    K, M = (
+        PETSc.Mat().createAIJ((n, n), csr=(A.indptr, A.indices, A.data))
+        for A in (diags(lam).tocsr(), identity(n).tocsr())
+    )
+    return petsc.PETScOperators(K, M)
+
+
+def test_a_krylov_space_that_closes_early_is_left_for_another():
+    """Two eigenvalues: a block finds as many vectors of each as it has, and then nothing new."""
+    m = 2 * lanczos.BLOCK_SIZE
+    lam = np.repeat([1.0, 4.0], [m, 700 - m])
+    ops = diagonal_operators(lam)
+    omega, Phi = ops.modes(ops.hold([699]), m)
+    assert_allclose(omega**2, lam[:m], rtol=1e-10)
+    assert_allclose(Phi.T @ Phi, np.eye(m), atol=1e-9)
+
+
+def test_more_equal_modes_than_a_block_has_columns_are_noticed():
+    lam = np.repeat([1.0, 4.0], 350)
+    ops = diagonal_operators(lam)
+    with pytest.raises(ModesMissedError, match=r"inertia of K - sigma M counts [36]"):
+        ops.modes(ops.hold([699]), 2 * lanczos.BLOCK_SIZE + 1)
+
+
+def test_the_shift_comes_from_the_model(small, exact):
+    """The polynomial estimate is an upper bound of the right size, in any units."""
+    estimate = small.operators.first_elastic(None)
+    assert exact[6] <= estimate < 1.5 * exact[6]
+
+
+def test_points_are_read_back_from_the_rigid_motions(small):
+    assert_allclose(spectrum.points_of(small.operators.rigid), small.points, atol=1e-15)
+
+
+def test_modes_of_equal_frequency_do_not_depend_on_the_way_they_were_found():
+    """A square beam: two planes of bending for each frequency, fixed by convention only."""
+    model = beam((8, 2, 2), (1.0, 0.1, 0.1), degree=2)
+    ops, held = model.operators, model.interfaces["x0"].dofs
+    omega, Phi = ops.modes(held, 6)
+    assert_allclose(omega[0], omega[1], rtol=1e-9)
+    Q, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(2, 2)))
+    turned = np.hstack([Phi[:, :2] @ Q, Phi[:, 2:]])
+    again = spectrum.signed(ops, spectrum.settled(ops, omega**2, turned))
+    assert_allclose(again, Phi, atol=1e-9 * np.abs(Phi).max())
+
+
+def test_a_part_that_hangs_on_nothing_is_a_mechanism():
+    """Two beams without a common node, as a mesh that was not glued."""
+    one = beam((8, 2, 2))
+    other = beam((8, 2, 2))
+    from scipy.sparse import block_diag
+
+    from rom.eigen.verbs import rigid_motions
+
+    points = np.vstack([one.points, other.points + np.array([0.0, 0.0, 1.0])])
+    from petsc4py import PETSc
+
+    K, M = (block_diag([a, b], "csr") for a, b in ((one.K, other.K), (one.M, other.M)))
+    K, M = (PETSc.Mat().createAIJ(A.shape, csr=(A.indptr, A.indices, A.data)) for A in (K, M))
+    ops = petsc.PETScOperators(K, M, rigid_motions(points))
+    with pytest.raises(ModelError, match="6 more motions without stiffness than the six"):
+        ops.modes((), 14)
+
+
+@pytest.mark.parametrize("held", [("x0", (0,)), ("x0", (1, 2)), ("z0", (2,))])
+def test_a_plane_that_slides_is_no_support(small, held):
+    with pytest.raises(InterfaceError, match="leave a rigid motion free"):
+        small.operators.hold(faces_held(small, dict([held])))
+
+
+def test_nothing_held_cannot_be_factored(small):
+    with pytest.raises(InterfaceError, match="the 0 boundary dofs leave a rigid motion free"):
+        small.operators.hold([])
+
+
+def test_everything_held_leaves_the_identity(small):
+    held = small.operators.hold(np.arange(small.n_dofs))
+    assert held.n_free == 0
+    assert not held(np.ones((small.n_dofs, 3))).any()
+    assert small.operators.modes(held, 0)[0].size == 0
+    with pytest.raises(ConfigError, match="ask for 0 to 0 modes"):
+        small.operators.modes(held, 1)
+
+
+def test_a_forgotten_mode_is_missed(monkeypatch):
+    model = beam((14, 4, 3))
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    whole = petsc.krylov_schur
+
+    def forgetful(*arguments):
+        lam, Phi = whole(*arguments)
+        return np.delete(lam, 1), np.delete(Phi, 1, axis=1)
+
+    monkeypatch.setattr(petsc, "krylov_schur", forgetful)
+    with pytest.raises(ModesMissedError, match="inertia of K - sigma M counts"):
+        model.operators.modes((), 12)
+
+
+def test_the_memory_law_follows_the_measured_factors():
+    """MUMPS estimates of blocks of quadratic tetrahedra (bytes, on one process)."""
+    for n, measured in ((16_731, 71e6), (80_703, 619e6), (224_547, 2489e6)):
+        assert_allclose(memory.factor_bytes(n), measured, rtol=0.1)
+
+
+def test_a_factor_that_does_not_fit_is_refused_before_it_is_made(small, monkeypatch):
+    monkeypatch.setattr(memory, "free_bytes", lambda: 1e5)
+    with pytest.raises(ResourceError, match=r"predicted to take 0.00 GiB; 0.00 GiB may be used"):
+        small.operators.hold(small.interfaces["x0"].dofs)
+
+
+def test_a_factor_is_refused_after_the_analysis_when_the_law_was_too_kind(monkeypatch):
+    model = beam((20, 6, 6))
+    monkeypatch.setattr(petsc, "check_factor_memory", lambda *args, **kwds: None)
+    monkeypatch.setattr(memory, "free_bytes", lambda: 4e6)
+    with pytest.raises(ResourceError, match=r"factoring 2940 dofs is predicted to take 0.0\d GiB"):
+        model.operators.hold(model.interfaces["x0"].dofs)

@@ -1,0 +1,116 @@
+"""One, two and three ranks: the same numbers, the same errors, no hang."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from cases.paths import RANKS, TESTS
+from rom.errors import MaterialError, RomError
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
+
+HERE = TESTS
+ENVIRONMENT = os.environ | {
+    "OMP_NUM_THREADS": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",  # more ranks than cores would spin
+    "PYTHONPATH": os.pathsep.join([str(HERE.parent), str(HERE)]),
+}
+
+
+def mpirun(n, *arguments, timeout=360):
+    command = [
+        "mpirun",
+        "--oversubscribe",
+        "-n",
+        str(n),
+        sys.executable,
+        str(RANKS / "under_mpi.py"),
+    ]
+    return subprocess.run(
+        [*command, *map(str, arguments)],
+        cwd=HERE, env=ENVIRONMENT, timeout=timeout, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def run_model(folder, n, cells, degree):
+    path = folder / f"{n}.npz"
+    done = mpirun(n, "model", path, cells, degree)
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(path))
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ranks")
+    return {n: run_model(folder, n, "6,2,2", 2) for n in (1, 2, 3)}
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_ranks_agree_with_one_process(runs, n):
+    """Frequencies and mass to 1e-9, interfaces node by node, shapes with their signs."""
+    one, many = runs[1], runs[n]
+    assert set(one) == set(many)
+    for name in ("free", "fixed", "tied", "mass"):
+        assert_allclose(many[name], one[name], rtol=1e-9)
+    assert np.array_equal(many["triangles"], one["triangles"])
+    for name in set(one) - {"free", "fixed", "tied", "triangles"}:
+        tolerance = 1e-9 if "shapes" in name else 1e-11
+        assert_allclose(many[name], one[name], atol=tolerance * np.abs(one[name]).max())
+
+
+def test_rbe2_ties_and_free_modes_are_different_models(runs):
+    """Guards the test above: stiff ends raise the frequencies."""
+    assert np.all(runs[1]["tied"][6:] > 1.0002 * runs[1]["free"][6:10])
+
+
+def test_fewer_cells_than_ranks(tmp_path):
+    """Six tetrahedra on eight ranks: some own nothing."""
+    one = run_model(tmp_path, 1, "1,1,1", 1)
+    many = run_model(tmp_path, 8, "1,1,1", 1)
+    for name in ("free", "fixed", "mass"):
+        assert_allclose(many[name], one[name], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "words"),
+    [
+        ("one", 4, "rank 1: MaterialError: rho = 0 on one rank."),
+        ("bug", 1, "IndexError: nobody foresaw this"),
+        ("together", 4, "MaterialError: rho = 0 on the last rank."),
+        (
+            "all",
+            4,
+            "MaterialError: 2 ranks met: rank 1 failed: IndexError: list index out of range",
+        ),
+        ("root", 6, "ParallelError: rank 0 failed: ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_rank_that_fails_ends_all_within_seconds(kind, code, words):
+    start = time.perf_counter()
+    done = mpirun(2, "fail", kind, timeout=30)
+    assert done.returncode == code
+    assert words in done.stderr
+    assert done.stderr.count(words) == 1
+    assert time.perf_counter() - start < 10.0  # of which most is the start of Python
+
+
+def test_on_one_rank_errors_pass_as_they_are():
+    from mpi4py import MPI
+
+    from rom.fe.parallel import collective, on_root, together
+
+    assert on_root(MPI.COMM_SELF, lambda a, b: a + b, 1, b=2) == 3
+    assert together(MPI.COMM_SELF, lambda: 7) == 7
+    with pytest.raises(ZeroDivisionError):
+        on_root(MPI.COMM_SELF, lambda: 1 / 0)
+    with pytest.raises(MaterialError), collective(MPI.COMM_SELF):
+        raise MaterialError("no")
+    assert issubclass(MaterialError, RomError)

@@ -1,0 +1,81 @@
+"""The connecting rod, from its geometry to a reduced body that stands for it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from cases.paths import ROOT
+
+pytest.importorskip("dolfinx", reason="needs finite elements")
+import rom
+
+pytestmark = pytest.mark.fenicsx
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+ROD = ROOT / "meshes" / "connecting_rod.geo"
+KINDS = {"pin_a": "rbe2", "pin_b": "rbe2"}
+SUPPORTS = [(), ("pin_a",), ("pin_b",), ("pin_a", "pin_b")]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return rom.fe.model(ROD, material=STEEL, parameters={"lc": 8e-3})
+
+
+@pytest.fixture(scope="module")
+def full(model):
+    """First six elastic frequencies of the full model in every support, bores rigid [Hz]."""
+    found = {}
+    for fixed in SUPPORTS:
+        n_rigid = 0 if fixed else 6
+        modes = rom.modes(model, n_rigid + 6, fixed=fixed, interfaces=KINDS)
+        found[fixed] = modes.frequencies[n_rigid:]
+    return found
+
+
+def reduced(model, n_modes, fixed):
+    body = rom.reduce(
+        model, method=rom.CraigBampton(n_modes), interfaces=KINDS, reference="pin_a", certify=False
+    )
+    n_rigid = 0 if fixed else 6
+    return body.frequencies(n_rigid + 6, fixed=fixed)[n_rigid:]
+
+
+@pytest.mark.parametrize("fixed", SUPPORTS)
+def test_twenty_modes_give_six_frequencies_within_a_tenth_of_a_per_cent(model, full, fixed):
+    error = reduced(model, 20, fixed) / full[fixed] - 1
+    assert error.max() < 1e-3
+    assert error.min() > -1e-9
+
+
+@pytest.mark.parametrize("fixed", [(), ("pin_b",)])
+def test_every_mode_more_lowers_the_frequencies_towards_the_full_ones(model, full, fixed):
+    steps = np.array([reduced(model, n, fixed) for n in (6, 12, 24, 48)])
+    assert (np.diff(steps, axis=0) < 1e-9 * steps[1:]).all()
+    assert_allclose(steps[-1], full[fixed], rtol=3e-4)
+
+
+@pytest.mark.parametrize("kind", ["full", "rbe2", "rbe3"])
+def test_a_complete_basis_is_the_full_model(tmp_path, kind):
+    """A coarse rod without fillets, all fixed-interface modes kept."""
+    model = rom.fe.model(ROD, material=STEEL, degree=1, parameters={"lc": 0.016})
+    kinds = dict.fromkeys(KINDS, kind)
+    n_boundary = sum(i.dofs.size for i in model.interfaces.values()) if kind == "full" else 12
+    n_inner = model.n_dofs - sum(i.dofs.size for i in model.interfaces.values())
+    if kind == "rbe3":
+        n_inner = model.n_dofs - 12
+    body = rom.reduce(model, method=rom.CraigBampton(n_inner), interfaces=kinds, certify=False)
+    assert body.n_modes == n_inner + n_boundary - 6
+    exact = rom.modes(model, 26, interfaces=kinds).frequencies[6:]
+    assert_allclose(body.frequencies(26)[6:], exact, rtol=1e-8)
+
+
+@pytest.mark.parametrize("reference", ["pin_b", "mean-axis", ("pin_a", "pin_b")])
+def test_another_frame_changes_no_supported_frequency(model, reference):
+    body = rom.reduce(
+        model, method=rom.CraigBampton(8), interfaces=KINDS, reference="pin_a", certify=False
+    )
+    seen = body.with_reference(reference)
+    for fixed in SUPPORTS:
+        n_rigid = 0 if fixed else 6
+        before, after = (b.frequencies(fixed=fixed)[n_rigid:] for b in (body, seen))
+        assert_allclose(after, before, rtol=1e-9)

@@ -1,0 +1,408 @@
+"""Mechanisms as FMUs, run by fmpy as another program would run them."""
+
+import os
+import signal
+import sys
+import warnings
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rom
+from cases.mbs.fmu_instance import Instance, fmpy
+from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
+from cases.paths import ROOT
+from rom.errors import ConfigError, ResourceError, RomWarning
+from rom.fmu.driven import Driven
+from rom.io.fmu.variables import structured
+from rom.mbs.mechanism import Mechanism
+
+# two processes of which one has just compiled the kernels and the other read them from the cache
+# differ in the last bit; of two that read them none does
+SAME_CODE = 1e-12
+CRANK = """
+from cases.mbs.mechanisms import slider_crank
+
+def mechanism():
+    mech = slider_crank(gravity=9.81)
+    mech.drives.clear()
+    mech.rotational_spring("coil", "main", stiffness=3.0, damping=0.01)
+    mech.force("gas", mech.parts["slider"].marker("b"), (0.0, 0.0, 0.0))
+    return mech
+"""
+FLEXIBLE = """
+from pathlib import Path
+import rom
+
+def mechanism():
+    print("what a mechanism prints is no answer")
+    mech = rom.Mechanism()
+    body = rom.load(Path(__file__).with_name("one.rom.npz"))
+    one = mech.add_flexible("one", body, omega=(1.0, 2.0, 3.0))
+    place = mech.design_point(one.marker("a"))
+    mech.spherical("hook", mech.ground.marker(place), one.marker("a"))
+    mech.force("pull", one.marker("b"), (1.0, 2.0, 3.0), frame="body")
+    return mech
+"""
+
+
+@pytest.fixture(autouse=True)
+def python_with_rom(monkeypatch):
+    """The process of an FMU finds this rom, and the mechanisms of the tests."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
+    monkeypatch.setenv("ROM_PYTHON", sys.executable)
+
+
+@pytest.fixture(scope="module")
+def crank(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("crank")
+    script = folder / "crank.py"
+    script.write_text(CRANK)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(ROOT / "tests"))
+        return rom.write_fmu(
+            script, folder / "slider crank.fmu", inputs=["gas"], outputs=["slider.b", "main"],
+            dt=1e-3,
+        )  # fmt: skip
+
+
+def crank_by_hand(function=None):
+    """The mechanism of the file above."""
+    mech = slider_crank(gravity=9.81)
+    mech.drives.clear()
+    mech.rotational_spring("coil", "main", stiffness=3.0, damping=0.01)
+    mech.force("gas", mech.parts["slider"].marker("b"), function or (0.0, 0.0, 0.0))
+    return mech
+
+
+POSITION = [f"slider.b.position[{k}]" for k in (1, 2, 3)]
+VELOCITY = [f"slider.b.velocity[{k}]" for k in (1, 2, 3)]
+
+
+def native(motion):
+    return np.hstack([motion.position("slider", "b"), motion.velocity("slider", "b")])
+
+
+def test_the_description_is_valid_and_names_no_place_of_this_machine(crank):
+    assert fmpy.validation.validate_fmu(str(crank)) == []
+    d = fmpy.read_model_description(str(crank))
+    assert (d.modelName, d.coSimulation.modelIdentifier) == ("slider crank", "slider_crank")
+    assert d.coSimulation.needsExecutionTool and d.coSimulation.canGetAndSetFMUstate
+    units = {v.name: (v.causality, v.unit) for v in d.modelVariables}
+    assert units["gas[1]"] == ("input", "N") and units["main.angle"] == ("output", "rad")
+    assert units["main.angle_rate"] == ("output", "rad/s") and units["dt"] == ("parameter", "s")
+    with zipfile.ZipFile(crank) as archive:
+        for name in archive.namelist():
+            assert str(crank.parent).encode() not in archive.read(name), name
+
+
+def test_the_slider_crank_is_the_native_run(crank):
+    """Two time steps in each communication step; the integrator keeps its memory in between."""
+    motion = simulate_quietly(crank_by_hand(), t_end=0.1, dt=1e-3)
+    found = fmpy.simulate_fmu(
+        str(crank), stop_time=0.1, step_size=2e-3, output_interval=2e-3, fmi_type="CoSimulation",
+        output=[*POSITION, *VELOCITY, "main.angle"],
+    )  # fmt: skip
+    slider = np.column_stack([found[name] for name in (*POSITION, *VELOCITY)])
+    here = native(motion)[::2]
+    assert_allclose(slider, here, rtol=0, atol=SAME_CODE * np.abs(here).max())
+    # the last corrections of Newton have not reached the angle that the integrator remembers
+    assert_allclose(found["main.angle"], motion.base[::2, 0], rtol=0, atol=1e-9)
+
+
+def moved(step, force, dt, end=0.1):
+    """Position and velocity of the slider after steps with a force held over each."""
+    driven = Driven(crank_by_hand(), inputs=("gas",), outputs=("slider.b",), dt=dt)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        driven.start(0.0)
+        for k in range(round(end / step)):
+            driven.set([2], [force(k * step)])
+            driven.step(k * step, step)
+    return driven.get([5, 8])
+
+
+def test_the_error_falls_with_the_second_power_of_the_step():
+    """Communication steps as long as the time step is allowed to be."""
+    exact = native(simulate_quietly(crank_by_hand(), t_end=0.1, dt=1e-4))[-1, [0, 3]]
+    errors = [np.abs(moved(h, lambda t: 0.0, dt=1.0) - exact) for h in (2e-3, 1e-3)]
+    assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
+
+
+def test_a_smooth_input_costs_an_error_of_first_order_in_the_communication_step():
+    """Its mean over a step is that of half a step earlier."""
+    smooth = crank_by_hand(lambda t: (30 * np.sin(40 * t), 0.0, 0.0))
+    exact = native(simulate_quietly(smooth, t_end=0.06, dt=5e-4))[-1, [0, 3]]
+    ends = (moved(h, lambda t: 30 * np.sin(40 * t), 5e-4, end=0.06) for h in (2e-3, 1e-3))
+    errors = [np.abs(end - exact) for end in ends]
+    assert_allclose(errors[0] / errors[1], 2.0, rtol=0.15)
+
+
+def test_a_jump_of_an_input_costs_no_order():
+    """Without a jump of the accelerations the method feels each jump half a step late."""
+
+    def square(t):
+        return 50.0 if int(t / 0.02 + 1e-6) % 2 else -20.0
+
+    a, b, c = (moved(0.02, square, dt) for dt in (2e-3, 1e-3, 5e-4))
+    assert_allclose((a - b) / (b - c), 4.0, rtol=0.1)
+
+
+def flywheel():
+    """A wheel of 0.2 kg m^2 on an axle, a sledge of 2 kg on rails."""
+    mech = Mechanism(gravity=(0.0, 0.0, 0.0))
+    o, z = mech.ground.marker((0, 0, 0)), (0, 0, 1)
+    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.1, 0.1, 0.2), at=(0, 0, 0),
+                           markers={"hub": (0, 0, 0), "rim": (0.5, 0, 0)})  # fmt: skip
+    sledge = mech.add_rigid("sledge", mass=2.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                            markers={"c": (0, 0, 0)})  # fmt: skip
+    mech.revolute("axle", o, wheel.marker("hub"), axis=z)
+    mech.prismatic("rails", o, sledge.marker("c"), axis=(1, 0, 0))
+    return mech
+
+
+def values(driven, names):
+    order = [v.name for v in driven.variables]
+    return driven.get(np.array([order.index(name) for name in names]))
+
+
+def test_a_drive_follows_its_acceleration_without_jumps():
+    mech = flywheel()
+    mech.drive("turn", "axle", lambda t: 0.3 * t, rate=lambda t: 0.3, acceleration=lambda t: 0.0)
+    driven = Driven(mech, inputs=("turn",), outputs=("axle", "turn", "wheel.rim"), dt=1e-3)
+    assert [v.name for v in driven.variables][2:5] == [
+        "turn.acceleration", "axle.angle", "axle.angle_rate",
+    ]  # fmt: skip
+    driven.start(0.0)
+    for k, a in enumerate((5.0, -2.0)):
+        driven.set([2], [a])
+        driven.step(0.5 * k, 0.5)
+        assert_allclose(values(driven, ["turn.load"]), 0.2 * a, rtol=1e-6)
+    x = 0.3 * 0.5 + 5 * 0.125
+    rate = 0.3 + 5 * 0.5
+    x, rate = x + rate * 0.5 - 2 * 0.125, rate - 2 * 0.5
+    names = ["axle.angle", "axle.angle_rate", "wheel.rim.position[1]", "wheel.rim.velocity[2]"]
+    expected = [x, rate, 0.5 * np.cos(x), 0.5 * rate * np.cos(x)]
+    assert_allclose(values(driven, names), expected, rtol=1e-6)
+    names = [f"wheel.rim.quaternion[{k}]" for k in (1, 4)] + ["wheel.rim.angular_velocity[3]"]
+    assert_allclose(values(driven, names), [np.cos(x / 2), np.sin(x / 2), rate], rtol=1e-6)
+
+
+def test_motors_torques_and_forces_follow_their_inputs():
+    """Angles count over whole turns."""
+    mech = flywheel()
+    mech.motor("engine", "axle", lambda t, x, xd: -1e3 * x)
+    mech.torque("brake", mech.parts["wheel"].marker("hub"), lambda t: (0.0, 0.0, 7.0))
+    mech.force("pull", mech.parts["sledge"].marker("c"), (3.0, 0.0, 0.0), frame="body")
+    driven = Driven(mech, inputs=("engine", "brake", "pull"), outputs=("axle", "rails"), dt=1e-2)
+    assert_allclose(driven.get(np.arange(2, 9)), [0, 0, 0, 7, 3, 0, 0])
+    driven.start(0.0)
+    driven.set(range(2, 9), [4.0, 0.0, 0.0, -1.0, 6.0, 9.0, 0.0])
+    driven.step(0.0, 1.0)
+    names = ["axle.angle", "axle.angle_rate", "rails.way", "rails.way_rate"]
+    assert_allclose(values(driven, names), [7.5, 15.0, 1.5, 3.0], rtol=1e-9)
+    driven.set([2, 6], [0.0, 0.0])
+    driven.step(1.0, 1.0)  # the brake alone
+    expected = [7.5 + 15.0 - 2.5, 10.0, 1.5 + 3.0, 3.0]
+    assert_allclose(values(driven, names), expected, rtol=1e-9)
+
+
+def test_a_spread_load_follows_its_amplitude():
+    """Its weight is taken from a body that would fall otherwise."""
+    body = random_body(np.random.default_rng(3))
+    mech = Mechanism()
+    part = mech.add_flexible("one", body)
+    load = rom.mass_load(body, (0.0, 0.0, 9.81))
+    mech.spread_load("lift", part, load, lambda t: 5.0, frame="world")
+    driven = Driven(mech, inputs=("lift",), outputs=("one.a",), dt=1e-3)
+    assert_allclose(driven.get([2]), 5.0)
+    driven.start(0.0)
+    before = driven.get(np.arange(3, 16))
+    driven.set([2], [1.0])
+    driven.step(0.0, 0.1)
+    assert_allclose(driven.get(np.arange(3, 16)), before, atol=1e-8)
+
+
+@pytest.fixture(scope="module")
+def hanging(tmp_path_factory):
+    """A flexible body in a file of its own."""
+    folder = tmp_path_factory.mktemp("hanging")
+    body = rom.save(random_body(np.random.default_rng(3)), folder / "one.rom.npz")
+    script = folder / "hanging.py"
+    script.write_text(FLEXIBLE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("PYTHONPATH", raising=False)
+        return rom.write_fmu(script, folder / "hanging.fmu", inputs=["pull"], outputs=["one.b"],
+                             dt=1e-2, files=[body])  # fmt: skip
+
+
+def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tmp_path):
+    one = Instance(hanging, tmp_path).begin(rho_inf=0.8)
+    names = [f"one.b.position[{k}]" for k in (1, 2, 3)]
+    one.fmu.doStep(0.0, 0.05)
+    begun = one.get(*names)
+    state = one.fmu.getFMUstate()
+    one.set("pull[1]", -4.0)
+    one.fmu.doStep(0.05, 0.05)
+    first = one.get(*names)
+    one.set("pull[1]", 50.0)
+    one.fmu.doStep(0.1, 0.05)
+    one.fmu.setFMUstate(state)
+    assert_allclose(one.get("pull[1]"), 1.0)
+    one.set("pull[1]", -4.0)
+    one.fmu.doStep(0.05, 0.05)
+    assert_array_equal(one.get(*names), first)
+    one.fmu.freeFMUstate(state)
+    assert "this state has been freed" in one.fails(one.fmu.setFMUstate, state)
+    mech = Mechanism()
+    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    place = mech.design_point(body.marker("a"))
+    mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
+    mech.force("pull", body.marker("b"), (1.0, 2.0, 3.0), frame="body")
+    half = simulate_quietly(mech, t_end=0.05, dt=1e-2, rho_inf=0.8)
+    assert_allclose(begun, half.position("one", "b")[-1], atol=SAME_CODE)
+    mech.loads["pull"] = replace(mech.loads["pull"], vector=np.array([-4.0, 2.0, 3.0]))
+    end = simulate_quietly(mech, t_end=0.1, dt=2e-4, rho_inf=0.8, state=replace(
+        half.final, algorithmic=None, memory=None))  # fmt: skip
+    assert_allclose(first, end.position("one", "b")[-1], atol=2e-3)
+    assert np.linalg.norm(first - half.position("one", "b")[-1]) > 0.02
+    one.fmu.reset()
+    one.begin()
+    assert_allclose(one.get("rho_inf", "pull[1]"), [0.9, 1.0])
+    one.fmu.terminate()
+    one.fmu.freeInstance()
+
+
+def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
+    one = Instance(hanging, tmp_path)
+    assert "before its initialisation" in one.fails(one.fmu.doStep, 0.0, 0.1)
+    assert "dt = -1 s must be positive" in one.fails(one.set, "dt", -1.0)
+    assert "outside [0, 1]" in one.fails(one.set, "rho_inf", 1.5)
+    one.begin()
+    assert "pull[2] = nan is not a finite number" in one.fails(one.set, "pull[2]", np.nan)
+    assert "the output 'one.b.position[1]' cannot be set" in one.fails(
+        one.set, "one.b.position[1]", 0.0
+    )
+    assert "value reference 99 cannot be set" in one.fails(one.fmu.setReal, [99], [0.0])
+    assert "no variable has the value reference 99" in one.fails(one.fmu.getReal, [99])
+    assert "fmi2GetInteger is not offered" in one.fails(one.fmu.getInteger, [0])
+    assert "a step from t = 5 s" in one.fails(one.fmu.doStep, 5.0, 0.1)
+    assert "must be positive" in one.fails(one.fmu.doStep, 0.0, -0.1)
+    one.fmu.doStep(0.0, 0.1)
+    assert "before the first step only" in one.fails(one.set, "dt", 1e-3)
+    before = one.get("one.b.position[1]")
+    one.set("pull[1]", 1e200)
+    assert "at t = 0.11 s" in one.fails(one.fmu.doStep, 0.1, 0.1)
+    one.set("pull[1]", 1.0)
+    assert_array_equal(one.get("one.b.position[1]"), before)
+    one.fmu.doStep(0.1, 0.1)
+    one.fmu.terminate()
+    assert "after its end" in one.fails(one.fmu.doStep, 0.2, 0.1)
+    one.fmu.freeInstance()
+
+
+def test_a_warning_is_logged_once(crank, tmp_path):
+    """That constraints repeat each other does not stop a run."""
+    one = Instance(crank, tmp_path).begin()
+    (text,) = one.log
+    assert "3 of 20 constraints repeat others" in text
+    one.fmu.reset()
+    one.begin()
+    one.fmu.doStep(0.0, 1e-3)
+    assert len(one.log) == 1
+    one.fmu.freeInstance()
+
+
+def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
+    """Nor the signal for a broken pipe, which Python ignores and other programs do not."""
+    one, other = (Instance(hanging, tmp_path / name).begin() for name in ("one", "other"))
+    commands = {int(p.parent.name): p.read_bytes() for p in Path("/proc").glob("[0-9]*/cmdline")}
+    (pid,) = (k for k, words in commands.items() if str(tmp_path / "one").encode() in words)
+    os.kill(pid, signal.SIGKILL)
+    usual = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    assert "has ended" in one.fails(one.fmu.doStep, 0.0, 0.1)
+    assert "has ended" in one.fails(one.set, "pull[1]", 0.1)
+    signal.signal(signal.SIGPIPE, usual)
+    one.fmu.freeInstance()
+    other.fmu.doStep(0.0, 0.1)
+    other.fmu.freeInstance()
+
+
+@pytest.mark.parametrize(
+    ("python", "guid", "message"),
+    [
+        ("/nowhere/python", None, "/nowhere/python cannot be started: No such file"),
+        ("false", None, "false ended at once. Set ROM_PYTHON to a Python that has rom"),
+        (sys.executable, "another", "the GUID of the model description is another"),
+    ],
+)
+def test_an_fmu_that_cannot_start_says_why(hanging, tmp_path, monkeypatch, python, guid, message):
+    monkeypatch.setenv("ROM_PYTHON", python)
+    log = []
+    with pytest.raises(Exception, match="instantiate"):
+        Instance(hanging, tmp_path, guid=guid, log=log)
+    assert message in log[0]
+
+
+def test_a_mechanism_that_cannot_start_says_why(tmp_path):
+    """Here its file is gone from the resources."""
+    path = written(tmp_path, CRANK, outputs=["slider.b"])
+    folder = fmpy.extract(str(path), str(tmp_path / "a folder"))
+    (Path(folder) / "resources" / "model" / "m.py").unlink()
+    log = []
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(Exception, match="instantiate"):
+        patch.setattr(fmpy, "extract", lambda *a: folder)
+        Instance(path, tmp_path, log=log)
+    assert "FileNotFoundError" in log[0] and "m.py" in log[0]
+
+
+def written(tmp_path, script, **options):
+    (tmp_path / "m.py").write_text(script)
+    return rom.write_fmu(tmp_path / "m.py", tmp_path / "m.fmu", **{"dt": 1e-3, **options})
+
+
+@pytest.mark.parametrize(
+    ("script", "options", "message"),
+    [
+        (CRANK, {"inputs": ["gass"]}, "m.py: no input 'gass'; the loads, motors and drives are"),
+        (CRANK, {"dt": 0.0}, "must be positive"),
+        (CRANK, {"files": ["nothing.npz"]}, "there is no file"),
+        ("mechanism = 3", {}, r"m.py has no function mechanism\(\)"),
+        ("def mechanism(): return 3", {}, "gave 3, not a Mechanism"),
+        ("open('rod.npz')", {}, "holds only it and the files named: FileNotFoundError"),
+    ],
+)
+def test_what_cannot_be_written_is_refused(tmp_path, script, options, message):
+    with pytest.raises(ConfigError, match=message):
+        written(tmp_path, script, **options)
+    assert not (tmp_path / "m.fmu").exists()
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "message"),
+    [
+        (("gas", "gas"), (), "the input 'gas' is named twice"),
+        ((), ("slider.c",), "no output 'slider.c'; there are .'crank.a', 'crank.o', 'guide'"),
+        ((), ("pin", "pin"), "the output 'pin' is named twice"),
+    ],
+)
+def test_unknown_names_are_refused(inputs, outputs, message):
+    with pytest.raises(ConfigError, match=message):
+        Driven(crank_by_hand(), inputs=inputs, outputs=outputs, dt=1e-3)
+
+
+def test_an_fmu_ends_in_fmu_and_needs_a_compiler(tmp_path, monkeypatch):
+    with pytest.raises(ConfigError, match=r"does not end in \.fmu"):
+        rom.write_fmu("m.py", tmp_path / "m.zip", dt=1.0)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ResourceError, match="needs a C compiler"):
+        written(tmp_path, CRANK)
+
+
+def test_names_that_are_no_identifiers_are_quoted():
+    assert structured("rod", "pin_a", "position") == "rod.pin_a.position"
+    assert structured("the 'rod'", "größe") == r"'the \'rod\''.'gr__e'"

@@ -1,0 +1,79 @@
+"""SIGTERM ends a program after it has cleaned up, and ends it by SIGTERM."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from cases.command import environment
+from rom.interruption import Terminated, terminable
+
+
+def test_sigterm_is_raised_inside_and_restored_outside():
+    with pytest.raises(Terminated):
+        interrupted_inside()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def interrupted_inside():
+    """The outermost block would end this very process; it is caught one block further in."""
+    with terminable():
+        try:
+            with terminable():
+                os.kill(os.getpid(), signal.SIGTERM)
+                signal.pause()
+        except Terminated as error:
+            caught = error
+    raise caught
+
+
+def test_a_handler_of_the_user_is_left_alone():
+    heard = []
+    signal.signal(signal.SIGTERM, lambda *_: heard.append(1))
+    try:
+        with terminable():
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert heard == [1]
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def test_another_thread_changes_nothing():
+    seen = []
+
+    def work():
+        with terminable():
+            seen.append(signal.getsignal(signal.SIGTERM))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.SIG_DFL]
+
+
+def test_the_process_cleans_up_and_ends_by_sigterm():
+    code = (
+        "import os, signal\nfrom rom.interruption import terminable\n"
+        "with terminable():\n    try:\n        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        signal.pause()\n    finally:\n        print('clean', flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
+                          text=True, timeout=60, check=False)  # fmt: skip
+    assert (done.returncode, done.stdout) == (-signal.SIGTERM, "clean\n"), done.stderr
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_a_signal_dropped_in_a_callback_comes_again(number):
+    code = (
+        "import os, signal, time\nfrom rom.interruption import heed_lost_signals, terminable\n"
+        "heed_lost_signals()\n"
+        "class Last:\n"
+        f"    def __del__(self): os.kill(os.getpid(), signal.{number}); time.sleep(0.01)\n"
+        "with terminable():\n    x = Last(); del x\n    time.sleep(20)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
+                          text=True, timeout=15, check=False)  # fmt: skip
+    assert done.returncode == -getattr(signal, number), done.stderr

@@ -1,0 +1,282 @@
+"""Names: one alphabet, and no way from a name to a file in another folder or to foreign text."""
+
+import ast
+import csv
+import json
+import os
+import unicodedata
+import xml.etree.ElementTree as ET
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rom
+from cases.solid import block
+from rom.cli.main import main
+from rom.config.keys import Named, Quantity
+from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
+from rom.io.archive import Kind, read_archive, write_archive
+from rom.io.native import FIELDS, SCHEMA_NAME, VERSION, body_arrays, body_manifest
+from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside, named
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+UNSEEN = ["a\0b", "a\nb", "a\rb", "a\x1b[2Jb", "\u202egnp.x", "a\u200bb", "a\u2028b", "\ud800",
+          "x" * 300, "", " "]  # fmt: skip
+ELSEWHERE = ["../../x", "/etc/x", "a/b", "..", ".", "~root/x", "-rf", "a\\b", ".x", "x ", " x"]
+HARMLESS = ["$(touch x)", "`touch x`", "~root", "CON", "a;b", "50% (a+b), #3", "Kolben №1", "ピン",
+            "=1+1", "x" * MAX_CHARACTERS, "%s{0}"]  # fmt: skip
+INJECTED = """a"<b>&'],;=x"""
+
+
+@pytest.mark.parametrize("name", [*UNSEEN, 5, None, b"x"])
+def test_what_is_no_visible_line_of_text_names_nothing(name):
+    for check in (check_text, check_name):
+        with pytest.raises(ConfigError, match="name"):
+            check(name, "a body")
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_what_leads_elsewhere_may_be_read_but_not_given(name):
+    assert check_text(name, "a body") == name
+    for check in (lambda n: check_name(n, "a body"), file_name):
+        with pytest.raises(ConfigError) as caught:
+            check(name)
+        assert repr(name) in str(caught.value)
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+def test_other_names_are_kept_and_make_one_file(name, tmp_path):
+    assert check_name(name, "a body") == name
+    path = inside(tmp_path, name, ".csv")
+    path.touch()
+    assert os.listdir(tmp_path) == [f"{name}.csv"]
+
+
+def test_every_character_of_unicode_is_either_visible_or_refused():
+    """The categories of characters that Unicode itself calls control, format or not assigned."""
+    for code in range(0x3000):
+        name = f"a{chr(code)}b"
+        hidden = unicodedata.category(chr(code))[0] == "C" or code in (0x2028, 0x2029)
+        try:
+            check_text(name, "a body")
+        except ConfigError as error:
+            assert hidden and f"U+{code:04X}" in error.message and name not in error.message
+        else:
+            assert not hidden
+
+
+def test_a_file_name_fits_into_255_bytes_while_it_is_written():
+    with pytest.raises(ConfigError, match="shorter name"):
+        file_name("ピ" * MAX_CHARACTERS, ".rom.npz")
+
+
+def test_all_names_are_told_up_to_a_line():
+    assert named(["b", 3, "a"]) == "'b', 3, 'a'"
+    assert named(range(30)).endswith("18, 19 and 10 more")
+
+
+@pytest.fixture(scope="module")
+def body():
+    return rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), interfaces=KINDS,
+                      certify=False)  # fmt: skip
+
+
+def listing(folder):
+    return sorted(str(path) for path in folder.rglob("*"))
+
+
+def forged(body, path, name, marker="root"):
+    """A body file as a stranger would write it, its checksums right."""
+    manifest = body_manifest(body) | {"name": name}
+    manifest["markers"][0]["name"] = marker
+    manifest.pop("sha256", None)
+    return write_archive(path, manifest, body_arrays(body), "a body")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working folder deep inside; what a name could reach is seen from above."""
+    place = tmp_path / "one" / "two" / "here"
+    place.mkdir(parents=True)
+    monkeypatch.chdir(place)
+    return place
+
+
+@pytest.mark.parametrize("name", UNSEEN + ELSEWHERE + HARMLESS)
+def test_a_body_file_with_that_name_writes_below_its_folder_only(name, body, folder, capsys):
+    forged(body, folder / "b.npz", name)
+    before = set(listing(folder.parents[1]))
+    code = main(["simulate", "b.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6",
+                 "-o", "out", "--history", "csv"])  # fmt: skip
+    new = set(listing(folder.parents[1])) - before
+    said = capsys.readouterr().err
+    if name in HARMLESS:
+        assert code in (0, 5), said
+        wanted = {f"out/{name}.csv", f"out/{name}.history.csv", "out/run.json", "out"}
+        assert new == {str(folder / path) for path in wanted}
+    else:
+        assert code == (3 if name in UNSEEN else 2) and not new, said
+        assert "name" in said and "Traceback" not in said
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+def test_a_body_file_with_an_unseen_name_is_not_read(name, body, tmp_path):
+    for changed in ({"name": name}, {"name": "b", "marker": name}):
+        path = forged(body, tmp_path / "b.npz", **changed)
+        with pytest.raises(FileFormatError, match=r"b\.npz: the name"):
+            rom.load(path)
+
+
+def test_a_body_file_with_a_slash_in_an_interface_stays_readable(body, tmp_path):
+    assert rom.load(forged(body, tmp_path / "b.npz", "b", "pin/a")).interface_names[0] == "pin/a"
+
+
+GIVEN = {
+    "reduce": lambda name, body: rom.reduce(
+        block(cells=(1, 1, 1)), method=rom.Guyan(), interfaces=KINDS, name=name, certify=False
+    ),
+    "rigid body": lambda name, body: rom.Mechanism().add_rigid(
+        name, mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0)
+    ),
+    "flexible body": lambda name, body: rom.Mechanism().add_flexible(name, body),
+    "joint": lambda name, body: jointed(name, body),
+    "force": lambda name, body: loaded(name, body),
+}
+
+
+def jointed(name, body):
+    mech = rom.Mechanism()
+    mech.fixed(name, mech.ground.marker((0, 0, 0)), mech.add_flexible("b", body).marker("root"))
+
+
+def loaded(name, body):
+    mech = rom.Mechanism()
+    mech.force(name, mech.add_flexible("b", body).marker("root"), (0, 0, 1.0))
+
+
+@pytest.mark.parametrize("way", GIVEN)
+@pytest.mark.parametrize("name", UNSEEN + ELSEWHERE)
+def test_no_thing_is_given_such_a_name(way, name, body):
+    with pytest.raises(ConfigError, match="name"):
+        GIVEN[way](name, body)
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+def test_what_is_read_has_visible_names(name, body):
+    with pytest.raises(ConfigError):
+        replace(body, name=name)
+    with pytest.raises(InterfaceError):
+        replace(block(cells=(1, 1, 1)).interfaces["root"], name=name)
+    with pytest.raises(ConfigError):
+        rom.Mechanism().add_rigid("b", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                                  markers={name: (0, 0, 0)})  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["../../x", "a\nb", ".x"])
+def test_the_command_line_refuses_it_before_the_computation(name, folder, capsys):
+    before = listing(folder.parents[1])
+    arguments = ["reduce", "missing.geo", "--E", "1", "--nu", "0", "--rho", "1", "-i", "root=rbe2"]
+    assert main([*arguments, "--name", name, "-o", "b.npz"]) == 2
+    assert "of a body" in capsys.readouterr().err
+    (folder / "m.toml").write_text(
+        f'[bodies.{json.dumps(name)}]\nmass = "1 kg"\ninertia = [1, 1, 1]\nat = [0, 0, 0]\n'
+        '[simulation]\nt_end = "1 s"\ndt = "0.1 s"\n'
+    )
+    assert main(["simulate", "m.toml", "-o", "out"]) == 2
+    assert "name" in capsys.readouterr().err
+    (folder / "m.toml").unlink()
+    assert listing(folder.parents[1]) == before
+
+
+def test_a_table_of_a_description_tells_the_line_of_a_wrong_name(tmp_path):
+    from rom.config.document import parsed
+    from rom.config.keys import Place
+
+    document = parsed('good = 1.0\n"a\\u202eb" = 2.0\n', tmp_path / "x.toml")
+    place = Place(document)
+    assert list(Named(Quantity(), "points").read(document.data, place)) == ["good"]
+    assert "U+202E" in str(place.mistakes[0])
+
+
+@pytest.fixture(scope="module")
+def marked(body):
+    """A body whose name and interface hold every character that other formats could trip over."""
+    markers = {INJECTED if n == "tip" else n: m for n, m in body.markers.items()}
+    markers = {n: replace(m, name=n) for n, m in markers.items()}
+    return replace(body, name=INJECTED, markers=markers)
+
+
+def test_names_do_not_break_out_of_xml(marked, tmp_path):
+    labelled = replace(marked, labels=(INJECTED,) * marked.n_modes)
+    root = ET.parse(rom.export(labelled, tmp_path / "x.vtu")).getroot()
+    fields = [e.get("Name") for e in root.iterfind(".//PointData/DataArray")]
+    assert fields and all(name.startswith(INJECTED) for name in fields)
+    with zipfile.ZipFile(rom.export(marked, tmp_path / "x.fmu")) as archive:
+        names = archive.namelist()
+        told = ET.fromstring(archive.read("modelDescription.xml"))
+    assert not [name for name in names if name.startswith("/") or ".." in name]
+    assert any("<b>" in v.get("name") for v in told.iter("ScalarVariable"))
+
+
+def test_names_do_not_break_out_of_html(marked):
+    from rom.report.html import checks, paragraph, source, table
+
+    written = [paragraph(INJECTED), source(INJECTED), table([INJECTED], [[INJECTED]], INJECTED),
+               checks(rom.Report(INJECTED, (rom.model.Row(INJECTED, 1.0, INJECTED, True),)),
+                      INJECTED), marked._repr_html_()]  # fmt: skip
+    assert not [text for text in written if "<b>&" in text or "&'" in text]
+
+
+def test_names_do_not_break_out_of_tables_and_programs(marked, folder):
+    rom.save(marked, folder / "b.npz")
+    assert main(["simulate", "b.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6",
+                 "-o", "out", "--history", "csv"]) in (0, 5)  # fmt: skip
+    for path in folder.glob("out/*.csv"):
+        with path.open(newline="") as file:
+            head, *rows = csv.reader(file)
+        assert {len(row) for row in rows} == {len(head)}
+        assert any(name.startswith(INJECTED) for name in head)
+    tree = ast.parse(rom.export(marked, folder / "x.py").read_text())
+    assert not [node for node in ast.walk(tree) if isinstance(node, ast.Call)
+                and getattr(node.func, "id", "") in ("exec", "eval", "system")]  # fmt: skip
+    space = {}
+    exec(compile(tree, "x.py", "exec"), space)
+    assert space["INTERFACES"] == ["root", INJECTED]
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+@pytest.mark.parametrize("to", ["npz", "vtu", "sid", "exudyn", "mbdyn", "openfast", "simscape"])
+def test_every_format_takes_every_name_that_may_be_given(to, name, body, tmp_path):
+    held = ("root",) if to == "openfast" else ()
+    path = rom.export(replace(body, name=name), tmp_path / "x.out", to=to, held=held)
+    assert os.listdir(tmp_path) == ["x.out"] and path.stat().st_size
+
+
+def test_all_that_is_missing_is_named(body, tmp_path):
+    model = block(cells=(1, 1, 1))
+    with pytest.raises(InterfaceError, match="'a', 'b'; the model has"):
+        rom.reduce(model, method=rom.Guyan(), interfaces={"a": "rbe2", "root": "rbe2", "b": "full"})
+    with pytest.raises(InterfaceError, match="'a', 'b'; it has"):
+        body.frequencies(3, fixed=("a", "root", "b"))
+    arrays = body_arrays(body)
+    for gone in (("K", "D"), ("marker/0/hold", "marker/1/point", "surface/shape")):
+        left = {name: A for name, A in arrays.items() if name not in gone}
+        path = write_archive(tmp_path / "b.npz", body_manifest(body), left, "a body")
+        with pytest.raises(RomError) as caught:
+            rom.load(path)
+        assert not [name for name in gone if repr(name) not in caught.value.message]
+        assert caught.value.where == str(path)
+
+
+def test_members_that_the_manifest_promises_are_named_when_they_are_gone(body, tmp_path):
+    path = rom.save(body, tmp_path / "b.npz")
+    other = tmp_path / "c.npz"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(other, "w") as new:
+        for name in old.namelist():
+            if name not in ("K.npy", "D.npy"):
+                new.writestr(name, old.read(name))
+    with pytest.raises(FileFormatError, match="'D', 'K'"):
+        read_archive(other, Kind({SCHEMA_NAME: VERSION}, "body file", FIELDS))
+    assert np.isfinite(rom.load(path).mass)

@@ -1,0 +1,101 @@
+"""Records in a notebook: short, escaped, and nothing is computed to show them."""
+
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import rom
+from cases.solid import block
+from rom.model import Modes, Report, Row
+from rom.notebook import MAX_ROWS, html_table, listed
+
+
+class Cells(HTMLParser):
+    """Texts of the cells of a table, row by row; tags must close."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.rows, self.open = [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "td" in self.open or "th" in self.open:
+            self.rows[-1][-1] += data
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(4), name="<b>bar",
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def motion():
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    bob = mech.add_rigid(
+        "<bob>", mass=2.5, inertia=(1, 1, 1), at=(1, 0, 0), markers={"o": (0, 0, 0)}
+    )
+    mech.spherical("pivot", mech.ground.marker((1, 0, 0)), bob.marker("o"))
+    mech.event("never", lambda t, instant: 1.0 + t)
+    return rom.simulate(mech, t_end=0.01, dt=1e-3)
+
+
+def test_texts_are_escaped_and_numbers_short():
+    text = html_table("a < b", ("x", "y"), [("<script>", 1.23456789), (3, np.float64(2e-9))])
+    assert "<script>" not in text and text.startswith("<div><b>a &lt; b</b>")
+    assert Cells(text).rows == [["x", "y"], ["<script>", "1.2346"], ["3", "2e-09"]]
+
+
+def test_long_tables_say_how_long_they_are():
+    rows = Cells(html_table("", ("k",), [(k,) for k in range(MAX_ROWS + 7)])).rows
+    assert len(rows) == MAX_ROWS + 2 and rows[-1] == ["and 7 more"]
+    assert listed("abcdefghij") == "a, b, c, d, e, f, g, h, and 2 more" and listed(()) == "none"
+
+
+def test_a_body(bar):
+    rows = dict(Cells(bar._repr_html_()).rows)
+    assert float(rows["mass [kg]"]) == pytest.approx(bar.mass, rel=1e-4)
+    assert rows["interface tip"].startswith("rbe2 at [1.0, ") and rows["certificate"] == "none"
+    assert rows["elastic coordinates"] == str(bar.n_modes)
+    assert "<b>bar" not in bar._repr_html_()
+    assert repr(bar).startswith("FlexibleBody('<b>bar': 62.8 kg, ") and len(repr(bar)) < 200
+
+
+def test_a_report_begins_with_what_fails():
+    report = Report("gate", (Row("good", 1.0, "<= 2", True), Row("bad", 3.0, "<= 2", False)))
+    assert [row[0] for row in Cells(report._repr_html_()).rows] == ["quantity", "bad", "good"]
+    assert "FAILED" in report._repr_html_()
+    assert repr(report) == "Report('gate': 1 of 2 failed)" and "bad" in str(report)
+
+
+def test_modes():
+    modes = Modes(2 * np.pi * np.array([10.0, 25.5]), np.zeros((6, 2)), np.array([1e-9, 2e-9]))
+    assert Cells(modes._repr_html_()).rows[1:] == [["1", "10", "1e-09"], ["2", "25.5", "2e-09"]]
+    assert repr(modes) == "Modes(2 modes, 10 to 25.5 Hz)"
+    assert repr(Modes(*np.zeros((3, 0)))) == "Modes(none)"
+
+
+def test_a_motion_and_its_mechanism(motion):
+    rows = dict(Cells(motion._repr_html_()).rows)
+    assert rows["instants"] == "11" and rows["bodies"] == "<bob>"
+    assert rows["event never"] == "0 times"
+    assert not motion._tracks and "energy" not in vars(motion)  # nothing was followed
+    assert repr(motion) == "Solution(11 instants, 0 to 0.01 s, bodies <bob>: Reached t = 0.01 s.)"
+    mechanism = motion.mechanism
+    assert Cells(mechanism._repr_html_()).rows[1:] == [
+        ["<bob>", "rigid", "2.5", "o"],
+        ["pivot", "spherical", "", "ground.(1.0, 0.0, 0.0), <bob>.o"],
+    ]
+    assert repr(mechanism) == "Mechanism(bodies <bob>; joints pivot)"

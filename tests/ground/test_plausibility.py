@@ -1,0 +1,592 @@
+"""Numbers of another unit never pass in silence, and numbers of real machines always do."""
+
+import json
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.command import rom as run_rom
+from cases.files.cells import solid as solid_mesh
+from cases.solid import STEEL, block
+from rom.body.rotating import rotating_frequencies
+from rom.body.stiffening import known_loads
+from rom.errors import ConfigError, ModelError, RomWarning
+from rom.fe.mesh.validate import checked
+from rom.io.matrices.op4 import write_op4
+from rom.io.native import body_arrays
+from rom.mbs.elements.impact import Impact
+from rom.mbs.parts.jumps import Examined
+from rom.plausible import far_doubt, scaled_doubt
+
+
+def said(make):
+    """What a call warns of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        make()
+    return [str(w.message) for w in caught if issubclass(w.category, RomWarning)]
+
+
+def moduli(E, nu, rho):
+    return rom.Orthotropic((E, E, E), (nu,) * 3, (E / 2.6,) * 3, rho)
+
+
+def toml(folder, E, nu, rho):
+    path = folder / "part.toml"
+    numbers = f"E = {E!r}\nnu = {nu!r}\nrho = {rho!r}"
+    path.write_text(f'[geometry]\nfile = "part.geo"\n[material]\n{numbers}\n')
+    return rom.read_component(path).material()
+
+
+WAYS = {
+    "material": lambda _, *numbers: rom.Material(*numbers),
+    "orthotropic": lambda _, *numbers: moduli(*numbers),
+    "file": toml,
+    "replace": lambda _, E, nu, rho: replace(rom.Material(210e9, nu, 7850.0), E=E, rho=rho),
+}
+WRONG = {  # E, rho: what is said
+    "E in MPa": (2.1e5, 7850.0, "5.172 m/s"),
+    "E in GPa": (210.0, 7850.0, "0.1636 m/s"),
+    "rho in g/cm^3": (210e9, 7.85, "1.636e+05 m/s"),
+    "mm, t, s": (2.1e5, 7.85e-9, "from_units('mm-t-s'"),
+    "mm, kg, ms": (210.0, 7.85e-6, "from_units('mm-kg-ms'"),
+    "kPa and t/m^3": (210e6, 7.85, "7.85 kg/m^3"),
+    "rho in g/m^3": (210e9, 7.85e6, "7.85e+06 kg/m^3"),
+}
+RIGHT = {  # E, rho
+    "steel": (210e9, 7850.0), "diamond": (1.2e12, 3510.0), "beryllium": (3.03e11, 1850.0),
+    "rubber": (1e6, 1100.0), "gel": (2e5, 1000.0), "soft foam": (3e4, 30.0),
+    "honeycomb": (1e9, 50.0), "aerogel": (1e4, 2.0), "tungsten": (4e11, 19300.0),
+    "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "concrete": (3e10, 2400.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("numbers", WRONG.values(), ids=WRONG)
+def test_a_solid_that_does_not_exist_is_doubted_whichever_way_it_comes(way, numbers, tmp_path):
+    E, rho, words = numbers
+    found = said(lambda: WAYS[way](tmp_path, E, 0.3, rho))
+    assert len(found) == 1 and words in found[0]
+    assert f"{E}" in found[0] and f"rho = {rho:g}" in found[0]
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("numbers", RIGHT.values(), ids=RIGHT)
+def test_a_solid_that_exists_is_taken_in_silence(way, numbers, tmp_path):
+    E, rho = numbers
+    assert said(lambda: WAYS[way](tmp_path, E, 0.3, rho)) == []
+
+
+@pytest.mark.parametrize(
+    ("units", "E", "rho"), [("SI", 210e9, 7850.0), ("mm-t-s", 2.1e5, 7.85e-9),
+                            ("mm-kg-ms", 210.0, 7.85e-6)],
+)  # fmt: skip
+def test_limits_follow_the_units_that_are_declared(units, E, rho):
+    made = []
+    numbers = {"nu": (0.3,) * 3, "rho": rho}
+    assert not said(lambda: made.append(rom.Material.from_units(units, E=E, nu=0.3, rho=rho)))
+    assert not said(
+        lambda: made.append(
+            rom.Orthotropic.from_units(units, E=(E,) * 3, G=(E / 2.6,) * 3, **numbers)
+        )
+    )
+    for solid in made:
+        assert_allclose([np.max(solid.E), solid.rho], [210e9, 7850.0], rtol=1e-14)
+
+
+@pytest.mark.parametrize("kind", [rom.YoungsModulus, rom.Density])
+@pytest.mark.parametrize(("high", "n"), [(210e9, 1), (7850.0, 1), (4.0, 0), (1e3, 0)])
+def test_a_factor_that_is_the_number_itself_is_doubted(kind, high, n):
+    found = said(lambda: kind("web", 0.5, high))
+    assert len(found) == n
+    assert all(f"{high:.4g}" in text and "'web'" not in text and "web" in text for text in found)
+
+
+DAMPING = {
+    "beyond one": (2.0, ConfigError, "2 per cent write 0.02"),
+    "negative": (-0.01, ConfigError, "-0.01 is negative"),
+    "no number": (float("nan"), ConfigError, "must be finite numbers"),
+    "infinite": (float("inf"), ConfigError, "must be finite numbers"),
+    "strong": (0.5, None, "0.5"),
+}
+
+
+@pytest.mark.parametrize("many", [False, True], ids=["one", "list"])
+@pytest.mark.parametrize("case", DAMPING.values(), ids=DAMPING)
+def test_damping_that_no_structure_has_is_refused_or_doubted(case, many):
+    ratio, error, words = case
+    given = [0.01, ratio] if many else ratio
+    if error:
+        with pytest.raises(error, match="ratio = ") as caught:
+            rom.ModalDamping(given)
+        assert words in str(caught.value)
+    else:
+        assert [words in text for text in said(lambda: rom.ModalDamping(given))] == [True]
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-4, 0.02, 0.3, 1.0, [0.01, 1.0]])
+def test_damping_of_structures_and_critical_damping_on_purpose_are_silent(ratio):
+    assert said(lambda: rom.ModalDamping(ratio)) == []
+
+
+@pytest.mark.parametrize("name", ["alpha", "beta"])
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), "1"])
+def test_factors_of_rayleigh_are_finite_and_not_negative(name, value):
+    with pytest.raises(ConfigError, match=f"{name} = "):
+        rom.Rayleigh(**{name: value})
+
+
+@pytest.mark.parametrize(("share", "n"), [(0.2, 0), (0.5, 1), (3.0, 1)])
+def test_rayleigh_is_doubted_by_its_lowest_coordinate(part, share, n):
+    beta = 2 * share / part.omega.min()
+    found = said(lambda: rom.Rayleigh(beta=beta).matrix(part))
+    assert len(found) == n and all(f"{share:.4g};" in text for text in found)
+
+
+def test_the_line_of_a_damping_ratio_in_a_file_is_told(tmp_path):
+    path = tmp_path / "part.toml"
+    path.write_text('[geometry]\nfile = "part.geo"\n[damping]\nratio = 2.0\n')
+    with pytest.raises(ConfigError, match=r"part.toml:\d.*= 2 is beyond"):
+        rom.read_component(path).damping()
+
+
+@pytest.mark.parametrize(("g", "n"), [(9.81, 0), (25.0, 0), (100.0, 0), (9810.0, 1), (981.0, 1)])
+@pytest.mark.parametrize("way", ["python", "file"])
+def test_gravity_of_no_planet_is_doubted(way, g, n, tmp_path):
+    body = "[bodies.a]\nmass = 1\ninertia = [1, 1, 1]\nat = [0, 0, 0]\n[simulation]\nt_end = 1\n"
+    path = tmp_path / "m.toml"
+    path.write_text(f"gravity = [0, 0, -{g}]\n{body}")
+    ways = {
+        "python": lambda: rom.Mechanism(gravity=(0, 0, -g)),
+        "file": lambda: rom.read_mechanism(path).mechanism(),
+    }
+    found = said(ways[way])
+    assert len(found) == n and all(f"gravity is {g:.4g} m/s^2" in text for text in found)
+
+
+@pytest.mark.parametrize("g", [9.81, "9.81", (9.81,), None])
+def test_gravity_needs_a_direction(g):
+    with pytest.raises(ConfigError, match="gravity"):
+        rom.Mechanism(gravity=g)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "reach", "words"),
+    [
+        ((0.01, 0.01, 0.01), 0.1, ""),
+        ((1e-9, 1e-9, 1e-9), 1.0, ""),  # a point at the end of a rod
+        ((1e4, 1e4, 1e4), 0.1, "1000"),  # kg mm^2
+        ((1e12, 1e12, 1e12), 0.0, "1e+06 m"),
+    ],
+)
+def test_an_inertia_far_beyond_its_markers_is_doubted(inertia, reach, words):
+    def add():
+        points = {"a": (reach, 0, 0)}
+        rom.Mechanism().add_rigid("bob", mass=1.0, inertia=inertia, at=(0, 0, 0), markers=points)
+
+    found = said(add)
+    assert len(found) == bool(words)
+    assert all(words in text and "'bob'" in text for text in found)
+
+
+def pendulum(at=(0.0, 0.0, 0.0)):
+    mech = rom.Mechanism()
+    bob = mech.add_rigid(
+        "bob",
+        mass=1.0,
+        inertia=(1e-2, 2e-2, 2e-2),
+        at=np.add(at, (0.5, 0, 0)),
+        markers={"a": (-0.5, 0, 0)},
+    )
+    mech.revolute("pin", mech.ground.marker(at), bob.marker("a"), axis=(0, 1, 0))
+    return mech
+
+
+SPRINGS = {
+    "spring": lambda m, **k: m.spring_damper(
+        "soft", m.ground.marker((0, 0, 1)), m.parts["bob"].marker("a"), **k
+    ),
+    "turn": lambda m, **k: m.rotational_spring("soft", "pin", **k),
+}
+
+
+@pytest.mark.parametrize("way", SPRINGS)
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [({"stiffness": -5.0}, "the stiffness of 'soft' is -5 "), ({"stiffness": 5.0}, ""),
+     ({"stiffness": 5.0, "damping": -2.0}, "the damping of 'soft' is -2;"),
+     ({"stiffness": 0.0, "damping": 0.0}, "")],
+)  # fmt: skip
+def test_a_spring_that_pushes_away_or_feeds_the_motion_is_doubted(way, numbers, words):
+    mech = pendulum()
+    found = said(lambda: SPRINGS[way](mech, **numbers))
+    assert len(found) == bool(words)
+    assert all(text.startswith(words.strip()) for text in found)
+
+
+MU = {
+    "stop": lambda mu: Impact(stiffness=1e5, mu=mu),
+    "friction": lambda mu: pendulum().friction(
+        "rub", "pin", mu=mu, radius=0.01, transition_speed=0.01
+    ),
+}
+
+
+@pytest.mark.parametrize("way", MU)
+@pytest.mark.parametrize(("mu", "n"), [(0.0, 0), (0.3, 0), (2.0, 0), (30.0, 1)])
+def test_friction_in_per_cent_is_doubted(way, mu, n):
+    found = said(lambda: MU[way](mu))
+    assert len(found) == n and all("friction" in text and "is 30;" in text for text in found)
+
+
+@pytest.mark.parametrize(("speed", "n"), [(0.0, 0), (7.8e3, 0), (7e4, 0), (3e6, 1)])
+def test_no_machine_starts_faster_than_spacecraft(speed, n):
+    def add():
+        pose = {"at": (0, 0, 0), "velocity": (speed, 0, 0)}
+        rom.Mechanism().add_rigid("probe", mass=1.0, inertia=(1, 1, 1), **pose)
+
+    found = said(add)
+    assert len(found) == n and all("'probe' is 3e+06 m/s" in text for text in found)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "at", "n"),
+    [(0.1, None, 0), (0.1, (2.0, 0, 0), 0), (1e5, None, 1), (0.1, (1500.0, 0, 0), 1)],
+)
+def test_what_hangs_on_an_interface_is_not_far_larger_than_the_model(inertia, at, n):
+    carried = rom.Attachment("tip", 1.0, inertia * np.eye(3), at)
+    model = replace(block(cells=(2, 1, 1)), attachments=(carried,))
+    found = set(said(lambda: rom.mass_properties(model)))
+    assert len(found) == n and all("the attachment on 'tip'" in text for text in found)
+
+
+def test_a_negative_length_is_refused_with_its_spring():
+    with pytest.raises(ConfigError, match="free_length of 'soft' = -1 m"):
+        SPRINGS["spring"](pendulum(), stiffness=1.0, free_length=-1.0)
+
+
+@pytest.mark.parametrize(("far", "n"), [(0.0, 0), (1e3, 0), (1e6, 1)])
+def test_joints_far_from_the_origin_of_the_world_are_doubted(far, n):
+    mech = pendulum(at=(far, 0, 0))
+    found = said(lambda: rom.simulate(mech, t_end=2e-3, dt=1e-3))
+    assert len(found) == n and all("1e+06 m from the origin" in text for text in found)
+
+
+@pytest.mark.parametrize(
+    ("size", "shift", "words"),
+    [(1.0, 0.0, ""), (1e-5, 0.0, ""), (3e3, 0.0, ""), (1e-8, 0.0, "the size of the mesh"),
+     (1e5, 0.0, "the size of the mesh"), (1.0, 50.0, ""), (1.0, 1e6, "12 of 16 digits"),
+     (1.0, 3e3, "7 of 16 digits")],
+)  # fmt: skip
+def test_meshes_of_strange_size_or_place_are_doubted(size, shift, words):
+    mesh = solid_mesh()
+    mesh = replace(mesh, points=(mesh.points / mesh.size + [shift, 0, 0]) * size)
+    found = said(lambda: checked(mesh))
+    assert len(found) == bool(words) and all(words in text for text in found)
+
+
+@pytest.mark.parametrize(
+    ("value", "default", "n"),
+    [(6.0, 0.006, 1), (6e-6, 0.006, 1), (0.06, 0.006, 0), (0.006, 0.006, 0), (0.0, 0.006, 0),
+     (30.0, 0.0, 0), ("a", "b", 0), (True, 1, 0), (-6.0, 0.006, 1)],
+)  # fmt: skip
+def test_a_parameter_in_millimetres_is_doubted(value, default, n):
+    text = scaled_doubt("bore", value, default)
+    assert bool(text) == bool(n)
+    assert not n or (f"bore = {value:g}" in text and f"default {default:g}" in text)
+
+
+BUILDER = """
+def build(gmsh, L=0.1, lc=0.05):
+    gmsh.model.occ.addBox(0, 0, 0, L, 0.1, 0.1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.setPhysicalName(3, gmsh.model.addPhysicalGroup(3, [1]), "body")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.1 * max(1.0, L))
+"""
+GEO = """SetFactory("OpenCASCADE");
+DefineConstant[ L = {0.1, Name "L"} ];
+Box(1) = {0, 0, 0, L, 0.1, 0.1};
+Physical Volume("body") = {1};
+Mesh.MeshSizeMax = 0.1 * (1 + L);
+"""
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(("name", "text"), [("a.geo", GEO), ("b.py", BUILDER)])
+@pytest.mark.parametrize(("L", "n"), [(0.2, 0), (20.0, 1)])
+def test_geometries_compare_parameters_with_their_defaults(name, text, L, n, tmp_path):
+    from rom.fe.mesh.read import read_mesh
+
+    path = tmp_path / name
+    path.write_text(text)
+    found = said(lambda: read_mesh(path, parameters={"L": L}, trust=path.suffix == ".py"))
+    assert len([text for text in found if "L = 20 is 200 times its default 0.1" in text]) == n
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(("scale", "n"), [(1.0, 0), (1e-3, 1)])
+def test_a_step_file_that_is_scaled_on_top_of_its_unit_is_doubted(scale, n, tmp_path):
+    gmsh = pytest.importorskip("gmsh")
+    from rom.fe.mesh.read import read_mesh
+
+    path = tmp_path / "box.step"
+    gmsh.initialize([], False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.occ.addBox(0, 0, 0, 100.0, 50.0, 50.0)  # STEP files of gmsh are in millimetres
+    gmsh.model.occ.synchronize()
+    gmsh.write(str(path))
+    gmsh.finalize()
+    found = said(lambda: read_mesh(path, scale=scale))
+    assert [("scale=0.001" in text and "0.0001225 m" in text) for text in found] == [True] * n
+
+
+def test_strict_turns_a_doubt_into_an_error_of_its_own_code(tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text(
+        "gravity = [0, 0, -9810]\n[bodies.a]\nmass = 1\ninertia = [1, 1, 1]\nat = [0, 0, 0]\n"
+        "[simulation]\nt_end = 1e-3\ndt = 1e-3\n"
+    )
+    arguments = ("simulate", path, "-o", tmp_path / "out", "--json")
+    done = run_rom(*arguments, "--strict")
+    assert done.returncode == 5 and "9810" in json.loads(done.stdout)["message"]
+    done = run_rom(*arguments)
+    assert done.returncode == 0
+    assert [text for text in json.loads(done.stdout)["warnings"] if "9810" in text] != []
+    assert done.stderr.count("9810 m/s^2;") == 1
+
+
+# ---------------------------------------------------------------- matrices of other programs
+
+
+def matrices(folder, *, k=1.0, m=1.0, x=1.0, material=STEEL, units="SI"):
+    """A block as matrix files with numbers times k and m, and its nodes times x."""
+    model = block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=material)
+    write_op4({"KAA": model.K.toarray() * k, "MAA": model.M.toarray() * m}, folder / "bar.op4")
+    labels = np.arange(1, len(model.points) + 1)
+    return rom.read_model(
+        (folder / "bar.op4", "KAA"),
+        (folder / "bar.op4", "MAA"),
+        nodes=(labels, model.points * x),
+        interfaces={"root": labels[model.interfaces["root"].nodes]},
+        units=units,
+    )
+
+
+MATRICES = {
+    "SI": ({}, ""),
+    "mm, t, s as said": ({"k": 1e-3, "m": 1e-3, "x": 1e3, "units": "mm-t-s"}, ""),
+    "mm, t, s read as SI": ({"k": 1e-3, "m": 1e-3, "x": 1e3}, "the speed of sound"),
+    "nodes in mm": ({"x": 1e3}, "the speed of sound"),
+    "nodes in km": ({"x": 1e-3}, "the mass over the volume"),
+    "E in MPa": ({"k": 1e-6}, "the speed of sound"),
+    "mass in t": ({"m": 1e-3}, "the speed of sound"),
+    "mass in g": ({"m": 1e3}, "the mass over the volume"),
+    "rubber": ({"material": rom.Material(1e6, 0.45, 1100.0)}, ""),
+}
+
+
+@pytest.mark.parametrize("case", MATRICES.values(), ids=MATRICES)
+def test_matrices_of_other_units_are_doubted(case, tmp_path):
+    numbers, words = case
+    found = said(lambda: matrices(tmp_path, **numbers))
+    assert bool(found) == bool(words)
+    assert not words or any(words in text and "bar.op4" in text for text in found)
+
+
+# ---------------------------------------------------------------- bodies of other units
+
+
+@pytest.fixture(scope="module")
+def part():
+    kinds = {"root": "rbe2", "tip": rom.Polynomial(2)}
+    body = rom.reduce(
+        block(cells=(4, 2, 2)), method=rom.CraigBampton(4), interfaces=kinds, certify=False
+    )
+    rng = np.random.default_rng(7)
+    stiffening = {}
+    for load in known_loads(body):
+        A = rng.normal(size=body.K.shape)
+        stiffening[load] = A + A.T
+    return replace(body, K_geo=stiffening, D=1e-4 * body.K)
+
+
+UNITS = ("mm-t-s", "mm-kg-ms")
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_a_body_comes_back_from_other_units(part, units):
+    there = part.in_units(units)
+    again, first = body_arrays(there.in_units("SI")), body_arrays(part)
+    for name, A in first.items():
+        assert_allclose(again[name], A, rtol=1e-14, atol=1e-14 * np.abs(A).max(initial=0.0))
+    assert there.units == units
+    assert there.inertia.max() > 1e2 * part.inertia.max()
+
+
+def test_the_conversion_of_a_body_is_that_of_its_model():
+    """The same beam meshed in mm, with MPa and t/mm^3."""
+    kinds = {"root": "rbe2", "tip": rom.Polynomial(1)}
+    si = block(size=(1.0, 0.1, 0.06), cells=(4, 1, 1))
+    L, material = 1e3, replace(rom.Material(210e9, 0.3, 7850.0))
+    options = {"method": rom.CraigBampton(3), "interfaces": kinds, "certify": False}
+    body = rom.reduce(si, reference="root", **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        material = rom.Material(material.E * 1e-6, 0.3, material.rho * 1e-12)
+        mm = block(size=(L, 0.1 * L, 0.06 * L), cells=(4, 1, 1), material=material)
+    native = rom.reduce(mm, reference="root", **options)
+    found = body.in_units("mm-t-s")
+    for name in ("mass", "first_moment", "inertia", "omega", "K"):
+        A = np.asarray(getattr(native, name))
+        assert_allclose(getattr(found, name), A, rtol=1e-7, atol=1e-9 * np.abs(A).max())
+    for name in ("S", "Ibar_kl"):
+        A = np.abs(getattr(native, name))
+        assert_allclose(np.abs(getattr(found, name)), A, rtol=1e-5, atol=1e-6 * A.max())
+    for one, other in ((found.markers[n], native.markers[n]) for n in kinds):
+        assert_allclose(one.point, other.point, atol=1e-9)
+        for name in ("translation", "rotation"):
+            A = np.abs(getattr(other, name))
+            assert_allclose(np.abs(getattr(one, name)), A, rtol=1e-5, atol=1e-6 * A.max() + 1e-9)
+        A = np.abs(other.hold)
+        assert_allclose(np.abs(one.hold), A, rtol=1e-5, atol=1e-6 * A.max())
+
+
+@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("fixed", [(), ("root",), ("tip",), ("root", "tip")])
+def test_frequencies_in_hertz_do_not_depend_on_units(part, units, fixed):
+    there = part.in_units(units)
+    wanted = part.frequencies(12, fixed=fixed)
+    assert_allclose(there.frequencies(12, fixed=fixed), wanted, rtol=1e-8)
+
+
+def test_geometric_stiffness_keeps_its_meaning_in_other_units(part):
+    """Stiffened by rotation: mm-t-s has the same time, so that Hz and rad/s are the same."""
+
+    def hertz(body, length=1.0):
+        at = length * np.array([2.0, 1.0, 3.0])
+        return rotating_frequencies(body, 3.0, (0.0, 0.6, 0.8), fixed=("root",), at=at)
+
+    stiff = replace(part, K_geo={load: 1e3 * A for load, A in part.K_geo.items()})
+    wanted = hertz(stiff)
+    assert_allclose(hertz(stiff.in_units("mm-t-s"), 1e3), wanted, rtol=1e-4)
+    plain = hertz(replace(part, K_geo={"a_x": 0 * part.K}))
+    assert np.abs(plain / wanted - 1).max() > 1e-2
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_the_motion_does_not_depend_on_the_units_of_the_body(part, units):
+    def motion(body):
+        mech = rom.Mechanism()
+        mech.add_flexible("beam", replace(body, K_geo={}).with_reference("root"), at=(0, 0, 0))
+        beam = mech.parts["beam"]
+        mech.revolute("pin", mech.ground.marker((0, 0.05, 0.04)), beam.marker("root"),
+                      axis=(0, 1, 0))  # fmt: skip
+        sol = rom.simulate(mech, t_end=0.01, dt=1e-4)
+        return sol.position("beam", "tip"), sol.reaction("pin")
+
+    for found, wanted in zip(motion(part.in_units(units)), motion(part), strict=True):
+        scale = np.abs(np.asarray(wanted)).max()
+        assert_allclose(np.asarray(found), np.asarray(wanted), atol=1e-6 * scale)
+
+
+def test_bodies_of_different_units_meet_in_si(part):
+    half = block(cells=(4, 2, 2), origin=(1.0, 0.0, 0.0))
+    kinds = {"root": rom.Polynomial(2), "tip": "rbe2"}
+    right = rom.reduce(half, method=rom.CraigBampton(4), interfaces=kinds, certify=False)
+    pair = (("left", "tip"), ("right", "root"))
+    both = {"left": part, "right": right}
+    wanted = rom.Assembly(both, (pair,)).frequencies(12)
+    mixed = {"left": part.in_units("mm-t-s"), "right": right.in_units("mm-kg-ms")}
+    assert_allclose(rom.Assembly(mixed, (pair,)).frequencies(12)[6:], wanted[6:], rtol=1e-8)
+
+
+def test_unknown_units_are_refused(part):
+    with pytest.raises(ConfigError, match="'inch' is unknown"):
+        part.in_units("inch")
+
+
+# ---------------------------------------------------------------- drives
+
+
+def steps(f, rate=None, span=(0.0, 1.0), n=500):
+    """What is said of a drive, and where it ends, over a run of n steps."""
+    drive, ends = Examined("motor", f, rate, span[0]), []
+    found = said(
+        lambda: ends.extend(drive.up_to(t, (span[1] - span[0]) / n)
+                            for t in np.linspace(*span, n // 50 + 1))
+    )  # fmt: skip
+    return found, ends[-1]
+
+
+SMOOTH = {
+    "constant": lambda t: 1.0 + 0 * t, "zero": lambda t: 0.0 * t, "steady": lambda t: 1e4 * t,
+    "fast": lambda t: np.sin(2 * np.pi * 400 * t), "steep": lambda t: np.tanh(1e4 * (t - 0.5)),
+    "from rest": lambda t: np.maximum(0.0, t - 0.5) ** 2, "offset": lambda t: 1e3 + 1e-3 * t**2,
+    "cycloid": lambda t: np.minimum(t, 0.4) - np.sin(2 * np.pi * np.minimum(t, 0.4) / 0.4)
+    * 0.4 / (2 * np.pi),
+}  # fmt: skip
+JUMPS = {  # function, time, size
+    "step": (lambda t: 1.0 * (t > 1 / 3), 1 / 3, 1.0),
+    "wrapped": (lambda t: (20 * t) % (2 * np.pi), 2 * np.pi / 20, -2 * np.pi),
+    "small on steady": (lambda t: 100 * t + 0.01 * (t >= 0.5), 0.5, 0.01),
+    "back": (lambda t: t - 0.2 * (t > 0.9999), 0.9999, -0.2),
+}
+KINKS = {  # function, time, size
+    "halt": (lambda t: np.minimum(t, 0.5), 0.5, -1.0),
+    "start": (lambda t: np.maximum(t - 0.25, 0.0), 0.25, 1.0),
+    "turn": (lambda t: np.abs(t - 0.7), 0.7, 2.0),
+}
+
+
+@pytest.mark.parametrize("f", SMOOTH.values(), ids=SMOOTH)
+def test_smooth_drives_are_not_blamed_however_fast(f):
+    assert steps(f) == ([], None)
+
+
+@pytest.mark.parametrize("case", JUMPS.values(), ids=JUMPS)
+def test_a_drive_that_jumps_is_refused_with_time_and_size(case):
+    f, time, size = case
+    _, (found, error) = steps(f)
+    assert isinstance(error, ModelError) and found == pytest.approx(time, abs=1e-6)
+    assert f"'motor' jumps by {size:.4g} at t = {time:.5g}"[:26] in str(error)
+
+
+@pytest.mark.parametrize("case", KINKS.values(), ids=KINKS)
+def test_a_drive_whose_velocity_jumps_is_doubted_once(case):
+    f, time, size = case
+    found, end = steps(f)
+    assert len(found) == 1 and end is None
+    assert f"'motor' jumps by {size:.4g} at t = {time:.6g} s" in found[0]
+
+
+@pytest.mark.parametrize(("factor", "n"), [(1.0, 0), (1.001, 0), (9.55, 1), (-1.0, 1)])
+def test_a_rate_that_is_not_that_of_the_value_is_doubted(factor, n):
+    found, _ = steps(lambda t: np.sin(3 * t), lambda t: factor * 3 * np.cos(3 * t))
+    assert len(found) == n and all("the rate given for drive 'motor'" in text for text in found)
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "bdf", "dop853"])
+def test_the_motion_before_a_jump_is_kept(method):
+    mech = pendulum()
+    mech.drive("motor", "pin", lambda t: 0.1 * t + 1.0 * (t > 0.0333))
+    with pytest.raises(ModelError, match=r"'motor' jumps by 1 at t = 0.0333") as caught:
+        rom.simulate(mech, t_end=0.1, dt=1e-3, method=method)
+    assert caught.value.solution.t[-1] <= 0.0333
+
+
+def test_loads_may_jump():
+    mech = pendulum()
+    push = mech.parts["bob"].marker("a")
+    mech.force("push", push, lambda t: np.array([0.0, 0.0, 5.0 * (t > 0.0333)]))
+    assert said(lambda: rom.simulate(mech, t_end=0.05, dt=1e-3)) == []
+
+
+@pytest.mark.parametrize(("distance", "n"), [(99.0, 0), (1e3, 1), (1e6, 1)])
+def test_digits_lost_are_two_for_each_factor_of_ten(distance, n):
+    text = far_doubt(distance, 1.0, "it")
+    assert bool(text) == bool(n)
+    assert not n or f"about {2 * np.log10(distance):.0f} of 16" in text

@@ -1,0 +1,435 @@
+"""Matrices and nodes of other programs become a model that reduces like the one they came from.
+
+The files in reference/foreign were written by pyyeti 1.4.7 (op4.write with 16 digits in each of
+its forms, bulk.wtdmig, bulk.wtgrids) from the block below, its nodes numbered out of order; those
+with six rows for each node have zeros for the rotations.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.io import loadmat, mmread, mmwrite
+from scipy.sparse import csr_matrix
+
+import rom
+from cases.files.decks import DECK
+from cases.paths import TESTS
+from cases.solid import block
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    InterfaceError,
+    ModelError,
+    QualityGateError,
+    RomError,
+    UnsafeFileError,
+)
+from rom.io.matrices.dmig import read_dmig, read_grids, real, write_dmig
+from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
+from rom.io.matrices.op4 import read_op4, write_op4
+from rom.io.matrices.read_model import read_model
+from rom.io.programs.interface_form import interface_form
+
+HERE = TESTS / "reference" / "foreign"
+LABELS = np.array([7, 3, 12, 20, 101, 55, 41, 60])  # of the nodes of the block
+SIDES = {"root": [7, 3, 12, 20], "tip": [60, 101, 41, 55]}
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+
+
+@pytest.fixture(scope="module")
+def brick():
+    return block(size=(0.3, 0.2, 0.1), cells=(1, 1, 1))
+
+
+def by_label(A):
+    """(24, 24) with the nodes in ascending order of their labels."""
+    order = (3 * np.argsort(LABELS)[:, None] + np.arange(3)).ravel()
+    return A.toarray()[np.ix_(order, order)]
+
+
+def with_rotations(A):
+    rows = (6 * np.arange(8)[:, None] + np.arange(3)).ravel()
+    out = np.zeros((48, 48))
+    out[np.ix_(rows, rows)] = A
+    return out
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "six"),
+    [("dense.op4", "KAA", False), ("dense.op4", "MAA", False), ("bigmat_text.op4", "MAA", True),
+     ("nonbigmat_text.op4", "MAA", True), ("dense_binary.op4", "KAA", True),
+     ("bigmat_binary.op4", "MAA", True), ("nonbigmat_binary.op4", "MAA", True)],
+)  # fmt: skip
+def test_every_form_of_output4_is_read(brick, file, name, six):
+    A = by_label(brick.K if name == "KAA" else brick.M)
+    expected = with_rotations(A) if six else A
+    found = read_op4(HERE / file)[name].toarray()
+    assert_allclose(found, expected, rtol=1e-14, atol=1e-13 * np.abs(expected).max())
+
+
+def test_punched_matrices_and_grids_are_read(brick):
+    found = read_dmig(HERE / "brick.dmig")
+    K, dofs = found["KAA"]
+    assert_array_equal(dofs[:, 0], np.repeat(np.sort(LABELS), 3))
+    lower = np.tril(by_label(brick.K))
+    assert_allclose(K.toarray(), lower, atol=1e-9 * np.abs(lower).max())
+    labels, points = read_grids(HERE / "brick.bdf")
+    assert_array_equal(labels, np.sort(LABELS))
+    assert_allclose(points, brick.points[np.argsort(LABELS)])
+
+
+SOURCES = {
+    "op4": ((HERE / "dense.op4", "kaa"), (HERE / "dense.op4", "maa")),
+    "six rows": (HERE / "dense_binary.op4", HERE / "bigmat_binary.op4"),
+    "dmig": ((HERE / "brick.dmig", "kaa"), (HERE / "brick.dmig", "maa")),
+}
+
+
+@pytest.mark.parametrize("case", SOURCES)
+def test_a_model_from_files_reduces_like_its_origin(brick, case):
+    K, M = SOURCES[case]
+    model = read_model(K, M, nodes=HERE / "brick.bdf", interfaces=SIDES)
+    assert model.mass() == pytest.approx(brick.mass(), rel=1e-8)
+    for name, interface in model.interfaces.items():
+        ours = brick.interfaces[name]
+        assert_allclose(interface.points, ours.points[np.lexsort(ours.points.T[::-1])])
+    bodies = [
+        rom.reduce(m, method=rom.CraigBampton(0), interfaces=KINDS, certify=False)
+        for m in (model, brick)
+    ]
+    f, expected = (body.frequencies(fixed=("root",)) for body in bodies)
+    assert_allclose(f, expected, rtol=1e-7)
+    assert_allclose(bodies[0].inertia, bodies[1].inertia, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_market_and_abaqus_text_with_nodes_of_an_input_deck(brick, whole, tmp_path):
+    """Symmetric matrices come with both triangles or one."""
+    symmetry = "general" if whole else "symmetric"
+    mmwrite(str(tmp_path / "K.mtx"), csr_matrix(by_label(brick.K)), symmetry=symmetry)
+    dofs = np.column_stack([np.repeat(LABELS, 3), np.tile([1, 2, 3], 8)])
+    write_abaqus_matrix(brick.M, dofs, tmp_path / "M.mtx")
+    if whole:
+        lines = (tmp_path / "M.mtx").read_text().splitlines()
+        turned = [[*(w := line.replace(" ", "").split(","))[2:4], *w[:2], w[4]] for line in lines]
+        more = [",".join(words) for words in turned if words[:2] != words[2:4]]
+        (tmp_path / "M.mtx").write_text("** all\n" + "\n".join(lines + more) + "\n")
+    nodes = [f"{n}, {x:.9g}, {y:.9g}, {z:.9g}" for n, (x, y, z) in
+             zip(LABELS, brick.points, strict=True)]  # fmt: skip
+    deck = ["*HEADING", "a block", "*Node, nset=all", "** first", *nodes, "*ELEMENT", "1, 2, 3"]
+    (tmp_path / "b.inp").write_text("\n".join(deck))
+    K, M = tmp_path / "K.mtx", tmp_path / "M.mtx"
+    model = read_model(K, M, nodes=tmp_path / "b.inp", interfaces=SIDES)
+    assert_allclose(model.K.toarray(), by_label(brick.K), atol=1e-2)
+    assert_allclose(model.M.toarray(), by_label(brick.M), atol=1e-12)
+    (tmp_path / "b.csv").write_text("# label, x, y, z\n" + "\n".join(nodes))
+    same = read_model(K, M, nodes=tmp_path / "b.csv", interfaces=SIDES)
+    assert_array_equal(same.points, model.points)
+
+
+def test_sets_of_nodes_in_the_deck_are_interfaces(brick, tmp_path):
+    (tmp_path / "b.inp").write_text(DECK)
+    K, M = SOURCES["op4"]
+    model = read_model(K, M, nodes=tmp_path / "b.inp", interfaces=("root", "tip"))
+    for name, labels in SIDES.items():
+        found = np.sort(LABELS)[model.interfaces[name].nodes]
+        assert_array_equal(np.sort(found), np.sort(labels))
+        assert model.interfaces[name].area == pytest.approx(1.0)
+    assert_allclose(model.points, brick.points[np.argsort(LABELS)])
+    for wanted, error, message in (
+        (
+            ("root", "pin"),
+            InterfaceError,
+            r"no set 'pin'; it has \['LEFT', 'ROOT', 'TIP', 'UPPER'\]",
+        ),
+        ("other", FileFormatError, "the set 'LOST' is unknown"),
+        ("self", FileFormatError, "the set 'SELF' is in itself"),
+        ("huge", UnsafeFileError, "has 2000000000 nodes"),
+        ("odd", FileFormatError, r"b\.inp, line \d+: a label is a whole number"),
+    ):
+        more = "*NSET, NSET=self\nself\n*NSET, NSET=other\nlost\n"
+        more += "*NSET, NSET=huge, GENERATE\n1, 2000000000, 1\n"
+        more += "*NSET, NSET=odd, GENERATE\n1, x\n" if wanted == "odd" else ""
+        (tmp_path / "b.inp").write_text(DECK + more.replace("self\nself", "self\nSelf"))
+        if wanted == ("root", "pin"):
+            (tmp_path / "b.inp").write_text(DECK)
+        with pytest.raises(error, match=message):
+            read_model(K, M, nodes=tmp_path / "b.inp", interfaces=wanted)
+    with pytest.raises(ConfigError, match=r"read from \.inp, not from"):
+        read_model(K, M, nodes=HERE / "brick.bdf", interfaces=["root"])
+    with pytest.raises(ConfigError, match=r"looked up in the \.inp file"):
+        read_model(K, M, nodes=read_grids(HERE / "brick.bdf"), interfaces=["root"])
+
+
+def test_decks_in_several_files(brick, tmp_path):
+    """Nodes as data of *NODE in a file of their own, sets included, both beside the deck."""
+    nodes, sets = DECK.partition("*NSET")[::2]
+    rows = [line for line in nodes.splitlines() if line[0] != "*"]
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "nodes.txt").write_text("** label, x, y, z\n" + "\n".join(rows))
+    (tmp_path / "parts" / "sets.inp").write_text(f"*NSET{sets}".replace("left", "3, 7"))
+    deck = tmp_path / "b.inp"
+    deck.write_text('*Node, input=parts/nodes.txt\n*INCLUDE, INPUT="parts/sets.inp"\n')
+    model = read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))
+    assert_allclose(model.points, brick.points[np.argsort(LABELS)])
+    for name, labels in SIDES.items():
+        found = np.sort(LABELS)[model.interfaces[name].nodes]
+        assert_array_equal(np.sort(found), np.sort(labels))
+    for name in ("gone.inp", "x" * 300, "x" * 300 + "/y", "nul\0"):
+        deck.write_text(f"*INCLUDE, INPUT={name}\n")
+        with pytest.raises(FileFormatError, match=f"{name}: there is no such file"):
+            read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))
+    deck.write_text("*INCLUDE, INPUT=b.inp\n")
+    with pytest.raises(FileFormatError, match="include each other too deep"):
+        read_model(*SOURCES["op4"], nodes=deck, interfaces=("root", "tip"))
+
+
+def test_units_are_converted_at_the_border(brick, tmp_path):
+    """Newton, millimetre, tonne: 1 N/mm is 1000 N/m."""
+    write_op4({"K": by_label(brick.K) / 1e3, "M": by_label(brick.M) / 1e3}, tmp_path / "b.op4")
+    labels, points = read_grids(HERE / "brick.bdf")
+    model = read_model(
+        (tmp_path / "b.op4", "K"), (tmp_path / "b.op4", "M"), nodes=(labels, 1e3 * points),
+        interfaces=SIDES, units="mm-t-s",
+    )  # fmt: skip
+    assert model.mass() == pytest.approx(brick.mass())
+    assert_allclose(model.K.toarray(), by_label(brick.K), rtol=1e-12, atol=1e-3)
+
+
+def test_written_matrices_come_back(tmp_path):
+    rng = np.random.default_rng(4)
+    A, B = rng.normal(size=(7, 7)), rng.normal(size=(4, 9)) * 10.0 ** rng.integers(-90, 90, (4, 9))
+    A[:, 3] = A[2] = 0.0
+    found = read_op4(write_op4({"a": A + A.T, "rect": B}, tmp_path / "a.op4"))
+    assert_array_equal(found["A"].toarray(), A + A.T)
+    assert_array_equal(found["RECT"].toarray(), B)
+    dofs = np.array([[4, 1], [4, 3], [9, 6], [11, 2], [1001, 0], [1002, 0], [1003, 0]])
+    write_dmig({"A": A + A.T + np.eye(7)}, dofs, tmp_path / "a.dmig", nodes={4: (0.1, -2e-3, 3e7)})
+    back, same = read_dmig(tmp_path / "a.dmig")["A"]
+    assert_array_equal(same, dofs)
+    assert_allclose(back.toarray(), np.tril(A + A.T + np.eye(7)), rtol=1e-9)
+    labels, points = read_grids(tmp_path / "a.dmig")
+    assert_array_equal(labels, [4])
+    assert_allclose(points, [[0.1, -2e-3, 3e7]])
+
+
+def test_short_and_free_cards_are_read(tmp_path):
+    """Numbers without the letter of the exponent, continuations with + or blanks, comments."""
+    (tmp_path / "a.bdf").write_text(
+        "$ free\nDMIG,KX,0,6,1,0\nDMIG,KX,1,1,,1,1,2.+3\nDMIG,KX,2,1,,2,1,4.0\n,2,2,-5.-1\n"
+        "DMIG    KX             2       2               2       2 1.5E+1\n"
+        "GRID           1             1.0      2.      3.\n"
+        "DMIG    KX             2       3               2       3     7.\n"
+        "+              3       1     -9.                       \n"
+    )
+    A, dofs = read_dmig(tmp_path / "a.bdf")["KX"]
+    assert_array_equal(dofs, [[1, 1], [2, 1], [2, 2], [2, 3], [3, 1]])
+    expected = np.diag([2000.0, 4.0, 15.0, 7.0, 0.0])
+    expected[2, 1], expected[4, 3] = -0.5, -9.0
+    assert_allclose(A.toarray(), expected)
+    assert real("1.5-3") == 1.5e-3 and real("-.25+2") == -25 and real("1.D+2") == 100
+
+
+def test_what_does_not_fit_is_named(brick, tmp_path):
+    K, M = SOURCES["op4"]
+    nodes = HERE / "brick.bdf"
+
+    def read(**other):
+        given = {"K": K, "M": M, "nodes": nodes, "interfaces": SIDES} | other
+        return read_model(given.pop("K"), given.pop("M"), **given)
+
+    with pytest.raises(ConfigError, match=r"holds \['KAA', 'MAA'\]; name one"):
+        read(K=HERE / "dense.op4")
+    with pytest.raises(ConfigError, match="has no matrix 'KGG'"):
+        read(K=(HERE / "dense.op4", "KGG"))
+    with pytest.raises(ConfigError, match="unit system"):
+        read(units="inch")
+    with pytest.raises(InterfaceError, match=r"'tip' has no nodes, or unknown ones: \[8\]"):
+        read(interfaces={"tip": [7, 8]})
+    labels, points = read_grids(nodes)
+    with pytest.raises(FileFormatError, match="24 rows are neither 3 nor 6 for each of 7"):
+        read(nodes=(labels[1:], points[1:]))
+    with pytest.raises(FileFormatError, match=r"nodes that are not given: \[3\]"):
+        read(K=SOURCES["dmig"][0], nodes=(labels[1:], points[1:]))
+    with pytest.raises(FileFormatError, match="occurs twice"):
+        read(nodes=(np.r_[labels[1:], 7], points))
+    with pytest.raises(QualityGateError, match="a rigid motion meets the stiffness"):
+        read(nodes=(labels, points[::-1]))
+    with pytest.raises(ConfigError, match=r"ending '\.xyz'"):
+        (tmp_path / "K.xyz").write_text("")
+        read(K=tmp_path / "K.xyz")
+    turning = with_rotations(by_label(brick.K))
+    turning[3, 3] = 1.0
+    path = write_op4({"K": turning}, tmp_path / "t.op4")
+    with pytest.raises(ModelError, match="node 3 has the component 4: nodes that turn"):
+        read(K=path)
+    supported = by_label(brick.K) + np.diag(np.r_[1e9, np.zeros(23)])
+    with pytest.raises(QualityGateError, match="the body is supported"):
+        read(K=write_op4({"K": supported}, tmp_path / "s.op4"))
+    uneven = by_label(brick.M) + np.diag(np.r_[1.0, np.zeros(23)])
+    with pytest.raises(ModelError, match="not the same along x, y and z"):
+        read(M=write_op4({"M": uneven}, tmp_path / "m.op4"))
+    skew = by_label(brick.K)
+    skew[0, 5] += 1e9
+    with pytest.raises(QualityGateError, match="not symmetric"):
+        read(K=write_op4({"K": skew}, tmp_path / "n.op4"))
+
+
+def test_hostile_sizes_take_no_memory(tmp_path):
+    market = tmp_path / "K.mtx"
+    for sizes in ("3 3 999999999999", "999999999 999999999 1", "-1 3 x"):
+        market.write_text(f"%%MatrixMarket matrix coordinate real general\n{sizes}\n1 1 1.0\n")
+        with pytest.raises(FileFormatError):
+            read_matrix(market)
+    market.write_text("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 1\n")
+    with pytest.raises(FileFormatError, match="not real"):
+        read_matrix(market)
+    text = (HERE / "dense.op4").read_text()
+    (tmp_path / "a.op4").write_text(text.replace("      24", "99999999", 1))
+    with pytest.raises(UnsafeFileError, match="rows and 99999999 columns"):
+        read_op4(tmp_path / "a.op4")
+    (tmp_path / "a.op4").write_text(
+        text.replace("       1       1      2", "       1       1 999992")
+    )
+    with pytest.raises(FileFormatError, match=r"a\.op4, line 2: .*9999\d+ values"):
+        read_op4(tmp_path / "a.op4")
+    (tmp_path / "a.op4").write_text(text.replace("       2KAA", "       4KAA", 1))
+    with pytest.raises(FileFormatError, match=r"KAA .*is complex"):
+        read_op4(tmp_path / "a.op4")
+
+
+@pytest.fixture(scope="module")
+def body():
+    return rom.reduce(
+        block(cells=(4, 1, 1)), method=rom.CraigBampton(3), interfaces=KINDS,
+        damping=rom.Rayleigh(0.0, 1e-6), certify=False,
+    )  # fmt: skip
+
+
+def test_the_interface_form_is_the_same_body(body):
+    """Frequencies of every support; a rigid motion of both interfaces meets no stiffness."""
+    form = interface_form(body)
+    n = len(form.K)
+    for fixed, keep in ((("root",), np.arange(6, n)), (("root", "tip"), np.arange(12, n))):
+        lam = np.linalg.eigvals(
+            np.linalg.solve(form.M[np.ix_(keep, keep)], form.K[np.ix_(keep, keep)])
+        )
+        f = np.sqrt(np.sort(lam.real)) / (2 * np.pi)
+        assert_allclose(f, body.frequencies(fixed=fixed), rtol=1e-8)
+    rigid = np.zeros((n, 6))
+    for k in (0, 1):
+        x, y, z = form.points[k + 1]
+        rigid[6 * k : 6 * k + 6] = np.eye(6)
+        rigid[6 * k : 6 * k + 3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    assert np.abs(form.K @ rigid).max() < 1e-8 * np.abs(form.K).max()
+    assert rigid[:, 0] @ form.M @ rigid[:, 0] == pytest.approx(body.mass, rel=1e-9)
+    inertia = (rigid.T @ form.M @ rigid)[3:, 3:]
+    assert_allclose(inertia, body.inertia, atol=1e-9 * np.abs(body.inertia).max())
+    assert_allclose(form.D[12:, 12:], 1e-6 * np.diag(form.omega**2), atol=1e-6)
+    assert_array_equal(form.dofs[[0, 5, 6, 11, 12, 14]].ravel(),
+                       [1, 1, 1, 6, 2, 1, 2, 6, 1001, 0, 1003, 0])  # fmt: skip
+
+
+def test_a_body_that_has_no_interface_form_is_named(body):
+    with pytest.raises(ConfigError, match="interface 'root' has other coordinates"):
+        root = replace(body.markers["root"], hold=np.zeros((5, 6 + body.n_modes)))
+        interface_form(replace(body, markers=body.markers | {"root": root}))
+    with pytest.raises(ConfigError, match="it has 0"):
+        interface_form(replace(body, markers={}))
+
+
+@pytest.mark.parametrize("ending", ["op4", "dmig"])
+def test_a_reduced_body_is_exported_for_nastran(body, ending, tmp_path):
+    form = interface_form(body)
+    path = rom.export(body, tmp_path / f"rod.{ending}")
+    found = read_op4(path) if ending == "op4" else {k: A for k, (A, _) in read_dmig(path).items()}
+    for name, A in (("KAAX", form.K), ("MAAX", form.M), ("BAAX", form.D)):
+        got = found[name].toarray()
+        expected = A if ending == "op4" else np.tril(A)
+        assert_allclose(got, expected, rtol=1e-9, atol=0 if ending == "op4" else 1e-30)
+
+
+def test_a_reduced_body_is_exported_for_simscape(body, tmp_path):
+    """Read back by SciPy; every motion of the frames with what the block expects of it."""
+    found = loadmat(rom.export(body, tmp_path / "rod.mat"))
+    K, M, form = found["K"], found["M"], interface_form(body)
+    assert_array_equal(K, form.K)
+    assert_array_equal(found["C"], form.D)
+    assert [str(name[0][0]) for name in found["interfaces"]] == list(body.interface_names)
+    points = [body.markers[name].point for name in body.interface_names]
+    assert_allclose(found["origins"], points)
+    still = np.arange(12, len(K))
+    lam = np.linalg.eigvals(np.linalg.solve(M[np.ix_(still, still)], K[np.ix_(still, still)]))
+    assert_allclose(np.sqrt(np.sort(lam.real)) / (2 * np.pi), found["frequencies"][:, 0])
+    along = np.zeros(len(K))
+    along[[0, 6]] = 1.0  # both frames along x
+    assert along @ M @ along == pytest.approx(body.mass, rel=1e-9)
+    assert_array_equal(found["quaternions"], [[1, 0, 0, 0]] * 2)
+    again = rom.export(body, tmp_path / "again.mat")
+    assert again.read_bytes() == (tmp_path / "rod.mat").read_bytes()
+
+
+@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric"])
+@pytest.mark.parametrize("dense", [True, False])
+@pytest.mark.parametrize("field", ["real", "integer"])
+def test_matrix_market_is_read_as_scipy_reads_it(symmetry, dense, field, tmp_path):
+    """Every form that scipy.io.mmwrite has for real matrices."""
+    rng = np.random.default_rng(6)
+    A = np.round(50 * rng.normal(size=(5, 5))) * rng.integers(0, 2, (5, 5))
+    A = {"general": A, "symmetric": A + A.T, "skew-symmetric": A - A.T}[symmetry]
+    A = A / 7 if field == "real" else A.astype(int)
+    path = tmp_path / "A.mtx"
+    mmwrite(str(path), A if dense else csr_matrix(A), symmetry=symmetry, comment="one\n\ntwo")
+    head = path.read_text().splitlines()[0].split()
+    assert head[2:] == ["array" if dense else "coordinate", field, symmetry]
+    found = read_matrix(path)
+    assert_allclose(found.A.toarray(), A, rtol=1e-14)
+    assert_allclose(found.A.toarray(), read_densely(path), rtol=0)
+
+
+def read_densely(path):
+    A = mmread(str(path))
+    return A if isinstance(A, np.ndarray) else A.toarray()
+
+
+@pytest.mark.parametrize(
+    ("head", "rest", "message"),
+    [
+        ("coordinate real general", "3 3 1\n4 1 1.0\n", "outside of 3 x 3"),
+        ("coordinate real general", "3 3 1\n1 0 1.0\n", "outside of 3 x 3"),
+        ("coordinate real general", "3 3 1\n1.5 1 1.0\n", "outside of 3 x 3"),
+        ("coordinate real general", "3 3 2\n1 1 1.0\n", "1 lines where 2 entries"),
+        ("coordinate real general", "3 3 3\n1\n", "1 lines where 3 entries"),
+        ("coordinate real general", "3 3 0\n1 1 1.0\n", "1 lines where 0 entries"),
+        ("array real symmetric", "2 2\n1\n2\n", "2 numbers where 3"),
+        ("array real symmetric", "2 1\n1\n2\n3\n", "2 x 1 is not square"),
+        ("array real general", "3 3\n1\n", "1 numbers where 9"),
+        ("coordinate pattern general", "2 2 1\n1 1\n", "not real"),
+        ("cordinate real general", "2 2 1\n1 1 1\n", "'cordinate real general' is unknown"),
+    ],
+)
+def test_what_is_no_matrix_market_is_named(head, rest, message, tmp_path):
+    (tmp_path / "A.mtx").write_text(f"%%MatrixMarket matrix {head}\n{rest}")
+    with pytest.raises(FileFormatError, match=message):
+        read_matrix(tmp_path / "A.mtx")
+
+
+@pytest.mark.parametrize("ending", ["dmig", "mtx"])
+def test_files_cut_between_two_lines_are_no_model(brick, ending, tmp_path):
+    """Nothing in such a file says where it ends; rigid motions tell."""
+    dofs = np.column_stack([np.repeat(LABELS, 3), np.tile([1, 2, 3], 8)])
+    write = {"dmig": lambda A, path: write_dmig({"A": A}, dofs, path),
+             "mtx": lambda A, path: write_abaqus_matrix(A, dofs, path)}[ending]  # fmt: skip
+    K, M, cut = (tmp_path / f"{name}.{ending}" for name in ("K", "M", "cut"))
+    write(brick.K, K)
+    write(brick.M, M)
+    nodes = HERE / "brick.bdf"
+    assert read_model(K, M, nodes=nodes, interfaces=SIDES).mass() == pytest.approx(47.1)
+    for k, path in enumerate((K, M)):
+        lines = path.read_text().splitlines(keepends=True)
+        for n in np.random.default_rng(k).integers(1, len(lines), 12):
+            cut.write_text("".join(lines[:n]))
+            with pytest.raises(RomError):
+                read_model(*((cut, M), (K, cut))[k], nodes=nodes, interfaces=SIDES)

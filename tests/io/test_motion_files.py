@@ -1,0 +1,297 @@
+"""Histories and films of a motion, read back by other programs."""
+
+import csv
+import json
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rom
+from cases.solid import block
+from rom.errors import ConfigError
+from rom.io.fields.gltf import MovingMesh, write_glb
+from rom.rotation import matrix
+
+BOX = (
+    np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.1, 0], [0, 0, 0.05]]),
+    np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A soft flexible pendulum with a rigid bob hinged to its tip."""
+    rubber = rom.Material(E=2e6, nu=0.3, rho=1100.0)
+    model = block(cells=(4, 1, 1), material=rubber)
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(
+        model, method=rom.CraigBampton(2), interfaces=kinds, reference="root", certify=False
+    )
+    mech = rom.Mechanism(gravity=(0.0, 0.0, -9.81))
+    rod = mech.add_flexible("rod", body)
+    at = rod.point(rod.marker("tip")) + np.array([0.1, 0.0, 0.0])
+    bob = mech.add_rigid(
+        "bob", mass=0.5, inertia=(1e-3, 2e-3, 2e-3), at=at, markers={"pin": (-0.1, 0.0, 0.0)}
+    )
+    root = rod.point(rod.marker("root"))
+    mech.revolute("hinge", mech.ground.marker(root), rod.marker("root"), axis=(0, 1, 0))
+    mech.spherical("wrist", rod.marker("tip"), bob.marker("pin"))
+    return rom.simulate(mech, t_end=0.2, dt=2e-3)
+
+
+def test_the_table_has_units_in_its_head_and_every_quantity(motion, tmp_path):
+    with rom.write_history(motion, tmp_path / "m.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert all(name.endswith("]") and "[" in name for name in head)
+    assert len(set(head)) == len(head)
+    values = np.array(rows, dtype=float)
+
+    def named(start, unit, axes="xyz"):
+        return values[:, [head.index(f"{start} {x} [{unit}]") for x in axes]]
+
+    assert_array_equal(values[:, head.index("t [s]")], motion.t)
+    assert_array_equal(named("rod markers tip position", "m"), motion.position("rod", "tip"))
+    assert_array_equal(named("bob velocity", "m/s"), motion.velocity("bob"))
+    assert_array_equal(named("hinge force", "N"), motion.reaction("hinge")[:, :3])
+    assert_array_equal(named("hinge moment", "N m"), motion.reaction("hinge")[:, 3:])
+    q = named("rod elastic", "m sqrt(kg)", [f"q{k + 1}" for k in range(8)])
+    assert_array_equal(q, motion.elastic("rod"))
+    assert_array_equal(values[:, head.index("strain [J]")], motion.energy.strain)
+
+
+def test_the_tree_is_read_by_h5py(motion, tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed")
+    path = rom.write_history(motion, tmp_path / "m.h5", every=5)
+    with h5py.File(path) as file:
+        assert_array_equal(file["time"], motion.t[::5])
+        tip = file["bodies/rod/markers/tip/position"]
+        assert_array_equal(tip, motion.position("rod", "tip")[::5])
+        assert tip.attrs["unit"] == "m" and list(tip.attrs["columns"]) == ["x", "y", "z"]
+        assert_array_equal(file["joints/wrist/force"], motion.reaction("wrist")[::5, :3])
+        assert_array_equal(file["energy/total"], motion.energy.total[::5])
+        assert file["bodies/rod/elastic"].attrs["unit"] == "m sqrt(kg)"
+        datasets = []
+        file.visititems(lambda _, x: datasets.append(x) if isinstance(x, h5py.Dataset) else None)
+        assert len(datasets) > 20 and all("unit" in x.attrs for x in datasets)
+
+
+def test_names_with_slashes_and_dots_stay_apart(tmp_path):
+    from rom.io.history import quoted
+
+    assert len({quoted(name) for name in ("a/b", "a%2Fb", "a", ".", "..", "a.b")}) == 6
+    assert not any("/" in quoted(name) for name in ("a/b", "/", "."))
+    assert quoted("rod 1") == "rod 1" and quoted("..") == "%2E%2E"
+
+
+def test_what_cannot_be_written_is_named(motion, tmp_path):
+    with pytest.raises(ConfigError, match=r"ending '.xls'; known: .csv, .h5, .hdf5"):
+        rom.write_history(motion, tmp_path / "m.xls")
+    with pytest.raises(ConfigError, match="every = 0"):
+        rom.write_history(motion, tmp_path / "m.csv", every=0)
+    with pytest.raises(ConfigError, match="does not exist"):
+        rom.write_history(motion, tmp_path / "none" / "m.csv")
+    with pytest.raises(ConfigError, match=r"'.fbx' is unknown"):
+        rom.write_animation(motion, tmp_path / "m.fbx")
+    with pytest.raises(ConfigError, match=r"no body 'rood'; there are \['bob', 'rod'\]"):
+        rom.write_animation(motion, tmp_path / "m.glb", shapes={"rood": BOX})
+    with pytest.raises(ConfigError, match="no film has 1 frames"):
+        rom.write_animation(motion, tmp_path / "m.glb", frames=1)
+    with pytest.raises(ConfigError, match="is no direction"):
+        rom.write_animation(motion, tmp_path / "m.glb", up=(0, 0, 0))
+    assert not list(tmp_path.iterdir())
+
+
+def world_points(motion, step, magnify=1.0):
+    """Surfaces of bob and rod in the world, one below the other, by rotation matrices."""
+    rod = motion.mechanism.parts["rod"].flexible.surface
+    u = (rod.shape @ motion.elastic("rod")[step]).reshape(-1, 3)
+    out = {"bob": BOX[0], "rod": rod.points + magnify * u}
+    return {
+        name: motion.position(name)[step] + X @ matrix(motion.orientation(name)[step]).T
+        for name, X in out.items()
+    }
+
+
+def chunks(path):
+    """JSON and buffer of a .glb, its lengths checked."""
+    data = path.read_bytes()
+    magic, version, length = struct.unpack_from("<4sII", data)
+    n, kind = struct.unpack_from("<I4s", data, 12)
+    m, other = struct.unpack_from("<I4s", data, 20 + n)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    assert (kind, other, 28 + n + m, n % 4, m % 4) == (b"JSON", b"BIN\0", len(data), 0, 0)
+    return json.loads(data[20 : 20 + n]), data[28 + n :]
+
+
+def test_a_film_has_the_structure_of_gltf(motion, tmp_path):
+    path = rom.write_animation(motion, tmp_path / "m.glb", frames=21, shapes={"bob": BOX})
+    film, buffer = chunks(path)
+    assert film["asset"]["version"] == "2.0" and film["buffers"][0]["byteLength"] <= len(buffer)
+    sizes = {5126: 4, 5125: 4}
+    parts = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+    for a in film["accessors"]:
+        view = film["bufferViews"][a["bufferView"]]
+        assert a["count"] * parts[a["type"]] * sizes[a["componentType"]] == view["byteLength"]
+        assert view["byteOffset"] % 4 == 0
+        assert view["byteOffset"] + view["byteLength"] <= film["buffers"][0]["byteLength"]
+    (animation,) = film["animations"]
+    kinds = [c["target"]["path"] for c in animation["channels"]]
+    assert sorted(kinds) == ["rotation", "rotation", "translation", "translation", "weights"]
+    clock = film["accessors"][animation["samplers"][0]["input"]]
+    assert (clock["min"], clock["max"], clock["count"]) == ([0.0], [4.0], 21)
+    rod = next(m for m in film["meshes"] if m["name"] == "rod")
+    for c in animation["channels"]:
+        out = film["accessors"][animation["samplers"][c["sampler"]]["output"]]
+        times = len(rod["weights"]) if c["target"]["path"] == "weights" else 1
+        assert out["count"] == 21 * times
+    assert film["scenes"][0]["nodes"] == [0] and film["nodes"][0]["children"] == [1, 2]
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("magnify", [1.0, 3.0])
+def test_vtk_plays_the_film_as_the_bodies_moved(motion, magnify, tmp_path):
+    """VTK's own importer applies morph weights, rotations and the turn of z to y."""
+    gltf = pytest.importorskip("vtkmodules.vtkIOGeometry", reason="VTK comes with the pictures")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    path = rom.write_animation(
+        motion, tmp_path / "m.glb", frames=11, shapes={"bob": BOX}, seconds=None, magnify=magnify
+    )
+    reader = gltf.vtkGLTFReader()
+    reader.SetFileName(str(path))
+    reader.SetApplyDeformationsToGeometry(True)
+    reader.SetFrameRate(50)  # times of the film are multiples of 1/50 s
+    reader.UpdateInformation()
+    reader.EnableAnimation(0)
+    for instant in (0, 4, 7):
+        reader.UpdateTimeStep(0.02 * instant)
+        found, blocks = [], reader.GetOutput().NewIterator()
+        while not blocks.IsDoneWithTraversal():
+            found.append(vtk_to_numpy(blocks.GetCurrentDataObject().GetPoints().GetData()))
+            blocks.GoToNextItem()
+        expected = world_points(motion, 10 * instant, magnify)
+        for name in ("rod", "bob"):
+            X = expected[name] @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # z goes to y
+            got = next(x for x in found if len(x) == len(X))
+            assert_allclose(got, X, atol=3e-6)
+
+
+@pytest.mark.fenicsx
+def test_vtk_reads_the_series_in_one_file(motion, tmp_path):
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="VTK comes with the pictures")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    shapes = {"bob": BOX}
+    path = rom.write_animation(motion, tmp_path / "m.vtkhdf", frames=5, shapes=shapes, magnify=2.0)
+    reader = hdf.vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == 5
+    for step in (0, 3):
+        reader.SetStep(step)
+        reader.Update()
+        grid = reader.GetOutput()
+        expected = world_points(motion, 25 * step, magnify=2.0)
+        order = list(motion.mechanism.parts)
+        assert_allclose(
+            vtk_to_numpy(grid.GetPoints().GetData()), np.vstack([expected[n] for n in order])
+        )
+        rod = motion.mechanism.parts["rod"].flexible.surface
+        u = np.linalg.norm((rod.shape @ motion.elastic("rod")[25 * step]).reshape(-1, 3), axis=1)
+        field = vtk_to_numpy(grid.GetPointData().GetArray("displacement [m]"))
+        body = vtk_to_numpy(grid.GetPointData().GetArray("body"))
+        assert_allclose(np.linalg.norm(field, axis=1)[body == order.index("rod")], u, atol=1e-12)
+        corners = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 3)
+        shift = sum(len(expected[name]) for name in order[: order.index("rod")])
+        mine = slice(None, len(rod.triangles)) if order[0] == "rod" else slice(len(BOX[1]), None)
+        assert_array_equal(corners[mine], rod.triangles + shift)
+        ends = vtk_to_numpy(grid.GetCells().GetOffsetsArray())
+        assert_array_equal(np.diff(ends), 3)
+
+
+@pytest.mark.parametrize("up", [(0, 1, 0), (0, -1, 0), (0, 0, 1), (1, 2, -0.5)])
+def test_upright_becomes_y(up):
+    from rom.io.fields.gltf import upright
+
+    p = upright(np.array(up, dtype=float))
+    assert_allclose(matrix(p) @ up / np.linalg.norm(up), [0, 1, 0], atol=1e-12)
+
+
+def test_quaternions_in_a_film_never_jump_to_the_other_sign(motion, tmp_path):
+    """Players interpolate the four numbers: a jump would turn the body once around."""
+    signs = np.where(np.arange(len(motion.t)) % 3 == 1, -1.0, 1.0)[:, None]
+    at = motion._start_of("rod") + 3
+    q = motion.q.copy()
+    q[:, at : at + 4] *= signs
+    film, data = chunks(rom.write_animation(replace(motion, q=q), tmp_path / "m.glb"))
+    for c in film["animations"][0]["channels"]:
+        if c["target"]["path"] == "rotation":
+            a = film["accessors"][film["animations"][0]["samplers"][c["sampler"]]["output"]]
+            start = film["bufferViews"][a["bufferView"]]["byteOffset"]
+            p = np.frombuffer(data, "<f4", 4 * a["count"], start).reshape(-1, 4)
+            assert np.einsum("fi,fi->f", p[1:], p[:-1]).min() > 0.9
+
+
+def test_a_film_without_flexible_bodies_or_with_one_at_rest_is_written(motion, tmp_path):
+    still = replace(motion, q=np.repeat(motion.q[:1], len(motion.t), axis=0))
+    film, _ = chunks(rom.write_animation(still, tmp_path / "m.glb"))
+    assert not any("weights" in mesh for mesh in film["meshes"])
+
+
+def played(path, frame):
+    """{body: points (n, 3) in the film}, by the rules of glTF: morph, turn, move, turn of root."""
+    film, data = chunks(path)
+
+    def numbers(accessor):
+        a = film["accessors"][accessor]
+        start = film["bufferViews"][a["bufferView"]]["byteOffset"]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[a["type"]]
+        return np.frombuffer(data, "<f4", a["count"] * width, start).reshape(a["count"], width)
+
+    (animation,), now = film["animations"], {}
+    for channel in animation["channels"]:
+        sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
+        values, times = numbers(sampler["output"]), len(numbers(sampler["input"]))
+        now[target["node"], target["path"]] = values.reshape(times, -1)[frame]
+    root = film["nodes"][film["scenes"][0]["nodes"][0]]
+    out = {}
+    for k in root["children"]:
+        mesh = film["meshes"][film["nodes"][k]["mesh"]]
+        (primitive,) = mesh["primitives"]
+        X = numbers(primitive["attributes"]["POSITION"])
+        weights = now.get((k, "weights"), ())
+        for w, target in zip(weights, primitive.get("targets", ()), strict=True):
+            X = X + w * numbers(target["POSITION"])
+        X = X @ matrix(np.roll(now[k, "rotation"], 1)).T + now[k, "translation"]
+        out[mesh["name"]] = X @ matrix(np.roll(root["rotation"], 1)).T
+        surface = film["materials"][primitive["material"]]["pbrMetallicRoughness"]
+        colour = surface["baseColorFactor"]
+        assert len(colour) == 4 and all(isinstance(c, float) and 0 <= c <= 1 for c in colour)
+    return out
+
+
+def test_a_film_of_given_motions_is_played_by_the_rules(tmp_path):
+    rng, n_frames = np.random.default_rng(3), 6
+    poses = [(rng.normal(size=(n_frames, 3)), rng.normal(size=(n_frames, 4))) for _ in range(2)]
+    poses = [(r, p / np.linalg.norm(p, axis=1, keepdims=True)) for r, p in poses]
+    shapes, q = rng.normal(size=(12, 2)), rng.normal(size=(n_frames, 2))
+    X, triangles = (np.asarray(part) for part in BOX)
+    bodies = [
+        MovingMesh("rod", X.astype(float), triangles, *poses[0], shapes, q, (0.1, 0.4, 0.6)),
+        MovingMesh(
+            "bob", 2.0 * X, triangles, *poses[1], np.zeros((12, 0)), np.zeros((n_frames, 0))
+        ),
+    ]
+    times = np.linspace(0.0, 1.0, n_frames)
+    path = write_glb(bodies, times, tmp_path / "m.glb", up=(0, 0, 1), title="motion")
+    up = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # z goes to y
+    for frame in range(n_frames):
+        found = played(path, frame)
+        for body, points in (("rod", X + (shapes @ q[frame]).reshape(-1, 3)), ("bob", 2.0 * X)):
+            r, p = poses[body == "bob"]
+            expected = points @ matrix(p[frame]).T + r[frame]
+            assert_allclose(found[body], expected @ up.T, atol=1e-5)

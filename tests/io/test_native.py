@@ -1,0 +1,190 @@
+"""The body file: written whole or not at all, read back bit by bit, refused when damaged."""
+
+import io
+import json
+import os
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rom
+from cases.solid import block
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    QualityGateError,
+    ResourceError,
+    RomError,
+    UnsafeFileError,
+)
+
+
+@pytest.fixture(scope="module")
+def body():
+    model = block(cells=(4, 1, 1), origin=(0.1, 0.2, 0.3))
+    kinds = {"root": "rbe2", "tip": "full"}
+    return rom.reduce(model, method=rom.CraigBampton(4), interfaces=kinds, reference="root")
+
+
+@pytest.fixture
+def file(body, tmp_path):
+    return rom.save(body, tmp_path / "rod.rom.npz")
+
+
+def test_what_is_read_equals_what_was_written(body, file):
+    again = rom.load(file)
+    for name in ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(body, name))
+    for name, marker in body.markers.items():
+        for part in ("point", "translation", "rotation", "hold"):
+            np.testing.assert_array_equal(getattr(again.marker(name), part), getattr(marker, part))
+    np.testing.assert_array_equal(again.surface.shape, body.surface.shape)
+    assert again.certificate == body.certificate
+    assert (again.labels, again.reference, again.units) == (body.labels, "root", "SI")
+    np.testing.assert_array_equal(again.frequencies(9), body.frequencies(9))
+    assert again.provenance == json.loads(json.dumps(body.provenance))
+
+
+def test_files_of_older_versions_are_read(body, file, tmp_path):
+    """Minor versions only add: what is missing is empty."""
+
+    def older(name, data):
+        return data.replace(b'"version": [1, 3]', b'"version": [1, 0]')
+
+    assert rom.load(rewritten(file, tmp_path / "old.npz", older)).K_geo == {}
+
+
+def test_a_geometric_stiffness_of_another_body_is_refused(body, tmp_path):
+    for A, message in ((np.eye(2), "has the shape"), (np.tri(body.n_modes), "is not symmetric")):
+        path = rom.save(replace(body, K_geo={"a_x": A}), tmp_path / "wrong.npz")
+        with pytest.raises(RomError, match=message):
+            rom.load(path)
+
+
+def test_the_same_body_gives_the_same_bytes(body, file, tmp_path):
+    other = rom.save(body, tmp_path / "other.npz")
+    assert other.read_bytes() == file.read_bytes()
+
+
+def test_a_geometric_stiffness_travels(body, tmp_path):
+    K_geo = {"omega_z^2": np.diag(np.arange(1.0, body.n_modes + 1))}
+    path = rom.save(replace(body, K_geo=K_geo), tmp_path / "b.npz")
+    np.testing.assert_array_equal(rom.load(path).K_geo["omega_z^2"], K_geo["omega_z^2"])
+
+
+def test_every_flipped_or_missing_byte_is_noticed(file, tmp_path):
+    """Damage gives a typed error or, outside the arrays, the identical body."""
+    original, good = file.read_bytes(), rom.load(file)
+    rng = np.random.default_rng(5)
+    broken = tmp_path / "broken.npz"
+    for trial in range(150):
+        data = bytearray(original)
+        if trial % 3 == 0:
+            data = data[: rng.integers(len(data))]
+        else:
+            data[rng.integers(len(data))] ^= 1 << rng.integers(8)
+        broken.write_bytes(data)
+        try:
+            body = rom.load(broken)
+        except RomError as error:
+            assert error.exit_code in (3, 5)
+        else:
+            np.testing.assert_array_equal(body.S_kl, good.S_kl)
+            np.testing.assert_array_equal(body.K, good.K)
+
+
+def rewritten(file, path, change):
+    """A copy of the file with its members passed through ``change(name, data)``."""
+    with zipfile.ZipFile(file) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            data = change(name, old.read(name))
+            if data is not None:
+                new.writestr(name, data)
+    return path
+
+
+def npy(array, **options):
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, array, **options)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("member", "content", "kind", "message"),
+    [
+        ("K.npy", None, FileFormatError, "lacks the array .K. of its manifest"),
+        ("manifest.npy", None, FileFormatError, "no manifest"),
+        ("manifest.npy", npy(np.zeros(3, np.uint8)), FileFormatError, "manifest cannot be read"),
+        ("K.npy", npy(np.array([{}], dtype=object), allow_pickle=True), UnsafeFileError, "type"),
+        ("K.npy", npy(np.eye(2, dtype=np.float32)), UnsafeFileError, "type <f4"),
+        ("K.npy", npy(np.eye(2)), FileFormatError, "'K' was changed after writing"),
+        ("K.npy", npy(np.eye(3))[:-8], FileFormatError, "cut|claims"),
+        ("K.npy", b"not an array", FileFormatError, "broken header"),
+    ],
+)
+def test_a_wrong_member_is_named(file, tmp_path, member, content, kind, message):
+    path = rewritten(file, tmp_path / "x.npz", lambda n, d: content if n == member else d)
+    with pytest.raises(kind, match=message):
+        rom.load(path)
+
+
+def test_a_file_that_claims_terabytes_is_refused_before_memory_is_taken(file, tmp_path):
+    huge = npy(np.zeros((2, 2))).replace(b"(2, 2)", b"(99999999, 99999)")
+    path = rewritten(file, tmp_path / "x.npz", lambda n, d: huge if n == "K.npy" else d)
+    with pytest.raises((UnsafeFileError, FileFormatError)):
+        rom.load(path)
+    with pytest.raises(UnsafeFileError, match="above the limit of 0"):
+        rom.load(file, limit=1000)
+
+
+def test_other_files_and_newer_versions_are_named(file, tmp_path, body):
+    (tmp_path / "text.npz").write_text("hello")
+    with pytest.raises(FileFormatError, match="not a complete body file"):
+        rom.load(tmp_path / "text.npz")
+    with pytest.raises(FileFormatError, match="no such file"):
+        rom.load(tmp_path / "missing.npz")
+
+    def newer(name, data):
+        return data.replace(b'"version": [1, 3]', b'"version": [9, 0]')
+
+    with pytest.raises(FileFormatError, match=r"schema 'rom-body' \[9, 0\]"):
+        rom.load(rewritten(file, tmp_path / "new.npz", newer))
+
+
+def test_a_body_that_is_not_finite_or_not_definite_is_not_passed_on(body, tmp_path):
+    with pytest.raises(QualityGateError, match="K of body 'body' is not finite"):
+        rom.save(replace(body, K=body.K * np.nan), tmp_path / "nan.npz")
+    assert not list(tmp_path.iterdir())
+    path = rom.save(replace(body, S_kl=-body.S_kl), tmp_path / "negative.npz")
+    with pytest.raises(QualityGateError, match="mass is not positive definite"):
+        rom.load(path)
+    K = body.K.copy()
+    K[0, 1] = K.max()
+    with pytest.raises(QualityGateError, match="K is not symmetric"):
+        rom.load(rom.save(replace(body, K=K), tmp_path / "skew.npz"))
+
+
+def test_a_wrong_place_to_write_is_named(body, tmp_path):
+    with pytest.raises(ConfigError, match="is a folder"):
+        rom.save(body, tmp_path)
+    with pytest.raises(ConfigError, match="does not exist"):
+        rom.save(body, tmp_path / "nowhere" / "b.npz")
+
+
+def test_a_full_disk_leaves_the_old_file_and_nothing_else(body, file):
+    before = file.read_bytes()
+    if not os.path.exists("/dev/full"):
+        pytest.fail("this test needs /dev/full")
+
+    def fail(_):
+        with open("/dev/full", "wb", buffering=0) as full:
+            full.write(b"x")
+
+    from rom.io.files import write_whole
+
+    with pytest.raises(ResourceError, match="No space left"):
+        write_whole(file, fail)
+    assert file.read_bytes() == before
+    assert [p.name for p in file.parent.iterdir()] == [file.name]

@@ -1,0 +1,320 @@
+"""Standard Input Data: the motion its blocks describe, its dialects, and files that are broken."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rom
+from cases.command import rom as command
+from cases.mbs.mechanisms import nodal_body, random_body, random_nodes
+from cases.mbs.particles import motion, particles
+from rom.errors import ConfigError, FileFormatError, RomWarning, UnsafeFileError
+from rom.io.sid.body import sid_body, standard_input
+from rom.io.sid.dialect import check_sid, read_sid
+from rom.io.sid.format import DIALECTS, Taylor, write_sid
+
+RNG = np.random.default_rng(11)
+
+
+@pytest.fixture(scope="module")
+def nodes():
+    return random_nodes(np.random.default_rng(5), n=7, r=4)
+
+
+@pytest.fixture(scope="module")
+def stiffened():
+    return random_body(np.random.default_rng(7), stiffened=True)
+
+
+def rows(record, q, qd, qdd, a, omega, domega):
+    """Left-hand sides of the three rows of equations, from the blocks alone."""
+    b = record.blocks
+
+    def at(name):
+        block = b[name]
+        return block.M0 + (0.0 if block.M1 is None else np.tensordot(q, block.M1, 1))
+
+    r = q.size
+    md, J, Ct, Cr = at("mdCM")[:, 0], at("J"), at("Ct"), at("Cr")
+    Gr = np.einsum("j,aj->a", qd, np.einsum("acj,c->aj", at("Gr").reshape(3, 3, r), omega))
+    Ge = np.einsum("j,icj,c->i", qd, at("Ge").reshape(r, 3, r), omega)
+    x, y, z = omega
+    W = np.array([x * x, y * y, z * z, x * y, y * z, x * z])
+    cross = np.cross
+    force = record.mass * a - cross(md, domega) + Ct.T @ qdd + 2 * cross(omega, Ct.T @ qd)
+    force += cross(omega, cross(omega, md))
+    moment = cross(md, a) + J @ domega + Cr.T @ qdd + Gr + cross(omega, J @ omega)
+    elastic = Ct @ a + Cr @ domega + at("Me") @ qdd + Ge + at("Oe") @ W + at("ksigma")[:, 0]
+    return force, moment, elastic + at("Ke") @ q + at("De") @ qd
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_forces_and_elastic_rows_are_those_of_particles(nodes, dialect, tmp_path):
+    """With blocks of first order these rows are exact, for deformations of any size."""
+    body = nodal_body(*nodes)
+    record = read_sid(write_sid(standard_input(body), tmp_path / "b.SID_FEM", dialect=dialect))
+    got, expected = rows(record, *motion()), particles(nodes, *motion())
+    for row in (0, 2):
+        assert_allclose(got[row], expected[row], atol=1e-9 * np.abs(expected[row]).max())
+
+
+def test_moments_are_those_of_particles_to_first_order(nodes):
+    """SID has no place for the second order of J and Gr: the error falls with the square."""
+    record = standard_input(nodal_body(*nodes))
+    errors = [
+        np.abs(rows(record, *motion(s))[1] - particles(nodes, *motion(s))[1]).max()
+        for s in (1e-2, 1e-3)
+    ]
+    assert 80 < errors[0] / errors[1] < 120
+
+
+def test_stiffening_adds_its_matrices_to_loads(stiffened):
+    """The load l adds K_l to the stiffness; forces on nodes stand on the other side."""
+    soft = replace(stiffened, K_geo={})
+    full, plain = standard_input(stiffened), standard_input(soft)
+    q, qd, qdd, a, omega, domega = motion()
+    more = (
+        rows(full, q, qd, qdd, a, omega, domega)[2] - rows(plain, q, qd, qdd, a, omega, domega)[2]
+    )
+    x, y, z = omega
+    loads = dict(zip(("a_x", "a_y", "a_z"), a, strict=True))
+    loads |= dict(zip(("domega_x", "domega_y", "domega_z"), domega, strict=True))
+    loads |= {"omega_x^2": x * x, "omega_y^2": y * y, "omega_z^2": z * z}
+    loads |= {"omega_x omega_y": x * y, "omega_y omega_z": y * z, "omega_x omega_z": x * z}
+    assert_allclose(more, sum(s * stiffened.K_geo[load] @ q for load, s in loads.items()))
+    for kind, block in (("f", "phi"), ("m", "psi")):
+        for axis, letter in enumerate("xyz"):
+            change = np.tensordot(q, full.nodes["a"][block].M1, 1)[axis]
+            assert_allclose(change, -stiffened.K_geo[f"a {kind}_{letter}"] @ q)
+
+
+def test_ge_does_no_work_even_with_angular_stiffening(stiffened):
+    record = standard_input(stiffened)
+    Ge = record.blocks["Ge"].M0.reshape(4, 3, 4)
+    assert_allclose(Ge, -Ge.transpose(2, 1, 0), atol=1e-14)
+    Cr1 = record.blocks["Cr"].M1
+    assert np.abs(Cr1 + Cr1.swapaxes(0, 1)).max() > 0.1  # stiffening went there, and stays there
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("r", [1, 2, 3, 6, 11])
+def test_every_dialect_is_told_and_comes_back_equal(dialect, r, tmp_path):
+    body = random_body(np.random.default_rng(r), r=r, stiffened=True)
+    record = standard_input(body)
+    path = write_sid(record, tmp_path / "b.SID_FEM", dialect=dialect)
+    back = read_sid(path)
+    if r > 1:
+        assert back.dialect == dialect
+    assert_record_equal(back, record)
+    again = write_sid(back, tmp_path / "again.SID_FEM", dialect=dialect)
+    assert again.read_bytes() == path.read_bytes()
+    report = check_sid(back)
+    assert report.ok, report
+    assert all(row.value < 1e-10 for row in report.rows[:-1])
+
+
+def assert_record_equal(back, record):
+    scalars = ("title", "name", "mass", "coordinates")
+    assert [getattr(back, k) for k in scalars[:2]] == [getattr(record, k) for k in scalars[:2]]
+    assert back.mass == pytest.approx(record.mass, rel=1e-11)
+    assert len(back.coordinates) == len(record.coordinates)
+    pairs = [(back.blocks, record.blocks)]
+    pairs += [(back.nodes[label], node) for label, node in record.nodes.items()]
+    assert list(back.nodes) == list(record.nodes)
+    for got, expected in pairs:
+        assert set(got) == set(expected)
+        for name, block in expected.items():
+            assert_allclose(got[name].M0, block.M0, rtol=1e-11, atol=0, err_msg=name)
+            assert (got[name].M1 is None) == (block.M1 is None), name
+            if block.M1 is not None:
+                assert_allclose(got[name].M1, block.M1, rtol=1e-11, atol=0, err_msg=name)
+
+
+def entries(path, name, kind):
+    """{indices: value} of a block of a file, found without the reader."""
+    text = path.read_text()
+    inside = text[text.index(f" {name}\n") : text.index(f" end {name}\n")]
+    found = re.findall(rf"{kind}\(([\d, ]+)\) *=(.*)", inside)
+    return {tuple(map(int, i.split(","))): float(v.replace("D", "E")) for i, v in found}
+
+
+@pytest.mark.parametrize(
+    ("dialect", "mode_second", "gr_axis", "ge_axis", "six"),
+    [("fembs", True, True, True, True), ("pysid", True, False, True, True),
+     ("geisler", False, False, False, False)],
+)  # fmt: skip
+def test_dialects_have_the_layouts_measured_in_public_files(
+    dialect, mode_second, gr_axis, ge_axis, six, nodes, tmp_path
+):
+    """Blocks from the nodes themselves: Gr_j = -2 int x~ phi~_j, Ge_j = 2 int phi_j x phi_i."""
+    x, Ms, phi, K, D = nodes
+    record = standard_input(nodal_body(x, Ms, phi, K, D))
+    path, r, j, axis = tmp_path / "b.SID_FEM", 4, 2, 1
+    write_sid(record, path, dialect=dialect)
+    by_axis, by_mode = axis * r + j + 1, 3 * j + axis + 1
+    skew = [np.cross(np.eye(3), v).T for v in x], [np.cross(np.eye(3), v).T for v in phi[j]]
+    Gr = -2 * np.einsum("nm,nab,mbc->ac", Ms, *skew)
+    got = entries(path, "Gr", "m0")[2, by_axis if gr_axis else by_mode]
+    assert_allclose(got, Gr[1, axis], rtol=1e-10)
+    Ge = 2 * np.einsum("nm,inma->ia", Ms, np.cross(phi[j][None, :, None], phi[:, None, :]))
+    got = entries(path, "Ge", "m0")[1, by_axis if ge_axis else by_mode]
+    assert_allclose(got, Ge[0, axis], rtol=1e-10)
+    Oe = np.einsum("nm,na,mb->ab", Ms, phi[j], phi[0])  # column 5 is y z
+    got = entries(path, "Oe", "m1")[(1, j + 1, 5) if mode_second else (1, 5, j + 1)]
+    assert_allclose(got, Oe[1, 2] + Oe[2, 1], rtol=1e-10)
+    J = entries(path, "J", "m0")
+    assert_allclose(J[5, 1] if six else J[3, 1], record.blocks["J"].M0[0, 2], rtol=1e-10)
+    assert ((1, 2) in J) is False  # a column, or the lower triangle alone
+
+
+def test_numbers_stand_where_fortran_puts_them(tmp_path):
+    path = write_sid(standard_input(random_body(RNG)), tmp_path / "b.SID_FEM")
+    lines = path.read_text().splitlines()
+    assert all(line.index("=") == 48 for line in lines if "=" in line and "modal =" not in line)
+    mass = next(line for line in lines if line.split()[0] == "mass")
+    assert mass[48:50] == "= " and mass[-4:-2] == "D+" and len(mass) == 48 + 1 + 18
+    assert lines[0].startswith("2 4 :No. nodes, No. modes:")
+
+
+def test_columns_in_a_wrong_order_are_seen_by_the_check(tmp_path):
+    """Shapes agree; only the relations between the blocks tell."""
+    record = standard_input(random_body(RNG, r=3))
+    for name in ("Gr", "Ge"):
+        M0 = record.blocks[name].M0[:, np.random.default_rng(1).permutation(9)]
+        bad = replace(record, blocks=record.blocks | {name: Taylor(M0)})
+        failed = [row.quantity for row in check_sid(bad).failures]
+        assert failed and all(name in quantity for quantity in failed)
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [("mdCM", "mdCM1"), ("Oe", "Oe0"), ("J", "Gr"), ("Cr", "Gr - Gr"), ("Ct", "mdCM1")],
+)
+def test_each_block_is_checked_against_another(name, what):
+    record = standard_input(random_body(RNG, r=3))
+    block = record.blocks[name]
+    M1 = None if block.M1 is None else 1.01 * block.M1
+    bad = replace(record, blocks=record.blocks | {name: Taylor(1.01 * block.M0, M1)})
+    assert any(row.quantity.startswith(what) for row in check_sid(bad).failures)
+
+
+def test_a_body_comes_back_from_its_sid(nodes, tmp_path):
+    x, Ms, phi, K, D = nodes
+    markers = {"a": (x[0], phi[:, 0].T, 0.2 * RNG.normal(size=(3, 4)))}
+    body = nodal_body(x, Ms, phi, K, D, markers)
+    rom.export(body, tmp_path / "b.SID_FEM")
+    back = sid_body(rom.read_sid(tmp_path / "b.SID_FEM"))
+    for name in ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega"):
+        assert_allclose(getattr(back, name), getattr(body, name), atol=1e-10, err_msg=name)
+    for part in ("point", "translation", "rotation"):
+        assert_allclose(getattr(back.markers["a"], part), getattr(body.markers["a"], part))
+    turn = np.array([0.0, 0.0, 1.0])  # about the body origin: the marker moves across its arm
+    moved = back.markers["a"].hold @ np.r_[0, 0, 0, turn, np.zeros(4)]
+    assert_allclose(moved, np.r_[np.cross(turn, x[0]), turn], atol=1e-12)
+
+
+def test_a_stiffened_file_is_no_body(stiffened, tmp_path):
+    rom.export(stiffened, tmp_path / "b.SID_FEM")
+    with pytest.raises(ConfigError, match="geometric stiffness in Oe"):
+        sid_body(read_sid(tmp_path / "b.SID_FEM"))
+
+
+def test_ge_with_stiffening_inside_is_cleaned_with_a_warning(tmp_path):
+    """Files of a well-known program have it there; it would create energy."""
+    record = standard_input(random_body(RNG, r=2))
+    Ge = record.blocks["Ge"].M0
+    bad = replace(record, blocks=record.blocks | {"Ge": Taylor(Ge + 0.1 * np.eye(2, 6))})
+    path = write_sid(bad, tmp_path / "b.SID_FEM")
+    with pytest.warns(RomWarning, match="part of Ge that does work"):
+        clean = read_sid(path)
+    assert_allclose(clean.blocks["Ge"].M0, Ge, rtol=1e-11, atol=1e-16)
+    kept = read_sid(path, ge="as_written")
+    assert_allclose(kept.blocks["Ge"].M0, bad.blocks["Ge"].M0, rtol=1e-11)
+    with pytest.raises(ConfigError, match="ge = 'none'"):
+        read_sid(path, ge="none")
+
+
+def test_habits_of_other_writers_are_read(tmp_path):
+    """Small letters of exponents, whole numbers, tabs, empty lines, terms of second order."""
+    path = write_sid(standard_input(random_body(RNG)), tmp_path / "a.SID_FEM")
+    expected = read_sid(path)
+    text = path.read_text().replace("D+00", "e+00").replace("D-01", "d-01")
+    text = text.replace("\n", "\r\n\n").replace("                =", "\t=\t")
+    (tmp_path / "b.SID_FEM").write_text(text)
+    assert_record_equal(read_sid(tmp_path / "b.SID_FEM"), expected)
+    text = path.read_text().replace("end mdCM", "mn( 1, 1, 1) = 2\n end mdCM")
+    (tmp_path / "c.SID_FEM").write_text(text)
+    with pytest.warns(RomWarning, match="1 terms of second order"):
+        assert_record_equal(read_sid(tmp_path / "c.SID_FEM"), expected)
+
+
+BROKEN = {
+    "no part": (" part\n", "", "'part' was expected"),
+    "a number": ("D+00", "Q+00", "is no finite number"),
+    "not finite": ("0D+00", "0D+999", "is no finite number"),
+    "an index": ("m0( 1, 1)", "m0( 1,99)", r"m0\( 1,99\) is outside"),
+    "an index zero": ("m0( 1, 1)", "m0( 0, 1)", r"is outside"),
+    "a word": ("m0( 1, 1)", "mm( 1, 1)", "is no entry of a block"),
+    "a block": ("mdCM", "mdCN", "'mdCN' is unknown"),
+    "a shape": ("nrow", "nrom", "no entry of a block|before the sizes"),
+    "structure": ("structure" + 23 * " " + "= 3", "structure = 9", "the structure 9"),
+    "no mass": ("nelastq", "nelastr", "are no body"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files_are_named_with_the_line(case, tmp_path):
+    old, new, message = BROKEN[case]
+    path = write_sid(standard_input(random_body(RNG, r=2)), tmp_path / "x.SID_FEM")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(FileFormatError, match=message) as caught:
+        read_sid(path)
+    assert "x.SID_FEM, line " in str(caught.value)
+
+
+def test_hostile_sizes_take_no_memory(tmp_path):
+    path = write_sid(standard_input(random_body(RNG, r=2)), tmp_path / "x.SID_FEM")
+    lines = path.read_text().splitlines()
+    at = next(k for k, line in enumerate(lines) if "nelastq" in line)
+    lines[at] = "nelastq = 999999999"
+    path.write_text("\n".join(lines))
+    with pytest.raises(UnsafeFileError, match="above the limit of 1000"):
+        read_sid(path)
+    with pytest.raises(FileFormatError, match="no such file"):
+        read_sid(tmp_path / "none.SID_FEM")
+
+
+def test_the_command_line_writes_checks_and_reads_back(nodes, tmp_path):
+    body = nodal_body(*nodes)
+    rom.save(body, tmp_path / "b.rom.npz")
+    path = tmp_path / "b.SID_FEM"
+    assert command("export", tmp_path / "b.rom.npz", path, "--to", "sid-pysid").returncode == 0
+    done = command("check", path, "--json")
+    answer = json.loads(done.stdout)
+    assert done.returncode == 0 and answer["dialect"] == "pysid" and answer["report"]["ok"]
+    assert command("export", path, tmp_path / "c.rom.npz").returncode == 0
+    assert_allclose(rom.load(tmp_path / "c.rom.npz").K, body.K, rtol=1e-11, atol=1e-11)
+    assert command("export", path, tmp_path / "c.xyz").returncode == 2
+    path.write_text(path.read_text()[:3000])
+    assert command("check", path).returncode == 3
+
+
+def test_mean_axis_bodies_have_round_off_where_nothing_stands(tmp_path):
+    """Zero momentum of the shapes must not be compared digit by digit."""
+    from cases.solid import block
+
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    body = rom.reduce(
+        block(cells=(4, 1, 1)), method=rom.CraigBampton(3), interfaces=kinds, certify=False
+    )
+    for dialect in DIALECTS:
+        path = write_sid(standard_input(body), tmp_path / "b.SID_FEM", dialect=dialect)
+        record = read_sid(path)
+        assert check_sid(record).ok and record.dialect == dialect
+    assert_array_equal(list(record.nodes), list(body.markers))

@@ -1,0 +1,104 @@
+"""Universal files: numbers of known files come back, broken files are named."""
+
+import struct
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from cases.files.decks import IM, RE, X, dataset, header
+from cases.paths import TESTS
+from rom.errors import ConfigError, FileFormatError
+from rom.io.fields.universal import assemble, read_universal
+
+HERE = TESTS / "reference" / "foreign"
+
+
+@pytest.mark.parametrize("spacing", [0, 1])
+@pytest.mark.parametrize("kind", [2, 4, 5, 6])
+def test_all_eight_forms_of_numbers_are_read(kind, spacing, tmp_path):
+    parts = [RE, IM] if kind > 4 else [RE]
+    (tmp_path / "a.unv").write_text(dataset(kind, spacing, ([] if spacing else [X]) + parts))
+    (f,) = read_universal(tmp_path / "a.unv")
+    assert_allclose(f.x, X, rtol=1e-12)
+    assert_allclose(f.y, RE + 1j * IM if kind > 4 else RE, rtol=1e-12)
+    assert (f.response, f.reference, f.kind) == ((7, 3), (11, -3), 4)
+    assert f.labels[0] == "wing tip"
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("kind", [5, 6])
+def test_binary_datasets_are_read_in_both_byte_orders(kind, order, tmp_path):
+    numbers = np.column_stack([RE, IM]).ravel()
+    packed = struct.pack(f"{'<>'[order - 1]}10{'fd'[kind - 5]}", *numbers)
+    head = f"    58b{order:6d}{2:6d}{11:12d}{len(packed):12d}" + " 0 0 0 0"
+    data = f"{-1:6d}\n{head}\n{header(kind, 5, 1)}".encode() + packed + b"\n    -1\n"
+    (tmp_path / "b.uff").write_bytes(data)
+    (f,) = read_universal(tmp_path / "b.uff")
+    assert_allclose(f.y, RE + 1j * IM, rtol=1e-6)
+    assert_allclose(f.x, X)
+
+
+@pytest.mark.parametrize("name", ["pyuff_text.uff", "pyuff_binary.uff"])
+def test_files_of_another_program_are_read(name):
+    """Written by pyuff 2.5.8 from these numbers, real parts times 5 and 9.
+
+    Its binary files announce 40 bytes for 80, and close the dataset without an end of line.
+    """
+    found = read_universal(HERE / name)
+    assert [f.response for f in found] == [(5, 2), (9, 2)]
+    for f, k in zip(found, (5, 9), strict=True):
+        assert_allclose(f.x, X, rtol=1e-12)
+        assert_allclose(f.y, k * RE + 1j * IM, rtol=1e-11)
+        assert (f.reference, f.numerator, f.denominator) == ((11, -3), 12, 13)
+
+
+def test_bytes_that_are_missing_are_not_made_up(tmp_path):
+    """Fewer bytes than the numbers need, and no closing mark where they would end."""
+    data, path = (HERE / "pyuff_binary.uff").read_bytes(), tmp_path / "x.uff"
+    for bad in (data[:-30], data[:-7], data[:940] + data[944:]):
+        path.write_bytes(bad)
+        with pytest.raises(FileFormatError, match=r"x\.uff: dataset \d is cut"):
+            read_universal(path)
+
+
+def test_other_datasets_and_line_ends_do_not_disturb(tmp_path):
+    other = f"{-1:6d}\n   151\nname\n{-1:6d}\n"
+    content = other + dataset(6, 1, [RE, IM]) + other + dataset(5, 1, [RE, IM], response=(8, 1))
+    (tmp_path / "c.unv").write_bytes(content.replace("\n", "\r\n").encode())
+    found = read_universal(tmp_path / "c.unv")
+    assert [f.response for f in found] == [(7, 3), (8, 1)]
+    assert_allclose(found[0].y, RE + 1j * IM)
+
+
+def test_acceleration_becomes_displacement(tmp_path):
+    """x'' = -omega^2 x."""
+    (tmp_path / "a.unv").write_text(dataset(6, 1, [RE, IM]))
+    (f,) = read_universal(tmp_path / "a.unv")
+    assert_allclose(f.receptance(), -(RE + 1j * IM) / (2 * np.pi * X) ** 2)
+
+
+def test_functions_are_assembled_by_sensor_and_exciter(tmp_path):
+    """The exciter pushes against its direction: the sign turns."""
+    sets = [dataset(6, 1, [k * RE, IM], response=(k, -2), numerator=8) for k in (5, 9)]
+    (tmp_path / "a.unv").write_text("".join(sets))
+    functions = read_universal(tmp_path / "a.unv")
+    f, H = assemble(functions, [(9, 2), (5, 2)], [(11, 3)])
+    assert_array_equal(f, X)
+    assert_allclose(H[:, :, 0], np.column_stack([9 * RE + 1j * IM, 5 * RE + 1j * IM]))
+    with pytest.raises(ConfigError, match=r"\(6, 2\)"):
+        assemble(functions, [(6, 2)], [(11, 3)])
+
+
+def test_broken_files_are_named(tmp_path):
+    path = tmp_path / "x.unv"
+    with pytest.raises(FileFormatError, match="no such file"):
+        read_universal(path)
+    whole = dataset(6, 1, [RE, IM])
+    for bad in (whole[: len(whole) // 2], whole.replace("E+00", "Q+00"), whole[:-40] + whole[-7:]):
+        path.write_text(bad)
+        with pytest.raises(FileFormatError, match=r"x\.unv: dataset 1"):
+            read_universal(path)
+    path.write_text("no universal file")
+    with pytest.raises(FileFormatError, match="holds no function"):
+        read_universal(path)

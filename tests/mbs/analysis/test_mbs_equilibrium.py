@@ -1,0 +1,229 @@
+"""Statics against closed forms, spinning equilibria, and mechanisms that nothing holds."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+import rom
+from cases.beam import stiffened_beam
+from cases.mbs.mechanisms import slider_crank
+from rom.errors import ConfigError, ModelError, RomWarning
+from rom.mbs.elements.impact import Impact
+from rom.mbs.mechanism import Mechanism
+
+g = 9.81
+X, Y, Z = np.eye(3)
+
+
+def pendulum(angle, length=0.7):
+    mech = Mechanism(gravity=(0, 0, -g))
+    at = length * np.array([np.sin(angle), 0, -np.cos(angle)])
+    bob = mech.add_rigid("bob", mass=2.0, inertia=(0.1, 0.2, 0.2), at=at, markers={"pin": -at,
+                         "c": (0, 0, 0)})  # fmt: skip
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=Y)
+    return mech
+
+
+@pytest.mark.parametrize("angle", [0.5, 2.0, 3.1])
+def test_a_pendulum_hangs_down_from_wherever_it_starts(angle):
+    state = rom.equilibrium(pendulum(angle))
+    assert_allclose(state.q[:3], [0, 0, -0.7], atol=1e-12)
+    assert not state.v.any() and not state.a.any()
+    reaction = rom.simulate(pendulum(angle), t_end=1e-3, dt=1e-3, state=state).reaction("hinge")
+    assert_allclose(reaction[0, :3], [0, 0, 2.0 * g], atol=1e-9)
+
+
+def test_on_its_head_it_is_said_to_be_unstable():
+    with pytest.warns(RomWarning, match="unstable: body 'bob' turns about its own axis"):
+        state = rom.equilibrium(pendulum(np.pi))
+    assert_allclose(state.q[2], 0.7)
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_pendulum_pulled_aside(steps):
+    """tan(angle) = F / m g, the force given by a function of time."""
+    mech = pendulum(0.1)
+    mech.force("wind", mech.parts["bob"].marker("c"), lambda t: (10.0 * t, 0, 0))
+    state = rom.equilibrium(mech, t=3.0, steps=steps)
+    assert state.t == 3.0
+    assert_allclose(np.arctan2(state.q[0], -state.q[2]), np.arctan(30.0 / (2.0 * g)), rtol=1e-11)
+
+
+def test_a_python_force_is_balanced():
+    mech = pendulum(0.0)
+    bob = mech.parts["bob"].marker("c")
+    mech.user_force("wind", lambda t, a: ((5.0, 0, 0), (0, 0, 0)), bob)
+    state = rom.equilibrium(mech)
+    assert_allclose(np.arctan2(state.q[0], -state.q[2]), np.arctan(5.0 / (2.0 * g)), rtol=1e-11)
+
+
+def test_a_chain_of_links_hangs_in_the_polygon_of_forces():
+    """Between two points of equal height: H tan(angle_k) = weight to the middle, span given."""
+    n, length, mass, span = 6, 0.5, 0.4, 2.0
+    mech = Mechanism(gravity=(0, 0, -g))
+    marks = {"a": (-length / 2, 0, 0), "b": (length / 2, 0, 0)}
+    last, corner = mech.ground.marker((0, 0, 0)), np.zeros(3)
+    for k in range(n):  # a half circle's worth of turning, which does not fit the span yet
+        angle = (0.5 - (k + 0.5) / n) * 2.0
+        way = length * np.array([np.cos(angle), 0, -np.sin(angle)])
+        c, s = np.cos(angle / 2), np.sin(angle / 2)
+        link = mech.add_rigid(f"link {k}", mass=mass, inertia=(0.01, 0.01, 0.01), markers=marks,
+                              at=corner + way / 2, orientation=(c, 0, s, 0))  # fmt: skip
+        mech.revolute(f"pin {k}", last, link.marker("a"), axis=Y)
+        last, corner = link.marker("b"), corner + way
+    end = mech.add_rigid("end", mass=1e-3, inertia=(1, 1, 1), at=corner, markers={"c": (0, 0, 0)})
+    mech.revolute("last", last, end.marker("c"), axis=Y)
+    mech.prismatic("rail", mech.ground.marker((0, 0, 0)), end.marker("c"), axis=X)
+    mech.drive("place", "rail", lambda t: span - corner[0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)  # planar: revolutes repeat each other
+        state = rom.equilibrium(mech)
+    weight = mass * g * (n / 2 - 0.5 - np.arange(n))
+
+    def gap(H):
+        return (length * np.cos(np.arctan(weight / H))).sum() - span
+
+    slope = np.arctan(weight / brentq(gap, 1e-3, 1e3))
+    heights = -np.cumsum(length * np.sin(slope)) + 0.5 * length * np.sin(slope)
+    assert_allclose(state.q[2 : 7 * n : 7], heights, atol=1e-9)
+
+
+def test_a_cantilever_sags_by_its_weight():
+    """rho A g L^4 / 8 E I at the tip, less what 20 modes do not see."""
+    length, EI, rhoA = 2.0, 30.0, 0.5
+    body = stiffened_beam(length, EI, rhoA, stiffened=False)
+    mech = Mechanism(gravity=(0, -1e-2, 0))
+    beam = mech.add_flexible("beam", body)
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("root"))
+    state = rom.equilibrium(mech)
+    tip = body.marker("tip").translation[1] @ state.q[7:]
+    assert_allclose(tip, -rhoA * 1e-2 * length**4 / (8 * EI), rtol=1e-7)
+    found = rom.linearize(mech, state)
+    assert_allclose(found.frequencies, body.frequencies(fixed=("root",)), rtol=1e-7)
+
+
+def test_the_torque_that_holds_a_slider_crank():
+    """Virtual work: torque of the drive = piston force times dx/dphi."""
+    l1, l2, phi, push = 0.1, 0.3, 0.8, 200.0
+    mech = slider_crank(l1, l2, speed=1.0)
+    mech.force("gas", mech.parts["slider"].marker("b"), (-push, 0, 0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        state = rom.equilibrium(mech, t=phi)
+    s = l1 / l2 * np.sin(phi)
+    slope = -l1 * np.sin(phi) * (1 + l1 / l2 * np.cos(phi) / np.sqrt(1 - s**2))
+    assert_allclose(abs(state.lam[-1]), abs(push * slope), rtol=1e-9)
+    assert_allclose(state.q[14], l1 * np.cos(phi) + l2 * np.sqrt(1 - s**2), rtol=1e-10)
+
+
+def test_statics_are_where_a_damped_motion_ends():
+    """Two links, a spring across, a flexible arm at the end."""
+    mech = Mechanism(gravity=(0, 0, -g))
+    marks = {"a": (-0.25, 0, 0), "b": (0.25, 0, 0)}
+    link = mech.add_rigid("link", mass=1.0, inertia=(0.01, 0.02, 0.02), at=(0.25, 0, 0),
+                          markers=marks)  # fmt: skip
+    body = stiffened_beam(0.5, 40.0, 1.0, n_modes=2)
+    turned = np.array([1.0, 1.0, 0, 0]) / np.sqrt(2)  # it bends in the plane of the motion
+    arm = mech.add_flexible(
+        "arm", replace(body, D=0.02 * body.K), at=(0.5, 0, 0), orientation=turned
+    )
+    mech.revolute("one", mech.ground.marker((0, 0, 0)), link.marker("a"), axis=Y)
+    mech.revolute("two", link.marker("b"), arm.marker("root"), axis=Y)
+    mech.rotational_spring("coil", "two", stiffness=8.0, damping=1.0)
+    mech.spring_damper("rope", mech.ground.marker((0.5, 0, 0.6)), link.marker("b"),
+                       stiffness=60.0, damping=8.0)  # fmt: skip
+    state = rom.equilibrium(mech)
+    rest = rom.simulate(mech, t_end=15.0, dt=0.02, rho_inf=0.5).final
+    assert_allclose(state.q, rest.q, atol=1e-7)
+    assert_allclose(state.lam, rest.lam, atol=1e-5)
+    still = rom.simulate(mech, t_end=0.2, dt=0.02, state=state)
+    assert np.abs(still.q - state.q).max() < 1e-9
+
+
+@pytest.mark.parametrize("speed", [5.0, 9.0])
+def test_a_pendulum_on_a_turning_shaft(speed):
+    """cos(angle) = g / (L W^2) of a point mass, and omega^2 = W^2 sin^2: Watt's governor."""
+    length = 0.7
+    mech = Mechanism(gravity=(0, 0, -g))
+    at = length * np.array([np.sin(0.4), 0, -np.cos(0.4)])
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                           markers={"c": (0, 0, 0)})  # fmt: skip
+    bob = mech.add_rigid("bob", mass=2.0, inertia=(1e-7,) * 3, at=at, markers={"pin": -at})
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), shaft.marker("c"), axis=Z)
+    mech.drive("motor", "axle", lambda t: speed * t, rate=lambda t: speed)
+    mech.revolute("hinge", shaft.marker("c"), bob.marker("pin"), axis=Y)
+    state = rom.equilibrium(mech, spin=(0, 0, speed))
+    cosine = g / (length * speed**2)
+    assert_allclose(-state.q[9] / length, cosine, rtol=1e-6)
+    found = rom.linearize(mech, state)
+    assert_allclose(2 * np.pi * found.frequencies, [speed * np.sqrt(1 - cosine**2)], rtol=1e-6)
+
+
+def test_what_nothing_holds_is_named():
+    mech = Mechanism(gravity=(0, 0, -g))
+    cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                          markers={"c": (0, 0, 0)})  # fmt: skip
+    mech.prismatic("rail", mech.ground.marker((0, 0, 0)), cart.marker("c"), axis=X)
+    with pytest.raises(ModelError, match=r"'cart' slides along \(1, 0, 0\) and no force opposes"):
+        rom.equilibrium(mech)
+    mech.force("push", cart.marker("c"), (1.0, 0, 0))
+    with pytest.raises(ModelError, match=r"'cart' slides along .*, pushed by forces that nothing"):
+        rom.equilibrium(mech)
+
+
+def test_wrong_arguments_are_named():
+    mech = pendulum(0.3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        other = rom.equilibrium(slider_crank(), t=0.1)
+    for options, message in (
+        ({"steps": 0}, "steps = 0"),
+        ({"spin": (0, 1)}, "spin has shape"),
+        ({"t": np.nan}, "t = nan"),
+        ({"state": other}, "this mechanism has 7 and 5"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            rom.equilibrium(mech, **options)
+    with pytest.raises(ConfigError, match="must be of type Mechanism"):
+        rom.equilibrium("crane")
+
+
+@pytest.mark.parametrize("height", [-1e-5, 0.0, 0.5])
+def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):
+    """depth = (m g / k)^(2/3), and small vibrations with 3/2 k sqrt(depth)."""
+    mech, k = Mechanism(gravity=(0, 0, -g)), 1e8
+    ball = mech.add_rigid("ball", mass=2.0, inertia=(0.1,) * 3, at=(0, 0, 0.1 + height),
+                          markers={"c": (0, 0, 0)})  # fmt: skip
+    floor = mech.ground.marker((0, 0, 0))
+    mech.prismatic("guide", floor, ball.marker("c"), axis=Z)
+    law = Impact(stiffness=k, exponent=1.5)
+    mech.sphere_on_plane("floor", floor, ball.marker("c"), law, normal=Z, radius=0.1)
+    state, depth = rom.equilibrium(mech), (2.0 * g / k) ** (2 / 3)
+    assert_allclose(0.1 - state.q[2], depth, rtol=1e-9)
+    found = rom.linearize(mech, state)
+    assert_allclose(2 * np.pi * found.frequencies, np.sqrt(1.5 * k * np.sqrt(depth) / 2), rtol=1e-9)
+
+
+def test_a_body_sags_in_its_bushing():
+    """m g / k down, m g a / k_r about y; the overhang turns with it."""
+    mech, k, turn, arm = Mechanism(gravity=(0, 0, -g)), 5e3, 400.0, 0.2
+    box = mech.add_rigid("box", mass=2.0, inertia=(0.1,) * 3, at=(arm, 0, 0),
+                         markers={"foot": (-arm, 0, 0)})  # fmt: skip
+    stiffness = (k, k, k, turn, turn, turn)
+    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), box.marker("foot"), stiffness=stiffness)
+    state = rom.equilibrium(mech)
+    angle = brentq(lambda x: turn * x - 2.0 * g * arm * np.cos(x), 0, 1)
+    height = -2.0 * g / k - arm * np.sin(angle)
+    assert_allclose(state.q[:3], [arm * np.cos(angle), 0, height], atol=1e-10)
+
+
+def test_a_mechanism_that_cannot_move_has_no_frequencies():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        mech = slider_crank(speed=0.0)
+        found = rom.linearize(mech, rom.equilibrium(mech))
+    assert found.frequencies.size == 0 and found.shapes.shape == (18, 0) and found.stable

@@ -1,0 +1,152 @@
+"""Loads of prescribed and simulated motions against closed forms and the rate of momentum."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
+
+import rom
+from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
+from rom.errors import ConfigError, ModelError
+from rom.rotation import matrix
+
+G = 9.81
+L1, L2, SPEED = 0.1, 0.3, 50.0
+
+
+def driven_pendulum(mass=2.0, reach=0.4, inertia=0.1):
+    """A bar on a hinge about z, driven as 0.8 sin 3t from the x axis."""
+    mech = rom.Mechanism(gravity=(0, -G, 0))
+    bar = mech.add_rigid("bar", mass=mass, inertia=(0.01, inertia, inertia), at=(reach, 0, 0))
+    mech.revolute(
+        "hinge", mech.ground.marker((0, 0, 0)), bar.marker((-reach, 0, 0)), axis=(0, 0, 1)
+    )
+    mech.drive("motor", "hinge", lambda t: 0.8 * np.sin(3 * t))
+    return mech
+
+
+def test_a_driven_pendulum_needs_the_torque_of_its_equation():
+    """Torque (I + m c^2) theta'' + m g c cos theta; hinge force m (a - g)."""
+    t = np.linspace(0, 2, 81)
+    sol = rom.inverse_dynamics(driven_pendulum(), t)
+    angle, rate, pull = 0.8 * np.sin(3 * t), 2.4 * np.cos(3 * t), -7.2 * np.sin(3 * t)
+    torque = (0.1 + 2.0 * 0.4**2) * pull + 2.0 * G * 0.4 * np.cos(angle)
+    assert_allclose(sol.drive_load("motor"), torque, atol=1e-5)
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    across = np.column_stack([-np.sin(angle), np.cos(angle)])
+    a = 0.4 * (pull[:, None] * across - rate[:, None] ** 2 * along)
+    assert_allclose(sol.reaction("hinge")[:, :2], 2.0 * (a + np.array([0, G])), atol=1e-5)
+    assert_allclose(sol.omega("bar")[:, 2], rate, atol=1e-6)
+
+
+def crank_energies(angle):
+    """Reduced inertia and gravity potential of `slider_crank`, of a complex angle as well."""
+    sine = -L1 / L2 * np.sin(angle)
+    turn = -L1 / L2 * np.cos(angle) / np.sqrt(1 - sine**2)  # of the rod, per radian
+    cosine = np.sqrt(1 - sine**2)
+    x = -L1 * np.sin(angle) - L2 / 2 * sine * turn
+    y = L1 * np.cos(angle) + L2 / 2 * cosine * turn
+    slide = -L1 * np.sin(angle) - L2 * sine * turn
+    inertia = 2e-3 + 0.5 * (x**2 + y**2) + 4e-3 * turn**2 + 0.4 * slide**2
+    return inertia, 0.5 * G * (L1 * np.sin(angle) + L2 / 2 * sine)
+
+
+def crank_torque(angle):
+    """Lagrange's equation of the one coordinate at constant speed, derivatives by complex step."""
+    step = 1e-30
+    inertia, height = crank_energies(angle + 1j * step)
+    return 0.5 * inertia.imag / step * SPEED**2 + height.imag / step
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+def test_a_slider_crank_needs_the_torque_of_lagranges_equation():
+    t = np.linspace(0, 0.15, 61)
+    sol = rom.inverse_dynamics(slider_crank(L1, L2, SPEED, G), t)
+    wanted = crank_torque(SPEED * t)
+    assert np.ptp(wanted) > 10.0
+    assert_allclose(sol.drive_load("motor"), wanted, atol=1e-9 * np.abs(wanted).max())
+    assert_allclose(sol.reaction("motor")[:, 5], wanted, atol=1e-9 * np.abs(wanted).max())
+    energy = sol.energy.kinetic + sol.energy.potential
+    work = CubicSpline(t, SPEED * wanted).antiderivative()(t)
+    assert_allclose(energy - energy[0], work, atol=2e-4)
+    assert_allclose(sol.energy.drives, work, atol=0.1)  # trapezoids over 61 times
+
+
+def test_inverse_dynamics_agrees_with_the_simulated_motion():
+    sol = simulate_quietly(slider_crank(L1, L2, SPEED, G), t_end=0.1, dt=1e-4, save_every=20)
+    assert_allclose(sol.drive_load("motor")[1:], crank_torque(SPEED * sol.t[1:]), atol=2e-3)
+
+
+def loaded_swing():
+    """A flexible body on a ball joint with a spring, a load and a law in Python."""
+    mech = rom.Mechanism()
+    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    hook = mech.ground.marker(mech.design_point(body.marker("a")))
+    mech.spherical("hook", hook, body.marker("a"))
+    mech.force("pull", body.marker("b"), lambda t: (0.3 * t, 0, np.sin(t)), frame="body")
+    mech.torque("twist", body.marker("b"), (0.2, -0.1, 0.3))
+    mech.user_force("drag", lambda t, a: (-0.1 * a.velocity, -0.05 * a.omega), body.marker("b"))
+    mech.spring_damper("coil", hook, body.marker("b"), stiffness=30.0, damping=0.2)
+    return mech
+
+
+def test_interface_loads_and_gravity_are_the_rate_of_momentum():
+    """Linear and angular, of a flexible body, with every kind of load."""
+    mech = loaded_swing()
+    sol = rom.simulate(mech, t_end=0.3, dt=2e-3, method="dop853")
+    loads = sol.interface_loads("one")
+    assert set(loads) == {"a", "b"}
+    force = sum(x[:, :3] for x in loads.values())
+    moment = sum(
+        x[:, 3:] + np.cross(sol.position("one", place), x[:, :3]) for place, x in loads.items()
+    )
+    linear, angular = (CubicSpline(sol.t, p)(sol.t, 1) for p in sol.momentum)
+    mass, g = mech.part("one").mass, np.array([0, 0, -G])
+    centre = np.array([_centre(sol, k) for k in range(sol.t.size)])
+    inner = slice(5, -5)
+    scale = np.abs(linear).max()
+    assert_allclose((force + mass * g)[inner], linear[inner], atol=1e-6 * scale)
+    moment += np.cross(centre, mass * g)
+    assert_allclose(moment[inner], angular[inner], atol=1e-6 * np.abs(angular).max())
+    on_ground = sum(sol.interface_loads("ground").values())[:, :3]
+    applied = loads["b"][:, :3] - _spring(sol)
+    assert_allclose(on_ground, applied - force, atol=1e-9 * scale)
+
+
+def _spring(sol):
+    """(n_t, 3) pull of the spring on the body."""
+    hook = sol.mechanism.springs["coil"].i
+    at, rate = sol.position("one", "b") - hook.place, sol.velocity("one", "b")
+    length = np.linalg.norm(at, axis=1, keepdims=True)
+    e = at / length
+    speed = (e * rate).sum(axis=1, keepdims=True)
+    return -(30.0 * (length - sol.mechanism.springs["coil"].free_length) + 0.2 * speed) * e
+
+
+def _centre(sol, k):
+    body = sol.mechanism.part("one").flexible
+    first = body.first_moment + body.S @ sol.elastic("one")[k]
+    return sol.position("one")[k] + matrix(sol.orientation("one")[k]) @ first / body.mass
+
+
+def test_interface_loads_can_be_asked_for_in_the_axes_of_the_body():
+    sol = rom.simulate(loaded_swing(), t_end=0.05, dt=1e-2)
+    world, own = sol.interface_loads("one"), sol.interface_loads("one", frame="body")
+    A = np.array([matrix(p) for p in sol.orientation("one")])
+    for place, load in world.items():
+        for part in (slice(0, 3), slice(3, 6)):
+            assert_allclose(np.einsum("nab,nb->na", A, own[place][:, part]), load[:, part])
+
+
+def test_motions_that_nothing_prescribes_are_refused():
+    mech = driven_pendulum()
+    mech.drives.clear()
+    with pytest.raises(ModelError, match=r"1 motions are not prescribed.*Add drives"):
+        rom.inverse_dynamics(mech, [0.0, 1.0])
+    with pytest.raises(ConfigError, match="ascending"):
+        rom.inverse_dynamics(driven_pendulum(), [1.0, 0.0])
+    sol = rom.inverse_dynamics(driven_pendulum(), [0.0, 0.01])
+    with pytest.raises(ConfigError, match=r"no drive 'hinge'.*motor"):
+        sol.drive_load("hinge")
+    with pytest.raises(ConfigError, match="frame is 'marker'"):
+        sol.interface_loads("bar", frame="marker")

@@ -1,0 +1,207 @@
+"""Bushings: an energy whatever the rotation, closed forms, curves, exact tangents."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose
+
+from cases.mbs.mechanisms import (
+    prepared,
+    random_body,
+    random_pose,
+    random_state,
+    residual_at,
+    tangents_at,
+)
+from cases.mbs.tangents import check_tangents, difference, shifted
+from rom import rotation
+from rom.errors import ConfigError
+from rom.mbs.elements.bushing_kernels import bushing_energy
+from rom.mbs.equations.equations import evaluate
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
+
+X, Y, Z = np.eye(3)
+TILT = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])
+
+
+@njit
+def stored_at(s, W, q, v):
+    evaluate(s, W, q, v)
+    return bushing_energy(s, W)
+
+
+def full_matrix(rng, size=30.0):
+    A = rng.normal(size=(6, 6))
+    return size * (A @ A.T / 6 + np.eye(6))
+
+
+def bushed(rng, damped=False):
+    """Two flexible bodies on a bushing with a full matrix, tilted axes and two curves."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    one = mech.add_flexible("one", random_body(rng, damped=False), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3, damped=False), **random_pose(rng))
+    x = np.linspace(-0.6, 0.6, 5)
+    mech.bushing("rubber", one.marker("a"), two.marker("b"), stiffness=full_matrix(rng), axes=TILT,
+                 damping=full_matrix(rng, 2.0) if damped else None,
+                 curves={"y": (x, 40 * x**3), "rx": (x, np.sinh(3 * x))})  # fmt: skip
+    return mech
+
+
+def near(rng, packed):
+    """A state not far from the start: rotations of the bushing well below half a turn."""
+    q, v, a, lam = random_state(rng, packed)
+    q[:] = shifted(packed, packed.q, 0.4 * rng.normal(size=packed.v.size))
+    return q, v, a, lam
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_forces_are_the_gradient_of_the_energy(seed):
+    rng = np.random.default_rng(seed)
+    packed, W = prepared(bushed(rng))
+    packed.system.markers.twist[:] *= 1e-3  # of the marker Jacobian, see `wrench_stiffness`
+    s, (q, v, _, lam) = packed.system, near(rng, packed)
+    none = 0 * v
+
+    def energy(delta):
+        return np.array([stored_at(s, W, shifted(packed, q, delta), none)])
+
+    gradient = difference(energy, v.size)[0]
+    residual_at(s, W, q, none, none, lam)
+    body = W.residual.copy()
+    s.bushings.stiffness[:] = 0.0
+    s.bushings.curve[:] = -1
+    residual_at(s, W, q, none, none, lam)
+    assert_allclose(body - W.residual, gradient, atol=1e-7 * np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_tangents_are_derivatives_of_the_forces(seed):
+    rng = np.random.default_rng(seed)
+    packed, W = prepared(bushed(rng, damped=True))
+    packed.system.markers.twist[:] *= 1e-3
+    state = near(rng, packed)
+    s, (q, v, a, lam) = packed.system, state
+    zero = 0 * v
+    C = difference(lambda x: _residual(packed, W, q, v + x, a, lam), v.size)
+    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
+    s.bushings.damping[:] = 0.0
+    check_tangents(packed, W, state, np.eye(zero.size), 1e-6)
+
+
+def _residual(packed, W, q, v, a, lam):
+    residual_at(packed.system, W, q, v, a, lam)
+    return W.residual.copy()
+
+
+def box(mech, name="box", **more):
+    return mech.add_rigid(name, **{"mass": 2.0, "inertia": (0.3, 0.5, 0.7), "at": (0, 0, 0)} | more)
+
+
+DIAGONAL = (800.0, 450.0, 200.0, 10.8, 8.0, 2.8)
+
+
+@pytest.mark.parametrize("k", range(6))
+def test_small_vibrations_have_the_frequency_of_a_spring(k):
+    """Omega^2 = k / m along, k / J about each axis of the bushing."""
+    omega = np.sqrt(DIAGONAL[k] / np.array([2.0, 2.0, 2.0, 0.3, 0.5, 0.7])[k])
+    mech = Mechanism(gravity=(0, 0, 0))
+    kick = 1e-6 * np.eye(6)[k]
+    part = box(mech, velocity=kick[:3], omega=kick[3:])
+    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
+                 stiffness=DIAGONAL)  # fmt: skip
+    sol = simulate(mech, t_end=1.0, dt=0.01, method="dop853", rtol=1e-10, atol=1e-18)
+    wanted = kick[k] * np.cos(omega * sol.t)
+    assert_allclose(sol.v[:, k], wanted, atol=1e-5 * kick[k])
+
+
+def test_a_large_turn_about_one_axis_is_that_of_a_torsion_spring():
+    runs = []
+    for coil in (True, False):
+        mech = Mechanism(gravity=(0, 0, 0))
+        part = box(mech, omega=(0, 0, 4.0))
+        ground, o = mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0))
+        mech.revolute("axle", ground, o, axis=Z)
+        if coil:
+            mech.rotational_spring("coil", "axle", stiffness=2.8, damping=0.2)
+        else:
+            mech.bushing("rubber", ground, o, stiffness=DIAGONAL, damping=(0, 0, 0, 0, 0, 0.2))
+        runs.append(simulate(mech, t_end=2.0, dt=1e-3))
+    assert_allclose(runs[0].q, runs[1].q, atol=1e-9)
+    assert 2 * np.arccos(runs[0].q[:, 3]).max() > 1.5
+
+
+def test_a_bushing_along_a_line_is_a_spring_with_a_damper():
+    runs = []
+    for spring in (True, False):
+        mech = Mechanism(gravity=(0, 0, -9.81))
+        part = box(mech, at=(0, 0, -1))
+        ground, o = mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0))
+        mech.prismatic("guide", ground, o, axis=Z)
+        if spring:
+            mech.spring_damper("spring", ground, o, stiffness=200.0, damping=3.0)
+        else:
+            axes = rotation.matrix(TILT)
+            K = np.zeros((6, 6))
+            K[:3, :3] = axes.T @ np.diag([0, 0, 200.0]) @ axes
+            mech.bushing("rubber", ground, o, stiffness=K, damping=K * 3.0 / 200.0, axes=axes)
+        runs.append(simulate(mech, t_end=1.0, dt=1e-3))
+    assert_allclose(runs[0].q, runs[1].q, atol=1e-10)
+    assert_allclose(runs[0].energy.damping, runs[1].energy.damping, rtol=1e-9)
+
+
+def test_a_load_at_rest_is_carried_by_the_full_matrix():
+    """Small deflections K^-1 F under a force and a torque, after the damper has done its work."""
+    rng = np.random.default_rng(2)
+    K = full_matrix(rng, 3e5)
+    mech = Mechanism(gravity=(0, 0, 0))
+    part = box(mech)
+    o = part.marker((0, 0, 0))
+    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), o, stiffness=K, damping=1e-2 * K)
+    load = np.array([1.0, -2.0, 0.5, 0.3, 0.2, -0.4])
+    mech.force("force", o, load[:3])
+    mech.torque("torque", o, load[3:])
+    q = simulate(mech, t_end=2.0, dt=1e-2, rho_inf=0.3).q[-1]
+    assert_allclose(np.r_[q[:3], 2 * q[4:7]], np.linalg.solve(K, load), rtol=1e-4, atol=1e-10)
+
+
+def test_a_curve_of_points_on_a_line_is_a_spring_and_a_bent_one_keeps_its_energy():
+    x = np.array([-0.2, -0.05, 0.1, 0.2])
+    runs = {}
+    for kind in ("spring", "line", "bent"):
+        mech = Mechanism(gravity=(0, 0, 0))
+        part = box(mech, velocity=(3.0, 0, 0))
+        force = 200 * x + (4e4 * x**3 if kind == "bent" else 0)
+        mech.bushing("rubber", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
+                     stiffness=(200.0 * (kind == "spring"), 0, 0, 0, 0, 0),
+                     curves=None if kind == "spring" else {"x": (x, force)})  # fmt: skip
+        runs[kind] = simulate(mech, t_end=2.0, dt=1e-3, rho_inf=1.0)
+    assert np.abs(runs["spring"].q[:, 0]).max() > 0.25  # beyond the points
+    assert_allclose(runs["line"].q, runs["spring"].q, atol=1e-10)
+    assert np.abs(runs["bent"].q - runs["spring"].q).max() > 0.05
+    assert audit(runs["bent"]).ok, audit(runs["bent"])
+    assert np.abs(runs["bent"].energy.balance).max() < 3e-4 * 9.0
+
+
+WRONG = {
+    "not symmetric": ({"stiffness": np.eye(6) + np.eye(6, k=1)}, "is not symmetric"),
+    "negative": ({"stiffness": (1, 1, 1, 1, 1, -1)}, "negative in some direction"),
+    "five": ({"stiffness": (1, 1, 1, 1, 1)}, "has shape (5,)"),
+    "driving damper": ({"stiffness": np.ones(6), "damping": -np.ones(6)}, "damping of s"),
+    "curve of nothing": ({"stiffness": np.ones(6), "curves": {"w": ([0, 1], [0, 1])}}, "'w'"),
+    "curve back": ({"stiffness": np.ones(6), "curves": {"x": ([0, 0], [0, 1])}}, "ascending"),
+    "uneven curve": ({"stiffness": np.ones(6), "curves": {"x": ([0, 1], [0, 1, 2])}}, "shape"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_bushings_are_refused_by_name(case):
+    mech = Mechanism()
+    part = box(mech)
+    arguments, words = WRONG[case]
+    with pytest.raises(ConfigError) as caught:
+        mech.bushing("s", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), **arguments)
+    assert words in str(caught.value)
+    assert not mech.bushings

@@ -1,0 +1,301 @@
+"""Contact of spheres, discs, planes and cylinders against closed forms and quadrature."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose
+from scipy.integrate import quad, solve_ivp
+from scipy.special import gamma
+
+from cases.mbs.mechanisms import (
+    prepared,
+    random_body,
+    random_pose,
+    random_state,
+    residual_at,
+    tangents_at,
+)
+from cases.mbs.tangents import difference, shifted
+from rom.errors import ConfigError
+from rom.mbs.elements.contact import contact_energy
+from rom.mbs.elements.impact import Impact, damping_of, hertz_stiffness
+from rom.mbs.equations.equations import evaluate
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
+
+X, Y, Z = np.eye(3)
+TILTED = np.array([1.0, 2.0, 2.0]) / 3
+g = 9.81
+KINDS = ("plane", "disc", "sphere", "cylinder", "bore")
+
+
+@njit
+def stored_at(s, W, q, v):
+    evaluate(s, W, q, v)
+    return contact_energy(s, W)
+
+
+def touching(kind, mech, m1, m2, law):
+    if kind == "plane":
+        mech.sphere_on_plane("c", m1, m2, law, normal=TILTED, radius=9.0)
+    elif kind == "disc":
+        mech.disc_on_plane("c", m1, m2, law, normal=TILTED, axis=X, radius=15.0)
+    elif kind == "sphere":
+        mech.sphere_on_sphere("c", m1, m2, law, radius1=7.0, radius2=5.0)
+    else:
+        inside = kind == "bore"
+        radii = {"radius1": 0.4, "radius2": 0.3} if inside else {"radius1": 9.0, "radius2": 6.0}
+        mech.sphere_on_cylinder("c", m1, m2, law, axis=TILTED, inside=inside, **radii)
+
+
+def random_contact(kind, law):
+    """Two flexible bodies in contact, anywhere and in any motion."""
+    rng = np.random.default_rng(5)
+    mech = Mechanism(gravity=(0, 0, 0))
+    one = mech.add_flexible("one", random_body(rng, damped=False), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3, damped=False), **random_pose(rng))
+    touching(kind, mech, one.marker("a"), two.marker("b"), law)
+    packed, W = prepared(mech)
+    packed.system.markers.twist[:] *= 1e-3
+    q, v, a, lam = random_state(rng, packed)
+    assert stored_at(packed.system, W, q, v) > 0.0
+    return packed, W, (q, v, a, lam)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_forces_without_loss_are_the_gradient_of_the_energy(kind):
+    packed, W, (q, v, _, lam) = random_contact(kind, Impact(3.0))
+    s, none = packed.system, 0 * v
+    gradient = difference(
+        lambda x: np.array([stored_at(s, W, shifted(packed, q, x), none)]), v.size
+    )[0]
+    residual_at(s, W, q, none, none, lam)
+    with_contact = W.residual.copy()
+    s.contacts.law[:, 0] = 0.0
+    residual_at(s, W, q, none, none, lam)
+    assert np.abs(gradient).max() > 0.1
+    assert_allclose(with_contact - W.residual, gradient, atol=2e-7 * np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tangents_are_derivatives_of_the_forces(kind):
+    """With friction and damping; the velocity of the markers is held in the position block."""
+    law = Impact(3.0, damping=0.02, mu=0.4, transition_speed=0.5)
+    packed, W, (q, v, a, lam) = random_contact(kind, law)
+    s = packed.system
+
+    def at(dq, dv):
+        residual_at(s, W, shifted(packed, q, dq), v + dv, a, lam)
+        return W.residual.copy()
+
+    zero = 0 * v
+    C = difference(lambda x: at(zero, x), v.size)
+    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
+    v[:] = 0.0  # then nothing is left out
+    K = difference(lambda x: at(x, zero), v.size)
+    tangents_at(s, W, q, v, a, lam, (0.0, 0.0, 1.0))
+    assert_allclose(W.Kt, K, atol=1e-6 * np.abs(K).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_lost_is_what_the_forces_take(kind):
+    """Power of the contact on all bodies = - rate of its energy - power lost."""
+    law = Impact(3.0, damping=0.02, mu=0.4, transition_speed=0.5)
+    packed, W, (q, v, a, lam) = random_contact(kind, law)
+    s = packed.system
+    rate = difference(lambda t: np.array([stored_at(s, W, shifted(packed, q, t * v), v)]), 1)[0, 0]
+    residual_at(s, W, q, v, a, lam)
+    force, lost = W.residual.copy(), W.power[2]
+    s.contacts.law[:, 0] = 0.0
+    residual_at(s, W, q, v, a, lam)
+    force, lost = W.residual - force, lost - W.power[2]
+    assert lost > 0.0
+    assert_allclose(force @ v, -rate - lost, rtol=1e-6)
+
+
+def ball(law, height=0.5, radius=0.1, mass=2.0, **more):
+    mech = Mechanism(gravity=(0, 0, -g))
+    J = 0.4 * mass * radius**2
+    part = mech.add_rigid("ball", mass=mass, inertia=(J, J, J), at=(0, 0, height + radius), **more)
+    mech.sphere_on_plane("floor", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), law,
+                         normal=Z, radius=radius)  # fmt: skip
+    return mech
+
+
+def test_one_instant_of_a_spinning_ball_that_comes_down():
+    """Force k depth^1.5 (1 + damping v) upwards, friction against the lowest point."""
+    k, chi, mu, v, spin, depth, radius = 1e6, 0.3, 0.2, 0.5, 4.0, 1e-3, 0.1
+    law = Impact(k, damping=chi, mu=mu, transition_speed=1e-9)
+    mech = ball(law, height=-depth, velocity=(0, 0, -v), omega=(0, spin, 0))
+    packed, W = prepared(mech)
+    residual_at(packed.system, W, packed.q, packed.v, np.zeros(6), np.zeros(0))
+    normal = k * depth**1.5 * (1 + chi * v)
+    force = np.array([mu * normal, 0, normal])
+    moment = np.cross([0, 0, -radius], force)
+    assert_allclose(-W.residual + [0, 0, 2.0 * g, 0, 0, 0], [*force, *moment], rtol=1e-9, atol=1e-9)
+    lost = chi * v * k * depth**1.5 * v + mu * normal * spin * radius
+    assert_allclose(W.power[2], lost, rtol=1e-9)
+
+
+def duration(t, depth):
+    """Time of the first contact [s]."""
+    inside = depth > 0
+    first = int(np.argmax(inside))
+    last = first + int(np.argmax(~inside[first:]))
+    cross = [t[i - 1] - depth[i - 1] * (t[i] - t[i - 1]) / (depth[i] - depth[i - 1])
+             for i in (first, last)]  # fmt: skip
+    return cross[1] - cross[0]
+
+
+def test_a_sphere_of_hertz_is_in_touch_for_the_time_of_the_closed_form():
+    """T = 2.9433 depth / v, depth = (5 m v^2 / 4 k)^(2/5): 3.2181 (m^2 / k^2 v)^(1/5)."""
+    radius, m, v = 0.05, 4.0, 0.8
+    k = hertz_stiffness(2e11, 0.3, 2e11, 0.3, radius)
+    assert_allclose(k, 4 / 3 * np.sqrt(radius) * 2e11 / (2 * 0.91), rtol=1e-12)
+    number = 2 * np.sqrt(np.pi) * gamma(7 / 5) / gamma(9 / 10)
+    assert_allclose(number, 2 * quad(lambda x: 1 / np.sqrt(1 - x**2.5), 0, 1)[0], rtol=1e-8)
+    assert_allclose(number, 2.943275, rtol=1e-6)  # also in specifications of rockfall
+    deepest = (5 * m * v**2 / (4 * k)) ** 0.4
+    time = number * deepest / v
+    assert_allclose(time, 3.218066 * (m**2 / (k**2 * v)) ** 0.2, rtol=1e-5)
+    mech = ball(Impact(k), height=1e-6, radius=radius, mass=m, velocity=(0, 0, -v))
+    mech.gravity = np.zeros(3)
+    sol = simulate(mech, t_end=2 * time, dt=time / 400, method="dop853")
+    depth = radius - sol.position("ball")[:, 2]
+    assert_allclose(depth.max(), deepest, rtol=1e-4)
+    assert_allclose(duration(sol.t, depth), time, rtol=1e-3)
+    assert_allclose(sol.velocity("ball")[-1, 2], v, rtol=1e-8)
+    implicit = simulate(mech, t_end=2 * time, dt=time / 400)
+    assert_allclose(implicit.velocity("ball")[-1, 2], v, rtol=1e-4)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("e", [0.95, 0.7, 0.3])
+def test_damping_gives_the_restitution_asked_for(e, exponent):
+    """Against the equation of the impact, integrated by itself; whatever exponent and stiffness."""
+    v0, k, m = 1.3, 4e5, 0.7
+    chi = damping_of(e, v0)
+
+    def fall(t, y):
+        return y[1], -k / m * max(y[0], 0.0) ** exponent * max(1 + chi * y[1], 0.0)
+
+    def leaves(t, y):
+        return y[0] + 1e-12
+
+    leaves.terminal, leaves.direction = True, -1
+    out = solve_ivp(fall, (0, 1), (0, v0), events=leaves, rtol=1e-11, atol=1e-14).y[1, -1]
+    assert_allclose(-out / v0, e, rtol=1e-6)
+
+
+def test_little_loss_is_that_of_hunt_and_crossley():
+    """E = 1 - (2 / 3) damping v, their relation alpha = (2 / 3) damping for e near one."""
+    for loss in (1e-2, 1e-3):
+        assert_allclose(damping_of(1 - loss, 2.0) * 2.0, 1.5 * loss, rtol=1.1 * loss)
+    assert damping_of(1.0, 2.0) == 0.0
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+def test_a_bouncing_ball_returns_to_the_height_of_its_restitution(method):
+    height, e = 0.5, 0.7
+    v0 = np.sqrt(2 * g * height)
+    mech = ball(Impact(1e7, restitution=e, impact_speed=v0), height=height)
+    flight = np.sqrt(2 * height / g) * (1 + e)
+    step = 1e-4 if method == "generalized-alpha" else 1e-3
+    sol = simulate(mech, t_end=flight, dt=step, method=method)
+    top = sol.position("ball")[sol.t > 0.4, 2].max() - 0.1
+    assert_allclose(top, e**2 * height, rtol=1.5e-2)  # gravity acts in the contact as well
+    lost = sol.energy.damping[-1] / (2.0 * g * height)
+    assert_allclose(lost, 1 - e**2, rtol=1.5e-2)
+    if method == "dop853":
+        assert np.abs(sol.energy.balance).max() < 1e-8 * sol.energy.kinetic.max()
+
+
+def test_a_sliding_ball_rolls_in_the_end_with_five_sevenths_of_its_speed():
+    """It slides for 2 v0 / (7 mu g), whatever the law of friction did meanwhile."""
+    mu, v0 = 0.2, 2.0
+    law = Impact(1e6, damping=1.0, mu=mu, transition_speed=1e-3)
+    sink = (2.0 * g / 1e6) ** (2 / 3)
+    mech = ball(law, height=-sink, velocity=(v0, 0, 0))
+    slides = 2 * v0 / (7 * mu * g)
+    sol = simulate(mech, t_end=1.5 * slides, dt=2e-4)
+    v, w = sol.velocity("ball")[:, 0], sol.omega("ball")[:, 1]
+    assert_allclose(v[-1], 5 / 7 * v0, rtol=2e-3)
+    assert_allclose(v[-1], 0.1 * w[-1], rtol=1e-2)
+    assert_allclose(np.interp(0.5 * slides, sol.t, v), v0 - 0.5 * mu * g * slides, rtol=1e-3)
+    assert_allclose(sol.energy.damping[-1], 0.5 * 2.0 * v0**2 * 2 / 7, rtol=3e-3)
+    assert audit(sol).ok, audit(sol)
+
+
+def test_two_equal_balls_exchange_their_speeds():
+    mech = Mechanism(gravity=(0, 0, 0))
+    for name, x, v in (("one", 0.0, 1.0), ("two", 0.5, 0.0)):
+        mech.add_rigid(name, mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0), velocity=(v, 0, 0))
+    m1, m2 = (mech.parts[n].marker((0, 0, 0)) for n in ("one", "two"))
+    mech.sphere_on_sphere("hit", m1, m2, Impact(1e6), radius1=0.1, radius2=0.15)
+    sol = simulate(mech, t_end=0.5, dt=1e-3, method="dop853")
+    assert_allclose(sol.velocity("one")[-1], 0.0, atol=1e-8)
+    assert_allclose(sol.velocity("two")[-1], X, atol=1e-8)
+    assert audit(sol).ok, audit(sol)
+
+
+def test_a_ball_slides_to_and_fro_in_a_bore_like_a_pendulum():
+    """Without friction the arm of the pendulum is the clearance; small swings."""
+    R, r, k = 0.5, 0.2, 1e9
+    mech = Mechanism(gravity=(0, 0, -g))
+    a = 1e-3
+    sink = (g / k) ** (2 / 3)
+    arm = R - r + sink
+    part = mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3,
+                          at=(0, arm * np.sin(a), -arm * np.cos(a)))  # fmt: skip
+    mech.sphere_on_cylinder("bore", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)),
+                            Impact(k), axis=X, radius1=R, radius2=r, inside=True)  # fmt: skip
+    sol = simulate(mech, t_end=1.0, dt=1e-3)
+    wanted = arm * a * np.cos(np.sqrt(g / arm) * sol.t)
+    assert_allclose(sol.position("ball")[:, 1], wanted, atol=1e-3 * arm * a)
+
+
+def test_two_discs_are_a_cylinder_that_rolls_down_a_slope():
+    """Acceleration 2/3 g sin when friction suffices; the rims share the weight."""
+    angle, radius = 0.2, 0.1
+    mech = Mechanism(gravity=(g * np.sin(angle), 0, -g * np.cos(angle)))
+    sink = 0.5 * 2.0 * g * np.cos(angle) / 1e5
+    ends = {"left": (0, 0.2, 0), "right": (0, -0.2, 0)}
+    part = mech.add_rigid("roller", mass=2.0, inertia=(0.03, 0.5 * 2.0 * radius**2, 0.03),
+                          at=(0, 0, radius - sink), markers=ends)  # fmt: skip
+    law = Impact(1e5, exponent=1.0, damping=5.0, mu=0.5, transition_speed=1e-2)
+    for end in ends:
+        mech.disc_on_plane(end, mech.ground.marker((0, 0, 0)), part.marker(end), law,
+                           normal=Z, axis=Y, radius=radius)  # fmt: skip
+    sol = simulate(mech, t_end=1.0, dt=1e-3)
+    a = 2 / 3 * g * np.sin(angle)
+    assert_allclose(sol.velocity("roller")[-1, 0], a, rtol=2e-3)
+    assert_allclose(sol.position("roller")[-1, 2], radius - sink, atol=1e-6)
+    assert audit(sol).ok, audit(sol)
+
+
+WRONG = {
+    "no law": (lambda m, a, b: m.sphere_on_plane("s", a, b, None, normal=Z, radius=1), "law ="),
+    "no size": (lambda m, a, b: m.sphere_on_plane("s", a, b, Impact(1), normal=Z, radius=0),
+                "radius = 0"),
+    "no axis": (lambda m, a, b: m.disc_on_plane("s", a, b, Impact(1), normal=Z, axis=0 * Z,
+                                                radius=1), "axis of s"),
+    "too large": (lambda m, a, b: m.sphere_on_cylinder("s", a, b, Impact(1), axis=Z, radius1=1,
+                                                       radius2=1, inside=True), "does not fit"),
+    "itself": (lambda m, a, b: m.sphere_on_sphere("s", b, b, Impact(1), radius1=1, radius2=1),
+               "with itself"),
+    "soft": (lambda m, a, b: hertz_stiffness(0, 0.3, 1, 0.3, 1), "E1 = 0"),
+    "gas": (lambda m, a, b: hertz_stiffness(1, 0.6, 1, 0.3, 1), "nu1 = 0.6"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_contacts_are_refused_by_name(case):
+    mech = Mechanism()
+    part = mech.add_rigid("box", mass=1, inertia=(1, 1, 1), at=(0, 0, 0))
+    act, words = WRONG[case]
+    with pytest.raises(ConfigError) as caught:
+        act(mech, mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)))
+    assert words in str(caught.value)
+    assert not mech.contacts

@@ -1,0 +1,90 @@
+"""The audit of a motion: quiet when it is right, red in the right line when it is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cases.mbs.mechanisms import lattice, lattice_body, simulate_quietly, slider_crank
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
+
+
+@pytest.fixture(scope="module")
+def crank():
+    return simulate_quietly(slider_crank(gravity=9.81), t_end=0.1, dt=1e-4)
+
+
+@pytest.fixture(scope="module")
+def free():
+    """A flexible bar thrown into empty space."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible("bar", lattice_body(lattice(stiffness=2e5)), omega=(1.0, 2.0, 5.0))
+    return simulate(mech, t_end=0.05, dt=1e-5, rho_inf=1.0)
+
+
+def failures(solution):
+    return [row.quantity for row in audit(solution).failures]
+
+
+def test_a_good_motion_passes(crank, free):
+    assert audit(crank).ok, audit(crank)
+    assert audit(free).ok, audit(free)
+    names = [row.quantity for row in audit(free).rows]
+    assert "change of angular momentum" in names
+    assert "largest deformation of bar / size" in names
+
+
+def test_an_open_joint_is_seen(crank):
+    q = crank.q.copy()
+    q[500, 14] += 1e-8  # the slider leaves its wrist pin
+    assert failures(replace(crank, q=q, _tracks={})) == ["largest gap in a joint / size"]
+
+
+def test_energy_from_nowhere_is_seen(crank):
+    work = crank.work * 1.05
+    assert "energy balance / energy" in failures(replace(crank, work=work, _tracks={}))
+
+
+def test_a_slow_drift_of_energy_is_seen(crank):
+    work = crank.work.copy()
+    work[:, 0] += 0.04 * np.ptp(crank.energy.drives) * crank.t / crank.t[-1]
+    assert "drift of energy / energy" in failures(replace(crank, work=work, _tracks={}))
+
+
+def test_momentum_that_changes_is_seen(free):
+    v = free.v.copy()
+    v[-1, 2] += 1e-4
+    assert "change of linear momentum" in failures(replace(free, v=v, _tracks={}))
+
+
+def test_forces_inside_what_starts_at_rest_change_no_momentum():
+    """Nothing but round-off: a share of itself would be one."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    ball = {"mass": 1.0, "inertia": (1, 2, 3), "at": (0, 0, 0)}
+    hub, wheel = (mech.add_rigid(name, **ball) for name in ("hub", "wheel"))
+    axle = (part.marker((0.3, 0.1, 0.2)) for part in (hub, wheel))
+    mech.revolute("axle", *axle, axis=(1, 2, 2))
+    mech.motor("motor", "axle", lambda t, angle, rate: 3.0)
+    sol = simulate(mech, t_end=0.2, dt=1e-3)
+    assert sol.energy.kinetic[-1] > 0.01
+    assert audit(sol).ok, audit(sol)
+
+
+def test_a_stretched_quaternion_is_seen(free):
+    q = free.q.copy()
+    q[10, 3:7] *= 1 + 1e-9
+    assert failures(replace(free, q=q, _tracks={})) == ["quaternion length - 1"]
+
+
+def test_deformations_beyond_linear_elasticity_are_seen():
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible("bar", lattice_body(lattice(stiffness=100.0)), omega=(0.0, 0.0, 25.0))
+    sol = simulate(mech, t_end=0.5, dt=1e-3)
+    assert "largest deformation of bar / size" in failures(sol)
+
+
+def test_newton_that_toils_is_seen(crank):
+    statistics = crank.statistics | {"iterations": 9 * crank.statistics["steps"]}
+    assert failures(replace(crank, statistics=statistics)) == ["Newton corrections per step"]

@@ -1,0 +1,173 @@
+"""Constraints of positions and velocities together, and BDF of orders one to five."""
+
+import numpy as np
+import pytest
+from numba import njit
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rom
+from cases.mbs.mechanisms import simulate_quietly, slider_crank
+from cases.mbs.motions import PARTS, errors, free_crank, heavy_top, swing, wound_drive
+from rom import rotation
+from rom.errors import ConfigError
+from rom.mbs.equations.equations import linearize_constraints
+from rom.mbs.integrate.bdf import joined, multistep_coefficients
+from rom.mbs.kernels.system import workspace
+
+BDF = [{"method": "bdf", "order": k} for k in (1, 3, 4, 5)]
+STABILISED = [{"stabilised": True}, {"method": "bdf", "stabilised": True}]
+
+
+@njit
+def joined_turns(a, b):
+    return joined(a, b)
+
+
+def velocity_gap(sol):
+    """Largest violation of the constraints by the velocities, over all instants but the first."""
+    packed = sol.packed
+    W = workspace(packed.system, len(packed.signals))
+    signal, largest = packed.system.rows.signal, 0.0
+    for k in range(1, sol.t.size):
+        W.signal[:] = sol.signals[k]
+        linearize_constraints(packed.system, W, sol.q[k], sol.v[k])
+        wanted = np.where(signal >= 0, W.signal[signal, 1], 0.0) if len(W.signal) else 0.0
+        largest = max(largest, np.abs(W.G @ sol.v[k] - wanted).max())
+    return largest
+
+
+def slopes(build, t_end, steps, exact, options):
+    table = []
+    for h in steps:
+        every = round(t_end / 10 / h)
+        sol = simulate_quietly(build(), t_end=t_end, dt=h, save_every=every, **options)
+        table.append(errors(sol, exact))
+    return np.log2(np.array(table)[:-1] / np.array(table)[1:])[-1]
+
+
+@pytest.mark.parametrize("options", [*STABILISED, *BDF], ids=str)
+def test_every_method_has_its_order(options):
+    """Coordinates, velocities, accelerations and multipliers of the heavy top, over all steps."""
+    exact = simulate_quietly(heavy_top(), t_end=0.1, dt=0.01, method="dop853")
+    order = options.get("order", 2)
+    found = slopes(heavy_top, 0.1, (5e-4, 2.5e-4), exact, {"tolerance": 1e-12, **options})
+    assert_allclose(found, order, atol=0.15)
+
+
+@pytest.mark.parametrize("options", [*STABILISED, {"method": "bdf", "order": 3}], ids=str)
+def test_order_holds_in_a_loop_of_redundant_joints(options):
+    exact = simulate_quietly(free_crank(), t_end=0.05, dt=0.005, method="dop853")
+    found = slopes(free_crank, 0.05, (1.25e-4, 6.25e-5), exact, {"tolerance": 1e-11, **options})
+    assert_allclose(found, options.get("order", 2), atol=0.2)
+
+
+@pytest.mark.parametrize("build", [heavy_top, free_crank, lambda: slider_crank(gravity=9.81)])
+@pytest.mark.parametrize("method", ["generalized-alpha", "bdf"])
+def test_velocities_fit_the_constraints_to_round_off(build, method):
+    """Without, they miss by the square of the step."""
+    gaps = {}
+    for stabilised in (False, True):
+        for h in (5e-4, 2.5e-4):
+            options = {"dt": h, "method": method, "stabilised": stabilised}
+            sol = simulate_quietly(build(), t_end=0.02, **options)
+            gaps[stabilised, h] = velocity_gap(sol)
+            assert np.abs(sol.gap).max() < 1e-13
+    assert gaps[True, 5e-4] < 1e-13
+    if build in (heavy_top, free_crank):
+        assert_allclose(np.log2(gaps[False, 5e-4] / gaps[False, 2.5e-4]), 2.0, atol=0.2)
+
+
+def rolling_ball():
+    """A ball that rolls down a slope; its rolling constrains velocities in any case."""
+    mech = rom.Mechanism(gravity=(3.0, 0, -9.0))
+    ball = mech.add_rigid("ball", mass=2.0, inertia=(0.008,) * 3, at=(0, 0, 0.1))
+    floor = mech.ground.marker((0, 0, 0))
+    mech.rolling("roll", floor, ball.marker((0, 0, 0)), radius=0.1, normal=(0, 0, 1))
+    return mech
+
+
+@pytest.mark.parametrize("options", [*STABILISED, BDF[2]], ids=str)
+def test_rolling_goes_with_it(options):
+    """Acceleration g sin / (1 + I / m r^2)."""
+    sol = simulate_quietly(rolling_ball(), t_end=0.5, dt=5e-3, **options)
+    assert_allclose(sol.position("ball")[-1, 0], 0.5 * 3.0 / 1.4 * 0.25, rtol=1e-9)
+    assert velocity_gap(sol) < 1e-12
+
+
+def test_chosen_steps_can_be_stabilised():
+    exact = simulate_quietly(heavy_top(), t_end=0.1, dt=0.05, method="dop853")
+    for method in ("generalized-alpha", "bdf"):
+        sol = simulate_quietly(heavy_top(), t_end=0.1, method=method, rtol=1e-4, stabilised=True)
+        assert np.abs(sol.q[-1] - exact.q[-1]).max() < 1e-3
+        assert velocity_gap(sol) < 1e-12
+
+
+def test_energy_of_a_flexible_body_agrees_with_the_reference():
+    """Elastic coordinates, a load in time and a law in Python."""
+    exact = simulate_quietly(swing(), t_end=0.2, dt=0.02, method="dop853")
+    for options, tolerance in ((STABILISED[0], 3e-3), (BDF[2], 2e-3)):
+        sol = simulate_quietly(swing(), t_end=0.2, dt=1e-3, save_every=20, **options)
+        assert np.abs(sol.q - exact.q).max() < tolerance * np.abs(exact.q).max()
+        assert np.abs(sol.energy.balance).max() < 5e-3 * np.ptp(sol.energy.kinetic)
+
+
+@pytest.mark.parametrize("options", [STABILISED[0], BDF[0], BDF[3]], ids=str)
+@pytest.mark.parametrize(("build", "dt"), [(swing, 1e-2), (slider_crank, 1e-3)])
+def test_a_run_goes_on_with_the_same_bits(build, dt, options, tmp_path):
+    """Drives need their rates for it: differences end where a run ends."""
+    whole = simulate_quietly(build(), t_end=40 * dt, dt=dt, **options)
+    state = simulate_quietly(build(), t_end=13 * dt, dt=dt, **options).final
+    state = rom.load_state(rom.save_state(state, tmp_path / "half.state.npz"))
+    second = simulate_quietly(build(), t_end=40 * dt, dt=dt, state=state, **options)
+    for name in PARTS:
+        assert_array_equal(getattr(second, name), getattr(whole, name)[13:], err_msg=name)
+
+
+def test_saving_less_often_keeps_the_same_instants():
+    every = simulate_quietly(wound_drive(), t_end=0.03, dt=1e-3, method="bdf", order=5)
+    third = simulate_quietly(
+        wound_drive(), t_end=0.03, dt=1e-3, method="bdf", order=5, save_every=3
+    )
+    assert_array_equal(third.q, every.q[::3])
+    assert_array_equal(third.t, every.t[::3])
+
+
+def test_an_event_can_end_the_first_steps():
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 1.0))
+    mech.event("low", lambda t, now: now.position("ball")[2] - 0.99, terminal=True)
+    sol = rom.simulate(mech, t_end=1.0, dt=0.02, method="bdf", order=5)
+    assert_allclose(sol.t[-1], np.sqrt(2 * 0.01 / 9.81), rtol=1e-6)
+
+
+def test_weights_differentiate_polynomials_of_their_order():
+    for order in range(1, 6):
+        method, weights = multistep_coefficients(0.3, order)
+        past = 2.0 - 0.3 * np.arange(order + 1)
+        assert_allclose(weights @ past**order, order * 2.0 ** (order - 1), rtol=1e-10)
+        assert_allclose(method[:3], [0.3, 1 / (0.3 * weights[0]) ** 2, 1 / (0.3 * weights[0])])
+
+
+def test_turns_join_to_the_turn_of_their_product():
+    rng = np.random.default_rng(1)
+    for size in (1e-9, 0.3, 2.5):
+        a, b = size * rng.normal(size=(2, 3)) / 2
+        wanted = rotation.log(rotation.multiply(rotation.exp(a), rotation.exp(b)))
+        assert_allclose(joined_turns(tuple(a), tuple(b)), wanted, rtol=1e-9, atol=1e-15)
+    assert_allclose(joined_turns((0.2, 0.1, 0.0), (-0.2, -0.1, 0.0)), 0.0, atol=1e-16)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"order": 3}, "order = 3 is for bdf only"),
+        ({"method": "bdf", "order": 6}, "order = 6 is not 1, 2, 3, 4 or 5"),
+        ({"method": "bdf", "order": 4, "dt": None}, "steps of one length"),
+        ({"method": "dop853", "stabilised": True}, "stabilised is for implicit methods"),
+        ({"stabilised": 1}, "stabilised = 1 must be True or False"),
+        ({"method": "bdf", "order": 5, "t_end": 3e-3}, "needs 4 steps to begin with"),
+    ],
+)
+def test_what_a_method_does_not_offer_is_refused(options, message):
+    with pytest.raises(ConfigError, match=message):
+        rom.simulate(heavy_top(), **{"t_end": 1.0, "dt": 1e-3, **options})

@@ -1,0 +1,189 @@
+"""Order of all methods, and steps that are chosen to meet a tolerance."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+
+from cases.mbs.mechanisms import simulate_quietly, slider_crank
+from cases.mbs.motions import G, errors, falling, free_crank, heavy_top, pendulum
+from rom import rotation
+from rom.errors import ConfigError, SolverError
+from rom.mbs.integrate.adaptive_step import _Run, increment
+from rom.mbs.integrate.generalized_alpha import STEPS, bdf_coefficients
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.integrate.step_memory import across, shift_ahead
+
+IMPLICIT = ["generalized-alpha", "bdf"]
+STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+@pytest.mark.parametrize(
+    ("build", "t_end", "step"), [(heavy_top, 0.1, 5e-4), (free_crank, 0.05, 5e-4)]
+)
+def test_half_the_step_has_a_quarter_of_the_error(method, build, t_end, step):
+    """Coordinates, velocities, accelerations and multipliers, large rotations and a loop."""
+    exact = simulate_quietly(build(), t_end=t_end, dt=t_end / 10, method="dop853")
+    table = []
+    for h in (step, step / 2, step / 4):
+        options = {"dt": h, "method": method, "tolerance": 1e-11}
+        sol = simulate_quietly(build(), t_end=t_end, save_every=round(t_end / 10 / h), **options)
+        table.append(errors(sol, exact))
+    order = np.log2(np.array(table)[:-1] / np.array(table)[1:])
+    assert_allclose(order[-1], 2.0, atol=0.1)
+
+
+def test_dop853_has_its_order_in_the_error_per_tolerance():
+    """Errors go with the tolerance; steps with its eighth root."""
+    exact = simulate(heavy_top(), t_end=0.2, dt=0.05, method="dop853")
+    runs = [
+        simulate(heavy_top(), t_end=0.2, dt=0.05, method="dop853", rtol=rtol, atol=rtol)
+        for rtol in (1e-5, 1e-9)
+    ]
+    steps = [run.statistics["steps"] for run in runs]
+    assert 1e4 ** (1 / 9) < steps[1] / steps[0] < 1e4 ** (1 / 7)
+    assert errors(runs[1], exact, "q")[0] < 1e-3 * errors(runs[0], exact, "q")[0]
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_the_very_first_step_has_the_order_already(method):
+    table = []
+    for h in (4e-4, 2e-4, 1e-4):
+        sol = simulate(heavy_top(), t_end=h, dt=h, method=method, tolerance=1e-12)
+        exact = simulate(heavy_top(), t_end=h, dt=h, method="dop853")
+        table.append(errors(sol, exact, ("a", "lam")))
+    order = np.log2(np.array(table)[:-1] / np.array(table)[1:])
+    assert (order[-1] > 1.8).all()
+
+
+def test_the_increment_of_a_step_is_known_to_fourth_order():
+    """A body that moves as sin t and turns with a given angular velocity, turned exactly."""
+
+    def omega(t):
+        return np.array([np.cos(t), 0.5 * np.sin(2 * t), 0.3])
+
+    def rate(t, p):
+        w = omega(t)
+        return 0.5 * np.concatenate([[-p[1:] @ w], p[0] * w + np.cross(p[1:], w)])
+
+    def ends(t):
+        v = np.concatenate([[np.cos(t), 0, 0], omega(t)])
+        return v, np.array([-np.sin(t), 0, 0, -np.sin(t), np.cos(2 * t), 0])
+
+    gaps, start = [], 0.4
+    for h in (0.2, 0.1):
+        p = solve_ivp(rate, (start, start + h), [1.0, 0, 0, 0], rtol=1e-12, atol=1e-13).y[:, -1]
+        psi = np.concatenate([[np.sin(start + h) - np.sin(start), 0, 0], rotation.log(p)])
+        gaps.append(np.abs(psi - increment([3], h, ends(start), ends(start + h))))
+    ratio = gaps[0][[0, 3, 4, 5]] / gaps[1][[0, 3, 4, 5]]
+    assert (ratio > 13).all()
+
+
+def test_another_length_of_steps_prepares_the_method_for_it(monkeypatch):
+    """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
+    seen = []
+    original = _Run.prepare
+
+    def prepare(self, h):
+        original(self, h)
+        if self.T.count[STEPS] < 5:
+            return
+        now, T = self.record.final, self.T
+        lag = (T.method[3] - T.method[4]) * h * self.jerk
+        ahead = h**2 * shift_ahead(self.record, now, T.method, self.jerk)
+        across_ahead = across(self.record, self.beside, now, ahead)
+        seen.append(
+            [
+                np.linalg.norm(T.a - now.a - lag) / np.linalg.norm(lag),
+                np.linalg.norm(T.v - now.v - across_ahead) / np.linalg.norm(across_ahead),
+            ]
+        )
+
+    monkeypatch.setattr(_Run, "prepare", prepare)
+    simulate(pendulum(), t_end=0.3, rtol=1e-3, rho_inf=0.0)
+    assert len(seen) > 2
+    assert np.max(seen, axis=0)[0] < 0.3
+    assert np.max(seen, axis=0)[1] < 1e-6
+
+
+@pytest.mark.parametrize("before", [0.1, 0.25, 0.4])
+def test_weights_of_bdf_differentiate_parabolas_exactly(before):
+    h = 0.2
+    method, weights = bdf_coefficients(h, before)
+    t = np.array([0.0, -h, -h - before])
+    values = np.array([np.ones(3), t, t**2])
+    assert_allclose(values @ weights, [0.0, 1.0, 0.0], atol=1e-13)
+    _, beta, gamma, *_ = method
+    assert_allclose([gamma / (beta * h), 1 / (beta * h**2)], [weights[0], weights[0] ** 2])
+    assert_allclose(bdf_coefficients(h, 0.0)[1], [1 / h, -1 / h, 0])
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+@pytest.mark.parametrize(("build", "t_end"), [(pendulum, 1.0), (free_crank, 0.05)])
+def test_chosen_steps_meet_the_tolerance(method, build, t_end):
+    """Against dop853: lengths relative to 1 m, velocities to the largest; better with rtol."""
+    worst = []
+    for rtol in (1e-2, 1e-3):
+        sol = simulate_quietly(build(), t_end=t_end, method=method, rtol=rtol)
+        exact = simulate_quietly(build(), t_end=t_end, dt=t_end / 20, method="dop853")
+        at = sol.at(exact.t)
+        q, v = errors(at, exact, ("q", "v"))
+        worst.append(max(q, v / np.abs(exact.v).max()))
+        assert worst[-1] < rtol
+        assert sol.t[-1] == t_end and sol.status.startswith("Reached")
+        assert all(name in sol.statistics for name in STATISTICS)
+        assert sol.t.size == sol.statistics["steps"] + 1
+        assert_allclose(np.diff(sol.t).min(), sol.statistics["shortest"], rtol=1e-9)
+    assert 3 < worst[0] / worst[1] < 30
+
+
+def test_what_a_variable_run_saves_fits_joints_and_drives():
+    sol = simulate_quietly(slider_crank(), t_end=0.05, rtol=1e-2)
+    assert np.abs(sol.gap).max() < 1e-9
+    assert_allclose(sol.omega("crank")[:, 2], 50.0, rtol=1e-9)
+    angle = 50 * sol.t
+    rod = np.sqrt(0.09 - 0.01 * np.sin(angle) ** 2)
+    speed = -5 * np.sin(angle) * (1 + 0.1 * np.cos(angle) / rod)
+    assert_allclose(sol.velocity("slider")[:, 0], speed, atol=1e-6)
+    exact = simulate_quietly(slider_crank(), t_end=0.05, dt=0.01, method="dop853")
+    assert_allclose(sol.reaction("main")[-1], exact.reaction("main")[-1], atol=2e-3)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_events_are_found_with_chosen_steps(method):
+    """Free fall: every step is exact for generalised-alpha."""
+    sol = simulate(falling(), t_end=1.0, method=method, rtol=1e-5)
+    assert_allclose(sol.t[-1], np.sqrt(2 / G), atol=1e-10 if method != "bdf" else 1e-5)
+    assert sol.status.startswith("Stopped by event 'floor'")
+
+
+def test_a_variable_run_goes_on_and_saves_less_if_asked():
+    half = simulate(pendulum(), t_end=0.5, rtol=1e-3)
+    rest = simulate(pendulum(), t_end=1.0, rtol=1e-3, state=half.final)
+    exact = simulate(pendulum(), t_end=1.0, dt=0.5, method="dop853")
+    assert np.abs(rest.q[-1] - exact.q[-1]).max() < 2e-3
+    some = simulate(pendulum(), t_end=0.5, rtol=1e-3, save_every=7)
+    assert_array_equal(some.t[:-1], half.t[::7][: some.t.size - 1])
+    assert some.t[-1] == 0.5
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_a_force_that_jumps_all_the_time_makes_the_step_too_small(method):
+    mech = pendulum()
+    bob = mech.parts["bob"]
+    mech.user_force(
+        "noise",
+        lambda t, a: ((1e3 * np.sign(np.sin(1e15 * t)), 0, 0), (0, 0, 0)),
+        bob.marker("tip"),
+    )
+    with pytest.raises(
+        SolverError, match=r"the step became too small at t = .* its error"
+    ) as caught:
+        simulate(mech, t_end=1.0, method=method, rtol=1e-6)
+    assert caught.value.solution.t[-1] < 1.0
+
+
+def test_dop853_needs_an_interval_of_output():
+    with pytest.raises(ConfigError, match="dt = None is not a finite number"):
+        simulate(pendulum(), t_end=1.0, method="dop853")

@@ -1,0 +1,358 @@
+"""Screws, gears, rods, points on lines and planes, balls and wheels that roll."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
+from cases.mbs.tangents import GRAVITY, check_tangents, difference, shifted
+from rom.errors import ConfigError, ModelError
+from rom.mbs.equations.equations import evaluate, linearize_constraints
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
+
+X, Y, Z = np.eye(3)
+AXIS, ACROSS = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
+BALL = (0.2, 0.2, 0.2)
+
+
+def everything(rng):
+    """Every connection of this page, between flexible bodies, a rigid one and the ground."""
+    mech = Mechanism(gravity=GRAVITY)
+    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    box = mech.add_rigid("box", mass=2.0, inertia=(1.0, 1.5, 2.0),
+                         markers={"a": (0.3, 0.2, -0.1)}, **random_pose(rng))  # fmt: skip
+    m1, m2, m3 = one.marker("a"), two.marker("b"), box.marker("a")
+    mech.screw("screw", m1, m2, axis=AXIS, pitch=0.4)
+    mech.planar("planar", m2, m3, normal=ACROSS)
+    mech.point_on_line("line", m3, one.marker("b"), axis=AXIS)
+    mech.point_on_plane("plane", mech.ground.marker((0, 1, 1)), m1, normal=Z)
+    mech.distance("rod", two.marker("a"), m3)
+    mech.rolling("ball", m1, m3, normal=ACROSS, radius=0.3)
+    mech.rolling("wheel", m2, one.marker("b"), normal=AXIS, radius=0.4, axis=ACROSS)
+    mech.gear("pinion", "screw", "planar", ratio=-0.7)
+    mech.gear("rack", "screw", "line", ratio=0.3, coordinate1="way")
+    return mech
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gradient_and_convective_term_are_derivatives(seed):
+    """dG/dt = 0 along every motion: the gradient times the velocity is the rate of the residual."""
+    rng = np.random.default_rng(seed)
+    packed, W = prepared(everything(rng))
+    s, (q, v, _, _) = packed.system, random_state(rng, packed)
+    rolls = s.rows.kind == ROLL
+
+    def value(delta):
+        evaluate(s, W, shifted(packed, q, delta), v)
+        return W.value.copy()
+
+    def rate(time):
+        linearize_constraints(s, W, shifted(packed, q, time * v), v)
+        return W.G @ v
+
+    evaluate(s, W, q, v)
+    W.base[:] = W.x
+    G = difference(value, v.size)
+    convective = difference(lambda x: rate(x[0]), 1)[:, 0]
+    linearize_constraints(s, W, q, v)
+    assert_allclose(W.G[~rolls], G[~rolls], atol=2e-8 * np.abs(G).max())
+    assert_allclose(W.value[rolls], (W.G @ v)[rolls], atol=1e-12 * np.abs(v).max())
+    assert_allclose(W.gamma, convective, atol=1e-7 * np.abs(convective).max())
+    assert np.abs(W.G).max(axis=1).min() > 0.01
+
+
+@pytest.mark.parametrize("kind", ["distance", "roll", "wheel", "line", "rack"])
+def test_constraint_stiffness_is_the_derivative_of_the_constraint_forces(kind):
+    rng = np.random.default_rng(7)
+    mech = Mechanism(gravity=GRAVITY)
+    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
+    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    a, b, c = one.marker("a"), two.marker("b"), two.marker("a")
+    if kind == "distance":
+        mech.distance("rod", a, b)
+    elif kind in ("roll", "wheel"):
+        mech.rolling(
+            "roll", a, b, normal=AXIS, radius=0.3, axis=ACROSS if kind == "wheel" else None
+        )
+    else:
+        mech.point_on_line("line", a, b, axis=AXIS)
+        if kind == "rack":
+            mech.point_on_line("other", c, one.marker("b"), axis=ACROSS)
+            mech.gear("rack", "line", "other", ratio=0.3)
+    packed, W = prepared(mech)
+    packed.system.markers.twist[:] *= 1e-3
+    check_tangents(packed, W, random_state(rng, packed), np.eye(packed.v.size), 1e-6)
+
+
+def test_a_nut_falls_on_a_steep_screw_with_the_acceleration_of_the_closed_form():
+    """Weight m g lowers m and turns J = I (2 pi / p)^2: a = g / (1 + J / m (2 pi / p)^2)."""
+    m, J, pitch = 2.0, 5e-3, 0.25
+    mech = Mechanism()
+    nut = mech.add_rigid("nut", mass=m, inertia=(J, J, J), at=(0, 0, 0), markers={"o": (0, 0, 0)})
+    mech.screw("thread", mech.ground.marker((0, 0, 0)), nut.marker("o"), axis=Z, pitch=pitch)
+    sol = simulate(mech, t_end=1.0, dt=1e-3)
+    a = 9.81 / (1 + J / m * (2 * np.pi / pitch) ** 2)
+    assert_allclose(sol.position("nut")[:, 2], -0.5 * a * sol.t**2, atol=1e-9)
+    assert_allclose(sol.omega("nut")[:, 2], -2 * np.pi / pitch * a * sol.t, atol=1e-8)
+    assert sol.omega("nut")[-1, 2] / 2 * sol.t[-1] < -2 * np.pi  # more than a turn
+    assert audit(sol).ok, audit(sol)
+
+
+def gear_pair(ratio, torque, carrier=False):
+    """Two wheels on parallel axles a metre apart, the first one driven by a torque."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    base = mech.ground
+    for name, x, J in (("pinion", 0.0, 0.02), ("wheel", 1.0, 0.3)):
+        part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0),
+                              markers={"o": (0, 0, 0)})  # fmt: skip
+        mech.revolute(f"axle of {name}", base.marker((x, 0, 0)), part.marker("o"), axis=Z)
+    mech.gear("teeth", "axle of pinion", "axle of wheel", ratio=ratio)
+    mech.torque("engine", mech.parts["pinion"].marker("o"), (0, 0, torque))
+    return mech
+
+
+def test_a_gear_pair_accelerates_the_sum_of_its_inertias():
+    """Alpha = T / (J1 + i^2 J2); the teeth turn the wheel with i J2 alpha. Ten turns and more."""
+    ratio, torque = -0.37, 5.0
+    sol = simulate(gear_pair(ratio, torque), t_end=2.0, dt=2e-3)
+    alpha = torque / (0.02 + ratio**2 * 0.3)
+    assert_allclose(sol.omega("pinion")[:, 2], alpha * sol.t, rtol=1e-9, atol=1e-9)
+    assert_allclose(sol.omega("wheel")[:, 2], ratio * alpha * sol.t, rtol=1e-9, atol=1e-9)
+    assert 0.5 * alpha * sol.t[-1] ** 2 > 20 * np.pi
+    assert_allclose(sol.reaction("teeth")[-1, 5], 0.3 * ratio * alpha, rtol=1e-8)
+    assert_allclose(sol.base[-1], sol.base[-1, 1] * np.array([ratio, 1.0]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.05, -0.2])
+def test_a_pinion_drives_its_rack(ratio):
+    """Way = ratio times angle: (J + m ratio^2) alpha = T, and the rack is pushed by m a."""
+    J, m, torque = 0.02, 3.0, 0.7
+    mech = Mechanism(gravity=(0, 0, 0))
+    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(J, J, J), at=(0, 0, 0))
+    rack = mech.add_rigid("rack", mass=m, inertia=(1, 1, 1), at=(0, -0.05, 0))
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), pinion.marker((0, 0, 0)), axis=Z)
+    mech.prismatic("rail", mech.ground.marker((0, 0, 0)), rack.marker((0, 0, 0)), axis=X)
+    mech.gear("teeth", "axle", "rail", ratio=ratio)
+    mech.torque("engine", pinion.marker((0, 0, 0)), (0, 0, torque))
+    sol = simulate(mech, t_end=1.0, dt=1e-2)
+    alpha = torque / (J + m * ratio**2)
+    assert_allclose(sol.omega("pinion")[:, 2], alpha * sol.t, rtol=1e-9, atol=1e-9)
+    assert_allclose(sol.velocity("rack")[:, 0], ratio * alpha * sol.t, rtol=1e-9, atol=1e-9)
+    assert_allclose(sol.reaction("teeth")[-1, 0], m * ratio * alpha, rtol=1e-8)
+
+
+@pytest.mark.parametrize("pitch", [0.02, -0.02])
+def test_a_screw_turns_torque_into_thrust(pitch):
+    """Right- and left-hand: (J + m (p / 2 pi)^2) alpha = T; so many turns, so many pitches."""
+    J, m, torque = 2e-3, 4.0, 0.5
+    mech = Mechanism(gravity=(0, 0, 0))
+    bolt = mech.add_rigid("bolt", mass=m, inertia=(J, J, J), at=(0, 0, 0))
+    mech.screw("thread", mech.ground.marker((0, 0, 0)), bolt.marker((0, 0, 0)), axis=X, pitch=pitch)
+    mech.torque("spanner", bolt.marker((0, 0, 0)), torque * X)
+    sol = simulate(mech, t_end=1.0, dt=1e-2)
+    alpha = torque / (J + m * (pitch / (2 * np.pi)) ** 2)
+    assert_allclose(sol.omega("bolt")[:, 0], alpha * sol.t, rtol=1e-9, atol=1e-8)
+    turns = 0.5 * alpha * sol.t**2 / (2 * np.pi)
+    assert_allclose(sol.position("bolt")[:, 0], pitch * turns, atol=1e-9)
+    assert_allclose(sol.reaction("thread")[-1, 0], m * pitch / (2 * np.pi) * alpha, rtol=1e-7)
+
+
+def test_a_gear_run_in_two_pieces_is_the_run_in_one():
+    """The angles go on from where they were, over whole turns."""
+    whole = simulate(gear_pair(2.7, 5.0), t_end=2.0, dt=2e-3)
+    mech = gear_pair(2.7, 5.0)
+    first = simulate(mech, t_end=1.0, dt=2e-3)
+    second = simulate(mech, t_end=2.0, dt=2e-3, state=first.final)
+    assert_allclose(second.base[-1], whole.base[-1], rtol=1e-9)
+    assert_allclose(second.v[-1], whole.v[-1], atol=1e-8)
+
+
+def test_a_planetary_gear_turns_as_willis_says():
+    """Ring held, sun driven: the carrier turns with z_sun / (z_sun + z_ring) of the sun."""
+    sun_teeth, ring_teeth = 20, 64
+    planet_teeth = (ring_teeth - sun_teeth) // 2
+    mech = Mechanism(gravity=(0, 0, 0))
+    wheels = {}
+    for name, x in (("sun", 0.0), ("carrier", 0.0), ("planet", 0.3)):
+        wheels[name] = mech.add_rigid(name, mass=1.0, inertia=BALL, at=(x, 0, 0),
+                                      markers={"o": (0, 0, 0), "p": (0.3, 0, 0)})  # fmt: skip
+    o = mech.ground.marker((0, 0, 0))
+    mech.revolute("arm", o, wheels["carrier"].marker("o"), axis=Z)
+    carrier = wheels["carrier"].marker("o")
+    mech.revolute("sun axle", carrier, wheels["sun"].marker("o"), axis=Z)
+    mech.revolute("pin", wheels["carrier"].marker("p"), wheels["planet"].marker("o"), axis=Z)
+    # seen from the carrier the ring, which is the ground, turns backwards
+    mech.gear("ring", "arm", "pin", ratio=-ring_teeth / planet_teeth)
+    mech.gear("teeth", "sun axle", "pin", ratio=-sun_teeth / planet_teeth)
+    mech.torque("engine", wheels["sun"].marker("o"), (0, 0, 1.0))
+    sol = simulate(mech, t_end=2.0, dt=2e-3)
+    share = sun_teeth / (sun_teeth + ring_teeth)
+    sun = sol.omega("sun")[-1, 2]
+    assert sun > 1.0
+    assert_allclose(sol.omega("carrier")[-1, 2], share * sun, rtol=1e-8)
+
+
+def test_a_rod_between_points_is_a_pendulum():
+    """Against the rigid pendulum of a point mass on the same arm, integrated by itself."""
+    from scipy.integrate import solve_ivp
+
+    L, start = 0.7, 2.0
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    bob = mech.add_rigid("bob", mass=1.3, inertia=BALL, markers={"o": (0, 0, 0)},
+                         at=(L * np.sin(start), -L * np.cos(start), 0))  # fmt: skip
+    mech.distance("rod", mech.ground.marker((0, 0, 0)), bob.marker("o"))
+    sol = simulate(mech, t_end=2.0, dt=0.02, method="dop853")
+    angle = solve_ivp(lambda t, y: (y[1], -9.81 / L * np.sin(y[0])), (0, 2), (start, 0.0),
+                      method="DOP853", rtol=1e-12, atol=1e-12, t_eval=sol.t).y[0]  # fmt: skip
+    path = L * np.column_stack([np.sin(angle), -np.cos(angle), 0 * angle])
+    assert_allclose(sol.position("bob"), path, atol=1e-8)
+    pull = np.linalg.norm(sol.reaction("rod")[0, :3])
+    assert_allclose(pull, -1.3 * 9.81 * np.cos(start), rtol=1e-9)
+
+
+def slope(build, angle=0.3, radius=0.2, J=0.4):
+    """Something of mass 1 that rolls down a plane inclined by ``angle``."""
+    mech = Mechanism(gravity=(9.81 * np.sin(angle), 0, -9.81 * np.cos(angle)))
+    body = mech.add_rigid("body", mass=1.0, inertia=(J * radius**2,) * 3, at=(0, 0, radius),
+                          markers={"o": (0, 0, 0)})  # fmt: skip
+    build(mech, mech.ground.marker((0, 0, 0)), body.marker("o"), radius)
+    return mech
+
+
+ROLLERS = {
+    "ball": (lambda m, a, b, r: m.rolling("roll", a, b, normal=Z, radius=r), 2 / 5),
+    "wheel": (lambda m, a, b, r: m.rolling("roll", a, b, normal=Z, radius=r, axis=Y), 1 / 2),
+}
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+@pytest.mark.parametrize("roller", ROLLERS)
+def test_what_rolls_down_a_slope_has_the_acceleration_of_the_closed_form(roller, method):
+    """A = g sin / (1 + J / (m r^2)): 5/7 for the ball, 2/3 for the disc."""
+    build, J = ROLLERS[roller]
+    sol = simulate(slope(build, J=J), t_end=1.0, dt=1e-3, method=method)
+    a = 9.81 * np.sin(0.3) / (1 + J)
+    assert_allclose(sol.position("body")[:, 0], 0.5 * a * sol.t**2, atol=1e-8)
+    assert_allclose(sol.omega("body")[:, 1], a / 0.2 * sol.t, atol=1e-7)
+    friction = sol.reaction("roll")[-1]
+    assert_allclose(friction[0], -J * a, rtol=1e-6)
+    assert_allclose(friction[2], 9.81 * np.cos(0.3), rtol=1e-6)
+    assert audit(sol).ok, audit(sol)
+    assert "largest slip of what rolls / speed" in [row.quantity for row in audit(sol).rows]
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+def test_a_ball_on_a_turntable_circles_with_two_sevenths_of_its_speed(method):
+    """The path of the centre is a circle run through with 2/7 of the speed of the table."""
+    speed, radius = 3.0, 0.1
+    mech = Mechanism(gravity=(0, 0, -9.81))
+    J = 0.4 * radius**2
+    table = mech.add_rigid("table", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                           markers={"o": (0, 0, 0)})  # fmt: skip
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(J, J, J), at=(0.5, 0, radius),
+                          markers={"o": (0, 0, 0)}, velocity=(0.2, 0.3, 0))  # fmt: skip
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), table.marker("o"), axis=Z)
+    mech.rolling("roll", table.marker("o"), ball.marker("o"), normal=Z, radius=radius)
+    mech.drive("motor", "axle", lambda t: speed * t)
+    sol = simulate(mech, t_end=4.0, dt=2e-3, method=method)
+    w, v0, x0 = 2 / 7 * speed, sol.velocity("ball")[0], sol.position("ball")[0]
+    centre = x0[:2] + np.array([-v0[1], v0[0]]) / w
+    arm = x0[:2] - centre
+    c, s = np.cos(w * sol.t), np.sin(w * sol.t)
+    circle = centre + np.column_stack([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+    if method != "dop853":  # rows of velocity enter Newton's iteration in the right measure
+        assert sol.statistics["iterations"] < 4 * sol.statistics["steps"]
+    error = np.abs(sol.position("ball")[:, :2] - circle).max()
+    assert error < (1e-7 if method == "dop853" else 1e-3)
+
+
+def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
+    mech = Mechanism()
+    J = 0.5 * 0.3**2
+    tilt = np.array([np.cos(0.1), np.sin(0.1), 0, 0])
+    hoop = mech.add_rigid("hoop", mass=1.0, inertia=(J, 2 * J, J), at=(0, 0, 0.3),
+                          orientation=tilt, velocity=(2.0, 0, 0), omega=(0.2, 6.0, 0.5),
+                          markers={"o": (0, 0, 0)})  # fmt: skip
+    axle = np.array([0, np.cos(0.2), np.sin(0.2)])
+    mech.rolling("roll", mech.ground.marker((0, 0, 0)), hoop.marker("o"), normal=Z, radius=0.3,
+                 axis=axle)  # fmt: skip
+    sol = simulate(mech, t_end=2.0, dt=0.01, method="dop853")
+    assert np.abs(sol.energy.balance).max() < 1e-8 * sol.energy.kinetic.max()
+    s = np.einsum("tij,j->ti", sol.axes("hoop", "o"), [0, 1.0, 0])
+    assert np.ptp(s[:, 2]) > 0.05
+    assert_allclose(sol.position("hoop")[:, 2], 0.3 * np.sqrt(1 - s[:, 2] ** 2), atol=1e-9)
+    slow = simulate(mech, t_end=2.0, dt=1e-3)
+    assert_allclose(slow.position("hoop")[-1], sol.position("hoop")[-1], atol=1e-4)
+
+
+def test_planar_joint_and_points_on_lines_stay_where_they_should():
+    """A flexible body thrown with a rigid one."""
+    rng = np.random.default_rng(17)
+    for kind in ("planar", "line", "plane"):
+        mech = Mechanism()
+        one = mech.add_flexible("one", random_body(rng), omega=(2.0, -1.0, 3.0))
+        place = mech.design_point(one.marker("b"))
+        two = mech.add_rigid("two", mass=2.0, inertia=(1.0, 1.5, 2.0), at=place,
+                             velocity=(1.0, 0.5, -0.5), omega=(-1.0, 2.0, 1.0),
+                             markers={"a": (0, 0, 0)})  # fmt: skip
+        a, b = one.marker("b"), two.marker("a")
+        if kind == "planar":
+            mech.planar("j", a, b, normal=AXIS)
+        elif kind == "line":
+            mech.point_on_line("j", a, b, axis=AXIS)
+        else:
+            mech.point_on_plane("j", a, b, normal=AXIS)
+        sol = simulate(mech, t_end=0.4, dt=1e-3)
+        E1, E2 = sol.axes("one", "b"), sol.axes("two", "a")
+        gap = np.einsum("tba,tb->ta", E1, sol.position("two", "a") - sol.position("one", "b"))
+        axis = E1[0].T @ AXIS
+        off = np.cross(gap, axis) if kind == "line" else gap @ axis
+        assert np.abs(off).max() < 1e-10
+        assert np.abs(gap).max() > 1e-2
+        turned = np.linalg.norm(E1 @ axis - E2 @ (E2[0].T @ AXIS), axis=1)
+        assert (turned.max() < 1e-9) == (kind == "planar")
+        assert np.abs(sol.energy.balance).max() < 1e-4 * np.ptp(sol.energy.potential)
+
+
+WRONG = {
+    "screw without pitch": (lambda m, a, b: m.screw("s", a, b, axis=Z, pitch=0.0), "pitch = 0"),
+    "rod of length zero": (lambda m, a, b: m.distance("s", a, b), "coincide"),
+    "rod of negative length": (lambda m, a, b: m.distance("s", a, b, length=-1), "length = -1"),
+    "flat wheel": (lambda m, a, b: m.rolling("s", a, b, normal=Z, radius=1, axis=Z), "lies flat"),
+    "ball of no size": (lambda m, a, b: m.rolling("s", a, b, normal=Z, radius=0), "radius = 0"),
+    "gear on itself": (lambda m, a, b: m.gear("s", "hinge", "hinge", ratio=2), "with itself"),
+    "gear on nothing": (lambda m, a, b: m.gear("s", "hinge", "door", ratio=2), "no joint 'door'"),
+    "gear on a ball": (lambda m, a, b: m.gear("s", "hinge", "ball", ratio=2), "is spherical"),
+    "gear that locks": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=0), "ratio = 0"),
+    "way of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="way"),
+                       "no coordinate 'way'"),
+    "side of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="x"),
+                        "coordinate 'x'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_connections_are_refused_by_name(case):
+    mech = Mechanism()
+    box = mech.add_rigid("box", mass=1, inertia=(1, 1, 1), at=(0, 0, 0))
+    a, b = mech.ground.marker((0, 0, 0)), box.marker((0, 0, 0))
+    mech.revolute("hinge", a, b, axis=Z)
+    mech.spherical("ball", a, b)
+    mech.cylindrical("tube", a, b, axis=Z)
+    act, words = WRONG[case]
+    with pytest.raises(ConfigError) as caught:
+        act(mech, a, b)
+    assert words in str(caught.value)
+    assert "s" not in mech.joints
+
+
+def test_gears_that_contradict_each_other_are_refused():
+    mech = gear_pair(2.0, 1.0)
+    mech.gear("other teeth", "axle of pinion", "axle of wheel", ratio=3.0)
+    mech.drive("motor", "axle of pinion", lambda t: t)
+    with pytest.raises(ModelError, match="misses"):
+        simulate_quietly(mech, t_end=0.1, dt=1e-3)

@@ -1,0 +1,181 @@
+"""Slider-cranks: the published flexible one, and the rigid one in closed form."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.mechanisms import CRANK, simeon_crank, simulate_quietly, slider_crank
+from cases.paths import TESTS
+from cases.solid import block
+
+REFERENCE = json.loads((TESTS / "reference" / "simeon_crank.json").read_text())
+
+
+def angle(sol, body):
+    p = sol.orientation(body)
+    return 2 * np.arctan2(p[:, 3], p[:, 0])
+
+
+def compare(sol, want, positions, velocities):
+    assert_allclose(angle(sol, "rod")[-1], want["phi2"], rtol=positions)
+    assert_allclose(sol.position("slider", "b")[-1, 0], want["x3"], rtol=positions)
+    assert_allclose(sol.elastic("rod")[-1], want["q"], rtol=2.5 * positions)
+    assert_allclose(sol.omega("rod")[-1, 2], want["phi2_rate"], rtol=velocities)
+    assert_allclose(sol.velocity("slider", "b")[-1, 0], want["x3_rate"], rtol=velocities)
+    assert_allclose(sol.v[-1, 12], want["q1_rate"], rtol=velocities)
+    loop, drive = sol.reaction("wrist")[-1], sol.reaction("motor")[-1]
+    assert_allclose([-loop[0], loop[1]], [want["loop_x"], want["loop_y"]], rtol=velocities)
+    assert_allclose(-drive[5], want["drive"], rtol=velocities)
+
+
+def test_published_solution_of_the_flexible_slider_crank():
+    """C2: 13 digits of an independent formulation, with its own inertia integrals."""
+    sol = simulate_quietly(
+        simeon_crank(), t_end=0.1, dt=0.1, method="dop853", rtol=1e-12, atol=1e-14
+    )
+    compare(sol, REFERENCE["published"], 2e-9, 2e-8)
+
+
+@pytest.mark.slow
+def test_physical_flexible_slider_crank():
+    """With the consistent axial mass, fifteen times lighter and four times faster."""
+    sol = simulate_quietly(
+        simeon_crank(15.0), t_end=0.1, dt=0.1, method="dop853", rtol=1e-9, atol=1e-11
+    )
+    compare(sol, REFERENCE["physical"], 1e-6, 1e-5)
+
+
+def test_largest_bending_of_the_published_crank_with_generalized_alpha():
+    """max |q1| = 1.65152e-3 m at 0.04756 s, 0.02 per cent above the peak at 0.0362 s."""
+    sol = simulate_quietly(simeon_crank(), t_end=0.1, dt=2e-5)
+    bending = np.abs(sol.elastic("rod")[:, 0])
+    assert_allclose(bending.max(), 1.65152e-3, rtol=1e-4)
+    assert_allclose(sol.t[bending.argmax()], 0.04756, atol=2e-5)
+
+
+def test_generalized_alpha_converges_with_order_two_in_coordinates_velocities_multipliers():
+    """Errors over the whole time against DOP853; the multipliers from the first step on."""
+    reference = simulate_quietly(
+        simeon_crank(), t_end=0.0032, dt=1.6e-4, method="dop853", rtol=1e-12, atol=1e-15
+    )
+    errors = []
+    for h in (16e-6, 8e-6, 4e-6):
+        sol = simulate_quietly(simeon_crank(), t_end=0.0032, dt=h, save_every=round(1.6e-4 / h))
+        assert_allclose(sol.t, reference.t, atol=1e-12)
+        errors.append(
+            [
+                np.abs(sol.elastic("rod") - reference.elastic("rod")).max(),
+                np.abs(sol.v - reference.v).max(),
+                np.abs(sol.lam - reference.lam).max(),
+            ]
+        )
+    coarse, fine = np.log2(np.array(errors)[:-1] / np.array(errors)[1:])
+    assert_allclose(fine[:2], 2.0, atol=0.1)
+    # round-off of the redundant multipliers, divided by h^2, reaches their error at the finest step
+    assert_allclose(coarse[2], 2.0, atol=0.1)
+
+
+def closed_form(t, l1=0.1, l2=0.3, speed=50.0):
+    """Crank angle, rod angle and slider position with their rates, of the rigid mechanism."""
+    phi = speed * t
+    s = -l1 / l2 * np.sin(phi)
+    c = np.sqrt(1 - s**2)
+    psi, rate = np.arcsin(s), -l1 * speed * np.cos(phi) / (l2 * c)
+    x = l1 * np.cos(phi) + l2 * c
+    return phi, psi, rate, x, -l1 * speed * np.sin(phi) - l2 * rate * s
+
+
+def crank_power(t, l1=0.1, l2=0.3, speed=50.0):
+    """Rate of the kinetic energy of the rigid mechanism, by a five-point difference."""
+
+    def energy(t):
+        phi, psi, rate, _, dx = closed_form(t)
+        vx = -l1 * speed * np.sin(phi) - l2 / 2 * rate * np.sin(psi)
+        vy = l1 * speed * np.cos(phi) + l2 / 2 * rate * np.cos(psi)
+        return 0.25 * (vx**2 + vy**2) + 0.002 * rate**2 + 0.2 * dx**2
+
+    d = 1e-4
+    return (energy(t - 2 * d) - 8 * energy(t - d) + 8 * energy(t + d) - energy(t + 2 * d)) / (
+        12 * d
+    )
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+def test_rigid_slider_crank_equals_its_closed_form(method):
+    """Two turns; the motor torque times the speed is the rate of the kinetic energy."""
+    sol = simulate_quietly(slider_crank(), t_end=0.25, dt=1e-4, method=method, tolerance=1e-12)
+    _, psi, _, x, dx = closed_form(sol.t)
+    assert_allclose(sol.position("slider")[:, 0], x, atol=1e-8 * 0.4)
+    assert_allclose(angle(sol, "rod"), psi, atol=1e-8)
+    exact = method == "dop853"
+    assert_allclose(sol.velocity("slider")[:, 0], dx, atol=1e-8 * 5 if exact else 1e-4 * 5)
+    power = 50.0 * sol.reaction("motor")[:, 5]
+    wanted = crank_power(sol.t)
+    assert_allclose(power, wanted, atol=(1e-7 if exact else 1e-3) * np.abs(wanted).max())
+
+
+def test_work_of_the_motor_balances_the_energy():
+    """10 J go in and out; the work is summed by the trapezoidal rule, of order two."""
+    worst = []
+    for h in (1e-4, 5e-5):
+        e = simulate_quietly(slider_crank(gravity=9.81), t_end=0.25, dt=h).energy
+        assert np.ptp(e.drives) > 10.0
+        worst.append(np.abs(e.balance).max())
+    assert worst[0] < 3e-4
+    assert worst[1] < 0.3 * worst[0]
+
+
+def test_speed_of_the_published_crank_is_that_of_the_drive():
+    sol = simulate_quietly(simeon_crank(), t_end=0.002, dt=1e-5)
+    assert_allclose(sol.omega("crank")[:, 2], CRANK["speed"], rtol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def steel_rod():
+    """A slender steel block between the pins "a" and "b"."""
+    rod = rom.reduce(
+        block(size=(0.3, 0.01, 0.01), cells=(10, 1, 1)), method=rom.CraigBampton(2),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+    ends = {new: replace(rod.marker(old), name=new) for old, new in (("root", "a"), ("tip", "b"))}
+    return replace(rod, markers=ends)
+
+
+def one_turn(rod):
+    """The crank turns once within 60 ms, from rest to rest."""
+
+    def course(t):
+        x = t / 0.06
+        return 2 * np.pi * x**3 * (10 - 15 * x + 6 * x * x)
+
+    mech = slider_crank(speed=0.0, rod=rod)
+    mech.drives.clear()
+    mech.drive("motor", "main", course)
+    sol = simulate_quietly(mech, t_end=0.06, dt=3e-5, rho_inf=0.8)
+    bending = np.abs(sol.elastic("rod") @ rod.marker("b").translation.T).max()
+    return bending, sol.position("slider", "b")[:, 0]
+
+
+def test_a_rod_moves_the_same_in_every_frame_but_for_the_square_of_its_deformation(steel_rod):
+    """A third of the stiffness: three times the bending, nine times the differences of frames.
+
+    Beside each other stand the frame on the chord and the mean axis.
+    """
+    frames, apart, bending = ("a", "b", ("a", "b"), "mean-axis"), [], []
+    for softer in (1.0, 3.0):
+        rod = replace(steel_rod, K=steel_rod.K / softer, omega=steel_rod.omega / np.sqrt(softer))
+        bent, ways = zip(*(one_turn(rod.with_reference(frame)) for frame in frames), strict=True)
+        bending.append(bent[0])
+        apart.append([[np.abs(x - y).max() for x in ways] for y in ways])
+    one, three = np.array(apart)
+    assert bending[0] > 4e-4
+    assert_allclose(bending[1] / bending[0], 3.0, rtol=0.05)
+    i, j = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3)]).T
+    assert 1e-8 < one[i, j].min() and one[i, j].max() < 1e-6
+    slope = np.log(three[i, j] / one[i, j]) / np.log(bending[1] / bending[0])
+    assert_allclose(slope, 2.0, atol=0.1)
+    assert one[2, 3] < 1e-3 * one[0, 2]

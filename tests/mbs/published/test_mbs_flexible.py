@@ -1,0 +1,277 @@
+"""Flexible bodies in motion, against unreduced models, conservation laws, and other frames."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import rom
+from cases.mbs.mechanisms import (
+    lattice,
+    lattice_body,
+    lattice_motion,
+    random_body,
+    simulate_quietly,
+)
+from cases.solid import block
+from rom import rotation
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+
+EXACT = {"method": "dop853", "rtol": 1e-9, "atol": 1e-11}
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+def pendulum(data):
+    """The lattice hung by its first node, released level."""
+    mech = Mechanism(gravity=GRAVITY)
+    bar = mech.add_flexible("bar", lattice_body(data))
+    mech.spherical("hook", mech.ground.marker(tuple(data[0][0])), bar.marker("n0"))
+    return mech
+
+
+def difference_of_the_pendulum(stiffness):
+    """Largest distance of a tip node, frame model against point masses and turning springs."""
+    data = lattice(stiffness=stiffness)
+    x, _, _, masses = data
+    times = np.linspace(0, 0.5, 26)
+    weight = masses[:, None] * GRAVITY
+    full = lattice_motion(data, times, x, 0 * x, lambda t, y: weight, held=(0,))
+    sol = simulate(pendulum(data), t_end=0.5, dt=0.02, **EXACT)
+    tip = sol.position("bar", "n14")
+    return np.abs(tip - full[:, 14]).max(), full[:, 14], data
+
+
+def rigid_tip(data, times):
+    """The tip node of the same pendulum with the springs replaced by rigid bars."""
+    x, _, _, masses = data
+    arm = x - x[0]
+    J = np.einsum("i,iab->ab", masses, [a @ a * np.eye(3) - np.outer(a, a) for a in arm])
+    centre = masses @ arm
+
+    def rhs(t, y):
+        A, w = rotation.matrix(y[:4]), y[4:]
+        torque = np.cross(centre, A.T @ GRAVITY) - np.cross(w, J @ w)
+        e0, e = y[0], y[1:4]
+        rate = 0.5 * np.r_[-e @ w, e0 * w + np.cross(e, w)]
+        return np.r_[rate, np.linalg.solve(J, torque)]
+
+    y0 = np.r_[1.0, np.zeros(6)]
+    out = solve_ivp(rhs, (0, times[-1]), y0, "DOP853", times, rtol=1e-10, atol=1e-12).y
+    return np.array([x[0] + rotation.matrix(p / np.linalg.norm(p)) @ arm[14] for p in out[:4].T])
+
+
+def test_flexible_pendulum_follows_the_unreduced_nonlinear_model():
+    """What is left is of second order: ten times stiffer, at least thirty times less.
+
+    Loads stiffen the lattice by a share 1/k of its own stiffness; linear elasticity does not see
+    it. Vibrations of the amplitude 1/k shift in phase by that share times their number, sqrt(k).
+    """
+    soft, full, data = difference_of_the_pendulum(2e4)
+    stiff, _, _ = difference_of_the_pendulum(2e5)
+    bent = np.abs(full - rigid_tip(data, np.linspace(0, 0.5, 26))).max()
+    assert bent > 1e-3
+    assert soft < 0.04 * bent
+    assert stiff < 1.1 * soft / 10**1.5
+
+
+def test_spinning_bar_stretches_as_the_unreduced_model_does():
+    """A free bar started rigidly at 40 rad/s about z swings out; frequency and stretch agree."""
+    data = lattice(stiffness=2e5)
+    x, _, _, masses = data
+    centre, spin = masses @ x / masses.sum(), np.array([0.0, 0.0, 40.0])
+    times = np.linspace(0, 0.05, 51)
+    v0 = np.cross(spin, x - centre)
+    full = lattice_motion(data, times, x, v0, lambda t, y: 0.0 * y)
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible("bar", lattice_body(data), omega=spin, velocity=np.cross(spin, -centre))
+    # nodes as joints of nothing: springs without stiffness make them markers of the run
+    bar = mech.parts["bar"]
+    mech.spring_damper("probe", bar.marker("n0"), bar.marker("n14"), stiffness=0.0)
+    sol = simulate(mech, t_end=0.05, dt=1e-3, **EXACT)
+    length = np.linalg.norm(sol.position("bar", "n14") - sol.position("bar", "n0"), axis=1)
+    wanted = np.linalg.norm(full[:, 14] - full[:, 0], axis=1)
+    stretch = np.ptp(wanted)
+    assert stretch > 1e-3
+    assert_allclose(length, wanted, atol=0.02 * stretch)
+    assert_allclose(sol.position("bar", "n14"), full[:, 14], atol=0.02 * stretch)
+
+
+def chain_of_two(gravity=(0.0, 0.0, -9.81), turn=None, shift=(0.0, 0.0, 0.0)):
+    """Flexible bar on a hook with a rigid ball at its end, in any place and orientation."""
+    data = lattice(stiffness=2e4)
+    A = np.eye(3) if turn is None else turn
+    shift, tip = np.asarray(shift), data[0][14]
+    mech = Mechanism(gravity=A @ gravity)
+    bar = mech.add_flexible(
+        "bar", lattice_body(data), at=shift, orientation=A, omega=(0.5, 0, 1.0),
+        velocity=A @ np.cross((0.5, 0, 1.0), -data[0][0]),
+    )  # fmt: skip
+    at = shift + A @ (tip + np.array([0.1, 0, 0]))
+    ball = mech.add_rigid(
+        "ball", mass=0.5, inertia=(1e-3, 2e-3, 2.5e-3), at=at, orientation=A,
+        markers={"c": (-0.1, 0, 0)},
+    )  # fmt: skip
+    mech.spherical("hook", mech.ground.marker(tuple(shift + A @ data[0][0])), bar.marker("n0"))
+    mech.revolute("hinge", bar.marker("n14"), ball.marker("c"), axis=A @ [0, 1.0, 0])
+    return mech
+
+
+def test_energy_does_not_drift_over_ten_thousand_steps():
+    """rho_inf = 1: balance within 1e-6 of what is exchanged, no trend; joints stay closed."""
+    sol = simulate(chain_of_two(), t_end=1.0, dt=1e-4, rho_inf=1.0, save_every=10)
+    energy = sol.energy
+    exchanged = np.ptp(energy.potential)
+    assert sol.statistics["steps"] == 10_000
+    assert exchanged > 1.0
+    assert np.abs(energy.balance).max() < 1e-6 * exchanged
+    assert np.abs(sol.gap).max() < 1e-10 * 1.1
+    for name in ("bar", "ball"):
+        assert_allclose(np.linalg.norm(sol.orientation(name), axis=1), 1.0, atol=1e-12)
+
+
+def test_a_turned_and_shifted_mechanism_moves_turned_and_shifted():
+    A = rotation.exp(np.array([0.7, -1.1, 0.4]))
+    A = A if A.shape == (3, 3) else rotation.matrix(A)
+    shift = np.array([3.0, -2.0, 5.0])
+    here = simulate(chain_of_two(), t_end=0.2, dt=1e-3)
+    there = simulate(chain_of_two(turn=A, shift=shift), t_end=0.2, dt=1e-3)
+    assert_allclose(there.position("ball"), shift + here.position("ball") @ A.T, atol=1e-9)
+    size = np.abs(here.elastic("bar")).max()
+    assert size > 1e-4
+    assert_allclose(there.elastic("bar"), here.elastic("bar"), atol=1e-9 * size)
+    force = here.reaction("hook")[:, :3]
+    assert_allclose(there.reaction("hook")[:, :3], force @ A.T, atol=1e-7 * np.abs(force).max())
+
+
+def test_momentum_of_a_free_flexible_body_is_conserved():
+    rng = np.random.default_rng(11)
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible(
+        "one", random_body(rng, damped=False), at=(0.1, 0.2, 0.3), velocity=(1, 2, -1),
+        omega=(3.0, -2.0, 1.0), q=0.1 * rng.normal(size=4), qd=rng.normal(size=4),
+    )  # fmt: skip
+    sol = simulate(mech, t_end=1.0, dt=0.05, method="dop853")
+    for momentum in sol.momentum:
+        assert_allclose(momentum, momentum[[0]].repeat(len(sol.t), axis=0), atol=1e-9)
+    assert np.ptp(sol.energy.total) < 1e-9 * sol.energy.kinetic[0]
+
+
+def test_momentum_gets_better_with_the_step_down_to_the_smallest():
+    """Second order, 1e-8 at last; increments that stop at the round-off of positions leave 1e-6."""
+    drift = []
+    for dt in (1e-3, 1e-4, 1e-5):
+        mech = Mechanism(gravity=(0, 0, 0))
+        rng = np.random.default_rng(11)
+        mech.add_flexible(
+            "one", random_body(rng, damped=False), at=(0.1, 0.2, 0.3), velocity=(1, 2, -1),
+            omega=(1.0, -0.5, 0.3), q=0.01 * rng.normal(size=4), qd=0.1 * rng.normal(size=4),
+        )  # fmt: skip
+        sol = simulate(mech, t_end=0.2, dt=dt, rho_inf=1.0, save_every=20)
+        drift.append([np.abs(p - p[0]).max() / np.abs(p).max() for p in sol.momentum])
+    drift = np.array(drift)
+    assert (drift[1] < drift[0] / 50).all()
+    assert (drift[1:] < 1e-8).all()
+
+
+@pytest.fixture(scope="module")
+def beam():
+    """A slender block on the hinge side "root", reduced to rigid ends and ten modes."""
+    model = block(size=(1.0, 0.02, 0.02), cells=(16, 1, 1))
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    return rom.reduce(
+        model, method=rom.CraigBampton(4), interfaces=kinds, reference="root", certify=False
+    )
+
+
+def hinged(body, tip_mass=0.5, scale=1.0):
+    """The body on a hinge about z with a ball at its tip, gravity across."""
+    mech = Mechanism(gravity=(0, -9.81 * scale, 0))
+    bar = mech.add_flexible("bar", body, at=-body.marker("root").point)
+    length = body.marker("tip").point - body.marker("root").point
+    ball = mech.add_rigid(
+        "ball", mass=tip_mass, inertia=(1e-4,) * 3, at=length, markers={"c": (0, 0, 0)}
+    )
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
+    mech.fixed("weld", bar.marker("tip"), ball.marker("c"))
+    return mech
+
+
+def test_the_frame_changes_the_motion_at_second_order_in_the_deformation_only(beam):
+    """Ten times the load, ten times the deformation: a hundred times the difference of frames."""
+    apart, bent = [], []
+    for softer in (1.0, 10.0):
+        tips = []
+        for reference in ("root", "mean-axis", ("root", "tip")):
+            seen = beam.with_reference(reference)
+            seen = replace(seen, K=seen.K / softer, omega=seen.omega / np.sqrt(softer))
+            sol = simulate(hinged(seen), t_end=0.1, dt=0.01, **EXACT)
+            tips.append(sol.position("ball"))
+            if reference == "root":
+                bent.append(np.abs(sol.elastic("bar") @ seen.marker("tip").translation.T).max())
+        apart.append(max(np.abs(tip - tips[0]).max() for tip in tips[1:]))
+    slope = np.log(apart[1] / apart[0]) / np.log(bent[1] / bent[0])
+    assert bent[0] > 5e-5
+    assert_allclose(slope, 2.0, atol=0.1)
+
+
+def test_small_swings_have_the_frequencies_of_the_hinged_body(beam):
+    """Bending vibration of the bar on its hinge, from zero crossings, against the eigenvalue."""
+    hold = beam.marker("root").hold
+    M, K = beam.full_matrices()
+    # all motions but the rotation about z are held at the root
+    C = hold[[0, 1, 2, 3, 4]]
+    N = np.linalg.svd(C)[2][5:].T
+    lam, V = np.linalg.eigh(np.linalg.solve(np.linalg.cholesky(N.T @ M @ N), N.T @ K @ N)
+                            @ np.linalg.inv(np.linalg.cholesky(N.T @ M @ N)).T)  # fmt: skip
+    omega = np.sqrt(np.maximum(lam, 0.0))
+    shape = N @ np.linalg.solve(np.linalg.cholesky(N.T @ M @ N).T, V)
+    k = next(i for i in range(1, len(lam)) if abs(beam_sway(beam, shape[:, i])) > 1e-3)
+    amplitude = 1e-6
+    mech = Mechanism(gravity=(0, 0, 0))
+    start = amplitude * shape[:, k]
+    turn = start[3:6]
+    root = beam.marker("root").point
+    bar = mech.add_flexible(
+        "bar", beam, at=-root + start[:3] + np.cross(turn, 0 * root),
+        orientation=rotation.matrix(np.r_[1.0, 0.5 * turn] / np.linalg.norm(np.r_[1, 0.5 * turn])),
+        q=start[6:],
+    )  # fmt: skip
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
+    mech.spring_damper("probe", bar.marker("root"), bar.marker("tip"), stiffness=0.0)
+    period = 2 * np.pi / omega[k]
+    sol = simulate(mech, t_end=3 * period, dt=period / 200, rho_inf=1.0)
+    y = sol.position("bar", "tip")[:, 1]
+    i = np.flatnonzero(np.diff(np.sign(y)))
+    crossings = sol.t[i] - y[i] * (sol.t[i + 1] - sol.t[i]) / (y[i + 1] - y[i])
+    assert_allclose(2 * np.diff(crossings).mean(), period, rtol=1e-3)
+
+
+def beam_sway(body, motion):
+    """Deflection of the tip along y in a small motion (6 + r,)."""
+    tip = body.marker("tip")
+    return (motion[:3] + np.cross(motion[3:6], tip.point) + tip.translation @ motion[6:])[1]
+
+
+def test_the_stiff_limit_is_the_rigid_body(beam):
+    """Modulus times 1e6: the trajectory of the same mechanism with a rigid bar to 1e-5."""
+    stiff = replace(beam, K=1e6 * beam.K, omega=1e3 * beam.omega)
+    flexible = simulate(hinged(stiff), t_end=0.3, dt=1e-3, rho_inf=0.5)
+    c = beam.first_moment / beam.mass
+    central = beam.inertia - beam.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    root, tip = beam.marker("root").point, beam.marker("tip").point
+    bar = mech.add_rigid(
+        "bar", mass=beam.mass, inertia=central, at=c - root,
+        markers={"root": root - c, "tip": tip - c},
+    )  # fmt: skip
+    ball = mech.add_rigid(
+        "ball", mass=0.5, inertia=(1e-4,) * 3, at=tip - root, markers={"c": (0, 0, 0)}
+    )
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
+    mech.fixed("weld", bar.marker("tip"), ball.marker("c"))
+    rigid = simulate_quietly(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
+    assert_allclose(flexible.position("ball"), rigid.position("ball"), atol=1e-5)
+    assert np.abs(rigid.position("ball")[-1] - rigid.position("ball")[0]).max() > 0.1

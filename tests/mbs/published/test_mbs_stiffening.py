@@ -1,0 +1,247 @@
+"""Stiffening of moving bodies: published beams, exact balances, and where it is missing."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+from cases.beam import stiffened_beam
+from cases.mbs.mechanisms import (
+    nodal_body,
+    prepared,
+    random_body,
+    random_nodes,
+    random_pose,
+    residual_at,
+)
+from rom import rotation
+from rom.body.stiffening import SecondOrder
+from rom.errors import ConfigError, RomWarning
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
+
+EXACT = {"method": "dop853", "rtol": 1e-10, "atol": 1e-12}
+# Southwell's beam: exact flapwise frequencies by speed, in sqrt(EI / m L^3)
+FLAP = {
+    0: (3.51601527, 22.0344916, 61.6972144),
+    1: (3.68164681, 22.1810112, 61.8417626),
+    5: (6.44954475, 25.4460804, 65.2050405),
+    12: (13.1701505, 37.6031123, 79.6144785),
+}
+
+
+@pytest.mark.parametrize("eta", FLAP)
+def test_rotating_beam_has_the_published_frequencies(eta):
+    """Flapwise about y, lag about z: the squares differ by that of the speed."""
+    beam = stiffened_beam()
+    flap = 2 * np.pi * beam.rotating_frequencies(eta, (0, 1, 0), fixed=("root",))
+    assert_allclose(flap[:3], FLAP[eta], rtol=5e-6)
+    lag = 2 * np.pi * beam.rotating_frequencies(eta, (0, 0, 1), fixed=("root",))
+    assert_allclose(lag[:3] ** 2, flap[:3] ** 2 - eta**2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("eta", "exact"), [(1, (3.8888235, 22.3750143)), (10, (16.6063628, 44.3682239))]
+)
+def test_a_hub_as_long_as_the_beam_stiffens_it_more(eta, exact):
+    beam = stiffened_beam()
+    flap = 2 * np.pi * beam.rotating_frequencies(eta, (0, 1, 0), fixed=("root",), at=(-1, 0, 0))
+    assert_allclose(flap[:2], exact, rtol=5e-6)
+
+
+def test_supports_share_the_pull_of_a_body_between_them():
+    """Held at both ends, and at both ends of a rotor as long as the beam: symmetric or not."""
+    beam = stiffened_beam(n_modes=80)
+    at_rest = 2 * np.pi * beam.rotating_frequencies(0, (0, 1, 0), fixed=("root", "tip"))
+    assert_allclose(at_rest[:2], (22.37328, 61.67282), rtol=1e-5)
+    # the tip gives no axial motion without axial shapes: all of the tension comes from the root
+    held = 2 * np.pi * beam.rotating_frequencies(3, (0, 1, 0), fixed=("root", "tip"))
+    assert at_rest[0] ** 2 < held[0] ** 2 < at_rest[0] ** 2 + 12.3 * 9 / 2
+
+
+# Kane, Ryan and Banerjee, Dynamics of a cantilever beam attached to a moving base, J. Guid. Control
+# Dyn. 10 (1987) 139; the beam of Wu and Haug. Extremes from a spectral beam theory.
+KRB = {"length": 10.0, "EI": 1.4e4, "rhoA": 1.2, "n_modes": 4}
+WU = {"length": 8.0, "EI": 6.8952e10 * 8.2181e-9, "rhoA": 2766.67 * 7.2968e-5, "n_modes": 4}
+
+
+def spin_up(body, speed, t_end, *, duration=15.0, **options):
+    """The base turns from rest to a speed; tip deflection (u, v) in the frame of the base."""
+    rate = 2 * np.pi / duration
+    mech = Mechanism(gravity=(0, 0, 0))
+    beam = mech.add_flexible("beam", body)
+    mech.revolute("base", mech.ground.marker((0, 0, 0)), beam.marker("root"), axis=(0, 0, 1))
+
+    def angle(t):
+        if t >= duration:
+            return speed * (t - duration / 2)
+        return speed / duration * (t**2 / 2 + (np.cos(rate * t) - 1) / rate**2)
+
+    def velocity(t):
+        return speed / duration * (t - np.sin(rate * t) / rate) if t < duration else speed
+
+    def acceleration(t):
+        return speed / duration * (1 - np.cos(rate * t)) if t < duration else 0.0
+
+    mech.drive("motor", "base", angle, rate=velocity, acceleration=acceleration)
+    sol = simulate(mech, t_end=t_end, **{"dt": 5e-3, "rho_inf": 0.9} | options)
+    psi = np.array([angle(t) for t in sol.t])
+    tip, arm = sol.position("beam", "tip"), body.marker("tip").point - body.marker("root").point
+    u = np.cos(psi) * tip[:, 0] + np.sin(psi) * tip[:, 1] - arm[0]
+    return sol, u, np.cos(psi) * tip[:, 1] - np.sin(psi) * tip[:, 0]
+
+
+def at(sol, values, times):
+    return [values[np.argmin(abs(sol.t - t))] for t in times]
+
+
+def test_spin_up_of_kane_ryan_and_banerjee():
+    """C3: extreme deflection of the consistent linear theory, foreshortening, residual motion."""
+    sol, u, v = spin_up(stiffened_beam(**KRB | {"n_modes": 8}), 6.0, 18.0, dt=2.5e-3)
+    assert_allclose(v.min(), -0.57438, atol=2e-5)
+    assert_allclose(sol.t[v.argmin()], 6.762, atol=0.02)
+    wanted = (-0.46878, -0.55953, -0.36285, -0.15083)
+    assert_allclose(at(sol, v, (5.0, 7.5, 10.0, 12.0)), wanted, atol=2e-5)
+    assert_allclose(v[sol.t > 15].max(), 3.64e-3, atol=1e-5)
+    assert_allclose(u.min(), -0.01892, atol=1e-5)
+    report = audit(sol)
+    assert report.ok, report
+
+
+@pytest.mark.parametrize(
+    ("speed", "extreme", "time"), [(6.0, -0.75269, 6.54), (2.0, -0.28027, 7.02)]
+)
+def test_spin_up_of_the_beam_of_wu_and_haug(speed, extreme, time):
+    sol, _, v = spin_up(stiffened_beam(**WU), speed, 9.0, dt=0.01)
+    assert_allclose(v.min(), extreme, atol=2e-4)
+    assert_allclose(sol.t[v.argmin()], time, atol=0.03)
+
+
+def test_without_geometric_stiffness_the_beam_runs_away_and_says_so():
+    with pytest.warns(RomWarning) as said:
+        sol, _, v = spin_up(stiffened_beam(stiffened=False, **KRB), 6.0, 10.0)
+    assert_allclose(at(sol, v, (5.0, 10.0)), (-0.5218, -72.0), rtol=2e-3)
+    assert_allclose(sol.t[np.argmax(np.abs(v) > 1.0)], 6.78, atol=0.01)
+    messages = "\n".join(str(w.message) for w in said)
+    assert "at 3.8 rad/s centrifugal force has used up the stiffness" in messages
+    assert "left the range of small elastic deformation" in messages
+    failed = [row.quantity for row in audit(sol).failures]
+    assert "largest deformation of beam / size" in failed
+    assert "speed of beam / speed that softens it to nothing" in failed
+
+
+def test_another_frame_is_stiffened_by_the_reaction_of_the_base():
+    """Away from its base the beam feels the pull of the joint instead of the acceleration."""
+    body = stiffened_beam(**KRB | {"n_modes": 3})
+    _, u, v = spin_up(body, 6.0, 8.0, dt=0.02, save_every=5)
+    free = body.with_reference("mean-axis")
+    assert "root f_x" in free.K_geo and "a_x" not in free.K_geo
+    _, u_free, v_free = spin_up(free, 6.0, 8.0, dt=0.02, save_every=5)
+    assert_allclose(v_free, v, atol=6e-3)
+    assert_allclose(u_free, u, atol=1e-3)
+
+
+@pytest.mark.parametrize("tension", [-0.8, 2.0])
+def test_a_force_at_the_tip_changes_the_frequency(tension):
+    """Dead axial force, compression up to Euler's load: the marker moves by the foreshortening."""
+    body, load = stiffened_beam(n_modes=3), tension * np.pi**2 / 4
+    lam, V = eigh(body.K + load * body.K_geo["tip f_x"], body.M)
+    mech = Mechanism(gravity=(0, 0, 0))
+    beam = mech.add_flexible("beam", body, q=1e-3 * V[:, 0])
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("root"))
+    mech.force("pull", beam.marker("tip"), (load, 0, 0))
+    period = 2 * np.pi / np.sqrt(lam[0])
+    sol = simulate(mech, t_end=2 * period, dt=period / 100, **EXACT)
+    assert_allclose(sol.position("beam", "tip")[:, 1],
+                    1e-3 * V[:, 0] @ body.marker("tip").translation[1]
+                    * np.cos(2 * np.pi * sol.t / period), atol=2e-8)  # fmt: skip
+    e = sol.energy
+    assert np.abs(e.balance).max() < 1e-7 * np.abs(e.forces).max()
+
+
+def test_energy_and_momentum_of_a_stiffened_free_body_are_exact():
+    rng = np.random.default_rng(3)
+    body = random_body(rng, damped=False, stiffened=True)
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible(
+        "one", body, velocity=(1, 2, -1), omega=(2.0, -1.0, 1.0), q=0.05 * rng.normal(size=4),
+        qd=rng.normal(size=4),
+    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        sol = simulate(mech, t_end=1.0, dt=0.05, **EXACT)
+    assert np.ptp(sol.energy.strain) > 1e-2 * sol.energy.kinetic[0]
+    assert np.ptp(sol.energy.total) < 1e-8 * sol.energy.kinetic[0]
+    for momentum in sol.momentum:
+        assert_allclose(momentum, momentum[[0]].repeat(len(sol.t), axis=0), atol=1e-7)
+
+
+def nodal_residual(nodes, psi, state, a, gravity):
+    """Equations of motion of nodes at x + phi q + psi q q / 2, by d'Alembert's principle."""
+    x, Ms, phi, K, D = nodes
+    q, qd, p, w = state
+    A, r, n = rotation.matrix(p), len(phi), len(x)
+    shape = phi + np.einsum("klia,l->kia", psi, q)
+    P = x + np.einsum("k,kia->ia", q, 0.5 * (phi + shape))
+    Pd = np.einsum("k,kia->ia", qd, shape)
+    J = np.zeros((3 * n, 6 + r))
+    for i in range(n):
+        J[3 * i : 3 * i + 3, :3], J[3 * i : 3 * i + 3, 6:] = np.eye(3), A @ shape[:, i].T
+        J[3 * i : 3 * i + 3, 3:6] = -A @ rotation.skew(P[i])
+    curved = np.einsum("klia,k,l->ia", psi, qd, qd)
+    conv = (np.cross(w, np.cross(w, P)) + 2 * np.cross(w, Pd) + curved) @ A.T
+    found = J.T @ np.kron(Ms, np.eye(3)) @ (J @ a + conv.ravel() - np.tile(gravity, n))
+    found[6:] += K @ q + D @ qd
+    return found
+
+
+def test_stiffened_equations_are_those_of_nodes_on_curved_paths():
+    """Small vibrations of a frame in any motion: what is left is of second order."""
+    rng = np.random.default_rng(8)
+    nodes, gravity = random_nodes(rng), np.array([0.3, -9.0, 2.0])
+    x, Ms = nodes[:2]
+    psi = rng.normal(size=(4, 4, 7, 3))
+    psi = psi + psi.transpose(1, 0, 2, 3)
+    second = SecondOrder(
+        np.einsum("ij,klia->akl", Ms, psi), np.einsum("ia,ij,kljb->abkl", x, Ms, psi), {}
+    )
+    soft, pose = nodal_body(*nodes), random_pose(rng)
+    bodies = {"soft": soft, "stiffened": replace(soft, K_geo=second.matrices())}
+    q, qd, a, errors = rng.normal(size=4), rng.normal(size=4), rng.normal(size=10), {}
+    for size in (1e-3, 1e-4):
+        state = (size * q, size * qd, pose["orientation"], pose["omega"])
+        moved = np.r_[a[:6], size * a[6:]]
+        exact = nodal_residual(nodes, psi, state, moved, gravity)
+        for name, body in bodies.items():
+            mech = Mechanism(gravity=gravity)
+            mech.add_flexible("body", body, q=size * q, qd=size * qd, **pose)
+            packed, W = prepared(mech)
+            residual_at(packed.system, W, packed.q, packed.v, moved, np.zeros(0))
+            errors[name, size] = np.abs(W.residual - exact).max()
+    assert_allclose(errors["soft", 1e-3] / errors["soft", 1e-4], 10, rtol=0.1)
+    assert_allclose(errors["stiffened", 1e-3] / errors["stiffened", 1e-4], 100, rtol=0.1)
+
+
+def test_matrices_and_second_order_say_the_same():
+    body = random_body(np.random.default_rng(2), stiffened=True)
+    again = SecondOrder.of(body).matrices()
+    assert set(again) == set(body.K_geo)
+    for load, A in body.K_geo.items():
+        assert_allclose(again[load], A, atol=1e-14, err_msg=load)
+
+
+def test_a_wrong_geometric_stiffness_is_named():
+    body = stiffened_beam(n_modes=3)
+    for K_geo, message in (
+        ({"spin": np.eye(3)}, "unknown load 'spin'"),
+        ({"a_x": np.eye(2)}, "no symmetric matrix of 3 coordinates"),
+        ({"a_x": np.tri(3)}, "no symmetric matrix"),
+    ):
+        mech = Mechanism()
+        mech.add_flexible("beam", replace(body, K_geo=K_geo))
+        with pytest.raises(ConfigError, match=message):
+            simulate(mech, t_end=1e-3, dt=1e-3)

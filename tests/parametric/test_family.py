@@ -1,0 +1,314 @@
+"""Bodies with parameters against closed forms and against models made with other materials."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
+
+import rom
+from cases.paths import ROOT
+from cases.solid import STEEL, block, composite
+from rom.body.reference import rigid_elastic
+from rom.errors import ConfigError, FileFormatError, ParameterError, RomWarning
+from rom.parametric.affine import AffineModel
+
+ALLOY = rom.Material(E=70e9, nu=0.33, rho=2700.0)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+CELLS, SIZE, ORIGIN = (10, 2, 3), (1.0, 0.1, 0.08), (0.3, -0.2, 0.1)
+PARAMETERS = {
+    "E_web": rom.YoungsModulus("web", 0.5, 2.0),
+    "rho_all": rom.Density(None, 0.8, 1.2),
+    "rho_web": rom.Density("web", 0.5, 1.5),
+}
+POINTS = [
+    {"E_web": 1.0, "rho_all": 1.0, "rho_web": 1.0},
+    {"E_web": 0.5, "rho_all": 1.2, "rho_web": 1.5},
+    {"E_web": 1.83, "rho_all": 0.93, "rho_web": 0.61},
+    {"E_web": 0.71, "rho_all": 0.81, "rho_web": 1.37},
+]
+TOL = 1e-3
+
+
+def scaled(material, E, rho):
+    return replace(material, E=E * material.E, rho=rho * material.rho)
+
+
+def made(E_web=1.0, rho_all=1.0, rho_web=1.0):
+    """The block itself: four tenths of steel, six of alloy."""
+    materials = {"web": scaled(STEEL, E_web, rho_all * rho_web), "rest": scaled(ALLOY, 1, rho_all)}
+    return composite(materials, lambda c: "web" if c[0] < 4 else "rest", SIZE, CELLS, ORIGIN)
+
+
+@pytest.fixture(scope="module")
+def family():
+    return rom.reduce_parametric(
+        made(), parameters=PARAMETERS, method=rom.CraigBampton(24), interfaces=KINDS, tol=TOL
+    )
+
+
+def two_boxes(rho_all, rho_web, E_web):
+    """Mass, first moment and inertia about the origin of coordinates of two boxes."""
+    mass, first, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+    for low, length, rho in ((0.3, 0.4, 7850.0 * rho_web), (0.7, 0.6, 2700.0)):
+        m, (a, b, c) = rho_all * rho * length * 0.1 * 0.08, (length, 0.1, 0.08)
+        x = np.array([low + length / 2, -0.15, 0.14])
+        mass, first = mass + m, first + m * x
+        inertia = inertia + np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * m / 12
+        inertia = inertia + m * (x @ x * np.eye(3) - np.outer(x, x))
+    return mass, first, inertia
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_mass_centre_and_inertia_are_those_of_two_boxes(family, point):
+    body, (mass, first, inertia) = family.at(**point), two_boxes(**point)
+    assert_allclose(body.mass, mass, rtol=1e-12)
+    assert_allclose(body.first_moment, first, rtol=1e-11)
+    assert_allclose(body.inertia, inertia, rtol=1e-10, atol=1e-12 * inertia.max())
+
+
+@pytest.mark.parametrize("point", POINTS)
+@pytest.mark.parametrize("fixed", [(), ("root",), ("tip",), ("root", "tip")])
+def test_frequencies_are_those_of_a_model_made_with_that_material(family, point, fixed):
+    n = 6 if fixed else 12
+    full = rom.modes(made(**point), n, fixed=fixed, interfaces=KINDS).frequencies
+    reduced = family.at(**point).frequencies(n, fixed=fixed)
+    assert_allclose(reduced, full, rtol=TOL, atol=1e-3)
+    assert np.all(reduced >= full - 1e-6)
+    assert_allclose(family.frequencies(n, fixed=fixed, **point)[6:], reduced[6:], rtol=1e-9)
+
+
+def test_the_terms_are_products_of_the_matrices_with_the_shapes():
+    """Every integral, not only those that frequencies feel."""
+    model, rng = made(), np.random.default_rng(3)
+    E, point = rng.standard_normal((model.n_dofs, 5)), POINTS[2]
+    direct = next(AffineModel(made(**point), {"x": rom.Density(None, 1, 1)}).shares(E, None))
+    affine = AffineModel(model, PARAMETERS)
+    shares = {share.region: share for share in affine.shares(E, None)}
+    assert set(shares) == {"web", None}
+    web, rest = shares["web"], shares[None]
+    for name in direct.integrals.__slots__:
+        found = 0.93 * (0.61 * getattr(web.integrals, name) + getattr(rest.integrals, name))
+        expected = np.asarray(getattr(direct.integrals, name))
+        assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    assert_allclose(1.83 * web.K + rest.K, direct.K, atol=1e-12 * np.abs(direct.K).max())
+    ops = affine.at(point)
+    assert_allclose(E.T @ ops.apply_K(E), direct.K, atol=1e-12 * np.abs(direct.K).max())
+
+
+def test_two_rods_in_a_row_ring_as_the_closed_form_says():
+    """Clamped and free: E1 k1 cot(k1 L1) = E2 k2 tan(k2 L2) per area, k = omega sqrt(rho / E)."""
+    soft, hard = rom.Material(3e9, 0.0, 1200.0), rom.Material(70e9, 0.0, 2700.0)
+    size, cells = (1.0, 0.02, 0.02), (80, 1, 1)
+    model = composite({"pad": soft, "rod": hard}, lambda c: ("pad", "rod")[c[0] >= 32], size, cells)
+    parameters = {"E": rom.YoungsModulus("pad", 0.5, 4.0), "rho": rom.Density("rod", 0.5, 2.0)}
+    family = rom.reduce_parametric(
+        model, parameters=parameters, method=rom.CraigBampton(40), interfaces=KINDS, certify=False
+    )
+    for E, rho in ((0.6, 0.7), (1.0, 1.0), (3.5, 1.7)):
+        k1, k2 = np.sqrt(1200.0 / (E * 3e9)), np.sqrt(rho * 2700.0 / 70e9)
+
+        def balance(w, E=E, k1=k1, k2=k2):
+            pull = E * 3e9 * k1 * np.cos(k1 * w * 0.4) * np.cos(k2 * w * 0.6)
+            return pull - 70e9 * k2 * np.sin(k2 * w * 0.6) * np.sin(k1 * w * 0.4)
+
+        omega = brentq(balance, 1.0, np.pi / 2 / (0.4 * k1))  # below it the pad alone resonates
+        body = family.at(E=E, rho=rho)
+        along = int(np.argmax(body.effective_mass(fixed="root")[:, 0]))
+        assert_allclose(2 * np.pi * body.frequencies(fixed="root")[along], omega, rtol=5e-4)
+
+
+def test_all_moduli_times_s_raise_frequencies_by_its_root():
+    parameters = {"E": rom.YoungsModulus(None, 0.1, 10.0), "rho": rom.Density(None, 0.1, 10.0)}
+    family = rom.reduce_parametric(
+        made(), parameters=parameters, method=rom.CraigBampton(8), interfaces=KINDS
+    )
+    assert len(family.provenance["reduction"]["points sampled"]) == 1
+    nominal = family.at().frequencies()[6:]
+    for s in (0.1, 0.37, 7.0):
+        assert_allclose(family.at(E=s).frequencies()[6:], np.sqrt(s) * nominal, rtol=1e-10)
+        assert_allclose(family.at(rho=s).frequencies()[6:], nominal / np.sqrt(s), rtol=1e-10)
+        both = family.at(E=s, rho=s)
+        assert_allclose(both.frequencies()[6:], nominal, rtol=1e-10)
+    single = rom.reduce(made(), method=rom.CraigBampton(8), interfaces=KINDS, certify=False)
+    assert_allclose(nominal, single.frequencies()[6:], rtol=1e-9)
+
+
+@pytest.mark.parametrize("reference", ["mean-axis", "root", ("root", "tip")])
+def test_the_frame_follows_its_condition_at_every_point(family, reference):
+    """The mean axis depends on the mass, and with it on the densities."""
+    bodies = [family.with_reference(reference).at(**point) for point in POINTS]
+    for body in bodies:
+        size = np.abs(body.surface.shape).max()
+        if reference == "mean-axis":
+            scale = body.mass * size
+            assert_allclose(rigid_elastic(body), 0, atol=1e-9 * scale)
+        else:
+            assert_allclose(body.marker("root").translation, 0, atol=1e-9 * size)
+        assert_allclose(body.M, np.eye(body.n_modes), atol=1e-8)
+        assert_allclose(np.sqrt(np.diag(body.K)), body.omega, rtol=1e-12)
+    assert np.abs(bodies[1].omega[:6] / bodies[0].omega[:6] - 1).max() > 0.05
+
+
+def test_what_interfaces_carry_keeps_its_mass():
+    carried = rom.Attachment("tip", 3.0, np.diag([0.01, 0.02, 0.03]), at=(1.35, -0.15, 0.14))
+    model = replace(made(), attachments=(carried,))
+    parameters = {"rho": rom.Density(None, 0.5, 2.0)}
+    family = rom.reduce_parametric(
+        model, parameters=parameters, method=rom.CraigBampton(24), interfaces=KINDS
+    )
+    assert family.certificate.ok, family.certificate
+    for rho in (0.5, 1.4):
+        body, other = family.at(rho=rho), replace(made(rho_all=rho), attachments=(carried,))
+        assert_allclose(body.mass, other.mass(), rtol=1e-12)
+        expected = rom.reduce(other, method=rom.Guyan(), interfaces=KINDS, certify=False)
+        assert_allclose(body.first_moment, expected.first_moment, rtol=1e-10)
+        size = np.abs(expected.inertia).max()
+        assert_allclose(body.inertia, expected.inertia, rtol=1e-10, atol=1e-12 * size)
+        full = rom.modes(other, 5, fixed=("root",), interfaces=KINDS).frequencies
+        assert_allclose(body.frequencies(5, fixed=("root",)), full, rtol=TOL)
+
+
+def test_damping_is_made_anew_at_every_point(family):
+    point = POINTS[2]
+    body = replace(family, damping=rom.Rayleigh(3.0, 1e-5)).at(**point)
+    assert_allclose(body.D, 3.0 * body.M + 1e-5 * body.K, rtol=1e-12)
+    body = replace(family, damping=rom.ModalDamping(0.02)).at(**point)
+    assert_allclose(np.diag(body.D), 0.04 * family.at(**point).omega, rtol=1e-12)
+
+
+def test_the_certificate_compares_away_from_the_points_sampled(family):
+    assert family.certificate.ok, family.certificate
+    tables = family.provenance["comparison"]
+    assert len(tables) == 9  # three points, each free and on two supports
+    sampled = family.provenance["reduction"]["points sampled"]
+    assert len(sampled) >= 5
+    for where in tables:
+        assert all(f"E_web = {point['E_web']:.4g}," not in where for point in sampled[:5])
+    poor = rom.reduce_parametric(
+        made(), parameters=PARAMETERS, method=rom.CraigBampton(2), interfaces=KINDS, tol=TOL
+    )
+    assert not poor.certificate.ok
+
+
+def test_points_between_join_where_the_estimate_says_so(monkeypatch):
+    """Without the corners one basis must not do for a range of a million."""
+    monkeypatch.setattr(rom.parametric.reduce, "corners", lambda *_: [])
+    wide = {"E": rom.YoungsModulus("web", 1e-3, 1e3)}
+    arguments = {"parameters": wide, "interfaces": KINDS, "certify": False}
+    coarse, fine = (
+        rom.reduce_parametric(made(), method=rom.CraigBampton(30), tol=tol, **arguments)
+        for tol in (0.99, TOL)
+    )
+    points = [len(f.provenance["reduction"]["points sampled"]) for f in (coarse, fine)]
+    assert points[0] == 1 and points[1] > 1
+    E = fine.provenance["reduction"]["points sampled"][-1]["E"]
+    full = rom.modes(made(E_web=E), 12, interfaces=KINDS).frequencies[6:]
+    assert_allclose(fine.frequencies(12, E=E)[6:], full, rtol=TOL)
+    assert np.abs(coarse.frequencies(12, E=E)[6:] / full - 1).max() > 10 * TOL
+
+
+def test_factors_outside_the_range_are_refused_or_announced(family):
+    with pytest.raises(ParameterError, match=r"E_web = 2\.5 is outside 0\.5 to 2"):
+        family.at(E_web=2.5)
+    with pytest.warns(RomWarning, match=r"E_web = 2\.5 is outside"):
+        body = family.at(E_web=2.5, extrapolate=True)
+    assert body.provenance["parameters"] == {"E_web": 2.5, "rho_all": 1.0, "rho_web": 1.0}
+    with pytest.raises(ParameterError, match=r"no parameter 'E_wbe'; the family has \['E_web'"):
+        family.at(E_wbe=1.0)
+    for wrong in (0.0, -1.0):
+        with pytest.raises(ParameterError, match="is not a positive factor"):
+            family.at(E_web=wrong, extrapolate=True)
+    for wrong in (np.nan, np.inf, "1", True, [1.0]):
+        with pytest.raises(ConfigError, match=r"BodyFamily.at: E_web = .* must be a finite number"):
+            family.at(E_web=wrong, extrapolate=True)
+
+
+def test_wrong_parameters_are_named():
+    with pytest.raises(ParameterError, match="range 2 to 1 of YoungsModulus of web"):
+        rom.YoungsModulus("web", 2.0, 1.0)
+    with pytest.raises(ParameterError, match="Density of the whole body: low = nan"):
+        rom.Density(None, np.nan, 1.0)
+    arguments = {"method": rom.CraigBampton(2), "interfaces": KINDS}
+    half = rom.Density("web", 0.5, 1.0)
+    for parameters, what in (
+        ({}, "needs a parameter"),
+        ({"rho": 2.0}, r"parameters\['rho'\] = 2.0 must be of type Parameter"),
+        ({"2rho": half}, "'2rho' cannot name a parameter"),
+        (
+            {"rho": rom.Density("wbe", 0.5, 1.0)},
+            r"no region 'wbe'; the model has \['rest', 'web'\]",
+        ),
+    ):
+        with pytest.raises(ConfigError, match=what):
+            rom.reduce_parametric(made(), parameters=parameters, **arguments)
+    with pytest.raises(ConfigError, match="tol = 0 is not a relative error"):
+        rom.reduce_parametric(made(), parameters={"rho": half}, tol=0, **arguments)
+    with pytest.raises(ConfigError, match="which this method does not keep"):
+        rom.reduce_parametric(
+            made(), parameters={"rho": half}, method=rom.FreeFree(4), interfaces=KINDS
+        )
+    with pytest.raises(ParameterError, match=r"no region 'web'; the model has \[\]"):
+        rom.reduce_parametric(block(), parameters={"rho": half}, **arguments)
+
+
+def test_a_family_read_equals_the_one_written(family, tmp_path):
+    damped = replace(family.with_reference(("root", "tip")), damping=rom.Rayleigh(1.0, 1e-6))
+    path = rom.save(damped, tmp_path / "family.rom.npz")
+    again = rom.load(path)
+    assert again.parameters == damped.parameters and again.certificate == damped.certificate
+    assert str(again) == str(damped)
+    one, other = again.at(**POINTS[3]), damped.at(**POINTS[3])
+    for name in ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega"):
+        assert_array_equal(getattr(one, name), getattr(other, name))
+    assert rom.save(again, tmp_path / "again.npz").read_bytes() == path.read_bytes()
+    modal = replace(family, damping=rom.ModalDamping(0.01))
+    body = rom.load(rom.save(modal, tmp_path / "modal.npz")).at()
+    assert_array_equal(body.D, modal.at().D)
+    single = rom.load(rom.save(body, tmp_path / "body.npz"))
+    assert_array_equal(single.K, body.K)
+
+
+def test_terms_that_do_not_fit_are_refused(family, tmp_path):
+    share = family.shares[0]
+    cut = replace(family, shares=(replace(share, K=share.K[:-1]), *family.shares[1:]))
+    with pytest.raises(FileFormatError, match="K of term 0 has the shape"):
+        rom.load(rom.save(cut, tmp_path / "cut.npz"))
+
+
+def test_a_thousand_points_need_no_finite_elements(family, tmp_path):
+    """The file in a process that cannot import FEniCSx and whose sparse solvers are gone."""
+    path = rom.save(family, tmp_path / "family.npz")
+    code = f"""
+import sys
+sys.modules.update(dict.fromkeys(("dolfinx", "ufl", "petsc4py", "slepc4py", "mpi4py", "gmsh")))
+import numpy as np
+import rom, rom.eigen.scipy
+def gone(*arguments, **options):
+    raise AssertionError("the full model was asked")
+for name, thing in vars(rom.eigen.scipy.SciPyOperators).items():
+    if callable(thing):
+        setattr(rom.eigen.scipy.SciPyOperators, name, gone)
+rom.eigen.scipy.splu = rom.eigen.scipy.eigsh = gone
+family = rom.load({str(path)!r})
+E = np.geomspace(0.5, 2.0, 1000)
+found = np.array([family.frequencies(8, fixed="root", E_web=e)[0] for e in E])
+bodies = [family.at(E_web=e) for e in E[::100]]
+assert np.all(np.diff(found) > 0), "stiffer is higher"
+print(found[0], found[-1], len(found), bodies[0].mass)
+"""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=600,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    low, high, n, mass = map(float, done.stdout.split())
+    assert n == 1000 and mass == pytest.approx(made().mass(), rel=1e-12)
+    for E_web, found in ((0.5, low), (2.0, high)):
+        full = rom.modes(made(E_web=E_web), 1, fixed=("root",), interfaces=KINDS).frequencies[0]
+        assert found == pytest.approx(full, rel=TOL)

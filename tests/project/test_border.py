@@ -1,0 +1,312 @@
+"""Wrong arguments: all public callables, argument by argument, with values that do not belong.
+
+Either a call works, because the value is legal, or it raises a RomError with an exit code of a
+user's mistake that names the argument. Missing and unknown arguments are a TypeError of Python, as
+everywhere.
+"""
+
+import inspect
+import signal
+import sys
+import warnings
+from collections import Counter
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from timeit import timeit
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+import rom
+import rom.view
+from cases.files.border_calls import body, calls, mistuned, model
+from rom import errors
+from rom.arguments import typed
+from rom.errors import RomError
+from rom.model import Array
+
+SECONDS = 5.0  # a wrong argument is refused before work starts
+WRONG = {
+    "None": None,
+    "text": "no such name",
+    "-1": -1,
+    "0": 0,
+    "1.5": 1.5,
+    "nan": np.nan,
+    "inf": np.inf,
+    "million": 10**6,
+    "1e300": 1e300,
+    "10**400": 10**400,
+    "True": True,
+    "complex": 1j,
+    "bytes": b"x",
+    "empty list": [],
+    "empty dict": {},
+    "a dict": {"root": 3},
+    "object": object(),
+    "function": lambda *_: None,
+    "ragged": [[1, 2], [3]],
+    "five numbers": np.zeros(5),
+    "numbers with nan": [np.nan, 0.0, 1.0],
+    "texts": ["no", "such"],
+    "a matrix": np.ones((40, 40)),
+}
+COUNTED = Counter()
+NO_NUMBERS = np.zeros(0)
+
+
+class TooSlow(Exception):
+    """A call took longer than it may."""
+
+
+@contextmanager
+def limited(seconds):
+    """Raise `TooSlow` inside after some time."""
+
+    def stop(number, frame):
+        raise TooSlow
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def outcome(function, given, wrong, argument):
+    """What is wrong with the answer to a wrong value, or nothing."""
+    COUNTED["cases"] += 1
+    try:
+        with limited(SECONDS), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            function(**given | {argument: wrong})
+    except RomError as error:
+        COUNTED["refused"] += 1
+        COUNTED["named"] += argument in str(error)
+        return f"exit code 1: {error}" if error.exit_code == 1 else None
+    except TooSlow:
+        return f"still busy after {SECONDS:g} s"
+    except Exception as error:
+        frames = inspect.getinnerframes(error.__traceback__)
+        place = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}"
+        return f"{type(error).__name__}: {error} ({place})"
+    COUNTED["legal"] += 1
+    return None
+
+
+@pytest.mark.parametrize("label", calls())
+def test_a_wrong_argument_is_a_mistake_of_the_user_and_named(label, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    call = calls()[label]
+    COUNTED["callables"] += 1
+    function, legal_call = call.make()
+    with suppress(RomError), warnings.catch_warnings():  # compiles what is not yet, untimed
+        warnings.simplefilter("ignore")
+        function(**legal_call)
+    found, made, legal = {}, call.make(), COUNTED["legal"]
+    for argument in call.arguments:
+        for kind, wrong in WRONG.items():
+            if (argument, kind) not in call.skipped:
+                found[f"{argument}={kind}"] = outcome(*made, wrong, argument)
+            if COUNTED["legal"] > legal and label.startswith("Mechanism."):  # it has changed
+                made, legal = call.make(), COUNTED["legal"]
+    bad = [f"{label}: {case}: {what}" for case, what in found.items() if what]
+    assert not bad, "\n".join(bad)
+
+
+def test_nearly_every_refusal_names_the_argument(capsys):
+    """Of the calls above; the others name what the argument belongs to, a joint or an interface."""
+    if not COUNTED["callables"]:
+        pytest.skip("counts the cases of the test above")
+    share = COUNTED["named"] / COUNTED["refused"]
+    with capsys.disabled():
+        sys.stdout.write(f"\n{dict(COUNTED)}: {share:.1%} of the refusals name the argument\n")
+    assert share > 0.97
+
+
+SAID = {
+    "save nothing": (
+        lambda b: rom.save(None, "x"),
+        "save: body = None must be of type FlexibleBody",
+    ),
+    "load nothing": (lambda b: rom.load(None), "load: path = None must be a path"),
+    "load a descriptor": (lambda b: rom.load(123), "load: path = 123 must be a path"),
+    "load bytes": (lambda b: rom.load(b"x"), "load: path = b'x' must be a path"),
+    "a method by name": (
+        lambda b: rom.reduce(model(), method="craig-bampton", interfaces={}),
+        "reduce: method = 'craig-bampton' must be of type Method (such as rom.CraigBampton",
+    ),
+    "a state of nothing": (
+        lambda b: rom.linearize(rom.Mechanism(), {}),
+        "linearize: state = {} must be of type State",
+    ),
+    "a text for a state": (
+        lambda b: rom.simulate(rom.Mechanism(), t_end=1.0, dt=0.1, state="x"),
+        "simulate: state = 'x' must be of type State",
+    ),
+    "fewer than no modes": (lambda b: b.frequencies(-1), "n = -1 must be a whole number from 0"),
+    "a million modes": (lambda b: b.frequencies(10**6), "n = 1000000 must be a whole number"),
+    "half a mode": (lambda b: b.frequencies(2.5), "FlexibleBody.frequencies: n = 2.5 must be"),
+    "true modes": (lambda b: b.frequencies(True), "n = True must be a whole number"),
+    "names with numbers": (
+        lambda b: b.frequencies(fixed={"root": 3}),
+        "fixed = {'root': 3} must be names",
+    ),
+    "a number among names": (lambda b: b.frequencies(fixed=("root", 3)), "fixed[1] = 3 must be"),
+    "a joint of parts": (
+        lambda b: rom.Mechanism().spherical("ball", None, None),
+        "Mechanism.spherical 'ball': m1 = None must be of type Marker (from part.marker(place)",
+    ),
+    "a number that overflows": (
+        lambda b: rom.Mechanism().add_rigid("m", mass=10**400, inertia=(1, 1, 1), at=(0, 0, 0)),
+        "mass = 1000",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SAID)
+def test_the_message_says_function_argument_value_and_what_is_wanted(case):
+    call, words = SAID[case]
+    with pytest.raises(rom.ConfigError) as caught:
+        call(body())
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("given", [{}, {"body": 1, "path": "x", "ending": ".npz"}])
+def test_missing_arguments_are_a_type_error_of_python(given):
+    """As everywhere; what is there and wrong is told first."""
+    with pytest.raises(TypeError if not given else rom.ConfigError):
+        rom.save(**given)
+    with pytest.raises(TypeError, match="unexpected keyword"):
+        rom.save(body(), "x", ending=".npz")
+
+
+def drawn():
+    """Functions that draw, argument by argument."""
+    for name in rom.view.__all__:
+        thing = getattr(rom.view, name)
+        for p in inspect.signature(thing).parameters.values():
+            if p.annotation not in (Any, "Any") and not isinstance(p.annotation, str):
+                yield pytest.param(thing, p.name, id=f"{name}-{p.name}")
+
+
+@pytest.mark.parametrize(("function", "argument"), list(drawn()))
+def test_pictures_refuse_what_they_cannot_draw_before_they_look_at_the_rest(function, argument):
+    with pytest.raises(rom.ConfigError, match=f"{argument} = "):
+        function(**{argument: object()})
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("argument", ["path", "material", "degree", "parameters"])
+def test_meshes_refuse_what_they_cannot_read(argument):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    given = {"path": "none.msh", "material": rom.Material(1.0, 0.3, 1.0)} | {argument: object()}
+    with pytest.raises(rom.ConfigError, match=f"{argument} = "):
+        rom.fe.model(**given)
+
+
+@typed
+def taken(  # noqa: PLR0913  one of each kind
+    x: float = 0.0,
+    n: int = 0,
+    names: tuple[str, ...] = (),
+    rows: "list[float] | None" = None,
+    far: "Unknown | None" = None,
+    numbers: Array = NO_NUMBERS,
+    *rest: int,
+    path: str | Path = "",
+    way: Literal["up", "down"] = "up",
+    **more: float,
+):
+    """What a typed function gets."""
+    return SimpleNamespace(**locals())
+
+
+class Unknown(SimpleNamespace):
+    """A class that the annotation above does not know."""
+
+
+def test_what_stands_for_the_same_thing_becomes_it():
+    got = taken(np.float64(1.5), np.int32(3), "root", (1, 2.0), Unknown(), [1, 2], path=Path("x"))
+    assert (got.x, got.n, got.names, got.rows) == (1.5, 3, ("root",), [1, 2.0])
+    assert type(got.n) is int and got.numbers.dtype == float and got.path == Path("x")
+    assert taken(names=(name for name in "ab")).names == ("a", "b")
+    assert taken(x=np.array(2.0)).x == 2.0 and taken(k=1.0).more == {"k": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"x": True}, "x = True must be a finite number"),
+        ({"x": 1e200}, "x = 1e+200 must be a number of at most 1e+150"),
+        ({"n": 3.0}, "n = 3.0 must be a whole number"),
+        ({"names": b"x"}, "names = b'x' must be names"),
+        ({"rows": [1.0, np.nan]}, "rows[1] = nan must be a finite number"),
+        ({"far": SimpleNamespace()}, "must be of type Unknown or None"),
+        ({"numbers": [[1], [1, 2]]}, "must be an array of numbers"),
+        ({"numbers": ["1"]}, "must be an array of numbers"),
+        ({"path": 3}, "path = 3 must be a path"),
+        ({"path": "a\0b"}, "must be a path"),
+        ({"way": "left"}, "way = 'left' must be 'up' or 'down'"),
+        ({"k": "x"}, "k = 'x' must be a finite number"),
+    ],
+)
+def test_what_does_not_is_refused_in_words(given, words):
+    with pytest.raises(rom.ConfigError) as caught:
+        taken(**given)
+    assert words in str(caught.value)
+
+
+def test_forces_with_a_phase_are_numbers():
+    force = np.array([0.0, 1j, 0.0])
+    sweep = {"engine_order": 1, "omega": [5e3], "damping": 1e-3, "at": [1]}
+    turned, plain = (mistuned().response(np.zeros(4), f, **sweep) for f in (force, abs(force)))
+    np.testing.assert_allclose(turned, 1j * plain, rtol=1e-12)
+
+
+def test_further_places_are_looked_at_and_long_values_shortened():
+    with pytest.raises(rom.ConfigError, match="rest = 'x' must be a whole number"):
+        taken(0.0, 0, (), None, None, np.zeros(1), 1, "x")
+    with pytest.raises(rom.ConfigError) as caught:
+        taken(x="long " * 1000)
+    assert len(str(caught.value)) < 150
+
+
+def test_a_typed_function_keeps_its_signature_and_costs_microseconds():
+    assert list(inspect.signature(rom.load).parameters) == ["path", "limit"]
+    assert rom.load.__doc__.startswith("Read")
+    calls_made = 2000
+    seconds = min(
+        timeit(lambda: taken(1.0, 2, ("a", "b"), path="x"), number=calls_made) for _ in range(5)
+    )
+    assert seconds / calls_made < 1e-4
+
+
+def test_every_error_can_be_caught_by_its_name_in_rom():
+    kinds = [
+        e
+        for e in vars(errors).values()
+        if isinstance(e, type) and issubclass(e, Exception | Warning)
+    ]
+    assert {kind.__name__ for kind in kinds} <= set(rom.__all__)
+    assert all(getattr(rom, kind.__name__) is kind for kind in kinds)
+
+
+@pytest.mark.fenicsx
+def test_forms_need_a_compiler_and_say_which(monkeypatch, tmp_path):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    from mpi4py import MPI
+
+    from rom.fe.jit import compiling
+
+    monkeypatch.setenv("CC", str(tmp_path / "gcc"))
+    with pytest.raises(rom.ResourceError, match=r"C compiler.*gcc.*apt-get install gcc"):
+        with compiling(MPI.COMM_SELF):
+            raise RuntimeError("command failed")
+    monkeypatch.delenv("CC")
+    with pytest.raises(RuntimeError, match="something else"), compiling(MPI.COMM_SELF):
+        raise RuntimeError("something else")

@@ -1,0 +1,211 @@
+"""The site builds without a warning, and its generated pages say what the project is."""
+
+import importlib
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+import rom
+from cases.paths import ROOT
+from cases.solid import block, composite
+from rom import errors
+from rom.cli.parser import VERBS
+from rom.io.matrices.op4 import write_op4
+
+DOCS = ROOT / "docs"
+WRITTEN = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
+CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
+TOUR = DOCS / "tour.md"  # its blocks start from files of their own
+TRIED = [path for path in WRITTEN if path != TOUR and CODE.search(path.read_text())]
+PARTS = """# # A title
+#
+# Some `code` in prose.
+# Writes: `drawn.png` and `absent.png`
+
+import rom
+
+x = 1  # a remark
+# a remark of its own
+
+y = 2
+
+# ## A section
+#
+# More prose.
+
+z = 3
+"""
+
+
+@pytest.fixture
+def pages(monkeypatch):
+    pytest.importorskip("sphinx", reason="the site is built in the environment of the developers")
+    monkeypatch.syspath_prepend(str(DOCS))
+    import site_pages
+
+    return site_pages
+
+
+def test_a_demo_becomes_text_and_code(pages, tmp_path):
+    script = tmp_path / "demo_x.py"
+    script.write_text(PARTS)
+    page = pages.demo_page(script, {"drawn.png": tmp_path / "drawn.png"})
+    assert page.startswith("# A title\n\nSome `code` in prose.")
+    assert "![Drawn](drawn.png)" in page and "Not drawn yet" in page and "`absent.png`." in page
+    code = "import rom\n\nx = 1  # a remark\n# a remark of its own\n\ny = 2"
+    assert f"```python\n{code}\n```\n\n## A section\n\nMore prose.\n\n```python\nz = 3" in page
+
+
+def test_the_error_page_has_every_error(pages):
+    kinds = [e for e in vars(errors).values() if isinstance(e, type) and hasattr(e, "exit_code")]
+    page = pages.error_page()
+    for kind in set(kinds) - {errors.RomError}:
+        (row,) = (line for line in page.splitlines() if line.startswith(f"| `{kind.__name__}` |"))
+        assert f"| {kind.exit_code} | {kind.__doc__.split()[0]}" in row
+    assert set(pages.CURES) == {kind.__name__ for kind in kinds} - {"RomError"}
+
+
+def test_every_public_name_has_its_place(pages):
+    text = "\n".join(pages.interface_pages().values())
+    for name in rom.__all__:
+        assert f":: rom.{name}\n" in text
+
+
+def test_every_verb_is_shown_with_its_help(pages):
+    page = pages.command_page()
+    for module in VERBS:
+        assert f"## rom {module.__name__.rpartition('.')[2]}\n" in page
+        assert module.EXAMPLES.splitlines()[0] in page
+
+
+def test_the_answers_page_has_every_key_of_every_schema(pages):
+    page = pages.answers_page()
+    for module in VERBS:
+        assert f"## rom {module.__name__.rpartition('.')[2]}\n" in page
+    for path in ("interfaces.NAME.middle", "findings[].state", "certificate.rows[].value",
+                 "geometric stiffness", "exit_code"):  # fmt: skip
+        assert f"| `{path}` |" in page, path
+
+
+def test_the_files_page_shows_the_samples(pages):
+    page = pages.files_page()
+    assert 'E = "210 GPa"' in page and 'rate = "300 rad/s"' in page and "| `rho_inf` |" in page
+
+
+@pytest.mark.fenicsx
+@pytest.mark.slow
+def test_the_site_builds_without_warnings(tmp_path):
+    pytest.importorskip("dolfinx", reason="docstrings of rom.fe need it")
+    pytest.importorskip("sphinx", reason="the site is built in the environment of the developers")
+    source = tmp_path / "docs"  # `make docs` may be writing into the folder itself
+    shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("generated", "__pycache__"))
+    command = [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "--keep-going", source]
+    done = subprocess.run([*command, tmp_path / "site"], capture_output=True, text=True,
+                          timeout=600, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    site = {p.relative_to(tmp_path / "site").as_posix(): p for p in tmp_path.rglob("*.html")}
+    assert {"index.html", "generated/errors.html", "generated/demo_beam.html"} <= set(site)
+    for path in site.values():  # nothing is fetched when the site is read
+        assert 'src="http' not in path.read_text() and '<link href="http' not in path.read_text()
+
+
+@pytest.fixture(scope="module")
+def beam(tmp_path_factory):
+    """What the first page makes of a mesh, here from bricks, so that FEniCSx is not needed."""
+    path = tmp_path_factory.mktemp("beam") / "beam.rom.npz"
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    model = block(size=(1.0, 0.05, 0.03), cells=(20, 2, 2))
+    rom.save(rom.reduce(model, method=rom.CraigBampton(12), interfaces=kinds), path)
+    return path
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.parametrize("page", TRIED, ids=lambda path: path.stem)
+def test_code_on_a_page_runs(page, beam, tmp_path, monkeypatch):
+    """Blocks of a page run one after the other, as a reader types them."""
+    text = page.read_text()
+    if "rom.fe" in text or "rom.view" in text:
+        pytest.importorskip("dolfinx", reason="the page starts from finite elements")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "beam.rom.npz").symlink_to(beam)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    names = {"__name__": "__main__"}
+    for found in CODE.finditer(text):
+        line = text.count("\n", 0, found.start(1))
+        exec(compile("\n" * line + found.group(1), str(page), "exec"), names)
+
+
+def bar_deck(folder):
+    """Matrices and nodes of a bar in mm, t and s, as another program leaves them: rod.op4, .bdf."""
+    steel = rom.Material(E=210e3, nu=0.3, rho=7.85e-9)
+    model = block(size=(200.0, 20.0, 10.0), cells=(7, 1, 1), material=steel)
+    write_op4({"KAA": model.K.toarray(), "MAA": model.M.toarray()}, folder / "rod.op4")
+    sections = [10 * (k // 4 + 1) + k % 4 + 1 for k in range(len(model.points))]
+    lines = [
+        f"GRID,{number},," + ",".join(f"{x:.6f}" for x in point)
+        for number, point in zip(sections, model.points, strict=True)
+    ]
+    (folder / "rod.bdf").write_text("BEGIN BULK\n" + "\n".join(lines) + "\nENDDATA\n")
+
+
+def panel():
+    """A bar of two materials, the inner part a core."""
+    core = rom.Material(E=1e9, nu=0.3, rho=200.0)
+    materials = {"skin": rom.Material(E=70e9, nu=0.3, rho=2700.0), "core": core}
+    return composite(materials, lambda cell: "core" if cell[2] == 1 else "skin", cells=(8, 2, 3))
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+def test_code_on_the_tour_runs(tmp_path, monkeypatch):
+    """All blocks; the film is not drawn."""
+    monkeypatch.chdir(tmp_path)
+    bar_deck(tmp_path)
+    drawn = []
+    monkeypatch.setattr(rom.view, "animate", lambda *a, **k: drawn.append(a[2]))
+    blocks = CODE.findall(TOUR.read_text())
+    _, mechanism = CODE.findall((ROOT / "README.md").read_text())  # the first runs in test_text
+    assert any(mechanism in block for block in blocks)
+    names = {"__name__": "__main__", "model": panel(), "rom": rom}
+    for text in blocks:
+        if "read_model" in text:  # its model is not that of the next block
+            own = dict(names)
+            exec(compile(text, str(TOUR), "exec"), own)
+            rom.save(own["body"], "rod.rom.npz")
+            assert own["body"].mass == pytest.approx(7850 * 4e-5, rel=1e-9)
+        else:
+            exec(compile(text, str(TOUR), "exec"), names)
+    assert drawn == ["pendulum.gif"] and len(blocks) == 3
+    assert {"pendulum.csv", "pendulum.glb", "panel.rom.npz"} <= {p.name for p in tmp_path.iterdir()}
+
+
+def test_pages_of_theory_are_short_and_name_their_sources():
+    for path in (DOCS / "theory").glob("*.md"):
+        text = path.read_text()
+        assert len(text.splitlines()) < 120
+        assert path.stem == "index" or ("\n## Sources\n" in text and CODE.search(text)), path
+
+
+def named(name):
+    """The module, function or class that a dotted name stands for; of rom.fe only the file."""
+    thing = rom
+    for part in name.split(".")[1:]:
+        if thing is rom.fe:
+            return part in rom.fe.__all__ or any((ROOT / "rom" / "fe").glob(f"{part}*"))
+        try:
+            thing = getattr(thing, part)
+        except AttributeError:
+            thing = importlib.import_module(f"{thing.__name__}.{part}")
+    return thing
+
+
+def test_what_pages_name_exists():
+    """Modules, functions and files written in backquotes."""
+    for path in WRITTEN:
+        text = path.read_text()
+        for name in re.findall(r"`(rom(?:\.\w+)+)(?:\(.*?\))?`", text):
+            assert named(name), f"{path.name} names {name}"
+        for name in re.findall(r"`((?:meshes|demos|tests|rom)/[\w./-]+)`", text):
+            assert (ROOT / name).exists(), f"{path.name} names {name}"

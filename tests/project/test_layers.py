@@ -1,0 +1,395 @@
+"""Who may import whom, and what works without FEniCSx."""
+
+import ast
+import os
+import subprocess
+import sys
+
+import pytest
+
+from cases.paths import ROOT
+
+HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
+DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
+LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parametric",
+         "reduction", "rotation", "units"}  # fmt: skip
+ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor", "child_entry"}  # they stand in front
+# what every part stands on, none of it above another
+GROUND = {
+    "arguments",
+    "child",
+    "deprecated",
+    "interruption",
+    "launcher",
+    "lazy",
+    "memory",
+    "moved",
+    "names",
+    "places",
+    "plausible",
+}
+MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
+    **{part: {"places", "errors", "interruption", "model", "rotation"} for part in GROUND},
+    "errors": set(),
+    "notebook": set(),
+    "model": {"errors", "notebook"},
+    "units": {"errors"},
+    "rotation": {"errors"},
+    "eigen": {"model", "errors"},
+    "reduction": {"model", "eigen", "errors"},
+    "cyclic": {"model", "eigen", "rotation", "reduction", "errors"},
+    "body": {"model", "eigen", "rotation", "notebook", "errors"},
+    "assembly": {"model", "eigen", "body", "reduction", "errors"},
+    "mbs": {"model", "rotation", "io", "notebook", "errors"},
+    "io": {"model", "units", "body", "parametric", "errors"},
+    "checks": {"model", "eigen", "body", "reduction", "errors"},
+    "workflow": LIGHT | {"checks"},
+    "prestress": {"model", "eigen", "rotation", "cyclic", "reduction", "errors"},
+    "parametric": LIGHT | {"checks", "workflow"},
+    "fe": {"model", "eigen", "units", "errors"},
+    "components": LIGHT,
+    "view": {"model", "mbs", "rotation", "io", "errors"},
+    "fmu": {"model", "mbs", "rotation", "body", "io", "errors"},
+    "config": LIGHT | {"checks", "fe", "workflow"},
+    "report": {"model", "body", "checks", "config", "mbs", "view", "io", "errors"},
+    "material": {"errors", "units"},
+    "rows": {"model"},
+}
+# inside each folder that has folders, what lies lower stands first; a file imports its own room or
+# a lower one
+ORDER = {
+    "": (
+        "errors",
+        "notebook",
+        "units",
+        "rotation",
+        "places",
+        "lazy",
+        "moved",
+        "names",
+        "arguments",
+        "interruption",
+        "child",
+        "child_entry",
+        "deprecated",
+        "launcher",
+        "memory",
+        "plausible",
+        "material",
+        "model",
+        "eigen",
+        "reduction",
+        "body",
+        "fe",
+        "doctor",
+        "rows",
+        "checks",
+        "assembly",
+        "cyclic",
+        "workflow",
+        "parametric",
+        "prestress",
+        "io",
+        "mbs",
+        "fmu",
+        "view",
+        "config",
+        "report",
+        "components",
+        "bench",
+        "cli",
+        "__main__",
+    ),
+    "bench": (
+        "models",
+        "peers",
+        "loops",
+        "wheel",
+        "benchmarks",
+    ),
+    "cli": (
+        "answer",
+        "speech",
+        "schemas",
+        "options",
+        "described",
+        "method",
+        "ranks",
+        "matrices",
+        "model",
+        "output",
+        "verbs",
+        "parser",
+        "main",
+    ),
+    "cyclic": (
+        "faces",
+        "sector",
+        "rotation",
+        "modes",
+        "gyroscopic",
+        "travelling",
+        "supports",
+        "campbell",
+        "certificate",
+        "reduced",
+        "blades",
+    ),
+    "fe": (
+        "parallel",
+        "jit",
+        "compat",
+        "operators",
+        "forms",
+        "mesh",
+        "elasticity",
+        "probe",
+    ),
+    "fe.mesh": (
+        "cell_types",
+        "topology",
+        "solid",
+        "sources",
+        "child",
+        "quality",
+        "repair",
+        "validate",
+        "distribute",
+        "read",
+        "summary",
+        "input_deck",
+    ),
+    "io": (
+        "files",
+        "archive",
+        "native",
+        "fields",
+        "matrices",
+        "sid",
+        "programs",
+        "fmu",
+        "family",
+        "history",
+        "export",
+        "claim",
+        "ours",
+    ),
+    "mbs": (
+        "kernels",
+        "parts",
+        "elements",
+        "connections",
+        "mechanism",
+        "equations",
+        "results",
+        "integrate",
+        "analysis",
+    ),
+    "reduction": (
+        "bases",
+        "interfaces",
+    ),
+    "view": (
+        "canvas",
+        "figures",
+        "scenes",
+    ),
+}
+CIRCLES = {  # files that still import each other
+    "body.conversion body.flexible body.recovery body.reference body.rotating body.spread body.stiffening",  # noqa: E501
+    "fe.forms.finite_strain fe.forms.region fe.forms.stress",
+    "fe.mesh.sources.builder fe.mesh.sources.gmsh_session fe.mesh.sources.readers fe.mesh.sources.step",  # noqa: E501
+    "fe.operators.petsc fe.operators.tied",
+}
+MODULES = sorted((ROOT / "rom").rglob("*.py"))
+
+
+def part_of(path):
+    return path.relative_to(ROOT / "rom").with_suffix("").parts[0]
+
+
+def imports(path):
+    """(line, module) of every import in a file, functions included."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: write absolute imports"
+            if node.module == "rom":
+                yield from ((node.lineno, f"rom.{alias.name}") for alias in node.names)
+            else:
+                yield node.lineno, node.module
+
+
+def wrong(part, name):
+    """What is wrong with an import, or nothing."""
+    package, _, rest = name.partition(".")
+    if package in HEAVY and part != "fe":
+        return f"{name}; only rom.fe may"
+    if package in DRAWING and part not in ("view", "report", "doctor"):
+        return f"{name}; only rom.view may"
+    target = rest.split(".")[0]
+    if package == "rom" and part not in ANYTHING and target != part:
+        if not target:
+            return "the package root"
+        ground = GROUND - {part} if part not in {"errors", "notebook", *GROUND} else set()
+        if target not in MAY_IMPORT[part] | ground:
+            return f"rom.{target}"
+    return None
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_follow_the_layers(path):
+    found = [(line, wrong(part_of(path), name)) for line, name in imports(path)]
+    bad = [f"{path.name}:{line} imports {what}" for line, what in found if what]
+    assert not bad, "\n".join(bad)
+
+
+def test_every_part_has_a_place_in_the_layers():
+    assert {part_of(path) for path in MODULES} <= set(MAY_IMPORT) | ANYTHING
+
+
+def level_of(parts):
+    """Dotted name of a folder below rom/, "" for rom/ itself."""
+    return ".".join(parts)
+
+
+def upward(path, name, order):
+    """What a file may not reach: a file or folder that is higher on the level where both meet."""
+    own = path.relative_to(ROOT / "rom").with_suffix("").parts
+    target = tuple(name.split(".")[1:])
+    if name.split(".")[0] != "rom" or own[-1] == "__init__":
+        return None
+    same = next((k for k, (a, b) in enumerate(zip(own, target, strict=False)) if a != b), None)
+    if same is None or level_of(own[:same]) not in order:
+        return None
+    places = order[level_of(own[:same])]
+    if target[same] in places and places.index(target[same]) > places.index(own[same]):
+        return f"{level_of(own[:same]) or 'rom'}: {own[same]} lies below {target[same]}"
+    return None
+
+
+def whole_imports(path):
+    """(line, module) of every import, of modules also where a package is named first."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_file_imports_from_a_higher_room(path):
+    """At every level, also inside functions and where only types are meant."""
+    found = [(line, upward(path, name, ORDER)) for line, name in whole_imports(path)]
+    bad = [f"{path.name}:{line} {what}" for line, what in found if what]
+    assert not bad, "\n".join(bad)
+
+
+def test_every_room_has_its_place_in_the_order():
+    """A folder with folders in it says in which order they and its files lie."""
+    for folder in {ROOT / "rom", *(path.parent for path in MODULES)}:
+        level = level_of(folder.relative_to(ROOT / "rom").parts)
+        inside = {p.stem for p in folder.glob("*.py")} - {"__init__"}
+        rooms = {p.parent.name for p in folder.glob("*/__init__.py")}
+        if level in ORDER or (rooms and level != "components"):
+            assert inside | rooms == set(ORDER[level]), level or "rom"
+
+
+@pytest.mark.parametrize("level", ORDER)
+def test_an_upward_import_is_found_on_each_level(level):
+    low, high = ORDER[level][0], ORDER[level][-1]
+    start = ".".join(("rom", *filter(None, [level])))
+    folder = ROOT.joinpath(*start.split("."))
+    file = folder / low / "x.py" if (folder / low).is_dir() else folder / f"{low}.py"
+    assert upward(file, f"{start}.{high}.y", ORDER)
+    assert not upward(folder / f"{high}.py", f"{start}.{low}", ORDER)
+
+
+def test_components_do_not_know_who_uses_them():
+    """They could leave as a package of their own; benchmarks measure them."""
+    for path in MODULES:
+        if part_of(path) not in ("components", "bench"):
+            bad = [name for _, name in imports(path) if name.startswith("rom.components")]
+            assert not bad, f"{path}: {bad}"
+
+
+def circles(modules):
+    """Files of one folder that import each other round and round, as sets of dotted names."""
+    names = {level_of(p.relative_to(ROOT / "rom").with_suffix("").parts): p for p in modules}
+    reach = {
+        name: {t.removeprefix("rom.") for _, one in whole_imports(path)
+               for t in (one, one.rpartition(".")[0]) if t.removeprefix("rom.") in names}
+        for name, path in names.items()
+    }  # fmt: skip
+    for _ in range(len(names).bit_length()):
+        reach = {name: near.union(*(reach[n] for n in near)) for name, near in reach.items()}
+    return {frozenset(n for n in names if n in reach[name] and name in reach[n])
+            for name in names if name in reach[name]}  # fmt: skip
+
+
+def test_no_more_files_go_round_in_circles():
+    """Those that are left; who opens one takes it out of the list."""
+    assert {" ".join(sorted(one)) for one in circles(MODULES)} == CIRCLES
+
+
+def test_folders_hold_no_more_than_one_can_look_over():
+    """On the ground floor, below rom/, the spine and what all stand on lie side by side."""
+    for folder in {path.parent for path in MODULES}:
+        limit = 20 if folder == ROOT / "rom" else 15
+        assert len([p for p in folder.glob("*.py") if p.name != "__init__.py"]) <= limit, folder
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [("io", "rom.fe.mesh"), ("mbs", "rom.body.flexible"), ("model", "rom"), ("fe", "rom.workflow"),
+     ("cli", "dolfinx"), ("io", "meshio"), ("mbs", "matplotlib.pyplot")],
+)  # fmt: skip
+def test_the_rules_forbid_something(part, name):
+    assert wrong(part, name)
+
+
+def run_blocked(code, *, blocked):
+    """Run code in a process where some packages cannot be imported."""
+    block = f"import sys; sys.modules.update(dict.fromkeys({sorted(blocked)!r}))\n"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-c", block + code],
+        env=environment, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+
+
+def test_the_front_door_opens_without_fenicsx_and_pictures():
+    """Every public name resolves where only NumPy, SciPy and Numba are installed."""
+    code = "import rom\nfor name in rom.__all__: getattr(rom, name)"
+    done = run_blocked(code, blocked=HEAVY | DRAWING)
+    assert done.returncode == 0, done.stderr
+
+
+def test_importing_rom_loads_nothing_heavy():
+    """Start-up time: the command line imports rom before it knows what it is asked."""
+    code = f"import rom; print(sorted(({HEAVY | DRAWING!r} | {{'numba'}}) & set(sys.modules)))"
+    done = run_blocked(code, blocked=())
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_the_mesh_checks_run_without_gmsh_and_dolfinx():
+    done = run_blocked(
+        "import rom.fe.mesh.validate, rom.fe.mesh, rom.fe.mesh.summary", blocked=HEAVY
+    )
+    assert done.returncode == 0, done.stderr
+
+
+TESTS = ROOT / "tests"
+
+
+def test_tests_share_what_lies_in_cases_and_nothing_else():
+    for path in TESTS.rglob("*.py"):
+        for name in {name.split(".")[0] for _, name in imports(path)}:
+            assert not name.startswith("test_"), f"{path}: {name} is a file of tests"
+
+
+def test_folders_of_tests_are_as_easy_to_look_over_as_those_of_the_package():
+    assert [path.name for path in TESTS.glob("*.py")] == ["conftest.py"]
+    for folder in {path.parent for path in TESTS.rglob("*.py")}:
+        assert len([p for p in folder.glob("*.py") if p.name != "__init__.py"]) <= 15, folder

@@ -1,0 +1,145 @@
+"""What is shipped is complete: sdist to wheel to a folder where only the light half can work."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from email.parser import Parser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rom
+from cases.paths import ROOT
+from cases.solid import block
+
+pytest.importorskip("wheel", reason="setuptools of Debian 12 needs wheel to make one")
+HEAVY = ("dolfinx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio", "matplotlib", "pyvista")
+L1, L2, SPEED = 0.1, 0.3, 50.0
+SLIDER_CRANK = f"""
+import sys
+sys.modules.update(dict.fromkeys({HEAVY}))
+import rom
+mech = rom.Mechanism()
+crank = mech.add_rigid("crank", mass=0.5, inertia=(1e-4, 1e-3, 1e-3), at=({L1 / 2}, 0, 0),
+                       markers={{"main": (-{L1 / 2}, 0, 0), "pin": ({L1 / 2}, 0, 0)}})
+rod = mech.add_flexible("rod", rom.load("rod.rom.npz"), at=({L1}, 0, 0))
+slider = mech.add_rigid("slider", mass=0.4, inertia=(1e-4,) * 3, at=({L1 + L2}, 0, 0),
+                        markers={{"pin": (0, 0, 0)}})
+ground = mech.ground
+mech.revolute("main", ground.marker((0, 0, 0)), crank.marker("main"), axis=(0, 0, 1))
+mech.revolute("big end", crank.marker("pin"), rod.marker("root"), axis=(0, 0, 1))
+mech.spherical("small end", rod.marker("tip"), slider.marker("pin"))
+mech.prismatic("guide", ground.marker(({L1 + L2}, 0, 0)), slider.marker("pin"), axis=(1, 0, 0))
+mech.drive("motor", "main", lambda t: {SPEED} * t)
+sol = rom.simulate(mech, t_end=2e-3, dt=1e-4)
+print(rom.__file__)
+print(*sol.position("slider")[:, 0])
+"""
+
+
+def hook(name, folder, out):
+    """Call a build hook in a process of its own, as every installer does."""
+    code = f"from setuptools import build_meta; print(build_meta.{name}({str(out)!r}))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True,
+                          timeout=600, check=True)  # fmt: skip
+    return out / done.stdout.splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    """Sdist of a clean copy, and the wheel made from it."""
+    folder = tmp_path_factory.mktemp("shipped")
+    tree = folder / "tree"
+    tree.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tree)
+    shutil.copytree(ROOT / "rom", tree / "rom", ignore=shutil.ignore_patterns("__pycache__"))
+    sdist = hook("build_sdist", tree, folder)
+    shutil.unpack_archive(sdist, folder / "unpacked")
+    wheel = hook("build_wheel", next((folder / "unpacked").iterdir()), folder)
+    return sdist, wheel
+
+
+@pytest.fixture(scope="module")
+def installed(shipped, tmp_path_factory):
+    """Folder with nothing but what pip takes out of the wheel."""
+    folder = tmp_path_factory.mktemp("installed")
+    subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index",
+                    "--disable-pip-version-check", "--no-compile", "--target", folder, shipped[1]],
+                   check=True, timeout=600)  # fmt: skip
+    return folder
+
+
+def environment(folder):
+    # 20 steps in plain Python take a second; a fresh place would compile for two minutes
+    return os.environ | {"PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
+
+
+def test_the_wheel_holds_every_module_and_its_data(shipped):
+    names = set(zipfile.ZipFile(shipped[1]).namelist())
+    files = [p for p in (ROOT / "rom").rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+    wanted = {str(p.relative_to(ROOT)) for p in files}
+    assert {"rom/py.typed", "rom/components/wind/nrel5mw_blade.csv"} <= wanted <= names
+    assert not {n for n in names if not n.startswith(("rom/", "fenicsx_rom-"))}
+
+
+def test_the_wheel_asks_pip_for_three_libraries(shipped):
+    with zipfile.ZipFile(shipped[1]) as wheel:
+        (text,) = (wheel.read(n) for n in wheel.namelist() if n.endswith("METADATA"))
+    metadata = Parser().parsestr(text.decode())
+    needed = [r for r in metadata.get_all("Requires-Dist") if "extra" not in r]
+    assert {re.match(r"\w+", r).group() for r in needed} == {"numpy", "scipy", "numba"}
+    assert metadata["Version"] == rom.__version__
+
+
+def test_a_saved_slider_crank_runs_from_the_wheel_alone(installed, tmp_path):
+    """The slider is where rigid kinematics has it: the chord of a stiff rod keeps its length."""
+    rod = rom.reduce(
+        block(size=(L2, 0.02, 0.02), cells=(12, 1, 1)),
+        method=rom.CraigBampton(n_modes=2),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, reference=("root", "tip"), certify=False,
+    )  # fmt: skip
+    rom.save(rod, tmp_path / "rod.rom.npz")
+    done = subprocess.run([sys.executable, "-c", SLIDER_CRANK], cwd=tmp_path, text=True,
+                          capture_output=True, env=environment(installed), timeout=600,
+                          check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    place, line = done.stdout.splitlines()[-2:]
+    assert Path(place).is_relative_to(installed)
+    x = np.array(line.split(), dtype=float)
+    angle = SPEED * np.linspace(0, 2e-3, x.size)
+    exact = L1 * np.cos(angle) + np.sqrt(L2**2 - (L1 * np.sin(angle)) ** 2)
+    assert x == pytest.approx(exact, abs=5e-6)  # inertia bends and shortens the rod
+    assert np.ptp(x) > 5e-4
+
+
+def test_the_command_comes_with_the_wheel(installed, tmp_path):
+    done = subprocess.run([sys.executable, installed / "bin" / "rom", "--version"], cwd=tmp_path,
+                          capture_output=True, text=True, env=environment(installed), timeout=60,
+                          check=False)  # fmt: skip
+    assert done.stdout.split() == ["rom", rom.__version__], done.stderr
+
+
+def test_versions_agree_everywhere():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    citation = (ROOT / "CITATION.cff").read_text()
+    newest = re.search(r"^## (\d+\.\d+\.\d+)", (ROOT / "CHANGELOG.md").read_text(), re.M).group(1)
+    cited = re.search(r"^version: (.+)$", citation, re.M).group(1)
+    assert project["version"] == cited == newest == rom.__version__
+    assert f"license: {project['license']['text']}" in citation
+
+
+def test_the_image_installs_what_the_set_up_installs():
+    script = (ROOT / ".ci" / "setup.sh").read_text()
+    wanted = re.search(r'packages="([^"]+)"', script).group(1).split()
+    recipe = (ROOT / "Dockerfile").read_text()
+    install = re.search(r"--no-install-recommends(.+?)&&", recipe, re.S).group(1)
+    assert install.replace("\\", " ").split() == wanted
+    sent = (ROOT / ".dockerignore").read_text()
+    for name in re.findall(r"^COPY (.+) \S+$", recipe, re.M):
+        assert all(f"!{word}\n" in sent for word in name.split())

@@ -1,0 +1,126 @@
+"""The set-up can be run again and again, and the lists of packages agree."""
+
+import os
+import re
+import subprocess
+import time
+import tomllib
+from itertools import chain
+
+import pytest
+
+import rom
+from cases.paths import ROOT
+from rom.doctor.libraries import PACKAGES
+from rom.doctor.machine import SLOW_ADVICE
+from rom.doctor.pictures import SYSTEM_COMMAND
+
+SETUP = ROOT / ".ci" / "setup.sh"
+
+
+def packages():
+    return re.search(r'packages="([^"]+)"', SETUP.read_text()).group(1).split()
+
+
+def deny_network(folder):
+    """An environment in which everything that would fetch or install something fails."""
+    for name in ("apt-get", "sudo", "curl", "wget"):
+        (folder / name).write_text("#!/bin/sh\nexit 99\n")
+        (folder / name).chmod(0o755)
+    nowhere = "http://127.0.0.1:9"
+    return os.environ | {
+        "PATH": f"{folder}:{os.environ['PATH']}", "PIP_NO_INDEX": "1", "PIP_RETRIES": "0",
+        "http_proxy": nowhere, "https_proxy": nowhere,
+    }  # fmt: skip
+
+
+def test_a_second_run_takes_seconds_and_no_network(tmp_path):
+    stamps = [ROOT / name / ".stamp" for name in (".venv", ".venv-light")]
+    if not all(stamp.exists() for stamp in stamps):
+        pytest.skip("this tree was not set up with 'make setup'")
+    before = [stamp.stat().st_mtime_ns for stamp in stamps]
+    start = time.perf_counter()
+    done = subprocess.run([SETUP], env=deny_network(tmp_path), capture_output=True, text=True,
+                          timeout=60, check=False)  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert time.perf_counter() - start < 5
+    assert [stamp.stat().st_mtime_ns for stamp in stamps] == before
+
+
+def test_a_system_without_debian_packages_is_told_so(tmp_path):
+    for name in ("sh", "dirname"):
+        (tmp_path / name).symlink_to(f"/bin/{name}" if name == "sh" else f"/usr/bin/{name}")
+    done = subprocess.run(["/bin/sh", SETUP], env={"PATH": str(tmp_path)}, capture_output=True,
+                          text=True, timeout=20, check=False)  # fmt: skip
+    assert done.returncode == 1
+    assert "no Debian" in done.stderr and "README" in done.stderr
+
+
+def test_programs_to_compare_with_are_not_needed(tmp_path):
+    """The function of the script, where nothing is installed and nothing can be."""
+    function = re.search(r"^try_optional\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
+    script = f"set -eu\noptional=calculix-ccx\ninstalled() {{ false; }}\n{function}\ntry_optional\n"
+    done = subprocess.run(["sh", "-c", script], env=deny_network(tmp_path), capture_output=True,
+                          text=True, timeout=20, check=False)  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "")
+    assert "not installed: calculix-ccx; some tests are skipped" in done.stderr
+    assert 'optional="calculix-ccx"' in SETUP.read_text()
+
+
+def test_scripts_are_valid_shell():
+    for script in (SETUP, ROOT / ".ci" / "run", ROOT / ".ci" / "newer_dolfinx.sh"):
+        assert os.access(script, os.X_OK), f"{script} is not executable"
+        subprocess.run(["sh", "-n", script], check=True)
+
+
+def test_ci_runs_what_a_user_runs():
+    lines = [s for s in (ROOT / ".ci" / "run").read_text().splitlines() if s and s[0] != "#"]
+    assert lines == ["set -eu", 'cd "$(dirname "$0")/.."', "exec make test"]
+
+
+def test_make_test_covers_style_types_and_both_environments():
+    makefile = (ROOT / "Makefile").read_text()
+    recipe = makefile.partition("\ntest: setup\n")[2].partition("\n\n")[0]
+    for part in ("ruff check", "ruff format --check", "-m mypy", "$(PYTHON) -m pytest -n",
+                 '$(LIGHT) -m pytest -m "not fenicsx"'):  # fmt: skip
+        assert part in recipe + "\n"
+    assert "ignore" not in recipe and "-k" not in recipe
+
+
+def test_the_doctor_advises_packages_the_setup_installs():
+    advised = {
+        word for text in (SYSTEM_COMMAND, SLOW_ADVICE) for word in text.split() if word[:3] == "lib"
+    }
+    known = {*packages(), "python3-mpi4py"}  # comes with petsc4py
+    assert advised and advised | set(PACKAGES.values()) <= known
+
+
+def test_pip_does_not_shadow_what_debian_provides():
+    """pip cannot see Debian's gmsh and h5py, and would put other builds in front of them."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
+    names = {re.split(r"[<>=!~ ;\[]", requirement)[0] for requirement in wanted}
+    assert not names & {
+        "gmsh",
+        "h5py",
+        "petsc4py",
+        "slepc4py",
+        "mpi4py",
+        "meshio",
+        "fenics-dolfinx",
+    }
+    assert {"numpy", "scipy", "numba"} <= names
+
+
+def test_types_are_checked_strictly_wherever_users_call():
+    """Kernels are left out, and no module from which a public name comes."""
+    checked = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
+    assert checked["strict"] and "rom" in checked["files"]
+    left_out = {path for path in ROOT.glob("rom/**/*.py")
+                if re.search(checked["exclude"], path.relative_to(ROOT).as_posix())}  # fmt: skip
+    public = {ROOT / "rom" / f"{name.replace('.', '/')}.py" for name in rom.MODULES.values()}
+    assert all(path.is_file() for path in public) and not public & left_out
+    assert {path.relative_to(ROOT).parts[:2] for path in left_out} == {("rom", "mbs")}
+    for exception in checked["overrides"]:
+        names = exception["module"]
+        assert isinstance(names, str) or len(set(names)) == len(names)

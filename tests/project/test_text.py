@@ -1,0 +1,128 @@
+"""What people read is true: README code runs, messages are filled in, names exist."""
+
+import ast
+import inspect
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import rom
+from cases.paths import ROOT
+from rom import errors
+from rom.cli.parser import EXIT_CODES, VERBS
+
+FIELD = re.compile(r"\{[A-Za-z_][\w.\[\]()]*(:[^}]*)?\}")
+SOURCES = sorted((ROOT / "rom").rglob("*.py"))
+PLACES = re.compile(r"(?<![\w.~$-])/(home|root|tmp|work|mnt|Users|private)/\w")
+HOSTS = re.compile(r"\b(pypi|pythonhosted|deb\.debian|anaconda|conda\.io|dockerhub|docker\.io)\b")
+UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX|raise NotImplementedError)\b")
+
+
+def readme():
+    return (ROOT / "README.md").read_text()
+
+
+def files():
+    """Text files of the project; those git knows where there is a repository."""
+    found = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    names = found.stdout.splitlines() or [p.relative_to(ROOT) for p in ROOT.rglob("*.py")]
+    endings = {".py", ".md", ".toml", ".txt", ".sh", ".geo", ""}
+    return [ROOT / n for n in names if Path(n).suffix in endings and (ROOT / n).is_file()]
+
+
+@pytest.mark.fenicsx
+def test_first_readme_block_runs(monkeypatch, tmp_path):
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    block = re.search(r"```python\n(.*?)```", readme(), re.S).group(1)
+    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, "README.md", "exec"), {"__name__": "__main__"})
+    assert len(block.splitlines()) <= 15
+    assert len(readme().splitlines()) <= 150
+
+
+def test_commands_in_the_readme_and_on_pages_exist():
+    """Every line that starts with rom, with verbs and options the parser knows."""
+    from rom.cli.parser import build_parser
+
+    pages = (readme(), *(path.read_text() for path in (ROOT / "docs").glob("*.md")))
+    text = "\n".join(pages).replace("\\\n", " ")
+    lines = re.findall(r"^(?:mpirun -n \d )?rom (.+)$", text, re.M)
+    assert len(lines) >= len(VERBS)
+    for line in lines:
+        words = re.sub(r"\s+#.*", "", line).split()
+        assert build_parser().parse_args(words).verb == words[0]
+
+
+def test_files_named_in_the_readme_exist():
+    for name in re.findall(r"`((?:meshes|demos|tests|rom|\.ci)/[\w./-]*)`", readme()):
+        assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_forgotten_f_prefix_in_a_message(path):
+    assert not forgotten(ast.parse(path.read_text()))
+
+
+def forgotten(tree):
+    """Line numbers of plain strings with {fields} inside raised or made errors and warnings."""
+    found = set()
+    for node in ast.walk(tree):
+        called = isinstance(node, ast.Call) and getattr(node.func, "id", "")
+        if not isinstance(node, ast.Raise) and not re.search("(Error|Warning)$", called or ""):
+            continue
+        inside = {id(v) for f in ast.walk(node) if isinstance(f, ast.JoinedStr) for v in f.values}
+        for text in ast.walk(node):
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                if id(text) not in inside and FIELD.search(text.value):
+                    found.add(text.lineno)
+    return sorted(found)
+
+
+def test_a_forgotten_f_prefix_is_found():
+    assert forgotten(ast.parse("x = 1\nraise ValueError('n = {x}')")) == [2]
+    assert forgotten(ast.parse("x = 1\ny = MeshError('n = {x:g}')")) == [2]
+    assert not forgotten(ast.parse("x = 1\nraise ValueError(f'n = {x}')"))
+
+
+@pytest.mark.parametrize("name", rom.__all__)
+def test_public_names_exist_and_are_documented(name):
+    thing = getattr(rom, name)
+    text = inspect.getdoc(thing) or ""
+    assert len(text) > 20
+    if inspect.isfunction(thing) and inspect.signature(thing).parameters:
+        assert "Args:" in text, f"{name} does not document its arguments"
+
+
+def test_every_error_has_an_exit_code_the_help_explains():
+    """DESIGN of the codes: 1 is ours; everything raised on purpose has another one."""
+    kinds = [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, Exception)]
+    codes = {e.__name__: e.exit_code for e in kinds if hasattr(e, "exit_code")}
+    assert codes.pop("RomError") == 1
+    assert set(codes.values()) == {2, 3, 4, 5, 6, 7}
+    documented = re.findall(r"^ +(\d) ", EXIT_CODES, re.M)
+    assert documented == [str(code) for code in range(8)]
+
+
+@pytest.mark.parametrize(
+    "pattern", [PLACES, HOSTS, UNFINISHED], ids=["places", "hosts", "unfinished"]
+)
+def test_no_file_names_one_machine_or_leaves_a_gap(pattern):
+    bad = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in files()
+        if path != Path(__file__)
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if pattern.search(line)
+    ]
+    assert not bad, "\n".join(bad)
+
+
+def test_the_patterns_above_find_something():
+    assert PLACES.search("open('/home/me/x')") and not PLACES.search("/usr/lib, out/tmp/x")
+    assert HOSTS.search("https://pypi.org/simple") and UNFINISHED.search("# TODO: later")

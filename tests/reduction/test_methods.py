@@ -1,0 +1,200 @@
+"""Every reduction method on both implementations of the operators, against the full model."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, subspace_angles
+
+import rom
+from cases.beam import CANTILEVER, ENDS, hermite_beam
+from cases.operators import KINDS
+from cases.solid import block
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ConfigError, InterfaceError
+from rom.reduction.bases.enhanced import estimated_errors, projected, residual_shapes
+from rom.reduction.bases.fixed_interface import fixed_interface
+
+METHODS = [rom.CraigBampton, rom.EnhancedCraigBampton, rom.Rubin, rom.Herting]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return block(cells=(9, 3, 2), origin=(0.4, 0.1, 0.0))
+
+
+@pytest.fixture(scope="module")
+def exact(model):
+    return eigh(model.K.toarray(), model.M.toarray(), eigvals_only=True)
+
+
+@pytest.fixture(params=KINDS)
+def ops(request, model):
+    return request.param(model)
+
+
+def boundary(model):
+    """Corners of the root and of the tip: enough to hold the block."""
+    ends = [model.interfaces[name].nodes[[0, 2, -1]] for name in ("root", "tip")]
+    return (3 * np.concatenate(ends)[:, None] + np.arange(3)).ravel()
+
+
+def reduced(ops, method, b):
+    basis = method.basis(ops, b, tuple(f"dof {d}" for d in b))
+    K, M = projected(ops, basis.Psi)
+    return eigh(K, M, eigvals_only=True), basis
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_frequencies_fall_towards_the_full_ones_with_every_mode(ops, model, exact, method):
+    b = boundary(model)
+    steps = []
+    for n in (2, 8, 20):
+        lam, basis = reduced(ops, method(n), b)
+        assert_allclose(ops.rows(basis.Psi, b)[:, : b.size], np.eye(b.size), atol=1e-7)
+        assert len(basis.labels) == basis.Psi.shape[1]
+        steps.append(lam[6:14])
+    steps = np.array(steps)
+    assert (steps >= exact[6:14] * (1 - 1e-8)).all()
+    # the space of the enhanced columns is not nested: its errors fall on the whole
+    if method is not rom.EnhancedCraigBampton:
+        assert (np.diff(steps, axis=0) < 1e-8 * steps[1:]).all()
+    assert_allclose(np.sqrt(steps[-1]), np.sqrt(exact[6:14]), rtol=1e-2)
+
+
+@pytest.mark.parametrize("method", [rom.Guyan, rom.CraigBampton, rom.Rubin, rom.Herting])
+def test_rigid_motions_and_statics_of_the_boundary_are_exact(ops, model, method):
+    """The flexibility under loads on the tip, root held, is that of the full model."""
+    b = boundary(model)
+    method = method() if method is rom.Guyan else method(6)
+    basis = method.basis(ops, b, tuple(map(str, b)))
+    K, M = projected(ops, basis.Psi)
+    R = ops.rigid
+    gap = R - basis.Psi @ np.linalg.solve(M, ops.gram(basis.Psi, ops.apply_M(R)))
+    assert np.abs(gap).max() < 1e-8 * np.abs(R).max()
+    held = ops.hold(b[:9])
+    F = np.zeros((ops.n_local, 9))
+    F[b[9:], np.arange(9)] = 1.0
+    full = held(F)[b[9:]]
+    keep = np.arange(9, K.shape[0])
+    static = np.linalg.solve(K[np.ix_(keep, keep)], np.eye(keep.size)[:, :9])[:9]
+    assert_allclose(static, full, rtol=1e-6, atol=1e-9 * np.abs(full).max())
+
+
+@pytest.mark.parametrize(
+    "method",
+    [rom.CraigBampton(10), rom.EnhancedCraigBampton(10), rom.Rubin(8), rom.Herting(8),
+     rom.MomentMatching((0.0, 5.0), 2), rom.BalancedTruncation(10, pool=10),
+     rom.WithLoads(rom.CraigBampton(9), np.eye(14)[:, [5]])],
+    ids=lambda method: type(method).__name__,
+)  # fmt: skip
+def test_all_modes_make_every_basis_the_full_model(method):
+    """A beam of six elements on its ends: four dofs of 14, rigid motions among the free modes."""
+    K, M = hermite_beam(6)
+    lam, basis = reduced(SciPyOperators(K, M), method, np.array([0, 1, 12, 13]))
+    assert basis.Psi.shape == (14, 14)
+    assert_allclose(lam[2:], eigh(K, M, eigvals_only=True)[2:], rtol=1e-8)
+
+
+def boundary_of_faces(model):
+    return np.concatenate([model.interfaces[name].dofs for name in ("root", "tip")])
+
+
+def test_rubin_and_herting_span_one_space():
+    """Inertia relief from the interfaces and residual flexibility describe the same shapes."""
+    model = block(cells=(6, 2, 2))
+    ops = SciPyOperators(model.K, model.M, rigid_motions(model.points))
+    b = boundary(model)
+    spans = [method(5).basis(ops, b, ("",) * b.size).Psi for method in (rom.Rubin, rom.Herting)]
+    scaled = [Psi / np.sqrt(np.einsum("ni,ni->i", Psi, model.M @ Psi)) for Psi in spans]
+    assert subspace_angles(*scaled).max() < 1e-6
+
+
+def test_free_modes_kept_are_exact_and_supports_converge():
+    """Beam on its two end nodes, without geometry: rigid motions are found by their stiffness."""
+    ops = SciPyOperators(*hermite_beam())
+    exact = np.sqrt(eigh(*hermite_beam(), eigvals_only=True)[2:6])
+    for method in (rom.Rubin(4), rom.Herting(4)):
+        lam, basis = reduced(ops, method, np.array(ENDS))
+        assert basis.labels.count("free 1") == 1
+        assert_allclose(np.sqrt(lam[2:6]), exact, rtol=1e-8)
+        K, M = (A[2:, 2:] for A in projected(ops, basis.Psi))
+        assert_allclose(np.sqrt(eigh(K, M, eigvals_only=True)[0]), CANTILEVER, rtol=1e-6)
+
+
+# Cantilever split in two, interface mid and tip node; relative eigenvalue errors of modes 1 to 5
+# with one mode per half: Craig-Bampton, enhanced, and estimate over truth.
+ERRORS = [1.58e-5, 2.765e-3, 7.991e-3, 4.331e-2, 9.320e-1]
+ESTIMATED = [1.000, 1.003, 1.016, 1.069, 1.968]
+
+
+@pytest.fixture(scope="module")
+def cantilever():
+    K, M = (A[2:, 2:] for A in hermite_beam())
+    return SciPyOperators(K, M), np.array([38, 39, 78, 79]), eigh(K, M, eigvals_only=True)[:5]
+
+
+def test_errors_of_craig_bampton_are_estimated_before_the_truth_is_known(cantilever):
+    ops, b, exact = cantilever
+    basis, held = fixed_interface(ops, b, 2), ops.hold(b)
+    shapes = residual_shapes(ops, held, basis.Psi[:, :4], basis.omega, basis.Psi[:, 4:])
+    lam, eta = estimated_errors(ops, basis, shapes, np.zeros(0, dtype=int), 5)
+    assert_allclose(lam / exact - 1, ERRORS, rtol=1e-2)
+    assert_allclose(eta / (lam / exact - 1), ESTIMATED, atol=2e-3)
+
+
+def test_enhanced_columns_are_orders_better_at_the_same_size(cantilever):
+    ops, b, exact = cantilever
+    for n, bounds in ((2, [1e-8, 5e-8, 1e-6, 5e-4, 2e-2]), (4, [1e-8] * 3 + [5.5e-6, 1.8e-5])):
+        lam, basis = reduced(ops, rom.EnhancedCraigBampton(n), b)
+        assert basis.Psi.shape[1] == 4 + n
+        assert (np.abs(lam[:5] / exact - 1) < bounds).all()
+
+
+def certificate(method):
+    model = block(cells=(9, 2, 2))
+    kinds = {"root": "rbe2", "tip": "rbe3"}
+    return rom.reduce(model, method=method(25), interfaces=kinds, reference="root").certificate
+
+
+@pytest.mark.parametrize("method", [rom.CraigBampton, rom.Rubin, rom.Herting])
+def test_every_method_makes_a_body_with_a_certificate(method):
+    assert certificate(method).ok, certificate(method)
+
+
+def test_the_certificate_says_that_enhanced_columns_give_up_statics():
+    failed = [row.quantity for row in certificate(rom.EnhancedCraigBampton).failures]
+    assert "root held: static flexibility of the interfaces" in failed
+    assert not any(name.startswith("free") for name in failed)
+
+
+@pytest.mark.parametrize(
+    ("method", "b", "error", "words"),
+    [
+        (rom.Rubin(3), [], ConfigError, "none is given"),
+        (rom.Herting(3), [], ConfigError, "none is given"),
+        (rom.EnhancedCraigBampton(3), [], ConfigError, "none is given"),
+        (rom.Rubin(3), [0, 1, 2], InterfaceError, "leave a rigid motion free"),
+        (rom.Rubin(3), [0, 1, 2, 3, 4, 5], InterfaceError, "leave a rigid motion free"),
+        (rom.Rubin(10_000), list(range(12)), ConfigError, "n_modes = 10000"),
+    ],
+)
+def test_messages_for_wrong_boundaries(model, method, b, error, words):
+    ops = SciPyOperators(model.K, model.M, rigid_motions(model.points))
+    with pytest.raises(error, match=words):
+        method.basis(ops, np.array(b, dtype=int), tuple(map(str, b)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("n", [-1, 1.5, True])
+def test_messages_for_wrong_numbers_of_modes(method, n):
+    with pytest.raises(ConfigError, match=r"n_modes = .* must be a whole number"):
+        method(n)
+
+
+def test_modes_that_spend_the_flexibility_of_the_interface_are_refused():
+    model = block(cells=(3, 1, 1))
+    ops = SciPyOperators(model.K, model.M, rigid_motions(model.points))
+    b = boundary_of_faces(model)
+    with pytest.raises(InterfaceError, match="residual flexibility of the 24 boundary dofs"):
+        rom.Rubin(model.n_dofs - 6).basis(ops, b, ("",) * 24)

@@ -1,0 +1,105 @@
+"""Every method on beam, connecting rod and blade, by PETSc and by SciPy, against the full model."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.paths import ROOT
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tetrahedra")]
+
+MESHES = ROOT / "meshes"
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+TITANIUM = rom.Material(E=114e9, nu=0.33, rho=4430.0)
+HEX = {"hex": 1, "nx": 12, "ny": 1, "nz": 1}
+COMPONENTS = {  # material, parameters, degree, interfaces
+    "beam": (STEEL, HEX, 2, ("root", "tip")),
+    "connecting_rod": (STEEL, {"lc": 0.009}, 1, ("pin_a", "pin_b")),
+    "compressor_blade": (TITANIUM, {"lc": 0.012, "lc_flank": 0.005}, 1,
+                         ("flank_left", "flank_right")),
+}  # fmt: skip
+METHODS = {  # what reduces, given a number of modes; kind of the second interface
+    "Guyan": (lambda _: rom.Guyan(), "rbe2"),
+    "Craig-Bampton": (rom.CraigBampton, "rbe2"),
+    "averaged": (rom.CraigBampton, "rbe3"),
+    "polynomials": (rom.CraigBampton, rom.Polynomial(2)),
+    "enhanced": (rom.EnhancedCraigBampton, "rbe2"),
+    "Rubin": (rom.Rubin, "rbe2"),
+    "Herting": (rom.Herting, "rbe2"),
+    "free-free": (rom.FreeFree, "rbe2"),
+    "moments": (lambda n: rom.MomentMatching((0.0,), 1 + n // 8), "rbe2"),
+    "balanced": (lambda n: rom.BalancedTruncation(n, pool=40), "rbe2"),
+    "loads": (lambda n: rom.WithLoads(rom.CraigBampton(n)), "rbe2"),
+    "characteristic": (lambda n: rom.Characteristic(rom.CraigBampton(n), 12), "full"),
+    "Rubin coupled": ("rubin", "rbe2"),
+    "MacNeal coupled": ("macneal", "rbe2"),
+    "dual coupled": ("dual", "rbe2"),
+}
+WORST = {  # relative error of six frequencies with sixteen modes, on all components
+    "Guyan": 30.0, "Craig-Bampton": 4e-3, "averaged": 4e-3, "polynomials": 4e-3,
+    "enhanced": 1e-6, "Rubin": 1e-8, "Herting": 1e-8, "free-free": 1e-8, "moments": 1e-2,
+    "balanced": 2e-2, "loads": 3e-3, "characteristic": 4e-3,
+    "Rubin coupled": 3e-5, "MacNeal coupled": 2e-3, "dual coupled": 5e-5,
+}  # fmt: skip
+HELD = ("Rubin coupled", "MacNeal coupled", "dual coupled")  # compared with one interface held
+FEW, MANY = 6, 16
+
+
+@cache
+def component(name):
+    material, parameters, degree, _ = COMPONENTS[name]
+    geometry = MESHES / f"{name}.geo"
+    return rom.fe.model(geometry, material=material, parameters=parameters, degree=degree)
+
+
+def given(name, implementation):
+    """The matrices with PETSc's operators, or alone as a user of SciPy would bring them."""
+    model = component(name)
+    return model if implementation == "petsc" else replace(model, operators=None)
+
+
+def kinds(name, method):
+    first, second = COMPONENTS[name][3]
+    return {first: "rbe2", second: METHODS[method][1]}
+
+
+@cache
+def exact(name, method):
+    fixed = COMPONENTS[name][3][:1] if method in HELD else ()
+    found = rom.modes(component(name), 12, fixed=fixed, interfaces=kinds(name, method))
+    return found.frequencies[0 if fixed else 6 :][:6]
+
+
+@cache
+def reduced(name, method, implementation, n_modes):
+    made, model = METHODS[method][0], given(name, implementation)
+    if method in HELD:
+        free = rom.substructure(model, n_modes=n_modes, interfaces=kinds(name, method))
+        held = (("body", COMPONENTS[name][3][0]),)
+        return rom.DualAssembly({"body": free}, ()).frequencies(6, kind=made, fixed=held)
+    body = rom.reduce(model, method=made(n_modes), interfaces=kinds(name, method), certify=False)
+    return body.frequencies(12)[6:]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_frequencies_lie_above_the_full_ones_and_fall_towards_them(name, method):
+    few, many = (reduced(name, method, "petsc", n) / exact(name, method) - 1 for n in (FEW, MANY))
+    assert np.abs(many).max() < WORST[method]
+    if method != "MacNeal coupled":  # it leaves residual mass out: no Galerkin projection
+        assert min(few.min(), many.min()) > -1e-8
+    if method != "Guyan":
+        assert np.abs(many).max() <= max(np.abs(few).max(), 1e-8)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_scipy_and_petsc_reduce_alike(name, method):
+    """Blocks of a Krylov sequence are nearly dependent: their span has more of the round-off."""
+    ours, theirs = (reduced(name, method, kind, MANY) for kind in ("petsc", "scipy"))
+    assert_allclose(ours, theirs, rtol=1e-8 if method == "moments" else 1e-9)

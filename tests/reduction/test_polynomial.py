@@ -1,0 +1,170 @@
+"""Interface functions chosen before anything is solved."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import diags
+
+import rom
+from cases.solid import block
+from cases.surfaces import TURN, surface
+from rom.eigen.scipy import HeldSciPy
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Interface
+from rom.reduction.interfaces.connection import connect
+from rom.reduction.interfaces.kinds import tie
+from rom.reduction.interfaces.polynomial import cylinder_coordinates, interface_functions
+from rom.workflow import operators
+
+
+@pytest.mark.parametrize(
+    ("name", "ranks"),
+    [
+        ("plane", [3, 6, 10, 15]),
+        ("strip", [3, 6, 10, 15]),
+        ("cylinder", [4, 9, 16, 25]),
+        ("sphere", [4, 9, 16, 25]),
+        ("wave", [4, 10, 20, 35]),
+    ],
+)
+def test_number_of_functions_is_the_rank_of_the_polynomials_on_the_surface(name, ranks):
+    """(p+1)(p+2)/2 on planes, (p+1)^2 on quadrics, (p+1)(p+2)(p+3)/6 elsewhere."""
+    interface = surface(name)
+    for order, rank in enumerate(ranks, start=1):
+        assert interface_functions(rom.Polynomial(order), interface).shape[1] == rank
+
+
+KINDS = [rom.Polynomial(1), rom.Polynomial(5), rom.FourierLegendre(3, 2)]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=str)
+def test_functions_are_orthonormal_over_the_area_and_move_rigidly(kind):
+    interface = surface("cylinder")
+    Q, S = interface_functions(kind, interface), interface.surface_mass
+    assert_allclose(Q.T @ (S @ Q), np.eye(Q.shape[1]), atol=1e-13)
+    R = rigid_motions(interface.points).reshape(-1, 3, 6)
+    left = R - np.einsum("kj,jax->kax", Q, np.einsum("kj,kax->jax", S @ Q, R))
+    assert np.abs(left).max() < 1e-13 * np.abs(R).max()
+
+
+def test_bases_of_growing_order_are_nested():
+    interface = surface("wave")
+    low, high = (interface_functions(rom.Polynomial(p), interface) for p in (2, 4))
+    assert_allclose(low, high[:, : low.shape[1]], atol=1e-12)
+
+
+def test_the_angle_runs_around_the_axis_of_a_bore():
+    angle, height = np.meshgrid(2 * np.pi * np.arange(24) / 24, [0.0, 0.1, 0.2, 0.3])
+    x = 0.1 * np.column_stack([np.cos(angle.ravel()), np.sin(angle.ravel()), 0 * angle.ravel()])
+    x[:, 2] = height.ravel()
+    S = diags(np.ones(96)).tocsr()
+    bore = Interface("bore", np.arange(96), x @ TURN.T, S, np.zeros(3))
+    theta, zeta = cylinder_coordinates(bore)
+    turned = np.exp(1j * (theta - angle.ravel())), np.exp(1j * (theta + angle.ravel()))
+    assert min(np.abs(t - t[0]).max() for t in turned) < 1e-9
+    assert_allclose(np.abs(zeta), np.abs(2 * height.ravel() / 0.3 - 1), atol=1e-9)
+
+
+def test_two_bodies_around_one_bore_choose_the_same_functions():
+    """Where two directions lie equally far from the axis, round-off must not choose."""
+    angle, height = np.meshgrid(2 * np.pi * (np.arange(24) + 0.3) / 24, [0.0, 0.1, 0.2, 0.3])
+    ring = [np.cos(angle.ravel()), np.sin(angle.ravel()), 10 * height.ravel()]
+    S, found = diags(np.ones(96)).tocsr(), []
+    for seed in range(6):
+        x = 0.1 * np.column_stack(ring) + np.random.default_rng(seed).normal(size=(96, 3)) * 1e-15
+        bore = Interface("bore", np.arange(96), x, S, np.zeros(3))
+        found.append(interface_functions(rom.FourierLegendre(2, 1), bore))
+    for Q in found[1:]:
+        assert_allclose(Q, found[0], atol=1e-9 * np.abs(Q).max())
+
+
+def frequencies(model, kind, n=6, m=15):
+    body = rom.reduce(
+        model,
+        method=rom.CraigBampton(m),
+        interfaces={"root": kind, "tip": kind},
+        reference="mean-axis",
+        certify=False,
+    )
+    return body.frequencies(6 + n)[6:]
+
+
+def test_frequencies_fall_with_the_order_towards_the_full_interface():
+    model = block(cells=(6, 3, 3))
+    full = frequencies(model, "full")
+    steps = np.array([frequencies(model, rom.Polynomial(p)) for p in (1, 2, 3, 6)])
+    assert (np.diff(steps, axis=0) < 1e-9 * full).all()
+    assert (steps[0] > full * (1 + 1e-4)).any()
+    assert (steps >= full * (1 - 1e-9)).all()
+    # 16 nodes of a face are all told apart by polynomials of degree 3 + 3
+    assert_allclose(steps[-1], full, rtol=1e-9)
+
+
+def test_only_as_many_solutions_as_functions_are_computed(monkeypatch):
+    model, solved = block(cells=(4, 4, 4)), []
+    solve = HeldSciPy.__call__
+
+    def counted(self, F):
+        solved.append(F.shape[1])
+        return solve(self, F)
+
+    monkeypatch.setattr(HeldSciPy, "__call__", counted)
+    ops = operators(model)
+    connection = connect(ops, model, {"root": rom.Polynomial(1), "tip": rom.Polynomial(2)})
+    assert connection.boundary.size == 3 * (3 + 6)
+    rom.CraigBampton(4).basis(connection.ops, connection.boundary, connection.labels)
+    assert sum(solved) <= 27
+    assert model.interfaces["root"].dofs.size == 75
+
+
+@pytest.mark.parametrize("kind", ["polynomial:2", rom.FourierLegendre(2, 1)], ids=str)
+def test_the_certificate_holds_and_interfaces_can_be_held(kind):
+    model = block(cells=(6, 3, 3))
+    kinds = {"root": kind, "tip": "rbe2"}
+    body = rom.reduce(model, method=rom.CraigBampton(25), interfaces=kinds, reference="root")
+    assert body.certificate.ok, body.certificate
+    full = rom.modes(model, 4, fixed=("root",), interfaces=kinds).frequencies
+    assert_allclose(body.frequencies(4, fixed=("root",)), full, rtol=1e-3)
+    assert body.markers["root"].kind in ("polynomial:2", "fourier:2,1")
+    assert_allclose(body.markers["root"].translation, 0, atol=1e-9)
+
+
+def test_text_and_record_name_the_same_kind():
+    interface = surface("plane")
+    assert tie(interface, "polynomial:3").label == tie(interface, rom.Polynomial(3)).label
+    one, other = tie(interface, "fourier:3,0"), tie(interface, rom.FourierLegendre(3, 0))
+    assert_allclose(one.by_masters, other.by_masters)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: rom.Polynomial(0), "ball joint"),
+        (lambda: rom.Polynomial(1.5), r"order = 1\.5"),
+        (lambda: rom.Polynomial(True), "order = True"),
+        (lambda: rom.FourierLegendre(0, 1), "harmonics = 0"),
+        (lambda: rom.FourierLegendre(1, -1), "order = -1"),
+        (lambda: tie(surface("plane"), "polynomial"), "on 'plane' is open"),
+        (lambda: tie(surface("plane"), "polynomial:x"), "known kinds"),
+        (lambda: tie(surface("plane"), "fourier:2"), "known kinds"),
+        (lambda: tie(surface("plane"), "polynomial:0"), "ball joint"),
+    ],
+)
+def test_messages_for_wrong_kinds(make, words):
+    with pytest.raises(ConfigError, match=words):
+        make()
+
+
+def test_messages_for_surfaces_that_cannot_carry_the_functions():
+    with pytest.raises(InterfaceError, match=r"'line' lie on a line"):
+        tie(surface("line"), "polynomial:2")
+    with pytest.raises(InterfaceError, match="'sphere' has no axis"):
+        tie(even_sphere(), "fourier:2,2")
+
+
+def even_sphere():
+    """The twelve corners of an icosahedron."""
+    g = (1 + np.sqrt(5)) / 2
+    x = [np.roll([0, a, b * g], k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
+    return Interface("sphere", np.arange(12), np.array(x), diags(np.ones(12)).tocsr(), np.zeros(3))

@@ -1,0 +1,123 @@
+"""The number of modes for a band and an accuracy."""
+
+import numpy as np
+import pytest
+
+import rom
+from cases.solid import block
+from rom.errors import ConfigError
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+BODIES = [  # size [m], cells
+    ((1.0, 0.1, 0.08), (10, 2, 2)),
+    ((1.0, 0.3, 0.05), (10, 4, 2)),
+    ((0.3, 0.3, 0.3), (4, 4, 4)),
+    ((1.0, 0.05, 0.05), (16, 1, 1)),
+    ((0.6, 0.4, 0.02), (8, 6, 1)),
+    ((0.2, 0.5, 0.1), (3, 6, 2)),
+    ((0.5, 0.02, 0.01), (14, 2, 1)),
+    ((2.0, 0.5, 0.5), (9, 3, 3)),
+    ((0.4, 0.2, 0.2), (6, 3, 3)),
+    ((0.1, 0.1, 0.4), (3, 3, 7)),
+]
+
+
+def worst_error(model, exact, n_modes):
+    """Largest relative error of the frequencies in the band; one when some are missing."""
+    method = rom.CraigBampton(n_modes)
+    body = rom.reduce(model, method=method, interfaces=KINDS, certify=False)
+    found = body.frequencies()[6 : 6 + exact.size]
+    return np.abs(found / exact - 1).max() if found.size == exact.size else 1.0
+
+
+@pytest.mark.parametrize(("size", "cells"), BODIES)
+@pytest.mark.parametrize(("count", "tol"), [(6, 1e-3), (10, 1e-2), (12, 1e-4)])
+def test_band_and_tolerance_are_met_with_few_modes(size, cells, count, tol):
+    """Accurate against the full model, and two thirds of the modes would not be."""
+    model = block(size=size, cells=cells)
+    exact = rom.modes(model, 6 + count, interfaces=KINDS).frequencies[6:]
+    method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=tol)
+    body = rom.reduce(model, method=method, interfaces=KINDS, certify=False)
+    n = body.n_modes - 6
+    assert worst_error(model, exact, n) <= tol
+    assert worst_error(model, exact, int(n / 1.5) - 1) > tol
+
+
+@pytest.mark.fenicsx
+def test_the_selection_works_on_meshes_too():
+    """PETSc operators, rbe3 and orthogonal functions as interfaces."""
+    pytest.importorskip("dolfinx", reason="needs finite elements")
+    from cases.boxes import box
+    from rom.fe.elasticity import assemble
+
+    mesh, tags = box((1.0, 0.1, 0.08), (10, 2, 2))
+    model = assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    kinds = {"x0": "rbe3", "x1": "polynomial:1"}
+    exact = rom.modes(model, 12, interfaces=kinds).frequencies[6:]
+    method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=1e-3)
+    body = rom.reduce(model, method=method, interfaces=kinds)
+    assert np.abs(body.frequencies(12)[6:] / exact - 1).max() <= 1e-3
+    assert body.n_modes < 60
+
+
+@pytest.mark.fenicsx
+def test_the_order_is_chosen_on_meshes_too():
+    """Beside an averaging interface, which PETSc has to project."""
+    pytest.importorskip("dolfinx", reason="needs finite elements")
+    from cases.boxes import box
+    from rom.fe.elasticity import assemble
+
+    mesh, tags = box((0.3, 0.2, 0.1), (4, 3, 2))
+    model = assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    kinds = {"x0": "rbe3", "x1": rom.Polynomial()}
+    exact = rom.modes(model, 12, interfaces={"x0": "rbe3"}).frequencies[6:]
+    method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=1e-3)
+    error, body = surface_error(model, kinds, exact, method)
+    assert error <= 1e-3
+    assert body.marker("x1").kind in ("polynomial:2", "polynomial:3", "polynomial:4")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tol": 1e-3}, "either n_modes or f_max"),
+        ({"n_modes": 3, "tol": 1e-3}, "needs f_max"),
+        ({"f_max": 1e3, "tol": 0.0}, "tol = 0.0"),
+        ({"f_max": 1e3, "tol": 1.0}, "tol = 1.0"),
+        ({"f_max": 1e3, "tol": float("nan")}, "tol = nan"),
+    ],
+)
+def test_messages_for_wrong_tolerances(options, words):
+    with pytest.raises(ConfigError, match=words):
+        rom.CraigBampton(**options)
+
+
+def surface_error(model, kinds, exact, method):
+    body = rom.reduce(model, method=method, interfaces=kinds, certify=False)
+    found = body.frequencies()[6 : 6 + exact.size]
+    return np.abs(found / exact - 1).max(), body
+
+
+@pytest.mark.parametrize("tol", [3e-2, 3e-3])
+@pytest.mark.parametrize(("size", "cells"), BODIES)
+def test_the_order_of_a_surface_is_the_lowest_that_meets_the_tolerance(size, cells, tol):
+    """Against the model whose tip keeps all its dofs; two orders less would not do."""
+    model = block(size=size, cells=cells)
+    exact = rom.modes(model, 12, interfaces={"root": "rbe2"}).frequencies[6:]
+    method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=tol)
+    error, body = surface_error(model, {"root": "rbe2", "tip": "polynomial"}, exact, method)
+    assert error <= tol
+    order = int(body.marker("tip").kind.split(":")[1])
+    if order > 2:
+        kinds = {"root": "rbe2", "tip": rom.Polynomial(order - 2)}
+        assert surface_error(model, kinds, exact, rom.CraigBampton(60))[0] > tol
+
+
+def test_an_open_order_needs_an_accuracy():
+    model = block(cells=(4, 2, 2))
+    kinds = {"root": "rbe2", "tip": rom.Polynomial()}
+    for method in (rom.CraigBampton(5), rom.CraigBampton(f_max=1e3), rom.Rubin(5)):
+        with pytest.raises(ConfigError, match="states no accuracy"):
+            rom.reduce(model, method=method, interfaces=kinds)
+    with pytest.raises(ConfigError, match="is open"):
+        rom.modes(model, 8, interfaces=kinds)

@@ -1,0 +1,359 @@
+"""Pictures show what they should: read back pixel by pixel."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pyvista = pytest.importorskip("pyvista", reason="pictures need pyvista")
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+from dataclasses import replace  # noqa: E402
+
+from PIL import Image  # noqa: E402
+
+from cases.mbs.mechanisms import lattice, lattice_body  # noqa: E402
+from rom import view  # noqa: E402
+from rom.body.flexible import Surface  # noqa: E402
+from rom.errors import ConfigError, InterfaceError  # noqa: E402
+from rom.mbs.analysis.campbell import Campbell  # noqa: E402
+from rom.mbs.integrate.simulation import simulate  # noqa: E402
+from rom.mbs.mechanism import Mechanism  # noqa: E402
+from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
+from rom.view.canvas.offscreen import render  # noqa: E402
+from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
+from rom.view.scenes.film import _stage  # noqa: E402
+
+
+def pixels(path, frame=0):
+    picture = Image.open(path)
+    picture.seek(frame)
+    return np.asarray(picture.convert("RGB")).astype(int)
+
+
+def colourful(image):
+    """Pixels of the colour map: neither grey nor ink."""
+    return np.ptp(image, axis=2) > 60
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """A lattice bar along x with a surface of its nodes, free, five sections."""
+    data = lattice(stiffness=4e5)
+    body = lattice_body(data)
+    x = data[0]
+    triangles = [
+        (3 * s + a, 3 * s + (a + 1) % 3, 3 * s + 3 + a) for s in range(4) for a in range(3)
+    ] + [(3 * s + 3 + a, 3 * s + (a + 1) % 3, 3 * s + 3 + (a + 1) % 3)
+         for s in range(4) for a in range(3)]  # fmt: skip
+    shape = np.vstack([body.markers[f"n{i}"].translation for i in range(len(x))])
+    return replace(body, surface=Surface(x, np.array(triangles), shape))
+
+
+def swinging(bar):
+    mech = Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("bar", bar, omega=(0, 0, 30.0))
+    mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0.6, 0))
+    mech.spherical("tie", mech.ground.marker((0, 0, 0.15)), part.marker("n7"))
+    return mech, simulate(mech, t_end=0.1, dt=1e-3)
+
+
+def test_a_scene_is_drawn_to_scale_and_the_right_way_up():
+    """A unit square at the upper right of a 4 by 2 window, seen along z."""
+    square = np.array([[1.0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0]])
+    actor = Actor(square[None], np.array([[0, 1, 2], [0, 2, 3]]), colour="#ff0000")
+    camera = Camera(np.zeros(3), np.array([0, 0, 1.0]), np.array([0, 1.0, 0]), 2.0, (400, 200))
+    image = render([actor], camera)[0].astype(int)
+    rows, columns = np.nonzero(image[..., 0] - image[..., 1] > 80)
+    assert image.shape == (200, 400, 3)
+    np.testing.assert_allclose([rows.min(), rows.max() + 1], [0, 100], atol=2)
+    np.testing.assert_allclose([columns.min(), columns.max() + 1], [300, 400], atol=2)
+
+
+def test_an_update_is_drawn_with_its_changes(tmp_path):
+    """The bar of a change of 40 % ends where the axis says; wrong lengths are refused."""
+    f = np.linspace(1.0, 9.0, 50)
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 1]])
+    beams = np.array([[0, 1], [1, 2], [0, 3]])
+    more = {
+        "changes": {"stiffness": (0.4, 0.38, 0.02), "mass": (-0.1, -0.1, 0.01)},
+        "structure": (points, beams, points, points[:1]),
+        "label": "displacement per force [m/N]", "title": "update", "caption": "words",
+    }  # fmt: skip
+    curves = {"test": 1 / (30 - f**2 + 0.1j), "before": 1 / (20 - f**2 + 0.1j)}
+    image = pixels(view.updating(f, curves, path=tmp_path / "u.png", **more))
+    assert colourful(image).sum() > 1000
+    bars = (image == (213, 218, 225)).all(axis=2).sum(axis=1)
+    middle = int(np.flatnonzero(bars > 60).mean())
+    assert bars[:middle].max() == pytest.approx(4 * bars[middle:].max(), rel=0.03)
+    with pytest.raises(ConfigError, match="7 values for 50"):
+        view.updating(f, {"test": f[:7]}, path=tmp_path / "u.png", **more)
+
+
+def squeezed(amount):
+    """Two triangles of a unit square made narrower, coloured by the amount."""
+    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    now = points * (1 - amount, 1 + amount)
+    return view.Shape("square", now, triangles, points, np.array([amount, 0.0]), "strain")
+
+
+def test_a_plane_body_is_drawn_beside_its_curves(tmp_path):
+    more = {"limit": ("exact", 1.0), "xlabel": "size", "ylabel": "answer", "title": "t"}
+    curves = {"coarse": ([1, 2, 4], [0.2, 0.7, 0.9])}
+    path = view.deformed(curves, [squeezed(0.5)], tmp_path / "s.png", caption="words", **more)
+    image = pixels(path)
+    yellow = (image[..., 0] > 240) & (image[..., 1] > 220) & (image[..., 2] < 60)
+    rows, columns = np.nonzero(yellow[:550])
+    assert np.ptp(rows) == pytest.approx(3 * np.ptp(columns), rel=0.05)  # 1.5 high, 0.5 wide
+    with pytest.raises(ConfigError, match="4 shapes"):
+        view.deformed(curves, [squeezed(0.1)] * 4, tmp_path / "s.png", caption="", **more)
+
+
+def test_a_film_of_a_plane_body_keeps_its_frame_and_colours(tmp_path):
+    shapes = [squeezed(a) for a in (0.0, 0.25, 0.5)]
+    path = view.flow(np.array([0.0, 1e-6, 2e-6]), shapes, tmp_path / "s.gif", caption="words")
+    sizes = [int(colourful(pixels(path, frame)[:740]).sum()) for frame in range(3)]
+    assert sizes[0] > sizes[1] > sizes[2]  # the area is 1 - amount^2
+    assert sizes[2] == pytest.approx(0.75 * sizes[0], rel=0.1)
+    with pytest.raises(ConfigError, match="2 times for 3"):
+        view.flow(np.zeros(2), shapes, tmp_path / "s.gif", caption="")
+
+
+def test_the_camera_sees_everything():
+    rng = np.random.default_rng(5)
+    points = rng.normal(size=(50, 3)) * (3.0, 1.0, 0.2)
+    camera = aimed(points, 600, heights=(0.1, 2.0))
+    right = np.cross(camera.up, camera.toward)
+    seen = (points - camera.focus) @ np.column_stack([right, camera.up])
+    half = 0.5 * camera.height * np.array([camera.size[0] / camera.size[1], 1.0])
+    assert (np.abs(seen) < half).all()
+    assert (np.abs(seen).max(axis=0) > 0.8 * half).any()
+
+
+def test_edges_of_a_box_are_its_twelve():
+    points, triangles = view.box((1, 2, 3))
+    edges = sharp_edges(points, triangles)
+    lengths = np.sort(np.linalg.norm(np.diff(points[edges], axis=1)[:, 0], axis=1))
+    np.testing.assert_allclose(lengths, [1] * 4 + [2] * 4 + [3] * 4)
+
+
+@pytest.mark.parametrize(
+    ("solid", "volume"),
+    [
+        (view.box((1, 2, 3), (5, 5, 5)), 6.0),
+        (view.cylinder((0, 1, 0), (0, 3, 0), 2.0, sides=2000), 2 * np.pi),
+    ],
+)
+def test_solids_are_closed_and_face_outwards(solid, volume):
+    points, triangles = solid
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    assert np.einsum("ti,ti->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=1e-5)
+
+
+def test_mode_shapes_fill_one_panel_each(bar, tmp_path):
+    view.mode_shapes(bar, tmp_path / "modes.png", n=4)
+    image = pixels(tmp_path / "modes.png")
+    h, w = image.shape[:2]
+    for half in (image[: h // 2, : w // 2], image[: h // 2, w // 2 :]):
+        assert colourful(half).mean() > 0.01
+
+
+def test_the_colours_of_a_mesh_are_those_of_its_interfaces(tmp_path):
+    points, triangles = view.box((2, 1, 1))
+    right = np.flatnonzero(points[:, 0] > 0)
+    face = Interface("tip", right, points[right], None, points[right].mean(axis=0))
+    model = FEModel(None, None, points, {"tip": face}, surface=SurfaceMesh(np.arange(8), triangles))
+    view.mesh(model, tmp_path / "box.png", view=(1, 0.2, 0.3), up=(0, 0, 1))
+    red = pixels(tmp_path / "box.png")
+    assert ((red[..., 0] - red[..., 1]) > 80).mean() > 0.1
+    view.mesh(model, tmp_path / "box.png", view=(-1, 0.2, 0.3), up=(0, 0, 1))
+    red = pixels(tmp_path / "box.png")
+    assert ((red[..., 0] - red[..., 1]) > 80).mean() < 0.01
+
+
+def test_a_film_moves_and_loops(bar, tmp_path):
+    mech, sol = swinging(bar)
+    view.animate(mech, sol, tmp_path / "film.gif", frames=5, seconds=1.0, magnify=10.0)
+    film = Image.open(tmp_path / "film.gif")
+    assert film.n_frames == 5
+    assert film.info["duration"] == 200
+    assert film.info["loop"] == 0
+    masks = [colourful(pixels(tmp_path / "film.gif", k)) for k in range(5)]
+    assert masks[4].mean() > 0.01
+    assert (masks[0] != masks[2]).mean() > 0.01
+
+
+def test_bodies_are_drawn_where_they_are(bar):
+    """The surface node under a marker is at the marker, deformed and turned, at any instant."""
+    mech, sol = swinging(bar)
+    stage = _stage(mech, sol, np.array([0, 40, 100]), {"ball": view.box((0.1, 0.1, 0.1))}, 1.0)
+    wanted = sol.position("bar", "n7")[[0, 40, 100]]
+    np.testing.assert_allclose(stage.actors[0].points[:, 7], wanted, atol=1e-12)
+    centre = stage.actors[2].points.mean(axis=1)
+    np.testing.assert_allclose(centre, sol.position("ball")[[0, 40, 100]], atol=1e-12)
+    u = sol.elastic("bar")[[0, 40, 100]] @ bar.markers["n7"].translation.T
+    scale = {"m": 1.0, "mm": 1e3, "um": 1e6, "nm": 1e9}[stage.unit]
+    size = scale * np.linalg.norm(u, axis=1)
+    np.testing.assert_allclose(stage.actors[0].values[:, 7], size, atol=1e-9 * size.max())
+
+
+def test_instants_are_drawn_side_by_side(bar, tmp_path):
+    mech, sol = swinging(bar)
+    shapes = {"ball": view.box((0.1, 0.1, 0.1))}
+    view.instants(mech, sol, tmp_path / "two.png", times=[0.05, 0.1], shapes=shapes)
+    image = colourful(pixels(tmp_path / "two.png"))
+    assert image[:, : image.shape[1] // 2].any()
+    assert image[:, image.shape[1] // 2 :].any()
+
+
+def test_histories_show_every_curve(tmp_path):
+    t = np.linspace(0, 2, 50)
+    panels = [("angle [rad]", {"one": np.sin(t), "two": np.cos(t)}), ("force [N]", {"": t})]
+    panels[0][1]["points"] = ([0.5, 1.5], [0.5, -0.5])
+    view.history(t, panels, tmp_path / "h.png", title="Title", caption="Words.")
+    image = pixels(tmp_path / "h.png")
+    for colour, least in (((0x2F, 0x7F, 0x9F), 300), ((0xD1, 0x49, 0x5B), 300),
+                          ((0xED, 0xAE, 0x49), 60)):  # fmt: skip
+        assert (np.abs(image - colour).max(axis=2) < 12).sum() > least
+
+
+def test_errors_of_frequencies_are_drawn_per_support(tmp_path):
+    table = {"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}
+    view.frequencies(table, tmp_path / "f.png", title="Title")
+    assert (np.abs(pixels(tmp_path / "f.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12).sum() > 100
+
+
+def test_wrong_requests_are_refused(bar, tmp_path):
+    mech, sol = swinging(bar)
+    with pytest.raises(ConfigError, match=r"ending '.jpg'"):
+        view.mode_shapes(bar, tmp_path / "modes.jpg")
+    with pytest.raises(ConfigError, match="does not exist"):
+        view.animate(mech, sol, tmp_path / "nowhere" / "film.gif")
+    with pytest.raises(ConfigError, match="no body 'boll'"):
+        view.animate(mech, sol, tmp_path / "film.gif", shapes={"boll": view.box((1, 1, 1))})
+    with pytest.raises(ConfigError, match="no surface"):
+        view.mode_shapes(replace(bar, surface=None), tmp_path / "modes.png")
+    with pytest.raises(InterfaceError, match="no interface 'tip'"):
+        view.mode_shapes(bar, tmp_path / "modes.png", fixed=("tip",))
+    with pytest.raises(ConfigError, match="no two directions"):
+        view.mode_shapes(bar, tmp_path / "modes.png", view=(0, 0, 1), up=(0, 0, 2))
+    with pytest.raises(ConfigError, match="'one' has 3 values for 2 times"):
+        view.history([0, 1], [("x", {"one": [1, 2, 3]})], tmp_path / "h.png", title="", caption="")
+    assert not list(tmp_path.iterdir())
+
+
+def test_vtk_stays_in_the_process_that_draws():
+    """VTK and dolfinx in one process may abort."""
+    script = (
+        "import sys, numpy as np; from rom.view.canvas.offscreen import render; "
+        "from rom.view.canvas.scene import Actor, Camera; "
+        "camera = Camera(np.zeros(3), np.eye(3)[2], np.eye(3)[1], 2.0, (40, 20)); "
+        "actor = Actor(np.eye(3)[None], np.array([[0, 1, 2]])); "
+        "assert render([actor], camera).shape == (1, 20, 40, 3); "
+        "assert not {'vtkmodules', 'pyvista', 'dolfinx'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    script = "import sys, rom.view.canvas.draw, pyvista; assert 'dolfinx' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(ConfigError, match="ended with code 1"):
+        view.mode_shapes(bar, tmp_path / "modes.png", n=1)
+
+
+def test_values_within_two_decades_have_ticks_at_one_two_five():
+    from matplotlib.figure import Figure
+
+    from rom.view.figures.curves import _near_ticks
+
+    axes = Figure().subplots()
+    axes.loglog([1, 10], [2.5, 40])
+    axes.set_ylim(2.5, 40)
+    _near_ticks(axes)
+    assert list(axes.get_yticks()) == [5, 10, 20]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["5", "10", "20"]
+    axes.set_ylim(1e-3, 1)
+    before = list(axes.get_yticks())
+    _near_ticks(axes)
+    assert list(axes.get_yticks()) == before
+
+
+def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
+    curves = {"one": ([1, 2, 4], [1e-1, 1e-2, 0.0]), "two": ([1, 2, 4], [1e-2, 1e-3, 1e-4])}
+    look = {"xlabel": "modes", "title": "Title", "caption": "Words."}
+    view.convergence([("error", curves)] * 2, tmp_path / "c.png", **look)
+    image = pixels(tmp_path / "c.png")
+    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):
+        assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
+    with pytest.raises(ConfigError, match="'x' has 1 errors for 2 sizes"):
+        view.convergence([("error", {"x": ([1, 2], [1.0])})], tmp_path / "d.png", **look)
+
+
+def test_a_panel_may_have_logarithmic_scales():
+    from rom.view.canvas import page
+    from rom.view.figures.panels import _draw
+
+    line = view.Panel(
+        "Cost", "links", "time [ms]", curves={"one": ([1, 1000], [0.1, 100])}, log=True
+    )
+    with page.styled():
+        axes = page.area(page.sheet(400, 300), 50, 50, 300, 200)
+        _draw(axes, line, (300, 200))
+        assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+        assert axes.get_xlim()[0] < 1 and axes.get_xlim()[1] > 1000
+
+
+def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
+    x = np.linspace(0, 1, 9)
+    path = view.Panel("Path", "x [m]", "y [m]", {"one": (x, x)}, {"seen": (x, 1 - x)}, equal=True)
+    bars = view.Panel("Bars", "change [%]", bars={"first": (-2.0, 3.0), "second": (-1.0, 1.0)})
+    view.panels([[path, bars], [path]], tmp_path / "p.png", title="Title", caption="Words.")
+    blue = np.abs(pixels(tmp_path / "p.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12
+    middle = blue.shape[0] // 2
+    assert blue[middle:].sum() > 300
+    assert blue[:middle, :700].sum() > 100
+    rows = blue[:middle, 800:].sum(axis=1)
+    assert rows.max() > 1.5 * rows[rows > 50].min()  # the first bar is 2.5 times as long
+    wrong = view.Panel("", "", curves={"one": ([1, 2], [1])})
+    with pytest.raises(ConfigError, match="'one' has 1 values for 2 places"):
+        view.panels([[wrong]], tmp_path / "q.png", title="", caption="")
+
+
+def test_a_plane_shows_values_outlines_and_the_first_index_along_x(tmp_path):
+    """A field that grows along x: the colour map brightens from left to right."""
+    shade = np.broadcast_to(np.linspace(0, 1, 40)[:, None], (40, 30))
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    drawings = [
+        view.Drawing("map", "x [m]", "y [m]", (0.0, 4.0, 0.0, 3.0), shade, "height [m]"),
+        view.Drawing("stone", "x [m]", "y [m]", polygons=[square], curves={"line": [square]}),
+    ]
+    path = view.plane(drawings, tmp_path / "plane.png", title="T", caption="C " * 20)
+    image = pixels(path)
+    row = image[110 + 240, 120:560]
+    hue = row[colourful(row[None])[0]].sum(axis=1)
+    assert hue.size > 300 and hue[-20:].mean() > 2 * hue[:20].mean()
+    assert (image[:, 700:] == (0xD9, 0xD2, 0xC3)).all(axis=2).sum() > 20000
+    with pytest.raises(ConfigError, match="nothing to draw"):
+        view.plane([], tmp_path / "plane.png", title="T", caption="C")
+
+
+def test_a_campbell_diagram_shows_modes_multiples_and_where_they_meet(tmp_path):
+    speeds = np.linspace(0.0, 100.0, 11)
+    modes = np.array([-2.0 + 60j + 0.1j * speeds, -1.0 + 90j - 0.1j * speeds]).T
+    diagram = Campbell(speeds, modes, np.ones((10, 2)))
+    words = {"title": "Rotor", "caption": "Two modes."}
+    file = view.campbell(diagram, tmp_path / "c.png", orders=(1, 2), names=("up", "down"), **words)
+    image = pixels(file)
+    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):  # in both panels
+        rows = np.flatnonzero((np.abs(image - colour).max(axis=2) < 8).any(axis=1))
+        assert np.ptp(rows) > 330
+    undamped = Campbell(speeds, 1j * modes.imag, np.ones((10, 2)))
+    alone = pixels(view.campbell(undamped, tmp_path / "alone.png", **words))
+    assert alone.shape[0] < image.shape[0] - 300
+    with pytest.raises(ConfigError, match="1 names for 2 modes"):
+        view.campbell(diagram, tmp_path / "c.png", names=("up",), **words)
