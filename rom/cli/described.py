@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 TOML_SUFFIX = ".toml"
 COMMON = {
     "verb", "file", "run", "output", "force", "json", "quiet", "verbose", "strict", "debug",
-    "version", "resume",
+    "version", "resume", "parser",
 }  # fmt: skip
 COMMON |= {"trust", "time_limit", "memory_limit"}  # no file may say them
 Changes = dict[tuple[str, ...], Any]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 BYTES_PER_GIGABYTE = 1e9
-OUTPUT = "-o/--output"
+OUTPUT_FLAG = "-o/--output"
 
 
 def number(text: str) -> float:

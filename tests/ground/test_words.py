@@ -22,8 +22,6 @@ CLEAR = {
     "OVERSAMPLING": "of pictures",
     "ALPHA": "symbol of the method",
     "EXECUTE": "flag of the kernel of Linux",
-    "GIGABYTE": "a unit",
-    "MEGABYTE": "a unit",
     "SUMMARY": "of every verb, read by the parser",
     "TRUNCATE": "flag of the kernel of Linux",
 }

@@ -15,7 +15,7 @@ from rom.cli.matrices import add_matrices, solid_options
 from rom.cli.method import add_method, method
 from rom.cli.model import read_model
 from rom.cli.options import (
-    OUTPUT,
+    OUTPUT_FLAG,
     add_geometry,
     add_interfaces,
     add_material,
@@ -90,7 +90,7 @@ def _checked(
     args: argparse.Namespace, output: Any, name: str, inputs: "Iterable[Path]" = ()
 ) -> Path:
     """The file to write, before anything is computed for it."""
-    require({OUTPUT: output})
+    require({OUTPUT_FLAG: output})
     check_name(name, "a body")
     return checked(args, output, "npz", inputs=inputs)
 
@@ -104,7 +104,7 @@ def _described(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
 def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
     from rom.workflow import reduce
 
-    needed = solid_options(args) | {"-i/--interface": args.interface, OUTPUT: args.output}
+    needed = solid_options(args) | {"-i/--interface": args.interface, OUTPUT_FLAG: args.output}
     require(needed, "A body needs an interface, for example -i pin_a=rbe2.")
     name = args.name or args.file.stem
     output = _checked(args, args.output, name)

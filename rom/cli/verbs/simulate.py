@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
-from rom.cli.options import OUTPUT, add_meshing, positive, require, vector
+from rom.cli.options import OUTPUT_FLAG, add_meshing, positive, require, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.errors import ConfigError, RomError
@@ -73,7 +73,7 @@ def _mechanism(args: argparse.Namespace) -> Answer:
     from rom.report.run import Run, made_from, paths_of
     from rom.report.run import run as move
 
-    require({OUTPUT: args.output})
+    require({OUTPUT_FLAG: args.output})
     file = mechanism(args)
     for path in paths_of(file, claim(args)):
         checked(args, path, inputs=files_in(file.values))
@@ -163,7 +163,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     from rom.report.run import RECORD_FILE, Record, file_digest
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
-    require(needed | {OUTPUT: args.output})
+    require(needed | {OUTPUT_FLAG: args.output})
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):

@@ -26,7 +26,7 @@ from rom.errors import (
 from rom.fe.mesh.solid import Read
 from rom.fe.mesh.sources.readers import GEOMETRIES, read
 
-BYTES_PER_MEGABYTE, GIGABYTE = 2**20, 1e9
+BYTES_PER_MEGABYTE, BYTES_PER_GIGABYTE = 2**20, 1e9
 MESHER_TIME_LIMIT = 1800.0  # [s]
 MAX_MEMORY_SHARE = 0.8  # of the memory of the machine, for a mesher
 # LC_ALL: gmsh reads decimal points with the locale of the process
@@ -188,8 +188,9 @@ def _too_long(reading: Reading) -> RomError:
 
 def _too_large(reading: Reading) -> RomError:
     if reading.geometry:
+        limit = reading.limits.memory / BYTES_PER_GIGABYTE
         return ResourceError(
-            f"meshing needs more than the limit of {reading.limits.memory / GIGABYTE:.3g} GB.",
+            f"meshing needs more than the limit of {limit:.3g} GB.",
             where=reading.where,
             hint="Use larger elements, or raise the limit by --memory-limit GIGABYTES or "
             "memory_limit= [bytes].",
