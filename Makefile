@@ -1,16 +1,19 @@
 # make setup   Debian packages, .venv over them, .venv-light without FEniCSx; seconds when done
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
 # make test    style, types, all tests, then those of the light half without FEniCSx
+# make long    what takes minutes: every signal at ten instants, every method with every fault
 # make docs    the site, in build/site/; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
+# tests that try more where there is time
+LONG = $(shell grep -rl ROM_LONG tests --include='test_*.py')
 # test files that run side by side
 WORKERS = 2
 # its own cache: two versions of Numba would compile over each other's code
 LIGHT = NUMBA_CACHE_DIR=$(CURDIR)/.venv-light/numba .venv-light/bin/python
 
-.PHONY: setup demo test docs pictures clean
+.PHONY: setup demo test long docs pictures clean
 setup:
 	@.ci/setup.sh
 
@@ -23,6 +26,9 @@ test: setup
 	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
 	$(LIGHT) -m pytest -m "not fenicsx" -p no:cacheprovider -n $(WORKERS) --dist loadfile
+
+long: setup
+	ROM_LONG=1 $(PYTHON) -m pytest $(LONG)
 
 docs: setup
 	$(PYTHON) -m sphinx -W -n -q docs build/site
