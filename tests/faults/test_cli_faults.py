@@ -287,7 +287,7 @@ def test_two_ranks_complain_once_and_end_within_seconds(arguments, code, words, 
 def test_a_rank_that_is_alone_with_its_error_ends_all(folder):
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     (folder / "alone.py").write_text(
-        "import sys\nfrom mpi4py import MPI\nfrom rom.cli import check\n"
+        "import sys\nfrom mpi4py import MPI\nfrom rom.cli.verbs import check\n"
         "from rom.cli.main import main\nfrom rom.errors import MaterialError\n"
         "def run(args):\n"
         "    if MPI.COMM_WORLD.rank == 1:\n        raise MaterialError('rho = 0.')\n"
