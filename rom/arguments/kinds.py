@@ -235,7 +235,7 @@ def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
 
 
 def _mapping(key: Taken | None, one: Taken | None) -> Taken:
-    words = f"a dictionary whose values are {(one or ANYTHING).words}"
+    words = "a dictionary" + (f" whose values are {one.words}" if one else "")
 
     def take(value: Any) -> Any:
         if not isinstance(value, Mapping):

@@ -309,7 +309,7 @@ def test_messages_for_wrong_interfaces(model, body):
         InterfaceError, match=r"no interface 'tipp'; the model has \['root', 'tip'\]"
     ):
         rom.modes(model, 3, fixed="tipp")
-    with pytest.raises(ConfigError, match="interfaces = 'rbe2' must be a mapping"):
+    with pytest.raises(ConfigError, match="interfaces = 'rbe2' must be a dictionary"):
         rom.reduce(model, method=rom.CraigBampton(4), interfaces="rbe2")
     with pytest.raises(ConfigError, match="kind 'rbe4'; known kinds"):
         rom.reduce(model, method=rom.CraigBampton(3), interfaces={"root": "rbe4"})
