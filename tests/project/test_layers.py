@@ -55,7 +55,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "material": {"errors", "units"},
     "rows": {"model"},
 }
-# inside each folder that has folders, what lies lower stands first; a file imports its own room or
+# inside each folder that has folders, what lies lower stands first; a file imports its own folder or
 # a lower one
 ORDER = {
     "": (
@@ -291,9 +291,9 @@ def test_every_room_has_its_place_in_the_order():
     for folder in {ROOT / "rom", *(path.parent for path in MODULES)}:
         level = level_of(folder.relative_to(ROOT / "rom").parts)
         inside = {p.stem for p in folder.glob("*.py")} - {"__init__"}
-        rooms = {p.parent.name for p in folder.glob("*/__init__.py")}
-        if level in ORDER or (rooms and level != "components"):
-            assert inside | rooms == set(ORDER[level]), level or "rom"
+        folders = {p.parent.name for p in folder.glob("*/__init__.py")}
+        if level in ORDER or (folders and level != "components"):
+            assert inside | folders == set(ORDER[level]), level or "rom"
 
 
 @pytest.mark.parametrize("level", ORDER)

@@ -1,6 +1,7 @@
 """Old import paths lead to the modules that moved, and say so."""
 
 import importlib
+import inspect
 import subprocess
 import sys
 
@@ -33,6 +34,15 @@ SCRIPTS = {f"rom.bench.peers.{name}" for name in ("beams", "craig_bampton", "ffr
 def test_no_old_path_hides_a_module():
     assert all(importlib.util.find_spec(new).origin for new in moved.NEW.values())
     assert not set(moved.NEW) & set(moved.NEW.values())
+
+
+def test_no_old_path_takes_the_place_of_a_function():
+    for old in moved.NEW:
+        package, _, name = old.rpartition(".")
+        if package.startswith("rom.fe"):
+            continue
+        there = vars(importlib.import_module(package)).get(name)
+        assert there is None or inspect.ismodule(there), old
 
 
 def test_the_warning_names_the_line_that_imports():
