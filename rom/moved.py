@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
     from types import ModuleType
 
-# Modules that a front hides behind a function of the same name, as rom.view.panels, are left out: an
+# Modules whose name is that of a function of the front, as rom.view.panels, are left out: an
 # import of the module would put it in the function's place.
 ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom", "rom.bench", "bench_loops=loops bench_models=models bench_wheel=wheel peers"),

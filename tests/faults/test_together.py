@@ -211,7 +211,7 @@ KERNELS = """
 import sys
 from pathlib import Path
 from rom.mbs.kernels.compiled import drop_stale_cache
-folder = TESTS
+folder = Path(__file__).parent
 for _ in range({drops}):
     drop_stale_cache(folder, folder / "__pycache__" / "stamp")
 import toy

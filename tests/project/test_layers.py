@@ -55,8 +55,8 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "material": {"errors", "units"},
     "rows": {"model"},
 }
-# inside each folder that has folders, what lies lower stands first; a file imports its own folder or
-# a lower one
+# inside each folder that has folders, what lies lower stands first; a file imports its own folder
+# or a lower one
 ORDER = {
     "": (
         "errors",
