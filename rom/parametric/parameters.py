@@ -103,7 +103,7 @@ class Thickness(Parameter):
 
     def __post_init__(self) -> None:
         Parameter.__post_init__(self)
-        if self.axis not in ("x", "y", "z"):
+        if not isinstance(self.axis, str) or self.axis not in ("x", "y", "z"):
             raise ParameterError(f"axis = {self.axis!r} of {self} is none of 'x', 'y', 'z'.")
 
 
