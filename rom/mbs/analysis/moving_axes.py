@@ -24,7 +24,7 @@ def chosen(frame: Any, names: tuple[str, ...]) -> tuple[bool, ...]:
         raise ConfigError(f"frame: no body {sorted(unknown)}; there are {sorted(names)}.")
     words = [table.get(name, "body") for name in names]
     for word in words:
-        if word not in FRAMES:
+        if not isinstance(word, str) or word not in FRAMES:
             raise ConfigError(f"frame is {word!r}; it is 'body' or 'world', or a dict of these.")
     return tuple(word == "world" for word in words)
 
