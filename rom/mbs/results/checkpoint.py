@@ -76,11 +76,15 @@ def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str
         fields |= {name: arrays.get(name) for name in OPTIONAL}
         memory = _memory(manifest.get("memory"), arrays)
         t, rank = float.fromhex(manifest["t"]), int(manifest["rank"])
+        return State(t=t, rank=rank, **fields, memory=memory)
+    except ConfigError as error:  # of the state itself, which knows of no file
+        raise FileFormatError(
+            f"the manifest lacks or misstates it: {error.message}", where=str(path)
+        ) from error
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             f"the manifest lacks or misstates {error}.", where=str(path)
         ) from error
-    return State(t=t, rank=rank, **fields, memory=memory)
 
 
 def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory | None:
