@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cases.paths import ROOT
+from cases.paths import TESTS
 from generated.case import CLASSES, Case, Silent, Warned, Works, all_cases, case, planted, require
 from rom.errors import ConfigError, MeshError
 
 MOST_CHARACTERS = 5000  # of a message that somebody still reads
 GRACE = 10.0  # s, beyond the time of a case, until its process is stopped
-HERE = ROOT
+HERE = TESTS / "faults"
 
 
 @dataclass(frozen=True)
