@@ -13,7 +13,7 @@ from numba import njit
 
 from rom.places import PACKAGE
 
-FOLDER = PACKAGE / "mbs"  # kernels lie in several rooms below
+FOLDER = PACKAGE / "mbs"  # kernels lie in several folders below
 STAMP = FOLDER / "__pycache__" / "kernels.sha256"
 
 USER = b".compiled import"  # in sources of kernels
