@@ -1,5 +1,7 @@
 """Factorisation, shifts, counts and refusals of the PETSc operators."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,7 +15,7 @@ pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 
 from rom.fe.elasticity import assemble  # noqa: E402
-from rom.fe.operators import lanczos, memory, petsc, spectrum  # noqa: E402
+from rom.fe.operators import factor, lanczos, memory, petsc, spectrum  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 
@@ -219,3 +221,36 @@ def test_a_factor_is_refused_after_the_analysis_when_the_law_was_too_kind(monkey
     monkeypatch.setattr(memory, "free_bytes", lambda: 4e6)
     with pytest.raises(ResourceError, match=r"factoring 2940 dofs is predicted to take 0.0\d GiB"):
         model.operators.hold(model.interfaces["x0"].dofs)
+
+
+def used_bytes(*kinds):
+    """What this process has taken, by the names of Linux [bytes]."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    fields = dict(line.split(":", 1) for line in lines)
+    return [1024 * int(fields[kind].split()[0]) for kind in kinds]
+
+
+def test_factors_that_are_let_go_leave_no_memory_behind():
+    """A process that has reserved more than the machine has cannot fork any more."""
+    model = beam((20, 6, 6))
+    boundary = model.interfaces["x0"].dofs
+    model.operators.hold(boundary)
+    before = used_bytes("VmRSS", "VmSize")
+    for _ in range(15):  # a factor takes 10 MB
+        model.operators.hold(boundary)
+    resident, reserved = np.subtract(used_bytes("VmRSS", "VmSize"), before)
+    assert resident < 40e6
+    assert reserved < 2e9
+
+
+def test_a_factor_that_outgrows_its_first_offer_is_made_with_a_larger_one(monkeypatch):
+    model = beam((20, 6, 6))
+    fixed = model.interfaces["x0"].dofs
+    F = np.eye(model.n_dofs, 2, -300)
+    expected = model.operators.hold(fixed)(F)
+    offer, offers = factor.Factor._offer, []
+    monkeypatch.setattr(factor, "WORKSPACE_RATIO", 0.0)
+    monkeypatch.setattr(factor, "LEAST_WORKSPACE", 1e6)
+    monkeypatch.setattr(factor.Factor, "_offer", lambda f, w: offers.append(w) or offer(f, w))
+    assert_allclose(model.operators.hold(fixed)(F), expected, rtol=1e-9, atol=1e-22)
+    assert offers[0] < offers[1] and offers[0] == 1e6

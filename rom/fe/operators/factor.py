@@ -5,12 +5,14 @@ from petsc4py import PETSc
 import numpy as np
 
 from rom.errors import SolverError
-from rom.fe.operators.memory import allowed_bytes, give_back, too_large
+from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
 from rom.fe.operators.solver import DIRECT, Solver
 from rom.model import Array
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
 PIVOT_THRESHOLD = 0.01  # the default of MUMPS
+WORKSPACE_RATIO = 3.0  # first offer over the prediction: a thin body takes less, pivoting more
+LEAST_WORKSPACE = 100e6  # of the first offer [bytes]
 MEMORY_ERRORS = (-8, -9, -11, -13, -19)  # INFOG(1) of MUMPS: work space or allocation too small
 
 
@@ -33,9 +35,21 @@ class Factor:
     def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT):
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
-        self.A = A
-        self.ksp = PETSc.KSP().create(A.comm)
-        self.ksp.setOperators(A)
+        self.A, self.solver = A, solver
+        self.allowed = allowed_bytes(A.comm.tompi4py())
+        predicted = WORKSPACE_RATIO * factor_bytes(A.getSize()[0]) / A.comm.size
+        self._offer(min(predicted + LEAST_WORKSPACE, self.allowed))
+        self.compute(definite=definite)
+
+    def _offer(self, workspace: float) -> None:
+        """Start anew with that much work space on each rank [bytes].
+
+        MUMPS reserves the whole of it, whatever it needs: a process with several factors that may
+        each take all memory could no longer fork.
+        """
+        self.workspace = workspace
+        self.ksp = PETSc.KSP().create(self.A.comm)
+        self.ksp.setOperators(self.A)
         self.ksp.setType(PETSc.KSP.Type.PREONLY)
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.CHOLESKY)
@@ -44,14 +58,12 @@ class Factor:
         self.factor = pc.getFactorMatrix()
         self.factor.setMumpsIcntl(24, 1)  # needed by PETSc for the inertia
         self.factor.setMumpsIcntl(13, 1)  # a root shared by ranks would not report its pivots
-        if solver.low_rank:
+        if self.solver.low_rank:
             self.factor.setMumpsIcntl(35, 1)
-            self.factor.setMumpsCntl(7, solver.low_rank)
-        if solver.out_of_core:
+            self.factor.setMumpsCntl(7, self.solver.low_rank)
+        if self.solver.out_of_core:
             self.factor.setMumpsIcntl(22, 1)
-        allowed = allowed_bytes(A.comm.tompi4py())
-        self.factor.setMumpsIcntl(23, max(int(allowed / 1e6), 1))  # obeyed after the analysis
-        self.compute(definite=definite)
+        self.factor.setMumpsIcntl(23, max(int(workspace / 1e6), 1))  # obeyed after the analysis
 
     def compute(self, *, definite: bool) -> None:
         """Factor A; again when its values have changed, without a new analysis.
@@ -63,11 +75,15 @@ class Factor:
         self.ksp.setUp()
         self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
         code = self.factor.getMumpsInfog(1)
-        if code in MEMORY_ERRORS:
+        if code in MEMORY_ERRORS and self.workspace < self.allowed:
+            self.release()
+            self._offer(self.allowed)
+            self.compute(definite=definite)
+        elif code in MEMORY_ERRORS:
             need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
-            allowed = allowed_bytes(self.A.comm.tompi4py()) * self.A.comm.size
-            raise too_large(self.A.getSize()[0], need, allowed)
-        self.ok = code >= 0
+            raise too_large(self.A.getSize()[0], need, self.allowed * self.A.comm.size)
+        else:
+            self.ok = code >= 0
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""

@@ -3,6 +3,7 @@
 import ctypes
 
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from rom.errors import ResourceError
 from rom.memory import free_bytes
@@ -30,11 +31,22 @@ def give_back() -> None:
         trim(0)
 
 
+def collect(comm: MPI.Comm) -> None:
+    """Free the matrices and factors that Python has let go, on all ranks together.
+
+    PETSc cannot free what one rank lets go while others still hold it: it keeps such objects, of
+    one rank, too, until it is asked.
+    """
+    PETSc.garbage_cleanup(comm)
+    give_back()
+
+
 def allowed_bytes(comm: MPI.Comm) -> float:
     """Memory each rank may take for a factor [bytes], the same on all ranks.
 
     Ranks of one machine share what it has.
     """
+    collect(comm)
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     share = MAX_MEMORY_SHARE * free_bytes() / node.size
     node.Free()
