@@ -16,11 +16,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 import rom
-from rom.io.matrices.dmig import read_dmig
-from rom.io.programs.openfast_reading import read_openfast
-from rom.io.sid import write_sid
-from rom.io.sid.body import sid_body, standard_input
-from rom.io.sid.dialect import check_sid
+from rom.io import check_sid, read_dmig, read_openfast, sid_body, standard_input, write_sid
 
 options = argparse.ArgumentParser(description="one body for many programs")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

@@ -17,11 +17,21 @@ import numpy as np
 import rom
 from rom import view
 from rom.bench.models import bar
-from rom.components.cosserat.helical_spring import HelicalSpring
-from rom.components.hand.compliant_hand import INDEX, SPRING, Finger, close, hand, rest
-from rom.components.hand.control_chart import Chart, envelope, muscle
-from rom.components.hand.grasp import Bar, grasp
-from rom.components.hand.solid_finger import parts_of_compliance
+from rom.components.cosserat import HelicalSpring
+from rom.components.hand import (
+    INDEX,
+    SPRING,
+    Bar,
+    Chart,
+    Finger,
+    close,
+    envelope,
+    grasp,
+    hand,
+    muscle,
+    parts_of_compliance,
+    rest,
+)
 from rom.view import Panel
 
 options = argparse.ArgumentParser(description="fingers of springs, their stiffness and command")

@@ -14,13 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from rom import view
-from rom.components.linkages.dynamic_isotropy import (
+from rom.components.linkages import (
+    FiveBar,
+    Link,
     angle_grid,
     closed_loci,
     isotropic_configurations,
     isotropy_index,
+    rod,
 )
-from rom.components.linkages.two_dof_linkages import FiveBar, Link, rod
 
 options = argparse.ArgumentParser(description="isotropic postures of a five-bar linkage")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

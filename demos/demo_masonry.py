@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rom import view
-from rom.components.masonry import simulate
-from rom.components.masonry.limits import Rock, arch, minimum_thickness, stands, wall
+from rom.components.masonry import Rock, arch, minimum_thickness, simulate, stands, wall
 
 options = argparse.ArgumentParser(description="arches at their limit, and a wall with an opening")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 
 import rom
 from rom import view
-from rom.cyclic.blades.mistuning import whitehead
+from rom.cyclic import whitehead
 
 options = argparse.ArgumentParser(description="statistics of mistuned bladed disks")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import eigsh, splu
 
 import rom
 from rom import view
-from rom.cyclic.rotation import rotation_matrices
+from rom.cyclic import rotation_matrices
 
 options = argparse.ArgumentParser(description="frequencies of rotating blades")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

@@ -16,17 +16,18 @@ import numpy as np
 
 from rom import view
 from rom.components.updating import (
+    LINKS,
     AtSensors,
     Measurement,
     ParametricModel,
+    airframe,
     modal,
+    noisy,
     parametric_basis,
     responses,
     update_by_input,
     update_by_output,
 )
-from rom.components.updating import frf_data as data
-from rom.components.updating.airframe import LINKS, airframe
 
 options = argparse.ArgumentParser(description="updating of a test bed like an aircraft")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
@@ -71,7 +72,7 @@ zeta = np.array([0.8, 1.2, 1.0, 1.0, 1.5, 1.1, 0.9, 1.3]) / 100
 f = np.linspace(4.0, 62.0, 240)
 omega, start, guess = 2 * np.pi * f, np.zeros(6), np.full(8, 0.01)
 exact = responses(model, true, zeta, omega, inputs)
-test = Measurement(omega, data.noisy(exact, options.noise, np.random.default_rng(7)), inputs)
+test = Measurement(omega, noisy(exact, options.noise, np.random.default_rng(7)), inputs)
 for name, p in (("test object", true), ("drawing", start)):
     found = np.sqrt(modal(model.at(p), []).lam[6:14]) / (2 * np.pi)
     say(f"{name:12s}", *(f"{x:7.2f}" for x in found), "Hz")

@@ -16,8 +16,7 @@ import numpy as np
 
 import rom
 from rom import view
-from rom.components.wind.whole_turbine import turbine
-from rom.components.wind.wind_turbine import RATED
+from rom.components.wind import RATED, turbine
 
 parser = argparse.ArgumentParser(description="a whole wind turbine runs up")
 parser.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

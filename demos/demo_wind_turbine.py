@@ -17,8 +17,8 @@ import numpy as np
 from rom import view
 from rom.components.cosserat import equilibrium, loads, modes
 from rom.components.linear_pieces import bend_in_pieces
-from rom.components.wind.wind_turbine import HUB_RADIUS, blade, run_up
-from rom.mbs.analysis.campbell import Campbell
+from rom.components.wind import HUB_RADIUS, blade, run_up
+from rom.mbs import Campbell
 from rom.view import Panel
 
 options = argparse.ArgumentParser(description="run-up of a rotor with flexible blades")

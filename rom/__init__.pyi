@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from rom import assembly as assembly
 from rom import body as body
 from rom import components as components
 from rom import cyclic as cyclic
@@ -11,6 +12,8 @@ from rom import fe as fe
 from rom import io as io
 from rom import mbs as mbs
 from rom import model as model
+from rom import parametric as parametric
+from rom import prestress as prestress
 from rom import reduction as reduction
 from rom import rotation as rotation
 from rom import units as units

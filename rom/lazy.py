@@ -1,26 +1,59 @@
-"""Fronts of packages: their names, whose modules are loaded when one is first asked for."""
+"""Fronts of packages: the names of a stub, whose modules are loaded when one is first asked for."""
 
+# Of what Python has not loaded itself nothing is imported here, for the reason in `rom`.
 import importlib
-from collections.abc import Callable, Iterable
-from typing import Any
+import sys
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from types import ModuleType
+    from typing import Any
+else:
+    ModuleType = type(sys)
 
 
-def front(package: str, module: str, names: Iterable[str]) -> Callable[[str], Any]:
-    """What a package says to names that it does not hold.
+class Front(ModuleType):
+    """A package that has the names of the stub beside it."""
+
+    PACKAGES: tuple[str, ...]  # modules and packages in it that the stub names
+    MODULES: dict[str, str]  # {other name: module below the package that has it}
+    __all__: list[str]
+
+    def __getattr__(self, name: str) -> object:
+        """Import a name on first use."""
+        if name in self.PACKAGES:
+            return importlib.import_module(f"{self.__name__}.{name}")
+        if name in self.MODULES:
+            module = importlib.import_module(f"{self.__name__}.{self.MODULES[name]}")
+            return getattr(module, name)
+        raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Keep a function's name when Python has loaded a module of the same name below."""
+        if name not in self.MODULES or value is not sys.modules.get(f"{self.__name__}.{name}"):
+            super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*self.__all__, *self.PACKAGES})
+
+
+def front(package: str) -> None:
+    """Let a package have the names of the stub beside it, which is the only list of them.
 
     Args:
-        package: name of the package.
-        module: of the package, where the names are.
-        names: that it gives on.
-
-    Returns:
-        For ``__getattr__`` of the package.
+        package: name of the package that is being imported.
     """
-    given = frozenset(names)
+    module: Any = sys.modules[package]
+    named = _named(package, module.__path__[0])
+    module.PACKAGES = tuple(name for name, place in named.items() if not place)
+    module.MODULES = {name: place for name, place in named.items() if place}
+    module.__all__ = sorted(module.MODULES)
+    module.__class__ = Front
 
-    def named(name: str) -> Any:
-        if name in given:
-            return getattr(importlib.import_module(f"{package}.{module}"), name)
-        raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
-    return named
+def _named(package: str, folder: str) -> dict[str, str]:
+    """{name: module below the package, "" for a module itself}; read without loading ``ast``."""
+    with open(f"{folder}/__init__.pyi", encoding="utf-8") as stub:
+        text = stub.read().replace("(\n", "").replace(",\n)", "")  # lines that are too long
+    lines = (line.split() for line in text.splitlines() if line.startswith(f"from {package}"))
+    return {name: module[len(package) + 1 :] for _, module, _, name, *_ in lines}

@@ -8,8 +8,6 @@ if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
     from types import ModuleType
 
-# Modules whose name is that of a function of the front, as rom.view.panels, are left out: an
-# import of the module would put it in the function's place.
 ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom", "rom.bench", "bench_loops=loops bench_models=models bench_wheel=wheel peers"),
     ("rom", "rom.checks", "certificate"),
@@ -77,9 +75,10 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom.reduction", "rom.reduction.interfaces",
      "characteristic interface=connection kinds order polynomial snapshots"),
     ("rom.view", "rom.view.canvas", "draw offscreen page scene solids"),
-    ("rom.view", "rom.view.figures", "curves planes=fields spectra=updating"),
+    ("rom.view", "rom.view.figures", "curves panels plane=sheets planes=fields spectra=updating"),
     ("rom.view", "rom.view.scenes",
-     "film motion=animation_files part=meshes rods shapes=mode_shapes wheels window"),
+     "film motion=animation_files part=meshes rods shapes=mode_shapes start=mechanisms wheels "
+     "window"),
 )  # fmt: skip
 
 

@@ -1,4 +1,8 @@
-"""Checks of what a user hands over: types by annotation, values by name."""
+"""Checks of what a user hands over: types by annotation, values by name.
+
+`border` asks for the types of all arguments, `kinds` says what an annotation takes, `values` checks
+numbers, words, shapes and rotations.
+"""
 
 from rom.arguments.border import typed
 from rom.arguments.kinds import AnyBody, AnyMechanism, AnySolution

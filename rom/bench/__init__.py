@@ -6,21 +6,4 @@
 
 from rom.lazy import front
 
-__all__ = [
-    "BED",
-    "BENCHMARKS",
-    "KINDS",
-    "Figure",
-    "blade",
-    "chain",
-    "film",
-    "geometry",
-    "integrator",
-    "large_reduction",
-    "motion",
-    "reduction",
-    "rods",
-    "run",
-    "transmission",
-]
-__getattr__ = front(__name__, "benchmarks", __all__)
+front(__name__)

@@ -5,5 +5,4 @@
 
 from rom.lazy import front
 
-__all__ = ["check", "check_body", "check_model"]
-__getattr__ = front(__name__, "gates", __all__)
+front(__name__)

@@ -1,1 +1,6 @@
-"""Files that describe components and mechanisms (TOML), with units, checked by one table."""
+"""Files that describe components and mechanisms (TOML), with units, checked by one table.
+
+`document` knows the lines of a file, `keys` what a table of keys says of it; `component` and
+`mechanism` read by those of `component_keys` and `mechanism_keys`, with `methods` and `laws` by
+name; `page` is their documentation.
+"""

@@ -6,22 +6,4 @@
 
 from rom.lazy import front
 
-__all__ = [
-    "CLUSTER_RTOL",
-    "ON_A_LINE",
-    "Held",
-    "Mass",
-    "Operators",
-    "Weighted",
-    "canonical_signs",
-    "count_shift",
-    "dofs_of",
-    "given_rigid_motions",
-    "mac",
-    "mean_motion",
-    "orthonormal",
-    "residual_errors",
-    "rigid_motions",
-    "whole_clusters",
-]
-__getattr__ = front(__name__, "verbs", __all__)
+front(__name__)

@@ -1,1 +1,10 @@
-"""Files: the native body file and other formats."""
+"""Files: the native body file and other formats.
+
+`native` and `family` are files of rom, an `archive` each; `export` picks one of `programs`, `sid`,
+`matrices`, `fields` or `fmu` by name, `history` writes motions. `files` are written whole, `ours`
+says which may be replaced, `claim` who writes in a folder.
+"""
+
+from rom.lazy import front
+
+front(__name__)

@@ -1,6 +1,10 @@
 """Mechanisms of rigid and flexible bodies, and their motion.
 
-`kernels` are compiled, `parts` and `elements` what a mechanism has, `mechanism` what users write;
-`equations` packs it, `integrate` moves it, `results` are what comes out, `analysis` needs no
-motion.
+`kernels` are compiled, `parts` and `elements` what a mechanism has, `connections` its joints,
+`mechanism` what users write; `equations` packs it, `integrate` moves it, `results` are what comes
+out, `analysis` needs no motion.
 """
+
+from rom.lazy import front
+
+front(__name__)

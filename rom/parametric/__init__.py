@@ -1,5 +1,10 @@
 """Bodies that depend on parameters.
 
 `parameters` are factors of material and thickness, `layers` thick ones; `affine` and `stretched`
-reduce, on a `common_basis`; `family` is the result, with `evidence`.
+models of them are reduced on a `common_basis`; `family` is the result, with `evidence`, and
+`reduce` the way to it in one call.
 """
+
+from rom.lazy import front
+
+front(__name__)

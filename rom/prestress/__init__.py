@@ -3,3 +3,7 @@
 `heat` and `thermal` stress a body, `steady_rotation` and `spin_up` turn it at large displacement,
 `speed_table` has the states over the speed.
 """
+
+from rom.lazy import front
+
+front(__name__)

@@ -1,1 +1,9 @@
-"""Reduction: `bases` of shapes, on `interfaces` of a kind."""
+"""Reduction: `bases` of shapes, on `interfaces` of a kind.
+
+A method of `bases` is a record that `rom.reduce` takes; a kind of interface is its name, "rbe2",
+or a record of `interfaces`.
+"""
+
+from rom.lazy import front
+
+front(__name__)

@@ -1,16 +1,9 @@
-"""Reports: `html` writes them, `pages` fills them for bodies, `run` for motions."""
+"""Reports in one HTML file that needs nothing else.
+
+`html` writes them, `pages` fills them for bodies, for files and for motions, `run` moves what a
+mechanism file describes and keeps it in a folder.
+"""
 
 from rom.lazy import front
 
-__all__ = [
-    "KINDS",
-    "MAX_PICTURE_BYTES",
-    "PAGE_STYLE",
-    "checks",
-    "paragraph",
-    "picture",
-    "source",
-    "table",
-    "write_report",
-]
-__getattr__ = front(__name__, "html", __all__)
+front(__name__)

@@ -373,6 +373,17 @@ def test_importing_rom_loads_nothing_heavy():
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_fronts_load_nothing_but_fronts():
+    """Neither NumPy nor a module behind them, so that a name costs what stands behind that name."""
+    stubs = (path.parent.relative_to(ROOT).parts for path in (ROOT / "rom").rglob("__init__.pyi"))
+    fronts = [".".join(parts) for parts in stubs if "fe" not in parts]
+    done = run_blocked(f"import sys, {', '.join(fronts)}; print(*sys.modules)", blocked=())
+    loaded = set(done.stdout.split())
+    own = {name for name in loaded if name.split(".")[0] == "rom"}
+    assert own == {*fronts, "rom.lazy", "rom.launcher", "rom.moved"}, done.stderr
+    assert not {"numpy", "scipy", "numba"} & loaded
+
+
 def test_the_mesh_checks_run_without_gmsh_and_dolfinx():
     done = run_blocked(
         "import rom.fe.mesh.validate, rom.fe.mesh, rom.fe.mesh.summary", blocked=HEAVY

@@ -2,32 +2,10 @@
 
 Total Lagrangian. The metric is evaluated at the middles of the sides, each from the four nodes of
 two neighbouring triangles; logarithmic strain, plasticity of von Mises with linear hardening.
+`triangles` has the meshes, `motion` forces and steps, `sides` the linear stiffness, `space` sheets
+as bodies; `kernels` are compiled.
 """
 
-from rom.components.assumed_strain.motion import (
-    Flight,
-    Metal,
-    equilibrium,
-    fly,
-    forces,
-    mass,
-    tangent,
-)
-from rom.components.assumed_strain.sides import stiffness_by_sides
-from rom.components.assumed_strain.space import in_space
-from rom.components.assumed_strain.triangles import Sheet, rectangle, sheet
+from rom.lazy import front
 
-__all__ = [
-    "Flight",
-    "Metal",
-    "Sheet",
-    "equilibrium",
-    "fly",
-    "forces",
-    "in_space",
-    "mass",
-    "rectangle",
-    "sheet",
-    "stiffness_by_sides",
-    "tangent",
-]
+front(__name__)

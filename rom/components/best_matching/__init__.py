@@ -9,7 +9,8 @@ with R the rigid motions of the configuration, and uniform growth where size has
 The rest has no momentum and no angular momentum: the condition of Tisserand. A configuration laid
 over a reference obeys that of Eckart; in a flexible body this is the mean-axis frame, and for small
 deformations both are. The toys of N bodies, which are Newton's, show what remains of mechanics:
-shapes, and a time read off them. Nothing here is about gravity as geometry.
+shapes, and a time read off them. Nothing here is about gravity as geometry. `projection` matches,
+`bodies` are the toys, `shapes` those of three.
 
 Source:
     After Mercati's chapter on shape dynamics, a theory of gravity of which this package takes the
@@ -18,26 +19,6 @@ Source:
     the two arrows of time. Equations derived here.
 """
 
-from rom.components.best_matching.bodies import Bodies
-from rom.components.best_matching.projection import (
-    Matched,
-    emergent_rate,
-    frame,
-    generators,
-    match,
-    rigid_part,
-    stacked,
-)
-from rom.components.best_matching.shapes import ShapeSphere
+from rom.lazy import front
 
-__all__ = [
-    "Bodies",
-    "Matched",
-    "ShapeSphere",
-    "emergent_rate",
-    "frame",
-    "generators",
-    "match",
-    "rigid_part",
-    "stacked",
-]
+front(__name__)

@@ -6,17 +6,4 @@
 
 from rom.lazy import front
 
-__all__ = [
-    "CONTACT_REACH_RATIO",
-    "SHEAR_STIFFNESS_RATIO",
-    "TENSION_RTOL",
-    "Masonry",
-    "Motion",
-    "Stone",
-    "polygon_moments",
-    "reduced_stone",
-    "simulate",
-    "stone",
-    "touching",
-]
-__getattr__ = front(__name__, "stones", __all__)
+front(__name__)

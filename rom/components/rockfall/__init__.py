@@ -11,7 +11,8 @@ z points down and counts from contact; plug and slab rest in balance with their 
 of a slab, such as those of a reduced finite element body, can take the place of the last mass:
 q'' + 2 zeta omega q' + omega^2 q = phi F_2, z_3 = phi . q.
 
-The laws are simple ones chosen here; no parameter and no result of a test is reproduced.
+The laws are simple ones chosen here; no parameter and no result of a test is reproduced. `laws`
+has them, `impact` the motion and what decides over it, `kernels` are compiled.
 
 Source:
     After Schellenberg, On the design of rockfall protection galleries, ETH Zurich (2009), and
@@ -19,16 +20,6 @@ Source:
     was read. Hertz: Johnson, Contact Mechanics (1985).
 """
 
-from rom.components.rockfall.impact import Gallery, Impact, Slab, sensitivity, strike
-from rom.components.rockfall.laws import Cushion, CushionForce, Shear
+from rom.lazy import front
 
-__all__ = [
-    "Cushion",
-    "CushionForce",
-    "Gallery",
-    "Impact",
-    "Shear",
-    "Slab",
-    "sensitivity",
-    "strike",
-]
+front(__name__)

@@ -1,43 +1,10 @@
 """Updating of a model by measured frequency responses, after Berriet, Fillod and Bouhaddi.
 
 Unknown are relative changes of stiffness and mass and the damping ratios of the modes. The model
-can be condensed to the sensors, and test and model together to one common basis.
+can be condensed to the sensors, and test and model together to one common basis: `models` and
+`methods`. `frf_data` are responses as a test gives them, `airframe` a test bed.
 """
 
-from rom.components.updating.methods import (
-    Update,
-    common_basis,
-    response_function_method,
-    responses,
-    sensitivity,
-    update_by_input,
-    update_by_output,
-)
-from rom.components.updating.models import (
-    AtSensors,
-    Measurement,
-    Modal,
-    Model,
-    ParametricModel,
-    damping_matrix,
-    modal,
-    parametric_basis,
-)
+from rom.lazy import front
 
-__all__ = [
-    "AtSensors",
-    "Measurement",
-    "Modal",
-    "Model",
-    "ParametricModel",
-    "Update",
-    "common_basis",
-    "damping_matrix",
-    "modal",
-    "parametric_basis",
-    "response_function_method",
-    "responses",
-    "sensitivity",
-    "update_by_input",
-    "update_by_output",
-]
+front(__name__)

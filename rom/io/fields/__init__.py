@@ -1,1 +1,4 @@
-"""Fields over meshes and motions for programs that draw: ParaView, glTF, UFF."""
+"""Fields over meshes and motions for programs that draw.
+
+`vtu` and `vtkhdf` for ParaView, `gltf` for browsers; `universal` reads functions of a test.
+"""

@@ -6,22 +6,4 @@
 
 from rom.lazy import front
 
-__all__ = [
-    "ALWAYS_SYMMETRIC",
-    "BLOCKS",
-    "DIAGONAL",
-    "DIALECTS",
-    "GENERAL",
-    "NODE_BLOCKS",
-    "SYMMETRIC",
-    "TENSOR",
-    "UNIT",
-    "ZERO",
-    "StandardInput",
-    "Taylor",
-    "in_dialect",
-    "repacked",
-    "shape_of",
-    "write_sid",
-]
-__getattr__ = front(__name__, "format", __all__)
+front(__name__)

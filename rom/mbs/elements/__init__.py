@@ -1,10 +1,11 @@
-"""Elements of force.
+"""Elements of force, as users describe them and as compiled laws.
 
-Springs, bushings and contacts as users describe them, and beside them their compiled laws in
-`..._kernels`.
+`force_elements` has bushings, contacts by the laws of `impact`, and spread loads, compiled in
+`bushing_kernels`, `contact` and `spread`; `joint_forces` motors, friction and stops, in
+`joint_kernels`; `nonlinear` bodies, in `nonlinear_kernels`; `surface_contact` that of surfaces;
+`springs_loads_kernels` springs and loads.
 """
 
 from rom.lazy import front
 
-__all__ = ["DIRECTIONS", "Bushing", "Contact", "Curves", "Elements", "Spread"]
-__getattr__ = front(__name__, "force_elements", __all__)
+front(__name__)

@@ -72,9 +72,7 @@ def checked_law(name: str, law: Any) -> Impact:
         ConfigError: if it is not.
     """
     if not isinstance(law, Impact):
-        raise ConfigError(
-            f"law of {name!r} is {law!r}; a rom.mbs.elements.impact.Impact is needed."
-        )
+        raise ConfigError(f"law of {name!r} is {law!r}; a rom.mbs.Impact is needed.")
     return law
 
 

@@ -163,7 +163,7 @@ class JointForces:
         Args:
             name: name of the stops.
             joint: joint with a coordinate.
-            law: `rom.mbs.elements.impact.Impact`, its friction without effect.
+            law: `rom.mbs.Impact`, its friction without effect.
             lower: smallest coordinate without force [rad or m]; None for no limit.
             upper: largest one.
             coordinate: "angle" or "displacement"; None for the only or the first one.

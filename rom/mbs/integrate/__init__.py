@@ -2,10 +2,9 @@
 
 `simulation` is the entry and `run` the loop; `consistent_start` and `step_memory` begin;
 `generalized_alpha`, `bdf`, `index2`, `dop853` and `radau_start` take steps, of `fixed_step` or
-`adaptive_step`; `events`, `event_end` and `release` interrupt.
+`adaptive_step`; `events`, `event_end` and `release` interrupt; `keeping` saves what there is.
 """
 
 from rom.lazy import front
 
-__all__ = ["METHODS", "RTOL", "simulate"]
-__getattr__ = front(__name__, "simulation", __all__)
+front(__name__)

@@ -1,5 +1,6 @@
 """Compiled mechanics, and the arrays it works on.
 
-`system` and `plan` are the arrays, `algebra` small matrices, `inertia`, `second_order`, `markers`,
-`constraints`, `rolling` and `coordinates` the mechanics; `compiled` guards the cache.
+`system` and `plan` are the arrays, `algebra` small matrices, `inertia` with its `integrals`,
+`second_order`, `markers`, `constraints`, `rolling` and `coordinates` the mechanics; `compiled`
+guards the cache.
 """

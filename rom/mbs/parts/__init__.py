@@ -1,17 +1,9 @@
-"""What mechanisms are made of: bodies, joints and signals, and checks of arguments."""
+"""What mechanisms are made of.
+
+`bodies` with markers, `joints` as rows of constraints, `signals` of time and their `jumps`;
+`foreign` asks the functions that users hand over.
+"""
 
 from rom.lazy import front
 
-__all__ = [
-    "GROUND",
-    "SINGULAR_MASS",
-    "SURFACE_PREFIX",
-    "Marker",
-    "Part",
-    "flexible_part",
-    "ground_part",
-    "mass_at_rest",
-    "rigid_part",
-    "surface_place",
-]
-__getattr__ = front(__name__, "bodies", __all__)
+front(__name__)

@@ -21,8 +21,8 @@ from rom.components.updating import (
     update_by_input,
     update_by_output,
 )
-from rom.components.updating import airframe as aircraft
 from rom.components.updating import frf_data as data
+from rom.components.updating.airframe import airframe, torsion_constant
 from rom.errors import ConfigError, ModelError
 from rom.io.fields.universal import assemble, read_universal
 
@@ -349,7 +349,7 @@ def airframe_frequencies(bed, hangers=()):
 
 def test_the_aircraft_is_as_heavy_as_drawn_and_vibrates_like_its_peer():
     """Another beam code, its drawing, coarse mesh, cords, and joints of 600 kN m/rad."""
-    bed = aircraft.airframe(0.3, joints=6e5)
+    bed = airframe(0.3, joints=6e5)
     M = sum(bed.M.values())
     along = np.linalg.lstsq(bed.T, np.tile([1.0, 0, 0, 0, 0, 0], len(bed.points)), rcond=None)[0]
     assert along @ M @ along == pytest.approx(39.825, rel=1e-12)
@@ -359,20 +359,20 @@ def test_the_aircraft_is_as_heavy_as_drawn_and_vibrates_like_its_peer():
 
 def test_joints_lower_the_seventh_frequency_and_hardly_any_other():
     """Rigid ones against the elements of a program of its own, which ties nodes by a null space."""
-    rigid = airframe_frequencies(aircraft.airframe(0.3))[6:]
+    rigid = airframe_frequencies(airframe(0.3))[6:]
     exact = [5.829, 16.893, 37.817, 38.205, 38.297, 44.732, 53.891, 57.358]
     assert_allclose(rigid, exact, rtol=7e-4)
-    stiff = airframe_frequencies(aircraft.airframe(0.3, joints=1e9))[6:]
+    stiff = airframe_frequencies(airframe(0.3, joints=1e9))[6:]
     assert_allclose(stiff, rigid, rtol=2e-4)
     assert np.all(stiff < rigid)
-    loose = airframe_frequencies(aircraft.airframe(0.3, joints=6e5))[6:]
+    loose = airframe_frequencies(airframe(0.3, joints=6e5))[6:]
     drop = 1 - loose / rigid
     assert drop[6] == pytest.approx(0.143, abs=2e-3) and np.delete(drop, 6).max() < 0.015
 
 
 def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
     """What updating is for on this structure; a basis of free modes serves for both parameters."""
-    bed = aircraft.airframe(0.2, joints=6e5)
+    bed = airframe(0.2, joints=6e5)
     K, M = sum(bed.K.values()), sum(bed.M.values())
     dK = np.array([bed.K["wing", "joint"], bed.K["wing", "torsion"]])
     places = [((0.2, 0.95, 0.106), 2), ((-0.2, -0.95, 0.106), 2), ((0, 0.95, 0.096), 0),
@@ -393,14 +393,14 @@ def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
 @pytest.mark.parametrize("wrong", [{"size": 0.0}, {"joints": -1.0}, {"size": np.nan}])
 def test_an_airframe_of_nothing_is_refused(wrong):
     with pytest.raises(ConfigError, match="must be positive"):
-        aircraft.airframe(**wrong)
+        airframe(**wrong)
     with pytest.raises(ConfigError, match=r"nearest is 0.05 m away"):
-        aircraft.airframe(0.1).node((0.65, 0, 0))
+        airframe(0.1).node((0.65, 0, 0))
 
 
 def test_a_wing_alone_is_a_free_beam():
     """Euler and Bernoulli, bending both ways; Saint-Venant's torsion of bar and square."""
-    bed = aircraft.airframe(0.05)
+    bed = airframe(0.05)
     wing = (bed.K["wing", kind] for kind in ("bending", "sideways"))
     used = np.flatnonzero(np.diag(bed.M["wing"]) > 0)
     M = bed.M["wing"][np.ix_(used, used)]
@@ -409,8 +409,8 @@ def test_a_wing_alone_is_a_free_beam():
         f = np.sqrt(np.abs(lam)) / (2 * np.pi)
         exact = 4.730041**2 * np.sqrt(72e9 * inertia**2 / 12 / 2700) / 2.0**2 / (2 * np.pi)
         assert np.abs(f / exact - 1).min() < 2e-3
-    assert aircraft.torsion_constant(1, 1) == pytest.approx(0.140577, rel=1e-5)
-    assert aircraft.torsion_constant(0.1, 10) == pytest.approx(10 * 0.1**3 / 3 * 0.9937, rel=1e-4)
+    assert torsion_constant(1, 1) == pytest.approx(0.140577, rel=1e-5)
+    assert torsion_constant(0.1, 10) == pytest.approx(10 * 0.1**3 / 3 * 0.9937, rel=1e-4)
 
 
 @pytest.mark.parametrize(

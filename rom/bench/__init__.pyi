@@ -1,0 +1,15 @@
+from rom.bench.benchmarks import BED as BED
+from rom.bench.benchmarks import BENCHMARKS as BENCHMARKS
+from rom.bench.benchmarks import Figure as Figure
+from rom.bench.benchmarks import blade as blade
+from rom.bench.benchmarks import chain as chain
+from rom.bench.benchmarks import film as film
+from rom.bench.benchmarks import integrator as integrator
+from rom.bench.benchmarks import large_reduction as large_reduction
+from rom.bench.benchmarks import motion as motion
+from rom.bench.benchmarks import reduction as reduction
+from rom.bench.benchmarks import rods as rods
+from rom.bench.benchmarks import run as run
+from rom.bench.benchmarks import transmission as transmission
+from rom.bench.models import KINDS as KINDS
+from rom.bench.models import geometry as geometry

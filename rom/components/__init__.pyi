@@ -1,0 +1,13 @@
+from rom.components import assumed_strain as assumed_strain
+from rom.components import best_matching as best_matching
+from rom.components import cosserat as cosserat
+from rom.components import gear_mesh as gear_mesh
+from rom.components import hand as hand
+from rom.components import journal_bearing as journal_bearing
+from rom.components import linear_pieces as linear_pieces
+from rom.components import linkages as linkages
+from rom.components import masonry as masonry
+from rom.components import rockfall as rockfall
+from rom.components import transmission as transmission
+from rom.components import updating as updating
+from rom.components import wind as wind

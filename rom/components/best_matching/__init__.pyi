@@ -1,0 +1,9 @@
+from rom.components.best_matching.bodies import Bodies as Bodies
+from rom.components.best_matching.projection import Matched as Matched
+from rom.components.best_matching.projection import emergent_rate as emergent_rate
+from rom.components.best_matching.projection import frame as frame
+from rom.components.best_matching.projection import generators as generators
+from rom.components.best_matching.projection import match as match
+from rom.components.best_matching.projection import rigid_part as rigid_part
+from rom.components.best_matching.projection import stacked as stacked
+from rom.components.best_matching.shapes import ShapeSphere as ShapeSphere

@@ -1,0 +1,17 @@
+from rom.components.masonry.limits import Limit as Limit
+from rom.components.masonry.limits import Rock as Rock
+from rom.components.masonry.limits import arch as arch
+from rom.components.masonry.limits import minimum_thickness as minimum_thickness
+from rom.components.masonry.limits import stands as stands
+from rom.components.masonry.limits import wall as wall
+from rom.components.masonry.stones import CONTACT_REACH_RATIO as CONTACT_REACH_RATIO
+from rom.components.masonry.stones import SHEAR_STIFFNESS_RATIO as SHEAR_STIFFNESS_RATIO
+from rom.components.masonry.stones import TENSION_RTOL as TENSION_RTOL
+from rom.components.masonry.stones import Masonry as Masonry
+from rom.components.masonry.stones import Motion as Motion
+from rom.components.masonry.stones import Stone as Stone
+from rom.components.masonry.stones import polygon_moments as polygon_moments
+from rom.components.masonry.stones import reduced_stone as reduced_stone
+from rom.components.masonry.stones import simulate as simulate
+from rom.components.masonry.stones import stone as stone
+from rom.components.masonry.stones import touching as touching

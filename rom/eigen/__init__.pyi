@@ -1,0 +1,16 @@
+from rom.eigen.verbs import CLUSTER_RTOL as CLUSTER_RTOL
+from rom.eigen.verbs import ON_A_LINE as ON_A_LINE
+from rom.eigen.verbs import Held as Held
+from rom.eigen.verbs import Mass as Mass
+from rom.eigen.verbs import Operators as Operators
+from rom.eigen.verbs import Weighted as Weighted
+from rom.eigen.verbs import canonical_signs as canonical_signs
+from rom.eigen.verbs import count_shift as count_shift
+from rom.eigen.verbs import dofs_of as dofs_of
+from rom.eigen.verbs import given_rigid_motions as given_rigid_motions
+from rom.eigen.verbs import mac as mac
+from rom.eigen.verbs import mean_motion as mean_motion
+from rom.eigen.verbs import orthonormal as orthonormal
+from rom.eigen.verbs import residual_errors as residual_errors
+from rom.eigen.verbs import rigid_motions as rigid_motions
+from rom.eigen.verbs import whole_clusters as whole_clusters

@@ -1,0 +1,16 @@
+from rom.io.sid.format import ALWAYS_SYMMETRIC as ALWAYS_SYMMETRIC
+from rom.io.sid.format import BLOCKS as BLOCKS
+from rom.io.sid.format import DIAGONAL as DIAGONAL
+from rom.io.sid.format import DIALECTS as DIALECTS
+from rom.io.sid.format import GENERAL as GENERAL
+from rom.io.sid.format import NODE_BLOCKS as NODE_BLOCKS
+from rom.io.sid.format import SYMMETRIC as SYMMETRIC
+from rom.io.sid.format import TENSOR as TENSOR
+from rom.io.sid.format import UNIT as UNIT
+from rom.io.sid.format import ZERO as ZERO
+from rom.io.sid.format import StandardInput as StandardInput
+from rom.io.sid.format import Taylor as Taylor
+from rom.io.sid.format import in_dialect as in_dialect
+from rom.io.sid.format import repacked as repacked
+from rom.io.sid.format import shape_of as shape_of
+from rom.io.sid.format import write_sid as write_sid

@@ -1,0 +1,10 @@
+from rom.mbs.parts.bodies import GROUND as GROUND
+from rom.mbs.parts.bodies import SINGULAR_MASS as SINGULAR_MASS
+from rom.mbs.parts.bodies import SURFACE_PREFIX as SURFACE_PREFIX
+from rom.mbs.parts.bodies import Marker as Marker
+from rom.mbs.parts.bodies import Part as Part
+from rom.mbs.parts.bodies import flexible_part as flexible_part
+from rom.mbs.parts.bodies import ground_part as ground_part
+from rom.mbs.parts.bodies import mass_at_rest as mass_at_rest
+from rom.mbs.parts.bodies import rigid_part as rigid_part
+from rom.mbs.parts.bodies import surface_place as surface_place

@@ -1,0 +1,9 @@
+from rom.prestress.heat import Heat as Heat
+from rom.prestress.speed_table import ReducedSpinUp as ReducedSpinUp
+from rom.prestress.speed_table import SpinUp as SpinUp
+from rom.prestress.spin_up import held_solid as held_solid
+from rom.prestress.spin_up import spin_up as spin_up
+from rom.prestress.steady_rotation import SteadyRotation as SteadyRotation
+from rom.prestress.thermal import heated as heated
+from rom.prestress.thermal import heated_sector as heated_sector
+from rom.prestress.thermal import thermal_buckling as thermal_buckling

@@ -1,0 +1,9 @@
+from rom.report.html import KINDS as KINDS
+from rom.report.html import MAX_PICTURE_BYTES as MAX_PICTURE_BYTES
+from rom.report.html import PAGE_STYLE as PAGE_STYLE
+from rom.report.html import checks as checks
+from rom.report.html import paragraph as paragraph
+from rom.report.html import picture as picture
+from rom.report.html import source as source
+from rom.report.html import table as table
+from rom.report.html import write_report as write_report
