@@ -10,6 +10,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from sphinx.application import Sphinx
@@ -196,7 +197,6 @@ def interface_pages() -> dict[str, str]:
         parts.setdefault(rom.MODULES[name].partition(".")[0], []).append(name)
     pages = {f"rom_{part}.rst": _names(part, names) for part, names in sorted(parts.items())}
     pages["rom_fe.rst"] = _modules("rom.fe", ["rom.fe"])
-    pages["rom_view.rst"] += ".. automodule:: rom.view\n"
     for name, modules in _components().items():
         pages[f"{name.replace('.', '_')}.rst"] = _modules(name, modules)
     listed = "\n".join(f"   {name.removesuffix('.rst')}" for name in pages)
@@ -223,15 +223,28 @@ def _head(name: str) -> str:
 
 
 def _names(part: str, names: list[str]) -> str:
-    lines = [_head(f"rom.{part}")]
-    for name in names:
-        kind = "class" if inspect.isclass(getattr(rom, name)) else "function"
-        lines.append(f".. auto{kind}:: rom.{name}\n")
+    lines = [_head(f"rom.{part}"), *(_one(rom, name) for name in names)]
+    if part in rom.PACKAGES:
+        lines += [_one(getattr(rom, part), name) for name in _further(part)]
     for module in ALSO.get(part, ()):
         listed = [name for name in names if rom.MODULES[name] == module]
         skip = f"   :exclude-members: {', '.join(listed)}\n" if listed else ""
         lines.append(f".. automodule:: rom.{module}\n{skip}")
     return "\n".join(lines)
+
+
+def _further(part: str) -> list[str]:
+    """Functions and classes of a package that `rom` does not have, and no module in `ALSO`."""
+    front = getattr(rom, part)
+    own: dict[str, str] = getattr(front, "MODULES", {})
+    shown = ALSO.get(part, ())
+    further = [n for n in own if n not in rom.MODULES and f"{part}.{own[n]}" not in shown]
+    return sorted(name for name in further if callable(getattr(front, name)))
+
+
+def _one(package: ModuleType, name: str) -> str:
+    kind = "class" if inspect.isclass(getattr(package, name)) else "function"
+    return f".. auto{kind}:: {package.__name__}.{name}\n"
 
 
 def _modules(title: str, modules: list[str]) -> str:

@@ -1,4 +1,3 @@
-from rom.io.export import FORMATS as FORMATS
 from rom.io.export import export as export
 from rom.io.export import read_body as read_body
 from rom.io.family import load as load
