@@ -22,7 +22,7 @@ suppress_warnings = ["config.cache"]
 
 autodoc_typehints = "none"  # docstrings give shapes and units, which types cannot
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True}
+autodoc_default_options = {"members": True, "inherited-members": "RomError, Exception, tuple"}
 add_module_names = False
 python_maximum_signature_line_length = 88
 napoleon_use_param = False  # several names may share a line

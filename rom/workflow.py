@@ -14,9 +14,10 @@ from rom.arguments import typed, whole
 from rom.assembly.dual import FreeSubstructure, free_substructure
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
-from rom.body.flexible import FlexibleBody, Marker
+from rom.body.flexible import FlexibleBody
 from rom.body.prestress import UnitLoads
 from rom.body.projection import elastic_part, flexible_body
+from rom.body.records import Marker
 from rom.checks.certificate import certify_body
 from rom.cyclic.reduced import ReducedSector, reduce_sector
 from rom.cyclic.sector import CyclicSector

@@ -21,7 +21,8 @@ from rom.assembly.condensed import (
     system_functions,
 )
 from rom.assembly.coupling import coupled_rows
-from rom.body.flexible import FlexibleBody, Marker
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker
 from rom.errors import ConfigError
 from rom.model import Array, Modes, Report, Row
 from rom.rows import frequency_rows, row

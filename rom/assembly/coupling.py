@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import block_diag
 from scipy.spatial import cKDTree
 
-from rom.body.flexible import Marker, Patch
+from rom.body.records import Marker, Patch
 from rom.errors import InterfaceError
 from rom.model import Array, Index, Interface
 

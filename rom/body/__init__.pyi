@@ -1,9 +1,9 @@
 from rom.body.damping import ModalDamping as ModalDamping
 from rom.body.damping import Rayleigh as Rayleigh
 from rom.body.flexible import FlexibleBody as FlexibleBody
-from rom.body.flexible import Marker as Marker
-from rom.body.flexible import Surface as Surface
 from rom.body.inertia import InertiaIntegrals as InertiaIntegrals
+from rom.body.records import Marker as Marker
+from rom.body.records import Surface as Surface
 from rom.body.recovery import von_mises as von_mises
 from rom.body.rotating import rotating_frequencies as rotating_frequencies
 from rom.body.spread import SpreadLoad as SpreadLoad

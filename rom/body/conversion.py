@@ -4,18 +4,15 @@ Shapes are scaled so that the elastic mass matrix keeps its numbers: ``K`` stays
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rom.body.records import Body, BodyData, Marker, Patch
 from rom.body.recovery import N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR
 from rom.errors import ModelError
 from rom.model import Array
 from rom.units import UnitSystem, unit_system
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody, Marker, Patch
 
 N_INTERFACE_COORDINATES = 6  # coordinates of a rigid or averaged interface: displacement, rotation
 
@@ -60,7 +57,7 @@ class Factors:
         return self.force * (self.length if turns else 1.0)
 
 
-def converted(body: "FlexibleBody", units: str) -> "FlexibleBody":
+def converted(body: Body, units: str) -> Body:
     """The same body with all numbers in another unit system; itself in its own.
 
     Raises:
@@ -93,7 +90,7 @@ def converted(body: "FlexibleBody", units: str) -> "FlexibleBody":
     )
 
 
-def _marker(body: "FlexibleBody", marker: "Marker", f: Factors) -> "Marker":
+def _marker(body: BodyData, marker: Marker, f: Factors) -> Marker:
     rows = _coordinates(body, marker, f)[:, None]
     rigid = np.r_[np.full(3, 1 / f.length), np.ones(3)]
     hold = marker.hold * rows * np.r_[rigid, np.full(body.n_modes, f.shape / f.length)]
@@ -107,7 +104,7 @@ def _marker(body: "FlexibleBody", marker: "Marker", f: Factors) -> "Marker":
     )
 
 
-def _coordinates(body: "FlexibleBody", marker: "Marker", f: Factors) -> Array:
+def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
     """(n_c,) factors of the coordinates: displacements, rotations, or functions of unit norm."""
     n = marker.hold.shape[0]
     if marker.patch is not None:  # functions q with integral of q^2 = 1 have coefficients in m^2
@@ -121,7 +118,7 @@ def _coordinates(body: "FlexibleBody", marker: "Marker", f: Factors) -> Array:
     )
 
 
-def _patch(patch: "Patch", f: Factors) -> "Patch":
+def _patch(patch: Patch, f: Factors) -> Patch:
     shapes = None if patch.shapes is None else patch.shapes / f.length
     return replace(
         patch,

@@ -1,6 +1,6 @@
 """The flexible body: everything a floating-frame integrator needs, independent of the mesh."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,76 +8,23 @@ import numpy.typing as npt
 from scipy.linalg import eigh, null_space
 
 from rom.arguments import typed, whole
-from rom.body.recovery import StressRecovery
-from rom.body.reference import moved_frame, reference_motion, rigid_elastic, rigid_mass
+from rom.body.conversion import converted
+from rom.body.frame import seen_from
+from rom.body.records import BodyData, Marker, Patch, Surface
+from rom.body.reference import rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
-from rom.body.spread import Where, point_areas
-from rom.body.stiffening import SecondOrder, moved_stiffening
-from rom.errors import InterfaceError, ModelError
-from rom.model import Array, Index, Modes, Report
-from rom.names import check_text, named
+from rom.body.stiffening import SecondOrder
+from rom.body.surface import Where, point_areas
+from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
 
-
-@dataclass(frozen=True, slots=True)
-class Patch:
-    """The meshed surface behind a deformable interface, to couple meshes that do not match.
-
-    Attributes:
-        points: (k, 3) undeformed nodes in the body frame [m].
-        surface_mass: (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2].
-        shapes: (3k, n_c) displacement of the nodes per unit of each interface coordinate; None
-            when the coordinates are these displacements.
-    """
-
-    points: Array
-    surface_mass: Any
-    shapes: Array | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Marker:
-    """Where a joint or a force acts.
-
-    Attributes:
-        name: name of the interface.
-        point: (3,) undeformed position in the body frame [m].
-        translation: (3, r) displacement per unit of each elastic coordinate.
-        rotation: (3, r) small rotation vector per unit of each elastic coordinate [rad].
-        kind: "rbe2", "rbe3", "full", or the functions it follows, e.g. "polynomial:3".
-        hold: (n_c, 6 + r) interface coordinates as a function of rigid motion (translation, then
-            rotation about the body origin) and elastic coordinates; zero when it is held.
-        patch: the surface of a deformable interface; None when its motion is rigid or averaged.
-    """
-
-    name: str
-    point: Array
-    translation: Array
-    rotation: Array
-    kind: str
-    hold: Array
-    patch: Patch | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Surface:
-    """Outer surface of the body, for pictures.
-
-    Attributes:
-        points: (s, 3) undeformed positions [m].
-        triangles: (t, 3) corners.
-        shape: (3 s, r) displacement per unit of each elastic coordinate; row 3*node + axis.
-    """
-
-    points: Array
-    triangles: Index
-    shape: Array
+__all__ = ["FlexibleBody", "Marker", "Patch", "Surface"]  # where pickles look for the last three
 
 
 @typed
 @dataclass(frozen=True)
-class FlexibleBody:
+class FlexibleBody(BodyData):
     """A reduced elastic body in its floating frame.
 
     A material point moves as x = r + A (X + sum_k phi_k q_k); the shapes phi contain no rigid
@@ -107,31 +54,6 @@ class FlexibleBody:
         certificate: evidence that it stands for the full model, or None.
     """
 
-    name: str
-    mass: float
-    first_moment: Array
-    inertia: Array
-    S: Array
-    Ibar_kl: Array
-    S_kl: Array
-    K: Array
-    D: Array
-    markers: dict[str, Marker]
-    omega: Array
-    labels: tuple[str, ...]
-    reference: str = "mean-axis"
-    K_geo: dict[str, Array] = field(default_factory=dict)
-    surface: Surface | None = None
-    stress: StressRecovery | None = None
-    units: str = "SI"
-    provenance: dict[str, Any] = field(default_factory=dict)
-    certificate: Report | None = None
-
-    def __post_init__(self) -> None:
-        check_text(self.name, "a body")
-        for name in self.markers:
-            check_text(name, "an interface")
-
     def __repr__(self) -> str:
         kg = self.mass * unit_system(self.units).mass
         return (
@@ -159,21 +81,6 @@ class FlexibleBody:
         return html_table(f"Flexible body {self.name}", ("", ""), rows)
 
     @property
-    def M(self) -> Array:
-        """(r, r) mass of the elastic coordinates [kg]."""
-        return np.einsum("aakl->kl", self.S_kl)
-
-    @property
-    def n_modes(self) -> int:
-        """Number r of elastic coordinates."""
-        return self.K.shape[0]
-
-    @property
-    def has_static_shapes(self) -> bool:
-        """False for a basis of free-free modes alone, which no joint may clamp."""
-        return bool(self.provenance.get("reduction", {}).get("static shapes", True))
-
-    @property
     def interface_names(self) -> tuple[str, ...]:
         """Names of the interfaces."""
         return tuple(self.markers)
@@ -185,8 +92,6 @@ class FlexibleBody:
             ConfigError: if a unit system is unknown.
             ModelError: if an interface has coordinates of unknown dimension.
         """
-        from rom.body.conversion import converted
-
         return converted(self, units)
 
     def with_reference(self, reference: Any) -> "FlexibleBody":
@@ -204,13 +109,7 @@ class FlexibleBody:
             InterfaceError: if an interface is unknown.
             ModelError: if the condition leaves the frame undetermined.
         """
-        X = reference_motion(self, reference)
-        body = moved_frame(self, X)
-        stress = None if self.stress is None else self.stress.moved(X)
-        stiffening = moved_stiffening(self, body, X, reference)
-        body = replace(body, K_geo=stiffening, stress=stress)
-        omega, V = _normal_modes(body.K, body.M)
-        return _recombined(body, V, omega, reference_label(reference))
+        return seen_from(self, reference)
 
     def surface_areas(self, where: Where = None) -> Array:
         """(s,) area that belongs to each point of the surface, undeformed [m^2].
@@ -257,21 +156,6 @@ class FlexibleBody:
         n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed), tol=1e-9)
         omega[:n_rigid] = 0.0
         return Modes(omega[:n], (N @ V)[:, :n])
-
-    def check_support(self, fixed: tuple[str, ...]) -> None:
-        """Refuse to hold interfaces that do not exist, or any of a basis of free-free modes alone.
-
-        Raises:
-            InterfaceError: if an interface is unknown.
-            ModelError: naming the interface.
-        """
-        self._refuse_unknown(fixed)
-        if fixed and not self.has_static_shapes:
-            raise ModelError(
-                f"body {self.name!r} has free-free modes only; with {named(fixed)} held its "
-                "frequencies would be tens of per cents too high.",
-                hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
-            )
 
     def effective_mass(self, *, fixed: tuple[str, ...] = ()) -> Array:
         """(m, 6) share of the rigid body inertia each mode carries when its supports shake.
@@ -348,86 +232,3 @@ class FlexibleBody:
             return np.zeros((1, 6))
         rows = np.vstack([self.marker(name).hold[:, :6] for name in fixed])
         return rows * np.r_[np.ones(3), np.full(3, 1 / self.size)]
-
-    @property
-    def size(self) -> float:
-        """A length that characterises the body [m]."""
-        if self.surface is not None:
-            return float(np.ptp(self.surface.points, axis=0).max())
-        reach = [float(np.linalg.norm(marker.point)) for marker in self.markers.values()]
-        return max([*reach, float(np.sqrt(np.trace(self.inertia) / self.mass))])
-
-    def marker(self, name: str) -> Marker:
-        """The marker of an interface.
-
-        Raises:
-            InterfaceError: listing the names that exist.
-        """
-        self._refuse_unknown((name,))
-        return self.markers[name]
-
-    def _refuse_unknown(self, names: tuple[str, ...]) -> None:
-        if unknown := [name for name in names if name not in self.markers]:
-            raise InterfaceError(
-                f"body {self.name!r} has no interface {named(unknown)}; it has "
-                f"{sorted(self.markers)}."
-            )
-
-
-def reference_label(reference: Any) -> str:
-    """How a reference condition is written in labels and files."""
-    if isinstance(reference, str):
-        return "mean-axis" if reference == "free" else reference
-    return ("pins " if len(reference) == 2 else "3-2-1 ") + " ".join(reference)
-
-
-def _normal_modes(K: Array, M: Array) -> tuple[Array, Array]:
-    smallest = np.linalg.eigvalsh(M).min(initial=np.inf)
-    if smallest <= 0:
-        raise ModelError(
-            f"the elastic mass matrix has the eigenvalue {smallest:.3g}: the elastic coordinates "
-            "contain a rigid motion, which the floating frame already describes.",
-            hint="Choose a reference condition that stops all six rigid motions.",
-        )
-    lam, V = eigh(K, M)
-    signs = np.sign(V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])])
-    return np.sqrt(np.maximum(lam, 0.0)), V * signs
-
-
-def _recombined(body: FlexibleBody, V: Array, omega: Array, reference: str) -> FlexibleBody:
-    """New elastic coordinates q = V q_new."""
-    markers = {
-        name: replace(
-            m,
-            translation=m.translation @ V,
-            rotation=m.rotation @ V,
-            hold=np.hstack([m.hold[:, :6], m.hold[:, 6:] @ V]),
-        )
-        for name, m in body.markers.items()
-    }
-    surface = body.surface
-    if surface is not None:
-        surface = replace(surface, shape=surface.shape @ V)
-    stress = body.stress
-    if stress is not None:
-        stress = stress.recombined(V)
-    S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
-    return replace(
-        body,
-        S=body.S @ V,
-        Ibar_kl=body.Ibar_kl @ V,
-        S_kl=0.5 * (S_kl + S_kl.transpose(1, 0, 3, 2)),
-        K=np.diag(omega**2),
-        D=_symmetric(V.T @ body.D @ V),
-        K_geo={load: _symmetric(V.T @ A @ V) for load, A in body.K_geo.items()},
-        markers=markers,
-        surface=surface,
-        stress=stress,
-        omega=omega,
-        labels=tuple(f"mode {k + 1}, {reference} frame" for k in range(omega.size)),
-        reference=reference,
-    )
-
-
-def _symmetric(A: Array) -> Array:
-    return 0.5 * (A + A.T)

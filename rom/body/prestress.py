@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from rom.body.flexible import Marker
-from rom.body.stiffening import CENTRIFUGAL, PRODUCTS, interface_loads
+from rom.body.records import Marker
+from rom.body.recovery import PRODUCTS
+from rom.body.stiffening import CENTRIFUGAL, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_matrix
 
-from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
+from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.body.prestress import UnitLoads
+from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import (

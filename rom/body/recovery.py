@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.body.stiffening import PRODUCTS
 from rom.errors import ConfigError
 from rom.model import Array
 
+PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  # of two angular velocities
 N_FRAME_LOADS = 12  # acceleration, angular acceleration, products of angular velocities
 
 

@@ -12,25 +12,22 @@ Source:
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from rom.body.records import Body, BodyData, Marker
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.plausible import far_doubt
 from rom.rotation import skew
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody, Marker
-
 
 # The frame of Tisserand carries no momentum of the deformation, that of Buckens keeps its mean
 # square smallest; linearised, both say that the shapes are orthogonal to rigid motion in the mass.
 MEAN = ("mean-axis", "buckens", "free")
 
 
-def reference_motion(body: "FlexibleBody", reference: Any) -> Array:
+def reference_motion(body: BodyData, reference: Any) -> Array:
     """(6, r) rigid motion X hidden in each shape, as the reference condition sees it.
 
     Raises:
@@ -65,13 +62,13 @@ def reference_motion(body: "FlexibleBody", reference: Any) -> Array:
     return np.linalg.solve(from_rigid, from_shapes)
 
 
-def _marker_motion(marker: "Marker", r: int) -> tuple[Array, Array]:
+def _marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
     """The six motions of a marker under rigid motions and under the shapes."""
     rigid = np.block([[np.eye(3), -skew(marker.point)], [np.zeros((3, 3)), np.eye(3)]])
     return rigid, np.vstack([marker.translation, marker.rotation]).reshape(6, r)
 
 
-def _pins(first: "Marker", second: "Marker", r: int) -> tuple[Array, Array]:
+def _pins(first: Marker, second: Marker, r: int) -> tuple[Array, Array]:
     """Chord frame: first point fixed, second on the axis, no mean twist at the first point."""
     axis = second.point - first.point
     length = np.linalg.norm(axis)
@@ -85,7 +82,7 @@ def _pins(first: "Marker", second: "Marker", r: int) -> tuple[Array, Array]:
     return rows[0], rows[1]
 
 
-def _three_two_one(points: "list[Marker]", r: int) -> tuple[Array, Array]:
+def _three_two_one(points: list[Marker], r: int) -> tuple[Array, Array]:
     """Simply supported: first point fixed, second on a line, third on a plane through all three."""
     first, second, third = points
     axis = second.point - first.point
@@ -105,20 +102,20 @@ def _three_two_one(points: "list[Marker]", r: int) -> tuple[Array, Array]:
     return rows[0], rows[1]
 
 
-def rigid_mass(body: "FlexibleBody") -> Array:
+def rigid_mass(body: BodyData) -> Array:
     """(6, 6) mass of the undeformed body: translation, rotation about the origin."""
     skew_d = skew(body.first_moment)
     return np.block([[body.mass * np.eye(3), -skew_d], [skew_d, body.inertia]])
 
 
-def rigid_elastic(body: "FlexibleBody") -> Array:
+def rigid_elastic(body: BodyData) -> Array:
     """(6, r) coupling of rigid and elastic coordinates: momentum and angular momentum of shapes."""
     X = body.Ibar_kl
     angular = np.array([X[1, 2] - X[2, 1], X[2, 0] - X[0, 2], X[0, 1] - X[1, 0]])
     return np.vstack([body.S, angular])
 
 
-def moved_frame(body: "FlexibleBody", X: Array) -> "FlexibleBody":
+def moved_frame(body: Body, X: Array) -> Body:
     """The body with shapes phi_k - (t_k + w_k x X), X = [t; w] (6, r); still not normalised.
 
     Every integral follows from those of the old shapes and of the undeformed body. Geometric
@@ -143,7 +140,7 @@ def moved_frame(body: "FlexibleBody", X: Array) -> "FlexibleBody":
     return replace(body, S=S, Ibar_kl=Ibar, S_kl=S_kl, markers=markers, surface=surface)
 
 
-def moved_integrals(body: "FlexibleBody", X: Array) -> tuple[Array, Array]:
+def moved_integrals(body: BodyData, X: Array) -> tuple[Array, Array]:
     """Integrals S (3, r) and Ibar_kl (3, 3, r) of the shapes without the rigid motion X (6, r)."""
     t, W = X[:3], np.einsum("abc,ck->abk", skew_tensor(), X[3:])
     d = body.first_moment
@@ -153,7 +150,7 @@ def moved_integrals(body: "FlexibleBody", X: Array) -> tuple[Array, Array]:
     return S, Ibar
 
 
-def moved_marker(marker: "Marker", X: Array) -> "Marker":
+def moved_marker(marker: Marker, X: Array) -> Marker:
     """The marker without the rigid motion X (6, r)."""
     W = np.einsum("abc,ck->abk", skew_tensor(), X[3:])
     return replace(

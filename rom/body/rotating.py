@@ -1,25 +1,23 @@
 """Natural frequencies of a body that rotates steadily with its supports."""
 
 import warnings
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigvals, null_space
 
 from rom.arguments import finite, unit_vector
+from rom.body.frame import seen_from
+from rom.body.records import BodyData
 from rom.body.stiffening import SecondOrder
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.model import Array
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
 
 GROWTH_RATE_RTOL = 1e-6  # growth rate of an unstable motion, of the largest frequency
 
 
 def rotating_frequencies(
-    body: "FlexibleBody",
+    body: BodyData,
     speed: float,
     axis: npt.ArrayLike,
     *,
@@ -37,7 +35,7 @@ def rotating_frequencies(
             RomWarning,
             stacklevel=3,
         )
-    seen = body.with_reference(fixed[0])  # in its frame the first support is at rest
+    seen = seen_from(body, fixed[0])  # in its frame the first support is at rest
     H = np.vstack([_held(seen, name) for name in fixed])
     N = null_space(H, rcond=1e-10) if H.size else np.eye(seen.n_modes)
     K, G = rotating_matrices(seen, w, arm, fixed[1:])
@@ -45,7 +43,7 @@ def rotating_frequencies(
     return _frequencies(M, K, G, f"body {body.name!r} at {speed:g} rad/s")
 
 
-def _held(body: "FlexibleBody", name: str) -> Array:
+def _held(body: BodyData, name: str) -> Array:
     """(h, r) coordinates of an interface, without those that its frame holds to round-off."""
     rows = body.marker(name).hold
     rigid = np.abs(rows[:, :6] * np.r_[np.ones(3), np.full(3, 1 / body.size)]).max()
@@ -55,7 +53,7 @@ def _held(body: "FlexibleBody", name: str) -> Array:
 
 
 def rotating_matrices(
-    body: "FlexibleBody", w: Array, at: Array, supports: tuple[str, ...] = ()
+    body: BodyData, w: Array, at: Array, supports: tuple[str, ...] = ()
 ) -> tuple[Array, Array]:
     """Stiffness and gyroscopic matrix (r, r) of small vibrations in a frame that turns steadily.
 
@@ -86,7 +84,7 @@ def _centrifugal(S: Array, w: Array) -> Array:
     return found
 
 
-def _reactions(body: "FlexibleBody", load: Array, supports: tuple[str, ...]) -> dict[str, Array]:
+def _reactions(body: BodyData, load: Array, supports: tuple[str, ...]) -> dict[str, Array]:
     """{support: (6,) force and moment at its marker} that hold it in place against a load."""
     if not supports:
         return {}

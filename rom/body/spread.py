@@ -1,21 +1,15 @@
 """Loads spread over a body, reduced once to what a floating frame feels of them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
+from rom.body.flexible import FlexibleBody
+from rom.body.surface import Where, chosen_triangles, surface_of
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
-
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody
-
-Where = Callable[[Array], Any] | str | None
-COINCIDENT_RTOL = 1e-9  # of the body's size
 
 
 @typed
@@ -45,7 +39,7 @@ class SpreadLoad:
 
 @typed
 def surface_load(
-    body: "FlexibleBody",
+    body: FlexibleBody,
     *,
     pressure: float | None = None,
     traction: npt.ArrayLike | None = None,
@@ -71,7 +65,7 @@ def surface_load(
     """
     if sum(x is not None for x in (pressure, traction, forces)) != 1:
         raise ConfigError("give either a pressure, a traction or forces.")
-    surface = _surface(body)
+    surface = surface_of(body)
     shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
     if forces is not None:
         f = np.asarray(forces, dtype=float)
@@ -83,7 +77,7 @@ def surface_load(
         return _reduced(surface.points, shapes, f)
     if pressure is not None:
         _refuse_inside_out(body.name, surface.triangles)
-    chosen, areas = _triangles(body, where)
+    chosen, areas = chosen_triangles(body, where)
     if pressure is not None:
         each = -float(pressure) * areas
     else:
@@ -96,33 +90,8 @@ def surface_load(
     return _reduced(surface.points, shapes, f)
 
 
-def point_areas(body: "FlexibleBody", where: Where = None) -> Array:
-    """(s,) a third of the area of the chosen triangles around each point of the surface [m^2]."""
-    chosen, areas = _triangles(body, where)
-    out = np.zeros(_surface(body).points.shape[0])
-    np.add.at(out, chosen.ravel(), np.repeat(np.linalg.norm(areas, axis=1) / 3, 3))
-    return out
-
-
-def _surface(body: "FlexibleBody") -> Any:
-    if body.surface is None:
-        raise ModelError(
-            f"body {body.name!r} carries no surface: nothing to spread a load on.",
-            hint="Reduce a model that has one; imported matrices have none.",
-        )
-    return body.surface
-
-
-def _triangles(body: "FlexibleBody", where: Where) -> tuple[Index, Array]:
-    """(t, 3) corners of the chosen triangles and their areas times the normal (t, 3)."""
-    surface = _surface(body)
-    chosen = surface.triangles[_chosen(body, where)]
-    a, b, c = np.moveaxis(surface.points[chosen], 1, 0)
-    return chosen, 0.5 * np.cross(b - a, c - a)
-
-
 @typed
-def mass_load(body: "FlexibleBody", acceleration: npt.ArrayLike) -> SpreadLoad:
+def mass_load(body: FlexibleBody, acceleration: npt.ArrayLike) -> SpreadLoad:
     """Force per mass on every particle of a body, such as gravity or a magnetic pull.
 
     Args:
@@ -142,38 +111,6 @@ def mass_load(body: "FlexibleBody", acceleration: npt.ArrayLike) -> SpreadLoad:
 def _reduced(points: Array, shapes: Array, f: Array) -> SpreadLoad:
     both = np.einsum("nak,nb->kab", shapes, f, optimize=True)
     return SpreadLoad(f.sum(axis=0), points.T @ f, both)
-
-
-def _chosen(body: "FlexibleBody", where: Where) -> Any:
-    """(t,) which triangles are meant."""
-    surface: Any = body.surface
-    corners = surface.points[surface.triangles]
-    if where is None:
-        chosen = np.ones(len(corners), dtype=bool)
-    elif isinstance(where, str):
-        chosen = _on_interface(body, where)[surface.triangles].all(axis=1)
-    else:
-        chosen = np.asarray(where(corners.mean(axis=1)))
-    if chosen.shape != (len(corners),) or chosen.dtype != bool or not chosen.any():
-        raise ConfigError(
-            f"`where` chooses no triangle of the {len(corners)} on body {body.name!r}.",
-            hint="It takes (t, 3) points and returns (t,) booleans.",
-        )
-    return chosen
-
-
-def _on_interface(body: "FlexibleBody", name: str) -> Any:
-    """(s,) whether the points of the surface belong to a deformable interface."""
-    patch = body.markers[name].patch if name in body.markers else None
-    if patch is None:
-        raise ConfigError(
-            f"body {body.name!r} has no deformable interface {name!r}.",
-            hint="Choose the place by a function of points.",
-        )
-    surface: Any = body.surface
-    grid = COINCIDENT_RTOL * max(float(np.ptp(surface.points, axis=0).max()), 1e-300)
-    known = {tuple(x) for x in np.round(patch.points / grid / 100).astype(int)}
-    return np.array([tuple(x) in known for x in np.round(surface.points / grid / 100).astype(int)])
 
 
 def _refuse_inside_out(name: str, triangles: Index) -> None:

@@ -22,20 +22,18 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from rom.body.records import BodyData, Marker
+from rom.body.recovery import PRODUCTS
 from rom.body.reference import moved_integrals, moved_marker, reference_motion, skew_tensor
 from rom.errors import ConfigError
 from rom.model import Array
 
-if TYPE_CHECKING:
-    from rom.body.flexible import FlexibleBody, Marker
-
 AXIS_NAMES = "xyz"
 ROUND_OFF = 1e-11  # of the largest displacement of second order
-PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 CENTRIFUGAL = tuple(
     f"omega_{AXIS_NAMES[i]}^2" if i == j else f"omega_{AXIS_NAMES[i]} omega_{AXIS_NAMES[j]}"
     for i, j in PRODUCTS
@@ -49,7 +47,7 @@ def interface_loads(name: str) -> tuple[str, ...]:
     return tuple(f"{name} {kind}_{axis}" for kind in "fm" for axis in AXIS_NAMES)
 
 
-def known_loads(body: "FlexibleBody") -> tuple[str, ...]:
+def known_loads(body: BodyData) -> tuple[str, ...]:
     """All loads a body can have a geometric stiffness for."""
     interfaces = (load for name in body.markers for load in interface_loads(name))
     return (*CENTRIFUGAL, *ANGULAR, *LINEAR, *interfaces)
@@ -70,7 +68,7 @@ class SecondOrder:
     markers: dict[str, Array]
 
     @classmethod
-    def of(cls, body: "FlexibleBody") -> "SecondOrder":
+    def of(cls, body: BodyData) -> "SecondOrder":
         """Read from the matrices of a body.
 
         Raises:
@@ -119,7 +117,7 @@ def _product(X: Array, i: int, j: int) -> Array:
     return X[i, i] - np.einsum("aakl->kl", X) if i == j else X[i, j] + X[j, i]
 
 
-def _check(body: "FlexibleBody") -> None:
+def _check(body: BodyData) -> None:
     known, r = known_loads(body), body.n_modes
     for load, A in body.K_geo.items():
         if load not in known:
@@ -135,7 +133,7 @@ def _check(body: "FlexibleBody") -> None:
             )
 
 
-def moved_stiffening(old: "FlexibleBody", new: "FlexibleBody", X: Array, reference: Any) -> Any:
+def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: Any) -> Any:
     """Geometric stiffness seen from another frame.
 
     The frame turns and moves with the body: rotations compose, and what the reference condition
@@ -162,7 +160,7 @@ def moved_stiffening(old: "FlexibleBody", new: "FlexibleBody", X: Array, referen
     return found.without_round_off(old.mass, old.size).matrices()
 
 
-def _turned(motion: Array, old: "Marker", new: "Marker", W: Array) -> Array:
+def _turned(motion: Array, old: Marker, new: Marker, W: Array) -> Array:
     """Second-order motion of a marker seen from a frame that turns by W q."""
     shift = _symmetrised(2 * np.einsum("abk,bl->akl", W, new.translation))
     WW = _symmetrised(np.einsum("abk,bcl->ackl", W, W))
@@ -171,7 +169,7 @@ def _turned(motion: Array, old: "Marker", new: "Marker", W: Array) -> Array:
     return motion - np.concatenate([shift, turn])
 
 
-def _without_rigid(body: "FlexibleBody", psi: SecondOrder, r: int, reference: Any) -> SecondOrder:
+def _without_rigid(body: BodyData, psi: SecondOrder, r: int, reference: Any) -> SecondOrder:
     """Every pair k, l counts as one shape of a body, whose frame obeys the reference condition."""
     flat = {name: motion.reshape(6, -1) for name, motion in psi.markers.items()}
     pairs = replace(

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.body.flexible import FlexibleBody, Marker, Patch, Surface
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import N_FRAME_LOADS, StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError
 from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive

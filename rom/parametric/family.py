@@ -16,7 +16,8 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh, damped
-from rom.body.flexible import FlexibleBody, reference_label
+from rom.body.flexible import FlexibleBody
+from rom.body.frame import reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
 from rom.body.recovery import StressRecovery
 from rom.model import Array, Report

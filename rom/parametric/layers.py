@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import null_space
 
-from rom.body.flexible import FlexibleBody, Marker, Surface
+from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
+from rom.body.records import Marker, Surface
 from rom.eigen.verbs import rigid_motions
 from rom.model import Array
 from rom.parametric.parameters import Parameter, Point, Thickness, factor

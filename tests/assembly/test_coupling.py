@@ -12,7 +12,7 @@ from cases.halves import COUPLED, ROOT, half, halves, joined, study, whole
 from cases.solid import block
 from cases.surfaces import surface
 from rom.assembly import coupling
-from rom.body.flexible import Marker, Patch
+from rom.body.records import Marker, Patch
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.body.flexible import FlexibleBody, Marker
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker
 
 N = 40  # elements
 

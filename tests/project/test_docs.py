@@ -108,6 +108,7 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert done.returncode == 0, done.stderr
     site = {p.relative_to(tmp_path / "site").as_posix(): p for p in tmp_path.rglob("*.html")}
     assert {"index.html", "generated/errors.html", "generated/demo_beam.html"} <= set(site)
+    assert "rom.FlexibleBody.marker" in site["generated/rom_body.html"].read_text()  # inherited
     for path in site.values():  # nothing is fetched when the site is read
         assert 'src="http' not in path.read_text() and '<link href="http' not in path.read_text()
 

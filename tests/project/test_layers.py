@@ -196,7 +196,6 @@ ORDER = {
     ),
 }
 CIRCLES = {  # files that still import each other
-    "body.conversion body.flexible body.recovery body.reference body.rotating body.spread body.stiffening",  # noqa: E501
     "fe.forms.finite_strain fe.forms.region fe.forms.stress",
     "fe.mesh.sources.builder fe.mesh.sources.gmsh_session fe.mesh.sources.readers fe.mesh.sources.step",  # noqa: E501
     "fe.operators.petsc fe.operators.tied",

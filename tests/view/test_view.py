@@ -14,7 +14,7 @@ from PIL import Image  # noqa: E402
 
 from cases.mbs.mechanisms import lattice, lattice_body  # noqa: E402
 from rom import view  # noqa: E402
-from rom.body.flexible import Surface  # noqa: E402
+from rom.body.records import Surface  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402
 from rom.mbs.analysis.campbell import Campbell  # noqa: E402
 from rom.mbs.integrate.simulation import simulate  # noqa: E402

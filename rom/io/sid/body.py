@@ -5,16 +5,11 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.body.flexible import FlexibleBody, Marker
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker
+from rom.body.recovery import PRODUCTS
 from rom.body.reference import skew_tensor
-from rom.body.stiffening import (
-    ANGULAR,
-    CENTRIFUGAL,
-    LINEAR,
-    PRODUCTS,
-    SecondOrder,
-    interface_loads,
-)
+from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR, SecondOrder, interface_loads
 from rom.errors import ConfigError
 from rom.io.sid.dialect import by_mode, first
 from rom.io.sid.format import StandardInput, Taylor

@@ -8,7 +8,8 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, eigh
 
-from rom.body.flexible import FlexibleBody, Marker
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker
 from rom.body.stiffening import known_loads
 from rom.errors import RomWarning
 from rom.mbs.equations.equations import evaluate, residual, tangents

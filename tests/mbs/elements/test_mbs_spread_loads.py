@@ -19,7 +19,7 @@ from cases.mbs.motions import swing
 from cases.mbs.tangents import check_tangents
 from cases.solid import block
 from rom import rotation
-from rom.body.flexible import Surface
+from rom.body.records import Surface
 from rom.errors import ConfigError, ModelError
 from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators

@@ -1,0 +1,155 @@
+"""What a flexible body consists of; the functions that make and move one take this."""
+
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.body.recovery import StressRecovery
+from rom.errors import InterfaceError, ModelError
+from rom.model import Array, Index, Report
+from rom.names import check_text, named
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """The meshed surface behind a deformable interface, to couple meshes that do not match.
+
+    Attributes:
+        points: (k, 3) undeformed nodes in the body frame [m].
+        surface_mass: (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2].
+        shapes: (3k, n_c) displacement of the nodes per unit of each interface coordinate; None
+            when the coordinates are these displacements.
+    """
+
+    points: Array
+    surface_mass: Any
+    shapes: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """Where a joint or a force acts.
+
+    Attributes:
+        name: name of the interface.
+        point: (3,) undeformed position in the body frame [m].
+        translation: (3, r) displacement per unit of each elastic coordinate.
+        rotation: (3, r) small rotation vector per unit of each elastic coordinate [rad].
+        kind: "rbe2", "rbe3", "full", or the functions it follows, e.g. "polynomial:3".
+        hold: (n_c, 6 + r) interface coordinates as a function of rigid motion (translation, then
+            rotation about the body origin) and elastic coordinates; zero when it is held.
+        patch: the surface of a deformable interface; None when its motion is rigid or averaged.
+    """
+
+    name: str
+    point: Array
+    translation: Array
+    rotation: Array
+    kind: str
+    hold: Array
+    patch: Patch | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Outer surface of the body, for pictures.
+
+    Attributes:
+        points: (s, 3) undeformed positions [m].
+        triangles: (t, 3) corners.
+        shape: (3 s, r) displacement per unit of each elastic coordinate; row 3*node + axis.
+    """
+
+    points: Array
+    triangles: Index
+    shape: Array
+
+
+@typed
+@dataclass(frozen=True)
+class BodyData:
+    """The constants of a flexible body, as `rom.FlexibleBody` explains them."""
+
+    name: str
+    mass: float
+    first_moment: Array
+    inertia: Array
+    S: Array
+    Ibar_kl: Array
+    S_kl: Array
+    K: Array
+    D: Array
+    markers: dict[str, Marker]
+    omega: Array
+    labels: tuple[str, ...]
+    reference: str = "mean-axis"
+    K_geo: dict[str, Array] = field(default_factory=dict)
+    surface: Surface | None = None
+    stress: StressRecovery | None = None
+    units: str = "SI"
+    provenance: dict[str, Any] = field(default_factory=dict)
+    certificate: Report | None = None
+
+    def __post_init__(self) -> None:
+        check_text(self.name, "a body")
+        for name in self.markers:
+            check_text(name, "an interface")
+
+    @property
+    def M(self) -> Array:
+        """(r, r) mass of the elastic coordinates [kg]."""
+        return np.einsum("aakl->kl", self.S_kl)
+
+    @property
+    def n_modes(self) -> int:
+        """Number r of elastic coordinates."""
+        return self.K.shape[0]
+
+    @property
+    def has_static_shapes(self) -> bool:
+        """False for a basis of free-free modes alone, which no joint may clamp."""
+        return bool(self.provenance.get("reduction", {}).get("static shapes", True))
+
+    def check_support(self, fixed: tuple[str, ...]) -> None:
+        """Refuse to hold interfaces that do not exist, or any of a basis of free-free modes alone.
+
+        Raises:
+            InterfaceError: if an interface is unknown.
+            ModelError: naming the interface.
+        """
+        self._refuse_unknown(fixed)
+        if fixed and not self.has_static_shapes:
+            raise ModelError(
+                f"body {self.name!r} has free-free modes only; with {named(fixed)} held its "
+                "frequencies would be tens of per cents too high.",
+                hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
+            )
+
+    @property
+    def size(self) -> float:
+        """A length that characterises the body [m]."""
+        if self.surface is not None:
+            return float(np.ptp(self.surface.points, axis=0).max())
+        reach = [float(np.linalg.norm(marker.point)) for marker in self.markers.values()]
+        return max([*reach, float(np.sqrt(np.trace(self.inertia) / self.mass))])
+
+    def marker(self, name: str) -> Marker:
+        """The marker of an interface.
+
+        Raises:
+            InterfaceError: listing the names that exist.
+        """
+        self._refuse_unknown((name,))
+        return self.markers[name]
+
+    def _refuse_unknown(self, names: tuple[str, ...]) -> None:
+        if unknown := [name for name in names if name not in self.markers]:
+            raise InterfaceError(
+                f"body {self.name!r} has no interface {named(unknown)}; it has "
+                f"{sorted(self.markers)}."
+            )
+
+
+Body = TypeVar("Body", bound=BodyData)  # of whoever asks: a moved body is of the same class
