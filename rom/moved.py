@@ -38,7 +38,8 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
      "abaqus builder deck gmsh_groups gmsh_session nastran readers step"),
     ("rom.fe", "rom.fe.operators",
      "aij counting factor held iterative krylov_schur lanczos memory petsc solver spectrum "
-     "tied"),
+     "tied=petsc"),
+    ("rom.fe.operators", "rom.fe.operators", "tied=petsc"),
     ("rom.io", "rom.io.fields", "gltf universal vtkhdf vtu"),
     ("rom.io", "rom.io.matrices",
      "calculix dmig foreign_model=read_model market matrix_files node_files op4 user_element"),

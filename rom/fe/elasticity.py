@@ -17,11 +17,11 @@ from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagEr
 from rom.fe.compat import assemble_matrix, cell_name, lagrange, versions
 from rom.fe.forms.material import by_region, coefficients, described, doubts
 from rom.fe.forms.nodes import all_points, interface, outer_surface
-from rom.fe.forms.region import Regions, aij, forms
+from rom.fe.forms.region import Regions, forms
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
 from rom.fe.mesh.solid import SolidMesh
-from rom.fe.operators.aij import symmetric
+from rom.fe.operators.aij import symmetric, wrapped
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import parsed
@@ -173,7 +173,7 @@ def _finish(K: PETSc.Mat, M: PETSc.Mat, points: Array, fields: dict[str, Any]) -
     K.destroy()
     M.destroy()
     give_back()
-    return FEModel(A, B, points, operators=PETScOperators(aij(A), aij(B), rigid), **fields)
+    return FEModel(A, B, points, operators=PETScOperators(wrapped(A), wrapped(B), rigid), **fields)
 
 
 def _check_mesh(mesh: Any, degree: int) -> str:

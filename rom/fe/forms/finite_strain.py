@@ -27,9 +27,8 @@ from rom.fe.compat import (
     per_cell,
 )
 from rom.fe.forms.material import stress
-from rom.fe.forms.region import aij
 from rom.fe.jit import compiling
-from rom.fe.operators.aij import symmetric
+from rom.fe.operators.aij import symmetric, wrapped
 from rom.model import Array
 
 
@@ -98,7 +97,7 @@ class FiniteStrain:
 
     def layout(self, A: csr_matrix) -> Any:
         """The same matrix for the operators of the model."""
-        return aij(A)
+        return wrapped(A)
 
     def _matrix(self, form: Any) -> csr_matrix:
         A = assemble_matrix(form)

@@ -3,18 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mpi4py import MPI
-from petsc4py import PETSc
-
 import numpy as np
 import ufl
-from scipy.sparse import csr_matrix
 
 from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, geometry_degree
 from rom.fe.forms.material import Solid, of_region, stress
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
-from rom.fe.operators.aij import symmetric
+from rom.fe.operators.aij import symmetric, wrapped
 from rom.model import Array, Index, Layered, Region
 
 LAYER_GAP_RTOL = 1e-9  # of the extent: gap between cells of one layer
@@ -42,7 +38,7 @@ class Regions(Mapping[str, Region]):
             numbers = of_region(mesh, self.tags, self.solids, tag)
             K, M = (assemble_matrix(form) for form in forms(self.V, numbers, self.degree))
         if mesh.comm.size == 1:
-            K, M = (aij(symmetric(A)) for A in (K, M))
+            K, M = (wrapped(symmetric(A)) for A in (K, M))
         stresses = Stresses(self.V, numbers, self.degree)
         return Region(K, M, stresses, lambda axis: self._stretched(tag, numbers, axis))
 
@@ -52,7 +48,7 @@ class Regions(Mapping[str, Region]):
             split = stretched_forms(self.V, numbers, self.degree, axis)
             parts = [assemble_matrix(form) for form in split]
         if mesh.comm.size == 1:
-            parts = [aij(symmetric(A)) for A in parts]
+            parts = [wrapped(symmetric(A)) for A in parts]
         return Layered(self._layers(tag, axis), *parts)
 
     def _layers(self, tag: int, axis: int) -> tuple[tuple[float, float], ...]:
@@ -126,9 +122,3 @@ def _quadrature(name: str, degree: int, curved: int) -> tuple[int, int]:
     if name == "tetrahedron":
         return 2 * (degree - 1) + 3 * (curved - 1), 2 * degree + 3 * (curved - 1)
     return 2 * degree + 2 * (curved - 1), 2 * degree + 3 * curved - 1
-
-
-def aij(A: csr_matrix) -> PETSc.Mat:
-    """The same numbers in the same memory, for PETSc."""
-    csr = (A.indptr, A.indices, A.data)
-    return PETSc.Mat().createAIJWithArrays(A.shape, csr, bsize=3, comm=MPI.COMM_SELF)

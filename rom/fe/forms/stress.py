@@ -19,6 +19,7 @@ from rom.fe.compat import (
     reference_points,
     to_global,
 )
+from rom.fe.forms.finite_strain import FiniteStrain
 from rom.fe.forms.material import stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
@@ -129,8 +130,6 @@ class Stresses:
 
     def finite_strain(self) -> Any:
         """The same solid in large motion, `finite_strain.FiniteStrain`; on one process."""
-        from rom.fe.forms.finite_strain import FiniteStrain
-
         return FiniteStrain(self.V, self.numbers, self.degree, *self.regions)
 
     def _second_variation(self, load: Any) -> ufl.Form:

@@ -65,6 +65,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 Read = tuple[Arrays, dict[str, Any]]  # arrays and notes
+Made = tuple[dict[str, Any], dict[str, Any]]  # parameters used, defaults of some of them
 
 
 def packed(

@@ -44,6 +44,12 @@ def weighted(A: PETSc.Mat, weight: float, parts: list[tuple[float, PETSc.Mat]]) 
     return B
 
 
+def wrapped(A: csr_matrix) -> PETSc.Mat:
+    """The same numbers in the same memory, on one process; three dofs to a node."""
+    csr = (A.indptr, A.indices, A.data)
+    return PETSc.Mat().createAIJWithArrays(A.shape, csr, bsize=3, comm=MPI.COMM_SELF)
+
+
 def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
     """The rows of this rank of a distributed matrix.
 
@@ -57,6 +63,21 @@ def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
     matrix = PETSc.Mat().createAIJ(size=sizes, csr=csr, comm=comm)
     matrix.assemble()
     return matrix
+
+
+def chosen(dofs: Index, n: int, comm: MPI.Comm) -> PETSc.IS:
+    """Rows of this rank, by number, that a submatrix takes from one of n rows."""
+    rows = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=comm)
+    if n % 3 == 0 and _whole_nodes(dofs, comm):
+        rows.setBlockSize(3)  # multigrid then aggregates nodes
+    return rows
+
+
+def _whole_nodes(dofs: Index, comm: MPI.Comm) -> bool:
+    """True when, on every rank, the dofs are all three of their nodes."""
+    mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
+    mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
+    return bool(comm.allreduce(mine, op=MPI.LAND))
 
 
 def gathered(A: PETSc.Mat) -> csr_matrix:

@@ -5,6 +5,7 @@ stiffness is factored already, come from our block Lanczos, which asks for many 
 and needs half the time. A certificate thereby compares two eigensolvers that share no line.
 """
 
+from functools import cached_property
 from typing import Any
 
 from mpi4py import MPI
@@ -18,14 +19,14 @@ from scipy.sparse import csr_matrix
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.fe.operators.aij import aij, gathered, weighted
+from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
 from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
 from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.lanczos import BlockLanczos, capacity
-from rom.fe.operators.memory import check_factor_memory
+from rom.fe.operators.memory import check_factor_memory, give_back
 from rom.fe.operators.solver import DIRECT, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
@@ -115,23 +116,12 @@ class PETScOperators:
 
     def part(self, rows: Index) -> "PETScOperators":
         """The body with all dofs held but these: numbers on this rank."""
-        dofs = self.first + rows
-        some = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=self.comm)
-        if self.n % 3 == 0 and self._whole_nodes(dofs):
-            some.setBlockSize(3)  # multigrid then aggregates nodes
+        some = chosen(self.first + rows, self.n, self.comm)
         K, M = (A.createSubMatrix(some, some) for A in (self.K, self.M))
         return PETScOperators(K, M, fixed=self.fixed[rows], solver=self.solver)
 
-    def _whole_nodes(self, dofs: Index) -> bool:
-        """True when, on every rank, the dofs are all three of their nodes."""
-        mine = dofs.size % 3 == 0 and bool((dofs[::3] % 3 == 0).all())
-        mine = mine and all(bool((dofs[a::3] == dofs[::3] + a).all()) for a in (1, 2))
-        return bool(self.comm.allreduce(mine, op=MPI.LAND))
-
     def transform(self, T: Any, rigid: Array) -> "PETScOperators":
         """The same body in the coordinates a of u = T a."""
-        from rom.fe.operators.tied import TiedOperators  # which is one of these itself
-
         return TiedOperators(self, csr_matrix(T), rigid)
 
     def expand(self, A: Array) -> Array:
@@ -243,7 +233,7 @@ class PETScOperators:
         if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES) + n_rigid):
             lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
         else:
-            sigma = -SHIFT_RATIO * self.first_elastic(R) if sigma is None else sigma
+            sigma = -SHIFT_RATIO * first_elastic(self) if sigma is None else sigma
             inverse = self.inverse(self.shifted(sigma), self.rigid)
             lam, Phi = self.lowest(m + N_SPARE_MODES, sigma, inverse, R)
             inverse.release()  # counting needs its memory
@@ -323,24 +313,78 @@ class PETScOperators:
         lam, Phi = eigh(K, M)
         return lam, Phi[self.first : self.first + self.n_local]
 
-    def first_elastic(self, R: Array) -> float:
-        """Estimate of the first elastic eigenvalue, for the choice of a shift.
 
-        With geometry, an upper bound; new coordinates leave its order of magnitude.
+class TiedOperators(PETScOperators):
+    """A body in the coordinates a of u = T a.
+
+    T^T K T is formed when it is needed. A reduction whose interface coordinates are all held needs
+    the rows of dofs that T leaves alone, and those stand in K already.
+
+    Args:
+        parent: operators in the coordinates u.
+        T: (n_local of u, n of a) rows of the map.
+        rigid: (n_local, 6) rigid motions in the coordinates a.
+    """
+
+    parent: PETScOperators
+
+    def __init__(self, parent: PETScOperators, T: csr_matrix, rigid: Array):
+        self.parent, self.rigid, self.comm, self.solver = parent, rigid, parent.comm, parent.solver
+        self.affordable = parent.affordable
+        sizes = ((parent.n_local, parent.n), (rigid.shape[0], T.shape[1]))
+        self.T = aij(T, sizes, self.comm)
+        self.n = T.shape[1]
+        self.first, end = self.T.getOwnershipRangeColumn()
+        self.n_local, self.last = end - self.first, parent.last
+        x, y = self.T.createVecs()
+        y.array[:] = parent.fixed
+        self.T.multTranspose(y, x)
+        self.fixed = x.array.copy()
+        self.plain = self._plain(T)
+
+    def _plain(self, T: csr_matrix) -> Index:
+        """(n_local,) row of the parent that is this coordinate and no other's; -1 if there is none.
+
+        Kept dofs stay on their rank, so that their rows are here.
         """
-        if self.parent is not None:
-            return self.parent.first_elastic(R)
-        if self.rigid is not None:
-            return first_elastic(self)
-        return self._by_inverse_iteration()
+        alone = np.flatnonzero(np.diff(T.indptr) == 1)
+        alone = alone[T.data[T.indptr[alone]] == 1.0]
+        others = np.setdiff1d(np.arange(T.shape[0]), alone)
+        shared = np.concatenate(self.comm.allgather(np.unique(T[others].indices)))
+        column = T.indices[T.indptr[alone]]
+        here = (column >= self.first) & (column < self.first + self.n_local)
+        plain = np.full(self.n_local, -1)
+        plain[column[here] - self.first] = alone[here]
+        shared = shared[(shared >= self.first) & (shared < self.first + self.n_local)]
+        plain[shared.astype(np.int64) - self.first] = -1
+        return plain
 
-    def _by_inverse_iteration(self) -> float:
-        """Smallest eigenvalue that is not zero, estimated without geometry."""
-        floor = RIGID_RTOL * self.largest()
-        factor = Factor(self.shifted(-1e-6 * self.largest()), definite=True, solver=self.solver)
-        X = self.fixed[:, None] ** np.arange(1.0, 9.0)
-        for _ in range(4):
-            X = factor.solve(self.apply_M(X))
-            X = np.linalg.solve(np.linalg.cholesky(self.gram(X, X)), X.T).T
-        lam = eigh(self.gram(X, self.apply_K(X)), self.gram(X, self.apply_M(X)), eigvals_only=True)
-        return float(max(lam[np.argmax(lam > floor)], floor))
+    def part(self, rows: Index) -> PETScOperators:
+        """The body with all coordinates held but these."""
+        same = self.plain[rows]
+        if self.comm.allreduce(bool((same >= 0).all()), op=MPI.LAND):
+            return self.parent.part(same)
+        return super().part(rows)
+
+    def apply_K(self, X: Array) -> Array:
+        """T^T K T X."""
+        return self.restrict(self.parent.apply_K(self.expand(X)))
+
+    def apply_M(self, X: Array) -> Array:
+        """T^T M T X."""
+        return self.restrict(self.parent.apply_M(self.expand(X)))
+
+    @cached_property
+    def K(self) -> PETSc.Mat:
+        """T^T K T."""
+        return self._projected(self.parent.K)
+
+    @cached_property
+    def M(self) -> PETSc.Mat:
+        """T^T M T."""
+        return self._projected(self.parent.M)
+
+    def _projected(self, A: PETSc.Mat) -> PETSc.Mat:
+        projected = symmetrized(A.ptap(self.T))
+        give_back()
+        return projected

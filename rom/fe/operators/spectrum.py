@@ -8,6 +8,8 @@ from mpi4py import MPI
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.fe.operators.factor import Factor
+from rom.fe.operators.held import RIGID_RTOL
 from rom.model import Array
 
 CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
@@ -60,6 +62,16 @@ def polynomial_fields(comm: MPI.Comm, rigid: Array) -> Array:
 
 
 def first_elastic(ops: Any) -> float:
+    """Estimate of the first elastic eigenvalue, for the choice of a shift.
+
+    With geometry, an upper bound; new coordinates leave its order of magnitude.
+    """
+    if ops.parent is not None:
+        return first_elastic(ops.parent)
+    return _by_polynomials(ops) if ops.rigid is not None else _by_inverse_iteration(ops)
+
+
+def _by_polynomials(ops: Any) -> float:
     """Upper bound of the first elastic eigenvalue: Rayleigh and Ritz with polynomial fields."""
     X = polynomial_fields(ops.comm, ops.rigid)
     K, M = ops.gram(X, ops.apply_K(X)), ops.gram(X, ops.apply_M(X))
@@ -68,6 +80,18 @@ def first_elastic(ops: Any) -> float:
     U = U[:, kept] / np.sqrt(lam[kept])
     lam = eigh(U.T @ K @ U, eigvals_only=True)
     return float(lam[min(6, lam.size - 1)])
+
+
+def _by_inverse_iteration(ops: Any) -> float:
+    """Smallest eigenvalue that is not zero, estimated without geometry."""
+    floor = RIGID_RTOL * ops.largest()
+    factor = Factor(ops.shifted(-1e-6 * ops.largest()), definite=True, solver=ops.solver)
+    X = ops.fixed[:, None] ** np.arange(1.0, 9.0)
+    for _ in range(4):
+        X = factor.solve(ops.apply_M(X))
+        X = np.linalg.solve(np.linalg.cholesky(ops.gram(X, X)), X.T).T
+    lam = eigh(ops.gram(X, ops.apply_K(X)), ops.gram(X, ops.apply_M(X)), eigvals_only=True)
+    return float(max(lam[np.argmax(lam > floor)], floor))
 
 
 def settled(ops: Any, lam: Array, Phi: Array) -> Array:

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError
-from rom.fe.mesh.sources.readers import Made
+from rom.fe.mesh.solid import Made
 from rom.names import named
 
 

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
-from rom.fe.mesh.solid import Read
+from rom.fe.mesh.solid import Made, Read
 from rom.fe.mesh.sources import builder, step
 from rom.fe.mesh.sources.confinement import confine
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
-from rom.fe.mesh.sources.readers import Made
 from rom.fe.mesh.sources.script import check_script
 from rom.plausible import scaled_doubt
 

@@ -7,7 +7,6 @@ from rom.errors import FileFormatError, ResourceError, RomError
 from rom.fe.mesh.solid import Read
 
 GEOMETRIES = ("geo", "builder", "step")
-Made = tuple[dict[str, Any], dict[str, Any]]  # parameters used, defaults of some of them
 
 
 def read(request: dict[str, Any]) -> Read:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
-from rom.fe.mesh.sources.readers import Made
+from rom.fe.mesh.solid import Made
 from rom.names import named
 
 FACE = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
