@@ -309,13 +309,14 @@ def test_components_do_not_know_who_uses_them():
 
 
 def circles(modules, package=ROOT / "rom"):
-    """Files of one folder that import each other round and round, as sets of dotted names."""
-    names = {level_of(p.relative_to(package).with_suffix("").parts): p for p in modules}
+    """Files that import each other round and round, fronts too, as sets of dotted names."""
+    parts = {path: path.relative_to(package.parent).with_suffix("").parts for path in modules}
+    names = {level_of(p[:-1] if p[-1] == "__init__" else p): path for path, p in parts.items()}
     reach = {
-        name: {t.removeprefix("rom.") for _, one in whole_imports(path)
-               for t in (one, one.rpartition(".")[0]) if t.removeprefix("rom.") in names}
+        name: {one if one in names else one.rpartition(".")[0] for _, one in whole_imports(path)}
         for name, path in names.items()
-    }  # fmt: skip
+    }
+    reach = {name: near & names.keys() for name, near in reach.items()}
     for _ in range(len(names).bit_length()):
         reach = {name: near.union(*(reach[n] for n in near)) for name, near in reach.items()}
     return {frozenset(n for n in names if n in reach[name] and name in reach[n])
@@ -327,13 +328,25 @@ def test_no_files_go_round_in_circles():
     assert not [" ".join(sorted(one)) for one in circles(MODULES)]
 
 
-def test_a_circle_of_imports_is_found(tmp_path):
-    """Of three files, the last of which imports the first inside a function."""
-    bodies = {"a": "from rom import b", "b": "import rom.c", "d": "import rom.a",
-              "c": "def f():\n    from rom.a import x"}  # fmt: skip
-    for name, text in bodies.items():
-        (tmp_path / f"{name}.py").write_text(text)
-    assert circles(sorted(tmp_path.glob("*.py")), tmp_path) == {frozenset("abc")}
+PLANTED = {  # files of a package, and those of them that go round
+    "in functions": ({"a": "from rom import b", "b": "import rom.c", "d": "import rom.a",
+                      "c": "def f():\n    from rom.a import x"}, {"rom.a", "rom.b", "rom.c"}),
+    "through a front": ({"p/__init__": "from rom.p.a import x", "p/a": "import rom.b",
+                         "b": "from rom.p import x"}, {"rom.p", "rom.p.a", "rom.b"}),
+    "none": ({"p/__init__": "from rom.p.a import x", "p/a": "from rom.p import b",
+              "p/b": "import numpy"}, None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", PLANTED)
+def test_a_circle_of_imports_is_found(case, tmp_path):
+    files, round_and_round = PLANTED[case]
+    package = tmp_path / "rom"
+    (package / "p").mkdir(parents=True)
+    for name, text in files.items():
+        (package / f"{name}.py").write_text(text)
+    found = circles(sorted(package.rglob("*.py")), package)
+    assert found == ({frozenset(round_and_round)} if round_and_round else set())
 
 
 def test_folders_hold_no_more_than_one_can_look_over():
