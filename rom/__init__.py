@@ -9,8 +9,8 @@ lives in ``rom.fe`` and is imported when it is first used.
 import os
 
 import rom.moved  # noqa: F401  old paths of modules
-from rom.launcher import one_thread_each as _one_thread_each
 from rom.lazy import front as _front
+from rom.process.launcher import one_thread_each as _one_thread_each
 
 # Empty is the default; it wins over a .numba_config.yaml in the working folder, by which Numba
 # would load compiled code from wherever that file says.

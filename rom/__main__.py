@@ -21,7 +21,7 @@ def leave_working_folder() -> None:
 
 leave_working_folder()
 
-from rom.interruption import heed_lost_signals  # noqa: E402
+from rom.process.interruption import heed_lost_signals  # noqa: E402
 
 heed_lost_signals()
 

@@ -13,6 +13,7 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom", "rom.checks", "certificate"),
     ("rom", "rom.eigen", "attachment=attachments scipy_operators=scipy"),
     ("rom", "rom.parametric", "parameters"),
+    ("rom", "rom.process", "child interruption launcher memory"),
     ("rom.body", "rom.assembly", "assembly condensed coupling"),
     ("rom.body", "rom.parametric", "family stretch=layers"),
     ("rom.components", "rom.components", "frf_updating=updating"),

@@ -18,8 +18,8 @@ from rom.errors import (
     ResourceError,
     RomError,
 )
-from rom.interruption import terminable
-from rom.memory import free_bytes
+from rom.process.interruption import terminable
+from rom.process.memory import free_bytes
 
 
 class InternalError(RomError):

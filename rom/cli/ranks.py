@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from rom.launcher import ranks
+from rom.process.launcher import ranks
 
 __all__ = ["on_first_rank", "ranks", "stop_all"]
 T = TypeVar("T")

@@ -12,7 +12,7 @@ import numpy as np
 from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.finding import Finding
 from rom.fe.probe import mapped_files
-from rom.memory import free_bytes
+from rom.process.memory import free_bytes
 
 BLAS_FILE = re.compile(r"/lib(blas|openblas|scipy_openblas|mkl_rt|blis|flexiblas|cblas)[^/]*\.so")
 FAST = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)

@@ -5,7 +5,7 @@ import subprocess
 from dataclasses import dataclass
 from typing import Any
 
-from rom import child
+from rom.process import child
 
 TIME_LIMIT = 60.0  # [s]; a first import from a cold disk takes a few
 

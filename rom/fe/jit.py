@@ -17,9 +17,9 @@ from mpi4py import MPI
 
 import dolfinx.jit
 
-from rom.child import lasting_scratch
 from rom.errors import ResourceError, RomError, RomWarning
 from rom.fe.parallel import on_root
+from rom.process.child import lasting_scratch
 
 JIT_OPTIONS = {"cffi_extra_compile_args": ["-O2", "-g0"], "cffi_libraries": None, "timeout": 60}
 # what dolfinx and FFCx call the function that reads option files, from version to version

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rom.errors import ParallelError, RomError
-from rom.launcher import ranks
+from rom.process.launcher import ranks
 
 T = TypeVar("T")
 GRACE_PERIOD = 1.0  # [s] that other ranks leave rank 0 to print an error all of them have

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from rom.arguments import typed
-from rom.child import Limits, python, run, scratch
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.fmu.server import SETTINGS_FILE
@@ -14,6 +13,7 @@ from rom.io.files import check_writable
 from rom.io.fmu.archive import Content, write_archive
 from rom.io.fmu.description import Model, model_description
 from rom.io.fmu.variables import Variable
+from rom.process.child import Limits, python, run, scratch
 
 MODEL_FOLDER = "model"  # of the Python file, below the resources
 BUILD_TIME_LIMIT = 600  # [s] for the mechanism, its compilation included

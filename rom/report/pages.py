@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.child import scratch
 from rom.config.document import read_document
 from rom.errors import FileFormatError, RomError
 from rom.model import Report, Row
+from rom.process.child import scratch
 from rom.report import html
 from rom.report.run import RECORD_FILE, versions
 

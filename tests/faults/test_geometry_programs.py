@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from cases.command import rom as command
-from rom import child
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -25,6 +24,8 @@ from rom.errors import (
     UnsafeFileError,
 )
 from rom.fe.mesh.read import read_mesh
+from rom.process import child
+from rom.process.memory import total_bytes
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -275,7 +276,7 @@ def test_no_limit_is_no_limit(none, here):
 
     assert _limits("geo", 1, none, none) == child.Limits()
     usual = _limits("geo", 1, None, None)
-    assert usual.seconds == 1800 and 0 < usual.memory <= 0.8 * child.machine_bytes()
+    assert usual.seconds == 1800 and 0 < usual.memory <= 0.8 * total_bytes()
 
 
 @pytest.mark.parametrize("wrong", [-1, float("nan"), "2", True])

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from cases.command import environment
-from rom import child
+from rom.process import child
 
 pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc"),
@@ -31,7 +31,7 @@ Mesh.MeshSizeMin = 0.05; Mesh.MeshSizeMax = 0.05;
 Sleep 20;
 """
 FILM = """
-from rom.interruption import heed_lost_signals
+from rom.process.interruption import heed_lost_signals
 heed_lost_signals()
 import numpy as np
 from rom.view.canvas.offscreen import render

@@ -358,7 +358,7 @@ def test_damaged_files_never_crash_or_hang(tmp_path):
 
 def test_a_reader_that_dies_is_a_typed_error(monkeypatch, tmp_path):
     """Signals of the child: crash, out of time, killed, Ctrl-C; a geometry is no damaged file."""
-    from rom import child
+    from rom.process import child
 
     mesh = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
     geometry = tmp_path / "box.geo"

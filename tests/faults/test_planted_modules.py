@@ -22,7 +22,7 @@ import pytest
 import rom
 from cases.command import ROOT, environment
 from cases.solid import block
-from rom import child
+from rom.process import child
 
 MODULES = (
     "gmsh numpy pyvista vtk vtkmodules meshio matplotlib json typing subprocess h5py sitecustomize "
@@ -135,7 +135,7 @@ STARTERS = {
     "FMU": "import rom; open('empty.py', 'w').write('import rom\\ndef mechanism():\\n"
     "    return rom.Mechanism()\\n'); rom.write_fmu('m.fmu', 'empty.py', dt=1e-3)",
     "probes": "from rom.doctor.probes import start; print(start('rom.doctor.drawing').answer())",
-    "peers": "from rom import child; from rom.bench.peers.compare import answer_of; "
+    "peers": "from rom.process import child; from rom.bench.peers.compare import answer_of; "
     "answer_of(child.python('rom.bench.peers.ours', '1'))",
 }
 
@@ -212,7 +212,7 @@ def alive(pid):
 def test_only_abandoned_folders_of_our_own_are_swept(tmp_path, monkeypatch):
     """By what a process killed by SIGKILL leaves, what lives, what others own, and links."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    code = "from rom import child; import os, signal\n"
+    code = "from rom.process import child; import os, signal\n"
     code += (
         "with child.scratch('dead') as f: (f / 'x').touch(); os.kill(os.getpid(), signal.SIGKILL)"
     )
@@ -251,13 +251,13 @@ def test_numba_loads_nothing_from_where_the_folder_says(planted):
 DIRECT = {"Popen", "call", "check_call", "check_output", "run", "getoutput", "getstatusoutput"}
 IN_OS = ("system", "popen", "exec", "spawn", "posix_spawn", "fork")
 EXCEPTIONS = {
-    "child.py": "the one way",
-    "child_entry.py": "becomes the command",
+    "process/child.py": "the one way",
+    "process/child_entry.py": "becomes the command",
 }
 
 
 def starts(tree):
-    """Lines that start a process without `rom.child`."""
+    """Lines that start a process without `rom.process.child`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module in ("subprocess", "multiprocessing"):
             yield node.lineno

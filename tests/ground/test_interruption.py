@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from cases.command import environment
-from rom.interruption import Terminated, terminable
+from rom.process.interruption import Terminated, terminable
 
 
 def test_sigterm_is_raised_inside_and_restored_outside():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rom import memory
 from rom.cli.main import translated
 from rom.errors import ResourceError
+from rom.process import memory
 
 
 @pytest.mark.parametrize(("limit", "use", "cache"), memory.GROUP_FILES)
@@ -20,8 +20,10 @@ def test_a_control_group_of_either_version_leaves_its_rest(tmp_path, limit, use,
 
 
 def test_the_least_limit_counts(monkeypatch):
-    monkeypatch.setattr(memory.resource, "getrlimit", lambda _: (int(memory.machine_bytes()), 0))
-    assert memory.free_bytes() < memory.machine_bytes()
+    monkeypatch.setattr(
+        memory.resource, "getrlimit", lambda _: (int(memory.machine_free_bytes()), 0)
+    )
+    assert memory.free_bytes() < memory.machine_free_bytes()
     monkeypatch.setattr(memory, "address_bytes", lambda: 9.0)
     monkeypatch.setattr(memory, "group_bytes", lambda _: 7.0)
     assert memory.free_bytes() == 7.0
@@ -31,7 +33,7 @@ def test_running_out_says_what_was_asked_and_what_there_is(monkeypatch):
     with pytest.raises(MemoryError) as caught:
         np.empty((2**30, 2**22))  # 2^52 numbers: 32 PiB
     monkeypatch.setattr(memory, "group_bytes", lambda _: 2.0**30)
-    monkeypatch.setattr(memory, "machine_bytes", lambda: 2.0**33)
+    monkeypatch.setattr(memory, "machine_free_bytes", lambda: 2.0**33)
     error = translated(caught.value)
     assert isinstance(error, ResourceError)
     assert "for 3.36e+07 GiB, 1073741824 x 4194304 numbers" in error.message

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from rom import child
 from rom.errors import ResourceError
+from rom.process import child
 
 # scikit-sparse builds on the CHOLMOD of Debian 12, and for NumPy 1
 PACKAGES = ("exudyn==1.13.6", "scikit-sparse<0.4.13", "scipy<1.14", "numpy<2")

@@ -19,12 +19,12 @@ from rom.bench.peers.compare import answer_of, interpreter
 from rom.bench.peers.mechanisms import Described, built, chain, slider_crank
 from rom.bench.peers.ours import save_matrices
 from rom.body.flexible import FlexibleBody
-from rom.child import scratch
 from rom.errors import ConfigError
 from rom.io.native import save
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, FEModel, SurfaceMesh
+from rom.process.child import scratch
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from rom import rotation
 from rom.bench.peers.compare import answer_of, interpreter
-from rom.child import scratch
 from rom.components.cosserat import Rod, body
 from rom.components.wind.wind_turbine import (
     N_BLADES,
@@ -28,6 +27,7 @@ from rom.components.wind.wind_turbine import (
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
+from rom.process.child import scratch
 
 SCRIPT = Path(__file__).with_name("beams.py")
 RISE_TIME, TIME_STEP, RHO_INF, N_SAMPLES = 20.0, 0.02, 0.9, 200

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rom import child, errors
+from rom import errors
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -25,6 +25,8 @@ from rom.errors import (
 )
 from rom.fe.mesh.solid import Read
 from rom.fe.mesh.sources.readers import GEOMETRIES, read
+from rom.process import child
+from rom.process.memory import total_bytes
 
 BYTES_PER_MEGABYTE, BYTES_PER_GIGABYTE = 2**20, 1e9
 MESHER_TIME_LIMIT = 1800.0  # [s]
@@ -112,9 +114,7 @@ def _limits(
             seconds=seconds,
             # of what a killed parent has left behind, where nothing else ends it
             processor=2 * math.ceil(seconds),
-            memory=int(
-                _chosen("memory_limit", memory_limit, MAX_MEMORY_SHARE * child.machine_bytes())
-            ),
+            memory=int(_chosen("memory_limit", memory_limit, MAX_MEMORY_SHARE * total_bytes())),
         )
     # measured: 0.08 s per megabyte and 10 bytes per byte; the rest is reserve
     return child.Limits(

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rom.errors import ResourceError
-from rom.memory import free_bytes
+from rom.process.memory import free_bytes
 
 MAX_MEMORY_SHARE = 0.85  # of the memory that is free
 THIN_FACTOR_RATIO = 0.2  # factor of a thin-walled body over that of a block with as many dofs

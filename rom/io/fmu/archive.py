@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
-from rom.child import Limits, run, scratch
 from rom.errors import ResourceError
 from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK, check_text
+from rom.process.child import Limits, run, scratch
 
 SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")

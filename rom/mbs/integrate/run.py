@@ -20,8 +20,8 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import Span, padded, sampled
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
-from rom.memory import free_bytes
 from rom.model import Array
+from rom.process.memory import free_bytes
 
 # a million steps a second, as the fastest mechanisms take, for eleven days
 MAX_STEPS = 10**12

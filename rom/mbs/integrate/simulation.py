@@ -10,7 +10,6 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, RomWarning
-from rom.interruption import terminable
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate.adaptive_step import run_variable
 from rom.mbs.integrate.consistent_start import initial_state
@@ -26,6 +25,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.mbs.results.validity import warn_of_limits
+from rom.process.interruption import terminable
 
 METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run_explicit}
 # tolerance of variable steps, of the explicit method and of implicit ones

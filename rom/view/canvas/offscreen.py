@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.child import Ended, python, run, scratch
 from rom.errors import ConfigError, ResourceError
+from rom.process.child import Ended, python, run, scratch
 from rom.view.canvas.scene import Actor, Camera
 
 Image = npt.NDArray[np.uint8]

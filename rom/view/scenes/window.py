@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.child import python, run, scratch
 from rom.errors import ConfigError
+from rom.process.child import python, run, scratch
 from rom.view.canvas.draw import add, aim
 from rom.view.canvas.offscreen import child_failure, require, write_scene
 from rom.view.canvas.scene import Actor, aimed, sharp_edges

@@ -12,10 +12,10 @@ from scipy.io import mmwrite
 import rom
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.solid import block
-from rom.child import environment
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.op4 import write_op4
 from rom.mbs.results.state import Memory, State
+from rom.process.child import environment
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}

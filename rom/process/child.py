@@ -19,8 +19,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rom.interruption import terminable, uninterrupted
 from rom.places import ABOVE
+from rom.process.interruption import terminable, uninterrupted
 
 ENTRY = Path(__file__).with_name("child_entry.py")
 ROOT = str(ABOVE)
@@ -228,11 +228,3 @@ def _ours(descriptor: int) -> bool:
     """Whether a folder belongs to this user and nobody else may enter it, as mkdtemp makes it."""
     about = os.fstat(descriptor)
     return about.st_uid == os.geteuid() and stat.S_IMODE(about.st_mode) == stat.S_IRWXU
-
-
-def machine_bytes() -> int:
-    """Memory of this machine, or of the control group this process belongs to [bytes]."""
-    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    with suppress(OSError, ValueError):  # "max", or no such file
-        total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
-    return total

@@ -1,8 +1,9 @@
-"""How much memory this process may still take."""
+"""How much memory there is, and how much of it this process may still take."""
 
 import os
 import resource
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 NO_LIMIT = 1 << 60
@@ -13,16 +14,24 @@ GROUP_FILES = (  # limit, use, and the line of memory.stat with what is given ba
 )
 
 
+def total_bytes() -> int:
+    """Memory of this machine, or of the control group this process belongs to [bytes]."""
+    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    with suppress(OSError, ValueError):  # "max", or no such file
+        total = min(total, int((CONTROL_GROUPS / "memory.max").read_text()))
+    return total
+
+
 def free_bytes() -> float:
     """Memory this process may still take [bytes].
 
     The least of what the machine has free, what its control groups leave, and what its own limit
     on address space leaves.
     """
-    return min(machine_bytes(), *map(group_bytes, _groups()), address_bytes())
+    return min(machine_free_bytes(), *map(group_bytes, _groups()), address_bytes())
 
 
-def machine_bytes() -> float:
+def machine_free_bytes() -> float:
     """What the machine has free; where it does not tell, no limit."""
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
