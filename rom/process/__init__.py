@@ -2,5 +2,5 @@
 
 `launcher` tells ranks and threads, `interruption` makes signals exceptions, `child` starts every
 other process by way of `child_entry`, `memory` says what may be taken. Nothing is imported here:
-`rom` comes by before the working folder is off the path of modules.
+the package comes by before the working folder is off the path of modules.
 """
