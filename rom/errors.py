@@ -5,7 +5,14 @@ mechanics, and what to do. Codes: 2 usage, 3 input file or mesh, 4 physics or mo
 quality gate, 6 resources, 7 interrupted; 1 is kept for our own bugs.
 """
 
+import os
+import sys
+import warnings
+from pathlib import Path
 from typing import Any
+
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
+PACKAGE = str(Path(__file__).parent) + os.sep
 
 
 class RomError(Exception):
@@ -15,13 +22,16 @@ class RomError(Exception):
         message: what happened, with the number and the name of the culprit.
         where: file, body, joint or interface the message is about; printed in front.
         hint: what to do; printed behind.
+        solution: the part of a motion, or the last state, that was reached before it failed, as
+            the function that failed would have returned it; None where nothing was reached.
     """
 
     exit_code = 1
-    solution: Any = None  # of a motion that failed: what came before
+    solution: Any = None
 
-    def __init__(self, message: str, *, where: str = "", hint: str = ""):
+    def __init__(self, message: str, *, where: str = "", hint: str = "", solution: Any = None):
         self.message, self.where, self.hint = message, where, hint
+        self.solution = solution
         super().__init__(message, where, hint)
 
     def __str__(self) -> str:
@@ -31,6 +41,21 @@ class RomError(Exception):
     def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild with keywords, so that an error survives a broadcast between ranks."""
         return _rebuild, (type(self), self.message, self.where, self.hint)
+
+
+def _as_solution(name: str) -> property:
+    """The solution of an error by the name that a component once gave to it."""
+
+    def put(error: RomError, reached: Any) -> None:
+        error.solution = reached
+
+    return property(
+        lambda error: error.solution, put, doc=f"{name}: the solution, as it was called."
+    )
+
+
+for _name in ("motion", "posture", "shape"):
+    setattr(RomError, _name, _as_solution(_name))
 
 
 def _rebuild(kind: type[RomError], message: str, where: str, hint: str) -> RomError:
@@ -123,3 +148,19 @@ class InterruptedRun(RomError):
 
 class RomWarning(UserWarning):
     """Something legal that a careful user wants to know."""
+
+
+def warn(sentence: str, kind: type[Warning] = RomWarning) -> None:
+    """Warn once: on the first of several ranks, at the line outside the package that caused it.
+
+    Args:
+        sentence: what a user wants to know; nothing happens without one.
+        kind: of the warning.
+    """
+    rank = next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
+    if not sentence or rank:
+        return
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and frame.f_code.co_filename.startswith((PACKAGE, "<string>")):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(kind(sentence), stacklevel=level)

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import finite, is_number, shortened
-from rom.errors import MaterialError
-from rom.plausible import FOAM_SPEED, SOLID_DENSITY, STIFF_DENSITY, WAVE_SPEED, warn
+from rom.errors import MaterialError, warn
+from rom.plausible import FOAM_SPEED, SOLID_DENSITY, STIFF_DENSITY, WAVE_SPEED
 from rom.units import SYSTEMS, UnitSystem, unit_system
 
 Array = npt.NDArray[np.float64]

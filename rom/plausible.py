@@ -5,18 +5,11 @@ what is built, so that nobody is blamed who means what he writes.
 """
 
 import math
-import os
-import sys
-import warnings
 from dataclasses import dataclass
 from numbers import Real
-from pathlib import Path
 from typing import Any
 
-from rom.errors import ConfigError, RomWarning
-
-RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
-PACKAGE = str(Path(__file__).parent) + os.sep
+from rom.errors import ConfigError, warn
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,17 +137,6 @@ def scaled_doubt(name: str, value: Any, default: Any) -> str:
         f"parameter {name} = {value:g} is {abs(value / default):.3g} times its default "
         f"{default:g}. Check its unit: lengths are in m."
     )
-
-
-def warn(sentence: str) -> None:
-    """Say a doubt once: on the first of several ranks, at the line outside that caused it."""
-    rank = next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
-    if not sentence or rank:
-        return
-    level, frame = 2, sys._getframe(1)
-    while frame.f_back and frame.f_code.co_filename.startswith((PACKAGE, "<string>")):
-        level, frame = level + 1, frame.f_back
-    warnings.warn(RomWarning(sentence), stacklevel=level)
 
 
 def warn_outside(limits: Range, value: float, of: str = "") -> None:

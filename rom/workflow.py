@@ -21,6 +21,7 @@ from rom.body.records import Marker
 from rom.checks.certificate import certify_body
 from rom.cyclic.reduced import ReducedSector, reduce_sector
 from rom.cyclic.sector import CyclicSector
+from rom.deprecated import renamed
 from rom.eigen.attachments import added_mass
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import Operators, rigid_motions
@@ -84,10 +85,11 @@ def mass_properties(model: FEModel) -> MassProperties:
     return MassProperties(mass, centre, 0.5 * (M[3:, 3:] + M[3:, 3:].T) - steiner)
 
 
+@renamed(m="n")
 @typed
 def modes(
     model: FEModel,
-    m: int,
+    n: int,
     *,
     fixed: tuple[str, ...] = (),
     interfaces: dict[str, Any] | None = None,
@@ -96,21 +98,21 @@ def modes(
 
     Args:
         model: the body.
-        m: number of modes; without support the six rigid motions come first and count.
+        n: number of modes; without support the six rigid motions come first and count.
         fixed: names of the interfaces held.
         interfaces: {name: kind} to give interfaces the kind they have in a reduced body, so that
             like is compared with like; an interface that is only held keeps all its dofs.
 
     Raises:
         InterfaceError: if an interface is unknown.
-        ConfigError: if m is not a positive number of modes.
+        ConfigError: if n is not a positive number of modes.
         ModesMissedError: if the inertia count says that a mode was skipped.
     """
-    whole("m", m, 1)
+    whole("n", n, 1)
     kinds = by_name(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)
-    omega, Phi = connection.ops.modes(held, m)
+    omega, Phi = connection.ops.modes(held, n)
     residual = _residual(connection.ops, held, omega, Phi)
     return Modes(omega, connection.ops.expand(Phi), residual)
 

@@ -9,6 +9,7 @@ from rom.arguments.kinds import AnyBody, AnyMechanism, AnySolution
 from rom.arguments.values import (
     finite,
     is_number,
+    lowest,
     matrix,
     matrix33,
     number,
@@ -29,6 +30,7 @@ __all__ = [
     "AnySolution",
     "finite",
     "is_number",
+    "lowest",
     "matrix",
     "matrix33",
     "number",

@@ -49,6 +49,15 @@ def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reaso
     raise ConfigError(f"{name} = {shortened(value)} must be a whole number {span}{why}.")
 
 
+def lowest(n: int | None) -> slice:
+    """Which modes are wanted: the n lowest ones, or all without a number.
+
+    Raises:
+        ConfigError: for a number below zero.
+    """
+    return slice(None if n is None else whole("n", n))
+
+
 def vector(name: str, value: Any, n: int | None = None) -> Array:
     """The value as (n,) finite numbers; without n as any number of them, one number alone too.
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import typed
+from rom.arguments import lowest, typed
 from rom.assembly.condensed import (
     CondensedAssembly,
     Partition,
@@ -91,7 +91,8 @@ class Assembly:
         M, K = self._matrices()
         N = self._free(fixed)
         omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
-        return Modes(omega[:n], per_body(self._widths(), N @ V[:, :n]))
+        kept = lowest(n)
+        return Modes(omega[kept], per_body(self._widths(), N @ V[:, kept]))
 
     def reduced(
         self, n_interface: int, *, level: str = "system", fixed: tuple[Place, ...] = ()

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
-from rom.arguments import whole
+from rom.arguments import lowest, whole
 from rom.eigen.verbs import whole_clusters
 from rom.model import Array, Modes, Report
 
@@ -79,7 +79,8 @@ class CondensedAssembly:
     def modes(self, n: int | None = None) -> Modes:
         """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
         omega, V = natural_modes(self.M, self.K, self.n_rigid)
-        return Modes(omega[:n], per_body(self.widths, self.basis @ V[:, :n]))
+        kept = lowest(n)
+        return Modes(omega[kept], per_body(self.widths, self.basis @ V[:, kept]))
 
 
 def natural_modes(M: Array, K: Array, n_rigid: int) -> tuple[Array, Array]:

@@ -1,7 +1,5 @@
 """Natural frequencies of a body that rotates steadily with its supports."""
 
-import warnings
-
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigvals, null_space
@@ -10,7 +8,7 @@ from rom.arguments import finite, unit_vector
 from rom.body.frame import seen_from
 from rom.body.records import BodyData
 from rom.body.stiffening import SecondOrder
-from rom.errors import ConfigError, ModelError, RomWarning
+from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array
 
 GROWTH_RATE_RTOL = 1e-6  # growth rate of an unstable motion, of the largest frequency
@@ -30,11 +28,7 @@ def rotating_frequencies(
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
     body.check_support(fixed)
     if speed and not body.K_geo:
-        warnings.warn(
-            f"body {body.name!r} has no geometric stiffness: rotation softens it only.",
-            RomWarning,
-            stacklevel=3,
-        )
+        warn(f"body {body.name!r} has no geometric stiffness: rotation softens it only.")
     seen = seen_from(body, fixed[0])  # in its frame the first support is at rest
     H = np.vstack([_held(seen, name) for name in fixed])
     N = null_space(H, rcond=1e-10) if H.size else np.eye(seen.n_modes)
@@ -108,10 +102,8 @@ def _frequencies(M: Array, K: Array, G: Array, culprit: str) -> Array:
     if not np.isfinite(lam).all():
         raise ModelError(f"{culprit} has no vibrations: its mass is singular.")
     if lam.real.max(initial=0.0) > GROWTH_RATE_RTOL * np.abs(lam).max(initial=0.0):
-        warnings.warn(
+        warn(
             f"{culprit} is unstable: rotation has used up its stiffness; motions that run away "
-            "count with their imaginary part, zero if they do not oscillate.",
-            RomWarning,
-            stacklevel=4,
+            "count with their imaginary part, zero if they do not oscillate."
         )
     return np.sort(np.abs(lam.imag))[::2] / (2 * np.pi)

@@ -1,6 +1,5 @@
 """The mechanism file: bodies, joints, forces, and how they are moved."""
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +11,7 @@ from rom.config.document import Document, read_document
 from rom.config.keys import Place, nearest, raise_mistakes, read_table
 from rom.config.laws import Pending, law_of
 from rom.config.mechanism_keys import IMPACT, SECTIONS, TABLE
-from rom.errors import ConfigError, RomWarning
+from rom.errors import ConfigError, warn
 
 if TYPE_CHECKING:
     from rom.mbs.integrate.keeping import Keeping
@@ -147,11 +146,9 @@ class MechanismFile:
         gap = float(np.linalg.norm(ends[0] - ends[1]))
         if gap > GAP_RTOL * max(float(np.ptp(placed, axis=0).max()), 1e-300):
             where = self.document.where(("joints", name))
-            warnings.warn(
+            warn(
                 f"{where}: the markers of joint {name!r} are {gap:.3g} m apart as the bodies are "
-                "placed; the start pulls them together.",
-                RomWarning,
-                stacklevel=2,
+                "placed; the start pulls them together."
             )
 
     def _marker(self, made: "Mechanism", marker: tuple[str, Any]) -> Any:

@@ -1,6 +1,5 @@
 """Stiffness and mass of a three-dimensional elastic body on a dolfinx mesh."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.eigen.verbs import rigid_motions
-from rom.errors import ConfigError, InterfaceError, MeshError, RomWarning, TagError
+from rom.errors import ConfigError, InterfaceError, MeshError, TagError, warn
 from rom.fe.compat import assemble_matrix, cell_name, lagrange, versions
 from rom.fe.forms.material import by_region, coefficients, described, doubts
 from rom.fe.forms.nodes import all_points, interface, outer_surface
@@ -212,4 +211,4 @@ def _check_attachments(attached: Sequence[Attachment], names: dict[str, Any]) ->
 
 def _warn(comm: MPI.Comm, remarks: list[str]) -> None:
     for remark in remarks if comm.rank == 0 else ():
-        warnings.warn(RomWarning(remark), stacklevel=3)
+        warn(remark)

@@ -7,7 +7,6 @@ import shutil
 import sys
 import sysconfig
 import time
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +16,7 @@ from mpi4py import MPI
 
 import dolfinx.jit
 
-from rom.errors import ResourceError, RomError, RomWarning
+from rom.errors import ResourceError, RomError, warn
 from rom.fe.parallel import on_root
 from rom.process.child import lasting_scratch
 
@@ -90,9 +89,7 @@ def usable_cache() -> Path:
             return path
     except OSError:
         pass
-    warnings.warn(
-        RomWarning(f"{path} cannot be written; forms are compiled anew for this run."), stacklevel=2
-    )
+    warn(f"{path} cannot be written; forms are compiled anew for this run.")
     return lasting_scratch("jit")
 
 

@@ -4,14 +4,13 @@ Every parameter is a factor of the nominal material, so that one is the model as
 """
 
 import itertools
-import warnings
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import is_number, shortened, typed
-from rom.errors import ParameterError, RomWarning
+from rom.errors import ParameterError, warn
 from rom.model import Array
 from rom.names import check_text, named
 from rom.plausible import FACTOR, warn_outside
@@ -167,7 +166,7 @@ def _checked(name: str, parameter: Parameter, value: Any, extrapolate: bool) -> 
         if not extrapolate:
             cure = "Reduce again with a wider range, or ask with extrapolate=True."
             raise ParameterError(message, hint=cure)
-        warnings.warn(RomWarning(f"{message} Errors there are unknown."), stacklevel=5)
+        warn(f"{message} Errors there are unknown.")
     return float(value)
 
 

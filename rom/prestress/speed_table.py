@@ -5,7 +5,6 @@ the square of the speed and omega_1 the lowest frequency at rest: a thin blade t
 straightens has a pole near s = -omega_1^2, of which tau knows nothing.
 """
 
-import warnings
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +18,7 @@ from rom.cyclic.modes import CyclicModes, cyclic_modes
 from rom.cyclic.reduced import ReducedSector, projected, reduce_sector
 from rom.cyclic.sector import CyclicSector
 from rom.cyclic.travelling import TravellingModes, travelling_modes
-from rom.errors import ConfigError, ModelError, RomWarning
+from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Report
 from rom.prestress.steady_rotation import SteadyRotation
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
@@ -185,11 +184,9 @@ class SpinUp(SpeedTable):
         small = ReducedSpinUp(self.speeds, self.omega, tuple(sectors))
         error = self._error(small)
         if error > FREQUENCY_RTOL:
-            warnings.warn(
+            warn(
                 f"reduced frequencies are off by {error:.1e}, judged by the lowest {N_CHECKED} "
-                f"between {self.speeds.size} states: ask for more states or modes.",
-                RomWarning,
-                stacklevel=2,
+                f"between {self.speeds.size} states: ask for more states or modes."
             )
         return replace(small, error=error)
 

@@ -337,7 +337,7 @@ def test_messages_for_wrong_methods_and_attachments(model):
         rom.CraigBampton(-1)
     with pytest.raises(ConfigError, match="dofs are off the interfaces"):
         rom.reduce(model, method=rom.CraigBampton(10**6), interfaces=KINDS)
-    with pytest.raises(ConfigError, match="m = 0 must be a whole number of 1 or more"):
+    with pytest.raises(ConfigError, match="n = 0 must be a whole number of 1 or more"):
         rom.modes(model, 0)
     for lump, message in (
         (rom.Attachment("tip", -1.0), "has the mass -1"),

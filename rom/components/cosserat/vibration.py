@@ -12,21 +12,19 @@ from rom import rotation
 from rom.components.cosserat.elements import Rod
 from rom.components.cosserat.shape import Shape
 from rom.components.cosserat.statics import clamped, linearised
+from rom.deprecated import renamed
 from rom.errors import SolverError
-from rom.model import Array
+from rom.model import Array, Modes
 
 
 @dataclass(frozen=True)
-class Vibrations:
-    """Modes, lowest first.
+class Vibrations(Modes):
+    """Modes of a rod, lowest first.
 
     Attributes:
-        frequencies: (m,) [Hz].
-        shapes: (6 N + 9, m) increments, complex in rotation; order of `statics.clamped`.
+        omega: (n,) circular frequencies [rad/s].
+        shapes: (6 N + 9, n) increments, complex in rotation; order of `statics.clamped`.
     """
-
-    frequencies: Array
-    shapes: Array
 
     def translations(self) -> Array:
         """(N + 1, 3, m) displacements of the vertices in world axes."""
@@ -56,21 +54,22 @@ def gyroscopic(rod: Rod, shape: Shape, spin: npt.ArrayLike) -> csc_matrix:
     return csc_matrix((G.ravel(), (i, j)))[:n, :n]
 
 
+@renamed(m="n")
 def modes(
     rod: Rod,
     shape: Shape,
-    m: int,
+    n: int,
     *,
     load: tuple[Array, Array] | None = None,
     free: npt.ArrayLike | None = None,
     spin: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Vibrations:
-    """The m lowest modes of vibration, without damping.
+    """The n lowest modes of vibration, without damping.
 
     Args:
         rod: the rod.
         shape: an equilibrium, see `statics.equilibrium`.
-        m: number of modes.
+        n: number of modes.
         load: the dead loads of that equilibrium.
         free: (6 N + 9,) which dofs may move; without it the plate at the start is held.
         spin: (3,) angular velocity of the axes in which the shape rests [rad/s].
@@ -83,12 +82,12 @@ def modes(
     K, M = (K + K.T) / 2, lumped_mass(rod)[free]
     if np.any(spin):
         G = gyroscopic(rod, shape, spin)[free][:, free]
-        omega, part = _rotating(K, M, G, m)
+        omega, part = _rotating(K, M, G, n)
     else:
-        omega, part = _resting(K, M, m)
-    Phi = np.zeros((free.size, m), dtype=part.dtype)
+        omega, part = _resting(K, M, n)
+    Phi = np.zeros((free.size, n), dtype=part.dtype)
     Phi[free] = part
-    return Vibrations(omega / (2 * np.pi), Phi)
+    return Vibrations(omega, Phi)
 
 
 def _resting(K: Array, M: Array, m: int) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import matrix, rows_at, typed, vector
+from rom.arguments import lowest, matrix, rows_at, typed, vector
 from rom.cyclic.blades.records import ReducedBlade, SubstructuredSector
 from rom.cyclic.certificate import wheel_certificate
 from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
@@ -134,16 +134,19 @@ class BladedWheel:
             for blade, Y, end in zip(blades, self.roots, ends, strict=True)
         ]
 
-    def modes(self, blades: Sequence[ReducedBlade], *, speed: float = 0.0) -> Modes:
+    def modes(
+        self, blades: Sequence[ReducedBlade], n: int | None = None, *, speed: float = 0.0
+    ) -> Modes:
         """Circular frequencies [rad/s] and mass-normalised modes of the wheel with these blades.
 
         Args:
             blades: N of them, in the order of the sectors.
+            n: number of modes, lowest first; None for all.
             speed: angular speed [rad/s]; Coriolis forces are left out, see `waves`.
 
         Returns:
-            omega (n,), ascending, rigid motions of a free wheel exactly zero, and Phi (n, n) in the
-            coordinates of `matrices`.
+            omega (n,), ascending, rigid motions of a free wheel exactly zero, and Phi with n
+            columns in the coordinates of `matrices`.
 
         Raises:
             ConfigError: see `matrices`; for a free wheel at speed.
@@ -164,7 +167,8 @@ class BladedWheel:
                 if speed
                 else "these blades leave a motion without stiffness."
             )
-        return Modes(np.sqrt(np.maximum(lam, 0.0)), Phi)
+        kept = lowest(n)
+        return Modes(np.sqrt(np.maximum(lam[kept], 0.0)), Phi[:, kept])
 
     def waves(self, blades: Sequence[ReducedBlade], *, speed: float) -> Modes:
         """Circular frequencies [rad/s], seen from the wheel, and shapes with Coriolis forces.

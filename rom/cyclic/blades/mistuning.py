@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import matrix, rows_at, typed, vector
+from rom.arguments import lowest, matrix, rows_at, typed, vector
 from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector
@@ -90,8 +90,12 @@ class MistunedWheel:
         found: Complex = waves[..., k] * self.blade + np.diag(self.omega**2)
         return found
 
-    def modes(self, deviations: npt.ArrayLike) -> Modes:
-        """Frequencies [rad/s] (..., r) and modes in waves (..., r, r) of mistuned wheels.
+    def modes(self, deviations: npt.ArrayLike, n: int | None = None) -> Modes:
+        """Frequencies [rad/s] (..., n) and modes in waves (..., r, n) of mistuned wheels.
+
+        Args:
+            deviations: (..., N) relative deviations of the stiffness of the blades.
+            n: number of modes, lowest first; None for all r.
 
         Raises:
             ModelError: if a deviation leaves a motion without stiffness.
@@ -99,7 +103,8 @@ class MistunedWheel:
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
             raise ModelError("blades with these deviations leave a motion without stiffness.")
-        return Modes(np.sqrt(np.maximum(lam, 0.0)), V)
+        kept = lowest(n)
+        return Modes(np.sqrt(np.maximum(lam[..., kept], 0.0)), V[..., kept])
 
     def response(
         self,

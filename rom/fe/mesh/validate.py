@@ -4,14 +4,13 @@ dolfinx 0.5 stops the whole process, hangs, or computes with NaN on several of t
 here. Cells are named by their numbers in the file.
 """
 
-import warnings as python_warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from rom.errors import MeshError, RomError, RomWarning, TagError
+from rom.errors import MeshError, RomError, TagError, warn
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.quality import check_shape
 from rom.fe.mesh.repair import repair
@@ -231,5 +230,5 @@ def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:
     except RomError as error:
         raise type(error)(error.message, where=error.where or where, hint=error.hint) from None
     for text in found:
-        python_warnings.warn(f"{where}: {text}" if where else text, RomWarning, stacklevel=3)
+        warn(f"{where}: {text}" if where else text)
     return replace(mesh, warnings=found)

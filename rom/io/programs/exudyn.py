@@ -19,7 +19,6 @@ import base64
 import io
 import json
 import textwrap
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ import numpy as np
 
 from rom.body.flexible import FlexibleBody
 from rom.body.reference import skew_tensor
-from rom.errors import RomWarning
+from rom.errors import warn
 from rom.io.files import write_whole
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -129,11 +128,9 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
     if np.abs(body.S).max(initial=0.0) > MOMENTUM_RTOL * np.sqrt(
         body.mass * np.abs(body.M).max(initial=0)
     ):
-        warnings.warn(
+        warn(
             f"the shapes of body {body.name!r} move its mass centre; the gravity of Exudyn 1.13 "
-            "turns the body as if they did not. body.with_reference('mean-axis') avoids that.",
-            RomWarning,
-            stacklevel=2,
+            "turns the body as if they did not. body.with_reference('mean-axis') avoids that."
         )
     memory = io.BytesIO()
     np.savez_compressed(memory, **arrays(body))

@@ -6,7 +6,6 @@ x~ phi~_j, J1_j = -(C4_j + C4_j^T) and Gr_j = -2 C4_j, while mdCM1_j is a row of
 Ge_j = 2 Cr1(:, j, :). Only the right order fulfils this.
 """
 
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rom.arguments import typed
-from rom.errors import ConfigError, FileFormatError, RomWarning
+from rom.errors import ConfigError, FileFormatError, warn
 from rom.io.sid.format import BLOCKS, DIALECTS, TENSOR, StandardInput, Taylor, repacked
 from rom.io.sid.reading import RawBlock, RawFile, read_raw, values
 from rom.model import Array, Report, Row
@@ -48,11 +47,9 @@ def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
     scale = max(np.abs(Ge.M0).max(initial=0.0), _scales(record)[2])
     if ge == "antisymmetric" and np.abs(symmetric).max(initial=0.0) > RESIDUAL_RTOL * scale:
         share = np.abs(symmetric).max() / scale
-        warnings.warn(
+        warn(
             f"{path}: the part of Ge that does work ({share:.2g} of its largest entry) is left "
-            "out; it mostly is stiffening that went to a wrong place.",
-            RomWarning,
-            stacklevel=2,
+            "out; it mostly is stiffening that went to a wrong place."
         )
         record.blocks["Ge"] = Taylor(Ge.M0 - symmetric, Ge.M1)
     return record
@@ -195,9 +192,7 @@ def _record(file: RawFile, mode_second: bool) -> StandardInput:
     coordinates = tuple(file.coordinates.get(k + 1, "") for k in range(file.n_modes))
     dropped = sum(raw.dropped for raw in _all(file))
     if dropped:
-        warnings.warn(
-            f"{file.path}: {dropped} terms of second order are left out.", RomWarning, stacklevel=4
-        )
+        warn(f"{file.path}: {dropped} terms of second order are left out.")
     return StandardInput(file.title, file.name, file.mass, coordinates, nodes, blocks)
 
 

@@ -1,6 +1,5 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +8,7 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.arguments import finite, typed, whole
-from rom.errors import ConfigError, ModelError, RomError, RomWarning, SolverError
+from rom.errors import ConfigError, ModelError, RomError, SolverError, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.tangent import Tangent, sizes
 from rom.mbs.equations.packing import Packed
@@ -165,11 +164,9 @@ class _Search:
             )
         if squares.size and squares[0] < 0.0 and not self.spin.any():
             motion = tangent.Z @ V[:, 0]
-            warnings.warn(
+            warn(
                 f"the equilibrium is unstable: {_described(self.now.packed, motion)} and falls "
-                f"away at a rate of {np.sqrt(-squares[0]):.3g} 1/s.",
-                RomWarning,
-                stacklevel=3,
+                f"away at a rate of {np.sqrt(-squares[0]):.3g} 1/s."
             )
 
     def along_spin(self, tangent: "Tangent", state: State, y: Array) -> bool:

@@ -1,6 +1,5 @@
 """Small motions around any state of a mechanism: frequencies, damping, shapes."""
 
-import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.errors import ConfigError, ModelError, RomWarning
+from rom.errors import ConfigError, ModelError, warn
 from rom.mbs.analysis.local_equations import (
     DIFFERENCE_STEP,
     Instant,
@@ -188,11 +187,9 @@ def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearizati
                      rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
         size = max(float(size), rate**2)
         if change > DRIFT_RTOL * PROBE_ANGLE * size:
-            warnings.warn(
+            warn(
                 f"the linear equations change with time, by {change / PROBE_ANGLE / size:.2g} of "
-                "their size per radian: these frequencies are those of one instant.",
-                RomWarning,
-                stacklevel=4,
+                "their size per radian: these frequencies are those of one instant."
             )
     return found
 

@@ -1,6 +1,5 @@
 """Stability of steady motions of first order: what rolls while it moves."""
 
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
-from rom.errors import RomWarning, SolverError
+from rom.errors import SolverError, warn
 from rom.mbs.analysis.local_equations import (
     DIFFERENCE_STEP,
     Instant,
@@ -102,11 +101,9 @@ def steady_motion(
     reduced = N.T @ A @ N
     away = np.abs(A @ N - N @ reduced).max(initial=0.0)
     if away > CONSTRAINT_RATE_RTOL * max(rate, np.abs(reduced).max(initial=0.0)):
-        warnings.warn(
+        warn(
             f"the motion is not steady: its linear equations leave the constraints by {away:.2g} "
-            "1/s; these eigenvalues are those of one instant.",
-            RomWarning,
-            stacklevel=2,
+            "1/s; these eigenvalues are those of one instant."
         )
     roots = np.linalg.eigvals(reduced).astype(complex)
     return SteadyMotion(state, roots[np.lexsort((roots.imag, np.round(np.abs(roots), 9)))], rate)

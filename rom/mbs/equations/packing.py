@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError
+from rom.errors import ConfigError, warn
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.equations.packing_elements import (
     actions,
@@ -31,7 +31,6 @@ from rom.mbs.parts.bodies import GROUND, Marker, Part
 from rom.mbs.parts.joints import Joint, Row
 from rom.mbs.parts.signals import Signal, clock_signal, drive_signal, load_signal
 from rom.model import Array
-from rom.plausible import warn
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
 

@@ -1,12 +1,11 @@
 """The start of a motion: positions that fit, velocities that fit, accelerations."""
 
-import warnings
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from rom.errors import ModelError, RomWarning, SolverError
+from rom.errors import ModelError, SolverError, warn
 from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
 from rom.mbs.equations.linear_solve import (
     factorised,
@@ -218,12 +217,10 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
         share = np.abs(U[:, rank:]).max(axis=1)
         names = dict.fromkeys(o for o, x in zip(packed.row_owner, share, strict=True) if x > 1e-6)
         _refuse_shared_friction(packed, names)
-        warnings.warn(
+        warn(
             f"{m - rank} of {m} constraints repeat others; joints {', '.join(names)} share loads "
             "that only their deformation could divide. The motion is exact, the reactions are "
-            "those of least norm.",
-            RomWarning,
-            stacklevel=5,
+            "those of least norm."
         )
     return rank
 

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rom.errors import ModelError
+from rom.errors import ModelError, warn
 from rom.model import Array
-from rom.plausible import warn
 
 MAX_INTERVALS = 4096  # in one pass
 FEW_INTERVALS = 8  # at least

@@ -1,13 +1,12 @@
 """Does a motion stay where linear elasticity in a floating frame holds? If not, it says so."""
 
-import warnings
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 
 from rom import rotation
-from rom.errors import RomWarning
+from rom.errors import warn
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.results.solution import Solution
 from rom.model import Array
@@ -25,13 +24,13 @@ def warn_of_limits(solution: Solution) -> None:
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
             top = np.linalg.norm(solution.omega(name), axis=1).max()
-            _warn(
+            warn(
                 f"body {name!r} turned at {top:.3g} rad/s; at {top / share:.3g} rad/s centrifugal "
                 "force has used up the stiffness of a body without geometric stiffness, which this "
                 "one lacks: its deformation is wrong. Reduce it with stiffening=True."
             )
         if bent > MAX_DEFORMATION:
-            _warn(
+            warn(
                 f"body {name!r} deformed by {bent:.2g} of its size and left the range of small "
                 "elastic deformation; its motion is no longer to be trusted. Divide it into "
                 "several bodies, or look for a load or drive that is too large."
@@ -53,7 +52,7 @@ def _warn_of_lost_turns(solution: Solution) -> None:
         rate = rate[np.isfinite(rate)].max(initial=0.0)
         if rate * h >= np.pi:
             names = [solution.packed.names[b] if b >= 0 else "ground" for b in (i, j)]
-            _warn(
+            warn(
                 f"body {names[1]!r} turned by {rate * h:.3g} rad a step against {names[0]!r}: the "
                 "angle of their joint loses whole turns beyond pi, and with it the spring, motor, "
                 f"gear or stop that acts on it is wrong. Take steps below {np.pi / rate:.3g} s."
@@ -75,10 +74,6 @@ def _spin(solution: Solution, body: int) -> Array:
     name = solution.packed.names[body]
     axes = (rotation.matrix(p) for p in solution.orientation(name))
     return np.array([A @ w for A, w in zip(axes, solution.omega(name), strict=True)])
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, RomWarning, stacklevel=4)
 
 
 def softening(solution: Solution, name: str) -> float:

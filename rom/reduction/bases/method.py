@@ -1,6 +1,5 @@
 """Reduction methods as small records: what `rom.reduce` is asked to do."""
 
-import warnings
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from rom.arguments import typed, whole
 from rom.eigen.verbs import Held, Operators, whole_clusters
-from rom.errors import ConfigError, RomWarning
+from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.bases.selection import enough_modes
@@ -128,5 +127,5 @@ def _lowest(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
             f"{keep} fixed-interface modes are kept instead of {n_modes}: the last ones share the "
             f"frequency {omega[n_modes - 1] / (2 * np.pi):.6g} Hz."
         )
-        warnings.warn(RomWarning(message), stacklevel=4)
+        warn(message)
     return omega[:keep], Phi[:, :keep]

@@ -2,6 +2,7 @@
 
 import io
 import textwrap
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +66,15 @@ def checked(path: str | Path, *endings: str) -> Path:
     return path
 
 
+def wanted(path: str | Path | None) -> Path | None:
+    """The path of a picture, checked, if it is to be written.
+
+    Raises:
+        ConfigError: see `checked`.
+    """
+    return None if path is None else checked(path, ".png")
+
+
 def area(figure: "Figure", left: float, top: float, width: float, height: float) -> Any:
     """Axes in a rectangle given in pixels from the top left corner."""
     w, h = figure.get_size_inches() * DPI
@@ -116,9 +126,36 @@ def pixels(figure: "Figure") -> Image:
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
 
 
-def save(figure: "Figure", path: Path) -> Path:
-    """Write the sheet as PNG, whole or not at all."""
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A finished picture that is not written yet; notebooks show it.
+
+    Attributes:
+        png: the bytes of its file.
+    """
+
+    png: bytes
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as .png, whole or not at all.
+
+        Raises:
+            ConfigError: for another ending, or a place that is not writable.
+        """
+        place = checked(path, ".png")
+        write_whole(place, lambda file: file.write(self.png))
+        return place
+
+    def __repr__(self) -> str:
+        return f"Picture({len(self.png)} bytes; save(path) writes it)"
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+def save(figure: "Figure", path: Path | None) -> Path | Picture:
+    """Write the sheet as PNG, or give it back where there is no path."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": "rom"})
-    write_whole(path, lambda file: file.write(buffer.getvalue()))
-    return path
+    picture = Picture(buffer.getvalue())
+    return picture if path is None else picture.save(path)

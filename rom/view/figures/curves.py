@@ -26,19 +26,19 @@ MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 def history(
     t: npt.ArrayLike,
     panels: Sequence[tuple[str, dict[str, Any]]],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     title: str,
     caption: str,
     over: str | None = None,
-) -> Path:
+) -> Path | page.Picture:
     """Draw quantities over time, or over something else, one panel below the other.
 
     Args:
         t: (n,) time [s], or values of what is named by ``over``.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
             (times, values) is drawn as points.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         caption: what a stranger has to know.
         over: label of the horizontal axis, with its unit, when that is not time.
@@ -46,7 +46,7 @@ def history(
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     t = np.asarray(t, dtype=float)
     unit, factor = ("ms", 1e3) if np.ptp(t) < 1.0 and over is None else ("s", 1.0)
     with page.styled():
@@ -73,18 +73,20 @@ def history(
 
 @path_came_first(1, 0)
 @typed
-def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> Path:
+def frequencies(
+    comparison: dict[str, Any], path: str | Path | None = None, *, title: str
+) -> Path | page.Picture:
     """Draw the relative errors of reduced frequencies in several supports.
 
     Args:
         comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
 
     Raises:
         ConfigError: without a comparison, or if pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     comparison = {support: table for support, table in comparison.items() if table["full"]}
     if not comparison:
         raise ConfigError("there is no comparison of frequencies to draw.")
@@ -116,18 +118,18 @@ def frequencies(comparison: dict[str, Any], path: str | Path, *, title: str) -> 
 @typed
 def convergence(
     panels: Sequence[tuple[str, dict[str, tuple[Any, Any]]]],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     xlabel: str,
     title: str,
     caption: str,
-) -> Path:
+) -> Path | page.Picture:
     """Draw errors that fall with the size of a model, on logarithmic axes.
 
     Args:
         panels: (label of the axis, {name: (sizes (n,), errors (n,))}) from top to bottom; errors
             at or below round-off are drawn at 1e-12.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         xlabel: what the sizes count.
         title: heading.
         caption: what a stranger has to know.
@@ -135,7 +137,7 @@ def convergence(
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     with page.styled():
         figure, areas = _panels(len(panels), title, caption)
         for axes, (label, curves) in zip(areas, panels, strict=True):
@@ -159,13 +161,13 @@ def convergence(
 @typed
 def campbell(
     diagram: Any,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     orders: Sequence[float] = (1.0,),
     names: Sequence[str] = (),
     title: str,
     caption: str,
-) -> Path:
+) -> Path | page.Picture:
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
 
     A ring marks where a mode meets a multiple of the speed. A second panel shows the damping,
@@ -173,7 +175,7 @@ def campbell(
 
     Args:
         diagram: what `rom.campbell` returned.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         orders: multiples of the speed to draw.
         names: one per mode, in the order of the columns; without names modes are numbered.
         title: heading.
@@ -182,7 +184,7 @@ def campbell(
     Raises:
         ConfigError: if there is not one name per mode, or pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     f, damping = diagram.frequencies, 100 * diagram.damping_ratios
     if names and len(names) != f.shape[1]:
         raise ConfigError(f"{len(names)} names for {f.shape[1]} modes.")

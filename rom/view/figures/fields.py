@@ -57,18 +57,18 @@ class Drawing:
 @typed
 def plane(
     drawings: Sequence[Drawing],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     title: str,
     caption: str,
     columns: int = 2,
     height: int = 480,
-) -> Path:
+) -> Path | page.Picture:
     """Draw things in a plane, side by side.
 
     Args:
         drawings: row by row, from the top left.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         caption: what a stranger has to know.
         columns: drawings in a row.
@@ -77,7 +77,7 @@ def plane(
     Raises:
         ConfigError: without a drawing, or if pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     if not drawings:
         raise ConfigError("there is nothing to draw.")
     rows = -(-len(drawings) // columns)

@@ -47,19 +47,21 @@ class Panel:
 
 @path_came_first(1, 0)
 @typed
-def panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str, caption: str) -> Path:
+def panels(
+    rows: Sequence[Sequence[Panel]], path: str | Path | None = None, *, title: str, caption: str
+) -> Path | page.Picture:
     """Draw rows of diagrams.
 
     Args:
         rows: diagrams from top to bottom, and from left to right in each row.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         caption: what a stranger has to know.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     with page.styled():
         text, below = page.caption(caption, PAGE_WIDTH - 60)
         step = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN

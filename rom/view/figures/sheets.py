@@ -50,20 +50,20 @@ class Shape:
 def deformed(  # noqa: PLR0913  keywords of one picture
     curves: dict[str, tuple[Any, Any]],
     shapes: Sequence[Shape],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     limit: tuple[str, float],
     xlabel: str,
     ylabel: str,
     title: str,
     caption: str,
-) -> Path:
+) -> Path | page.Picture:
     """Draw curves that tend to a limit beside the bodies they belong to.
 
     Args:
         curves: {name: (x (n,), y (n,))}, x on a logarithmic axis.
         shapes: bodies, from left to right.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         limit: name and value of a horizontal line.
         xlabel: of the curves.
         ylabel: of the curves.
@@ -73,7 +73,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if the shapes do not fit beside the curves, or pictures cannot be made here.
     """
-    path, left = page.checked(path, ".png"), PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
+    path, left = page.wanted(path), PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
     if left < 400:
         raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves.")
     with page.styled():

@@ -25,20 +25,20 @@ def updating(  # noqa: PLR0913  keywords of one picture
     f: npt.ArrayLike,
     curves: dict[str, npt.ArrayLike | npt.NDArray[np.complex128]],
     changes: dict[str, tuple[float, float, float]],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     structure: tuple[Array, Index, Array, Array],
     label: str,
     title: str,
     caption: str,
-) -> Path:
+) -> Path | page.Picture:
     """Draw one response of test and model above the changes that explain it.
 
     Args:
         f: (n,) frequencies [Hz].
         curves: {name: (n,) complex receptance [m/N]}: test, model before, model after.
         changes: {parameter: (true, found, standard deviation)} as fractions.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         structure: points (n, 3) [m], beams (m, 2), sensor and exciter positions (k, 3), (l, 3).
         label: what the response is, with its unit.
         title: heading.
@@ -47,7 +47,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path, f = page.checked(path, ".png"), np.asarray(f, dtype=float)
+    path, f = page.wanted(path), np.asarray(f, dtype=float)
     for name, values in curves.items():
         if np.shape(values) != f.shape:
             raise ConfigError(f"{name!r} has {np.size(values)} values for {f.size} frequencies.")

@@ -72,16 +72,16 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
 def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     mechanism: AnyMechanism,
     solution: AnySolution,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     times: npt.ArrayLike,
     shapes: dict[str, Mesh] | None = None,
     magnify: float = 1.0,
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path:
+) -> Path | page.Picture:
     """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`, .png."""
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     wanted = np.asarray(times, dtype=float).ravel()
     steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in wanted])
     stage = _stage(mechanism, solution, steps, shapes or {}, magnify)

@@ -21,17 +21,17 @@ MAX_LEGEND_BODIES = 16  # bodies in the legend
 @typed
 def start(
     mechanism: AnyMechanism,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     title: str = "Mechanism at its start",
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path:
+) -> Path | page.Picture:
     """Draw a mechanism before it moves: flexible bodies by their surface, rigid ones as bars.
 
     Args:
         mechanism: a `Mechanism`.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         view: (3,) direction from the things to the eye; None: mainly along the shortest extent.
         up: (3,) upright direction; None: across the longest extent.
@@ -39,7 +39,7 @@ def start(
     Raises:
         ConfigError: if pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     actors = start_actors(mechanism)
     points = np.concatenate([actor.points[0] for actor in actors])
     image = render(actors, aimed(points, PAGE_WIDTH, view=view, up=up))[0]

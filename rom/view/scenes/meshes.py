@@ -21,17 +21,17 @@ MARKED = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")  # o
 @typed
 def mesh(
     model: FEModel,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     title: str = "Mesh",
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path:
+) -> Path | page.Picture:
     """Draw the outer surface of a model, its elements and, in colour, its interfaces.
 
     Args:
         model: the model.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         view: (3,) direction from the body to the eye; None: mainly along its shortest extent.
         up: (3,) upright direction; None: across its longest extent.
@@ -39,7 +39,7 @@ def mesh(
     Raises:
         ConfigError: if the model has no surface, or pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     actors = mesh_actors(model)
     image = render(actors, aimed(actors[0].points, PAGE_WIDTH, view=view, up=up))[0]
     with page.styled():

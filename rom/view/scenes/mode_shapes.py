@@ -20,18 +20,18 @@ AMPLITUDE_RATIO = 0.08  # largest displacement shown, of the body's size
 @typed
 def mode_shapes(
     body: AnyBody,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     n: int = 6,
     fixed: tuple[str, ...] = (),
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path:
+) -> Path | page.Picture:
     """Draw the lowest elastic modes of a flexible body.
 
     Args:
         body: a `FlexibleBody` with a surface.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         n: number of modes.
         fixed: names of the interfaces held; the body is free when there are none.
         view: (3,) direction from the body to the eye; None: mainly along its shortest extent.
@@ -41,7 +41,7 @@ def mode_shapes(
         ConfigError: if the body has no surface, or pictures cannot be made here.
         InterfaceError: if an interface is unknown.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     if body.surface is None:
         raise ConfigError(f"body {body.name!r} has no surface to draw.")
     omega, V = body.modes(fixed=fixed)

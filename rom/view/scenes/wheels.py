@@ -23,20 +23,20 @@ COINCIDENT_RTOL = 1e-6  # of the wheel's size: nodes of neighbouring sectors
 def wheel_modes(  # noqa: PLR0913  keywords of one picture
     model: FEModel,
     shapes: Mapping[str, npt.ArrayLike],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     title: str,
     caption: str,
     hidden: tuple[str, ...] = ("cyclic_low", "cyclic_high"),
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
     view: npt.ArrayLike | None = None,
-) -> Path:
+) -> Path | page.Picture:
     """Draw modes of a wheel on its deformed surface.
 
     Args:
         model: one sector, with its surface.
         shapes: {name: (N, 3 k) displacements of the k nodes of each sector, axes of the wheel}.
-        path: picture to write, .png.
+        path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         caption: what a stranger has to know.
         hidden: interfaces inside the wheel, not drawn.
@@ -46,7 +46,7 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     Raises:
         ConfigError: if there is nothing to draw, or pictures cannot be made here.
     """
-    path = page.checked(path, ".png")
+    path = page.wanted(path)
     if model.surface is None or not shapes:
         raise ConfigError("there is no surface, or no mode of the wheel, to draw.")
     U = [np.asarray(u, dtype=float) for u in shapes.values()]
