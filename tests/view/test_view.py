@@ -12,13 +12,11 @@ from dataclasses import replace  # noqa: E402
 
 from PIL import Image  # noqa: E402
 
-from cases.mbs.mechanisms import lattice, lattice_body  # noqa: E402
+from cases.drawn import lattice_bar, squeezed, swinging  # noqa: E402
 from rom import view  # noqa: E402
 from rom.body.records import Surface  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402
 from rom.mbs.analysis.campbell import Campbell  # noqa: E402
-from rom.mbs.integrate.simulation import simulate  # noqa: E402
-from rom.mbs.mechanism import Mechanism  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
 from rom.view.canvas.offscreen import render  # noqa: E402
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
@@ -38,24 +36,7 @@ def colourful(image):
 
 @pytest.fixture(scope="module")
 def bar():
-    """A lattice bar along x with a surface of its nodes, free, five sections."""
-    data = lattice(stiffness=4e5)
-    body = lattice_body(data)
-    x = data[0]
-    triangles = [
-        (3 * s + a, 3 * s + (a + 1) % 3, 3 * s + 3 + a) for s in range(4) for a in range(3)
-    ] + [(3 * s + 3 + a, 3 * s + (a + 1) % 3, 3 * s + 3 + (a + 1) % 3)
-         for s in range(4) for a in range(3)]  # fmt: skip
-    shape = np.vstack([body.markers[f"n{i}"].translation for i in range(len(x))])
-    return replace(body, surface=Surface(x, np.array(triangles), shape))
-
-
-def swinging(bar):
-    mech = Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible("bar", bar, omega=(0, 0, 30.0))
-    mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0.6, 0))
-    mech.spherical("tie", mech.ground.marker((0, 0, 0.15)), part.marker("n7"))
-    return mech, simulate(mech, t_end=0.1, dt=1e-3)
+    return lattice_bar()
 
 
 def test_a_scene_is_drawn_to_scale_and_the_right_way_up():
@@ -88,14 +69,6 @@ def test_an_update_is_drawn_with_its_changes(tmp_path):
     assert bars[:middle].max() == pytest.approx(4 * bars[middle:].max(), rel=0.03)
     with pytest.raises(ConfigError, match="7 values for 50"):
         view.updating(f, {"test": f[:7]}, path=tmp_path / "u.png", **more)
-
-
-def squeezed(amount):
-    """Two triangles of a unit square made narrower, coloured by the amount."""
-    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    triangles = np.array([[0, 1, 2], [0, 2, 3]])
-    now = points * (1 - amount, 1 + amount)
-    return view.Shape("square", now, triangles, points, np.array([amount, 0.0]), "strain")
 
 
 def test_a_plane_body_is_drawn_beside_its_curves(tmp_path):

@@ -80,7 +80,10 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
 ) -> Path | page.Picture:
-    """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`, .png."""
+    """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`.
+
+    The path ends in .png; without one the `Picture` itself is given back.
+    """
     path = page.wanted(path)
     wanted = np.asarray(times, dtype=float).ravel()
     steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in wanted])

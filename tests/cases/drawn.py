@@ -1,0 +1,41 @@
+"""Things to draw: a bar that swings, a square that is squeezed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cases.mbs.mechanisms import lattice, lattice_body
+from rom import view
+from rom.body.flexible import Surface
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+
+
+def lattice_bar():
+    """A lattice bar along x with a surface of its nodes, free, five sections."""
+    data = lattice(stiffness=4e5)
+    body = lattice_body(data)
+    x = data[0]
+    triangles = [
+        (3 * s + a, 3 * s + (a + 1) % 3, 3 * s + 3 + a) for s in range(4) for a in range(3)
+    ] + [(3 * s + 3 + a, 3 * s + (a + 1) % 3, 3 * s + 3 + (a + 1) % 3)
+         for s in range(4) for a in range(3)]  # fmt: skip
+    shape = np.vstack([body.markers[f"n{i}"].translation for i in range(len(x))])
+    return replace(body, surface=Surface(x, np.array(triangles), shape))
+
+
+def swinging(bar):
+    """The bar, turning with a ball beside it: a mechanism and its motion."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("bar", bar, omega=(0, 0, 30.0))
+    mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0.6, 0))
+    mech.spherical("tie", mech.ground.marker((0, 0, 0.15)), part.marker("n7"))
+    return mech, simulate(mech, t_end=0.1, dt=1e-3)
+
+
+def squeezed(amount):
+    """Two triangles of a unit square made narrower, coloured by the amount."""
+    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    now = points * (1 - amount, 1 + amount)
+    return view.Shape("square", now, triangles, points, np.array([amount, 0.0]), "strain")

@@ -1,0 +1,136 @@
+"""One order for all pictures: what is drawn, then the path, then words by name."""
+
+import ast
+import inspect
+from functools import cache
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pyvista", reason="pictures need pyvista")
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+from cases.drawn import lattice_bar, squeezed, swinging
+from cases.paths import ROOT
+from cases.solid import block
+from rom import view
+from rom.errors import ConfigError
+from rom.mbs.analysis.campbell import Campbell
+
+X = np.linspace(0.0, 1.0, 5)
+WORDS = {"title": "Title", "caption": "What a stranger has to know."}
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 1]])
+STRUCTURE = (POINTS, np.array([[0, 1], [1, 2], [0, 3]]), POINTS, POINTS[:1])
+SPEEDS = np.linspace(0.0, 100.0, 3)
+
+
+@cache
+def moved():
+    return swinging(lattice_bar())
+
+
+def wheel():
+    model = block((0.3, 0.1, 0.08), (3, 2, 2), origin=(-0.15, 0.2, 0.0))
+    return model, {"mode 1": np.ones((6, model.n_dofs)) * np.arange(6)[:, None]}
+
+
+PICTURES = {  # function -> what is drawn, words
+    "campbell": lambda: (
+        [Campbell(SPEEDS, (-2.0 + 60j + 0.1j * SPEEDS)[:, None], np.ones((2, 1)))], WORDS),
+    "convergence": lambda: (
+        [[("error", {"one": ([1, 2, 4], [1e-1, 1e-2, 1e-3])})]], WORDS | {"xlabel": "modes"}),
+    "deformed": lambda: (
+        [{"coarse": ([1, 2, 4], [0.2, 0.7, 0.9])}, [squeezed(0.5)]],
+        WORDS | {"limit": ("exact", 1.0), "xlabel": "size", "ylabel": "answer"}),
+    "frequencies": lambda: ([{"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}],
+                            {"title": "Title"}),
+    "history": lambda: ([X, [("angle [rad]", {"one": np.sin(X)})]], WORDS),
+    "instants": lambda: ([*moved()], {"times": [0.05]}),
+    "mesh": lambda: ([block()], {}),
+    "mode_shapes": lambda: ([lattice_bar()], {"n": 1}),
+    "panels": lambda: ([[[view.Panel("Path", "x [m]", "y [m]", {"one": (X, X)})]]], WORDS),
+    "plane": lambda: (
+        [[view.Drawing("stone", "x [m]", "y [m]", polygons=[POINTS[:3, :2]])]], WORDS),
+    "start": lambda: ([moved()[0]], {}),
+    "updating": lambda: (
+        [X, {"test": 1 / (3 - X)}, {"mass": (-0.1, -0.1, 0.01)}],
+        WORDS | {"structure": STRUCTURE, "label": "displacement per force [m/N]"}),
+    "wheel_modes": lambda: ([*wheel()], WORDS | {"hidden": ("root", "tip")}),
+}  # fmt: skip
+FILMS = {
+    "animate": lambda: ([*moved()], {"frames": 2}),
+    "flow": lambda: ([np.array([0.0, 1e-6]), [squeezed(0.0), squeezed(0.5)]],
+                     {"caption": "What a stranger has to know."}),
+}  # fmt: skip
+PATH_CAME_FIRST = {"campbell", "convergence", "deformed", "flow", "frequencies", "history",
+                   "panels", "plane", "updating", "wheel_modes"}  # fmt: skip
+WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/family.py",
+           "io/export.py", "io/history.py", "io/fmu/body.py", "fmu/export.py", "report/html.py",
+           "mbs/results/checkpoint.py", "view/scenes")  # fmt: skip
+
+
+def parameters(name):
+    return inspect.signature(getattr(view, name)).parameters
+
+
+def test_every_function_of_view_that_takes_a_path_is_tried_here():
+    functions = [name for name in view.__all__ if inspect.isfunction(getattr(view, name))]
+    assert {name for name in functions if "path" in parameters(name)} == {*PICTURES, *FILMS}
+
+
+@pytest.mark.parametrize("name", [*PICTURES, *FILMS])
+def test_things_come_first_then_the_path_then_words_by_name(name):
+    names, kinds = [*parameters(name)], [p.kind for p in parameters(name).values()]
+    place = names.index("path")
+    things = len({**PICTURES, **FILMS}[name]()[0])
+    assert place == things > 0
+    assert set(kinds[: place + 1]) == {inspect.Parameter.POSITIONAL_OR_KEYWORD}
+    assert set(kinds[place + 1 :]) <= {inspect.Parameter.KEYWORD_ONLY}
+    assert parameters(name)["path"].default is (inspect.Parameter.empty if name in FILMS else None)
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_picture_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
+    (things, words), draw = PICTURES[name](), getattr(view, name)
+    seen, file = draw(*things, **words), draw(*things, tmp_path / "a.png", **words)
+    assert file == tmp_path / "a.png" and file.read_bytes()[:4] == b"\x89PNG"
+    assert seen._repr_png_() == seen.save(tmp_path / "b.png").read_bytes() == file.read_bytes()
+    if name in PATH_CAME_FIRST:
+        with pytest.warns(DeprecationWarning, match=f"{name} takes the path behind") as caught:
+            earlier = draw(tmp_path / "c.png", *things, **words)
+        assert caught[0].filename == __file__
+        assert earlier.read_bytes() == file.read_bytes()
+
+
+@pytest.mark.parametrize("name", FILMS)
+def test_a_film_needs_a_path_and_is_the_same_in_both_orders(name, tmp_path):
+    (things, words), draw = FILMS[name](), getattr(view, name)
+    with pytest.raises(ConfigError, match=f"{name}: path = None must be a path"):
+        draw(*things, None, **words)
+    file = draw(*things, tmp_path / "a.gif", **words)
+    assert file.read_bytes()[:3] == b"GIF"
+    if name in PATH_CAME_FIRST:
+        with pytest.warns(DeprecationWarning, match=f"{name} takes the path behind"):
+            earlier = draw(tmp_path / "b.gif", *things, **words)
+        assert earlier.read_bytes() == file.read_bytes()
+
+
+def test_a_picture_that_is_saved_later_is_refused_in_the_same_words(tmp_path):
+    seen = view.history(*PICTURES["history"]()[0], **WORDS)
+    with pytest.raises(ConfigError, match=r"ending '\.jpg' is unknown"):
+        seen.save(tmp_path / "a.jpg")
+    assert not list(tmp_path.iterdir())
+
+
+def test_whatever_writes_a_file_takes_the_thing_before_the_path():
+    """Public functions of all modules that write files of ours and of other programs."""
+    files = [file for name in WRITERS for path in [ROOT / "rom" / name]
+             for file in (sorted(path.glob("*.py")) if path.is_dir() else [path])]  # fmt: skip
+    orders = {
+        node.name: [argument.arg for argument in node.args.args]
+        for file in files
+        for node in ast.parse(file.read_text()).body
+        if isinstance(node, ast.FunctionDef) and node.name.startswith(("write", "save", "export"))
+    }
+    assert len(orders) > 15
+    assert {name for name, order in orders.items() if order.index("path") == 0} == set()
