@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from rom.arguments import typed, whole
-from rom.assembly.dual import FreeSubstructure, free_substructure
+from rom.assembly.dual import FreeSubstructure, free_substructure, with_certificate
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
@@ -265,20 +265,24 @@ def _on_interfaces(names: Iterable[str]) -> Iterator[None]:
 
 
 @typed
-def substructure(model: FEModel, *, n_modes: int, interfaces: dict[str, Any]) -> FreeSubstructure:
+def substructure(
+    model: FEModel, *, n_modes: int, interfaces: dict[str, Any], certify: bool = True
+) -> FreeSubstructure:
     """A free body for coupling by interface forces: MacNeal, Rubin, dual Craig-Bampton.
 
     Args:
         model: the full model, free-free.
         n_modes: number of elastic free-free modes.
         interfaces: {name: kind} as for `reduce`.
+        certify: compare with the full model; costs one more factorisation per interface.
 
     Raises:
         InterfaceError, ConfigError: for a wrong interface, kind or number of modes.
     """
     connection = connect(operators(model), model, by_name(interfaces))
     origins = {name: model.interfaces[name].origin for name in connection.parts}
-    return free_substructure(connection, origins, n_modes)
+    body = free_substructure(connection, origins, n_modes)
+    return with_certificate(body, connection) if certify else body
 
 
 def _described(method: str, basis: Any, n: int) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Reduced bodies coupled where they touch: modes of the whole from its parts."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import lowest, typed
+from rom.assembly.certificate import N_COMPARED, rows_of_parts
 from rom.assembly.condensed import (
     CondensedAssembly,
     Partition,
@@ -28,9 +29,7 @@ from rom.model import Array, Modes, Report, Row
 from rom.rows import frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
-N_COMPARED = 6  # elastic modes that certificates look at
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
-MISSING = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
 
 
 @typed
@@ -142,11 +141,7 @@ class Assembly:
     @cached_property
     def certificate(self) -> Report:
         """The certificates of the bodies, and whether couplings close in the lowest modes."""
-        rows = [
-            replace(line, quantity=f"{name}: {line.quantity}")
-            for name, body in self.bodies.items()
-            for line in (body.certificate.rows if body.certificate is not None else MISSING)
-        ]
+        rows = rows_of_parts(self.bodies)
         return Report("certificate of the assembly", (*rows, *self._gap_row()))
 
     def _gap_row(self) -> list[Row]:

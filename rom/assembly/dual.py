@@ -20,16 +20,19 @@ Source:
     Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math. 168 (2004) 383.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import typed
+from rom.assembly.certificate import N_COMPARED, rows_of_parts
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, Index
+from rom.model import Array, Index, Report, Row
 from rom.reduction.bases.free_interface import free_modes, residual_flexibility
 from rom.reduction.interfaces.records import Connection
+from rom.rows import FREQUENCY_RTOL, frequency_rows, row
 
 KINDS = ("macneal", "rubin", "dual")
 SAME_PLACE = 1e-6  # distance of two interfaces, of their distance from the origin, that still meet
@@ -51,6 +54,7 @@ class FreeSubstructure:
         shapes: (n_b, m) interface coordinates of the mass-normalised modes.
         flexibility: (n_b, n_b) residual flexibility G [m/N].
         mass: (n_b, n_b) kinetic energy of the residual shapes, G^T M G.
+        certificate: frequencies with one interface held against the full model, or None.
     """
 
     parts: dict[str, Index]
@@ -60,6 +64,7 @@ class FreeSubstructure:
     shapes: Array
     flexibility: Array
     mass: Array
+    certificate: Report | None = None
 
 
 def free_substructure(
@@ -116,6 +121,25 @@ class DualAssembly:
             x, y = (self.bodies[body].origins[name] for body, name in (one, other))
             if np.linalg.norm(x - y) > SAME_PLACE * max(np.linalg.norm(x), np.linalg.norm(y)):
                 raise InterfaceError(f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.")
+
+    @cached_property
+    def certificate(self) -> Report:
+        """The certificates of the bodies, and what it changes that the forces are unknowns."""
+        rows = rows_of_parts(self.bodies)
+        return Report("certificate of the dual assembly", (*rows, *self._kinds_row()))
+
+    def _kinds_row(self) -> list[Row]:
+        """Frequencies of dual Craig-Bampton against Rubin's, whose interfaces meet exactly."""
+        n_rigid = self._n_rigid(())
+        n = n_rigid + N_COMPARED
+        try:
+            weak, exact = (self.frequencies(n, kind=kind)[n_rigid:] for kind in ("dual", "rubin"))
+        except InterfaceError:  # modes that leave the forces no flexibility: the kinds are one
+            return []
+        n = min(weak.size, exact.size)
+        worst = np.abs(weak[:n] / exact[:n] - 1).max(initial=0.0)
+        what = f"dual: largest change of {n} frequencies by interfaces that meet weakly"
+        return [row(what, worst, FREQUENCY_RTOL)]
 
     def frequencies(
         self, n: int | None = None, *, kind: str = "dual", fixed: tuple[Place, ...] = ()
@@ -225,3 +249,24 @@ class DualAssembly:
                 f"{sorted(self.bodies[body].parts)}."
             )
         return self.bodies[body].parts[interface]
+
+
+def with_certificate(body: FreeSubstructure, connection: Connection) -> FreeSubstructure:
+    """The substructure with its evidence: each interface held in turn, by Rubin's method.
+
+    Args:
+        body: made by `free_substructure`.
+        connection: the full model in interface coordinates.
+    """
+    alone, rows = DualAssembly({"body": body}, ()), []
+    if not connection.ops.affordable:
+        rows = [Row("dofs; full modes are too dear", connection.ops.n, "--", True)]
+    for name in connection.parts if connection.ops.affordable else ():
+        found = alone.frequencies(kind="rubin", fixed=(("body", name),))
+        n_rigid = np.count_nonzero(found == 0.0)
+        reduced = found[n_rigid : n_rigid + N_COMPARED]
+        held = connection.held((name,))
+        full = connection.ops.modes(held, n_rigid + reduced.size)[0][n_rigid:] / (2 * np.pi)
+        table = {"reduced": reduced.tolist(), "full": full.tolist()}
+        rows += frequency_rows(f"{name} held", table) if reduced.size else []
+    return replace(body, certificate=Report("certificate of the substructure", tuple(rows)))

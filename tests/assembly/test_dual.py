@@ -78,6 +78,30 @@ def test_a_dual_assembly_has_as_many_negative_eigenvalues_as_forces():
     assert assembly.frequencies(kind="dual", fixed=(ROOT,)).size == 2 * (6 + 6)
 
 
+def test_a_certificate_tells_good_from_missing_and_wrong():
+    """Each body with one interface held, and both kinds of interfaces against each other."""
+    assembly = joined(8)
+    report = assembly.certificate
+    assert report.ok and report is assembly.certificate  # computed once
+    assert {row.quantity.partition(":")[0] for row in report.rows} == {"left", "right", "dual"}
+    held = rom.modes(half("left"), 6, fixed=("tip",), interfaces={"root": "rbe2"}).frequencies
+    alone = rom.DualAssembly({"left": assembly.bodies["left"]}, ())
+    error = alone.frequencies(6, kind="rubin", fixed=(("left", "tip"),)) / held - 1
+    found = {row.quantity: row.value for row in report.rows}
+    assert_allclose(found["left: tip held: worst error of 6 frequencies"], error.max(), rtol=1e-4)
+    left = assembly.bodies["left"]
+    assert not replaced(assembly, replace(left, certificate=None)).certificate.ok
+    weak = replaced(assembly, replace(left, mass=100 * left.mass)).certificate
+    assert [row.quantity.partition(":")[0] for row in weak.failures] == ["dual"]
+    kinds = {"root": "rbe2", "tip": "full"}
+    poor = rom.substructure(half("left"), n_modes=1, interfaces=kinds).certificate
+    assert not poor.ok and all("worst error" in row.quantity for row in poor.failures)
+
+
+def replaced(assembly, left):
+    return rom.DualAssembly(assembly.bodies | {"left": left}, assembly.couplings)
+
+
 def test_without_residual_mass_forces_are_those_of_macneal():
     """Eliminating the forces of a dual assembly without residual mass gives MacNeal's matrices."""
     assembly = joined(6)

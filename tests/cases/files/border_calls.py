@@ -64,22 +64,26 @@ def body():
 
 
 @cache
+def behind():
+    """The block behind that one."""
+    return block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
+
+
+@cache
 def bodies():
     """Two bodies in a row."""
-    second = block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
     return {
         "a": body(),
-        "b": rom.reduce(second, method=rom.Guyan(), interfaces=KINDS, certify=False),
+        "b": rom.reduce(behind(), method=rom.Guyan(), interfaces=KINDS, certify=False),
     }
 
 
 @cache
 def free():
     """The same for coupling by forces."""
-    second = block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
     return {
         "a": rom.substructure(model(), n_modes=1, interfaces=KINDS),
-        "b": rom.substructure(second, n_modes=1, interfaces=KINDS),
+        "b": rom.substructure(behind(), n_modes=1, interfaces=KINDS),
     }
 
 
