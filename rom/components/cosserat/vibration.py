@@ -9,6 +9,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from rom import rotation
+from rom.arguments import whole
 from rom.components.cosserat.elements import Rod
 from rom.components.cosserat.shape import Shape
 from rom.components.cosserat.statics import clamped, linearised
@@ -75,9 +76,11 @@ def modes(
         spin: (3,) angular velocity of the axes in which the shape rests [rad/s].
 
     Raises:
+        ConfigError: for a number of modes that the rod cannot have.
         SolverError: if the shape is not stable, or the modes of a rotating rod were not found.
     """
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
+    n = whole("n", n, 1, int(free.sum()))
     K = linearised(rod, shape, load, spin)[1][np.ix_(free, free)]
     K, M = (K + K.T) / 2, lumped_mass(rod)[free]
     if np.any(spin):

@@ -265,7 +265,7 @@ GIVEN = {  # callable -> legal values of its own
     "load": {"path": lambda: "body.rom.npz"},
     "load_state": {"path": lambda: "state.npz"},
     "mistuned_wheel": {"sector": ring},
-    "modes": {"m": lambda: 1},
+    "modes": {"n": lambda: 1},
     "motion_sensitivity": {
         "result": lambda: lambda stiffness: 2 * stiffness,
         "parameters": lambda: {"stiffness": 2.0},
