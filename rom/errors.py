@@ -8,6 +8,8 @@ quality gate, 6 resources, 7 interrupted; 1 is kept for our own bugs.
 import os
 import sys
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -43,19 +45,26 @@ class RomError(Exception):
         return _rebuild, (type(self), self.message, self.where, self.hint)
 
 
-def _as_solution(name: str) -> property:
-    """The solution of an error by the name that a component once gave to it."""
-
-    def put(error: RomError, reached: Any) -> None:
-        error.solution = reached
-
-    return property(
-        lambda error: error.solution, put, doc=f"{name}: the solution, as it was called."
-    )
+def _put_solution(error: RomError, found: Any) -> None:
+    error.solution = found
 
 
-for _name in ("motion", "posture", "shape"):
-    setattr(RomError, _name, _as_solution(_name))
+for _name in ("motion", "posture", "shape"):  # what components called the solution once
+    setattr(RomError, _name, property(lambda error: error.solution, _put_solution))
+
+
+@contextmanager
+def reached(found: Callable[[], Any]) -> Iterator[None]:
+    """Errors from within carry what was found before, as ``error.solution``.
+
+    Args:
+        found: gives it, in the form in which the function that fails would have returned it.
+    """
+    try:
+        yield
+    except RomError as error:
+        error.solution = found()
+        raise
 
 
 def _rebuild(kind: type[RomError], message: str, where: str, hint: str) -> RomError:

@@ -161,7 +161,7 @@ class Driven:
             state=begun,
         )
         if abs(motion.final.t - begun.t - h) > 2 * TIME_RTOL * h:
-            raise SolverError(f"the mechanism ended its run: {motion.status}")
+            raise SolverError(f"the mechanism ended its run: {motion.status}", solution=motion)
         self.state, self.held, self.stepped = motion.final, self.inputs.values.copy(), True
         self.inputs.follow(self.state.t)
 

@@ -146,7 +146,10 @@ class SpinUp(SpeedTable):
             start = self.steady.independent(self.displacements[:, k])
             a, reached = self.steady.follow(start, self.speeds[k] ** 2, square, self.steady.load)
             if reached < square:
-                raise ModelError(f"no stable steady state was found at {speed:.5g} rad/s.")
+                raise ModelError(
+                    f"no stable steady state was found at {speed:.5g} rad/s.",
+                    solution=self.steady.T @ a,
+                )
         found: Array = self.steady.T @ a
         return found
 

@@ -11,7 +11,7 @@ from rom.cyclic.faces import unit_axis
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.rotation import rotation_matrices
 from rom.cyclic.sector import NONE, CyclicSector
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, ModelError, reached
 from rom.model import Array, FEModel
 from rom.prestress.heat import Heat
 from rom.prestress.speed_table import SpinUp, straightened
@@ -42,7 +42,8 @@ def spin_up(
     Raises:
         ConfigError: if the model has no finite elements or carries attachments, or for a wrong
             speed or number of states.
-        ModelError: if the solid passes an instability on its way; the message says where.
+        ModelError: if the solid passes an instability on its way; the message says where, and
+            ``error.solution`` holds the states below.
         ParallelError: on several processes.
     """
     positive("speed", speed)
@@ -61,9 +62,15 @@ def spin_up(
     tau = straightened(speed, lowest) * (1 - np.cos(np.pi * np.arange(n_states) / (n_states - 1)))
     squares = lowest**2 * tau / (2 - tau)
     found = [a]
-    for k in range(1, n_states):
-        found.append(_reached(steady, found[-1], squares[k - 1], squares[k]))
-    return SpinUp(np.sqrt(squares), lowest, steady, base, steady.T @ np.array(found).T)
+
+    def table() -> SpinUp:
+        speeds = np.sqrt(squares[: len(found)])
+        return SpinUp(speeds, lowest, steady, base, steady.T @ np.array(found).T)
+
+    with reached(table):
+        for k in range(1, n_states):
+            found.append(_next(steady, found[-1], squares[k - 1], squares[k]))
+    return table()
 
 
 @typed
@@ -117,7 +124,7 @@ def _warmed(steady: SteadyRotation, heat: Heat) -> Array:
     return a
 
 
-def _reached(steady: SteadyRotation, a: Array, start: float, end: float) -> Array:
+def _next(steady: SteadyRotation, a: Array, start: float, end: float) -> Array:
     a, square = steady.follow(a, start, end, steady.load)
     if square < end:
         raise ModelError(

@@ -104,13 +104,15 @@ def equilibrium(
 
     Raises:
         ConfigError: if loads or held dofs do not fit, or without a step.
-        SolverError: if Newton's method does not find equilibrium.
+        SolverError: if Newton's method does not find equilibrium; ``error.solution`` is that of the
+            load step before.
     """
     load, held = _nodal("loads", load, body), _dofs(held, body)
     if steps < 1:
         raise ConfigError(f"{steps} load steps: one or more are needed.")
     free = np.setdiff1d(np.arange(load.size), held)
     x, history, most = body.points.copy(), None, 0
+    before: tuple[Array, Any, int] = x.copy(), history, most
     for k in range(1, steps + 1):
         for i in range(30):
             f, new = forces(body, metal, x, history)
@@ -120,15 +122,18 @@ def equilibrium(
             K = tangent(body, metal, x, history)[free][:, free]
             x.reshape(-1)[free] += spsolve(K.tocsc(), r)
             if not np.isfinite(x).all():
-                raise _lost(k, steps)
+                raise _lost(k, steps, before)
         else:
-            raise _lost(k, steps)
+            raise _lost(k, steps, before)
         history, most = new, max(most, i)
+        before = x.copy(), history, most
     return x, history, most
 
 
-def _lost(k: int, steps: int) -> SolverError:
-    return SolverError(f"no equilibrium in load step {k} of {steps}.", hint="Take more steps.")
+def _lost(k: int, steps: int, before: tuple[Array, Any, int]) -> SolverError:
+    return SolverError(
+        f"no equilibrium in load step {k} of {steps}.", hint="Take more steps.", solution=before
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +145,7 @@ class Flight:
         x: (k, n, 2) positions [m].
         plastic: (k, t, p) accumulated plastic strain.
         work: energy that went from the motion into the solid [J].
-        steps: number of time steps.
+        steps: number of time steps; -1 of a motion that was lost.
     """
 
     t: Array
@@ -157,7 +162,7 @@ def fly(
 
     Raises:
         ConfigError: if velocities, held dofs, duration or pictures do not fit.
-        SolverError: if the motion is lost.
+        SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
     v, held = _nodal("velocities", v, body), _dofs(held, body)
     if not 0 < t_end < np.inf or pictures < 2:
@@ -166,14 +171,17 @@ def fly(
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
     free.reshape(-1)[held] = False
     t = np.linspace(0, t_end, pictures)
-    path, seen = np.zeros((pictures, *x.shape)), np.zeros((pictures, *body.weights.shape))
+    path, seen = np.full((pictures, *x.shape), np.nan), np.zeros((pictures, *body.weights.shape))
     steps, work = kernels.fly(
         x, np.where(free, v, 0.0), lumped, free, (*parts[:4], body.area), *parts[4:6],
         metal.wave_speed, t, (parts[6], parts[6].copy()), path, seen,
     )  # fmt: skip
     if steps < 0 or not np.isfinite(path).all():
+        taken = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
         raise SolverError(
-            "the explicit motion was lost.", hint="Use the element F1, or finer time."
+            "the explicit motion was lost.",
+            hint="Use the element F1, or finer time.",
+            solution=Flight(t[:taken], path[:taken], seen[:taken], work, steps),
         )
     return Flight(t, path, seen, work, steps)
 

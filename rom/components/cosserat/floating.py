@@ -224,5 +224,6 @@ def simulate(
         (0.0, times[-1]), begun.packed(), "DOP853", times, rtol=rtol, atol=rtol,
     )  # fmt: skip
     if not found.success:
-        raise SolverError(f"the motion ends at {found.t[-1]:g} s: {found.message}")
+        raise SolverError(f"the motion ends at {found.t[-1]:g} s: {found.message}",
+                          solution=[Instant.unpacked(y, n) for y in found.y.T])  # fmt: skip
     return [Instant.unpacked(y, n) for y in found.y.T]

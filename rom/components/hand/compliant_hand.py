@@ -227,7 +227,7 @@ def close(
 
     Raises:
         ConfigError: for both tension and pull, a tension below zero, a pull beyond the springs.
-        SolverError: if no posture was found; its attribute ``posture`` is the last good one.
+        SolverError: if no posture was found; ``error.solution`` is the last good one.
     """
     if tension is not None and pull is not None:
         raise ConfigError("both tension and pull are given.", hint="One follows from the other.")
@@ -250,10 +250,9 @@ def close(
         elif part > 0.5**MAX_HALVINGS:
             part /= 2
         else:
-            error = SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
-                                hint="A joint buckles, or the load is too large.")  # fmt: skip
-            error.posture = here  # type: ignore[attr-defined]
-            raise error
+            raise SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
+                              hint="A joint buckles, or the load is too large.",
+                              solution=here)  # fmt: skip
     return here
 
 

@@ -329,7 +329,8 @@ def simulate(
 
     Raises:
         ConfigError: if times or shapes do not fit.
-        SolverError: if contacts do not settle even in the shortest steps.
+        SolverError: if contacts do not settle even in the shortest steps; ``error.solution`` is the
+            motion before.
     """
     B, law = masonry.blocks(), masonry.law
     if not (0 < dt < np.inf and abs(t_end) < np.inf):
@@ -356,5 +357,7 @@ def simulate(
                 f"contacts do not settle near t = {dt * kept[k]:.6g} s, even in steps of "
                 f"{dt / 3**8:.2g} s.",
                 hint="Use softer contacts, or a smaller dt.",
-            )
+                solution=Motion(masonry, dt * np.array(kept[:k]), Q[:k], U[:k], E[:k], C,
+                                int(cuts[0])),
+            )  # fmt: skip
     return Motion(masonry, dt * np.array(kept), Q, U, E, C, int(cuts[0]))

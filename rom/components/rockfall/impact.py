@@ -172,7 +172,8 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
 
     Raises:
         ConfigError: for a duration, a step or a number of instants that is not positive.
-        SolverError: if the motion grows without bound because dt is too large.
+        SolverError: if the motion grows without bound because dt is too large; ``error.solution``
+            is what was finite of it.
     """
     if not (0 < t_end < np.inf and keep >= 1 and (dt is None or dt > 0)):
         raise ConfigError(f"t_end = {t_end} s, dt = {dt} s, keep = {keep}: all must be positive.")
@@ -188,8 +189,16 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
     modes = tuple(np.array(x, dtype=float) for x in (g.slab.phi, g.slab.omega))
     out, last = np.zeros((n // every + 1, 17)), np.zeros(7)
     kernels.strike(laws, modes, t_end / n, every, out, last)
-    if not np.isfinite(out).all():
-        raise SolverError(f"the impact grows without bound with a step of {t_end / n:.3g} s.")
+    finite = np.isfinite(out).all(axis=1)
+    if not finite.all():
+        raise SolverError(
+            f"the impact grows without bound with a step of {t_end / n:.3g} s.",
+            solution=_impact(out[: int(finite.argmin())], last),
+        )
+    return _impact(out, last)
+
+
+def _impact(out: Array, last: Array) -> Impact:
     t, z, v, forces, energy = np.split(out, [1, 4, 7, 10], axis=1)
     deepest, deflection, plastic = map(float, last[3:6])
     return Impact(

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import eig
 
 from rom.components.transmission.unit import Rest, Transmission, rest
-from rom.errors import ModelError, SolverError
+from rom.errors import ModelError, SolverError, reached
 from rom.model import Array
 
 MAX_ITERATIONS, FORCE_RTOL = 30, 1e-9
@@ -130,7 +130,7 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
 
     Raises:
         ModelError: if the speed is above the threshold of whirl.
-        SolverError: if a step fails.
+        SolverError: if a step fails; ``error.solution`` is the motion before.
     """
     unit = state.unit
     if not whirling and not whirl(state).stable:
@@ -143,13 +143,19 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
     dt, n_t = unit.mesh_period / steps, round(periods * steps)
     step = Step(unit, state.q, state.theta)
     rows = [step.row()]
-    for k in range(n_t):
-        step.advance(dt, state.theta + unit.speed * (k + 1) * dt)
-        rows.append(step.row())
+    with reached(lambda: _run(step, rows, dt)):
+        for k in range(n_t):
+            step.advance(dt, state.theta + unit.speed * (k + 1) * dt)
+            rows.append(step.row())
+    return _run(step, rows, dt)
+
+
+def _run(step: "Step", rows: list[Row], dt: float) -> Run:
     q, v, teeth, error, heat, work = (np.array(column) for column in zip(*rows, strict=True))
     names = (*step.NAMES, "kinetic")
     named = {name: work[:, k] - work[0, k] for k, name in enumerate(names)}
-    return Run(unit, dt * np.arange(n_t + 1), q, v, teeth, error, heat, named, step.iterations)
+    t = dt * np.arange(len(rows))
+    return Run(step.unit, t, q, v, teeth, error, heat, named, step.iterations)
 
 
 class Step:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rom.components.transmission.motion import Row, Step
 from rom.components.transmission.unit import Rest, Transmission, rest
-from rom.errors import ModelError, SolverError
+from rom.errors import ModelError, SolverError, reached
 from rom.model import Array
 
 MAX_PERIODS = 40
@@ -141,13 +141,15 @@ def sweep(unit: Transmission, speeds: Iterable[float], *, steps: int = 60) -> li
         steps: per mesh period.
 
     Raises:
-        ModelError, SolverError: as `rest` and `steady`.
+        ModelError, SolverError: as `rest` and `steady`; ``error.solution`` holds the motions
+            before.
     """
     found: list[Steady] = []
-    for speed in speeds:
-        there = replace(unit, speed=float(speed))
-        start = replace(found[-1], unit=there) if found else rest(there)
-        found.append(steady(start, steps=steps))
+    with reached(lambda: found):
+        for speed in speeds:
+            there = replace(unit, speed=float(speed))
+            start = replace(found[-1], unit=there) if found else rest(there)
+            found.append(steady(start, steps=steps))
     return found
 
 

@@ -17,7 +17,7 @@ from rom.components.journal_bearing import Film, JournalBearing, film
 from rom.components.transmission.housing import Housing
 from rom.components.transmission.shaft import Shaft
 from rom.components.transmission.solid_shaft import SolidShaft
-from rom.errors import ModelError, SolverError
+from rom.errors import ModelError, SolverError, reached
 from rom.model import Array
 
 MIRROR = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
@@ -295,13 +295,17 @@ def rest(
         loads: shares of the load on the way.
 
     Raises:
-        SolverError: if films or teeth cannot carry the load.
+        SolverError: if films or teeth cannot carry the load; ``error.solution`` is the equilibrium
+            at the share of it before, if there was one.
     """
     K, f = unit.matrices[1], unit.load
     q = _touching(unit, theta) if start is None else np.array(start, dtype=float)
-    for share in loads if start is None else (1.0,):
-        q, forces, residual = _newton(unit, K, share * f, q, theta)
-    return Rest(unit, q, theta, forces, residual)
+    found: list[Rest] = []
+    with reached(lambda: found[-1] if found else None):
+        for share in loads if start is None else (1.0,):
+            q, forces, residual = _newton(unit, K, share * f, q, theta)
+            found.append(Rest(unit, q, theta, forces, residual))
+    return found[-1]
 
 
 def _touching(unit: Transmission, theta: float) -> Array:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.arguments import finite, typed, whole
-from rom.errors import ConfigError, ModelError, RomError, SolverError, warn
+from rom.errors import ConfigError, ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.tangent import Tangent, sizes
 from rom.mbs.equations.packing import Packed
@@ -56,7 +56,8 @@ def equilibrium(
         ConfigError: for a wrong argument.
         ModelError: naming the body that can still move although no force opposes, or the joint
             that cannot be closed.
-        SolverError: naming the body out of balance, or the open joint, where Newton failed.
+        SolverError: naming the body out of balance, or the open joint, where Newton failed. Either
+            of them has ``error.solution``: the state reached, at the share of the loads before.
 
     Warns:
         RomWarning: if the equilibrium at rest is unstable.
@@ -69,17 +70,18 @@ def equilibrium(
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
     search = _Search(now, _spinning(now, spin), finite("about", about, (3,)))
     found, done, width = search.start(state), 0.0, 1.0 / steps
-    while done < 1.0:
-        load = min(done + width, 1.0)
-        try:
-            found = search.settle(found, load if load < 1.0 - 1e-9 else 1.0)
-        except SolverError:
-            width /= 2
-            if width < MIN_LOAD_STEP / steps:
-                raise
-            continue
-        done = load if load < 1.0 - 1e-9 else 1.0
-    search.judge(found)
+    with reached(lambda: found):
+        while done < 1.0:
+            load = min(done + width, 1.0)
+            try:
+                found = search.settle(found, load if load < 1.0 - 1e-9 else 1.0)
+            except SolverError:
+                width /= 2
+                if width < MIN_LOAD_STEP / steps:
+                    raise
+                continue
+            done = load if load < 1.0 - 1e-9 else 1.0
+        search.judge(found)
     return found
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, ModelError, reached
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.python_laws import Law, MotorLaw, apply_laws, laws
@@ -62,13 +62,21 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
         raise failure
     W = workspace(packed.system, len(packed.signals))
     W.base[:] = state.base
-    forces, states, powers = laws(mechanism, packed), [], []
-    for k, x in enumerate(times):
-        W.signal[:] = signals[k]
-        state = _next(packed, W, forces, state, float(x))
-        states.append(state)
-        powers.append(W.power.copy())
-    return _solution(mechanism, packed, states, np.array(powers), signals)
+    forces = laws(mechanism, packed)
+    states: list[State] = []
+    powers: list[Array] = []
+
+    def solution() -> Any:
+        so_far = np.array(powers), signals[: len(states)]
+        return _solution(mechanism, packed, states, *so_far) if states else None
+
+    with reached(solution):
+        for k, x in enumerate(times):
+            W.signal[:] = signals[k]
+            state = _next(packed, W, forces, state, float(x))
+            states.append(state)
+            powers.append(W.power.copy())
+    return solution()
 
 
 def _next(
