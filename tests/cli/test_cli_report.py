@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.files.reports import read
-from cases.files.toml_files import CRANK, PENDULUM
+from cases.files.toml_files import laid_out
 from cases.solid import block
 from rom.cli.main import main
 
@@ -25,11 +25,8 @@ def rod(tmp_path_factory):
 
 @pytest.fixture
 def folder(rod, tmp_path, monkeypatch):
-    (tmp_path / "rod.rom.npz").symlink_to(rod)
-    (tmp_path / "crank.toml").write_text(CRANK)
-    (tmp_path / "pendulum.toml").write_text(PENDULUM)
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return laid_out(tmp_path, rod)
 
 
 def reported(*words):

@@ -12,7 +12,7 @@ from scipy.special import ellipk
 
 import rom
 from cases.command import ROOT, environment
-from cases.files.toml_files import ALL, CRANK, PENDULUM
+from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
 from cases.solid import block
 from rom.cli.main import main
 from rom.config.document import parsed
@@ -32,11 +32,8 @@ def rod(tmp_path_factory):
 
 @pytest.fixture
 def folder(rod, tmp_path, monkeypatch):
-    (tmp_path / "rod.rom.npz").symlink_to(rod)
-    (tmp_path / "crank.toml").write_text(CRANK)
-    (tmp_path / "pendulum.toml").write_text(PENDULUM)
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return laid_out(tmp_path, rod)
 
 
 def test_the_pendulum_reaches_the_bottom_when_it_must(folder):

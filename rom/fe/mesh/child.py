@@ -23,8 +23,8 @@ from rom.errors import (
     RomError,
     UnsafeFileError,
 )
-from rom.fe.mesh.solid import Read
-from rom.fe.mesh.sources.readers import GEOMETRIES, read
+from rom.fe.mesh.solid import GEOMETRIES, Read
+from rom.fe.mesh.sources.readers import read
 from rom.process import child
 from rom.process.memory import total_bytes
 

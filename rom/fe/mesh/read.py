@@ -21,8 +21,7 @@ from rom.errors import (
 from rom.fe.mesh.child import read_apart
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
-from rom.fe.mesh.solid import Arrays, SolidMesh
-from rom.fe.mesh.sources.readers import GEOMETRIES
+from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, SolidMesh
 from rom.fe.mesh.validate import checked
 
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
@@ -192,7 +191,7 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
 
 
 def _check_trust(path: Path, reader: str, trust: bool) -> None:
-    if reader == "builder" and trust is not True:
+    if reader in PROGRAMS and trust is not True:
         raise UnsafeFileError(
             "is a Python program, which can do to this machine whatever you can.",
             where=str(path),

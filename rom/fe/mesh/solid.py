@@ -65,6 +65,8 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 Read = tuple[Arrays, dict[str, Any]]  # arrays and notes
+GEOMETRIES = ("geo", "builder", "step")  # readers that make a mesh
+PROGRAMS = ("builder",)  # can do what a user can: run only with trust, and then without limits
 Made = tuple[dict[str, Any], dict[str, Any]]  # parameters used, defaults of some of them
 
 

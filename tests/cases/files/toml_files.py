@@ -145,3 +145,11 @@ stiffness = 1e6
 [simulation]
 t_end = 1
 """
+
+
+def laid_out(folder, rod):
+    """The folder with both mechanism files and a link to the body that they name."""
+    (folder / "rod.rom.npz").symlink_to(rod)
+    (folder / "crank.toml").write_text(CRANK)
+    (folder / "pendulum.toml").write_text(PENDULUM)
+    return folder

@@ -3,6 +3,7 @@
 import inspect
 import sys
 import traceback
+from collections.abc import Iterable
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
@@ -61,14 +62,20 @@ def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
     names = [p.name for p in known if p.kind is not p.VAR_KEYWORD]
     unknown = sorted(set(given) - set(names))
     if unknown and len(names) == len(known):
-        raise ConfigError(
-            f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(names)}."
-        )
+        raise no_parameter(path, unknown, names)
     defaults = _defaults(build)
     missing = sorted(set(names) - set(defaults) - set(given))
     if missing:
         raise ConfigError(f"{path.name} needs a value for the parameter {named(missing)}.")
     return defaults | given
+
+
+def no_parameter(
+    path: Path, unknown: Iterable[str], known: Iterable[str], *, hint: str = ""
+) -> ConfigError:
+    """What is said of parameters that a geometry does not have, of whatever kind it is."""
+    text = f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(known)}."
+    return ConfigError(text, hint=hint)
 
 
 def _defaults(build: Any) -> dict[str, Any]:

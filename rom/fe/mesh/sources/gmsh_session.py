@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
-from rom.fe.mesh.solid import Made, Read
+from rom.fe.mesh.solid import PROGRAMS, Made, Read
 from rom.fe.mesh.sources import builder, step
 from rom.fe.mesh.sources.confinement import confine
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
@@ -27,7 +27,7 @@ def run(request: dict[str, Any]) -> Read:
 
     path, reader = Path(request["path"]), request["reader"]
     with session(gmsh):
-        if reader != "builder":  # that is a program of its own, and trusted
+        if reader not in PROGRAMS:
             confine(Path(request["folder"]))
         declared = Path(request["folder"], "declared.msh")
         with complaints(gmsh):
@@ -127,10 +127,8 @@ def _full_name(name: str, known: dict[str, Any], path: Path) -> str:
     ends = [full for full in known if full.rpartition("/")[2] == name]
     if len(ends) == 1:
         return ends[0]
-    raise ConfigError(
-        f"{path.name} has no parameter {name!r}; its parameters are {sorted(known)}.",
-        hint='A .geo parameter can be set only if it has a name: x = {1.0, Name "x"}.',
-    )
+    cure = 'A .geo parameter can be set only if it has a name: x = {1.0, Name "x"}.'
+    raise builder.no_parameter(path, [name], known, hint=cure)
 
 
 def _number(name: str, value: Any, path: Path) -> float:

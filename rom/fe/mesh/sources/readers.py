@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from rom.errors import FileFormatError, ResourceError, RomError
-from rom.fe.mesh.solid import Read
+from rom.fe.mesh.solid import GEOMETRIES, Read
 
-GEOMETRIES = ("geo", "builder", "step")
 
 
 def read(request: dict[str, Any]) -> Read:
