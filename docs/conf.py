@@ -14,7 +14,8 @@ copyright = author
 version = release = rom.__version__
 
 extensions = [
-    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser", "site_pages", "site_text",
+    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser", "site_flow", "site_pages",
+    "site_text",
 ]  # fmt: skip
 exclude_patterns = ["build"]
 nitpicky = True  # a name that is linked must exist

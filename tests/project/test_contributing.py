@@ -1,0 +1,117 @@
+"""The page for contributors names files that exist, and all that a new thing takes."""
+
+import re
+import shutil
+import tokenize
+
+import pytest
+
+from cases.paths import ROOT
+
+PAGE = ROOT / "docs" / "contributing.md"
+PATH = re.compile(r"`((?:rom|tests|docs|demos|meshes)/[\w./]*)`")
+NAMED = re.compile(r"`([A-Z_]+)` of `([\w./]+)`")
+# A member of each family: whatever names it in the code is a file that another one takes too.
+MEMBERS = {
+    "a reduction method": r"Herting|herting",
+    "a kind of interface": r"FourierLegendre|fourier",
+    "a joint": r"universal",
+    "a force element": r"[Bb]ushings?(_\w+)?",
+    "a file format": r"(write_)?radioss",
+    "a verb of the command line": r"swing",
+    "a picture": r"wheel_modes",
+}
+ELSEWHERE = {  # where the word means something else, or the member is used and no family listed
+    "a kind of interface": ("rom/cyclic/", "rom/prestress/"),
+    "a joint": ("rom/io/",),
+    "a verb of the command line": ("rom/mbs/",),
+}
+
+
+def rows():
+    """{what is added: its cell} of the table."""
+    text = PAGE.read_text().partition("## Where do I add")[2]
+    cells = (line.strip("| ").split(" | ", 1) for line in text.splitlines() if "| a " in line)
+    return dict(cells)
+
+
+def listed(cell):
+    """Files below rom/ that a cell names, those of its folders too."""
+    paths = [ROOT / name for name in PATH.findall(cell)]
+    files = {file for path in paths if path.is_dir() for file in path.glob("*.py")}
+    return {str(file.relative_to(ROOT)) for file in files | {p for p in paths if p.is_file()}}
+
+
+def names(path):
+    """Names, keywords and texts of a file of Python, comments and longer texts left out."""
+    with path.open("rb") as stream:
+        for token in tokenize.tokenize(stream.readline):
+            if token.type in (tokenize.NAME, tokenize.STRING):
+                yield token.string.strip("\"'")
+
+
+def test_every_file_named_on_the_page_exists():
+    paths = PATH.findall(PAGE.read_text())
+    assert len(paths) > 50
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+    for name, path in NAMED.findall(PAGE.read_text()):
+        assert re.search(rf"^{name}\b", (ROOT / path).read_text(), re.M), f"{name} of {path}"
+
+
+def test_the_table_answers_for_eight_things():
+    assert {*rows()} == {*MEMBERS, "a component"}
+
+
+@pytest.mark.parametrize("what", MEMBERS)
+def test_a_row_names_all_files_that_know_a_member(what):
+    member, row = re.compile(MEMBERS[what]), rows()[what]
+    sources = [*(ROOT / "rom").rglob("*.py"), *(ROOT / "rom").glob("*.pyi")]
+    apart = ("rom/components/", "rom/bench/", "rom/moved.py", *ELSEWHERE.get(what, ()))
+    files = {str(path.relative_to(ROOT)): path for path in sources}
+    know = {
+        name for name, path in files.items()
+        if not name.startswith(apart) and any(map(member.fullmatch, names(path)))
+    }  # fmt: skip
+    assert len(know) > 1 and know <= listed(row), sorted(know - listed(row))
+
+
+@pytest.fixture
+def flow(monkeypatch):
+    pytest.importorskip("sphinx", reason="the site is built in the environment of the developers")
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    import site_flow
+
+    return site_flow
+
+
+def test_the_picture_is_drawn_from_all_modules(flow, tmp_path):
+    """Each has a stage, the curves count what the source imports, and the file is a picture."""
+    stages = {flow.stage_of(module) for module in flow.modules() if module}
+    assert stages == {*flow.STAGES, flow.COMPONENTS, flow.FRONT, flow.GROUND}
+    shown = sum(flow.files_in(part) for parts in flow.STAGES.values() for part in parts)
+    known = [m for m in flow.modules() if m and flow.stage_of(m) in flow.STAGES]
+    fronts = {"reduction"}  # of folders that are shown each by itself
+    assert shown == len(known) - len(fronts)
+    assert flow.draw(tmp_path / "flow.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_picture_follows_the_source(flow, tmp_path):
+    source = tmp_path / "rom"
+    for name in ("body", "mbs"):
+        (source / name).mkdir(parents=True)
+        (source / name / "__init__.py").touch()
+    (source / "body" / "one.py").write_text("from rom.mbs.mechanism import A, B\nimport rom.view\n")
+    assert flow.counted(source) == {("mechanism", "body"): 2, ("results", "body"): 1}
+    assert flow.files_in("body", source) == 2
+    with pytest.raises(KeyError, match="no class Basis"):
+        flow.defined("Basis", source)
+    shutil.rmtree(source / "body")
+    assert not flow.counted(source)
+
+
+def test_a_folder_without_a_stage_is_refused(flow, tmp_path, monkeypatch):
+    (tmp_path / "rom" / "optics").mkdir(parents=True)
+    monkeypatch.setattr(flow, "SOURCE", tmp_path / "rom")
+    with pytest.raises(KeyError, match=r"optics\.lens has no stage"):
+        flow.stage_of("optics.lens")
