@@ -125,8 +125,9 @@ def error_page() -> str:
         "# Errors",
         "Everything raised on purpose is a `rom.RomError`. Its message says what happened, with the"
         " number and the name of the culprit, and what to do; `error.where` names the file, body,"
-        " joint or interface and `error.hint` the cure. The command line turns it into one line and"
-        " an exit code; `--debug` adds the traceback, `--json` gives the error as an object.",
+        " joint or interface and `error.hint` the cure; `error.solution` is the part of a"
+        " motion, or the last state, that was reached before. The command line turns an error into"
+        " one line and an exit code; `--debug` adds the traceback, `--json` gives the error as an object.",
         "\n".join(rows),
         "`RomWarning` announces something legal that a careful user wants to know; `--strict` makes"
         " it an error.",

@@ -12,7 +12,7 @@ from dataclasses import replace  # noqa: E402
 
 from PIL import Image  # noqa: E402
 
-from cases.drawn import lattice_bar, squeezed, swinging  # noqa: E402
+from cases.mbs.drawn import lattice_bar, squeezed, swinging  # noqa: E402
 from rom import view  # noqa: E402
 from rom.body.records import Surface  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("pyvista", reason="pictures need pyvista")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
-from cases.drawn import lattice_bar, squeezed, swinging
+from cases.mbs.drawn import lattice_bar, squeezed, swinging
 from cases.paths import ROOT
 from cases.solid import block
 from rom import view
