@@ -127,7 +127,8 @@ def error_page() -> str:
         " number and the name of the culprit, and what to do; `error.where` names the file, body,"
         " joint or interface and `error.hint` the cure; `error.solution` is the part of a"
         " motion, or the last state, that was reached before. The command line turns an error into"
-        " one line and an exit code; `--debug` adds the traceback, `--json` gives the error as an object.",
+        " one line and an exit code; `--debug` adds the traceback, `--json` gives the error as an"
+        " object.",
         "\n".join(rows),
         "`RomWarning` announces something legal that a careful user wants to know; `--strict` makes"
         " it an error.",
