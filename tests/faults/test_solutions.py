@@ -166,7 +166,9 @@ def test_it_has_the_form_of_what_the_function_gives(monkeypatch):
         with monkeypatch.context() as patch, pytest.raises(RomError) as caught:
             fail(patch)
         assert isinstance(caught.value.solution, kind)
-    assert caught.value.solution.t.tolist() == [0.0, 0.02, 0.04]
+    motion = caught.value.solution
+    assert motion.t.tolist() == [0.0, 0.02, 0.04]
+    assert {len(rows) for rows in (motion.q, motion.v, motion.energy)} == {3}
 
 
 @pytest.mark.parametrize("name", ["motion", "posture", "shape"])

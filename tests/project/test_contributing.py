@@ -101,7 +101,9 @@ def test_the_picture_follows_the_source(flow, tmp_path):
     for name in ("body", "mbs"):
         (source / name).mkdir(parents=True)
         (source / name / "__init__.py").touch()
-    (source / "body" / "one.py").write_text("from rom.mbs.mechanism import A, B\nimport rom.view\n")
+    (source / "body" / "one.py").write_text(
+        "from rom.mbs.mechanism import A, B\nimport rom.view, rom.io\n"
+    )
     assert flow.counted(source) == {("mechanism", "body"): 2, ("results", "body"): 1}
     assert flow.files_in("body", source) == 2
     with pytest.raises(KeyError, match="no class Basis"):
