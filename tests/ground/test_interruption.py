@@ -68,7 +68,8 @@ def test_the_process_cleans_up_and_ends_by_sigterm():
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
 def test_a_signal_dropped_in_a_callback_comes_again(number):
     code = (
-        "import os, signal, time\nfrom rom.process.interruption import heed_lost_signals, terminable\n"
+        "import os, signal, time\n"
+        "from rom.process.interruption import heed_lost_signals, terminable\n"
         "heed_lost_signals()\n"
         "class Last:\n"
         f"    def __del__(self): os.kill(os.getpid(), signal.{number}); time.sleep(0.01)\n"

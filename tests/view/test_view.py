@@ -14,7 +14,6 @@ from PIL import Image  # noqa: E402
 
 from cases.mbs.drawn import lattice_bar, squeezed, swinging  # noqa: E402
 from rom import view  # noqa: E402
-from rom.body.records import Surface  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402
 from rom.mbs.analysis.campbell import Campbell  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402

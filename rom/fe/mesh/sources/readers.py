@@ -7,7 +7,6 @@ from rom.errors import FileFormatError, ResourceError, RomError
 from rom.fe.mesh.solid import GEOMETRIES, Read
 
 
-
 def read(request: dict[str, Any]) -> Read:
     """Read or make the mesh a request asks for.
 
