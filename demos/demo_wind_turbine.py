@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from rom import view
-from rom.components.cosserat import equilibrium, loads, modes
-from rom.components.linear_pieces import bend_in_pieces
+from rom.components.cosserat import bend_in_pieces, equilibrium, loads, modes
 from rom.components.wind import HUB_RADIUS, blade, run_up
 from rom.mbs import Campbell
 from rom.view import Panel

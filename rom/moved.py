@@ -17,7 +17,7 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom.body", "rom.assembly", "assembly condensed coupling"),
     ("rom.body", "rom.parametric", "family stretch=layers"),
     ("rom.components", "rom.components", "frf_updating=updating"),
-    ("rom.components", "rom.components.cosserat", "helical_spring"),
+    ("rom.components", "rom.components.cosserat", "helical_spring linear_pieces"),
     ("rom.components", "rom.components.hand",
      "cable compliant_hand control_chart grasp solid_finger"),
     ("rom.components", "rom.components.linkages", "dynamic_isotropy two_dof_linkages"),

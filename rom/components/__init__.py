@@ -1,6 +1,6 @@
 """Engineering components on the light layers.
 
-Structures: rods of `cosserat`, `linear_pieces`, sheets of `assumed_strain`, `masonry`, `rockfall`.
+Structures: rods of `cosserat`, sheets of `assumed_strain`, `masonry`, `rockfall`.
 Machines: `hand`, `linkages`, `wind`, `gear_mesh`, `journal_bearing`, `transmission`. Methods:
 `updating` by measured responses, `best_matching`. `compiled` is the compiler of their kernels.
 """

@@ -4,7 +4,6 @@ from rom.components import cosserat as cosserat
 from rom.components import gear_mesh as gear_mesh
 from rom.components import hand as hand
 from rom.components import journal_bearing as journal_bearing
-from rom.components import linear_pieces as linear_pieces
 from rom.components import linkages as linkages
 from rom.components import masonry as masonry
 from rom.components import rockfall as rockfall

@@ -3,6 +3,7 @@ from rom.components.cosserat.helical_spring import HelicalSpring as HelicalSprin
 from rom.components.cosserat.helical_spring import plate_compliance as plate_compliance
 from rom.components.cosserat.helical_spring import spring_rod as spring_rod
 from rom.components.cosserat.helical_spring import wire_rod as wire_rod
+from rom.components.cosserat.linear_pieces import bend_in_pieces as bend_in_pieces
 from rom.components.cosserat.motion import Motion as Motion
 from rom.components.cosserat.motion import simulate as simulate
 from rom.components.cosserat.multibody import RodBody as RodBody

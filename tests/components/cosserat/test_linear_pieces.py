@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom.components.cosserat import clamped, equilibrium, linearised, loads, reference, straight
-from rom.components.linear_pieces import bend_in_pieces, cut
+from rom.components.cosserat.linear_pieces import bend_in_pieces, cut
 from rom.components.wind.wind_turbine import blade
 from rom.errors import ConfigError, SolverError
 

@@ -5,10 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.mbs import floating_rod as floating
 from rom import rotation
 from rom.components import cosserat
-from rom.components.cosserat import floating
-from rom.errors import ConfigError, ModelError
 
 LOAD = {"tip": (30.0, -20.0, 10.0), "tip_moment": (10.0, 20.0, -15.0), "weight": (0, 0, -9.81)}
 VELOCITY, OMEGA = (1.0, 2.0, 0.0), (1.0, -2.0, 3.0)
@@ -90,10 +89,3 @@ def test_forces_of_the_rod_do_not_notice_the_frame(rod, motion):
     world = np.append(W.r, np.zeros(3)).reshape(-1, 6)
     assert_allclose(world[:-1, 3:], force @ rotation.matrix(now.P).T, atol=1e-11)
     assert_allclose(world[:, :3], seen[:, :3], atol=1e-11)
-
-
-def test_wrong_arguments_are_named(rod):
-    with pytest.raises(ConfigError, match="'tip' is none of"):
-        floating.simulate(rod, 1.0, reference_condition="tip")
-    with pytest.raises(ModelError, match="has no inertia"):
-        floating.simulate(cosserat.straight(1.0, 2, stretch=1.0, bend=1.0, mass=1.0), 1.0)
