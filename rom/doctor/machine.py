@@ -1,34 +1,26 @@
-"""Python, the light libraries, the BLAS in use, memory and cores."""
+"""The BLAS in use, memory and cores, and code kept on disk with what killed runs left there."""
 
 import os
-import platform
 import re
-import sys
-from importlib.metadata import PackageNotFoundError, version
-from time import perf_counter
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rom.doctor.core import abilities, better, taken_for
-from rom.doctor.finding import Finding
+from rom.doctor.probes import Finding
 from rom.fe.probe import mapped_files
+from rom.places import PACKAGE
 from rom.process.memory import free_bytes
 
 BLAS_FILE = re.compile(r"/lib(blas|openblas|scipy_openblas|mkl_rt|blis|flexiblas|cblas)[^/]*\.so")
 FAST = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)
 SLOW_ADVICE = "5 to 9 times faster: sudo apt-get install libopenblas0-pthread"
-
-
-def light() -> list[Finding]:
-    """Python and the libraries everything needs; without them nothing of rom starts."""
-    kind = "environment" if sys.prefix != sys.base_prefix else "system"
-    found = [Finding("Python", "python", f"{platform.python_version()} ({kind}, {sys.prefix})")]
-    for name in ("numpy", "scipy", "numba"):
-        try:
-            found.append(Finding("Python", name, version(name)))
-        except PackageNotFoundError:
-            found.append(Finding("Python", name, "", "broken", f"pip install {name}"))
-    return found
+REMOVE_COMMAND = "rom doctor --fix"
+AT_WORK = 60.0  # seconds after which nobody is still writing a temporary file
+END_OF_PICKLE = b"."
 
 
 def blas(mapped: list[str]) -> list[Finding]:
@@ -54,9 +46,9 @@ def blas(mapped: list[str]) -> list[Finding]:
 def _gigaflops(n: int = 400) -> float:
     A = np.ones((n, n))
     A @ A
-    began = perf_counter()
+    began = time.perf_counter()
     A @ A
-    return 2e-9 * n**3 / (perf_counter() - began)
+    return 2e-9 * n**3 / (time.perf_counter() - began)
 
 
 def machine() -> list[Finding]:
@@ -69,3 +61,56 @@ def machine() -> list[Finding]:
         Finding("machine", "memory", f"{total:.1f} GiB, of which {free:.1f} GiB may be taken"),
         Finding("machine", "cores", f"{cores}, OMP_NUM_THREADS {threads}"),
     ]
+
+
+def caches(forms: dict[str, Any], *, fix: bool) -> list[Finding]:
+    """State of the cache of compiled forms and of Numba's.
+
+    Args:
+        forms: what the probe says about the cache of forms; empty without dolfinx.
+        fix: remove damaged files; those of forms have been removed by the probe.
+    """
+    found = [_form_cache(forms, fix)] if "path" in forms else []
+    damaged = [path for folder in numba_folders() for path in damaged_files(folder)]
+    if fix:
+        for path in damaged:
+            path.unlink(missing_ok=True)
+    return [*found, _cache("compiled by Numba", "", damaged, fix)]
+
+
+def _form_cache(forms: dict[str, Any], fix: bool) -> Finding:
+    if not forms["writable"]:
+        value = f"{forms['path']} cannot be written; forms are compiled in every run"
+        return Finding("caches", "compiled forms", value, "note", f"chown it: {forms['path']}")
+    return _cache("compiled forms", forms["path"], forms["stale"], fix)
+
+
+def _cache(name: str, where: str, damaged: list[Any], fix: bool) -> Finding:
+    if not damaged:
+        return Finding("caches", name, f"{where} healthy".strip())
+    if fix:
+        return Finding("caches", name, f"{len(damaged)} damaged files removed {where}".strip())
+    value = f"{len(damaged)} damaged files, e.g. {damaged[0]}"
+    return Finding("caches", name, value, "note", REMOVE_COMMAND)
+
+
+def numba_folders() -> Iterator[Path]:
+    """Where Numba may keep what it compiled for rom."""
+    own = os.environ.get("NUMBA_CACHE_DIR")
+    if own:
+        yield Path(own)
+    yield PACKAGE
+
+
+def damaged_files(folder: Path) -> Iterator[Path]:
+    """Index and code files that end in the middle, and temporary ones nobody writes any more."""
+    for path in sorted(folder.rglob("*.nb[ic]*")):
+        try:
+            if ".tmp." in path.name:
+                damaged = time.time() - path.stat().st_mtime > AT_WORK
+            else:
+                damaged = path.read_bytes()[-1:] != END_OF_PICKLE
+        except OSError:
+            continue
+        if damaged:
+            yield path

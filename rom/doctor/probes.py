@@ -1,4 +1,7 @@
-"""Processes that try things which may crash; what they wrote before they died still counts."""
+"""What the doctor finds, and processes that try what may crash.
+
+What a process wrote before it died still counts.
+"""
 
 import json
 import subprocess
@@ -8,6 +11,26 @@ from typing import Any
 from rom.process import child
 
 TIME_LIMIT = 60.0  # [s]; a first import from a cold disk takes a few
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked at, a line of the report.
+
+    Attributes:
+        topic: heading it stands under.
+        name: what was looked at.
+        value: version, place or number found.
+        state: "ok"; "note": works, and could be better; "missing": a part of rom cannot be used;
+            "broken": installed or found, and does not work.
+        advice: what to type.
+    """
+
+    topic: str
+    name: str
+    value: str
+    state: str = "ok"
+    advice: str = ""
 
 
 @dataclass

@@ -13,7 +13,7 @@ from rom.bench.benchmarks import Figure
 from rom.cli.main import main
 from rom.cli.parser import VERBS
 from rom.cli.schemas import schema
-from rom.doctor.finding import Finding
+from rom.doctor.probes import Finding
 
 NAMES = [module.__name__.rpartition(".")[2] for module in VERBS]
 ANSWERS = {

@@ -11,11 +11,9 @@ import pytest
 
 from cases.command import environment
 from cases.command import rom as command
-from rom.doctor.caches import damaged_files
 from rom.doctor.core import abilities, better
-from rom.doctor.libraries import PACKAGES, fenicsx
-from rom.doctor.machine import blas, light
-from rom.doctor.pictures import pictures
+from rom.doctor.libraries import PACKAGES, fenicsx, light, pictures
+from rom.doctor.machine import blas, damaged_files
 
 OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
 REFERENCE = "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"
@@ -145,7 +143,7 @@ def test_a_missing_light_library_is_essential(monkeypatch):
             raise PackageNotFoundError(name)
         return "1.0"
 
-    monkeypatch.setattr("rom.doctor.machine.version", version)
+    monkeypatch.setattr("rom.doctor.libraries.version", version)
     states = {f.name: f.state for f in light()}
     assert states["numba"] == "broken" and states["numpy"] == "ok"
 

@@ -134,7 +134,7 @@ STARTERS = {
     "body FMU": "import rom; rom.write_body_fmu(rom.load('bar.rom.npz'), 'bar.fmu')",
     "FMU": "import rom; open('empty.py', 'w').write('import rom\\ndef mechanism():\\n"
     "    return rom.Mechanism()\\n'); rom.write_fmu('m.fmu', 'empty.py', dt=1e-3)",
-    "probes": "from rom.doctor.probes import start; print(start('rom.doctor.drawing').answer())",
+    "probes": "from rom.doctor.probes import start; print(start('rom.doctor.libraries').answer())",
     "peers": "from rom.process import child; from rom.bench.peers.compare import answer_of; "
     "answer_of(child.python('rom.bench.peers.ours', '1'))",
 }

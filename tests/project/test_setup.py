@@ -11,9 +11,8 @@ import pytest
 
 import rom
 from cases.paths import ROOT
-from rom.doctor.libraries import PACKAGES
+from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
 from rom.doctor.machine import SLOW_ADVICE
-from rom.doctor.pictures import SYSTEM_COMMAND
 
 SETUP = ROOT / ".ci" / "setup.sh"
 

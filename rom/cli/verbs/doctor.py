@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rom.cli.answer import Answer
 
 if TYPE_CHECKING:
-    from rom.doctor.finding import Finding
+    from rom.doctor.probes import Finding
 
 SUMMARY = "versions, speed of the linear algebra, display, caches, advice"
 EXAMPLES = """\
@@ -27,12 +27,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Answer:
     """Examine and report."""
     from rom import __version__
-    from rom.doctor.examination import diagnose
 
-    found = diagnose(fix=args.fix)
+    found = _diagnosed(args.fix)
     broken = tuple(f"{f.name} is broken: {f.value}" for f in found if f.state == "broken")
     data = {"rom": __version__, "findings": [asdict(f) for f in found]}
     return Answer(data, f"rom {__version__}\n{_text(found)}", failed=broken)
+
+
+def _diagnosed(fix: bool) -> "list[Finding]":
+    """Findings in the order of the report; what could crash runs in a process of its own."""
+    from rom.doctor import libraries, machine
+    from rom.doctor.probes import start
+
+    fe = start("rom.fe.probe", *(["--fix"] if fix else []))
+    drawing = start("rom.doctor.libraries")
+    found, answers = libraries.light(), fe.answer()
+    return [
+        *found,
+        *libraries.fenicsx(answers, fe.ending),
+        *machine.blas(answers.get("mapped", {}).get("value", [])),
+        *libraries.pictures(drawing.answer(), drawing.ending),
+        *machine.caches(answers.get("forms", {}), fix=fix),
+        *machine.machine(),
+    ]
 
 
 def _text(found: "list[Finding]") -> str:
