@@ -165,10 +165,7 @@ class DualAssembly:
         """All eigenvalues [rad^2/s^2], ascending, with those below zero of a dual assembly."""
         K, M = self.matrices(kind=kind, fixed=fixed)
         scale = 1 / np.sqrt(np.diag(M))
-        found: Array = eigh(
-            scale[:, None] * K * scale, scale[:, None] * M * scale, eigvals_only=True
-        )
-        return found
+        return eigh(scale[:, None] * K * scale, scale[:, None] * M * scale, eigvals_only=True)
 
     def matrices(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> tuple[Array, Array]:
         """Stiffness and mass of the whole in modal coordinates, and forces for "dual"."""

@@ -96,5 +96,4 @@ def von_mises(stress: Array) -> Array:
     """(p,) equivalent stress of (p, 6) stress xx, yy, zz, yz, xz, xy [Pa]."""
     xx, yy, zz, yz, xz, xy = stress.T
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    found: Array = np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
-    return found
+    return np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))

@@ -74,8 +74,7 @@ def rotating_matrices(
 
 def _centrifugal(S: Array, w: Array) -> Array:
     """Integral of rho u . (w x (w x v)) from the nine integrals of rho u_a v_b."""
-    found: Array = np.einsum("a,ab...,b->...", w, S, w) - w @ w * np.einsum("aa...->...", S)
-    return found
+    return np.einsum("a,ab...,b->...", w, S, w) - w @ w * np.einsum("aa...->...", S)
 
 
 def _reactions(body: BodyData, load: Array, supports: tuple[str, ...]) -> dict[str, Array]:

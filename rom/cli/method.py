@@ -1,7 +1,7 @@
 """Options that choose how a body is reduced."""
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rom.cli.options import count, number, positive
 from rom.config.methods import CRAIG_BAMPTON, METHODS
@@ -95,5 +95,4 @@ def _plain(args: argparse.Namespace) -> "Method":
     number_kept = () if default is None else (default if args.modes is None else args.modes,)
     if args.method == "moment-matching":
         return rom.MomentMatching(args.at or (0.0,), *number_kept)
-    made: Any = getattr(rom, name)(*number_kept)
-    return made
+    return getattr(rom, name)(*number_kept)

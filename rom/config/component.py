@@ -41,8 +41,7 @@ class Component:
     @property
     def output(self) -> Path | None:
         """Where its body is to be written."""
-        path: Path | None = self.values.get("output", {}).get("file")
-        return path
+        return self.values.get("output", {}).get("file")
 
     @property
     def kinds(self) -> dict[str, Any]:
@@ -154,8 +153,7 @@ class Component:
     def _section(self, name: str) -> dict[str, Any]:
         if name not in self.values:
             raise ConfigError(f"[{name}] is missing.", where=str(self.document.path))
-        found: dict[str, Any] = self.values[name]
-        return found
+        return self.values[name]
 
     def _solid(self, values: dict[str, Any], *path: str) -> Any:
         from rom.model import Material, Orthotropic

@@ -65,5 +65,4 @@ def _plain(settings: dict[str, Any]) -> "Method":
         made = make(tuple(settings.get("at", (0.0,))), modes or default)
     else:
         made = make() if default is None else make(default if modes is None else modes)
-    found: Method = made
-    return found
+    return made

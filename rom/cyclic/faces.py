@@ -43,8 +43,7 @@ def turned(axis: Array, angle: float) -> Array:
     """(3, 3) rotation about a unit vector (Rodrigues)."""
     x, y, z = axis
     S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    R: Array = np.eye(3) + np.sin(angle) * S + (1 - np.cos(angle)) * (S @ S)
-    return R
+    return np.eye(3) + np.sin(angle) * S + (1 - np.cos(angle)) * (S @ S)
 
 
 def unit_axis(axis: npt.ArrayLike) -> Array:
@@ -188,5 +187,4 @@ def _weights(arms: Array) -> Array:
     r3 = np.linalg.norm(xi[:, None] - xi[None], axis=2) ** 3
     A = np.block([[r3, P], [P.T, np.zeros((6, 6))]])
     b = np.r_[np.linalg.norm(xi, axis=1) ** 3, 1.0, np.zeros(5)]
-    found: Array = np.linalg.lstsq(A, b, rcond=1e-12)[0][: len(arms)]
-    return found
+    return np.linalg.lstsq(A, b, rcond=1e-12)[0][: len(arms)]

@@ -53,8 +53,7 @@ class GyroscopicModes:
         slower = np.sqrt(1.0 - damping**2)
         met = self.velocities.conj().T @ p
         gap = 1j * (sweep[:, None] - slower * self.w) + damping * np.abs(self.w)
-        found: Complex = (met / gap) @ self.shapes.T / slower
-        return found
+        return (met / gap) @ self.shapes.T / slower
 
 
 def gyroscopic_modes(omega: Array, g: Array) -> GyroscopicModes:

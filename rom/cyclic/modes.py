@@ -168,5 +168,4 @@ def _basis(T: csr_matrix, M: csr_matrix, Z: Complex) -> Complex:
     U = T @ Z
     weight, V = np.linalg.eigh(U.conj().T @ (M @ U))
     keep = slice(Z.shape[1] - Z.shape[1] // 2, None)
-    basis: Complex = Z @ (V[:, keep] / np.sqrt(weight[keep]))
-    return basis
+    return Z @ (V[:, keep] / np.sqrt(weight[keep]))

@@ -50,8 +50,7 @@ class ReducedSector(CyclicSector):
 
     def expand(self, shapes: Complex) -> Complex:
         """(n_full, m) displacements of the full sector."""
-        found: Complex = self.Psi @ shapes
-        return found
+        return self.Psi @ shapes
 
     def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:
         """(N, n_full, m) real displacements of the full sectors, see `CyclicSector.on_wheel`."""
@@ -184,8 +183,7 @@ def fading(face: Interface, at_rest: npt.NDArray[np.bool_]) -> Array:
     weights = np.asarray(face.surface_mass.sum(axis=1)).ravel() / face.area
     x = face.points - weights @ face.points
     across = np.linalg.eigvalsh((weights[:, None] * x).T @ x)[1]  # of a strip, thickness^2 / 12
-    found: Array = d / (d + np.sqrt(3 * across))
-    return found
+    return d / (d + np.sqrt(3 * across))
 
 
 def distance(points: Array, line: Array) -> Array:

@@ -75,15 +75,13 @@ def centrifugal_displacement(sector: CyclicSector) -> Array:
     T = sector.harmonic(0)
     load = sector.M @ arms(sector, sector.points).ravel()
     ops = SciPyOperators(T.T @ sector.K @ T, T.T @ sector.M @ T)
-    found: Array = T @ ops.hold(axial_pins(sector))((T.T @ load)[:, None])[:, 0]
-    return found
+    return T @ ops.hold(axial_pins(sector))((T.T @ load)[:, None])[:, 0]
 
 
 def arms(sector: CyclicSector, points: Array) -> Array:
     """(k, 3) vectors from the axis of rotation to points, across it [m]."""
     x = points - sector.at
-    found: Array = x - np.outer(x @ sector.axis, sector.axis)
-    return found
+    return x - np.outer(x @ sector.axis, sector.axis)
 
 
 def axial_pins(sector: CyclicSector) -> Index:

@@ -273,8 +273,7 @@ class CyclicSector:
             return U
         turns = np.array([turned(self.axis, k * self.angle) for k in j])
         nodal = U.reshape(self.n_sectors, -1, 3, shapes.shape[1])
-        found: Array = np.einsum("jab,jpbm->jpam", turns, nodal).reshape(U.shape)
-        return found
+        return np.einsum("jab,jpbm->jpam", turns, nodal).reshape(U.shape)
 
 
 def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:

@@ -117,8 +117,7 @@ class Driven:
             )
         outputs = self._outputs() if (np.asarray(refs) >= first).any() else np.zeros(count - first)
         every = np.concatenate([self.parameters, self.inputs.values, outputs])
-        found: Array = every[np.asarray(refs, dtype=int)]
-        return found
+        return every[np.asarray(refs, dtype=int)]
 
     def start(self, t: float) -> None:
         """Take the positions and velocities nearest to those given that satisfy all joints.

@@ -126,8 +126,7 @@ class Inputs:
 
 
 def _at(signal: Any, t: float) -> Array:
-    sample: Array = signal.sample(np.array([t]), INFINITE, DIFFERENCE_SPACING)[0]
-    return sample
+    return signal.sample(np.array([t]), INFINITE, DIFFERENCE_SPACING)[0]
 
 
 def _load(mechanism: Mechanism, name: str) -> list[Variable]:

@@ -157,8 +157,7 @@ class AffineModel:
 
 def _stress(stresses: Any, model: FEModel, E: Array) -> Array:
     nodes = model.surface.nodes
-    found: Array = stresses.at_nodes(E, nodes).reshape(6 * nodes.size, -1)
-    return found
+    return stresses.at_nodes(E, nodes).reshape(6 * nodes.size, -1)
 
 
 def symmetric(A: Array) -> Array:

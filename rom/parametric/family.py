@@ -162,5 +162,4 @@ class BodyFamily:
 def _sum(weights: Array, parts: list[Array | None]) -> Array:
     """Weighted sum of the parts that exist."""
     terms = [w * A for w, A in zip(weights, parts, strict=True) if A is not None]
-    total: Array = np.sum(terms, axis=0)
-    return total
+    return np.sum(terms, axis=0)

@@ -71,8 +71,7 @@ class Stretch:
 
     def mapped(self, points: Array, weights: Array) -> Array:
         """(k, 3) where nominal points are."""
-        found: Array = np.einsum("j,jka->ka", weights, self.fields(points))
-        return found
+        return np.einsum("j,jka->ka", weights, self.fields(points))
 
     def motions(self, points: Array) -> list[Array]:
         """(3k, 6) rigid motions of each field; their weighted sum is that of the mapped points."""
@@ -146,8 +145,7 @@ def _coordinates(body: FlexibleBody, R: Array, M: Array) -> Array:
     C = np.vstack(rows)
     N = scale[:, None] * (null_space(C, rcond=1e-10) if C.size else np.eye(scale.size))
     momentum = R.T @ M @ N
-    Y: Array = N @ null_space(momentum / np.linalg.norm(momentum, axis=1, keepdims=True))
-    return Y
+    return N @ null_space(momentum / np.linalg.norm(momentum, axis=1, keepdims=True))
 
 
 def _marker(marker: Marker, point: Array, R: Array, Y: Array) -> Marker:

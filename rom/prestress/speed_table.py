@@ -150,8 +150,7 @@ class SpinUp(SpeedTable):
                     f"no stable steady state was found at {speed:.5g} rad/s.",
                     solution=self.steady.T @ a,
                 )
-        found: Array = self.steady.T @ a
-        return found
+        return self.steady.T @ a
 
     def at(self, speed: float) -> CyclicSector:
         """The sector in its own steady state at a speed [rad/s], for vibrations at this speed."""
@@ -214,8 +213,7 @@ def lagrange(nodes: Array, x: Array | float) -> Array:
     """(k,) values at x of the polynomials that are one at one of k nodes, zero at the others."""
     others = ~np.eye(nodes.size, dtype=bool)
     gaps = np.where(others, nodes[:, None] - nodes, 1.0)
-    found: Array = np.where(others, (x - nodes) / gaps, 1.0).prod(axis=1)
-    return found
+    return np.where(others, (x - nodes) / gaps, 1.0).prod(axis=1)
 
 
 def _basis(
@@ -237,5 +235,4 @@ def _resembling(Phi: Array, other: Array, M: csr_matrix) -> Array:
     likeness = Phi.T @ (M @ other)
     kept = np.sort(linear_sum_assignment(-(likeness**2))[0])
     U, _, Vt = np.linalg.svd(likeness[kept])
-    found: Array = Phi[:, kept] @ (U @ Vt)
-    return found
+    return Phi[:, kept] @ (U @ Vt)

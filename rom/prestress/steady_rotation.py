@@ -54,8 +54,7 @@ class SteadyRotation:
 
     def independent(self, u: Array) -> Array:
         """(f,) independent dofs of a displacement (n,) that is equal in all sectors."""
-        found: Array = u[self.kept]
-        return found
+        return u[self.kept]
 
     def load(self, square: float) -> None:
         """Turn from now on at the root of this square of a speed [(rad/s)^2]."""

@@ -99,5 +99,4 @@ def answer_of(command: list[str]) -> dict[str, Any]:
     done = child.run(command, variables=one | allow)
     if done.code:
         raise ResourceError(f"{' '.join(command[:4])} ended with {done.code}: {done.last}.")
-    answer: dict[str, Any] = json.loads(done.out.strip().splitlines()[-1])
-    return answer
+    return json.loads(done.out.strip().splitlines()[-1])

@@ -202,8 +202,7 @@ class BladedWheel:
         each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q)
                          for blade, q in zip(blades, self.of_blades(blades, Phi[:, :n]),
                                              strict=True)])  # fmt: skip
-        found: Array = (each / each.sum(axis=0)).T
-        return found
+        return (each / each.sum(axis=0)).T
 
     def response(
         self,

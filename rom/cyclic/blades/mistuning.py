@@ -87,8 +87,7 @@ class MistunedWheel:
             )
         waves = np.fft.ifft(delta, axis=-1)  # 1/N sum_j delta_j exp(+i k j alpha)
         k = (self.harmonics[None, :] - self.harmonics[:, None]) % N
-        found: Complex = waves[..., k] * self.blade + np.diag(self.omega**2)
-        return found
+        return waves[..., k] * self.blade + np.diag(self.omega**2)
 
     def modes(self, deviations: npt.ArrayLike, n: int | None = None) -> Modes:
         """Frequencies [rad/s] (..., n) and modes in waves (..., r, n) of mistuned wheels.
@@ -185,8 +184,7 @@ class MistunedWheel:
             )
         N = self.sector.n_sectors
         met = (self.harmonics - engine_order) % N == 0
-        found: Complex = np.where(met, N * (self.shapes.conj().T @ f), 0.0)
-        return found
+        return np.where(met, N * (self.shapes.conj().T @ f), 0.0)
 
     def _rows(self, at: npt.ArrayLike) -> Complex:
         """(p, r) displacements wanted of each wave, on sector 0."""
@@ -199,24 +197,21 @@ class MistunedWheel:
         check_damping_ratio(zeta, "the wheel")
         load = np.einsum("...km,k->...m", V.conj(), drive)
         gap = w[..., None, :] ** 2 - sweep[:, None] ** 2
-        found: Complex = load[..., None, :] / (gap + 2j * zeta * sweep[:, None] * w[..., None, :])
-        return found
+        return load[..., None, :] / (gap + 2j * zeta * sweep[:, None] * w[..., None, :])
 
     def _seen(self, q: Complex, rows: Complex) -> Complex:
         """(..., N, p) displacements of all sectors from amplitudes of waves (..., r)."""
         N = self.sector.n_sectors
         spread = np.exp(2j * np.pi / N * np.outer(self.harmonics, np.arange(N)))
         reach = (spread[:, :, None] * rows.T[:, None]).reshape(self.omega.size, -1)
-        found: Complex = (q @ reach).reshape(*q.shape[:-1], N, -1)
-        return found
+        return (q @ reach).reshape(*q.shape[:-1], N, -1)
 
     def _peaks(
         self, many: Array, drive: Complex, sweep: Array, zeta: float, rows: Complex
     ) -> Array:
         w, V = self.modes(many)
         q = self._modal(w, V, drive, sweep, zeta) @ np.swapaxes(V, -1, -2)
-        largest: Array = np.linalg.norm(self._seen(q, rows), axis=-1).max(axis=(1, 2))
-        return largest
+        return np.linalg.norm(self._seen(q, rows), axis=-1).max(axis=(1, 2))
 
 
 @typed

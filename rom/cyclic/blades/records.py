@@ -43,8 +43,7 @@ class ReducedBlade:
     def omega(self) -> Array:
         """(m,) circular frequencies of the cantilever blade [rad/s]."""
         modes = slice(self.n_root, None)
-        found: Array = np.sqrt(self.K.diagonal()[modes] / self.M.diagonal()[modes])
-        return found
+        return np.sqrt(self.K.diagonal()[modes] / self.M.diagonal()[modes])
 
     def varied(
         self, *, stiffness: float = 0.0, density: float = 0.0, cantilever: npt.ArrayLike = ()

@@ -54,8 +54,7 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
 
 def _middle(points: Array) -> list[float]:
     """Middle of the box around the points."""
-    middle: list[float] = (0.5 * (points.min(axis=0) + points.max(axis=0))).tolist()
-    return middle
+    return (0.5 * (points.min(axis=0) + points.max(axis=0))).tolist()
 
 
 def cell_volumes(mesh: SolidMesh) -> Array:

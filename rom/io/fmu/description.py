@@ -77,8 +77,7 @@ def model_description(model: Model, variables: list[Variable]) -> bytes:
         _variable(listed, reference, variable)
     _structure(root, variables)
     ET.indent(root)
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True)
 
 
 def _co_simulation(root: ET.Element, model: Model) -> None:

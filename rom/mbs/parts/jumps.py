@@ -182,8 +182,7 @@ def _quotient(function: Function, span: tuple[float, float], apart: float) -> Fu
     def rate(t: Array) -> Array:
         ends = np.clip(t - apart, *span), np.clip(t + apart, *span)
         low, high = (function(end) for end in ends)
-        found: Array = (high - low) / (ends[1] - ends[0])
-        return found
+        return (high - low) / (ends[1] - ends[0])
 
     return rate
 

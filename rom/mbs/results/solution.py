@@ -222,8 +222,7 @@ class Solution:
             a = self.a[instant, at : at + 6 + part.r]
             a_minus_g = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
             moving = recovery.accelerations(a_minus_g, a[3:6], self.omega(body)[instant], a[6:])
-        found: Array = recovery.field(q, moving)
-        return found
+        return recovery.field(q, moving)
 
     def reaction(self, name: str) -> Array:
         """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.
@@ -241,8 +240,7 @@ class Solution:
         """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
         if name not in self.mechanism.drives:
             raise ConfigError(f"no drive {name!r}; there are {sorted(self.mechanism.drives)}.")
-        load: Array = -self.lam[:, self.packed.rows_of(name)[0]]
-        return load
+        return -self.lam[:, self.packed.rows_of(name)[0]]
 
     def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
         """Loads on each marker of a body: joints, drives, springs, contacts, loads together.

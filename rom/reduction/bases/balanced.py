@@ -167,5 +167,4 @@ def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[
 def _factor(P: Array) -> Array:
     """F with P = F F^T of a semi-definite P."""
     lam, V = np.linalg.eigh(0.5 * (P + P.T))
-    F: Array = V * np.sqrt(np.maximum(lam, 0.0))
-    return F
+    return V * np.sqrt(np.maximum(lam, 0.0))
