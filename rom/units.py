@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from fractions import Fraction
 from unicodedata import normalize
 
+from rom.arguments import one_of
 from rom.errors import ConfigError
 
 
@@ -58,9 +59,7 @@ def unit_system(name: str) -> UnitSystem:
     Raises:
         ConfigError: listing the names that exist.
     """
-    if not isinstance(name, str) or name not in SYSTEMS:
-        raise ConfigError(f"the unit system {name!r} is unknown; known: {sorted(SYSTEMS)}.")
-    return SYSTEMS[name]
+    return SYSTEMS[one_of("unit system", name, SYSTEMS)]
 
 
 BASES = ("kg", "m", "s", "rad", "cycle")  # "cycle" keeps hertz and radians per second apart

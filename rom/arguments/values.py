@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.errors import ConfigError
+from rom.errors import ConfigError, RomError
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
 SHOWN_LENGTH = 60  # letters of a wrong value in a message
@@ -111,16 +111,18 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def one_of(name: str, value: Any, words: Iterable[str]) -> str:
+def one_of(
+    name: str, value: Any, words: Iterable[str], *, error: type[RomError] = ConfigError
+) -> str:
     """The value as one of some words.
 
     Raises:
-        ConfigError: listing them.
+        RomError: listing them, of the class ``error``.
     """
     known = list(words)
     if isinstance(value, str) and value in known:
         return value
-    raise ConfigError(f"{name} = {shortened(value)} is none of {', '.join(map(repr, known))}.")
+    raise error(f"{name} = {shortened(value)} is none of {', '.join(map(repr, known))}.")
 
 
 def finite(name: str, value: Any, shape: tuple[int, ...] | None) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import lowest, typed
+from rom.arguments import lowest, one_of, typed
 from rom.assembly.certificate import N_COMPARED, rows_of_parts
 from rom.assembly.condensed import (
     CondensedAssembly,
@@ -113,8 +113,7 @@ class Assembly:
                 is unknown, or "local" meets an interface that is coupled twice.
             InterfaceError: if an interface is unknown.
         """
-        if level not in ("system", "local"):
-            raise ConfigError(f'level = {level!r} is neither "system" nor "local".')
+        one_of("level", level, ("system", "local"))
         if not self.couplings:
             raise ConfigError("nothing is coupled: there are no interfaces to reduce.")
         (M, K), H = self._matrices(), self._interfaces()

@@ -7,6 +7,7 @@ from scipy.sparse import block_diag
 from scipy.spatial import cKDTree
 
 from rom.body.records import Marker, Patch
+from rom.eigen import dofs_of
 from rom.errors import InterfaceError
 from rom.model import Array, Index, Interface
 
@@ -130,8 +131,7 @@ def _equal_coordinates(
     if one_shapes is None or other_shapes is None:
         if order is None:
             return None
-        dofs = (3 * order[:, None] + np.arange(3)).ravel()
-        return one.hold, other.hold[dofs]
+        return one.hold, other.hold[dofs_of(order)]
     if one.hold.shape[0] != other.hold.shape[0]:
         return None
     if order is None:

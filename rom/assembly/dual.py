@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
-from rom.arguments import typed
+from rom.arguments import one_of, typed
 from rom.assembly.certificate import N_COMPARED, rows_of_parts
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Report, Row
@@ -169,8 +169,7 @@ class DualAssembly:
 
     def matrices(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> tuple[Array, Array]:
         """Stiffness and mass of the whole in modal coordinates, and forces for "dual"."""
-        if kind not in KINDS:
-            raise ConfigError(f"kind = {kind!r} is none of {', '.join(KINDS)}.")
+        one_of("kind", kind, KINDS)
         Lam, Psi, Gamma, H = self._coupled(fixed)
         hard = self._hard(Lam, Psi, Gamma)
         if kind == "dual":

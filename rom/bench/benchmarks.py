@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import identity, kron
 
+from rom.arguments import one_of
 from rom.bench.models import (
     CRANK_SPEED,
     KINDS,
@@ -25,7 +26,6 @@ from rom.bench.models import (
     geometry,
     slider_crank,
 )
-from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.connection import connect
@@ -320,9 +320,7 @@ def run(names: tuple[str, ...] = ()) -> Iterator[Figure]:
         ConfigError: listing the names that exist.
     """
     for name in names or tuple(BENCHMARKS):
-        if name not in BENCHMARKS:
-            raise ConfigError(f"there is no benchmark {name!r}; there are {sorted(BENCHMARKS)}.")
-        yield from BENCHMARKS[name]()
+        yield from BENCHMARKS[one_of("benchmark", name, BENCHMARKS)]()
 
 
 def _beam(n_dofs: float) -> dict[str, float]:

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rom.arguments import typed
+from rom.arguments import one_of, typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.fields.vtu import write_vtu
@@ -112,9 +112,7 @@ def format_of(path: str | Path, to: str | None = None) -> str:
         ConfigError: listing what is known.
     """
     if to is not None:
-        if to not in FORMATS:
-            raise ConfigError(f"the format {to!r} is unknown; known: {', '.join(FORMATS)}.")
-        return to
+        return one_of("format", to, FORMATS)
     ending = Path(path).suffix.lower()
     endings = {known: name for name, (known, _) in FORMATS.items() if known}
     if ending not in endings:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import is_number, shortened, typed
+from rom.arguments import is_number, one_of, shortened, typed
 from rom.errors import ParameterError, warn
 from rom.model import Array
 from rom.names import check_text, named
@@ -102,8 +102,7 @@ class Thickness(Parameter):
 
     def __post_init__(self) -> None:
         Parameter.__post_init__(self)
-        if not isinstance(self.axis, str) or self.axis not in ("x", "y", "z"):
-            raise ParameterError(f"axis = {self.axis!r} of {self} is none of 'x', 'y', 'z'.")
+        one_of(f"axis of {self}", self.axis, ("x", "y", "z"), error=ParameterError)
 
 
 KINDS = {kind.__name__: kind for kind in (YoungsModulus, Density, Thickness)}

@@ -143,7 +143,7 @@ def test_a_slender_beam_of_two_halves_bends_as_euler_and_bernoulli_say():
 
 def test_messages():
     assembly = joined(4)
-    with pytest.raises(ConfigError, match="none of macneal, rubin, dual"):
+    with pytest.raises(ConfigError, match="none of 'macneal', 'rubin', 'dual'"):
         assembly.frequencies(kind="craig")
     with pytest.raises(ConfigError, match="no body 'middle'"):
         assembly.frequencies(fixed=(("middle", "root"),))

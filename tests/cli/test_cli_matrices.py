@@ -80,7 +80,7 @@ FAULTS = {
     "range": ((*CALCULIX, "--set", "a=7-3", "--fixed", "a"), "'7-3' is no label"),
     "which": ((HERE / "dense.op4", *NASTRAN[1:]), "name one.", "FILE:NAME"),
     "unknown name": ((f"{HERE / 'dense.op4'}:KGG", *NASTRAN[1:]), "has no matrix 'KGG'"),
-    "units": ((*CALCULIX, "--units", "inch"), "unit system 'inch' is unknown"),
+    "units": ((*CALCULIX, "--units", "inch"), "unit system = 'inch' is none of 'SI', "),
     "missing": ((HERE / "nope.sti", *CALCULIX[1:]), "nope.sti: there is no such file"),
 }  # fmt: skip
 

@@ -241,7 +241,7 @@ def test_mid_edge_nodes_are_added_and_numbers_fit():
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"step": "static"}, ConfigError, "known: frequencies, matrices"),
+        ({"step": "static"}, ConfigError, "none of 'frequencies', 'matrices'"),
         ({"fixed": ["bore"]}, InterfaceError, r"'bore' cannot be held; .*\['root', 'tip'\]"),
         ({"degree": 3}, ConfigError, "degree = 3"),
     ],

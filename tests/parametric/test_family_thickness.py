@@ -174,7 +174,7 @@ def test_what_thickness_does_not_go_with_is_named():
     beside = replace(model, regions=model.regions | {"rib": part})
     with pytest.raises(ParameterError, match=r"'rib' is no layer of its own: 'all' lies beside it"):
         StretchedModel(beside, {"t": rom.Thickness("rib", 0.5, 1.0)})
-    with pytest.raises(ParameterError, match="axis = 'w'"):
+    with pytest.raises(ParameterError, match="the whole body = 'w' is none of 'x', 'y', 'z'"):
         rom.Thickness(None, 0.5, 1.0, axis="w")
     with pytest.raises(ParameterError, match="choose one axis"):
         both = half | {"u": rom.Thickness(None, 0.5, 1.0, axis="x")}

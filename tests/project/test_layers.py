@@ -58,7 +58,6 @@ ORDER = {
     "": (
         "errors",
         "notebook",
-        "units",
         "rotation",
         "places",
         "lazy",
@@ -66,6 +65,7 @@ ORDER = {
         "names",
         "process",
         "arguments",
+        "units",
         "deprecated",
         "plausible",
         "material",

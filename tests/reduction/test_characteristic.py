@@ -143,7 +143,7 @@ def test_messages_for_functions_that_cannot_be(assembly):
             assembly.reduced(n)
         with pytest.raises(ConfigError, match=f"n_interface = {n}"):
             assembly.reduced(n, level="local")
-    with pytest.raises(ConfigError, match=r"level = 'body' is neither"):
+    with pytest.raises(ConfigError, match=r"level = 'body' is none of"):
         assembly.reduced(6, level="body")
     with pytest.raises(ConfigError, match="nothing is coupled"):
         rom.Assembly(assembly.bodies, ()).reduced(6)

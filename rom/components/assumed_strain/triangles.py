@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import one_of
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
 
@@ -67,8 +68,8 @@ def sheet(
         MeshError: if a triangle is turned over or names no point, a side belongs to three, or a
             radius is negative.
     """
-    if element not in ELEMENTS or state not in STATES:
-        raise ConfigError(f"{element!r}, {state!r}: known are {ELEMENTS} and {tuple(STATES)}.")
+    one_of("element", element, ELEMENTS)
+    one_of("state", state, STATES)
     if not 0 < thickness < np.inf:
         raise ConfigError(f"thickness = {thickness} m: no sheet is as thin or as thick.")
     X, T = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import one_of
 from rom.components.journal_bearing.film_kernel import FULL, JFO, REYNOLDS, Grid
 from rom.errors import ModelError
 from rom.model import Array
@@ -76,8 +77,7 @@ class JournalBearing:
             )
         if not 0 <= self.preload < 1:
             raise ModelError(f"preload {self.preload} leaves no room; it is from 0 to below 1.")
-        if self.cavitation not in LAWS:
-            raise ModelError(f"there is no cavitation {self.cavitation!r}; there are {[*LAWS]}.")
+        one_of("cavitation", self.cavitation, LAWS, error=ModelError)
         if self.cavitation == "jfo" and not self.grooves:
             raise ModelError(
                 "a mass-conserving film without a groove has no oil.", hint="Add a Groove."

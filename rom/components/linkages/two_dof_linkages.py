@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
 
+from rom.arguments import one_of
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ModelError
 from rom.mbs.equations.equations import linearize_constraints
@@ -297,9 +298,7 @@ def _gram(X: Array, Y: Array) -> Array:
 
 
 def _links(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
-    if elastic not in ("held", "free"):
-        raise ConfigError(f'elastic = {elastic!r}; use "held" or "free".')
-    if elastic == "free":
+    if one_of("elastic", elastic, ("held", "free")) == "free":
         return links
     return tuple(replace(link, M=link.M[:3, :3], tip=np.zeros((2, 0))) for link in links)
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from rom.arguments import one_of
 from rom.body.flexible import FlexibleBody
 from rom.components.masonry.block_contact import (
     OPEN,
@@ -80,8 +81,7 @@ def stone(
         ConfigError, MaterialError: for an unknown state; if no stone has these numbers.
         ModelError: if the outline does not enclose an area counterclockwise.
     """
-    if state not in ("plane stress", "plane strain"):
-        raise ConfigError(f'{state!r} is no state of a stone: "plane stress" or "plane strain".')
+    one_of("state", state, ("plane stress", "plane strain"))
     if not (E > 0 and -1 < nu < 0.5 and rho > 0 and thickness > 0):
         raise MaterialError(
             f"no stone has E = {E} Pa, nu = {nu}, rho = {rho} kg/m^3, thickness = {thickness} m.",

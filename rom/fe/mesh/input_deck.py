@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import one_of
 from rom.errors import ConfigError, InterfaceError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.solid import SolidMesh
@@ -59,8 +60,7 @@ def input_deck(
         MeshError: for hexahedra, or curved elements of degree 1.
         TagError: if a region has no material, or a name is none for a deck.
     """
-    if step not in STEPS:
-        raise ConfigError(f"the step {step!r} is unknown; known: {', '.join(STEPS)}.")
+    one_of("step", step, STEPS)
     if missing := sorted(set(fixed) - set(mesh.facets)):
         raise InterfaceError(
             f"{named(missing)} cannot be held; the interfaces are {sorted(mesh.facets)}."

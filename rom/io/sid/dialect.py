@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rom.arguments import typed
-from rom.errors import ConfigError, FileFormatError, warn
+from rom.arguments import one_of, typed
+from rom.errors import FileFormatError, warn
 from rom.io.sid.format import BLOCKS, DIALECTS, TENSOR, StandardInput, Taylor, repacked
 from rom.io.sid.reading import RawBlock, RawFile, read_raw, values
 from rom.model import Array, Report, Row
@@ -40,8 +40,7 @@ def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
     Warns:
         RomWarning: if Ge has a part that does work, or terms of second order are left out.
     """
-    if ge not in GE:
-        raise ConfigError(f"ge = {ge!r} is unknown; known: {', '.join(GE)}.")
+    one_of("ge", ge, GE)
     record = _settled(read_raw(path))
     Ge, symmetric = record.blocks["Ge"], _symmetric_ge(record)
     scale = max(np.abs(Ge.M0).max(initial=0.0), _scales(record)[2])

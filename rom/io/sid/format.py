@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rom.errors import ConfigError
+from rom.arguments import one_of
 from rom.io.files import write_whole
 from rom.model import Array
 from rom.names import ORIGIN_MARK
@@ -98,8 +98,7 @@ def write_sid(record: StandardInput, path: str | Path, *, dialect: str = "fembs"
     Raises:
         ConfigError: for an unknown dialect or a place that is not writable.
     """
-    if dialect not in DIALECTS:
-        raise ConfigError(f"the dialect {dialect!r} is unknown; known: {', '.join(DIALECTS)}.")
+    one_of("dialect", dialect, DIALECTS)
     text = "\n".join(_document(record, dialect)) + "\n"
     write_whole(path, lambda file: file.write(text.encode("ascii", "replace")))
     return Path(path)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
+from rom.arguments import one_of
 from rom.errors import ConfigError
 from rom.mbs.results.state import State
 from rom.model import Array
@@ -22,10 +23,7 @@ def chosen(frame: Any, names: tuple[str, ...]) -> tuple[bool, ...]:
     unknown = set(table) - set(names)
     if unknown:
         raise ConfigError(f"frame: no body {sorted(unknown)}; there are {sorted(names)}.")
-    words = [table.get(name, "body") for name in names]
-    for word in words:
-        if not isinstance(word, str) or word not in FRAMES:
-            raise ConfigError(f"frame is {word!r}; it is 'body' or 'world', or a dict of these.")
+    words = (one_of("frame", table.get(name, "body"), FRAMES) for name in names)
     return tuple(word == "world" for word in words)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import one_of, typed
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, RomWarning
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate.adaptive_step import run_variable
@@ -104,8 +104,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         RomWarning: if a body left the range of small elastic deformation, or turned faster than
             it can without geometric stiffness.
     """
-    if method not in METHODS:
-        raise ConfigError(f"no method {method!r}; there are {sorted(METHODS)}.")
+    one_of("method", method, METHODS)
     if t_start is None:
         t_start = 0.0 if state is None else state.t
     rtol = RTOL[method] if rtol is None else rtol

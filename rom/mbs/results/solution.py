@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed, vector
+from rom.arguments import one_of, typed, vector
 from rom.errors import ConfigError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import WORK
@@ -260,8 +260,7 @@ class Solution:
             ConfigError: for an unknown body or frame.
         """
         self.mechanism.part(body)
-        if frame not in ("world", "body"):
-            raise ConfigError(f"frame is {frame!r}; it is 'world' or 'body'.")
+        one_of("frame", frame, ("body", "world"))
         return of_body(self, body, self._marker_loads, frame)
 
     @cached_property

@@ -148,5 +148,5 @@ def test_motions_that_nothing_prescribes_are_refused():
     sol = rom.inverse_dynamics(driven_pendulum(), [0.0, 0.01])
     with pytest.raises(ConfigError, match=r"no drive 'hinge'.*motor"):
         sol.drive_load("hinge")
-    with pytest.raises(ConfigError, match="frame is 'marker'"):
+    with pytest.raises(ConfigError, match="frame = 'marker' is none of 'body', 'world'"):
         sol.interface_loads("bar", frame="marker")

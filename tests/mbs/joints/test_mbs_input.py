@@ -123,7 +123,7 @@ GOOD = {"t_end": 0.01, "dt": 1e-3}
         ({"tolerance": 0.0}, "tolerance = 0"),
         ({"save_every": 0}, "save_every = 0"),
         ({"save_every": 1.5}, "save_every = 1.5"),
-        ({"method": "euler"}, "no method 'euler'"),
+        ({"method": "euler"}, "method = 'euler' is none of "),
     ],
 )
 def test_wrong_arguments_of_a_run_are_named(options, words):
