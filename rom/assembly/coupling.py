@@ -7,14 +7,13 @@ from scipy.sparse import block_diag
 from scipy.spatial import cKDTree
 
 from rom.body.records import Marker, Patch
-from rom.eigen import dofs_of
+from rom.eigen.verbs import dofs_of, new_part
 from rom.errors import InterfaceError
 from rom.model import Array, Index, Interface
 
 SAME_PLACE = 1e-6  # distance of two nodes or interfaces, of the size of the bodies, that still meet
 SAME_SURFACE = (0.05, 0.25)  # gap of centroids over extent, and of areas, of two faceted surfaces
 SAME_FUNCTIONS = 1e-6  # difference of functions at equal nodes, of the largest value
-DEPENDENT_RTOL = 1e-9  # share of a function that is new, below which it is dropped
 MIN_COMMON_RATIO = 0.5  # norm of a function on one mesh, of that on the other, to be common to both
 
 
@@ -97,20 +96,11 @@ def _common_functions(a: Patch, b: Patch, projection: Any) -> tuple[Array, ...]:
     kept: list[int] = []
     Q_a, Q_b = V_a[:, :0], V_b[:, :0]
     for j in range(V_a.shape[1]):
-        q_a, new_a = _new_part(Q_a, a.surface_mass, V_a[:, j])
-        q_b, new_b = _new_part(Q_b, b.surface_mass, V_b[:, j])
-        if min(new_a, new_b) > max(DEPENDENT_RTOL, MIN_COMMON_RATIO * max(new_a, new_b)):
-            Q_a, Q_b, kept = np.column_stack([Q_a, q_a]), np.column_stack([Q_b, q_b]), [*kept, j]
+        q_a, new_a = new_part(Q_a, V_a[:, j : j + 1], lambda A, B: A.T @ (a.surface_mass @ B))
+        q_b, new_b = new_part(Q_b, V_b[:, j : j + 1], lambda A, B: A.T @ (b.surface_mass @ B))
+        if min(new_a, new_b) > MIN_COMMON_RATIO * max(new_a, new_b):
+            Q_a, Q_b, kept = np.hstack([Q_a, q_a]), np.hstack([Q_b, q_b]), [*kept, j]
     return V_a[:, kept], V_b[:, kept], Q_a, Q_b
-
-
-def _new_part(Q: Array, S: Any, v: Array) -> tuple[Array, float]:
-    """What Q does not contain of v, normalised, and its share of v."""
-    before = np.sqrt(v @ (S @ v))
-    for _ in range(3):
-        v = v - Q @ (Q.T @ (S @ v))
-    after = np.sqrt(v @ (S @ v))
-    return (v / after, float(after / before)) if after > DEPENDENT_RTOL * before else (v, 0.0)
 
 
 def _same_nodes(a: Patch, b: Patch, tolerance: float) -> Index | None:

@@ -13,15 +13,11 @@ from rom.arguments import typed
 from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
 from rom.eigen.scipy import SciPyOperators
+from rom.eigen.verbs import DEPENDENT_RTOL, orthonormal_in
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
 from rom.reduction.bases.method import CraigBampton
-from rom.reduction.interfaces.polynomial import (
-    DEPENDENT_RTOL,
-    FourierLegendre,
-    Polynomial,
-    orthonormal_in,
-)
+from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ Rows of tall matrices belong to this process; small matrices are equal on all ra
 implementation below holds all rows; ``rom.fe.operators.petsc`` distributes them.
 """
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,8 +14,11 @@ from scipy.sparse import identity, kron
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Interface
 
+Product = Callable[[Array, Array], Array]
 Weighted = tuple[float, list[tuple[float, Any]]]
 CLUSTER_RTOL = 1e-5  # relative distance of eigenvalues that belong to one space
+DEPENDENT_RTOL = 1e-9  # share of a column that is new, below which it is dropped
+CANCELLING_RATIO = 0.7  # length after over before a projection that may have left a part of it
 ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
 
 
@@ -172,15 +176,53 @@ def whole_clusters(lam: Array, m: int) -> int:
 
 
 def orthonormal(ops: Mass, X: Array) -> Array:
-    """M-orthonormal columns with the span of X, in the order given (Gram-Schmidt, twice)."""
-    Q = np.zeros((X.shape[0], 0))
+    """M-orthonormal columns with the span of X, in the order given."""
+    return without_dependent(ops, X)[0]
+
+
+def without_dependent(ops: Mass, X: Array) -> tuple[Array, list[int]]:
+    """Columns of X, mass-orthonormal in their order, and which; the others add nothing."""
+    return independent(X, lambda A, B: ops.gram(A, ops.apply_M(B)))
+
+
+def orthonormal_in(S: Any, V: Array) -> Array:
+    """S-orthonormal columns with the span of V, in the order given; sums over one process."""
+    return independent(V, lambda A, B: A.T @ (S @ B))[0]
+
+
+def independent(X: Array, product: Product) -> tuple[Array, list[int]]:
+    """Columns of X, orthonormal in their order, and the numbers of those that add something.
+
+    The order makes bases of growing degree nested, so that frequencies fall with it.
+
+    Args:
+        X: (n_local, m) columns.
+        product: (k, l) scalar products of (n_local, k) and (n_local, l) columns.
+    """
+    Q, kept = X[:, :0], list[int]()
     for k in range(X.shape[1]):
-        x = X[:, k : k + 1]
-        for _ in range(2):
-            x = x - Q @ ops.gram(Q, ops.apply_M(x))
-            x = x / np.sqrt(ops.gram(x, ops.apply_M(x)).item())
-        Q = np.hstack([Q, x])
-    return Q
+        x, share = new_part(Q, X[:, k : k + 1], product)
+        if share:
+            Q, kept = np.hstack([Q, x]), [*kept, k]
+    return Q, kept
+
+
+def new_part(Q: Array, x: Array, product: Product) -> tuple[Array, float]:
+    """What orthonormal columns Q do not contain of x (n_local, 1), of length one, and its share.
+
+    A share that is round-off is zero. Gram-Schmidt, again while cancellation takes digits.
+    """
+    before, size = np.inf, _length(x, product)
+    least = DEPENDENT_RTOL * size
+    whole = size
+    while least < size < CANCELLING_RATIO * before:
+        x = x - Q @ product(Q, x)
+        before, size = size, _length(x, product)
+    return (x / size, size / whole) if size > least else (x, 0.0)
+
+
+def _length(x: Array, product: Product) -> float:
+    return float(np.sqrt(max(product(x, x).item(), 0.0)))
 
 
 def given_rigid_motions(ops: Operators) -> Array:

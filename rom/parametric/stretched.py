@@ -9,7 +9,7 @@ from scipy.sparse import identity, kron
 
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import inertia_integrals
-from rom.eigen.verbs import Operators, rigid_motions
+from rom.eigen.verbs import Operators, orthonormal_in, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered
 from rom.parametric.affine import AffineModel, RegionOperators, symmetric
@@ -17,7 +17,6 @@ from rom.parametric.family import Share
 from rom.parametric.layers import Stretch
 from rom.parametric.parameters import Parameter, Point, Thickness, centre, factor, factors
 from rom.reduction.interfaces.characteristic import GivenFunctions
-from rom.reduction.interfaces.polynomial import orthonormal_in
 
 OVERLAP_RTOL = 1e-6  # of the extent, by which regions may overlap along the axis
 REMAINDER_RTOL = 1e-9  # share of mass and stiffness that may lie outside all regions

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Operators, orthonormal
+from rom.eigen.verbs import Operators, orthonormal, without_dependent
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.fixed_interface import constraint_modes, unit_motions
@@ -190,21 +190,6 @@ def _attached(ops: Operators, boundary: Index, G: Array) -> Array:
         )
     factor = cho_factor(scale[:, None] * G_bb * scale)
     return G @ (scale[:, None] * cho_solve(factor, np.diag(scale)))
-
-
-def without_dependent(ops: Operators, X: Array) -> tuple[Array, list[int]]:
-    """Columns of X, mass-orthonormal in their order; those that add nothing are left out."""
-    Q = np.zeros((X.shape[0], 0))
-    kept: list[int] = []
-    for k in range(X.shape[1]):
-        x = X[:, k : k + 1]
-        before = np.sqrt(ops.gram(x, ops.apply_M(x)).item())
-        for _ in range(2):
-            x = x - Q @ ops.gram(Q, ops.apply_M(x))
-        after = np.sqrt(max(ops.gram(x, ops.apply_M(x)).item(), 0.0))
-        if after > 1e-9 * before > 0.0:
-            Q, kept = np.hstack([Q, x / after]), [*kept, k]
-    return Q, kept
 
 
 def numbered(what: str, n: int) -> list[str]:

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.eigen.verbs import Operators
+from rom.eigen.verbs import Operators, without_dependent
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import numbered, without_dependent
+from rom.reduction.bases.free_interface import numbered
 from rom.reduction.bases.method import Method
 
 

@@ -9,11 +9,16 @@ from scipy.linalg import eigh, null_space, orth
 from scipy.sparse import identity, kron
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Operators, given_rigid_motions, rigid_motions, whole_clusters
+from rom.eigen.verbs import (
+    Operators,
+    given_rigid_motions,
+    orthonormal_in,
+    rigid_motions,
+    whole_clusters,
+)
 from rom.errors import ConfigError
 from rom.model import Array, Interface
 from rom.reduction.bases.method import Guyan, Method
-from rom.reduction.interfaces.polynomial import orthonormal_in
 
 if TYPE_CHECKING:
     from rom.reduction.interfaces.records import Connection

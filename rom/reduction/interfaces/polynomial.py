@@ -16,10 +16,10 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from rom.arguments import typed, whole
+from rom.eigen.verbs import DEPENDENT_RTOL, orthonormal_in
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface
 
-DEPENDENT_RTOL = 1e-9  # share of a function that is new, below which it is dropped
 ON_AXIS = 1e-6  # distance from an axis, of the size, where the angle about it is round-off
 EXTENT_RTOL = 1e-9  # extent of a surface that counts as none, of its largest one
 MOST_VALUES = 10**8  # of all functions at all nodes: 0.8 GB
@@ -112,10 +112,9 @@ def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface
     """
     S, V = interface.surface_mass, kind.functions(interface)
     size = np.sqrt(S.sum())  # of the constant function; all others reach one
-    V = V[
-        :, [_norm(S, v) > DEPENDENT_RTOL * size for v in V.T]
-    ]  # cosines of right angles are round-off
-    Q = orthonormal_in(S, V)
+    norms = np.sqrt(np.einsum("km,km->m", V, S @ V))
+    # cosines of right angles are round-off
+    Q = orthonormal_in(S, V[:, norms > DEPENDENT_RTOL * size])
     linear = np.linalg.matrix_rank(_local(interface), tol=1e-6)
     if linear < 2 or Q.shape[1] < 3:
         raise InterfaceError(
@@ -123,26 +122,6 @@ def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface
             "its rotation about that line is undetermined.",
             hint="Choose a surface with an area, or hold another interface.",
         )
-    return Q
-
-
-def orthonormal_in(S: object, V: Array) -> Array:
-    """Gram-Schmidt, twice, in the order given; columns that add nothing new are dropped.
-
-    The order makes the bases of growing degree nested, so that frequencies fall with it.
-    """
-    Q, SQ = np.zeros((V.shape[0], 0)), np.zeros((V.shape[0], 0))
-    for v in V.T:
-        before = _norm(S, v)
-        for _ in range(2):
-            v = v - Q @ (SQ.T @ v)
-        after = _norm(S, v)
-        if before == 0.0 or after < DEPENDENT_RTOL * before or Q.shape[1] == V.shape[0]:
-            continue
-        v = v / after
-        v = v - Q @ (SQ.T @ v)  # after strong cancellation the second pass is not enough
-        v = (v / _norm(S, v))[:, None]
-        Q, SQ = np.hstack([Q, v]), np.hstack([SQ, S @ v])
     return Q
 
 
@@ -205,7 +184,3 @@ def _refuse_many(n: int, interface: Interface, asked: str) -> None:
             f"{interface.nodes.size} nodes.",
             hint="Orders above ten add nothing to most surfaces.",
         )
-
-
-def _norm(S: object, v: Array) -> float:
-    return float(np.sqrt(max(v @ (S @ v), 0.0)))  # type: ignore[operator]
