@@ -15,6 +15,7 @@ from rom.cli.described import described, mechanism
 from rom.cli.options import OUTPUT_FLAG, add_meshing, positive, require, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
+from rom.cli.verbs.swing import pendulum
 from rom.errors import ConfigError, RomError
 from rom.names import inside
 
@@ -205,13 +206,9 @@ def _swing(
     body: "FlexibleBody", args: argparse.Namespace, keep: "Keeping | None"
 ) -> tuple[Any, Any]:
     from rom.mbs.integrate.simulation import simulate
-    from rom.mbs.mechanism import Mechanism
     from rom.mbs.results.audit import audit
 
-    mechanism = Mechanism(gravity=args.gravity)
-    part = mechanism.add_flexible(body.name, body, at=(0.0, 0.0, 0.0))
-    hinge = mechanism.ground.marker(tuple(body.marker(args.hinge).point))
-    mechanism.revolute("hinge", hinge, part.marker(args.hinge), axis=args.axis)
+    mechanism = pendulum(body, args.hinge, axis=args.axis, gravity=args.gravity)
     steps = {"t_end": args.t_end, "dt": args.dt}
     solution = simulate(mechanism, **steps, progress=_aloud(args), keep=keep)
     return solution, audit(solution)

@@ -22,6 +22,7 @@ from rom.names import inside
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
+    from rom.mbs.mechanism import Mechanism
 
 log = logging.getLogger("rom")
 SUMMARY = "show a part of yours, reduced and swinging, in one go"
@@ -190,13 +191,20 @@ def leave_uncompiled() -> None:
 
 def _moved(body: "FlexibleBody", hinge: str, swing: Swing) -> tuple[Any, Any]:
     from rom.mbs.integrate.simulation import simulate
+
+    mechanism = pendulum(body, hinge, axis=swing.axis, gravity=swing.gravity)
+    return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / N_STEPS, rho_inf=0.5)
+
+
+def pendulum(body: "FlexibleBody", hinge: str, *, axis: Any, gravity: Any) -> "Mechanism":
+    """A body that hangs on one of its interfaces where it was drawn."""
     from rom.mbs.mechanism import Mechanism
 
-    mechanism = Mechanism(gravity=swing.gravity)
+    mechanism = Mechanism(gravity=gravity)
     part = mechanism.add_flexible(body.name, body)
     place = mechanism.ground.marker(tuple(body.marker(hinge).point))
-    mechanism.revolute("hinge", place, part.marker(hinge), axis=swing.axis)
-    return mechanism, simulate(mechanism, t_end=swing.t_end, dt=swing.t_end / N_STEPS, rho_inf=0.5)
+    mechanism.revolute("hinge", place, part.marker(hinge), axis=axis)
+    return mechanism
 
 
 def magnification(body: "FlexibleBody", q: Any) -> float:
