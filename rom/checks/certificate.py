@@ -88,7 +88,7 @@ def compared(
         omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
         agreement = mac(ops, Phi, connection.ops.expand(shapes))
         table["full"] = (omega / (2 * np.pi)).tolist()
-        table["mac"] = _cluster_mac(agreement, omega, omega_r[: n + n_rigid]).tolist()
+        table["mac"] = _cluster_mac(agreement, omega_r[: n + n_rigid]).tolist()
     return table
 
 
@@ -105,7 +105,7 @@ def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...],
     return Psi @ (scale[:, None] * V)
 
 
-def _cluster_mac(table: Array, full: Array, reduced: Array) -> Array:
+def _cluster_mac(table: Array, reduced: Array) -> Array:
     """For each full mode the part of it spanned by its best partner and that one's neighbours.
 
     Modes of nearly one frequency may rotate among themselves; they count together.

@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rom.errors import ParallelError, RomError
-from rom.process.launcher import ranks
 
 T = TypeVar("T")
 GRACE_PERIOD = 1.0  # [s] that other ranks leave rank 0 to print an error all of them have
@@ -114,11 +113,6 @@ def install_abort_hook(comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         comm.Abort(getattr(error, "exit_code", 1))
 
     sys.excepthook = abort
-
-
-def launched_by_mpirun() -> bool:
-    """True when this process was started by an MPI launcher with several ranks."""
-    return ranks()[1] > 1
 
 
 def stop_all_ranks(code: int, print_error: Callable[[], None]) -> None:

@@ -96,7 +96,7 @@ def steady_motion(
     both = np.concatenate([size, size * rate])
     motions = small_motions(now.packed.system, state, world)
     A = _first_order(now, state, motions, rate) * both / both[:, None]
-    B = _bound(now, state, motions, rate) * both
+    B = _bound(now, state, motions) * both
     N = _null_space(B)
     reduced = N.T @ A @ N
     away = np.abs(A @ N - N @ reduced).max(initial=0.0)
@@ -138,7 +138,7 @@ def _first_order(now: Instant, state: State, motions: tuple[Array, ...], rate: f
     return A
 
 
-def _bound(now: Instant, state: State, motions: tuple[Array, ...], rate: float) -> Array:
+def _bound(now: Instant, state: State, motions: tuple[Array, ...]) -> Array:
     """(m_h + m, 2n) what the constraints bind of p and dp/dt."""
     T, T1 = motions[:2]
     _, G, _ = now.gradient(state.q, state.v)
