@@ -10,7 +10,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, reached
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import Law, MotorLaw, apply_laws, laws
+from rom.mbs.equations.python_laws import Laws, apply_laws, laws
 from rom.mbs.integrate.consistent_start import (
     assembled,
     fitting_velocity,
@@ -79,9 +79,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
     return solution()
 
 
-def _next(
-    packed: Packed, W: Work, forces: tuple[Law | MotorLaw, ...], last: State, t: float
-) -> State:
+def _next(packed: Packed, W: Work, forces: Laws, last: State, t: float) -> State:
     """The state at a time, found from the one before."""
     h, q = t - last.t, np.empty_like(last.q)
     retract(packed.system, last.q, h * last.v + 0.5 * h * h * last.a, q)

@@ -14,7 +14,7 @@ from rom.mbs.equations.equations import (
     slopes,
 )
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import Law, MotorLaw, apply_laws, laws
+from rom.mbs.equations.python_laws import Laws, apply_laws, laws
 from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
 from rom.mbs.kernels.system import ROLL, Work, workspace
 from rom.mbs.mechanism import Mechanism
@@ -46,7 +46,7 @@ class Instant:
     packed: Packed
     W: Work
     t: float
-    laws: tuple[Law | MotorLaw, ...]
+    laws: Laws
     signal: Array
     load: float = 1.0
 

@@ -146,7 +146,8 @@ def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
     found = [Marker(part.name, name) for part in parts for name in part.names]
     found += [m for joint in mechanism.joints.values() for m in joint.markers]
     found += [m for s in mechanism.springs.values() for m in (s.i, s.j)]
-    for pair in (*mechanism.bushings.values(), *mechanism.contacts.values()):
+    pairs: tuple[Any, ...] = (*mechanism.bushings.values(), *mechanism.contacts.values())
+    for pair in pairs:
         found += [pair.i, pair.j]
     found += [load.marker for load in mechanism.loads.values()]
     for law in mechanism.user_forces.values():
@@ -264,7 +265,7 @@ def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
 class _Coordinates:
     """Joint coordinates that something acts on, each once."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.found: list[tuple[tuple[Marker, Marker], Row]] = []
 
     def number(self, markers: tuple[Marker, ...], row: Row) -> int:
@@ -288,8 +289,8 @@ class _Coordinates:
 
 def _rows(
     mechanism: Mechanism, index: dict[Marker, int], coordinates: _Coordinates
-) -> tuple[Rows, tuple, list[Signal]]:
-    entries, signals = [], []
+) -> tuple[Rows, tuple[str, ...], list[Signal]]:
+    entries, signals = [], list[Signal]()
     for pair, (name, joint) in enumerate(mechanism.joints.items()):
         entries += [(name, pair, joint, row, -1) for row in joint.rows]
     for name, drive in mechanism.drives.items():
@@ -340,7 +341,7 @@ def _forces(
 ) -> tuple[Forces, list[Signal]]:
     springs, loads, turns = mechanism.springs.values(), mechanism.loads, mechanism.turns.values()
     coiled = [mechanism.joints[t.joint] for t in turns]
-    signals, at = [], []
+    signals, at = list[Signal](), []
     for name, load in loads.items():
         at.append(n_drives + len(signals) if load.function else -1)
         signals += [load_signal(name, load.function)] if load.function else []

@@ -98,7 +98,7 @@ def spread_loads(mechanism: Mechanism, first: int, R: int) -> tuple[Spread, list
     """Spread loads and their functions of time, counted from the signal ``first``."""
     found = mechanism.spread_loads
     names = list(mechanism.parts)
-    shapes, signals, at = np.zeros((len(found), R, 9)), [], []
+    shapes, signals, at = np.zeros((len(found), R, 9)), list[Signal](), []
     for k, (name, load) in enumerate(found.items()):
         shapes[k, : len(load.shapes)] = load.shapes.reshape(-1, 9)
         at.append(first + len(signals) if load.function else -1)

@@ -71,7 +71,10 @@ class MotorLaw:
         W.motor[self.k] = numbers(what, t, answer, (), "a number")
 
 
-def laws(mechanism: Mechanism, packed: Packed) -> tuple[Law | MotorLaw, ...]:
+Laws = tuple[Law | MotorLaw, ...]
+
+
+def laws(mechanism: Mechanism, packed: Packed) -> Laws:
     """The user forces of a mechanism, and its motors that could not be compiled."""
     forces = [
         Law(name, u.function, packed.row(u.i), -1 if u.j is None else packed.row(u.j))
@@ -91,7 +94,7 @@ def motion_of(W: Work, m: int) -> MarkerMotion:
     return MarkerMotion(W.P[m].copy(), W.E[m].copy(), W.V[m, :3].copy(), W.V[m, 3:].copy())
 
 
-def apply_laws(forces: tuple[Law | MotorLaw, ...], W: Work, t: float) -> None:
+def apply_laws(forces: Laws, W: Work, t: float) -> None:
     """Call all laws and set the wrenches of the user.
 
     Raises:

@@ -267,6 +267,4 @@ class _Run:
 
     def keep(self) -> None:
         """Save the present instant."""
-        f = self.record.final
-        arrays = (f.q, f.v, f.a, f.lam, self.T.work, f.base)
-        self.record.keep(np.array([f.t]), *(x[None].copy() for x in arrays))
+        self.record.keep_state(self.record.final, self.T.work)

@@ -102,7 +102,7 @@ def _solver(equations: Equations, state: State) -> tuple[DOP853, int, int]:
 
 def _memory(record: Record, equations: Equations, solver: DOP853, due: int) -> Memory:
     """All that the next step depends on and the state does not tell."""
-    settings, steps = record.settings, record.counts["steps"]
+    settings, steps = record.settings, int(record.counts["steps"])
     arrays = {
         "y": solver.y.copy(),
         "f": solver.f.copy(),
@@ -172,11 +172,10 @@ def _save(record: Record, equations: Equations, t: float, y: Array) -> None:
     _unit(record, y)
     equations(t, y, accepted=True)
     record.t, record.final = t, _state_of(equations, t, y)
-    f = record.final
-    record.keep(t, *(x[None].copy() for x in (f.q, f.v, f.a, f.lam, y[-3:], f.base)))
+    record.keep_state(record.final, y[-3:])
 
 
 def _state_of(equations: Equations, t: float, y: Array, memory: Memory | None = None) -> State:
-    q, v = y[: equations.n_q], y[equations.n_q : equations.n_q + equations.n]
-    copies = (x.copy() for x in (q, v, equations.a, equations.lam))
-    return State(t, *copies, equations.rank, None, equations.W.base.copy(), memory)
+    n_q, n = equations.n_q, equations.n
+    q, v, a, lam = (x.copy() for x in (y[:n_q], y[n_q : n_q + n], equations.a, equations.lam))
+    return State(t, q, v, a, lam, equations.rank, None, equations.W.base.copy(), memory)

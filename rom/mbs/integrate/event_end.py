@@ -1,11 +1,12 @@
 """The end of a run by an event."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rom.errors import RomError
-from rom.mbs.equations.python_laws import Law
+from rom.mbs.equations.python_laws import Laws
 from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.run import Record
 from rom.mbs.integrate.step_memory import accelerated, signals_at
@@ -18,7 +19,7 @@ from rom.model import Array
 def kept_before_the_end(
     record: Record,
     W: Work,
-    forces: tuple[Law, ...],
+    forces: Laws,
     t: Array,
     out: tuple[Array, ...],
     saved: Array,
@@ -44,7 +45,8 @@ def kept_before_the_end(
     if saved[:k].any():
         record.keep(*(x[saved[:k]] for x in rows))
     last = tuple(x[-1] for x in rows) if k else first
-    state = State(*(last[0], *last[1:5]), record.final.rank, None, last[6])
+    now, q, v, a, lam, _, base = last
+    state = State(now, q, v, a, lam, record.final.rank, None, base)
     if failure:
         record.t, record.final = state.t, state
         raise failure
@@ -53,7 +55,7 @@ def kept_before_the_end(
     return True
 
 
-def _row(record: Record) -> tuple:
+def _row(record: Record) -> tuple[Any, ...]:
     """Time, q, v, a, lam, work and base of the last state; work is that of the last kept row."""
     f = record.final
     return record.t, f.q, f.v, f.a, f.lam, record.blocks[-1][5][-1], f.base
@@ -69,7 +71,7 @@ def projected(record: Record, W: Work, ends: tuple[Point, Point], t: float) -> t
 
 
 def _look(
-    record: Record, first: tuple, t: Array, out: tuple[Array, ...]
+    record: Record, first: tuple[Any, ...], t: Array, out: tuple[Array, ...]
 ) -> tuple[int, BaseException | None]:
     """Number of steps before the one that an event ends, or that an event function refuses."""
     # not the memory of the steps: its factorisation must stay
@@ -96,7 +98,7 @@ def _look(
 def _finish(
     record: Record,
     W: Work,
-    forces: tuple[Law, ...],
+    forces: Laws,
     state: State,
     ends: tuple[Point, Point],
     works: tuple[Array, Array],
@@ -110,5 +112,4 @@ def _finish(
     record.t, record.final = t, accelerated(record, W, state, forces, 0.0, np.zeros_like(v))
     share = (t - left.t) / (right.t - left.t)
     work = works[0] + share * (works[1] - works[0])
-    f = record.final
-    record.keep(np.array([t]), *(x[None].copy() for x in (f.q, f.v, f.a, f.lam, work, f.base)))
+    record.keep_state(record.final, work)

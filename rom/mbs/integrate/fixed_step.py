@@ -1,12 +1,12 @@
 """Implicit methods with steps of one length: compiled steps in chunks, or around Python forces."""
 
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rom.errors import RomError, SolverError
-from rom.mbs.equations.python_laws import Law, apply_laws, laws
+from rom.mbs.equations.python_laws import Laws, apply_laws, laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.event_end import kept_before_the_end
 from rom.mbs.integrate.events import Noted
@@ -50,7 +50,7 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
         )
 
 
-def _first(record: Record, W: Work, step: Step, forces: tuple[Law, ...]) -> int:
+def _first(record: Record, W: Work, step: Step, forces: Laws) -> int:
     """Take the steps before a multistep method can begin; returns how many there were."""
     t, rows = first_steps(record, W, step)
     step.count[alpha.STEPS_BEFORE] = 0
@@ -68,9 +68,7 @@ def space(W: Work, step: Step, rows: int) -> tuple[Array, ...]:
     )
 
 
-def _chunk(
-    record: Record, W: Work, step: Step, forces: tuple[Law, ...], done: int, count: int
-) -> int:
+def _chunk(record: Record, W: Work, step: Step, forces: Laws, done: int, count: int) -> int:
     """Take up to ``count`` steps and keep what is to be saved; returns how many were taken."""
     packed, settings = record.packed, record.settings
     t = settings.time(np.arange(done + 1, done + count + 1))
@@ -106,9 +104,7 @@ class Mark(NamedTuple):
     noted: Noted | None
 
 
-def _retrace(
-    record: Record, W: Work, mark: Mark, forces: tuple[Law, ...], chunk: tuple[Array, ...]
-) -> None:
+def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: tuple[Any, ...]) -> None:
     """Repeat the good steps of a chunk that failed, to stand behind the last as if it ended there.
 
     The step that failed has changed the factorisation and more of what the next one starts from.
@@ -133,7 +129,7 @@ def _retrace(
         record.reach(_state(record, W, step), noted)
 
 
-def _advance(record: Record, W: Work, step: Step, forces: tuple[Law, ...], chunk: tuple) -> int:
+def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: tuple[Any, ...]) -> int:
     """Run a chunk, calling Python forces whenever they are asked for; says how it ended."""
     times, table, out = chunk
     settings, rank, system = record.settings, record.final.rank, record.packed.system
@@ -150,7 +146,7 @@ def _advance(record: Record, W: Work, step: Step, forces: tuple[Law, ...], chunk
     return answer
 
 
-def counts(step: Step) -> dict[str, int]:
+def counts(step: Step) -> dict[str, float]:
     """Steps, Newton iterations and factorisations so far."""
     names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
     names["factorisations"] = alpha.FACTORISATIONS
@@ -158,7 +154,7 @@ def counts(step: Step) -> dict[str, int]:
 
 
 def _note(
-    record: Record, W: Work, step: Step, forces: tuple[Law, ...], t: Array, out: tuple[Array, ...]
+    record: Record, W: Work, step: Step, forces: Laws, t: Array, out: tuple[Array, ...]
 ) -> None:
     """Keep the saved steps of a chunk, finished or not."""
     record.counts = counts(step)
@@ -176,10 +172,10 @@ def _note(
 
 def _state(record: Record, W: Work, step: Step) -> State:
     """The last state with all that the next step depends on."""
-    arrays = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
+    q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
     memory = remember(record.settings, W, step, int(step.count[alpha.STEPS]))
     before = None if record.settings.method == "bdf" else step.a.copy()
-    return State(record.t, *arrays, record.final.rank, before, W.base.copy(), memory)
+    return State(record.t, q, v, a, lam, record.final.rank, before, W.base.copy(), memory)
 
 
 def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> SolverError:

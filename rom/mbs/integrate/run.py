@@ -29,8 +29,8 @@ MAX_STEPS = 10**12
 ROUND_OFF = 1e-12
 # first step of chosen length, relative to the duration
 FIRST_STEP_RATIO = 1e-4
-# place of the works in a block, behind the time; the array by which a memory knows its state
-WORK_ROW, RUN_KEY = 4, "of"
+# the array by which a memory knows its state
+RUN_KEY = "of"
 TOLERANCES = (1e-14, 1e-2)  # of the Newton iteration: round-off, and no solution at all
 
 
@@ -54,7 +54,7 @@ class Settings:
     stabilised: bool = False
     begun: int = 0  # steps of this very run that were taken before it was interrupted
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
         for name in numbers:
             value = getattr(self, name)
@@ -198,9 +198,9 @@ class Settings:
         Steps of one length are counted from the first one. Steps of chosen length go on with the
         length they had, which belongs to the whole duration.
         """
-        memory = None if state is None else state.memory
-        if memory is None or memory.method != self.kind:
+        if state is None or state.memory is None or state.memory.method != self.kind:
             return self
+        memory = state.memory
         if RUN_KEY in memory.arrays:
             same = self.t_start == state.t and np.array_equal(memory.arrays[RUN_KEY], of(state))
             whole = self.dt is None or memory.h == replace(self, t_start=memory.origin).h
@@ -254,28 +254,32 @@ class Record:
     clock: float
     blocks: list[tuple[Array, ...]] = field(default_factory=list)
     t: float = 0.0
-    final: State | None = None
+    final: State = None  # type: ignore[assignment]  # until the start
     given: State | None = None
     compiled: float = 0.0
-    counts: dict[str, int] = field(default_factory=dict)
+    counts: dict[str, float] = field(default_factory=dict)
     shown_at: float = 0.0
     watch: Watch | None = None
     noted: Noted | None = None
     keeping: Keeping | None = None
 
-    def keep(self, t: Array, *arrays: Array) -> None:
+    def keep(self, t: Array | float, *arrays: Array) -> None:
         """Add saved instants."""
         self.blocks.append((np.atleast_1d(t), *arrays))
+
+    def keep_state(self, state: State, work: Array) -> None:
+        """Add a state as a saved instant."""
+        arrays: tuple[Any, ...] = (state.q, state.v, state.a, state.lam, work, state.base)
+        self.keep(np.array([state.t]), *(x[None].copy() for x in arrays))
 
     def start(self, state: State, work: Array) -> None:
         """Save the first instant, unless the run goes on behind what it kept already."""
         self.t = state.t
         if not self.blocks:
-            arrays = (state.q, state.v, state.a, state.lam, work, state.base)
-            self.keep(np.array([state.t]), *(x[None].copy() for x in arrays))
+            self.keep_state(state, work)
         if self.watch and self.noted is None:
             self.watch.begin(state.q, state.v)
-        elif self.watch:
+        elif self.watch and self.noted:
             self.watch.recall(self.noted)
         self.reach(state)
 
@@ -302,7 +306,7 @@ class Record:
             return
         arrays = f.memory.arrays
         work = arrays["y"][-3:] if "y" in arrays else arrays["work"]
-        self.keep(np.array([f.t]), *(x[None].copy() for x in (f.q, f.v, f.a, f.lam, work, f.base)))
+        self.keep_state(f, work)
 
     @property
     def stopped(self) -> float | None:
@@ -329,8 +333,8 @@ class Record:
         """
         if self.settings.progress:
             line("")
-        t, *arrays = (np.concatenate(pieces) for pieces in zip(*self.blocks, strict=True))
-        arrays[WORK_ROW] -= arrays[WORK_ROW][0]
+        pieces = zip(*self.blocks, strict=True)
+        t, q, v, a, lam, work, base = (np.concatenate(piece) for piece in pieces)
         signals = np.full((t.size, len(self.packed.signals), 3), np.nan)
         table, failure = sampled(
             self.packed.signals, padded(t), self.settings.span, self.settings.spacing
@@ -339,8 +343,9 @@ class Record:
             raise failure
         signals[: len(table)] = table[: t.size]
         return Solution(
-            *(self.mechanism, self.packed, t, *arrays, signals, self._statistics(), status),
-            *(self.final, {} if self.watch is None else self.watch.occurrences),
+            *(self.mechanism, self.packed, t, q, v, a, lam, work - work[0], base, signals),
+            *(self._statistics(), status, self.final),
+            {} if self.watch is None else self.watch.occurrences,
         )
 
     def _statistics(self) -> dict[str, Any]:

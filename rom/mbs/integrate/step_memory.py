@@ -7,7 +7,7 @@ import numpy as np
 from rom.errors import SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints, retract
 from rom.mbs.equations.linear_solve import factorised, gradient_times, least_motion
-from rom.mbs.equations.python_laws import Law, apply_laws
+from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.bdf import multistep_coefficients
 from rom.mbs.integrate.consistent_start import with_accelerations
@@ -24,9 +24,7 @@ FACTOR = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
 SINCE = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
 
 
-def begin(
-    record: Record, W: Work, state: State, forces: tuple[Law, ...], h: float
-) -> tuple[Step, State]:
+def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tuple[Step, State]:
     """Step memory at the start for a first step of length h, consistent to second order.
 
     Generalised-alpha begins with its acceleration-like variable, BDF with a step before the start
@@ -168,7 +166,7 @@ def fits(memory: Memory | None, method: Array, weights: Array) -> bool:
     return all(same)
 
 
-def _power(record: Record, W: Work, state: State, forces: tuple[Law, ...]) -> Array:
+def _power(record: Record, W: Work, state: State, forces: Laws) -> Array:
     """(3,) powers of drives, forces and dampers at a state."""
     system = record.packed.system
     signals_at(record, W, state.t)
@@ -185,7 +183,7 @@ def signals_at(record: Record, W: Work, t: float) -> None:
 
 
 def measured(
-    record: Record, W: Work, state: State, forces: tuple[Law, ...], h: float
+    record: Record, W: Work, state: State, forces: Laws, h: float
 ) -> tuple[State, Array | None]:
     """Accelerations at a start and their rate; None if a step does not resolve it.
 
@@ -210,7 +208,7 @@ def measured(
 
 
 def accelerated(
-    record: Record, W: Work, state: State, forces: tuple[Law, ...], shift: float, jerk: Array
+    record: Record, W: Work, state: State, forces: Laws, shift: float, jerk: Array
 ) -> State:
     """The state with its accelerations, some time later by its Taylor series."""
     system = record.packed.system
