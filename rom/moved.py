@@ -93,7 +93,7 @@ def _paths() -> dict[str, str]:
     return found
 
 
-NEW = _paths()
+NEW_PATHS = _paths()
 
 
 class OldPaths:
@@ -103,7 +103,7 @@ class OldPaths:
         self, name: str, path: "Sequence[str] | None" = None, target: "ModuleType | None" = None
     ) -> "ModuleSpec | None":
         """This, for an old name."""
-        if name not in NEW:
+        if name not in NEW_PATHS:
             return None
         from importlib.machinery import ModuleSpec
 
@@ -117,7 +117,7 @@ class OldPaths:
         import importlib
         import warnings
 
-        old, new = module.__name__, NEW[module.__name__]
+        old, new = module.__name__, NEW_PATHS[module.__name__]
         text = f"{old} is {new} now; the old path goes with version 0.2."
         warnings.warn(text, DeprecationWarning, stacklevel=2)
         sys.modules[old] = importlib.import_module(new)

@@ -4,4 +4,4 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
 # what a search path holds to find the package; the root of the source tree, where there is one
-ABOVE = PACKAGE.parent
+FOLDER_ABOVE = PACKAGE.parent

@@ -108,8 +108,8 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
     if isinstance(annotation, str):
         annotation = eval(annotation, {}, known)  # our own source, as Python would
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
-    if annotation in PLAIN:
-        return PLAIN[annotation]
+    if annotation in PLAIN_KINDS:
+        return PLAIN_KINDS[annotation]
     if origin is Annotated and isinstance(inner[1], type):
         return _instance(inner[1])
     if origin is Annotated:
@@ -127,7 +127,7 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
     if origin in (dict, Mapping):
         return _mapping(*(taken_by(kind, known) for kind in inner))
     if origin is collections.abc.Callable:
-        return FUNCTION
+        return ANY_FUNCTION
     return _instance(annotation) if isinstance(annotation, type) else None
 
 
@@ -152,13 +152,13 @@ def _in_words(words: str, taken: Taken | None) -> Taken:
 
 
 def _one_of(several: list[Taken | None]) -> Taken | None:
-    takes = [take for take in several if take is not None and take is not NOTHING]
+    takes = [take for take in several if take is not None and take is not NONE_ONLY]
     if None in several:
         return None
-    words = _either([take.words for take in takes] + ["None"] * (NOTHING in several))
+    words = _either([take.words for take in takes] + ["None"] * (NONE_ONLY in several))
 
     def take(value: Any) -> Any:
-        if value is None and NOTHING in several:
+        if value is None and NONE_ONLY in several:
             return None
         deepest = Unfit(value, words)
         for one in takes:
@@ -204,17 +204,17 @@ def _several(one: Taken | None, kind: type) -> Taken:
     what = "" if one is None else f", each {one.words}"
 
     def take(value: Any) -> Any:
-        if isinstance(value, str) and one is TEXT:
+        if isinstance(value, str) and one is ANY_TEXT:
             return kind([value])
         if isinstance(value, str | bytes | Mapping):
             raise TypeError(value)
         return kind(value if one is None else _each(one, enumerate(value)))
 
-    return Taken("names" if one is TEXT else f"a sequence{what}", take)
+    return Taken("names" if one is ANY_TEXT else f"a sequence{what}", take)
 
 
 def _row(takes: list[Taken | None]) -> Taken:
-    each = [ANYTHING if take is None else take for take in takes]
+    each = [ANY_VALUE if take is None else take for take in takes]
 
     def take(value: Any) -> Any:
         if isinstance(value, str | bytes | Mapping) or len(value) != len(each):
@@ -241,7 +241,7 @@ def _mapping(key: Taken | None, one: Taken | None) -> Taken:
         if not isinstance(value, Mapping):
             raise TypeError(value)
         for name in value:
-            (key or ANYTHING)(name)
+            (key or ANY_VALUE)(name)
         if one is None:
             return value
         return dict(zip(value, _each(one, value.items()), strict=True))
@@ -327,21 +327,21 @@ def _nothing(value: Any) -> None:
         raise TypeError(value)
 
 
-ANYTHING = Taken("anything", lambda value: value)
-NOTHING = Taken("None", _nothing)
-TEXT = Taken("a text", _instance(str).take)
-FUNCTION = Taken("a function", _function)
-PLAIN: dict[Any, Taken | None] = {
+ANY_VALUE = Taken("anything", lambda value: value)
+NONE_ONLY = Taken("None", _nothing)
+ANY_TEXT = Taken("a text", _instance(str).take)
+ANY_FUNCTION = Taken("a function", _function)
+PLAIN_KINDS: dict[Any, Taken | None] = {
     float: Taken("a finite number", _number),
     int: Taken("a whole number", _whole),
     bool: Taken("True or False", _truth),
-    str: TEXT,
+    str: ANY_TEXT,
     Path: Taken("a path", _path),
     npt.ArrayLike: Taken("finite numbers", _array_like),
-    type(None): NOTHING,
-    None: NOTHING,
+    type(None): NONE_ONLY,
+    None: NONE_ONLY,
     object: None,
     Any: None,
     Parameter.empty: None,
-    Callable: FUNCTION,
+    Callable: ANY_FUNCTION,
 }

@@ -31,7 +31,7 @@ from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators, reduce
 
-BED = TITANIUM.E / 0.010  # as soft as 10 mm of the same metal [N/m^3]
+BED_STIFFNESS = TITANIUM.E / 0.010  # as soft as 10 mm of the same metal [N/m^3]
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,7 +341,7 @@ def _on_a_bed(body: Any, model: FEModel) -> Any:
     for name, marker in body.markers.items():
         H, S = marker.hold, model.interfaces[name].surface_mass
         felt = kron(S, identity(3)) @ H if marker.kind == "full" else H
-        K = K + BED * H.T @ felt
+        K = K + BED_STIFFNESS * H.T @ felt
     return np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * pi)
 
 

@@ -8,7 +8,7 @@ from scipy.sparse import bmat, csr_matrix, identity, kron
 
 from rom.errors import ConfigError
 from rom.model import FEModel, Interface, Material
-from rom.places import ABOVE
+from rom.places import FOLDER_ABOVE
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 
@@ -117,7 +117,7 @@ def geometry(name: str) -> Path:
     Raises:
         ConfigError: if the package was installed without it.
     """
-    path = ABOVE / "meshes" / f"{name}.geo"
+    path = FOLDER_ABOVE / "meshes" / f"{name}.geo"
     if not path.is_file():
         raise ConfigError(
             f"{path} does not exist: benchmarks need the source tree.", hint="Clone the project."

@@ -15,7 +15,7 @@ from rom.eigen.scipy import SciPyOperators
 from rom.model import Array
 from rom.reduction.interfaces.polynomial import Polynomial
 
-WHEEL = {
+WHEEL_SIZES = {
     "width": 0.016, "chord": 0.015, "chord_tip": 0.012, "t": 0.003, "t_tip": 0.002,
     "stagger": 20, "lc": 0.010, "lc_blade": 0.0065,
 }  # fmt: skip
@@ -33,7 +33,7 @@ def measured(
     """
     from rom.fe import model as read_model
 
-    model = read_model(geometry, material=TITANIUM, parameters=parameters or WHEEL)
+    model = read_model(geometry, material=TITANIUM, parameters=parameters or WHEEL_SIZES)
     sector = CyclicSector.from_model(model, fixed=("bore",))
     case, N = f"{sector.n_wheel} dofs, {sector.n_sectors} sectors", sector.n_sectors
     yield case, "mesh and matrices: peak memory", _peak(), "GiB", ""

@@ -14,7 +14,7 @@ from scipy.linalg import qr
 
 from rom.body.records import Marker
 from rom.body.recovery import PRODUCTS
-from rom.body.stiffening import CENTRIFUGAL, interface_loads
+from rom.body.stiffening import CENTRIFUGAL_LOADS, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError
@@ -60,7 +60,7 @@ class UnitLoads:
             Carried(self.model.interfaces[a.interface], *carried_displacements(a, self.model))
             for a in self.model.attachments
         ]
-        names = [*CENTRIFUGAL, *(load for m in markers for load in interface_loads(m))]
+        names = [*CENTRIFUGAL_LOADS, *(load for m in markers for load in interface_loads(m))]
         accelerations, wrenches = self._balanced(carried, tuple(markers))
         forces = self.mesh.apply_M(accelerations(self._points))
         U = self._answer(forces + wrenches + self._carried_load(carried, accelerations))

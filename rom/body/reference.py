@@ -24,7 +24,7 @@ from rom.rotation import skew
 
 # The frame of Tisserand carries no momentum of the deformation, that of Buckens keeps its mean
 # square smallest; linearised, both say that the shapes are orthogonal to rigid motion in the mass.
-MEAN = ("mean-axis", "buckens", "free")
+MEAN_AXES = ("mean-axis", "buckens", "free")
 
 
 def reference_motion(body: BodyData, reference: Any) -> Array:
@@ -35,7 +35,7 @@ def reference_motion(body: BodyData, reference: Any) -> Array:
             names.
         ModelError: if the condition does not determine the frame.
     """
-    if isinstance(reference, str) and reference in MEAN:
+    if isinstance(reference, str) and reference in MEAN_AXES:
         from_rigid, from_shapes = rigid_mass(body), rigid_elastic(body)
     elif isinstance(reference, str):
         from_rigid, from_shapes = _marker_motion(body.marker(reference), body.n_modes)

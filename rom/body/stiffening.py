@@ -34,12 +34,12 @@ from rom.model import Array
 
 AXIS_NAMES = "xyz"
 ROUND_OFF = 1e-11  # of the largest displacement of second order
-CENTRIFUGAL = tuple(
+CENTRIFUGAL_LOADS = tuple(
     f"omega_{AXIS_NAMES[i]}^2" if i == j else f"omega_{AXIS_NAMES[i]} omega_{AXIS_NAMES[j]}"
     for i, j in PRODUCTS
 )
-ANGULAR = tuple(f"domega_{axis}" for axis in AXIS_NAMES)
-LINEAR = tuple(f"a_{axis}" for axis in AXIS_NAMES)
+ANGULAR_LOADS = tuple(f"domega_{axis}" for axis in AXIS_NAMES)
+LINEAR_LOADS = tuple(f"a_{axis}" for axis in AXIS_NAMES)
 
 
 def interface_loads(name: str) -> tuple[str, ...]:
@@ -50,7 +50,7 @@ def interface_loads(name: str) -> tuple[str, ...]:
 def known_loads(body: BodyData) -> tuple[str, ...]:
     """All loads a body can have a geometric stiffness for."""
     interfaces = (load for name in body.markers for load in interface_loads(name))
-    return (*CENTRIFUGAL, *ANGULAR, *LINEAR, *interfaces)
+    return (*CENTRIFUGAL_LOADS, *ANGULAR_LOADS, *LINEAR_LOADS, *interfaces)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +77,17 @@ class SecondOrder:
         _check(body)
         r = body.n_modes
         K = {load: np.asarray(body.K_geo.get(load, np.zeros((r, r)))) for load in known_loads(body)}
-        squares = np.array([K[load] for load in CENTRIFUGAL[:3]])
+        squares = np.array([K[load] for load in CENTRIFUGAL_LOADS[:3]])
         symmetric = np.zeros((3, 3, r, r))
-        for (i, j), load in zip(PRODUCTS, CENTRIFUGAL, strict=True):
+        for (i, j), load in zip(PRODUCTS, CENTRIFUGAL_LOADS, strict=True):
             # omega_x^2 pulls along y and z, so that K = -(Ibar_yy + Ibar_zz)
             half = K[load] - 0.5 * squares.sum(axis=0) if i == j else 0.5 * K[load]
             symmetric[i, j] = symmetric[j, i] = half
-        turning = 0.5 * np.einsum("abc,ckl->bakl", skew_tensor(), [K[load] for load in ANGULAR])
+        turning = 0.5 * np.einsum(
+            "abc,ckl->bakl", skew_tensor(), [K[load] for load in ANGULAR_LOADS]
+        )
         markers = {m: -np.array([K[load] for load in interface_loads(m)]) for m in body.markers}
-        return cls(np.array([K[load] for load in LINEAR]), symmetric + turning, markers)
+        return cls(np.array([K[load] for load in LINEAR_LOADS]), symmetric + turning, markers)
 
     def without_round_off(self, mass: float, size: float) -> "SecondOrder":
         """Zeros where a frame leaves nothing: on its own support, or of the mean motion."""
@@ -104,10 +106,13 @@ class SecondOrder:
 
     def matrices(self) -> dict[str, Array]:
         """Geometric stiffness per unit load; loads without any are left out."""
-        X, K = self.Ibar, dict(zip(LINEAR, self.S, strict=True))
-        K |= {load: _product(X, i, j) for (i, j), load in zip(PRODUCTS, CENTRIFUGAL, strict=True)}
+        X, K = self.Ibar, dict(zip(LINEAR_LOADS, self.S, strict=True))
+        K |= {
+            load: _product(X, i, j)
+            for (i, j), load in zip(PRODUCTS, CENTRIFUGAL_LOADS, strict=True)
+        }
         twist = (X[1, 2] - X[2, 1], X[2, 0] - X[0, 2], X[0, 1] - X[1, 0])
-        K |= dict(zip(ANGULAR, twist, strict=True))
+        K |= dict(zip(ANGULAR_LOADS, twist, strict=True))
         for name, motion in self.markers.items():
             K |= dict(zip(interface_loads(name), -motion, strict=True))
         return {load: 0.5 * (A + A.T) for load, A in K.items() if np.any(A)}

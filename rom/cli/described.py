@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from rom.config.mechanism import MechanismFile
 
 TOML_SUFFIX = ".toml"
-COMMON = {
+COMMON_OPTIONS = {
     "verb", "file", "run", "output", "force", "json", "quiet", "verbose", "strict", "debug",
     "version", "resume", "parser",
 }  # fmt: skip
-COMMON |= {"trust", "time_limit", "memory_limit"}  # no file may say them
+COMMON_OPTIONS |= {"trust", "time_limit", "memory_limit"}  # no file may say them
 Changes = dict[tuple[str, ...], Any]
 PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "E": ("material", "E"),
@@ -38,14 +38,14 @@ PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "number": ("modes", "number"),
     "fixed": ("modes", "fixed"),
 }
-MOTION: dict[str, tuple[str, ...]] = {
+MOTION_KEYS: dict[str, tuple[str, ...]] = {
     "gravity": ("gravity",),
     "t_end": ("simulation", "t_end"),
     "dt": ("simulation", "dt"),
     "film": ("output", "film"),
     "history": ("output", "history"),
 }
-WITHOUT = {  # an option takes the place of what contradicts it
+REPLACED_KEYS = {  # an option takes the place of what contradicts it
     "modes": (("reduction", "f_max"), ("reduction", "tol")),
     "f_max": (("reduction", "modes"),),
 }
@@ -79,20 +79,20 @@ def mechanism(args: argparse.Namespace) -> "MechanismFile":
     """
     from rom.config.mechanism import read_mechanism
 
-    return read_mechanism(args.file, changes(args.given, MOTION, ()), **meshing(args))
+    return read_mechanism(args.file, changes(args.given, MOTION_KEYS, ()), **meshing(args))
 
 
 def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:
     """What options say, by the keys of the file."""
     found: Changes = {}
     for option, value in given.items():
-        if option in COMMON or option in extra:
+        if option in COMMON_OPTIONS or option in extra:
             continue
         if option in places:
-            found |= dict.fromkeys(WITHOUT.get(option, ()))
+            found |= dict.fromkeys(REPLACED_KEYS.get(option, ()))
             found[places[option]] = list(value) if isinstance(value, tuple) else value
-        elif option in SPECIAL and places is PLACES:
-            found |= SPECIAL[option](value)
+        elif option in SPECIAL_KEYS and places is PLACES:
+            found |= SPECIAL_KEYS[option](value)
         else:
             name = "--" + option.replace("_", "-")
             raise ConfigError(
@@ -126,7 +126,7 @@ def _rayleigh(text: str) -> Changes:
     return {("damping",): {"alpha": alpha, "beta": beta}}
 
 
-SPECIAL: dict[str, Callable[[Any], Changes]] = {
+SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
     "parameter": _parameters,
     "interface": _interfaces,
     "face": _faces,

@@ -11,7 +11,7 @@ from rom.names import named
 if TYPE_CHECKING:
     from rom.model import FEModel
 
-GEOMETRY: dict[str, Any] = {  # options of a geometry, and what they are when not given
+GEOMETRY_OPTIONS: dict[str, Any] = {  # options of a geometry, and what they are when not given
     "E": None,
     "nu": None,
     "rho": None,
@@ -76,7 +76,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
 
     odd = [
         f"--{name.replace('_', '-')}"
-        for name, default in GEOMETRY.items()
+        for name, default in GEOMETRY_OPTIONS.items()
         if getattr(args, name) != default
     ]
     if odd:

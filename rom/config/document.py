@@ -13,8 +13,8 @@ from rom.io.files import check_readable
 MAX_BYTES = 1_000_000  # bytes
 MAX_DEPTH = 40  # brackets or tables inside each other: more is an accident, and costs the stack
 STRING_PATTERN = r'"""(?:\\.|[^\\])*?"""' + r"|'''.*?'''" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'"
-TOKEN = re.compile(STRING_PATTERN + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
-WORD = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'|[A-Za-z0-9_-]+')
+TOKEN_PATTERN = re.compile(STRING_PATTERN + r"|\#[^\n]*|[^\"'\#\[\]{}=\n]+|.", re.S | re.X)
+WORD_PATTERN = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'|[A-Za-z0-9_-]+')
 KeyPath = tuple[str, ...]
 
 
@@ -82,7 +82,7 @@ def parsed(text: str, path: Path) -> Document:
 
 def _check_depth(text: str, path: Path) -> None:
     depth = 0
-    for token in TOKEN.finditer(text):
+    for token in TOKEN_PATTERN.finditer(text):
         depth += (token[0] in ("[", "{")) - (token[0] in ("]", "}"))
         if depth > MAX_DEPTH:
             raise ConfigError(f"has more than {MAX_DEPTH} brackets in each other.", where=str(path))
@@ -114,7 +114,7 @@ def statements(text: str) -> Iterator[tuple[KeyPath, int]]:
     """Full path and line of every table and key that begins a line; inline tables count as one."""
     table: KeyPath = ()
     for head, line in _heads(text):
-        words = tuple(word.strip("\"'") for word in WORD.findall(head))
+        words = tuple(word.strip("\"'") for word in WORD_PATTERN.findall(head))
         if head.startswith("["):
             table = words
             if not head.startswith("[["):
@@ -126,7 +126,7 @@ def statements(text: str) -> Iterator[tuple[KeyPath, int]]:
 def _heads(text: str) -> Iterator[tuple[str, int]]:
     """What stands before each ``=`` outside of values, and each line in brackets."""
     line, depth, head, in_value = 1, 0, "", False
-    for token in TOKEN.finditer(text + "\n"):
+    for token in TOKEN_PATTERN.finditer(text + "\n"):
         word = token[0]
         if word == "\n" and depth <= 0:
             if head.strip().startswith("["):

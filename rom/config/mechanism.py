@@ -129,7 +129,7 @@ class MechanismFile:
         for key, value in values.items():
             if isinstance(value, Pending):
                 values[key] = value.of(turns=turns)
-        adapt = ADAPTED.get(section)
+        adapt = SECTION_ADAPTERS.get(section)
         if adapt is not None:
             first, values = adapt(first, values, place, self.values["simulation"]["t_end"])
         getattr(made, method)(name, *first, **values)
@@ -311,7 +311,7 @@ def _impact(first: list[Any], values: dict[str, Any], _place: Place, _t_end: flo
     return [*first, Impact(**numbers)], values
 
 
-ADAPTED = {
+SECTION_ADAPTERS = {
     "drives": _drive,
     "motors": _motor,
     "forces": _load,

@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import typed
-from rom.cyclic.sector import NONE, CyclicSector
+from rom.cyclic.sector import NO_DOFS, CyclicSector
 from rom.eigen.scipy import MAX_DENSE_DOFS, SciPyOperators
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
@@ -91,7 +91,7 @@ def axial_pins(sector: CyclicSector) -> Index:
     """
     rigid = sector.rigid(0)[sector.free].real
     if not rigid.shape[1]:
-        return NONE
+        return NO_DOFS
     scaled = rigid / np.linalg.norm(rigid, axis=0)
     return np.sort(qr(scaled.T, mode="r", pivoting=True)[1][: rigid.shape[1]]).astype(np.int64)
 

@@ -29,7 +29,7 @@ from rom.model import Array, FEModel, Index, Interface
 from rom.names import named
 
 Complex = npt.NDArray[np.complex128]
-NONE = np.zeros(0, dtype=np.int64)
+NO_DOFS = np.zeros(0, dtype=np.int64)
 
 
 @typed
@@ -67,7 +67,7 @@ class CyclicSector:
     master: Index
     coupling: Any
     step: int = 1
-    held: Index = field(default_factory=lambda: NONE)
+    held: Index = field(default_factory=lambda: NO_DOFS)
     points: Array | None = None
     motions: Array | None = None
     face: Interface | None = None
@@ -141,7 +141,7 @@ class CyclicSector:
             master=pair.master.dofs,
             coupling=kron(pair.weights, turned(e, pair.step * 2 * np.pi / pair.n_sectors), "csr"),
             step=pair.step,
-            held=np.unique(np.concatenate(held)) if held else NONE,
+            held=np.unique(np.concatenate(held)) if held else NO_DOFS,
             points=model.points,
             motions=None if held else rigid_motions(model.points - at),
             face=pair.master,

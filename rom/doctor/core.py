@@ -11,8 +11,8 @@ import re
 import sys
 from pathlib import Path
 
-MISTAKEN = {"Prescott", "Core2", "Generic", "generic"}
-ABLE = {
+MISTAKEN_CORES = {"Prescott", "Core2", "Generic", "generic"}
+CORE_FLAGS = {
     "SkylakeX": {"avx512f", "avx512bw", "avx512dq", "avx512vl"},
     "Haswell": {"avx2", "fma"},
 }
@@ -44,8 +44,8 @@ def better(core: str, flags: set[str]) -> str:
         core: what it takes the processor for.
         flags: instruction sets of the processor.
     """
-    able = [name for name, needed in ABLE.items() if needed <= flags]
-    return able[0] if core in MISTAKEN and able else ""
+    able = [name for name, needed in CORE_FLAGS.items() if needed <= flags]
+    return able[0] if core in MISTAKEN_CORES and able else ""
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from rom.places import PACKAGE
 from rom.process.memory import free_bytes
 
 BLAS_FILE = re.compile(r"/lib(blas|openblas|scipy_openblas|mkl_rt|blis|flexiblas|cblas)[^/]*\.so")
-FAST = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)
+FAST_BLAS = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)
 SLOW_ADVICE = "5 to 9 times faster: sudo apt-get install libopenblas0-pthread"
 REMOVE_COMMAND = "rom doctor --fix"
 AT_WORK = 60.0  # seconds after which nobody is still writing a temporary file
@@ -31,7 +31,7 @@ def blas(mapped: list[str]) -> list[Finding]:
     """
     speed = _gigaflops()
     files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
-    slow = [f for f in files if not FAST.search(f)]
+    slow = [f for f in files if not FAST_BLAS.search(f)]
     named = ", ".join(slow or files) or "not found in the memory map"
     found = [Finding("BLAS", "library", named)]
     if slow:

@@ -23,7 +23,7 @@ from rom.names import named
 
 PIVOT_RTOL = 1e-13  # smallest over largest pivot below which K_ii counts as singular
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
-SYMMETRIC = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+SYMMETRIC_LU = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
 MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
 N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
 
@@ -175,7 +175,9 @@ class SciPyOperators:
             return np.zeros(0), np.zeros((self.n, 0))
         if sigma is None:
             sigma = -0.05 * self._first_elastic(R)
-        lu = splu(csc_matrix(self.K - sigma * self.M), options={"SymmetricMode": True}, **SYMMETRIC)
+        lu = splu(
+            csc_matrix(self.K - sigma * self.M), options={"SymmetricMode": True}, **SYMMETRIC_LU
+        )
         MR = self.M @ R
 
         def inverse(x: Array) -> Array:
@@ -203,7 +205,9 @@ class SciPyOperators:
     def _first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
         shift = 1e-6 * self._largest()
-        lu = splu(csc_matrix(self.K + shift * self.M), options={"SymmetricMode": True}, **SYMMETRIC)
+        lu = splu(
+            csc_matrix(self.K + shift * self.M), options={"SymmetricMode": True}, **SYMMETRIC_LU
+        )
         X = np.sin(np.outer(1.0 + np.arange(self.n), 1.0 + np.arange(8.0)))
         for _ in range(4):
             X = lu.solve(np.ascontiguousarray(self.M @ (X - R @ (R.T @ (self.M @ X)))))
@@ -256,7 +260,7 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
     advice = f"K_ii is singular: the {n_held} boundary dofs leave a rigid motion free."
     cure = "Fix at least three nodes that do not lie on one line, or use a free-interface basis."
     try:
-        lu = splu(csc_matrix(K_ii), options={"SymmetricMode": True}, **SYMMETRIC)
+        lu = splu(csc_matrix(K_ii), options={"SymmetricMode": True}, **SYMMETRIC_LU)
     except RuntimeError as error:
         raise InterfaceError(advice, hint=cure) from error
     pivots = np.abs(lu.U.diagonal())
@@ -333,7 +337,7 @@ def _verify_count(K: csr_matrix, M: csr_matrix, lam: Array, m: int) -> None:
 
 def negative_count(A: Any) -> int:
     """Number of negative eigenvalues of a symmetric matrix, from its pivots (Sylvester)."""
-    lu = splu(csc_matrix(A), options={"SymmetricMode": True}, **SYMMETRIC)
+    lu = splu(csc_matrix(A), options={"SymmetricMode": True}, **SYMMETRIC_LU)
     if not np.array_equal(lu.perm_r, lu.perm_c):
         return int(np.count_nonzero(eigvalsh(A.toarray()) < 0))
     return int(np.count_nonzero(lu.U.diagonal() < 0))

@@ -13,7 +13,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import drive_signal
 from rom.model import Array
 
-INFINITE = (-np.inf, np.inf)
+INFINITE_SPAN = (-np.inf, np.inf)
 DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
 
 
@@ -126,7 +126,7 @@ class Inputs:
 
 
 def _at(signal: Any, t: float) -> Array:
-    return signal.sample(np.array([t]), INFINITE, DIFFERENCE_SPACING)[0]
+    return signal.sample(np.array([t]), INFINITE_SPAN, DIFFERENCE_SPACING)[0]
 
 
 def _load(mechanism: Mechanism, name: str) -> list[Variable]:

@@ -16,7 +16,7 @@ from rom.rotation import quaternion
 
 # reads (W, lam, packed) at an instant
 Reading = Callable[[Work, Array, Packed], Any]
-MARKER = (
+MARKER_OUTPUTS = (
     ("position", 3, "m", "world"),
     ("velocity", 3, "m/s", "world"),
     ("quaternion", 4, "1", "marker to world, scalar first"),
@@ -64,7 +64,7 @@ class Outputs:
         return np.concatenate(found) if found else np.zeros(0)
 
     def _marker(self, marker: Marker) -> None:
-        for what, count, unit, axes in MARKER:
+        for what, count, unit, axes in MARKER_OUTPUTS:
             name = structured(marker.body, str(marker.place), what)
             self.variables += [
                 Variable(f"{name}[{k}]", "output", unit, description=axes)

@@ -25,8 +25,8 @@ from rom.model import Array, Index
 
 SETTINGS_FILE, BUILD_FUNCTION = "fmu.json", "mechanism"
 OK, ERROR = 0, 3
-HEAD = struct.Struct("=iii")
-NONE = np.zeros(0)
+HEAD_LAYOUT = struct.Struct("=iii")
+NO_VALUES = np.zeros(0)
 
 
 def driven(resources: Path) -> Driven:
@@ -89,24 +89,24 @@ class Server:
             try:
                 found = self.verbs[verb](refs, values)
             except RomError as error:
-                return ERROR, NONE, str(error)
+                return ERROR, NO_VALUES, str(error)
             except Exception as error:  # whatever the user's own functions raise
-                return ERROR, NONE, f"{type(error).__name__}: {error}"
+                return ERROR, NO_VALUES, f"{type(error).__name__}: {error}"
         new = {str(w.message) for w in caught if issubclass(w.category, RomWarning)} - self.reported
         self.reported |= new
         return OK, found, " ".join(sorted(new))
 
     def _set(self, refs: Index, values: Array) -> Array:
         self.model.set(refs, values)
-        return NONE
+        return NO_VALUES
 
     def _start(self, refs: Index, values: Array) -> Array:
         self.model.start(float(values[0]))
-        return NONE
+        return NO_VALUES
 
     def _step(self, refs: Index, values: Array) -> Array:
         self.model.step(float(values[0]), float(values[1]))
-        return NONE
+        return NO_VALUES
 
     def _keep(self, refs: Index, values: Array) -> Array:
         self.count += 1
@@ -117,15 +117,15 @@ class Server:
         if int(values[0]) not in self.states:
             raise ConfigError("this state has been freed, or is of another instance.")
         self.model.recall(self.states[int(values[0])])
-        return NONE
+        return NO_VALUES
 
     def _drop(self, refs: Index, values: Array) -> Array:
         self.states.pop(int(values[0]), None)
-        return NONE
+        return NO_VALUES
 
     def _reset(self, refs: Index, values: Array) -> Array:
         self.model = self.build()
-        return NONE
+        return NO_VALUES
 
 
 def serve(connection: socket.socket, build: Callable[[], Driven]) -> None:
@@ -134,11 +134,11 @@ def serve(connection: socket.socket, build: Callable[[], Driven]) -> None:
         server = Server(build)
     except Exception as error:  # the Python file is the user's
         kind = "" if isinstance(error, RomError) else f"{type(error).__name__}: "
-        _send(connection, ERROR, NONE, f"{kind}{error}")
+        _send(connection, ERROR, NO_VALUES, f"{kind}{error}")
         return
-    _send(connection, OK, NONE, "")
-    while (head := _receive(connection, HEAD.size)) is not None:
-        verb, n_refs, n_values = HEAD.unpack(head)
+    _send(connection, OK, NO_VALUES, "")
+    while (head := _receive(connection, HEAD_LAYOUT.size)) is not None:
+        verb, n_refs, n_values = HEAD_LAYOUT.unpack(head)
         data = _receive(connection, 4 * n_refs + 8 * n_values)
         if data is None:
             return
@@ -149,7 +149,7 @@ def serve(connection: socket.socket, build: Callable[[], Driven]) -> None:
 
 def _send(connection: socket.socket, status: int, values: Array, text: str) -> None:
     words = text.encode()
-    head = HEAD.pack(status, values.size, len(words))
+    head = HEAD_LAYOUT.pack(status, values.size, len(words))
     connection.sendall(head + np.ascontiguousarray(values, dtype=float).tobytes() + words)
 
 

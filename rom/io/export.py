@@ -25,7 +25,7 @@ from rom.io.sid.dialect import read_sid
 from rom.io.sid.format import write_sid
 
 SID_SUFFIX = ".sid_fem"
-HOLDING = ("openfast", "openfast-4")  # formats with one free interface
+HOLDING_FORMATS = ("openfast", "openfast-4")  # formats with one free interface
 
 
 def _write_sid(body: FlexibleBody, path: str | Path, dialect: str) -> Path:
@@ -98,8 +98,8 @@ def export(
             hold, or the place is not writable.
     """
     kind = format_of(path, to)
-    if held and kind not in HOLDING:
-        raise ConfigError(f"interfaces are held for {HOLDING[0]} alone, not for {kind}.")
+    if held and kind not in HOLDING_FORMATS:
+        raise ConfigError(f"interfaces are held for {HOLDING_FORMATS[0]} alone, not for {kind}.")
     options = {"held": tuple(held)} if held else {}
     body = body if kind in OWN_UNITS else body.in_units("SI")
     return FORMATS[kind][1](body, path, **options)

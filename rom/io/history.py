@@ -14,7 +14,7 @@ from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable, write_whole
 from rom.model import Array
 
-XYZ = ("x", "y", "z")
+AXIS_LETTERS = ("x", "y", "z")
 ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
 
 
@@ -73,8 +73,8 @@ def channels(solution: Any) -> Iterator[Channel]:
         yield from _of_body(solution, name, part)
     for joint in sorted(set(solution.packed.row_owner)):
         loads = solution.reaction(joint)
-        yield Channel(("joints", joint, "force"), "N", XYZ, loads[:, :3])
-        yield Channel(("joints", joint, "moment"), "N m", XYZ, loads[:, 3:])
+        yield Channel(("joints", joint, "force"), "N", AXIS_LETTERS, loads[:, :3])
+        yield Channel(("joints", joint, "moment"), "N m", AXIS_LETTERS, loads[:, 3:])
     for name in ENERGIES:
         values = getattr(solution.energy, name)
         yield Channel(("energy", name), "J", ("",), values)
@@ -82,11 +82,11 @@ def channels(solution: Any) -> Iterator[Channel]:
 
 def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
     place = ("bodies", name)
-    yield Channel((*place, "position"), "m", XYZ, solution.position(name))
+    yield Channel((*place, "position"), "m", AXIS_LETTERS, solution.position(name))
     quaternion = solution.orientation(name)
     yield Channel((*place, "orientation"), "1", ("p0", "p1", "p2", "p3"), quaternion)
-    yield Channel((*place, "velocity"), "m/s", XYZ, solution.velocity(name))
-    yield Channel((*place, "omega"), "rad/s", XYZ, solution.omega(name))
+    yield Channel((*place, "velocity"), "m/s", AXIS_LETTERS, solution.velocity(name))
+    yield Channel((*place, "omega"), "rad/s", AXIS_LETTERS, solution.omega(name))
     if part.r:
         labels = tuple(f"q{k + 1}" for k in range(part.r))
         normalised = np.allclose(part.flexible.M, np.eye(part.r), rtol=0, atol=1e-6)
@@ -94,8 +94,8 @@ def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
         yield Channel((*place, "elastic"), unit, labels, solution.elastic(name))
     for marker in part.names:
         at = (*place, "markers", marker)
-        yield Channel((*at, "position"), "m", XYZ, solution.position(name, marker))
-        yield Channel((*at, "velocity"), "m/s", XYZ, solution.velocity(name, marker))
+        yield Channel((*at, "position"), "m", AXIS_LETTERS, solution.position(name, marker))
+        yield Channel((*at, "velocity"), "m/s", AXIS_LETTERS, solution.velocity(name, marker))
 
 
 def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:

@@ -10,7 +10,7 @@ from rom.arguments import positive, typed, whole
 from rom.cyclic.faces import unit_axis
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.rotation import rotation_matrices
-from rom.cyclic.sector import NONE, CyclicSector
+from rom.cyclic.sector import NO_DOFS, CyclicSector
 from rom.errors import ConfigError, ModelError, reached
 from rom.model import Array, FEModel
 from rom.prestress.heat import Heat
@@ -104,8 +104,8 @@ def held_solid(
         n_sectors=2,  # with 0 diameters any number does
         K=csr_matrix(model.K),
         M=csr_matrix(model.M),
-        slave=NONE,
-        master=NONE,
+        slave=NO_DOFS,
+        master=NO_DOFS,
         coupling=csr_matrix((0, 0)),
         held=held_dofs(model, fixed),
         points=model.points,

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from rom.cyclic.rotation import axial_pins, rotation_matrices
 from rom.cyclic.sector import CyclicSector
-from rom.eigen.scipy import SYMMETRIC
+from rom.eigen.scipy import SYMMETRIC_LU
 from rom.model import Array
 
 MAX_ITERATIONS = 25
@@ -119,6 +119,6 @@ class SteadyRotation:
 def _factor(K: csr_matrix) -> Any:
     """Symmetric factor whose pivots tell stability; None where the matrix is singular."""
     try:
-        return splu(csc_matrix(K), options={"SymmetricMode": True}, **SYMMETRIC)
+        return splu(csc_matrix(K), options={"SymmetricMode": True}, **SYMMETRIC_LU)
     except RuntimeError:
         return None

@@ -19,12 +19,12 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rom.places import ABOVE
+from rom.places import FOLDER_ABOVE
 from rom.process.interruption import terminable, uninterrupted
 
-ENTRY = Path(__file__).with_name("child_entry.py")
-ROOT = str(ABOVE)
-INSTALLED = ("site-packages", "dist-packages")  # on the path of every child anyway
+ENTRY_FILE = Path(__file__).with_name("child_entry.py")
+ROOT_FOLDER = str(FOLDER_ABOVE)
+INSTALL_FOLDERS = ("site-packages", "dist-packages")  # on the path of every child anyway
 FOLDER_PREFIX, FOLDER_SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
 GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL
 # The launcher of MPI recognises its processes by these; a child is none of them.
@@ -111,7 +111,7 @@ def start(
 ) -> subprocess.Popen[bytes]:
     """Start a command beside this process; arguments as in `run`, `finish` waits for it."""
     limits = limits or Limits()
-    entry = [sys.executable, "-P", str(ENTRY), str(os.getpid())]
+    entry = [sys.executable, "-P", str(ENTRY_FILE), str(os.getpid())]
     entry += [str(limits.processor), str(limits.memory)]
     own = sys.executable in command
     with uninterrupted():
@@ -161,8 +161,8 @@ def environment(*, own: bool = True) -> dict[str, str]:
     """
     kept = {k: v for k, v in os.environ.items() if not k.startswith(MPI_VARIABLES)}
     given = [p for p in kept.pop("PYTHONPATH", "").split(os.pathsep) if os.path.isabs(p)]
-    if own and os.path.basename(ROOT) not in INSTALLED:
-        given.insert(0, ROOT)
+    if own and os.path.basename(ROOT_FOLDER) not in INSTALL_FOLDERS:
+        given.insert(0, ROOT_FOLDER)
     path = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(given))} if given else {}
     return kept | path | {"PYTHONSAFEPATH": "1"}
 

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 
 Sections = dict[str, Sequence[str]]
 N_FREQUENCIES = 6
-SHOWN = ("path", "sha256", "parameters", "scale", "material", "degree", "solver", "K", "M", "units")
-BODY = ("body", "mass [kg]", "elastic coordinates", "markers")
+SHOWN_KEYS = (
+    "path", "sha256", "parameters", "scale", "material", "degree", "solver", "K", "M", "units",
+)  # fmt: skip
+BODY_COLUMNS = ("body", "mass [kg]", "elastic coordinates", "markers")
 ENERGIES = ("kinetic", "strain", "potential", "total")
 
 
@@ -149,7 +151,7 @@ def _mode_picture(body: "FlexibleBody") -> list[str]:
 
 
 def _provenance(body: "FlexibleBody") -> list[str]:
-    known = {key: body.provenance[key] for key in SHOWN if key in body.provenance}
+    known = {key: body.provenance[key] for key in SHOWN_KEYS if key in body.provenance}
     known |= {
         f"{name}, when the body was made": version
         for name, version in dict(body.provenance.get("versions", {})).items()
@@ -233,7 +235,7 @@ def of_run(folder: Path) -> tuple[str, Sections]:
     return f"Motion of {record['name']}", {
         "What it is": [html.paragraph(words + record["status"]), *pictures],
         "Bodies and joints": [
-            html.table(BODY, bodies, "Bodies."),
+            html.table(BODY_COLUMNS, bodies, "Bodies."),
             html.table(("joint", "kind"), list(record["joints"].items()), "Joints."),
         ],
         "Checks": [html.checks(audit, "Is the computed motion believable?")],

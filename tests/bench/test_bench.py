@@ -65,7 +65,7 @@ def test_a_bed_under_the_interfaces_is_that_of_the_full_model(bar, kind):
     """Ten frequencies of the bar with springs under both ends, from all its dofs by LAPACK."""
     K, M = bar.K.toarray(), bar.M.toarray()
     for face in bar.interfaces.values():
-        K[np.ix_(face.dofs, face.dofs)] += benchmarks.BED * np.kron(
+        K[np.ix_(face.dofs, face.dofs)] += benchmarks.BED_STIFFNESS * np.kron(
             face.surface_mass.toarray(), np.eye(3)
         )
     exact = np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * np.pi)
@@ -103,13 +103,13 @@ def test_chains_of_all_lengths_are_measured():
 
 def test_other_programs_reduce_the_same_model(bar, tmp_path):
     """The script that other programs run, here with SciPy: its body has our frequencies."""
-    from rom.bench.peers.compare import SCRIPT
+    from rom.bench.peers.compare import SCRIPT_FILE
     from rom.bench.peers.ours import save_matrices
 
     file = tmp_path / "matrices.npz"
     save_matrices(bar, str(file), tuple(benchmarks.KINDS))
     done = subprocess.run(
-        [sys.executable, str(SCRIPT), str(file), "superlu", "rbe2", "8"],
+        [sys.executable, str(SCRIPT_FILE), str(file), "superlu", "rbe2", "8"],
         capture_output=True, text=True, timeout=600, check=True,
     )  # fmt: skip
     found = json.loads(done.stdout)
@@ -121,7 +121,7 @@ def test_other_programs_reduce_the_same_model(bar, tmp_path):
 def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
     from rom.bench.peers import compare
 
-    monkeypatch.setattr(compare, "ENVIRONMENT", tmp_path / "peers")
+    monkeypatch.setattr(compare, "PEER_FOLDER", tmp_path / "peers")
     monkeypatch.setattr(compare, "PACKAGES", ("no-such-package-anywhere==0",))
     with pytest.raises(ResourceError, match=r"the environment .* could not be made"):
         compare.interpreter()

@@ -13,7 +13,7 @@ from rom.components.transmission import rest
 def theirs(monkeypatch):
     """An answer as ROSS gives it, with the stiffness and damping of our own film, in SI."""
     bearing, load = films.two_groove()
-    kept = {"speed": films.CASE["speed"], "viscosity": films.CASE["viscosity"]}
+    kept = {"speed": films.FILM_CASE["speed"], "viscosity": films.FILM_CASE["viscosity"]}
     f = equilibrium(bearing, (0.0, -load), **kept)
     found = {"seconds": 1.0, "stiffness": f.stiffness[:2, :2].tolist(),
              "damping": f.damping[:2, :2].tolist()}  # fmt: skip

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from rom import rotation
 from rom.bench.peers import rods
 from rom.components.cosserat import body
-from rom.components.wind.wind_turbine import RATED, blade, ramp, run_up
+from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 
 
 def test_beams_have_the_sections_of_the_blade():
@@ -54,9 +54,11 @@ def test_the_rotor_here_is_the_run_up_of_its_blades(monkeypatch):
 
 def test_both_programs_turn_the_hub_alike():
     """The script knows nothing of rom; its law of the angle is read from its text."""
-    source = Path(rods.SCRIPT).read_text()
+    source = Path(rods.SCRIPT_FILE).read_text()
     law = next(f for f in ast.parse(source).body if getattr(f, "name", "") == "angle")
     scope = {"cos": np.cos, "pi": np.pi}
     exec(compile(ast.Module([law], []), "beams", "exec"), scope)
     for t in (0.3, 7.0, 19.9, 25.0):
-        assert_allclose(scope["angle"](t, RATED, 20.0), ramp(RATED, 20.0)[1](t), rtol=1e-14)
+        assert_allclose(
+            scope["angle"](t, RATED_SPEED, 20.0), ramp(RATED_SPEED, 20.0)[1](t), rtol=1e-14
+        )

@@ -16,7 +16,7 @@ from cases.beam import gauss_hermite, hermite_beam
 from cases.ranks.environment import ENVIRONMENT
 from rom.body.prestress import _turning, centrifugal
 from rom.body.rotating import rotating_matrices
-from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR, interface_loads
+from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, LINEAR_LOADS, interface_loads
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.reduction.interfaces.connection import connect
@@ -157,7 +157,9 @@ def test_unit_loads_with_the_root_held_by_the_full_model(model, body):
     p = (ops.apply_K(U) - np.hstack([force, np.zeros((ops.n, 6))]))[face.dofs]
     moment = np.einsum("nal,nb->lab", p.reshape(-1, 3, 18), face.points - face.origin)
     K += _turning(moment, body.marker("tip").rotation)
-    for load, A in zip((*LINEAR, *ANGULAR, *CENTRIFUGAL, *interface_loads("tip")), K, strict=True):
+    for load, A in zip(
+        (*LINEAR_LOADS, *ANGULAR_LOADS, *CENTRIFUGAL_LOADS, *interface_loads("tip")), K, strict=True
+    ):
         assert_allclose(body.K_geo[load], A, atol=1e-6 * np.abs(A).max(), err_msg=load)
 
 
@@ -172,7 +174,7 @@ def test_there_and_back_to_another_frame(model, body, reference):
         )
         assert np.array_equal(A, A.T)
     free = body.with_reference("mean-axis")
-    assert not {*LINEAR, *ANGULAR} & set(free.K_geo)  # inertia relief: no stress
+    assert not {*LINEAR_LOADS, *ANGULAR_LOADS} & set(free.K_geo)  # inertia relief: no stress
     seen = (rotating(b.with_reference(reference), 8.0) for b in (body, free))
     assert_allclose(*seen, rtol=1e-7)
 

@@ -12,10 +12,10 @@ import rom
 from cases.mbs.mechanisms import nodal_body, random_nodes, simulate_quietly
 from cases.paths import ROOT
 from cases.solid import block
-from rom.bench.peers.compare import ENVIRONMENT
+from rom.bench.peers.compare import PEER_FOLDER
 from rom.io.programs.exudyn import arrays
 
-PEER = ROOT / ENVIRONMENT / "bin" / "python"
+PEER = ROOT / PEER_FOLDER / "bin" / "python"
 SCRIPT = """
 import sys, json
 sys.path.insert(0, sys.argv[1])

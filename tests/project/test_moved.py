@@ -12,18 +12,18 @@ from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.results.state import Memory, State
 
 
-@pytest.mark.parametrize("old", moved.NEW)
+@pytest.mark.parametrize("old", moved.NEW_PATHS)
 def test_an_old_path_is_the_module_itself_and_warns(old, monkeypatch):
     if old.startswith("rom.fe."):
         pytest.importorskip("dolfinx", reason="modules of rom.fe need it")
-    if moved.NEW[old] in SCRIPTS:
+    if moved.NEW_PATHS[old] in SCRIPTS:
         pytest.skip("is a script of another program's environment")
     for name in [name for name in sys.modules if name == old or name.startswith(f"{old}.")]:
         monkeypatch.delitem(sys.modules, name)
     with pytest.warns(DeprecationWarning, match=f"^{old} is {moved.NEW[old]} now") as caught:
         found = importlib.import_module(old)
-    assert found is importlib.import_module(moved.NEW[old])
-    assert found.__spec__.name == found.__name__ == moved.NEW[old]
+    assert found is importlib.import_module(moved.NEW_PATHS[old])
+    assert found.__spec__.name == found.__name__ == moved.NEW_PATHS[old]
     assert not [w for w in caught if "moved.py" in w.filename]
 
 
@@ -31,8 +31,8 @@ SCRIPTS = {f"rom.bench.peers.{name}" for name in ("beams", "craig_bampton", "ffr
 
 
 def test_no_old_path_hides_a_module():
-    assert all(importlib.util.find_spec(new).origin for new in moved.NEW.values())
-    assert not set(moved.NEW) & set(moved.NEW.values())
+    assert all(importlib.util.find_spec(new).origin for new in moved.NEW_PATHS.values())
+    assert not set(moved.NEW_PATHS) & set(moved.NEW_PATHS.values())
 
 
 def test_the_warning_names_the_line_that_imports():

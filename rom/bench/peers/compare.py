@@ -17,12 +17,12 @@ from rom.process import child
 # scikit-sparse builds on the CHOLMOD of Debian 12, and for NumPy 1
 PACKAGES = ("exudyn==1.13.6", "scikit-sparse<0.4.13", "scipy<1.14", "numpy<2")
 # not in the working folder, whose programs somebody else may have put there
-CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rom"
-ENVIRONMENT = CACHE / "peers"
+CACHE_FOLDER = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rom"
+PEER_FOLDER = CACHE_FOLDER / "peers"
 N_MODES = 20
 RBE3_DOFS = 40_000  # beyond, Exudyn's rbe3 runs out of memory
 FREQUENCY_RTOL = 1e-6  # difference of frequencies of the same model
-SCRIPT = Path(__file__).with_name("craig_bampton.py")
+SCRIPT_FILE = Path(__file__).with_name("craig_bampton.py")
 
 
 def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
@@ -41,7 +41,7 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
         two = answer_of(["mpirun", "--oversubscribe", "-n", "2", *rod, "rbe2", str(N_MODES)])
         yield case, "one process over two", ours["seconds"] / two["seconds"], "", "above 1"
         for program, aim in (("superlu", ""), ("cholmod", "above 1"), ("exudyn", "above 10")):
-            theirs = answer_of([python, str(SCRIPT), file, program, "rbe2", str(N_MODES)])
+            theirs = answer_of([python, str(SCRIPT_FILE), file, program, "rbe2", str(N_MODES)])
             yield case, f"{program} over rom", theirs["seconds"] / ours["processor"], "", aim
             gap = np.abs(np.array(theirs["frequencies"]) / ours["frequencies"] - 1).max()
             yield (
@@ -53,7 +53,7 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
             )
         if ours["dofs"] <= RBE3_DOFS:
             mean = answer_of([*rod, "rbe3", str(N_MODES)])
-            theirs = answer_of([python, str(SCRIPT), file, "exudyn", "rbe3", str(N_MODES)])
+            theirs = answer_of([python, str(SCRIPT_FILE), file, "exudyn", "rbe3", str(N_MODES)])
             ratio = theirs["seconds"] / mean["processor"]
             yield f"{ours['dofs']} dofs, rbe3", "exudyn over rom", ratio, "", "above 10"
 
@@ -69,7 +69,7 @@ def interpreter(environment: Path | None = None, packages: tuple[str, ...] = ())
         ResourceError: if a package cannot be installed.
     """
     if environment is None:
-        environment, packages = ENVIRONMENT, PACKAGES
+        environment, packages = PEER_FOLDER, PACKAGES
     python = environment / "bin" / "python"
     done = environment / "complete"
     if not done.exists():

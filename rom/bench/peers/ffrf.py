@@ -25,8 +25,11 @@ import exudyn as exu  # noqa: E402
 from exudyn import itemInterface as item  # noqa: E402
 from exudyn.FEM import FEMinterface, ObjectFFRFreducedOrderInterface  # noqa: E402
 
-FREE = {"revolute": [1, 1, 1, 1, 1, 0], "point_on_line": [1, 1, 0, 0, 0, 0]}  # about or along z
-PRISMATIC = [0, 1, 1, 1, 1, 1]  # along x
+FREE_AXES = {
+    "revolute": [1, 1, 1, 1, 1, 0],
+    "point_on_line": [1, 1, 0, 0, 0, 0],
+}  # about or along z
+SLIDER_AXES = [0, 1, 1, 1, 1, 1]  # along x
 MAX_DENSE_UNKNOWNS = 150  # a dense factor is the faster one up to here
 
 
@@ -114,7 +117,7 @@ class Model:
             self.mbs.AddObject(item.SphericalJoint(markerNumbers=markers))
             return
         markers = [self.marker(*end, turns=True) for end in (i, j)]
-        along = PRISMATIC if kind == "prismatic" else FREE[kind]
+        along = SLIDER_AXES if kind == "prismatic" else FREE_AXES[kind]
         assert axis == ([1, 0, 0] if kind == "prismatic" else [0, 0, 1]), axis
         self.mbs.AddObject(item.GenericJoint(markerNumbers=markers, constrainedAxes=along))
 

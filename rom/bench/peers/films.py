@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.peers.compare import CACHE, answer_of, interpreter
+from rom.bench.peers.compare import CACHE_FOLDER, answer_of, interpreter
 from rom.components.gear_mesh import GearPair, Mesh, stiffness_table
 from rom.components.journal_bearing import (
     Groove,
@@ -28,11 +28,11 @@ from rom.model import Array
 
 # of a wheel of charts that newer drawing libraries lack
 PACKAGES = ("ross-rotordynamics==2.3.0", "plotly<6")
-ENVIRONMENT = CACHE / "ross"
-SCRIPT = Path(__file__).with_name("ross_films.py")
-STIFFNESS = np.array([[2.67, 3.70], [-0.78, 1.75]])  # c/W, x along the load
-DAMPING = np.array([[6.96, 1.94], [1.94, 2.40]])  # c speed/W
-CASE: dict[str, Any] = {
+ROSS_FOLDER = CACHE_FOLDER / "ross"
+SCRIPT_FILE = Path(__file__).with_name("ross_films.py")
+ROSS_STIFFNESS = np.array([[2.67, 3.70], [-0.78, 1.75]])  # c/W, x along the load
+ROSS_DAMPING = np.array([[6.96, 1.94], [1.94, 2.40]])  # c speed/W
+FILM_CASE: dict[str, Any] = {
     "diameter": 0.1, "length": 0.05, "clearance": 1e-4, "viscosity": 0.03, "speed": 300.0,
     "groove_deg": 20, "cells": (53, 8), "guess": (0.5, -0.7),
 }  # fmt: skip
@@ -43,10 +43,10 @@ Row = tuple[str, str, float, str, str]
 
 def two_groove() -> tuple[JournalBearing, float]:
     """The bearing of the row and its load [N], which points against Y."""
-    size = CASE["diameter"], CASE["length"], CASE["clearance"]
-    grooves = [Groove(angle, np.radians(CASE["groove_deg"])) for angle in (0.0, np.pi)]
+    size = FILM_CASE["diameter"], FILM_CASE["length"], FILM_CASE["clearance"]
+    grooves = [Groove(angle, np.radians(FILM_CASE["groove_deg"])) for angle in (0.0, np.pi)]
     bearing = JournalBearing(*size, grooves, cells=(120, 8))
-    film = CASE["viscosity"] * CASE["speed"] / (2 * np.pi) * size[0] * size[1]
+    film = FILM_CASE["viscosity"] * FILM_CASE["speed"] / (2 * np.pi) * size[0] * size[1]
     return bearing, film / SOMMERFELD_NUMBER * (size[0] / 2 / size[2]) ** 2
 
 
@@ -57,7 +57,7 @@ def coefficients_compared() -> Iterator[Row]:
         ResourceError: if ROSS cannot be installed, or fails.
     """
     (bearing, load), case = two_groove(), "two-groove bearing, 120 x 8 cells"
-    kept = {"speed": CASE["speed"], "viscosity": CASE["viscosity"]}
+    kept = {"speed": FILM_CASE["speed"], "viscosity": FILM_CASE["viscosity"]}
     equilibrium(bearing, (0.0, -load), **kept)
     start = process_time()
     for _ in range(N_REPEATS):
@@ -66,14 +66,18 @@ def coefficients_compared() -> Iterator[Row]:
     ours = (process_time() - start) / N_REPEATS
     yield case, "rom, rest and coefficients", 1e3 * ours, "ms of the processor", ""
     yield case, "rom, coefficients off Lund and Thomsen", off(K, C), "", "below 0.03"
-    command = [interpreter(ENVIRONMENT, PACKAGES), str(SCRIPT), json.dumps(CASE | {"load": load})]
+    command = [
+        interpreter(ROSS_FOLDER, PACKAGES),
+        str(SCRIPT_FILE),
+        json.dumps(FILM_CASE | {"load": load}),
+    ]
     found = answer_of(command)
-    each, name = CASE["clearance"] / load, f"ROSS {found.pop('version')}"
+    each, name = FILM_CASE["clearance"] / load, f"ROSS {found.pop('version')}"
     for method, theirs in found.items():
         K, C = (along_the_load(each * np.array(theirs[k])) for k in ("stiffness", "damping"))
         ratio = theirs["seconds"] / ours
         yield case, f"{name}, {method}, over rom", ratio, "", "above 10"
-        wrong = off(K, C * CASE["speed"])
+        wrong = off(K, C * FILM_CASE["speed"])
         yield case, f"{name}, {method}, coefficients off Lund and Thomsen", wrong, "", ""
 
 
@@ -85,7 +89,7 @@ def along_the_load(A: Array) -> Array:
 
 def off(K: Array, C: Array) -> float:
     """Largest difference from the published row over the largest coefficient of each matrix."""
-    parts = ((K, STIFFNESS), (C, DAMPING))
+    parts = ((K, ROSS_STIFFNESS), (C, ROSS_DAMPING))
     return float(max(np.abs(A - B).max() / np.abs(B).max() for A, B in parts))
 
 

@@ -28,7 +28,7 @@ from rom.process.child import scratch
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
 
-SCRIPT = Path(__file__).with_name("ffrf.py")
+SCRIPT_FILE = Path(__file__).with_name("ffrf.py")
 ENDS = ("root", "tip")
 TIME_STEP = 2.5e-4  # of the pendulum and the slider-crank [s]; four times that for chains
 N_TIMED_STEPS = 4000  # over the number of bodies
@@ -93,7 +93,7 @@ def by_exudyn(model: FEModel, body: FlexibleBody, runs: list[Run]) -> list[Moved
         save(body, files[0])
         save_for_exudyn(model, files[1])
         Path(files[2]).write_text(json.dumps([run.described for run in runs]))
-        answers: Any = answer_of([interpreter(), str(SCRIPT), *files])
+        answers: Any = answer_of([interpreter(), str(SCRIPT_FILE), *files])
     return [
         Moved(run.steps / found["seconds"], np.array(found["positions"]), found["version"])
         for run, found in zip(runs, answers, strict=True)

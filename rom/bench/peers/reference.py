@@ -13,7 +13,7 @@ from rom.bench.peers.motion import Run, by_exudyn, reduced, with_all_nodes
 from rom.body.flexible import FlexibleBody
 from rom.model import FEModel, Material
 
-SOFT = Material(E=2e9, nu=0.3, rho=1000.0)
+SOFT_SOLID = Material(E=2e9, nu=0.3, rho=1000.0)
 STEPS = (2000, 4000)
 T_END = 0.4  # [s]
 NAMES = ("pendulum", "chain of 2", "slider-crank")
@@ -21,7 +21,7 @@ NAMES = ("pendulum", "chain of 2", "slider-crank")
 
 def mesh() -> FEModel:
     """A bar of 1 m that bends by a centimetre under its own weight."""
-    return with_all_nodes(bar((1.0, 0.04, 0.03), (4, 1, 1), SOFT))
+    return with_all_nodes(bar((1.0, 0.04, 0.03), (4, 1, 1), SOFT_SOLID))
 
 
 def case(name: str, model: FEModel) -> tuple[FlexibleBody, list[Run]]:

@@ -17,8 +17,8 @@ from rom.bench.peers.compare import answer_of, interpreter
 from rom.components.cosserat import Rod, body
 from rom.components.wind.wind_turbine import (
     N_BLADES,
-    RATED,
-    VISCOSITY,
+    RATED_SPEED,
+    VISCOSITY_TIMES,
     blade,
     ramp,
     run_up,
@@ -29,7 +29,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 from rom.process.child import scratch
 
-SCRIPT = Path(__file__).with_name("beams.py")
+SCRIPT_FILE = Path(__file__).with_name("beams.py")
 RISE_TIME, TIME_STEP, RHO_INF, N_SAMPLES = 20.0, 0.02, 0.9, 200
 N_REFERENCE_SEGMENTS = 192  # of the blade whose lag is the reference
 FROM_SECTION = [2, 0, 1]  # first axis along the beam there, third along the rod here
@@ -41,7 +41,7 @@ def rotor(segments: int) -> Mechanism:
     mech = Mechanism(gravity=ORIGIN)
     hub = mech.add_rigid("hub", mass=1.0, inertia=(1.0, 1.0, 1.0), at=ORIGIN)
     mech.revolute("shaft", mech.ground.marker(ORIGIN), hub.marker(ORIGIN), axis=(1, 0, 0))
-    speed, angle = ramp(RATED, RISE_TIME)
+    speed, angle = ramp(RATED_SPEED, RISE_TIME)
     mech.drive("motor", "shaft", angle, rate=speed)
     one = body(blade(segments, damped=True))
     for k in range(N_BLADES):
@@ -73,7 +73,7 @@ def _timed(mech: Mechanism, t_end: float, options: dict[str, Any]) -> tuple[floa
 def deflection(tip: Array, home: Array) -> Array:
     """(k, 3) positions of a tip [m] as seen from the rotor, less its place at rest."""
     t = np.linspace(0.0, RISE_TIME, len(tip))
-    angle = ramp(RATED, RISE_TIME)[1]
+    angle = ramp(RATED_SPEED, RISE_TIME)[1]
     back = [rotation.matrix(rotation.exp([-angle(s), 0.0, 0.0])) for s in t]
     return np.array([A @ x - home for A, x in zip(back, tip, strict=True)])
 
@@ -84,13 +84,13 @@ def by_exudyn(segments: int) -> tuple[float, Array, str]:
         "blades": [
             beams(blade(segments, azimuth=2 * np.pi / N_BLADES * k)) for k in range(N_BLADES)
         ],
-        "final": RATED, "rise": RISE_TIME, "t_end": RISE_TIME,
+        "final": RATED_SPEED, "rise": RISE_TIME, "t_end": RISE_TIME,
         "steps": round(RISE_TIME / TIME_STEP), "samples": N_SAMPLES, "rho_inf": RHO_INF,
     }  # fmt: skip
     with scratch("peers") as folder:
         file = folder / "rotor.json"
         file.write_text(json.dumps(described))
-        found = answer_of([interpreter(), str(SCRIPT), str(file)])
+        found = answer_of([interpreter(), str(SCRIPT_FILE), str(file)])
     tip = np.array(found["tips"])[:, 0]
     return found["seconds"], deflection(tip, tip[0]), found["version"]
 
@@ -105,7 +105,7 @@ def beams(rod: Rod) -> dict[str, Any]:
     middle = (eta[1:] + eta[:-1]) / 2
     named = ("EA", "kGA", "kGA", "GJ", "EI_edge", "EI_flap")
     stiffness = np.column_stack([np.interp(middle, table["eta"], table[x]) for x in named])
-    viscosity = np.array(VISCOSITY)[[2, 0, 1, 5, 3, 4]]
+    viscosity = np.array(VISCOSITY_TIMES)[[2, 0, 1, 5, 3, 4]]
     J = rod.inertia[1:-1] / rod.h[:, None]
     mass = np.array(_segment_masses(rod)) / rod.h
     return {"nodes": nodes.tolist(), "length": rod.h.tolist(), "stiffness": stiffness.tolist(),

@@ -13,7 +13,7 @@ from rom.components.cosserat.elements import Rod, energy, strains, work
 from rom.errors import ModelError
 from rom.model import Array
 
-FLAT = np.cos(np.pi / 4 * 0.99)  # neighbours turned further have no side to bend to
+FLAT_COSINE = np.cos(np.pi / 4 * 0.99)  # neighbours turned further have no side to bend to
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
     _refuse((B <= 0).any(axis=1), "vertex", "has a bending rigidity that is not positive", "")
     turns: Array = p / np.linalg.norm(p, axis=1)[:, None]
     s = np.array([_root(a, b) for a, b in pairwise(turns)])
-    _refuse(s[:, 0] < FLAT, "vertex", "turns back on itself", "Place stations more densely.")
+    _refuse(s[:, 0] < FLAT_COSINE, "vertex", "turns back on itself", "Place stations more densely.")
     a0 = np.array([rotation.matrix(q).T @ d for q, d in zip(turns[1:-1], np.diff(x, axis=0),
                                                           strict=True)]) / h[:, None]  # fmt: skip
     lumped = np.zeros(n + 1)

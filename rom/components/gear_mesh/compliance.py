@@ -15,7 +15,7 @@ from rom.errors import ModelError
 from rom.model import Array
 
 Body = Literal["weber", "sainsot"]
-SAINSOT = {  # A, B, C, D, E, F of L, M, P, Q
+RIM_COEFFICIENTS = {  # A, B, C, D, E, F of L, M, P, Q
     "L": (-5.574e-5, -1.9986e-3, -2.3015e-4, 4.7702e-3, 0.0271, 6.8045),
     "M": (60.111e-5, 28.100e-3, -83.431e-4, -9.9256e-3, 0.1624, 0.9086),
     "P": (-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236),
@@ -148,7 +148,7 @@ def _sainsot(pair: GearPair, gear: int, root: float, u: float, tan2: float, bore
     h = pair.rf[gear] / (bore * pair.r[gear])
     L, M, P, Q = (
         a / theta**2 + b * h**2 + c * h / theta + d / theta + e * h + f
-        for a, b, c, d, e, f in SAINSOT.values()
+        for a, b, c, d, e, f in RIM_COEFFICIENTS.values()
     )
     x = u / (2 * pair.rf[gear] * theta)
     return float(L * x**2 + M * x + P * (1 + Q * tan2))

@@ -30,8 +30,8 @@ MAX_ROTATION = 0.2  # of an iteration [rad]
 INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
 MAX_ITERATIONS = 80
 MAX_HALVINGS = 8  # of the load step
-SPRING = HelicalSpring(0.7e-3, 7e-3, 5, 8e-3)
-INDEX = (18e-3, 12e-3, 10e-3)  # m
+HAND_SPRING = HelicalSpring(0.7e-3, 7e-3, 5, 8e-3)
+INDEX_LENGTHS = (18e-3, 12e-3, 10e-3)  # m
 LENGTHS = {  # m, of whole fingers
     "thumb": 49.5e-3, "index": 64e-3, "middle": 70.7e-3, "ring": 65.5e-3, "little": 53.3e-3,
 }  # fmt: skip
@@ -56,8 +56,8 @@ class Finger:
         ModelError: if springs and phalanges do not match.
     """
 
-    springs: tuple[HelicalSpring, ...] = (SPRING,) * 3
-    phalanges: tuple[float, ...] = INDEX
+    springs: tuple[HelicalSpring, ...] = (HAND_SPRING,) * 3
+    phalanges: tuple[float, ...] = INDEX_LENGTHS
     offset: float = 4.5e-3
     friction: float = 0.0
     stiffener: float = 1.0
@@ -301,8 +301,8 @@ def _moved(shape: Shape, rows: Array) -> Shape:
 
 def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
     """Five fingers of three joints each; phalanges scale with the length of the finger."""
-    springs = sum(s.length for s in (SPRING,) * 3)
-    shares = np.array(INDEX) / sum(INDEX)
+    springs = sum(s.length for s in (HAND_SPRING,) * 3)
+    shares = np.array(INDEX_LENGTHS) / sum(INDEX_LENGTHS)
     return {
         name: Finger(phalanges=tuple(shares * (length - springs)), friction=friction, n=n)
         for name, length in LENGTHS.items()

@@ -18,7 +18,7 @@ from rom.errors import ConfigError
 from rom.model import Array, Index, Mask
 
 GROUPS = ("thumb", "index", "middle", "ring and little", "all")
-COUPLING = np.array(  # (5 fingers, 5 groups): which fingers a group draws
+COUPLINGS = np.array(  # (5 fingers, 5 groups): which fingers a group draws
     [[1, 0, 0, 0, 1], [0, 1, 0, 0, 1], [0, 0, 1, 0, 1], [0, 0, 0, 1, 1], [0, 0, 0, 1, 1]],
     dtype=float,
 )
@@ -125,7 +125,7 @@ class Commands:
 
     def fingers(self) -> Array:
         """(n, 5) pull of thumb, index, middle, ring and little finger [m]: the largest command."""
-        return (self.pulls[:, None, :] * COUPLING).max(axis=2)
+        return (self.pulls[:, None, :] * COUPLINGS).max(axis=2)
 
 
 def muscle(activation: npt.ArrayLike, dt: float, rng: np.random.Generator) -> Array:

@@ -206,7 +206,7 @@ def _impact(out: Array, last: Array) -> Impact:
     )
 
 
-VARIED = {  # what `sensitivity` changes: where it stands, and the power of the factor there
+VARIED_NUMBERS = {  # what `sensitivity` changes: where it stands, and the power of the factor there
     "mass of the boulder": ("boulder", 1.0),
     "height of the fall": ("height", 1.0),
     "stiffness of the cushion": ("cushion.stiffness", 1.0),
@@ -231,7 +231,7 @@ def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str
     first = answer(g)
     return {
         name: np.array([answer(_scaled(g, path, s**power)) for s in factors]) / first - 1
-        for name, (path, power) in VARIED.items()
+        for name, (path, power) in VARIED_NUMBERS.items()
     }
 
 

@@ -18,7 +18,7 @@ from rom.components.transmission.shaft import Shaft
 from rom.errors import ModelError
 from rom.model import Array
 
-LATERAL = (0, 1, 3, 4)  # coordinates of a node that bend the shaft
+LATERAL_DOFS = (0, 1, 3, 4)  # coordinates of a node that bend the shaft
 LINE_ORBIT_RTOL = 1e-6  # smallest over largest axis of an orbit that is a line
 SUPPORT_STIFFNESS_RTOL = 1e-12  # smallest over largest stiffness of a shaft that is held
 
@@ -132,7 +132,7 @@ def _matrices(
         K[at, at] += _square(support.stiffness)
         C[at, at] += _square(support.damping)
     _refuse_loose(shaft, supports)
-    rows = (6 * np.arange(shaft.n // 6)[:, None] + LATERAL).ravel()
+    rows = (6 * np.arange(shaft.n // 6)[:, None] + LATERAL_DOFS).ravel()
     M, C, K, G = (A[np.ix_(rows, rows)] for A in (M, C, K, G))
     return M, C, K, G, rows
 

@@ -20,7 +20,7 @@ from rom.components.transmission.solid_shaft import SolidShaft
 from rom.errors import ModelError, SolverError, reached
 from rom.model import Array
 
-MIRROR = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
+MIRROR_SIGNS = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
 LOADS = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
 MAX_ITERATIONS = 80
 RESIDUAL_RTOL = 1e-10
@@ -190,7 +190,7 @@ class Transmission:
                 inside = self.rows(k, node)
                 if self.housing is not None:
                     inside[:, self.parts[2]] -= self.housing.bushes[k][node]
-                mirror = np.append(MIRROR if turn < 0 else np.ones(4), turn)
+                mirror = np.append(MIRROR_SIGNS if turn < 0 else np.ones(4), turn)
                 found.append((mirror[:, None] * inside[[0, 1, 3, 4, 5]], bearing, turn))
         return found
 

@@ -201,7 +201,7 @@ def _summed(
 # local dofs: u v w and rotations about x y z of both ends; x along the beam, y along the broad side
 AXIAL_DOFS, TWIST_DOFS = [0, 6], [3, 9]
 IN_Y, IN_Z = [1, 5, 7, 11], [2, 4, 8, 10]  # deflection and slope; w' is minus the rotation
-TURNED = np.array([1.0, -1.0, 1.0, -1.0])
+TURN_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
 BAR_K, BAR_M = np.array([[1.0, -1], [-1, 1]]), np.array([[2.0, 1], [1, 2]]) / 6
 
 
@@ -221,7 +221,7 @@ def _stiffness(L: float, part: Part, material: Material, kind: str) -> Array:
         if kind == "sideways":  # deflection along the broad side
             K[np.ix_(IN_Y, IN_Y)] = k * b * a**3
         else:
-            K[np.ix_(IN_Z, IN_Z)] = k * a * b**3 * np.outer(TURNED, TURNED)
+            K[np.ix_(IN_Z, IN_Z)] = k * a * b**3 * np.outer(TURN_SIGNS, TURN_SIGNS)
     return K
 
 
@@ -234,7 +234,7 @@ def _mass(L: float, part: Part, material: Material) -> Array:
     M[np.ix_(AXIAL_DOFS, AXIAL_DOFS)] = m * BAR_M
     M[np.ix_(TWIST_DOFS, TWIST_DOFS)] = m * (a**2 + b**2) / 12 * BAR_M
     M[np.ix_(IN_Y, IN_Y)] = h
-    M[np.ix_(IN_Z, IN_Z)] = h * np.outer(TURNED, TURNED)
+    M[np.ix_(IN_Z, IN_Z)] = h * np.outer(TURN_SIGNS, TURN_SIGNS)
     return M
 
 

@@ -24,8 +24,8 @@ from rom.components.wind.wind_turbine import (
 )
 from rom.model import Array
 
-HUB = HUB_INERTIA
-GENERATOR = GENERATOR_INERTIA * GEAR_RATIO**2  # kg m^2, on the slow side of the gear
+ROTOR_INERTIA = HUB_INERTIA
+SLOW_GENERATOR_INERTIA = GENERATOR_INERTIA * GEAR_RATIO**2  # kg m^2, on the slow side of the gear
 RIGID_STIFFNESS = 1e12  # [N], [N m^2] of what does not bend; the root of a blade has 2e10
 
 
@@ -86,8 +86,8 @@ def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
         bends=[True, True, False] + [True] * n,
     )  # fmt: skip
     inertia = np.concatenate([np.zeros((4, 3)), one.inertia[1:]])
-    inertia[0, 2] = GENERATOR / N_BLADES
-    inertia[3, :2] = HUB / N_BLADES  # both, since the sections of the root are turned
+    inertia[0, 2] = SLOW_GENERATOR_INERTIA / N_BLADES
+    inertia[3, :2] = ROTOR_INERTIA / N_BLADES  # both, since the sections of the root are turned
     viscous = np.concatenate([np.zeros((3, 3)), one.viscous_bend])
     viscous[:2, 2] = twist * SHAFT_DAMPING / SHAFT_STIFFNESS
     stretched = np.concatenate([np.zeros((3, 3)), one.viscous_stretch])

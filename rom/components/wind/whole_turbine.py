@@ -46,7 +46,7 @@ NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
 # kg; gear wheel and generator are part of the nacelle, which is lighter by as much
 WHEEL_MASS, GENERATOR_MASS = 1000.0, 1000.0
 WHEEL_INERTIA = 500.0  # kg m^2: of no weight beside the generator's 5e6 on the slow side
-STILL = (0.0, 0.0, 0.0)
+NO_VELOCITY = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def _tower(mech: Mechanism, segments: int) -> tuple[Marker, Assembly | None]:
     if segments == 0:
         return mech.ground.marker((0.0, 0.0, TOWER_HEIGHT)), None
     standing = mech.add_nonlinear("tower", body(tower(segments)))
-    mech.fixed("foot", mech.ground.marker(STILL), standing.marker("start"))
+    mech.fixed("foot", mech.ground.marker(NO_VELOCITY), standing.marker("start"))
     return standing.marker("end"), standing
 
 
@@ -182,10 +182,10 @@ def _train(
         "hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, at=hub, orientation=lean,
         omega=(speed, 0.0, 0.0),
     )  # fmt: skip
-    mech.revolute("slow", bearing, wheel.marker(STILL), axis=axis)
-    mech.revolute("fast", bearing, generator.marker(STILL), axis=axis)
+    mech.revolute("slow", bearing, wheel.marker(NO_VELOCITY), axis=axis)
+    mech.revolute("fast", bearing, generator.marker(NO_VELOCITY), axis=axis)
     mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
-    mech.revolute("shaft", wheel.marker(hub - at), turning.marker(STILL), axis=axis)
+    mech.revolute("shaft", wheel.marker(hub - at), turning.marker(NO_VELOCITY), axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
     return turning
 

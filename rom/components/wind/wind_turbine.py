@@ -27,10 +27,10 @@ COLUMNS = (
 )  # fmt: skip
 BLADE_LENGTH, HUB_RADIUS = 61.5, 1.5  # m
 MASS_FACTOR = 1.04536  # brings the mass to that of the definition; inertias stay as they are
-VISCOSITY = (1e-3, 1e-3, 1e-3, 1.4e-3, 2.2e-3, 2.2e-3)  # s, as in the files of BeamDyn
-RATED = 12.1 * np.pi / 30  # rad/s
+VISCOSITY_TIMES = (1e-3, 1e-3, 1e-3, 1.4e-3, 2.2e-3, 2.2e-3)  # s, as in the files of BeamDyn
+RATED_SPEED = 12.1 * np.pi / 30  # rad/s
 TOWER_HEIGHT = 87.6  # m
-TUBE = {"diameter": (6.0, 3.87), "wall": (0.0351, 0.0247)}  # m, at foot and top
+TUBE_SIZES = {"diameter": (6.0, 3.87), "wall": (0.0351, 0.0247)}  # m, at foot and top
 N_BLADES = 3
 HUB_OVERHANG = 5.0191  # from the axis of the tower to the hub [m]
 HUB_INERTIA = 115_926.0  # kg m^2, about the rotor axis
@@ -77,7 +77,7 @@ def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: flo
         bend=np.column_stack([at("EI_edge", cells), at("EI_flap", cells), at("GJ", cells)]),
         mass=MASS_FACTOR * at("mass", middles),
         inertia=np.column_stack([edge, flap, edge + flap]),
-        viscosity=VISCOSITY if damped else 0.0,
+        viscosity=VISCOSITY_TIMES if damped else 0.0,
     )
 
 
@@ -88,7 +88,7 @@ def tower(n: int = 40, *, top: float = 0.0) -> Rod:
 
     def tube(where: Array) -> tuple[Array, Array]:
         """Area, and second moment of area about a diameter."""
-        D, t = (end[0] + where * (end[1] - end[0]) for end in TUBE.values())
+        D, t = (end[0] + where * (end[1] - end[0]) for end in TUBE_SIZES.values())
         d = D - 2 * t
         return np.pi / 4 * (D**2 - d**2), np.pi / 64 * (D**4 - d**4)
 
@@ -155,7 +155,7 @@ def run_up(
     *,
     t_end: float = 30.0,
     dt: float = 0.02,
-    final: float = RATED,
+    final: float = RATED_SPEED,
     rise: float = 20.0,
     gravity: float = 0.0,
     **options: Any,

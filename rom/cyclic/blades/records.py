@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from rom.arguments import typed, vector
 from rom.cyclic.reduced import ReducedSector
-from rom.cyclic.sector import NONE
+from rom.cyclic.sector import NO_DOFS
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
@@ -97,8 +97,8 @@ class SubstructuredSector(ReducedSector):
     """
 
     blade: ReducedBlade | None = None
-    root: Index = field(default_factory=lambda: NONE)
-    cantilever: Index = field(default_factory=lambda: NONE)
+    root: Index = field(default_factory=lambda: NO_DOFS)
+    cantilever: Index = field(default_factory=lambda: NO_DOFS)
     root_points: Array | None = None
     root_functions: Array | None = None
     root_moved: Array | None = None

@@ -114,7 +114,7 @@ def _alone(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple((i,) for i in range(n))
 
 
-_HEX27 = (*_alone(8), *HEX_EDGES, *HEX_FACES, tuple(range(8)))
+_HEX27_NODES = (*_alone(8), *HEX_EDGES, *HEX_FACES, tuple(range(8)))
 
 CELL_TYPES = {
     kind.name: kind
@@ -122,7 +122,7 @@ CELL_TYPES = {
         CellType("tet4", "tetrahedron", 1, TET_CORNERS, TET_FACES, _alone(4)),
         CellType("tet10", "tetrahedron", 2, TET_CORNERS, TET_FACES, (*_alone(4), *TET_EDGES)),
         CellType("hex8", "hexahedron", 1, HEX_CORNERS, HEX_FACES, _alone(8)),
-        CellType("hex27", "hexahedron", 2, HEX_CORNERS, HEX_FACES, _HEX27),
+        CellType("hex27", "hexahedron", 2, HEX_CORNERS, HEX_FACES, _HEX27_NODES),
     )
 }
 

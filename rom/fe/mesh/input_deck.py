@@ -27,7 +27,7 @@ STEPS = {
     "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE",
 }
 ELEMENTS = {"tet4": "C3D4", "tet10": "C3D10"}
-NAME = re.compile(r"[A-Za-z][\w.-]{0,79}", re.ASCII)
+NAME_PATTERN = re.compile(r"[A-Za-z][\w.-]{0,79}", re.ASCII)
 PER_LINE = 8  # numbers
 
 
@@ -176,7 +176,7 @@ def _numbers(values: Iterable[float]) -> str:
 def _check_names(names: Iterable[str]) -> None:
     seen: set[str] = set()
     for name in names:
-        if not NAME.fullmatch(name):
+        if not NAME_PATTERN.fullmatch(name):
             raise TagError(
                 f"{name!r} is no name for a deck.",
                 hint="It begins with a letter, followed by at most 79 letters, digits, _, - or .",

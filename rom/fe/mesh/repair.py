@@ -10,7 +10,7 @@ from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import row_ids
 from rom.model import Array, Index
 
-HEX20 = CELL_TYPES["hex27"].supports[:20]
+HEX20_NODES = CELL_TYPES["hex27"].supports[:20]
 # Serendipity shape functions at the centre of a face, and of the cell: corners, then mid-edges.
 FACE_CORNER, FACE_EDGE, CELL_CORNER, CELL_EDGE = -0.25, 0.5, -0.25, 0.25
 
@@ -75,7 +75,7 @@ def _turned(mesh: SolidMesh) -> SolidMesh:
 def _complete(mesh: SolidMesh) -> SolidMesh:
     """27-node hexahedra with the same geometry as the 20-node ones: the new nodes are on it."""
     kind, cells, x = CELL_TYPES["hex27"], mesh.cells, mesh.points
-    if cells.shape[1] != len(HEX20):
+    if cells.shape[1] != len(HEX20_NODES):
         raise MeshError(f"a 20-node hexahedron has 20 nodes, got {cells.shape[1]}.")
     n, m = x.shape[0], cells.shape[0]
     faces = cells[:, np.array(kind.faces)]
@@ -93,7 +93,7 @@ def _face_centres(x: Array, cells: Index, kind: CellType) -> Array:
     """(m, 6, 3) centres of the faces."""
     centres = []
     for face in kind.faces:
-        edges = [i for i, s in enumerate(HEX20) if len(s) == 2 and set(s) <= set(face)]
+        edges = [i for i, s in enumerate(HEX20_NODES) if len(s) == 2 and set(s) <= set(face)]
         corner, edge = x[cells[:, list(face)]].sum(axis=1), x[cells[:, edges]].sum(axis=1)
         centres.append(FACE_CORNER * corner + FACE_EDGE * edge)
     return np.stack(centres, axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rom.errors import SolverError
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
-from rom.fe.operators.solver import DIRECT, Solver
+from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
@@ -32,7 +32,7 @@ class Factor:
         ResourceError: if MUMPS runs out of memory.
     """
 
-    def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT):
+    def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT_SOLVER):
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
         self.A, self.solver = A, solver

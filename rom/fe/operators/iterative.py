@@ -19,7 +19,7 @@ MAX_ITERATIONS = 400  # well posed elasticity takes 20 to 60, at any size
 MODE_TOLERANCE = 1e-8  # residual over eigenvalue; the eigenvalue itself errs by its square
 MODE_ITERATIONS = 20_000
 MISSED_EIGENVALUE_RTOL = 1e-5  # distance below the last eigenvalue of one that was missed
-MULTIGRID = {
+MULTIGRID_OPTIONS = {
     "pc_type": "gamg",
     "pc_gamg_agg_nsmooths": 1,
     "pc_gamg_threshold": 0.02,  # drops weak couplings of stretched cells
@@ -101,7 +101,7 @@ def multigrid(A: PETSc.Mat, near_null: Array) -> ConjugateGradients:
     pc = PETSc.PC().create(A.comm)
     pc.setOperators(A)
     options, prefix = PETSc.Options(), "rom_multigrid_"
-    for key, value in MULTIGRID.items():
+    for key, value in MULTIGRID_OPTIONS.items():
         options[prefix + key] = value
     pc.setOptionsPrefix(prefix)
     pc.setFromOptions()

@@ -27,7 +27,7 @@ from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, mu
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.lanczos import BlockLanczos, capacity
 from rom.fe.operators.memory import check_factor_memory, give_back
-from rom.fe.operators.solver import DIRECT, Solver
+from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
 
@@ -62,7 +62,7 @@ class PETScOperators:
         T: PETSc.Mat | None = None,
         fixed: Array | None = None,
         parent: "PETScOperators | None" = None,
-        solver: Solver = DIRECT,
+        solver: Solver = DIRECT_SOLVER,
     ):
         self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
         self.solver, self.affordable = solver, not solver.iterative
@@ -266,7 +266,7 @@ class PETScOperators:
             if near_null is None:
                 raise ConfigError("the iterative solver needs the coordinates of the nodes.")
             return multigrid(A, near_null)
-        if self.solver == DIRECT:
+        if self.solver == DIRECT_SOLVER:
             check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
@@ -283,7 +283,7 @@ class PETScOperators:
                 "answers at a frequency above zero need a factor.",
                 hint='Use solver="direct" or "out-of-core", or frequencies=(0.0,).',
             )
-        factor = Factor(self.shifted(shift), definite=False, solver=DIRECT)
+        factor = Factor(self.shifted(shift), definite=False, solver=DIRECT_SOLVER)
         if not factor.ok:
             raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
         return factor

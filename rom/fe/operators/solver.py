@@ -27,7 +27,7 @@ class Solver:
     out_of_core: bool = False
 
 
-DIRECT = Solver()
+DIRECT_SOLVER = Solver()
 
 
 def parsed(text: str) -> Solver:
@@ -37,7 +37,7 @@ def parsed(text: str) -> Solver:
         ConfigError: listing the words that are known.
     """
     if text == "direct":
-        return DIRECT
+        return DIRECT_SOLVER
     if text == "iterative":
         return Solver(iterative=True)
     low_rank, out_of_core = 0.0, False

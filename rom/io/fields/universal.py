@@ -13,7 +13,7 @@ from rom.io.files import check_readable
 from rom.model import Array
 
 MAX_BYTES = 2**30  # of a file that is still read
-MARK = b"    -1"
+BLOCK_MARK = b"    -1"
 N_HEADER_RECORDS = 11  # before the values
 FREQUENCY_RESPONSE = 4
 PER_RECEPTANCE = {8: 0, 11: 1, 12: 2}  # displacement, velocity, acceleration: powers of i omega
@@ -137,7 +137,7 @@ def _line_end(data: bytes, place: int) -> int:
 
 def _mark(data: bytes, place: int) -> int:
     """Start of the next line that is the mark of datasets, or -1."""
-    while 0 <= (place := data.find(MARK, place)):
+    while 0 <= (place := data.find(BLOCK_MARK, place)):
         alone = data[place : _line_end(data, place)].strip() == b"-1"
         if alone and (place == 0 or data[place - 1 : place] == b"\n"):
             return place
@@ -232,7 +232,7 @@ def _closing(data: bytes, place: int) -> int:
     """The mark right behind values, with or without an end of line before it, or -1."""
     while data[place : place + 1] in (b"\r", b"\n"):
         place += 1
-    return place if data.startswith(MARK, place) else -1
+    return place if data.startswith(BLOCK_MARK, place) else -1
 
 
 def _behind(data: bytes, place: int) -> int:

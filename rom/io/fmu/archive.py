@@ -19,7 +19,7 @@ from rom.process.child import Limits, run, scratch
 SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
 COMPILE_TIME_LIMIT = 600.0  # [s]
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
+ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
 
 
 @dataclass(frozen=True)
@@ -109,4 +109,4 @@ def _pack(file: IO[bytes], files: dict[str, bytes]) -> None:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.comment = ORIGIN_MARK.encode()
         for name in sorted(files):
-            archive.writestr(zipfile.ZipInfo(name, EPOCH), files[name], zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(name, ZIP_EPOCH), files[name], zipfile.ZIP_DEFLATED)

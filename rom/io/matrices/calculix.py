@@ -24,8 +24,8 @@ from rom.io.files import check_last_line
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 
-STORED = (".sti", ".mas")
-LABEL = re.compile(r"(\d{1,18})\.([1-6])")
+MATRIX_ENDINGS = (".sti", ".mas")
+LABEL_PATTERN = re.compile(r"(\d{1,18})\.([1-6])")
 REWRITE_HINT = "Let CalculiX write .sti, .mas and .dof again; they belong together."
 
 
@@ -93,7 +93,7 @@ def _dofs(path: Path) -> Dofs:
     rows = []
     with path.open(encoding="latin1") as file:
         for number, line in enumerate(file, 1):
-            found = LABEL.fullmatch(line.strip())
+            found = LABEL_PATTERN.fullmatch(line.strip())
             if not found:
                 raise FileFormatError(
                     "a row is node.component, with 1 to 6 for the component.",

@@ -18,7 +18,7 @@ from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
 
 BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
-WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
+WHOLE_PATTERN = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 SYMMETRIC_FORM, SQUARE_FORM = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
 
@@ -133,7 +133,7 @@ def whole(text: str) -> int:
     Raises:
         ValueError: if it is no whole number that fits eight bytes.
     """
-    if not WHOLE.fullmatch(text.strip()):
+    if not WHOLE_PATTERN.fullmatch(text.strip()):
         raise ValueError(f"{text.strip()[:20]!r} is no whole number of at most 18 digits")
     return int(text)
 

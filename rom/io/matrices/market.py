@@ -18,7 +18,7 @@ from rom.errors import FileFormatError, UnsafeFileError
 from rom.io.files import check_last_line
 from rom.model import Array, Index
 
-BANNER = b"%%MatrixMarket"
+BANNER_TEXT = b"%%MatrixMarket"
 MOST_ROWS = 10_000_000
 SIGNS = {"general": 0.0, "symmetric": 1.0, "hermitian": 1.0, "skew-symmetric": -1.0}
 

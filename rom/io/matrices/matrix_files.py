@@ -9,9 +9,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.errors import ConfigError, FileFormatError
 from rom.io.files import check_last_line, check_readable, write_whole
-from rom.io.matrices.calculix import STORED, read_stored_matrix
+from rom.io.matrices.calculix import MATRIX_ENDINGS, read_stored_matrix
 from rom.io.matrices.dmig import Dofs, read_dmig, whole
-from rom.io.matrices.market import BANNER, read_market
+from rom.io.matrices.market import BANNER_TEXT, read_market
 from rom.io.matrices.op4 import read_op4
 from rom.io.matrices.user_element import read_user_element
 
@@ -93,7 +93,7 @@ def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
         return {name: (A, None) for name, A in read_op4(path).items()}
     if ending in (".bdf", ".dat", ".pch", ".dmig"):
         return dict(read_dmig(path))
-    if ending in STORED:
+    if ending in MATRIX_ENDINGS:
         A, dofs = read_stored_matrix(path)
         return {"": (_finite(A, path), dofs)}
     if ending not in (".mtx", ".mm", ".inp"):
@@ -106,7 +106,9 @@ def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
     if ending == ".inp" or b"*USER ELEMENT" in start.upper():
         return dict(read_user_element(path))
     return {
-        "": (_finite(read_market(path), path), None) if start.startswith(BANNER) else _abaqus(path)
+        "": (_finite(read_market(path), path), None)
+        if start.startswith(BANNER_TEXT)
+        else _abaqus(path)
     }
 
 

@@ -31,7 +31,7 @@ from rom.io.files import write_whole
 from rom.model import Array
 from rom.names import ORIGIN_MARK
 
-STAR = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
+STAR_POINTS = np.vstack([np.eye(3), -np.eye(3)])  # nodes around an interface
 MOMENTUM_RTOL = 1e-9  # share of what the momentum of a shape could be
 STAR_RADIUS_RATIO = 1e-3  # of the body's size
 
@@ -169,7 +169,7 @@ def arrays(body: FlexibleBody) -> dict[str, Array]:
 
 def _nodes(body: FlexibleBody) -> dict[str, Array]:
     points, modes = [np.zeros((0, 3))], [np.zeros((0, body.n_modes))]
-    arms = STAR_RADIUS_RATIO * body.size * STAR
+    arms = STAR_RADIUS_RATIO * body.size * STAR_POINTS
     for m in body.markers.values():
         points.append(m.point + arms)
         turned = np.einsum("abc,ck,nb->nak", skew_tensor(), m.rotation, arms)

@@ -9,7 +9,13 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.recovery import PRODUCTS
 from rom.body.reference import skew_tensor
-from rom.body.stiffening import ANGULAR, CENTRIFUGAL, LINEAR, SecondOrder, interface_loads
+from rom.body.stiffening import (
+    ANGULAR_LOADS,
+    CENTRIFUGAL_LOADS,
+    LINEAR_LOADS,
+    SecondOrder,
+    interface_loads,
+)
 from rom.errors import ConfigError
 from rom.io.sid.dialect import by_mode, first
 from rom.io.sid.format import StandardInput, Taylor
@@ -52,11 +58,13 @@ def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
     return {
         "mdCM": Taylor(body.first_moment[:, None], body.S.T[:, :, None]),
         "J": Taylor(body.inertia, -(C4 + C4.swapaxes(1, 2))),
-        "Ct": Taylor(body.S.T, _loads(K, LINEAR, r)),
-        "Cr": Taylor(np.einsum("cab,abk->kc", EPS, X), cross + _loads(K, ANGULAR, r, zero=True)),
+        "Ct": Taylor(body.S.T, _loads(K, LINEAR_LOADS, r)),
+        "Cr": Taylor(
+            np.einsum("cab,abk->kc", EPS, X), cross + _loads(K, ANGULAR_LOADS, r, zero=True)
+        ),
         "Gr": Taylor(-2 * _by_axis(C4)),
         "Ge": Taylor(2 * _by_axis(cross)),
-        "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL, r, zero=True)),
+        "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL_LOADS, r, zero=True)),
     }
 
 

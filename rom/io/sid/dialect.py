@@ -14,12 +14,19 @@ import numpy as np
 
 from rom.arguments import one_of, typed
 from rom.errors import FileFormatError, warn
-from rom.io.sid.format import BLOCKS, DIALECTS, TENSOR, StandardInput, Taylor, repacked
+from rom.io.sid.format import (
+    BLOCKS,
+    DIALECTS,
+    TENSOR_ENTRIES,
+    StandardInput,
+    Taylor,
+    repacked,
+)
 from rom.io.sid.reading import RawBlock, RawFile, read_raw, values
 from rom.model import Array, Report, Row
 
 RESIDUAL_RTOL = 1e-8  # files have twelve digits
-GE = ("antisymmetric", "as_written")
+GE_FORMS = ("antisymmetric", "as_written")
 BLOCK_RTOL = 1e-4  # share of what a block could be, below which its differences are round-off
 
 
@@ -40,7 +47,7 @@ def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
     Warns:
         RomWarning: if Ge has a part that does work, or terms of second order are left out.
     """
-    one_of("ge", ge, GE)
+    one_of("ge", ge, GE_FORMS)
     record = _settled(read_raw(path))
     Ge, symmetric = record.blocks["Ge"], _symmetric_ge(record)
     scale = max(np.abs(Ge.M0).max(initial=0.0), _scales(record)[2])
@@ -83,7 +90,7 @@ def _relations(record: StandardInput) -> Iterator[tuple[str, float]]:
     yield "Gr - Gr^T = -2 skew(Cr0)", _relative(Gr - Gr.swapaxes(1, 2), turned, moment)
     Cr1, Ge = first(b["Cr"], r), by_mode(b["Ge"].M0)
     yield "Ge = 2 Cr1, antisymmetric part", _relative(_odd(Ge), 2 * _odd(Cr1), mass)
-    J6 = np.stack([J1[:, i, j] for i, j in TENSOR], axis=1)
+    J6 = np.stack([J1[:, i, j] for i, j in TENSOR_ENTRIES], axis=1)
     expected = -J6[:, [0, 1, 2, 3, 5, 4]] * np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])
     yield "Oe0 from J1", _relative(b["Oe"].M0, expected, moment)
     Oe1 = first(b["Oe"], r)
@@ -205,7 +212,7 @@ def _taylor(file: RawFile, raw: RawBlock, mode_second: bool) -> Taylor:
 def _tensor(six: Array) -> Array:
     """(..., 3, 3) from (..., 6)."""
     out = np.zeros((*six.shape[:-1], 3, 3))
-    for k, (i, j) in enumerate(TENSOR):
+    for k, (i, j) in enumerate(TENSOR_ENTRIES):
         out[..., i, j] = out[..., j, i] = six[..., k]
     return out
 

@@ -25,7 +25,7 @@ ZERO, DIAGONAL, SYMMETRIC, GENERAL, UNIT = range(5)
 NODE_BLOCKS = ("origin", "phi", "psi", "AP", "sigma")
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 ALWAYS_SYMMETRIC = ("J", "Me", "Ke", "De")
-TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # entries of J in a column of six
+TENSOR_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # entries of J in a column of six
 DIALECTS = {  # mode is the second index of m1; columns of Gr and of Ge axis by axis; J a column
     "fembs": (True, True, True, True),
     "pysid": (True, False, True, True),
@@ -167,7 +167,7 @@ def in_dialect(name: str, block: Taylor, dialect: str) -> tuple[Array, Array | N
 
     def turned(A: Array) -> Array:
         if name == "J" and column:
-            i, j = np.transpose(TENSOR)
+            i, j = np.transpose(TENSOR_ENTRIES)
             A = A[..., i, j][..., None]
         return repacked(A, by_axis=False) if by_mode else A
 

@@ -16,8 +16,8 @@ from rom.names import ORIGIN_MARK
 
 MAX_BYTES = 2**28  # of a file that is still read
 MOST_MODES = 1000  # blocks grow with their square
-ASSIGNMENT = re.compile(r"([A-Za-z]\w*(?:\s+\w+)?)\s*(?:\(([^)]*)\))?\s*=\s*(.*)")
-HEAD = re.compile(r"^\d+\s+\d+\s*:No\. nodes, No\. modes:")
+ASSIGNMENT_PATTERN = re.compile(r"([A-Za-z]\w*(?:\s+\w+)?)\s*(?:\(([^)]*)\))?\s*=\s*(.*)")
+HEAD_PATTERN = re.compile(r"^\d+\s+\d+\s*:No\. nodes, No\. modes:")
 SIZES = ("order", "nrow", "ncol", "nq", "nqn", "structure")
 LONGEST_MESSAGE = 200  # characters that quote a damaged file
 
@@ -89,7 +89,7 @@ def read_raw(path: str | Path) -> RawFile:
     """
     file = RawFile(check_readable(path, MAX_BYTES))
     lines = _Lines(file, file.path.read_bytes().decode("ascii", "replace"))
-    file.title = HEAD.sub("", lines.next()).strip().removesuffix(f"; {ORIGIN_MARK}")
+    file.title = HEAD_PATTERN.sub("", lines.next()).strip().removesuffix(f"; {ORIGIN_MARK}")
     _expect(lines, "part")
     key, _, file.name = lines.next().partition("=")
     if key.split() != ["new", "modal"]:
@@ -216,7 +216,7 @@ def _check_sizes(file: RawFile, block: RawBlock) -> None:
 
 
 def _assignment(lines: _Lines, line: str) -> tuple[str, str, str]:
-    found = ASSIGNMENT.fullmatch(line)
+    found = ASSIGNMENT_PATTERN.fullmatch(line)
     if found is None:
         lines.file.refuse(f"{line[:60]!r} is neither a block nor an assignment", lines.number)
     return found[1], found[2] or "", found[3]

@@ -42,7 +42,7 @@ MIN_WORTHWHILE_GROWTH = 1.3  # of a step that justifies a new factorisation
 # smallest step relative to the duration
 MIN_STEP_RATIO = 1e-12
 # what a step changes and a rejected one gives back
-CHANGED = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
+CHANGED_FIELDS = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
 # what a run remembers beside its step memory, whose arrays have this in front of their names
 NUMBERS = ("h", "before", "fastest", "shortest", "longest", "rejected", "uneven")
 STEP_PREFIX = "step."
@@ -84,7 +84,9 @@ class _Run:
         self.state, self.bdf, self.uneven = state, record.settings.method == "bdf", False
         bare = replace(state, memory=None)
         self.T, start = begin(record, W, bare, self.forces, FIRST_STEP_RATIO * self.duration)
-        self.old = self.T._replace(**{name: getattr(self.T, name).copy() for name in CHANGED})
+        self.old = self.T._replace(
+            **{name: getattr(self.T, name).copy() for name in CHANGED_FIELDS}
+        )
         self.out, self.base = space(W, self.T, 1), W.base.copy()
         self.h = self.before = FIRST_STEP_RATIO * self.duration
         self.fastest, self.rejected = record.packed.length / self.duration, 0
@@ -147,7 +149,7 @@ class _Run:
     def attempt(self, t: float) -> int:
         """Take the step to a time; says how it went."""
         step, W, settings, packed = self.T, self.W, self.record.settings, self.record.packed
-        for name in CHANGED:
+        for name in CHANGED_FIELDS:
             getattr(self.old, name)[:] = getattr(step, name)
         self.base[:] = W.base
         times = np.array([t])
@@ -187,7 +189,7 @@ class _Run:
             SolverError: if that would be too short.
         """
         spent = self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]]
-        for name in CHANGED:
+        for name in CHANGED_FIELDS:
             getattr(self.T, name)[:] = getattr(self.old, name)
         self.W.base[:] = self.base
         self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]] = spent
@@ -211,7 +213,7 @@ class _Run:
         if step.count[alpha.STEPS] == 0:
             spent = step.count.copy()
             fresh, _ = begin(self.record, self.W, self.state, self.forces, h)
-            for name in (*CHANGED, "method", "bdf"):
+            for name in (*CHANGED_FIELDS, "method", "bdf"):
                 getattr(step, name)[:] = getattr(fresh, name)
             step.count[:] = spent
         elif self.bdf:

@@ -19,14 +19,14 @@ from rom.errors import ConfigError, FileFormatError
 from rom.io.archive import Kind, digest, read_archive, write_archive
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.events import Noted
-from rom.mbs.results.checkpoint import KIND as STATE
+from rom.mbs.results.checkpoint import STATE_KIND as STATE
 from rom.mbs.results.checkpoint import packed_state, unpacked_state
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
 SCHEMA_NAME, VERSION = "rom-motion", (1, 0)
 COLUMNS = ("t", "q", "v", "a", "lam", "work", "base")
-PART = Kind({SCHEMA_NAME: VERSION}, "part of a motion", COLUMNS)
+PART_KIND = Kind({SCHEMA_NAME: VERSION}, "part of a motion", COLUMNS)
 STATE_FILE = "state.npz"
 EVENTS_PREFIX = "events/"
 # seconds of stepping between two parts, and how many times longer than it takes to write one
@@ -34,7 +34,7 @@ MIN_INTERVAL, WRITE_TIME_FACTOR = 1.0, 60.0
 # of the time spent so far: what a long run risks, so that it does not leave thousands of parts
 MAX_LOSS_RATIO = 1 / 500
 # of a system: addresses differ between processes, the graph follows from the rest
-PASSING = {"graph", "address", "motor"}
+PASSING_FIELDS = {"graph", "address", "motor"}
 
 Block = tuple[Array, ...]
 
@@ -149,7 +149,7 @@ class Keeping:
             )
 
     def _part(self, k: int) -> Block:
-        _, arrays = read_archive(self._path(k), PART)
+        _, arrays = read_archive(self._path(k), PART_KIND)
         return tuple(arrays[name] for name in COLUMNS)
 
     def _path(self, k: int) -> Path:
@@ -222,7 +222,7 @@ def _numbers(table: Any) -> list[Array]:
     """All arrays of nested tables that are the same in every process."""
     found: list[Array] = []
     for name, value in table._asdict().items():
-        if name not in PASSING:
+        if name not in PASSING_FIELDS:
             found += _numbers(value) if hasattr(value, "_asdict") else [np.asarray(value)]
     return found
 

@@ -29,7 +29,7 @@ from rom.process.interruption import terminable
 
 METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run_explicit}
 # tolerance of variable steps, of the explicit method and of implicit ones
-RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
+METHOD_RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
 
 
 @typed
@@ -107,7 +107,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     one_of("method", method, METHODS)
     if t_start is None:
         t_start = 0.0 if state is None else state.t
-    rtol = RTOL[method] if rtol is None else rtol
+    rtol = METHOD_RTOL[method] if rtol is None else rtol
     numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
     settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
     settings, packed = settings.after(state), pack(mechanism)

@@ -19,9 +19,9 @@ from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
 # what belongs to the factorised iteration matrix, by blocks or whole
-FACTOR = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
+FACTOR_FIELDS = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
 # counts of a whole run
-SINCE = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
+RUN_COUNTS = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
 
 
 def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tuple[Step, State]:
@@ -121,7 +121,7 @@ def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
 
 def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
     """All that the next step depends on and the state does not tell."""
-    names = (*FACTOR, "factor" if W.by_blocks[0] else "lu")
+    names = (*FACTOR_FIELDS, "factor" if W.by_blocks[0] else "lu")
     arrays = {name: getattr(W, name).copy() for name in names}
     arrays["method"], arrays["bdf"] = step.method.copy(), step.bdf.copy()
     arrays["before"], arrays["psi"], arrays["past"] = (
@@ -131,7 +131,7 @@ def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
     )
     arrays["count"] = step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]]
     arrays["work"], arrays["lost"] = step.work.copy(), step.lost.copy()
-    arrays["counts"] = step.count[list(SINCE)]
+    arrays["counts"] = step.count[list(RUN_COUNTS)]
     origin = settings.t_start if settings.origin is None else settings.origin
     return Memory(settings.kind, settings.h, origin, settings.taken + steps, arrays)
 
@@ -140,7 +140,7 @@ def recall(memory: Memory, W: Work, step: Step) -> None:
     """Go on with the factorisation of an earlier run that `fits`."""
     step.a[:], step.psi[:] = memory.arrays["before"], memory.arrays["psi"]
     step.past[:] = memory.arrays.get("past", step.past)
-    for name in (*FACTOR, "factor" if memory.arrays["by_blocks"][0] else "lu"):
+    for name in (*FACTOR_FIELDS, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
     step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]] = memory.arrays["count"]
 
@@ -148,7 +148,7 @@ def recall(memory: Memory, W: Work, step: Step) -> None:
 def go_on(memory: Memory, step: Step) -> None:
     """Count steps and works on from those of a run that was interrupted."""
     step.work[:], step.lost[:] = memory.arrays["work"], memory.arrays["lost"]
-    step.count[list(SINCE)] = memory.arrays["counts"]
+    step.count[list(RUN_COUNTS)] = memory.arrays["counts"]
 
 
 def copied(step: Step) -> Step:

@@ -10,8 +10,8 @@ from rom.mbs.kernels.system import ALONG, ANGLE, COUPLING, DISTANCE, NORMAL, POI
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array
 
-ZERO = np.zeros(3)
-TURN = 2 * np.pi
+NO_VECTOR = np.zeros(3)
+FULL_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +62,11 @@ class Triad:
 
     def normal(self, i: int, j: int) -> Row:
         """Axis i on the first body stays normal to axis j on the second."""
-        return Row(NORMAL, self.one[:, i], self.two[:, j], ZERO)
+        return Row(NORMAL, self.one[:, i], self.two[:, j], NO_VECTOR)
 
     def along(self, i: int, gap: Array) -> Row:
         """The distance along axis i stays what it is."""
-        return Row(ALONG, self.one[:, i], ZERO, ZERO, float(self.one[:, i] @ gap))
+        return Row(ALONG, self.one[:, i], NO_VECTOR, NO_VECTOR, float(self.one[:, i] @ gap))
 
     def angle(self) -> Row:
         """Rotation about axis 2."""
@@ -84,7 +84,7 @@ def triad(axis: Array, frames: tuple[Array, Array]) -> Triad:
 
 def coincidence() -> tuple[Row, ...]:
     """The two points are one."""
-    return tuple(Row(POINT, e, ZERO, ZERO) for e in np.eye(3))
+    return tuple(Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3))
 
 
 def revolute(name: str, markers: Any, frames: Any, _gap: Array, axis: Array) -> Joint:
@@ -103,7 +103,7 @@ def spherical(name: str, markers: Any, _frames: Any, _gap: Array) -> Joint:
 def cylindrical(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> Joint:
     """One axis in common; the second point lies on the axis through the first."""
     t = triad(axis, frames)
-    rows = (t.along(0, ZERO), t.along(1, ZERO), t.normal(0, 2), t.normal(1, 2))
+    rows = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR), t.normal(0, 2), t.normal(1, 2))
     angle = t.angle()
     return Joint(name, "cylindrical", markers, rows, angle, angle, t.along(2, frames[0].T @ gap))
 
@@ -112,7 +112,7 @@ def prismatic(name: str, markers: Any, frames: Any, gap: Array, axis: Array) -> 
     """One axis in common and no rotation."""
     t = triad(axis, frames)
     rows = (
-        *(t.along(0, ZERO), t.along(1, ZERO)),
+        *(t.along(0, NO_VECTOR), t.along(1, NO_VECTOR)),
         *(t.normal(0, 2), t.normal(1, 2), t.normal(0, 1)),
     )
     displacement = t.along(2, frames[0].T @ gap)
@@ -127,7 +127,7 @@ def universal(
         raise ConfigError(
             f"the axes of joint {name!r} are not perpendicular: cosine {axis1 @ axis2:.3g}."
         )
-    cross = Row(NORMAL, frames[0].T @ axis1, frames[1].T @ axis2, ZERO)
+    cross = Row(NORMAL, frames[0].T @ axis1, frames[1].T @ axis2, NO_VECTOR)
     return Joint(name, "universal", markers, (*coincidence(), cross))
 
 
@@ -142,7 +142,11 @@ def screw(name: str, markers: Any, frames: Any, gap: Array, axis: Array, *, pitc
     """Cylindrical, the way a multiple of the angle."""
     joint = cylindrical(name, markers, frames, gap, axis)
     lead = Row(
-        COUPLING, ZERO, ZERO, ZERO, terms=((joint.displacement, 1.0), (joint.turn, -pitch / TURN))
+        COUPLING,
+        NO_VECTOR,
+        NO_VECTOR,
+        NO_VECTOR,
+        terms=((joint.displacement, 1.0), (joint.turn, -pitch / FULL_TURN)),
     )
     return replace(joint, kind="screw", rows=(*joint.rows, lead))
 
@@ -151,7 +155,7 @@ def planar(name: str, markers: Any, frames: Any, _gap: Array, normal: Array) -> 
     """One plane in common: the second point slides in it, the body turns about its normal."""
     t = triad(normal, frames)
     angle = t.angle()
-    rows = (t.along(2, ZERO), t.normal(0, 2), t.normal(1, 2))
+    rows = (t.along(2, NO_VECTOR), t.normal(0, 2), t.normal(1, 2))
     return Joint(name, "planar", markers, rows, angle, angle)
 
 
@@ -163,7 +167,7 @@ def point_on_line(name: str, markers: Any, frames: Any, gap: Array, axis: Array)
         name,
         "point on line",
         markers,
-        (t.along(0, ZERO), t.along(1, ZERO)),
+        (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR)),
         displacement,
         None,
         displacement,
@@ -172,7 +176,7 @@ def point_on_line(name: str, markers: Any, frames: Any, gap: Array, axis: Array)
 
 def point_on_plane(name: str, markers: Any, frames: Any, _gap: Array, normal: Array) -> Joint:
     """The second point stays in a plane of the first body."""
-    return Joint(name, "point on plane", markers, (triad(normal, frames).along(2, ZERO),))
+    return Joint(name, "point on plane", markers, (triad(normal, frames).along(2, NO_VECTOR),))
 
 
 def distance(name: str, markers: Any, _frames: Any, gap: Array, *, length: float | None) -> Joint:
@@ -183,7 +187,7 @@ def distance(name: str, markers: Any, _frames: Any, gap: Array, *, length: float
             f"the points of joint {name!r} coincide: a rod of length zero has no direction.",
             hint="Use a spherical joint.",
         )
-    row = Row(DISTANCE, ZERO, ZERO, ZERO, apart if length is None else length)
+    row = Row(DISTANCE, NO_VECTOR, NO_VECTOR, NO_VECTOR, apart if length is None else length)
     return Joint(name, "distance", markers, (row,))
 
 
@@ -195,7 +199,7 @@ def rolling(
     if spin and abs(normal @ spin[0]) > 1 - 1e-6:
         raise ConfigError(f"the wheel of joint {name!r} lies flat on its plane: it cannot roll.")
     t = triad(normal, frames)
-    s = frames[1].T @ spin[0] if spin else ZERO
+    s = frames[1].T @ spin[0] if spin else NO_VECTOR
     n = t.one[:, 2]
     touch = Row(TOUCH, n, s, n, radius=radius)
     rows = tuple(Row(ROLL, t.one[:, i], s, n, radius=radius) for i in (0, 1))
@@ -204,5 +208,5 @@ def rolling(
 
 def coupling(name: str, first: Joint, second: Joint, rows: Any, ratio: float) -> Joint:
     """The second joint coordinate is a multiple of the first."""
-    row = Row(COUPLING, ZERO, ZERO, ZERO, terms=((rows[1], 1.0), (rows[0], -ratio)))
+    row = Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=((rows[1], 1.0), (rows[0], -ratio)))
     return Joint(name, "coupling", (*second.markers, *first.markers), (row,))

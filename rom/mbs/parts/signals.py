@@ -14,12 +14,12 @@ from rom.model import Array
 # first and last time a function may be asked for
 Span = tuple[float, float]
 # weights of f(t), f(t + s), ... f(t + 4 s) in 12 s f' and 12 s^2 f'', fourth and third order
-FORWARD = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [35.0, -104.0, 114.0, -56.0, 11.0]])
+FORWARD_WEIGHTS = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [35.0, -104.0, 114.0, -56.0, 11.0]])
 # weights of f(t - 4 s), ... f(t)
-BACKWARD = np.array([[3.0, -16.0, 36.0, -48.0, 25.0], [11.0, -56.0, 114.0, -104.0, 35.0]])
+BACKWARD_WEIGHTS = np.array([[3.0, -16.0, 36.0, -48.0, 25.0], [11.0, -56.0, 114.0, -104.0, 35.0]])
 # weights of f(t - 2 s), ... f(t + 2 s), fourth order
-CENTRAL = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
-NONE = np.zeros((0, 0, 3))
+CENTRAL_WEIGHTS = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
+NO_SAMPLES = np.zeros((0, 0, 3))
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class Signal:
         first = np.where(early, t, np.where(late, t - 4 * spacing, t - 2 * spacing))
         grid = np.clip(first[:, None] + spacing * np.arange(5), *span)  # round-off leads beyond
         values = self._values(self.function, grid.ravel())[:, 0].reshape(-1, 5)
-        weights = np.where(late[:, None], BACKWARD[order], CENTRAL[order])
-        weights = np.where(early[:, None], FORWARD[order], weights)
+        weights = np.where(late[:, None], BACKWARD_WEIGHTS[order], CENTRAL_WEIGHTS[order])
+        weights = np.where(early[:, None], FORWARD_WEIGHTS[order], weights)
         # differences to one value first, so that a constant has the derivative zero exactly
         return ((values - values[:, :1]) * weights).sum(axis=1) / 12
 
@@ -168,9 +168,9 @@ def _before(
         try:
             sample_all(signals, t[k : k + 1], *how[:2])
         except RomError as first:
-            table, earlier = sampled(signals, padded(t[:k]), *how) if k else (NONE, None)
+            table, earlier = sampled(signals, padded(t[:k]), *how) if k else (NO_SAMPLES, None)
             return table[:k].reshape(-1, len(signals), 3), earlier or first
-    return NONE.reshape(0, len(signals), 3), failure  # of a function that changes its mind
+    return NO_SAMPLES.reshape(0, len(signals), 3), failure  # of a function that changes its mind
 
 
 def padded(t: Array) -> Array:

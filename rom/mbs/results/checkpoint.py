@@ -10,9 +10,9 @@ from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
 SCHEMA_NAME, VERSION = "rom-state", (1, 0)
-NEEDED = ("q", "v", "a", "lam")
-KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED)
-OPTIONAL = ("algorithmic", "base")
+NEEDED_FIELDS = ("q", "v", "a", "lam")
+STATE_KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED_FIELDS)
+OPTIONAL_FIELDS = ("algorithmic", "base")
 MEMORY_PREFIX = "memory/"
 
 
@@ -36,8 +36,8 @@ def save_state(state: State, path: str | Path) -> Path:
 
 def packed_state(state: State) -> tuple[dict[str, Any], dict[str, Array]]:
     """Manifest and arrays of a state."""
-    arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED}
-    given = {name: getattr(state, name) for name in OPTIONAL}
+    arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED_FIELDS}
+    given = {name: getattr(state, name) for name in OPTIONAL_FIELDS}
     arrays |= {name: A for name, A in given.items() if A is not None}
     manifest: dict[str, Any] = {"schema": SCHEMA_NAME, "version": list(VERSION)}
     manifest["t"] = float(state.t).hex()
@@ -62,7 +62,7 @@ def load_state(path: str | Path, *, limit: int = MAX_BYTES) -> State:
         FileFormatError: if the file is missing, cut, changed, or no state file.
         UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
     """
-    return unpacked_state(*read_archive(path, KIND, limit), path)
+    return unpacked_state(*read_archive(path, STATE_KIND, limit), path)
 
 
 def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str | Path) -> State:
@@ -72,8 +72,8 @@ def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str
         FileFormatError: if something is missing.
     """
     try:
-        fields: dict[str, Any] = {name: arrays[name] for name in NEEDED}
-        fields |= {name: arrays.get(name) for name in OPTIONAL}
+        fields: dict[str, Any] = {name: arrays[name] for name in NEEDED_FIELDS}
+        fields |= {name: arrays.get(name) for name in OPTIONAL_FIELDS}
         memory = _memory(manifest.get("memory"), arrays)
         t, rank = float.fromhex(manifest["t"]), int(manifest["rank"])
         return State(t=t, rank=rank, **fields, memory=memory)

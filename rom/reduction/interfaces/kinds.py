@@ -36,7 +36,7 @@ def tie(interface: Interface, kind: Any) -> Tie:
         return _full(interface)
     if kind == "rbe2":
         R = rigid_motions(interface.points - interface.origin)
-        return _stiff(interface, "rbe2", SIX, mean_motion(interface), R)
+        return _stiff(interface, "rbe2", SIX_LABELS, mean_motion(interface), R)
     if kind == "rbe3":
         return _averaged(interface)
     if isinstance(kind, Snapshots):
@@ -49,7 +49,7 @@ def tie(interface: Interface, kind: Any) -> Tie:
     return _stiff(interface, _label(kind), tuple(names), L, np.kron(Q, np.eye(3)))
 
 
-SIX = ("ux", "uy", "uz", "rx", "ry", "rz")
+SIX_LABELS = ("ux", "uy", "uz", "rx", "ry", "rz")
 NO_DOFS = np.zeros(0, dtype=np.int64)
 
 
@@ -98,7 +98,7 @@ def _averaged(interface: Interface) -> Tie:
     d, r = np.sort(pivots[:6]), np.sort(pivots[6:])
     inverse = np.linalg.inv(C[:, d])
     dofs = interface.dofs
-    return Tie("rbe3", SIX, C, dofs[d], inverse, dofs[r], -inverse @ C[:, r])
+    return Tie("rbe3", SIX_LABELS, C, dofs[d], inverse, dofs[r], -inverse @ C[:, r])
 
 
 def _label(kind: Polynomial | FourierLegendre) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
 LINE_HEIGHT = 26  # of small text [pixel]
-STYLE = {
+PAGE_STYLE = {
     "font.family": "DejaVu Sans",
     "text.color": TEXT_COLOUR,
     "axes.labelcolor": TEXT_COLOUR,
@@ -50,7 +50,7 @@ def styled() -> Any:
     require("matplotlib")
     from matplotlib import rc_context
 
-    return rc_context(STYLE)
+    return rc_context(PAGE_STYLE)
 
 
 def checked(path: str | Path, *endings: str) -> Path:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
-SHARP = np.cos(np.deg2rad(35.0))  # cosine of the angle from which an edge is drawn
+SHARP_COSINE = np.cos(np.deg2rad(35.0))  # cosine of the angle from which an edge is drawn
 TEXT_COLOUR, UNDEFORMED_COLOUR = "#20242a", "#7c828c"
 MARGIN_RATIO = 0.03  # of the view, left free on every side
 
@@ -112,7 +112,7 @@ def sharp_edges(points: Array, triangles: Index) -> Index:
     total = np.zeros((len(edges), 3))
     np.add.at(total, place.ravel(), normals[owner])
     # two unit normals under the angle theta add up to the length 2 cos(theta / 2)
-    flat = (count == 2) & (np.linalg.norm(total, axis=1) > np.sqrt(2 + 2 * SHARP))
+    flat = (count == 2) & (np.linalg.norm(total, axis=1) > np.sqrt(2 + 2 * SHARP_COSINE))
     return edges[~flat]
 
 

@@ -15,7 +15,7 @@ from rom.view.figures.curves import LINES, PAGE_WIDTH, finish
 
 # pixel, of a diagram and around it
 PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
-GUIDE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
+GUIDE_STYLE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
 Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
 
 
@@ -84,7 +84,7 @@ def panels(
 def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
     for k, (name, line) in enumerate(panel.curves.items()):
         look = {"color": LINES[k % len(LINES)], "lw": 1.4, "ls": "--" if k % 2 else "-"}
-        look = GUIDE if name.startswith("_") else look
+        look = GUIDE_STYLE if name.startswith("_") else look
         axes.plot(*_paired(name, line), label=name, **look)
     for name, line in panel.points.items():
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}

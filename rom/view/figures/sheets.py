@@ -17,7 +17,7 @@ from rom.view.canvas.offscreen import COLOUR_MAP
 from rom.view.figures.curves import LINES, MARKERS, finish
 
 PAGE_WIDTH, PANEL_HEIGHT = 1500, 430  # pixel
-FILM = (640, 700)  # of the picture in a film [pixel]
+FILM_SIZE = (640, 700)  # of the picture in a film [pixel]
 SURFACE_COLOUR, EDGE_COLOUR, UNDEFORMED_COLOUR = "#dfe5ec", "#6b7480", "#d1495b"
 
 
@@ -132,7 +132,7 @@ def flow(
     highest = max(float(s.values.max()) for s in shapes if s.values is not None)
     everything = np.concatenate([s.points for s in shapes])
     frame = np.array([everything.min(axis=0), everything.max(axis=0)])
-    width, height = FILM
+    width, height = FILM_SIZE
     pages = []
     with page.styled():
         text, below = page.caption(caption, width - 40)

@@ -17,8 +17,8 @@ from rom.view.canvas.page import checked
 from rom.view.canvas.solids import Mesh
 from rom.view.scenes.film import bars, placed, shades_of
 
-METAL = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bodies
-ELASTIC = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.63, 0.51))
+METAL_COLOURS = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bodies
+ELASTIC_COLOURS = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.63, 0.51))
 
 
 @typed
@@ -76,12 +76,15 @@ def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) 
         surface = getattr(part.flexible, "surface", None)
         if surface is not None:
             points, triangles, modes = surface.points, surface.triangles, magnify * surface.shape
-            q, colour = solution.elastic(name)[steps], ELASTIC[elastic % len(ELASTIC)]
+            q, colour = (
+                solution.elastic(name)[steps],
+                ELASTIC_COLOURS[elastic % len(ELASTIC_COLOURS)],
+            )
             elastic += 1
         else:
             points, triangles = shapes[name] if name in shapes else bars(part)
             modes, q = np.zeros((3 * len(points), 0)), np.zeros((len(steps), 0))
-            colour = METAL[shades[name]]
+            colour = METAL_COLOURS[shades[name]]
         pose = solution.position(name)[steps], solution.orientation(name)[steps]
         mesh = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
         bodies.append(MovingMesh(name, *mesh, *pose, modes, q, colour))

@@ -20,7 +20,7 @@ from rom.view.canvas.solids import Mesh, cylinder
 
 FILM_WIDTH, STILL_WIDTH = 900, 740  # of a film and of one instant in a series [pixel]
 CLOCK_HEIGHT = 40  # of the strip with the time [pixel]
-METAL = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
+METAL_COLOURS = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 SCALES = ((1.0, "m"), (1e3, "mm"), (1e6, "um"), (1e9, "nm"))  # per metre
 
 
@@ -138,7 +138,7 @@ def _stage(
             X, size = np.asarray(X, dtype=float)[None], None
         points = placed(X, pose)
         values = None if size is None else np.linalg.norm(size, axis=2)
-        actors.append(Actor(points, triangles, values, METAL[shades[name]]))
+        actors.append(Actor(points, triangles, values, METAL_COLOURS[shades[name]]))
         edges = sharp_edges(X[0], triangles)
         actors.append(Actor(points, edges, colour="#3a414b", width=1.0))
     return _scaled(actors, flexible)
@@ -151,7 +151,9 @@ def shades_of(mechanism: Any) -> dict[str, int]:
         whole.get(name, name) for name, part in mechanism.parts.items() if part.flexible is None
     )
     number = {name: k for k, name in enumerate(things)}
-    return {name: number.get(whole.get(name, name), 0) % len(METAL) for name in mechanism.parts}
+    return {
+        name: number.get(whole.get(name, name), 0) % len(METAL_COLOURS) for name in mechanism.parts
+    }
 
 
 def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:

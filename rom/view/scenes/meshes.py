@@ -15,7 +15,8 @@ from rom.view.canvas.scene import TEXT_COLOUR, Actor, aimed, directed_edges
 
 PAGE_WIDTH = 1500  # [pixel]
 PART_COLOUR, EDGE_COLOUR = "#c9d1da", "#6b7480"
-MARKED = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")  # one per interface
+# one per interface
+MARK_COLOURS = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")
 
 
 @typed
@@ -63,7 +64,7 @@ def mesh_actors(model: FEModel) -> list[Actor]:
         on = np.zeros(len(points), dtype=bool)
         on[[place[int(node)] for node in interface.nodes if int(node) in place]] = True
         patch = triangles[on[triangles].all(axis=1)]
-        actors.append(Actor(points[None], patch, colour=MARKED[k % len(MARKED)]))
+        actors.append(Actor(points[None], patch, colour=MARK_COLOURS[k % len(MARK_COLOURS)]))
     return actors
 
 
@@ -82,7 +83,8 @@ def _sheet(model: FEModel, image: Any, title: str) -> Any:
     page.place(figure, image, 0, 80)
     left = 30
     for k, name in enumerate(model.interfaces):
-        page.words(figure, "\u25a0", left, top, color=MARKED[k % len(MARKED)], size=page.TITLE_SIZE)
+        colour = MARK_COLOURS[k % len(MARK_COLOURS)]
+        page.words(figure, "\u25a0", left, top, color=colour, size=page.TITLE_SIZE)
         page.words(figure, name, left + 30, top + 3, size=page.BODY_SIZE)
         left += 60 + 16 * len(name)
     page.words(figure, text, 30, top + 45, size=page.SMALL_SIZE, color=TEXT_COLOUR)

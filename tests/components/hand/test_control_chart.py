@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.components.hand.control_chart import COUPLING, GROUPS, NO_GROUP, Chart, envelope, muscle
+from rom.components.hand.control_chart import COUPLINGS, GROUPS, NO_GROUP, Chart, envelope, muscle
 from rom.errors import ConfigError
 
 DT = 1e-2
@@ -33,7 +33,7 @@ def test_every_group_is_reached_and_drawn(group):
     assert commands.groups[-1] == group
     assert_allclose(commands.pulls[-1, group], 7e-3)
     assert (np.delete(commands.pulls[-1], group) == 0).all()
-    assert ((commands.fingers()[-1] > 0) == (COUPLING[:, group] > 0)).all()
+    assert ((commands.fingers()[-1] > 0) == (COUPLINGS[:, group] > 0)).all()
 
 
 def test_pull_follows_effort_no_faster_than_allowed():
@@ -74,7 +74,7 @@ def test_five_inputs_move_all_fingers_independently():
     """Fifteen joints follow five pulls; the groups span four fingers' worth of them."""
     joints = np.kron(np.eye(5), np.ones((3, 1)))  # equal joints bend equally
     assert np.linalg.matrix_rank(joints) == 5
-    assert np.linalg.matrix_rank(COUPLING) == 4 and len(GROUPS) == 5
+    assert np.linalg.matrix_rank(COUPLINGS) == 4 and len(GROUPS) == 5
 
 
 def test_envelope_of_noise_is_its_strength():

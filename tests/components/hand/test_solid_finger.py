@@ -9,7 +9,7 @@ from cases.paths import ROOT
 from rom import rotation
 from rom.bench.models import bar
 from rom.components.cosserat.helical_spring import HelicalSpring
-from rom.components.hand.compliant_hand import INDEX, SPRING, Finger, rest
+from rom.components.hand.compliant_hand import HAND_SPRING, INDEX_LENGTHS, Finger, rest
 from rom.components.hand.solid_finger import (
     heavy_spring,
     link_compliance,
@@ -23,10 +23,10 @@ ENDS = ("root", "tip")
 UPWARD = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])  # bars lie along x
 SOFT = rom.Material(E=2e6, nu=0.3, rho=1100.0)
 SIDE = 6e-3
-SPRINGS = (SPRING, HelicalSpring(0.8e-3, 8e-3, 4, 9e-3), SPRING)
+SPRINGS = (HAND_SPRING, HelicalSpring(0.8e-3, 8e-3, 4, 9e-3), HAND_SPRING)
 
 
-def bars(material, lengths=INDEX, kind="rbe2", cells=(2, 1, 1)):
+def bars(material, lengths=INDEX_LENGTHS, kind="rbe2", cells=(2, 1, 1)):
     kinds = dict.fromkeys(ENDS, kind)
     return [
         rom.reduce(bar((length, SIDE, 0.8 * SIDE), cells, material),
@@ -58,9 +58,9 @@ def test_compliance_is_the_sum_of_springs_and_phalanges():
 
 def test_compliance_of_one_link_is_that_of_a_beam():
     """Bending, shear and tension in closed form, for plates that leave the bar free to widen."""
-    L, b, h = INDEX[0], SIDE, 0.8 * SIDE
+    L, b, h = INDEX_LENGTHS[0], SIDE, 0.8 * SIDE
     E, G = 2e6, 2e6 / 2.6
-    C = link_compliance(bars(SOFT, INDEX[:1], "rbe3", (6, 2, 2))[0], ENDS)
+    C = link_compliance(bars(SOFT, INDEX_LENGTHS[:1], "rbe3", (6, 2, 2))[0], ENDS)
     bends = np.array([h * b**3, b * h**3]) / 12
     exact = [L / (E * b * h), *(L**3 / (3 * E * bends) + L / (5 / 6 * G * b * h))]
     assert_allclose(np.diag(C)[:3], exact, rtol=5e-3)
@@ -70,14 +70,14 @@ def test_compliance_of_one_link_is_that_of_a_beam():
 
 def test_stiff_phalanges_make_the_rigid_finger():
     """Tip of the finger of rigid links: 267.362 mm/N across, 2.2286 mm/N along."""
-    C = tip_compliance(*finger(bars(rom.Material(E=200e9, nu=0.3, rho=7850.0)), (SPRING,) * 3))
+    C = tip_compliance(*finger(bars(rom.Material(E=200e9, nu=0.3, rho=7850.0)), (HAND_SPRING,) * 3))
     assert_allclose(1e3 * np.diag(C)[:3], [267.362, 267.362, 2.2286], rtol=1e-3)
     assert_allclose(*scaled(C, rest(Finger()).tip_compliance()), atol=1e-4)
 
 
 def test_springs_weigh_as_much_as_their_wire():
     """Steel wire of 0.7 mm, 5 coils of 7 mm: 0.332 g; a thin tube turns as its radius says."""
-    rod = heavy_spring(SPRING)
+    rod = heavy_spring(HAND_SPRING)
     wire = 7850 * np.pi / 4 * 0.7e-3**2 * 5 * np.hypot(np.pi * 7e-3, 8e-3 / 5)
     assert_allclose(rod.mass.sum(), wire, rtol=1e-12)
     assert_allclose(rod.inertia.sum(axis=0), wire * 3.5e-3**2 * np.array([0.5, 0.5, 1]))
@@ -86,13 +86,13 @@ def test_springs_weigh_as_much_as_their_wire():
 def test_hanging_finger_stretches_under_its_weight():
     """Each spring carries what hangs below it and half of its own weight."""
     solids = bars(rom.Material(E=200e9, nu=0.3, rho=1000.0))
-    mech, _ = finger(solids, (SPRING,) * 3, gravity=(0, 0, 0.5))
+    mech, _ = finger(solids, (HAND_SPRING,) * 3, gravity=(0, 0, 0.5))
     state = rom.equilibrium(mech)
     packed = rom.linearize(mech, state).packed
-    own, below, drop = heavy_spring(SPRING).mass.sum(), 0.0, 0.0
+    own, below, drop = heavy_spring(HAND_SPRING).mass.sum(), 0.0, 0.0
     for solid in reversed(solids):
         below += solid.mass
-        drop += 0.5 * (below + own / 2) / SPRING.stiffness
+        drop += 0.5 * (below + own / 2) / HAND_SPRING.stiffness
         below += own
     at = packed.system.bodies.q_at[packed.names.index("phalanx 3")]
     start = mech.part("phalanx 3").at
@@ -100,7 +100,7 @@ def test_hanging_finger_stretches_under_its_weight():
 
 
 def test_what_does_not_fit_is_named():
-    solids = bars(SOFT, INDEX[:2])
+    solids = bars(SOFT, INDEX_LENGTHS[:2])
     with pytest.raises(ModelError, match="3 springs and 2 phalanges"):
         solid_finger(solids, SPRINGS, ends=ENDS)
     with pytest.raises(ModelError, match="3 springs and 2 phalanges"):
@@ -117,7 +117,7 @@ def test_bones_of_polyamide_add_less_than_a_hundredth():
     geometry = ROOT / "meshes" / "phalanx.geo"
     kinds = {"proximal": "rbe2", "distal": "rbe2", "pad": rom.Polynomial(1)}
     solids = []
-    for L in INDEX:
+    for L in INDEX_LENGTHS:
         model = rom.fe.model(geometry, material=polyamide, parameters={"L": L}, order=2)
         solids.append(
             rom.reduce(model, method=rom.CraigBampton(4), interfaces=kinds, certify=False)
@@ -125,12 +125,14 @@ def test_bones_of_polyamide_add_less_than_a_hundredth():
     D, R, d = 0.014, 0.00125, 0.0015
     a = D / 2 - R
     rim = np.pi * (a**2 * R + a * np.pi * R**2 / 2 + 2 * R**3 / 3)
-    between = np.pi * (D**2 * (np.array(INDEX) - 2 * R) - d**2 * np.array(INDEX)) / 4
+    between = (
+        np.pi * (D**2 * (np.array(INDEX_LENGTHS) - 2 * R) - d**2 * np.array(INDEX_LENGTHS)) / 4
+    )
     assert_allclose([solid.mass for solid in solids], 1010 * (between + 2 * rim), rtol=1.5e-3)
-    mech = solid_finger(solids, (SPRING,) * 3)
+    mech = solid_finger(solids, (HAND_SPRING,) * 3)
     tip = mech.part("phalanx 3").marker("distal")
     C = tip_compliance(mech, tip)
-    joints, links = parts_of_compliance(solids, (SPRING,) * 3)
+    joints, links = parts_of_compliance(solids, (HAND_SPRING,) * 3)
     assert_allclose(*scaled(C, joints + links), atol=1e-6)
     share = np.diag(C - joints) / np.diag(C)
     assert_allclose(share, np.diag(links) / np.diag(C), rtol=1e-3)
@@ -145,7 +147,7 @@ def test_bones_of_polyamide_add_less_than_a_hundredth():
 
 def beams(material, area, bends):
     """Tip of three links that bend and stretch while springs do not: across and along [m/N]."""
-    away = np.cumsum([0.0, *(link + SPRING.length for link in INDEX[::-1])])
-    near, far = away[:-1], away[:-1] + INDEX[::-1]
+    away = np.cumsum([0.0, *(link + HAND_SPRING.length for link in INDEX_LENGTHS[::-1])])
+    near, far = away[:-1], away[:-1] + INDEX_LENGTHS[::-1]
     across = ((far**3 - near**3) / (3 * material.E * bends)).sum()
-    return across, sum(INDEX) / (material.E * area)
+    return across, sum(INDEX_LENGTHS) / (material.E * area)

@@ -18,7 +18,7 @@ from rom.components.wind.blade_element import (
     strips,
 )
 from rom.components.wind.whole_turbine import N_BLADES, turbine
-from rom.components.wind.wind_turbine import RATED, blade
+from rom.components.wind.wind_turbine import RATED_SPEED, blade
 from rom.errors import ConfigError
 from rom.mbs.equations.equations import retract
 from rom.mbs.equations.packing import pack
@@ -106,10 +106,12 @@ def stiff_blade(n):
     one, mech = blade(n, damped=True), rom.Mechanism(gravity=(0, 0, 0))
     one = one._replace(stretch=300 * one.stretch, bend=300 * one.bend)
     part = mech.add_nonlinear("blade", in_wind(cosserat.body(one), (WIND, 0.0, 0.0)),
-                              omega=(RATED, 0.0, 0.0))  # fmt: skip
-    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(RATED, 0, 0))
+                              omega=(RATED_SPEED, 0.0, 0.0))  # fmt: skip
+    hub = mech.add_rigid(
+        "hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(RATED_SPEED, 0, 0)
+    )
     mech.revolute("shaft", mech.ground.marker((0, 0, 0)), hub.marker((0, 0, 0)), axis=(1, 0, 0))
-    mech.drive("speed", "shaft", lambda t: RATED * t, rate=lambda t: RATED)
+    mech.drive("speed", "shaft", lambda t: RATED_SPEED * t, rate=lambda t: RATED_SPEED)
     root = mech.design_point(part.marker("start"))
     mech.fixed("root", hub.marker(root), part.marker("start"))
     return mech
@@ -125,7 +127,7 @@ def test_a_stiff_rotor_takes_the_power_of_its_strips():
     r, rod = 1.5 + 61.5 * np.linspace(0, 1, n + 1), blade(n)
     axes = [rotation.matrix(p)[:, 1] for p in rod.p[:-1]]  # towards the trailing edge
     twist = np.array([np.arctan2(abs(y[0]), abs(y[1])) for y in axes])
-    u = np.column_stack([np.full(n + 1, 2 / 3 * WIND), RATED * r])
+    u = np.column_stack([np.full(n + 1, 2 / 3 * WIND), RATED_SPEED * r])
     flow = np.arctan2(u[:, 0], u[:, 1])
     q = 0.5 * 1.225 * area * (u**2).sum(axis=1)
     lift = np.where(lifting, LIFT_SLOPE * np.sin(flow - twist - ZERO_LIFT), 0.0)
@@ -133,14 +135,14 @@ def test_a_stiff_rotor_takes_the_power_of_its_strips():
     assert_allclose(torque, (q * r) @ (lift * np.sin(flow) - drag * np.cos(flow)), rtol=5e-3)
     thrust = sol.reaction("shaft")[late][:, 0].mean()
     assert_allclose(abs(thrust), q @ (lift * np.cos(flow) + drag * np.sin(flow)), rtol=5e-3)
-    share = N_BLADES * torque * RATED / (0.5 * 1.225 * np.pi * 63**2 * WIND**3)
+    share = N_BLADES * torque * RATED_SPEED / (0.5 * 1.225 * np.pi * 63**2 * WIND**3)
     assert 0.38 < share < 16 / 27
 
 
 def test_the_wind_bends_the_blades_of_the_turbine_downwind():
     """Metres, as in published runs at 11.4 m/s, where the tip goes 5 to 6 m."""
-    whole = turbine(16, tower_segments=8, wind=WIND, speed=RATED)
-    whole.turn_by(lambda t: RATED * t, lambda t: RATED)
+    whole = turbine(16, tower_segments=8, wind=WIND, speed=RATED_SPEED)
+    whole.turn_by(lambda t: RATED_SPEED * t, lambda t: RATED_SPEED)
     sol = rom.simulate(whole.mechanism, t_end=20.0, dt=0.02, rho_inf=0.6, save_every=5)
     late = sol.t > 15.0
     assert 3.0 < whole.tip(sol, 0)[late, 0].mean() < 8.0

@@ -13,10 +13,10 @@ from rom.components.wind.whole_turbine import (
     WHEEL_INERTIA,
     turbine,
 )
-from rom.components.wind.wind_turbine import RATED, blade, ramp, run_up
+from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 from rom.errors import ConfigError
 
-SPEED, ANGLE = ramp(RATED, 20.0)
+SPEED, ANGLE = ramp(RATED_SPEED, 20.0)
 
 
 def test_masses_are_those_of_the_definition():
@@ -44,9 +44,9 @@ def test_geometry_and_yaw_are_those_of_the_definition():
     own = nacelle.second[0, 0] + nacelle.second[1, 1]  # about the third axis
     extra = 2000.0 * 1.9**2  # of wheel and generator, which are drawn elsewhere on the shaft
     assert_allclose(own + nacelle.mass * nacelle.at[0] ** 2 + extra, 2_607_890, rtol=1e-9)
-    fast = turbine(4, speed=RATED).mechanism.parts
-    assert_allclose(fast["generator"].omega, GEAR_RATIO * RATED * whole.axis)
-    assert_allclose(fast["blade 2.3"].velocity, RATED * np.cross(
+    fast = turbine(4, speed=RATED_SPEED).mechanism.parts
+    assert_allclose(fast["generator"].omega, GEAR_RATIO * RATED_SPEED * whole.axis)
+    assert_allclose(fast["blade 2.3"].velocity, RATED_SPEED * np.cross(
         whole.axis, fast["blade 2.3"].at - whole.hub), atol=1e-12)  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from rom.components.cosserat import equilibrium, loads, modes, reference
 from rom.components.wind.wind_turbine import (
     BLADE_LENGTH,
-    RATED,
+    RATED_SPEED,
     blade,
     ramp,
     run_up,
@@ -50,7 +50,7 @@ def test_rotation_stiffens_the_blade():
     rod = blade(96)
     assert_allclose([frequencies(rod, 1, n * RPM)[0] for n in (3, 6, 9)], [0.6747, 0.6845, 0.7005],
                     rtol=3e-4)  # fmt: skip
-    rated = frequencies(rod, 6, RATED)
+    rated = frequencies(rod, 6, RATED_SPEED)
     assert_allclose(rated, [0.7229, 1.0655, 1.9651, 3.6813, 4.3467, 5.5799], rtol=3e-4)
     assert_allclose(rated[0], 0.72365, rtol=0.002)  # assumed modes with centrifugal stiffness
 

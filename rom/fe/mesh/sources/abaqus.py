@@ -27,7 +27,7 @@ from rom.fe.mesh.sources.deck import (
 from rom.model import Array, Index
 
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
-SKIN = ("S3", "S4", "S6", "S8", "STRI3", "STRI65", "M3D3", "M3D4", "M3D6", "M3D8", "SFM3D")
+SKIN_TYPES = ("S3", "S4", "S6", "S8", "STRI3", "STRI65", "M3D3", "M3D4", "M3D6", "M3D8", "SFM3D")
 # corners of the faces S1, S2, ... of a cell
 SIDES = {
     4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
@@ -59,8 +59,8 @@ def read(path: str) -> Read:
     """
     deck = Deck()
     for keyword, options, rows in _sections(Path(path).read_text(encoding="utf-8")):
-        READ.get(keyword, _ignore)(deck, options, rows)
-    blocks = [block for block in deck.blocks if not block[0].startswith(SKIN)]
+        BLOCK_READERS.get(keyword, _ignore)(deck, options, rows)
+    blocks = [block for block in deck.blocks if not block[0].startswith(SKIN_TYPES)]
     cell_type = only_type(_solid(block[0]) for block in blocks)
     width = QUADRATIC_HEX if cell_type == "hex20" else kind_of(cell_type).n_nodes
     tables = [_table(rows, width) for _, _, rows in blocks]
@@ -179,7 +179,7 @@ def _ignore(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
     pass
 
 
-READ = {
+BLOCK_READERS = {
     "NODE": _node,
     "ELEMENT": _element,
     "NSET": _node_set,
@@ -268,7 +268,7 @@ def _skin_nodes(deck: Deck) -> dict[str, list[int | str]]:
     """Nodes of the skin elements by element set."""
     found: dict[str, list[int | str]] = {}
     for kind, name, rows in deck.blocks:
-        if kind.startswith(SKIN) and name:
+        if kind.startswith(SKIN_TYPES) and name:
             found.setdefault(name, []).extend(int(x) for row in rows for x in row[1:] if x)
     return found
 

@@ -17,7 +17,7 @@ DECK_EDGES = {
     "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
     "hex20": (*LOWER_EDGES, *UPPER_EDGES, (0, 4), (1, 5), (2, 6), (3, 7)),
 }
-WHOLE = ("tet4", "hex8")
+WHOLE_TYPES = ("tet4", "hex8")
 
 
 def kind_of(cell_type: str) -> CellType:
@@ -27,7 +27,7 @@ def kind_of(cell_type: str) -> CellType:
 
 def to_gmsh(cells: Index, cell_type: str) -> Index:
     """Cells in gmsh order from cells in deck order."""
-    if cell_type in WHOLE:
+    if cell_type in WHOLE_TYPES:
         return cells
     n_corners = kind_of(cell_type).n_corners
     wanted = [set(s) for s in kind_of(cell_type).supports[n_corners : cells.shape[1]]]

@@ -25,14 +25,14 @@ MESHES, SCRIPTS = (".msh", ".pos"), (".geo", ".pos", ".opt", ".geo_unrolled", ""
 MESH_STARTS = (b"$MeshFormat", b"$Comments", b"$PostFormat", b"$View")
 LONGEST_TEXT = 1000  # characters; gmsh cuts at 1023 and runs what follows
 MOST_FILES, MOST_BYTES = 200, 2 * 10**7
-TOKEN = re.compile(
+TOKEN_PATTERN = re.compile(
     rb"""(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<text>"[^"]*"|'[^']*')
     |(?P<number>(?:\d+\.\d*|\.\d+|\d+)(?:[Ee][-+]?\d+)?)|(?P<word>[A-Za-z_][A-Za-z_0-9]*)
     |(?P<open>/\*|["'])|(?P<sign>>>|[^\s])""",
     re.DOTALL | re.VERBOSE,
 )
 # Skipping a block, gmsh looks for its end from these letters on, and does not see what follows one
-BLIND = re.compile(rb"(?<![A-Za-z_])[EFIR]$")
+BLIND_PATTERN = re.compile(rb"(?<![A-Za-z_])[EFIR]$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Token:
     line: int
 
 
-END = Token("sign", ";", 0)
+END_TOKEN = Token("sign", ";", 0)
 
 
 def check_script(path: Path) -> None:
@@ -132,10 +132,10 @@ def _tokens(path: Path, where: str) -> Iterator[Token]:
     """
     data = path.read_bytes()
     line, last = 1, 0
-    for found in TOKEN.finditer(data):
+    for found in TOKEN_PATTERN.finditer(data):
         line, last = line + data.count(b"\n", last, found.start()), found.start()
         kind, value = str(found.lastgroup), found.group()
-        hidden = kind in ("text", "comment") and BLIND.search(data[max(last - 2, 0) : last])
+        hidden = kind in ("text", "comment") and BLIND_PATTERN.search(data[max(last - 2, 0) : last])
         long = kind == "text" and len(value) > LONGEST_TEXT
         if kind == "open" or hidden or long or b"\0" in value:
             raise UnsafeFileError(
@@ -151,7 +151,7 @@ def _tokens(path: Path, where: str) -> Iterator[Token]:
 def _refusals(tokens: list[Token]) -> Iterator[tuple[int, str]]:
     """Lines that do more than make a geometry, and what they do."""
     printing, depth = False, 0
-    for token, after in zip(tokens, [*tokens[1:], END][: len(tokens)], strict=True):
+    for token, after in zip(tokens, [*tokens[1:], END_TOKEN][: len(tokens)], strict=True):
         if token.kind == "sign":
             depth += (token.value == "(") - (token.value == ")")
             if token.value in (">", ">>") and printing and depth <= 0:

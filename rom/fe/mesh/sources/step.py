@@ -14,8 +14,10 @@ from rom.errors import ConfigError, FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Made
 from rom.names import named
 
-FACE = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
-SHELL = re.compile(r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^)]*)\)", re.I)
+FACE_PATTERN = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
+SHELL_PATTERN = re.compile(
+    r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^)]*)\)", re.I
+)
 ELEMENTS_ACROSS = 20  # default element size: this part of the diagonal
 CELLS_PER_CUBE = 8.0  # tetrahedra in a cube of the element size
 MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
@@ -70,8 +72,8 @@ def _check_size(gmsh: Any, lc: Any) -> None:
 
 
 def _name_faces(gmsh: Any, text: str) -> None:
-    names = dict(FACE.findall(text))
-    listed = [f for shell in SHELL.findall(text) for f in re.findall(r"#(\d+)", shell)]
+    names = dict(FACE_PATTERN.findall(text))
+    listed = [f for shell in SHELL_PATTERN.findall(text) for f in re.findall(r"#(\d+)", shell)]
     named = {f: names[f].strip() for f in listed if names.get(f, "").strip(" '")}
     surfaces = sorted(tag for _, tag in gmsh.model.getEntities(2))
     if not named or set(named.values()) == {"NONE"}:
