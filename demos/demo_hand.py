@@ -19,8 +19,8 @@ from rom import view
 from rom.bench.models import bar
 from rom.components.cosserat import HelicalSpring
 from rom.components.hand import (
-    INDEX,
-    SPRING,
+    HAND_SPRING,
+    INDEX_LENGTHS,
     Bar,
     Chart,
     Finger,
@@ -95,11 +95,11 @@ columns = {"40 mm long": (100 * share[within], column.lateral_stiffness(share[wi
 
 polyamide = rom.Material(E=1.7e9, nu=0.4, rho=1010.0)
 ends = {"root": "rbe3", "tip": "rbe3"}  # plates that leave the bars free to widen, as in beams
-solids = [bar((link, 12 * MM, 12 * MM), (3, 2, 2), polyamide) for link in INDEX]
+solids = [bar((link, 12 * MM, 12 * MM), (3, 2, 2), polyamide) for link in INDEX_LENGTHS]
 bones = [rom.reduce(solid, interfaces=ends, method=rom.CraigBampton(n_modes=3), certify=False)
          for solid in solids]  # fmt: skip
 upward = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])  # these bars lie along x
-joints, links = parts_of_compliance(bones, (SPRING,) * 3, ends=tuple(ends), orientation=upward)
+joints, links = parts_of_compliance(bones, (HAND_SPRING,) * 3, ends=tuple(ends), orientation=upward)
 bone_share = 100 * links[0, 0] / (joints + links)[0, 0]
 say(f"sideways compliance of the tip that is in the bones: {bone_share:.4f} %")
 

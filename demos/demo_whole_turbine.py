@@ -16,7 +16,7 @@ import numpy as np
 
 import rom
 from rom import view
-from rom.components.wind import RATED, turbine
+from rom.components.wind import RATED_SPEED, turbine
 
 parser = argparse.ArgumentParser(description="a whole wind turbine runs up")
 parser.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
@@ -50,7 +50,7 @@ LARGEST, GAIN = 4e6, 2e7  # N m, N m s/rad
 
 
 def torque(t, angle, speed):
-    return min(LARGEST * min(t / 2.0, 1.0), max(0.0, GAIN * (RATED - speed)))
+    return min(LARGEST * min(t / 2.0, 1.0), max(0.0, GAIN * (RATED_SPEED - speed)))
 
 
 plant = turbine(24)

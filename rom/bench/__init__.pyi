@@ -1,4 +1,4 @@
-from rom.bench.benchmarks import BED as BED
+from rom.bench.benchmarks import BED_STIFFNESS as BED_STIFFNESS
 from rom.bench.benchmarks import BENCHMARKS as BENCHMARKS
 from rom.bench.benchmarks import Figure as Figure
 from rom.bench.benchmarks import blade as blade

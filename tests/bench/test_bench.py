@@ -144,7 +144,7 @@ def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
 @pytest.mark.fenicsx
 def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
     pytest.importorskip("dolfinx", reason="the sector is meshed")
-    coarse = wheel.WHEEL | {"lc": 0.02, "lc_blade": 0.02}
+    coarse = wheel.WHEEL_SIZES | {"lc": 0.02, "lc_blade": 0.02}
     figures = {f.quantity.split(":")[0]: f.value for f in benchmarks.wheel(3, coarse)}
     assert 1e-8 < figures["reduced sector above sector"] < 1e-3
     assert figures["sector against wheel"] < 1e-8

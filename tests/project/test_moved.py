@@ -20,7 +20,7 @@ def test_an_old_path_is_the_module_itself_and_warns(old, monkeypatch):
         pytest.skip("is a script of another program's environment")
     for name in [name for name in sys.modules if name == old or name.startswith(f"{old}.")]:
         monkeypatch.delitem(sys.modules, name)
-    with pytest.warns(DeprecationWarning, match=f"^{old} is {moved.NEW[old]} now") as caught:
+    with pytest.warns(DeprecationWarning, match=f"^{old} is {moved.NEW_PATHS[old]} now") as caught:
         found = importlib.import_module(old)
     assert found is importlib.import_module(moved.NEW_PATHS[old])
     assert found.__spec__.name == found.__name__ == moved.NEW_PATHS[old]

@@ -1,8 +1,8 @@
 from rom.components.hand.cable import Hole as Hole
 from rom.components.hand.cable import Tendon as Tendon
-from rom.components.hand.compliant_hand import INDEX as INDEX
+from rom.components.hand.compliant_hand import HAND_SPRING as HAND_SPRING
+from rom.components.hand.compliant_hand import INDEX_LENGTHS as INDEX_LENGTHS
 from rom.components.hand.compliant_hand import LENGTHS as LENGTHS
-from rom.components.hand.compliant_hand import SPRING as SPRING
 from rom.components.hand.compliant_hand import Finger as Finger
 from rom.components.hand.compliant_hand import Posture as Posture
 from rom.components.hand.compliant_hand import close as close

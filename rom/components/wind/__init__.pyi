@@ -5,7 +5,7 @@ from rom.components.wind.drivetrain import rotor as rotor
 from rom.components.wind.whole_turbine import Turbine as Turbine
 from rom.components.wind.whole_turbine import turbine as turbine
 from rom.components.wind.wind_turbine import HUB_RADIUS as HUB_RADIUS
-from rom.components.wind.wind_turbine import RATED as RATED
+from rom.components.wind.wind_turbine import RATED_SPEED as RATED_SPEED
 from rom.components.wind.wind_turbine import RunUp as RunUp
 from rom.components.wind.wind_turbine import blade as blade
 from rom.components.wind.wind_turbine import ramp as ramp

@@ -5,7 +5,7 @@ from rom.io.sid.format import DIALECTS as DIALECTS
 from rom.io.sid.format import GENERAL as GENERAL
 from rom.io.sid.format import NODE_BLOCKS as NODE_BLOCKS
 from rom.io.sid.format import SYMMETRIC as SYMMETRIC
-from rom.io.sid.format import TENSOR as TENSOR
+from rom.io.sid.format import TENSOR_ENTRIES as TENSOR_ENTRIES
 from rom.io.sid.format import UNIT as UNIT
 from rom.io.sid.format import ZERO as ZERO
 from rom.io.sid.format import StandardInput as StandardInput
