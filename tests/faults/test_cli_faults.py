@@ -95,7 +95,7 @@ FILES = {
     "export of a SID with nothing in it": (3, ["export", "text.SID_FEM", "x.op4"], "text.SID_FEM"),
     "export into a folder": (2, ["export", "good.npz", ".", "--to", "op4"], ". is a folder"),
     "export nowhere": (2, ["export", "good.npz", "no/x.op4"], "folder no does not exist"),
-    "format in capitals": (2, ["export", "good.npz", "x.op4", "--to", "OP4"], "'OP4' is unknown"),
+    "format in capitals": (2, ["export", "good.npz", "x.op4", "--to", "OP4"], "'OP4' is none of "),
     "held for a format that holds nothing": (2, ["export", "good.npz", "x.op4", "--held", "root"],
                                              "held for openfast alone, not for op4"),
     "held misspelt": (2, ["export", "good.npz", "x.dat", "--to", "openfast", "--held", "rot"],
