@@ -7,7 +7,7 @@ from typing import Any
 from rom.model import Row
 
 N_COMPARED = 6  # elastic modes that certificates look at
-MISSING = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
+MISSING_ROWS = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
 
 
 def rows_of_parts(bodies: Mapping[str, Any]) -> list[Row]:
@@ -15,5 +15,5 @@ def rows_of_parts(bodies: Mapping[str, Any]) -> list[Row]:
     return [
         replace(line, quantity=f"{name}: {line.quantity}")
         for name, body in bodies.items()
-        for line in (MISSING if body.certificate is None else body.certificate.rows)
+        for line in (MISSING_ROWS if body.certificate is None else body.certificate.rows)
     ]

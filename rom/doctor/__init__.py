@@ -1,5 +1,5 @@
 """What is installed, what works, and what to type for the rest.
 
-`examination` is all of it in order, a `finding` one line of it: `machine` and `core`, `libraries`,
-`pictures`, `caches`. `probes` are processes that try what may crash, one of them `drawing`.
+`machine` and `core`, the kind of processor, are looked at first, then `libraries`; `probes` are
+processes that try what may crash.
 """

@@ -15,5 +15,4 @@ from rom.reduction.bases.method import Method as Method
 from rom.reduction.interfaces.characteristic import Characteristic as Characteristic
 from rom.reduction.interfaces.polynomial import FourierLegendre as FourierLegendre
 from rom.reduction.interfaces.polynomial import Polynomial as Polynomial
-from rom.reduction.interfaces.polynomial import orthonormal_in as orthonormal_in
 from rom.reduction.interfaces.snapshots import Snapshots as Snapshots

@@ -1,4 +1,3 @@
-from rom.view.canvas.page import Picture as Picture
 from rom.view.canvas.solids import box as box
 from rom.view.canvas.solids import cylinder as cylinder
 from rom.view.figures.curves import campbell as campbell
