@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
-PACKAGE = str(Path(__file__).parent) + os.sep
+PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 
 
 class RomError(Exception):
@@ -170,6 +170,6 @@ def warn(sentence: str, kind: type[Warning] = RomWarning) -> None:
     if not sentence or rank:
         return
     level, frame = 2, sys._getframe(1)
-    while frame.f_back and frame.f_code.co_filename.startswith((PACKAGE, "<string>")):
+    while frame.f_back and frame.f_code.co_filename.startswith((PACKAGE_FOLDER, "<string>")):
         level, frame = level + 1, frame.f_back
     warnings.warn(kind(sentence), stacklevel=level)

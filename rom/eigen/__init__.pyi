@@ -11,6 +11,7 @@ from rom.eigen.verbs import given_rigid_motions as given_rigid_motions
 from rom.eigen.verbs import mac as mac
 from rom.eigen.verbs import mean_motion as mean_motion
 from rom.eigen.verbs import orthonormal as orthonormal
+from rom.eigen.verbs import orthonormal_in as orthonormal_in
 from rom.eigen.verbs import residual_errors as residual_errors
 from rom.eigen.verbs import rigid_motions as rigid_motions
 from rom.eigen.verbs import whole_clusters as whole_clusters
