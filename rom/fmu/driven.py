@@ -14,7 +14,7 @@ from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.python_laws import apply_laws, laws
 from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
 from rom.mbs.integrate.simulation import simulate
-from rom.mbs.kernels.system import Work, workspace
+from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.state import State

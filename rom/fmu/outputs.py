@@ -8,7 +8,7 @@ import numpy as np
 from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
 from rom.mbs.equations.packing import Packed
-from rom.mbs.kernels.system import Work
+from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array

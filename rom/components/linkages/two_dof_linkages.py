@@ -20,7 +20,7 @@ from rom.errors import ConfigError, ModelError
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import assembled
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 

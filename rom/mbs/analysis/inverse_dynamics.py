@@ -17,7 +17,8 @@ from rom.mbs.integrate.consistent_start import (
     initial_state,
     with_accelerations,
 )
-from rom.mbs.kernels.system import ROLL, Work, workspace
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.solution import Solution

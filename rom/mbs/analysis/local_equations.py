@@ -7,16 +7,17 @@ import numpy as np
 
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import (
-    balance,
     evaluate,
     linearize_constraints,
+    residual,
     retract,
-    slopes,
+    tangents,
 )
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.python_laws import Laws, apply_laws, laws
 from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
-from rom.mbs.kernels.system import ROLL, Work, workspace
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.state import State
@@ -60,10 +61,10 @@ class Instant:
     def system(self) -> Any:
         """The arrays of the mechanism, gravity and loads times their factor."""
         s = self.packed.system
-        forces = s.forces._replace(load=self.load * s.forces.load)
-        bodies = s.bodies._replace(gravity=self.load * s.bodies.gravity)
-        spread = s.spread._replace(amplitude=self.load * s.spread.amplitude)
-        return s._replace(bodies=bodies, forces=forces, spread=spread)
+        forces = s.forces.replace(load=self.load * s.forces.load)
+        bodies = s.bodies.replace(gravity=self.load * s.bodies.gravity)
+        spread = s.spread.replace(amplitude=self.load * s.spread.amplitude)
+        return s.replace(bodies=bodies, forces=forces, spread=spread)
 
     def evaluate(self, q: Array, v: Array) -> None:
         """Everything that depends on coordinates and velocities, Python forces included."""
@@ -74,7 +75,7 @@ class Instant:
     def residual(self, q: Array, v: Array, a: Array, lam: Array) -> Array:
         """(n,) equations of motion M a + h - Q + G^T lam."""
         self.evaluate(q, v)
-        balance(self.system, self.W, q, v, a, lam)
+        residual(self.system, self.W, q, v, a, lam)
         return self.W.residual.copy()
 
     def gradient(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
@@ -89,7 +90,7 @@ class Instant:
             step = self.probe()
             return difference(lambda dv: self.residual(q, v + dv, a, lam), step)
         self.residual(q, v, a, lam)
-        slopes(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
+        tangents(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
         return self.W.S.copy()
 
     def stiffness(self, state: State) -> Array:
@@ -100,7 +101,7 @@ class Instant:
                 lambda dq: self.residual(self.shifted(q, dq), v, a, lam), self.probe()
             )
         self.residual(q, v, a, lam)
-        slopes(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
+        tangents(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
         return self.W.Kt.copy()
 
     def exact(self, state: State) -> bool:

@@ -7,6 +7,8 @@ has a potential whatever the rotation.
 
 import math
 
+from numba import types
+
 from rom.mbs.kernels.algebra import (
     add,
     cross,
@@ -22,6 +24,9 @@ from rom.mbs.kernels.algebra import (
 )
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.stages import TANGENT_TYPES, stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Work
 
 
 @inner
@@ -163,7 +168,7 @@ def bushing_force(s, k, W, state):
     return force, to_world(W, i, frame, moment), dot(drag, xd) + dot(brake, rate)
 
 
-@inner
+@stage(types.void, System, Work, needed=lambda s: s.bushings.i.size)
 def bushing_wrenches(s, W):
     """Add the bushings to the wrenches on the markers; add up the power lost."""
     B = s.bushings
@@ -190,7 +195,7 @@ def column(Q, p, c, dforce, dmoment, lever):
         Q[9 + q, p] += c * dmoment[q]
 
 
-@inner
+@stage(types.void, System, Work, *TANGENT_TYPES, needed=lambda s: s.bushings.i.size)
 def bushing_tangents(s, W, ck, cc, K, S):
     """Add the stiffness (times ck) and damping (times cc) of all bushings to K and S.
 

@@ -9,11 +9,14 @@ Source:
 """
 
 import numpy as np
+from numba import types
 
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
-from rom.mbs.kernels.system import BORE, DISC, PLANE, SPHERE
+from rom.mbs.kernels.stages import TANGENT_TYPES, stage
+from rom.mbs.kernels.system import BORE, DISC, PLANE, SPHERE, System
+from rom.mbs.kernels.work import Work
 
 COMPLEX_STEP = 1e-30
 
@@ -68,7 +71,7 @@ def contact_state(s, k, W):
     return e, axle, (gap, slide, row(W.V, i, 3), row(W.V, j, 3))
 
 
-@inner
+@stage(types.void, System, Work, needed=lambda s: s.contacts.i.size)
 def contact_wrenches(s, W):
     """Add the contacts to the wrenches on the markers; add up the power lost."""
     C = s.contacts
@@ -119,7 +122,7 @@ def contact_column(s, W, k, p, by_position, c):
         W.Q[9 + q, p] += c / COMPLEX_STEP * at_j[q].imag
 
 
-@inner
+@stage(types.void, System, Work, *TANGENT_TYPES, needed=lambda s: s.contacts.i.size)
 def contact_tangents(s, W, ck, cc, K, S):
     """Add the stiffness (times ck) and damping (times cc) of all contacts to K and S."""
     C = s.contacts

@@ -9,7 +9,9 @@ from numba.extending import intrinsic
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import column_of
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
-from rom.mbs.kernels.system import ALONG, POINT
+from rom.mbs.kernels.stages import REAL_VECTOR, TANGENT_TYPES, stage
+from rom.mbs.kernels.system import ALONG, POINT, System
+from rom.mbs.kernels.work import Work
 
 
 @intrinsic
@@ -93,7 +95,12 @@ def stop_state(law, x, rate):
     return -law[0] * elastic * grip, -stiffness, -damping, law[0] * elastic, depth
 
 
-@inner
+def _has_actions(system):
+    A = system.actions
+    return A.motor_at.size or A.friction_at.size or A.stop_at.size
+
+
+@stage(types.void, System, Work, REAL_VECTOR, needed=_has_actions)
 def action_wrenches(s, W, lam):
     """Add motors, friction and stops to the wrenches on the markers, and their powers."""
     A = s.actions
@@ -115,7 +122,7 @@ def action_wrenches(s, W, lam):
         W.power[2] -= (force + elastic) * W.xd[at]
 
 
-@inner
+@stage(types.void, System, Work, REAL_VECTOR, *TANGENT_TYPES, needed=_has_actions)
 def action_tangents(s, W, lam, ck, cc, K, S):
     """Add the stiffness (times ck) and damping (times cc) of all actions to K and S."""
     A = s.actions

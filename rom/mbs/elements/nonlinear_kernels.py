@@ -6,6 +6,9 @@ from numba.extending import intrinsic
 
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
+from rom.mbs.kernels.stages import REAL_VECTOR, TANGENT_TYPES, stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Work
 
 
 @intrinsic
@@ -40,7 +43,11 @@ def take_frames(s, W, e, q, v):
             W.pose[e, 13 * k + 7 + i] = v[vt + i]
 
 
-@inner
+def _has_elements(system):
+    return system.nonlinear.address.size
+
+
+@stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR, needed=_has_elements)
 def nonlinear_residuals(s, W, q, v):
     """Add the forces of all elements to W.residual, and the power they lose to W.power[2]."""
     N = s.nonlinear
@@ -54,7 +61,7 @@ def nonlinear_residuals(s, W, q, v):
                 W.residual[t + i] += W.answer[2 + 6 * k + i]
 
 
-@inner
+@stage(types.void, System, Work, *TANGENT_TYPES, needed=_has_elements)
 def nonlinear_tangents(s, W, ck, cc, K, S):
     """Add stiffness times ck and damping times cc to K and S; `nonlinear_residuals` first."""
     N, graph = s.nonlinear, s.graph

@@ -1,9 +1,14 @@
 """Loads spread over a body, which keep their direction in the body or in the world."""
 
+from numba import types
+
 from rom.mbs.kernels.algebra import add, cross, dot, mtv, mv, place, put, scale, unit, vec
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.integrals import dual, trace
 from rom.mbs.kernels.markers import own_block
+from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Work
 
 
 @inner
@@ -41,7 +46,7 @@ def spread_arm(s, W, k, q):
     return N
 
 
-@inner
+@stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR, needed=lambda s: s.spread.body.size)
 def spread_residuals(s, W, q, v):
     """Subtract all spread loads from W.residual, and add their power to W.power[1]."""
     L = s.spread
@@ -63,7 +68,7 @@ def spread_residuals(s, W, q, v):
             W.power[1] += modal_force * v[t + 6 + j]
 
 
-@inner
+@stage(types.void, System, Work, types.float64, REAL_MATRIX, needed=lambda s: s.spread.body.size)
 def spread_tangents(s, W, c, S):
     """Add c times the derivative by the coordinates to S; `spread_residuals` first."""
     L = s.spread

@@ -2,11 +2,15 @@
 
 import math
 
+from numba import types
+
 from rom.mbs.kernels.algebra import add, cross, dot, place, put, row, scale, sub, turn, unit
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness, place_relative
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
-from rom.mbs.kernels.system import FORCE_BODY, FORCE_WORLD, TORQUE_BODY
+from rom.mbs.kernels.stages import TANGENT_TYPES, stage
+from rom.mbs.kernels.system import FORCE_BODY, FORCE_WORLD, TORQUE_BODY, System
+from rom.mbs.kernels.work import Work
 
 
 @inner
@@ -36,7 +40,7 @@ def load_vector(F, k, E, signal):
     return turn(E, F.load_at[k], x) if kind in (FORCE_BODY, TORQUE_BODY) else x
 
 
-@inner
+@stage(types.void, System, Work)
 def applied_wrenches(s, W):
     """Set the wrenches on all markers to the applied forces; add up their power."""
     F = s.forces
@@ -84,7 +88,12 @@ def spring_tangent(s, W, k, ck, cc, K, S):
         pair_stiffness(s, W, F.spring_i[k], F.spring_j[k], S)
 
 
-@inner
+def _has_forces(system):
+    F = system.forces
+    return F.spring_i.size or F.load_at.size or F.turn_at.size
+
+
+@stage(types.void, System, Work, *TANGENT_TYPES, needed=_has_forces)
 def force_tangents(s, W, ck, cc, K, S):
     """Add the stiffness (times ck) and damping (times cc) of all applied forces to K and S."""
     F = s.forces

@@ -1,5 +1,7 @@
 """Equations of motion of the whole mechanism: residual, iteration matrix, accelerations."""
 
+from numba import types
+
 from rom.mbs.elements.bushing_kernels import bushing_tangents, bushing_wrenches
 from rom.mbs.elements.contact import contact_tangents, contact_wrenches
 from rom.mbs.elements.joint_kernels import action_tangents, action_wrenches, friction_by_load
@@ -24,12 +26,15 @@ from rom.mbs.kernels.inertia import (
     body_stiffness,
 )
 from rom.mbs.kernels.markers import marker_states, own_block, spread_wrench, wrench_stiffness
+from rom.mbs.kernels.stages import REAL_VECTOR, THREE_FACTORS, stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Work
 
 # over the loads of joints with friction; each gains a digit when the friction angle is small
 MAX_PASSES = 60
 
 
-@kernel
+@stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR)
 def evaluate(s, W, q, v):
     """All quantities that depend on coordinates, velocities and signals only."""
     body_states(s.bodies, W, q, v)
@@ -54,7 +59,7 @@ def linearize_constraints(s, W, q, v):
     body_masses(s, W)
 
 
-@inner
+@stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR, REAL_VECTOR, REAL_VECTOR)
 def residual(s, W, q, v, a, lam):
     """Set W.residual = M a + h - Q + G^T lam at the state of the last `evaluate`."""
     W.residual[:] = 0.0
@@ -80,7 +85,7 @@ def drive_power(s, W, lam):
             W.power[0] -= lam[k] * W.signal[s.rows.signal[k], 1]
 
 
-@inner
+@stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR, REAL_VECTOR, THREE_FACTORS)
 def tangents(s, W, v, a, lam, c):
     """Set W.S = c0 M + c1 dr/dv and W.Kt = c2 dr/dq for the coefficients c; `residual` first."""
     W.S[:] = 0.0
@@ -190,15 +195,3 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     copy(a, out[n_q : n_q + n])
     copy(W.power, out[n_q + n :])
     return True
-
-
-@kernel
-def balance(s, W, q, v, a, lam):
-    """Set W.residual to M a + h - Q + G^T lam; `evaluate` first."""
-    residual(s, W, q, v, a, lam)
-
-
-@kernel
-def slopes(s, W, v, a, lam, c):
-    """Set W.S and W.Kt to the tangents of the residual, see `tangents`; `balance` first."""
-    tangents(s, W, v, a, lam, c)

@@ -10,6 +10,7 @@ import numpy as np
 from rom.mbs.equations.ordering import Group, Ordering, forest
 from rom.mbs.kernels.plan import Graph, Plan
 from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.tables import Table
 from rom.model import Index
 
 # operations of a whole factorisation over those by blocks, from which blocks are quicker: measured
@@ -47,9 +48,8 @@ def graph_of(system: Any, *, whole: bool = False) -> Graph:
 def _neighbours(system: Any) -> list[list[int]]:
     """Bodies that each body is coupled to by the stiffness of joints and forces, and itself."""
     found: list[set[int]] = [{b} for b in range(system.bodies.mass.size)]
-    for part in system:
-        for name in getattr(part, "_fields", ()):
-            markers = getattr(part, name)
+    for _, part in system.items():
+        for name, markers in part.items() if isinstance(part, Table) else ():
             if (name != "i" and not name.endswith("_i")) or markers.ndim > 1:
                 continue
             markers = markers, getattr(part, name[:-1] + "j")

@@ -6,10 +6,15 @@ also where a block is singular for itself.
 
 import math
 
+from numba import types
+
 from rom.mbs.equations.elimination import eliminate, fill_blocks, substitute
 from rom.mbs.kernels.algebra import back_substitute, factorise
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.markers import own_block
+from rom.mbs.kernels.stages import REAL_VECTOR, stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Work
 
 
 @inner
@@ -82,7 +87,7 @@ def fill_from_blocks(s, W):
                 W.lu[j, n + k] = W.UG[k, graph.at[k, p] + q] * d[n + k] * d[j]
 
 
-@inner
+@stage(types.boolean, System, Work, types.int64)
 def factorise_bordered(s, W, rank):
     """Factorise [S, UG^T; UGT, 0]; False when it is singular."""
     n = W.residual.size
@@ -101,7 +106,7 @@ def factorise_bordered(s, W, rank):
     return factorise(W.lu, n + rank, W.pivot)
 
 
-@inner
+@stage(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR)
 def solve_bordered(s, W, rank, x, lam):
     """Solve for x (n,) and lam (m,); W.rhs[:n] and W.part (m,) hold the right-hand side."""
     m, n = W.G.shape[0], W.residual.size

@@ -16,6 +16,7 @@ from rom.mbs.equations.packing_elements import (
     spread_loads,
     table,
 )
+from rom.mbs.kernels.stages import STAGE_ADDRESSES
 from rom.mbs.kernels.system import (
     ALONG,
     LENGTHS,
@@ -80,7 +81,7 @@ class Packed:
     def whole(self) -> "Packed":
         """The same with whole matrices, which constraints that repeat others need."""
         graph = graph_of(self.system, whole=True)
-        return replace(self, system=self.system._replace(graph=graph))
+        return replace(self, system=self.system.replace(graph=graph))
 
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""
@@ -117,6 +118,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     )
     R = max(part.r for part in parts)
     system = System(
+        STAGE_ADDRESSES,
         _bodies(parts, R, np.asarray(mechanism.gravity)),
         _markers(mechanism, handles, R),
         rows,
@@ -129,7 +131,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         nonlinear(mechanism),
     )
     return Packed(
-        system._replace(graph=graph_of(system, whole=whole)),
+        system.replace(graph=graph_of(system, whole=whole)),
         tuple(mechanism.parts),
         index,
         owners,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.mbs.equations.packing import Packed
-from rom.mbs.kernels.system import Work
+from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.foreign import ask, numbers
 from rom.model import Array

@@ -18,7 +18,6 @@ from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import fitting_velocity
 from rom.mbs.integrate.event_end import kept_before_the_end
 from rom.mbs.integrate.fixed_step import counts, failed_step, space
-from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.run import FIRST_STEP_RATIO, RUN_KEY, Record, of, standing_at
 from rom.mbs.integrate.step_memory import (
     accelerated,
@@ -29,7 +28,7 @@ from rom.mbs.integrate.step_memory import (
     shift_ahead,
     signals_at,
 )
-from rom.mbs.kernels.system import Work, workspace
+from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.signals import sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
@@ -84,9 +83,7 @@ class _Run:
         self.state, self.bdf, self.uneven = state, record.settings.method == "bdf", False
         bare = replace(state, memory=None)
         self.T, start = begin(record, W, bare, self.forces, FIRST_STEP_RATIO * self.duration)
-        self.old = self.T._replace(
-            **{name: getattr(self.T, name).copy() for name in CHANGED_FIELDS}
-        )
+        self.old = self.T.replace(**{name: getattr(self.T, name).copy() for name in CHANGED_FIELDS})
         self.out, self.base = space(W, self.T, 1), W.base.copy()
         self.h = self.before = FIRST_STEP_RATIO * self.duration
         self.fastest, self.rejected = record.packed.length / self.duration, 0
@@ -100,7 +97,7 @@ class _Run:
     def remembered(self) -> Memory:
         """All that the next step depends on and the state does not tell."""
         record, memory = self.record, remember(self.record.settings, self.W, self.T, 0)
-        steps = {STEP_PREFIX + name: x.copy() for name, x in self.T._asdict().items()}
+        steps = {STEP_PREFIX + name: x.copy() for name, x in self.T.items()}
         arrays = memory.arrays | steps
         arrays["numbers"] = np.array([getattr(self, name) for name in NUMBERS], dtype=float)
         # joint coordinates are followed apart from those of the saved instants
@@ -113,7 +110,7 @@ class _Run:
         """Go on where `remembered` was asked."""
         arrays = state.memory.arrays
         recall(state.memory, self.W, self.T)
-        for name in Step._fields:
+        for name in dict(self.T.items()):
             getattr(self.T, name)[:] = arrays[STEP_PREFIX + name]
         for name, x in zip(NUMBERS, arrays["numbers"], strict=True):
             setattr(self, name, float(x))

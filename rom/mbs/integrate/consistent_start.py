@@ -15,7 +15,8 @@ from rom.mbs.equations.linear_solve import (
     weigh,
 )
 from rom.mbs.equations.packing import Packed
-from rom.mbs.kernels.system import ROLL, Work, workspace
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.state import Memory, State  # noqa: F401  under its old name
 from rom.model import Array, Integers

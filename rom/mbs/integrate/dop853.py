@@ -13,7 +13,7 @@ from rom.errors import SolverError
 from rom.mbs.equations.equations import evaluate, rates
 from rom.mbs.equations.python_laws import apply_laws, laws
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
-from rom.mbs.kernels.system import Work
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
@@ -36,6 +36,7 @@ class Equations:
                 singular.
         """
         packed, settings = self.record.packed, self.record.settings
+        y = np.ascontiguousarray(y)  # SciPy hands over columns
         if packed.signals:
             times = np.array([t])
             h = settings.spacing

@@ -10,7 +10,7 @@ from rom.mbs.equations.python_laws import Laws
 from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.run import Record
 from rom.mbs.integrate.step_memory import accelerated, signals_at
-from rom.mbs.kernels.system import Work
+from rom.mbs.kernels.work import Work
 from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.state import State
 from rom.model import Array

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from rom.errors import ConfigError
 from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Event, Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.foreign import ask, numbers

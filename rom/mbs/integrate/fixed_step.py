@@ -14,7 +14,7 @@ from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.radau_start import first_steps
 from rom.mbs.integrate.run import Record, standing_at
 from rom.mbs.integrate.step_memory import begin, copied, recall, remember
-from rom.mbs.kernels.system import Work
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import padded, sampled
 from rom.mbs.results.state import State
 from rom.model import Array

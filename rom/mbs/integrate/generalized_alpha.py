@@ -9,7 +9,6 @@ Source:
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -31,7 +30,8 @@ from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.kernels.coordinates import follow_coordinates
 from rom.mbs.kernels.markers import own_block
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH
-from rom.model import Array, Index
+from rom.mbs.kernels.tables import Array1, Array3, Index1, Table, table
+from rom.model import Array
 
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
@@ -59,7 +59,8 @@ INCREMENT_SHARE = 1e-3
 JOINT_GAP_TOL = 1e-11
 
 
-class Step(NamedTuple):
+@table
+class Step(Table):
     """State, the trial state of the step under way, and the method.
 
     Attributes:
@@ -83,24 +84,24 @@ class Step(NamedTuple):
         drift: (n,) part of the increment of such a step that closes gaps.
     """
 
-    q: Array
-    v: Array
-    a: Array
-    vd: Array
-    lam: Array
-    q1: Array
-    v1: Array
-    vd1: Array
-    lam1: Array
-    psi: Array
-    work: Array
-    lost: Array
-    count: Index
-    size: Array
-    method: Array
-    bdf: Array
-    past: Array
-    drift: Array
+    q: Array1
+    v: Array1
+    a: Array1
+    vd: Array1
+    lam: Array1
+    q1: Array1
+    v1: Array1
+    vd1: Array1
+    lam1: Array1
+    psi: Array1
+    work: Array1
+    lost: Array1
+    count: Index1
+    size: Array1
+    method: Array1
+    bdf: Array1
+    past: Array3
+    drift: Array1
 
 
 def coefficients(h: float, rho_inf: float) -> Array:

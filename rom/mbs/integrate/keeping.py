@@ -34,7 +34,7 @@ MIN_INTERVAL, WRITE_TIME_FACTOR = 1.0, 60.0
 # of the time spent so far: what a long run risks, so that it does not leave thousands of parts
 MAX_LOSS_RATIO = 1 / 500
 # of a system: addresses differ between processes, the graph follows from the rest
-PASSING_FIELDS = {"graph", "address", "motor"}
+PASSING_FIELDS = {"graph", "address", "motor", "stages"}
 
 Block = tuple[Array, ...]
 
@@ -221,9 +221,9 @@ def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
 def _numbers(table: Any) -> list[Array]:
     """All arrays of nested tables that are the same in every process."""
     found: list[Array] = []
-    for name, value in table._asdict().items():
+    for name, value in table.items():
         if name not in PASSING_FIELDS:
-            found += _numbers(value) if hasattr(value, "_asdict") else [np.asarray(value)]
+            found += _numbers(value) if hasattr(value, "items") else [np.asarray(value)]
     return found
 
 

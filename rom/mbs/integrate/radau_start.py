@@ -16,7 +16,7 @@ from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.dop853 import Equations
 from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.run import Record
-from rom.mbs.kernels.system import Work
+from rom.mbs.kernels.work import Work
 from rom.mbs.results.state import State
 from rom.model import Array
 

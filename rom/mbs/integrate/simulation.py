@@ -20,7 +20,7 @@ from rom.mbs.integrate.generalized_alpha import advance
 from rom.mbs.integrate.keeping import Keeping, digests_of
 from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.kernels import compiled
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
@@ -113,7 +113,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     settings, packed = settings.after(state), pack(mechanism)
     settings.check_room(packed)
     if progress and not compiled.compiled_before(advance):
-        sys.stderr.write("compile the integrator, once on this machine: one or two minutes\n")
+        sys.stderr.write("compile the integrator, once on this machine: about half a minute\n")
     record = Record(mechanism, packed, settings, perf_counter(), given=state, keeping=keep)
     with terminable():
         try:

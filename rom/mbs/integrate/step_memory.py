@@ -13,7 +13,8 @@ from rom.mbs.integrate.bdf import multistep_coefficients
 from rom.mbs.integrate.consistent_start import with_accelerations
 from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.run import Record, Settings
-from rom.mbs.kernels.system import ROLL, Work
+from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
@@ -109,12 +110,12 @@ def across(record: Record, W: Work, state: State, shift: Array) -> Array:
 
 def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
     """The same from the blocks of masses and gradients at hand."""
-    system, columns = record.packed.system, np.atleast_2d(shift.T)
+    system, columns = record.packed.system, np.ascontiguousarray(np.atleast_2d(shift.T))
     gap, out = np.zeros(W.value.size), np.zeros_like(columns)
     if not factorised(system, W, 0.0):
         raise SolverError("the equations of motion are singular where constraints are met.")
     for column, motion in zip(columns, out, strict=True):
-        gradient_times(system, W, np.ascontiguousarray(column), False, gap)
+        gradient_times(system, W, column, False, gap)
         least_motion(system, W, gap, motion)
     return out.T.reshape(shift.shape)
 
@@ -153,7 +154,7 @@ def go_on(memory: Memory, step: Step) -> None:
 
 def copied(step: Step) -> Step:
     """A step memory of its own with the same content."""
-    return Step(*(x.copy() for x in step))
+    return Step(*(x.copy() for _, x in step.items()))
 
 
 def fits(memory: Memory | None, method: Array, weights: Array) -> bool:

@@ -17,8 +17,7 @@ FOLDER = PACKAGE / "mbs"  # kernels lie in several folders below
 STAMP = FOLDER / "__pycache__" / "kernels.sha256"
 
 USER = b".compiled import"  # in sources of kernels
-# constants, layouts and options that kernels contain
-BUILT_IN = {"system.py", "compiled.py", "plan.py"}
+BUILT_IN = "kernels"  # folder of what kernels contain: constants, layouts and options
 
 
 def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:
@@ -26,7 +25,7 @@ def drop_stale_cache(folder: Path = FOLDER, stamp: Path = STAMP) -> bool:
     digest = hashlib.sha256(Path(__file__).read_bytes())
     for source in sorted(folder.rglob("*.py")):
         text = source.read_bytes()
-        if source.name in BUILT_IN or USER in text:
+        if source.parent.name == BUILT_IN or USER in text:
             digest.update(text)
     try:
         if stamp.exists() and stamp.read_text() == digest.hexdigest():

@@ -2,10 +2,24 @@
 
 import math
 
+from numba import types
+
 from rom.mbs.kernels.algebra import add, cross, dot, place, row, scale, sub, turn, unit
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.rolling import rolling_row, rolling_stiffness
-from rom.mbs.kernels.system import ALONG, ANGLE, COUPLING, DISTANCE, NORMAL, POINT, ROLL, TOUCH
+from rom.mbs.kernels.stages import stage
+from rom.mbs.kernels.system import (
+    ALONG,
+    ANGLE,
+    COUPLING,
+    DISTANCE,
+    NORMAL,
+    POINT,
+    ROLL,
+    TOUCH,
+    System,
+)
+from rom.mbs.kernels.work import Work
 
 
 @inner
@@ -150,7 +164,7 @@ def block_of(graph, b, c):
     return low
 
 
-@inner
+@stage(types.void, System, Work)
 def constraint_gradient(s, W):
     """Assemble G (m, n), the gradient of all rows in the velocities."""
     bodies, markers, rows, G, graph = s.bodies, s.markers, s.rows, W.G, s.graph

@@ -6,12 +6,11 @@ a chain or tree grow with its length only. `rom.mbs.equations.graph` makes both 
 mechanism.
 """
 
-from typing import NamedTuple
-
-from rom.model import Index
+from rom.mbs.kernels.tables import Index1, Index2, Table, table
 
 
-class Plan(NamedTuple):
+@table
+class Plan(Table):
     """Elimination of k nodes, each coupled to later nodes with c unknowns together.
 
     The factor is one vector. Of each node it holds the pivot (d, d), the block to its right
@@ -30,28 +29,29 @@ class Plan(NamedTuple):
         memory: (1,) length of the factor.
     """
 
-    position: Index
-    size: Index
-    wide: Index
-    start: Index
-    pivot: Index
-    right: Index
-    below: Index
-    next_first: Index
-    next: Index
-    shift: Index
-    pair_first: Index
-    target: Index
-    stride: Index
-    block_to: Index
-    block_stride: Index
-    row_to: Index
-    row_back: Index
-    row_stride: Index
-    memory: Index
+    position: Index1
+    size: Index1
+    wide: Index1
+    start: Index1
+    pivot: Index1
+    right: Index1
+    below: Index1
+    next_first: Index1
+    next: Index1
+    shift: Index1
+    pair_first: Index1
+    target: Index1
+    stride: Index1
+    block_to: Index1
+    block_stride: Index1
+    row_to: Index2
+    row_back: Index2
+    row_stride: Index2
+    memory: Index1
 
 
-class Graph(NamedTuple):
+@table
+class Graph(Table):
     """Where the entries of two bodies, or of a row and a body, are stored.
 
     Attributes:
@@ -66,13 +66,13 @@ class Graph(NamedTuple):
     """
 
     compact: int
-    first: Index
-    other: Index
-    x: Index
-    y: Index
-    own: Index
-    body: Index
-    at: Index
-    joint_first: Index
-    joint_rows: Index
+    first: Index1
+    other: Index1
+    x: Index1
+    y: Index1
+    own: Index1
+    body: Index2
+    at: Index2
+    joint_first: Index1
+    joint_rows: Index1
     plan: Plan

@@ -1,4 +1,4 @@
-"""The mechanism as flat arrays, in tuples that compiled code understands.
+"""The mechanism as flat arrays, in tables that compiled code understands.
 
 ``r`` is the number of elastic coordinates of one body, R the largest one, n the number of
 velocities, m the number of constraint rows. Coordinates of a body: position of the origin (3),
@@ -6,12 +6,8 @@ quaternion (4), elastic (r). Velocities: of the origin in the world (3), angular
 body frame (3), elastic (r). A marker twist is velocity (3), then angular velocity (3), world.
 """
 
-from typing import NamedTuple
-
-import numpy as np
-
 from rom.mbs.kernels.plan import Graph
-from rom.model import Array, Index
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Array4, Index1, Index2, Table, table
 
 # kinds of constraint rows
 POINT, ALONG, NORMAL, ANGLE, DISTANCE, COUPLING, TOUCH, ROLL = range(8)
@@ -23,14 +19,12 @@ PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
 # numbers that the law of a non-linear element may use as memory
 LAW_MEMORY_SIZE = 256
-# velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
-# case that a block of a body or joint is singular for itself
-LARGEST_WHOLE = 2000
 # columns of the work done since the start
 WORK = ("drives", "forces", "damping")
 
 
-class Bodies(NamedTuple):
+@table
+class Bodies(Table):
     """Inertia, stiffness and damping of all bodies; rigid ones have r = 0.
 
     Attributes:
@@ -50,26 +44,27 @@ class Bodies(NamedTuple):
         gravity: (3,) [m/s^2].
     """
 
-    q_at: Index
-    v_at: Index
-    r: Index
-    flex: Index
-    mass: Array
-    first: Array
-    second: Array
-    S: Array
-    S1: Array
-    S2: Array
-    M: Array
-    K: Array
-    C: Array
-    stiffened: Index
-    T: Array
-    T1: Array
-    gravity: Array
+    q_at: Index1
+    v_at: Index1
+    r: Index1
+    flex: Index1
+    mass: Array1
+    first: Array2
+    second: Array3
+    S: Array3
+    S1: Array3
+    S2: Array3
+    M: Array3
+    K: Array3
+    C: Array3
+    stiffened: Index1
+    T: Array3
+    T1: Array3
+    gravity: Array1
 
 
-class Markers(NamedTuple):
+@table
+class Markers(Table):
     """Points with axes on bodies: P = r + A (x + shape q + q bend q / 2), axes A exp(twist q).
 
     Attributes:
@@ -80,14 +75,15 @@ class Markers(NamedTuple):
         bend: (k, 6, R, R) displacement and rotation of second order, of stiffened bodies.
     """
 
-    body: Index
-    point: Array
-    shape: Array
-    twist: Array
-    bend: Array
+    body: Index1
+    point: Array2
+    shape: Array3
+    twist: Array3
+    bend: Array4
 
 
-class Rows(NamedTuple):
+@table
+class Rows(Table):
     """Scalar constraints between marker i and marker j.
 
     Attributes:
@@ -109,40 +105,42 @@ class Rows(NamedTuple):
         joint_i, joint_j: (p,) markers of each joint.
     """
 
-    kind: Index
-    i: Index
-    j: Index
-    k: Index
-    l: Index
-    a: Array
-    b: Array
-    c: Array
-    at: Index
-    factor: Array
-    offset: Array
-    signal: Index
-    pair: Index
-    joint_i: Index
-    joint_j: Index
+    kind: Index1
+    i: Index1
+    j: Index1
+    k: Index1
+    l: Index1
+    a: Array2
+    b: Array2
+    c: Array2
+    at: Index2
+    factor: Array2
+    offset: Array1
+    signal: Index1
+    pair: Index1
+    joint_i: Index1
+    joint_j: Index1
 
 
-class Coordinates(NamedTuple):
+@table
+class Coordinates(Table):
     """Joint coordinates that forces or couplings act on.
 
     Attributes:
         kind: (c,) ALONG or ANGLE; i, j, a, b, c, offset: as in `Rows`.
     """
 
-    kind: Index
-    i: Index
-    j: Index
-    a: Array
-    b: Array
-    c: Array
-    offset: Array
+    kind: Index1
+    i: Index1
+    j: Index1
+    a: Array2
+    b: Array2
+    c: Array2
+    offset: Array1
 
 
-class Forces(NamedTuple):
+@table
+class Forces(Table):
     """Springs, loads and rotational springs.
 
     Attributes:
@@ -154,18 +152,19 @@ class Forces(NamedTuple):
         turn: (t, 3) stiffness [N m/rad], damping [N m s/rad], free angle [rad].
     """
 
-    spring_i: Index
-    spring_j: Index
-    spring: Array
-    load_at: Index
-    load_kind: Index
-    load: Array
-    load_signal: Index
-    turn_at: Index
-    turn: Array
+    spring_i: Index1
+    spring_j: Index1
+    spring: Array2
+    load_at: Index1
+    load_kind: Index1
+    load: Array2
+    load_signal: Index1
+    turn_at: Index1
+    turn: Array2
 
 
-class Actions(NamedTuple):
+@table
+class Actions(Table):
     """Motors, friction and stops on joint coordinates.
 
     Attributes:
@@ -179,18 +178,19 @@ class Actions(NamedTuple):
             damping factor [s/m or s/rad].
     """
 
-    motor_at: Index
-    motor: Index
-    clock: Index
-    friction_at: Index
-    friction: Array
-    load_first: Index
-    load_count: Index
-    stop_at: Index
-    stop: Array
+    motor_at: Index1
+    motor: Index1
+    clock: Index1
+    friction_at: Index1
+    friction: Array2
+    load_first: Index1
+    load_count: Index1
+    stop_at: Index1
+    stop: Array2
 
 
-class Bushings(NamedTuple):
+@table
+class Bushings(Table):
     """Springs and dampers in six directions.
 
     Attributes:
@@ -202,19 +202,20 @@ class Bushings(NamedTuple):
         piece: (n, 7) lower end, origin, four coefficients of powers, energy at the origin.
     """
 
-    i: Index
-    j: Index
-    frame_i: Array
-    frame_j: Array
-    zero: Array
-    stiffness: Array
-    damping: Array
-    curve: Index
-    pieces: Index
-    piece: Array
+    i: Index1
+    j: Index1
+    frame_i: Array3
+    frame_j: Array3
+    zero: Array2
+    stiffness: Array3
+    damping: Array3
+    curve: Index2
+    pieces: Index2
+    piece: Array2
 
 
-class Contacts(NamedTuple):
+@table
+class Contacts(Table):
     """A sphere or disc on marker j that touches something on marker i.
 
     Attributes:
@@ -227,16 +228,17 @@ class Contacts(NamedTuple):
             which friction changes its sign [m/s].
     """
 
-    kind: Index
-    i: Index
-    j: Index
-    e: Array
-    s: Array
-    radius: Array
-    law: Array
+    kind: Index1
+    i: Index1
+    j: Index1
+    e: Array2
+    s: Array2
+    radius: Array2
+    law: Array2
 
 
-class Spread(NamedTuple):
+@table
+class Spread(Table):
     """Loads spread over bodies.
 
     Attributes:
@@ -247,16 +249,17 @@ class Spread(NamedTuple):
         amplitude: (l,) factor; signal: (l,) function of time added to it, -1 for none.
     """
 
-    body: Index
-    world: Index
-    force: Array
-    first: Array
-    shapes: Array
-    amplitude: Array
-    signal: Index
+    body: Index1
+    world: Index1
+    force: Array2
+    first: Array2
+    shapes: Array3
+    amplitude: Array1
+    signal: Index1
 
 
-class Nonlinear(NamedTuple):
+@table
+class Nonlinear(Table):
     """Elements of non-linear bodies between up to K frames, each with a compiled law.
 
     Attributes:
@@ -266,15 +269,17 @@ class Nonlinear(NamedTuple):
         numbers: (e, c) what the law knows of the element.
     """
 
-    address: Index
-    count: Index
-    body: Index
-    numbers: Array
+    address: Index1
+    count: Index1
+    body: Index2
+    numbers: Array2
 
 
-class System(NamedTuple):
-    """Everything that stays constant during a run."""
+@table
+class System(Table):
+    """Everything that stays constant during a run; first the addresses of the stages."""
 
+    stages: Index1
     bodies: Bodies
     markers: Markers
     rows: Rows
@@ -286,127 +291,3 @@ class System(NamedTuple):
     spread: Spread
     nonlinear: Nonlinear
     graph: Graph | None = None
-
-
-class Work(NamedTuple):
-    """Memory for the quantities of one instant; nothing is allocated during a time step."""
-
-    A: Array  # (b, 3, 3) orientation
-    Ct: Array  # (b, 3, R) first moment per elastic coordinate
-    d: Array  # (b, 3) first moment
-    dd: Array  # (b, 3) rate of the first moment in the body frame
-    J: Array  # (b, 3, 3) inertia about the origin
-    SP: Array  # (b, R, 9) integral of rho P phi_k, P the deformed position
-    Sd: Array  # (b, R, 9) integral of rho (dP/dt) phi_k
-    SPd: Array  # (b, 3, 3) integral of rho P (dP/dt)
-    Sa: Array  # (R, 9) integral of rho (d2P/dt2) phi_k
-    Td: Array  # (b, R, 3) integral of rho psi_kl dq_l/dt
-    T1d: Array  # (b, R, 9) integral of rho X psi_kl dq_l/dt
-    Ta: Array  # (R, 3) integral of rho psi_kl d2q_l/dt2
-    T1a: Array  # (R, 9) integral of rho X psi_kl d2q_l/dt2
-    line: Array  # (9 R,) the rows of a contraction, one after the other
-    P: Array  # (k, 3) marker positions
-    E: Array  # (k, 3, 3) marker axes
-    V: Array  # (k, 6) marker twists
-    conv: Array  # (k, 6) marker accelerations at zero accelerations of the coordinates
-    H: Array  # (k, 6, 6 + R) marker twist as a function of the body velocities
-    move: Array  # (k, 6, R) displacement and rotation of a marker per elastic rate, body frame
-    u: Array  # (k, 3) marker positions in the body frame
-    theta: Array  # (k, 3) marker rotation vectors
-    wrench: Array  # (k, 6) force and moment on each marker
-    user: Array  # (k, 6) force and moment from Python functions
-    arm: Array  # (l, 9) sum of positions and forces of spread loads, body frame
-    pose: Array  # (e, 13 K) frames of non-linear elements: position, quaternion, velocities
-    answer: Array  # (2 + 6 K + 72 K^2,) what the law of an element says
-    space: Array  # (LAW_MEMORY_SIZE,) for the laws to use as they like
-    signal: Array  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
-    x: Array  # (c,) joint coordinates, angles followed over whole turns
-    xd: Array  # (c,) their rates
-    xc: Array  # (c,) their convective accelerations
-    xg: Array  # (c, 12) their gradients in the twists of their two markers
-    value: Array  # (m,) constraint residual
-    g: Array  # (m, 24) constraint gradient in the twists of its two or four markers
-    gamma: Array  # (m,) convective term of the constraint acceleration
-    G: Array  # (m, n) constraint gradient in the velocities; blocks in a row if they are stored
-    base: Array  # (c,) joint coordinates at the last accepted instant
-    power: Array  # (3,) of drives and motors, of forces, lost in dampers and friction
-    driven: Array  # (1,) power of motors
-    motor: Array  # (k,) forces of motors whose law is in Python
-    residual: Array  # (n,) equations of motion
-    S: Array  # (n, n) mass and damping part of the iteration matrix; or blocks below each other
-    Kt: Array  # as S: stiffness part
-    Q: Array  # (12, 12) stiffness of a pair of markers
-    QH: Array  # (12, 12 + 2 R)
-    lu: Array  # (n + m, n + m)
-    factor: Array  # the factor by blocks, see rom.mbs.kernels.plan.Plan
-    by_blocks: Index  # (1,) whether the factor at hand is the one by blocks
-    pivot: Index  # (n + m,)
-    spare: Array  # (n + m,)
-    rhs: Array  # (n + m,)
-    scaling: Array  # (n + m,)
-    weight: Array  # (n,) mass weights of the norm of increments
-    U: Array  # (m, m) range of the constraints, leading rows
-    U_lu: Array  # (m, m) the range that is built into lu
-    UG: Array  # (m, n) U_lu^T G, leading rows
-    UGT: Array  # (m, n) the same in increments of the rotation vectors of a step
-    remainder: Array  # (n, m)
-    part: Array  # (m,)
-    delta: Array  # (n,) increment
-    dlam: Array  # (m,) increment of the multipliers
-
-
-def workspace(system: System, n_signals: int) -> Work:
-    """Zeroed memory that fits the system."""
-    bodies, markers, rows = system.bodies, system.markers, system.rows
-    b, k, m, c = bodies.mass.size, markers.body.size, rows.kind.size, system.coordinates.kind.size
-    R = bodies.K.shape[1]
-    n = int(6 * b + bodies.r.sum())
-    square, wide, whole = (n, n), n, n + m
-    if system.graph.compact:
-        square = (int(np.repeat(6 + bodies.r, np.diff(system.graph.first)).sum()), 6 + R)
-        moved = system.graph.body
-        wide = int((system.graph.at + 6 + bodies.r[moved])[moved >= 0].max(initial=0))
-        whole = n + m if n + m <= LARGEST_WHOLE else 0
-    redundant = (0, 0) if system.graph.compact else (m, m)
-    e, K = system.nonlinear.body.shape
-    shapes = {
-        **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
-        **dict.fromkeys(("d", "dd"), (b, 3)),
-        **dict.fromkeys(("SP", "Sd"), (b, R, 9)),
-        "Ct": (b, 3, R),
-        "Td": (b, R, 3),
-        "T1d": (b, R, 9),
-        "Ta": (R, 3),
-        **dict.fromkeys(("Sa", "T1a"), (R, 9)),
-        "line": (9 * R,),
-        "move": (k, 6, R),
-        **dict.fromkeys(("P", "u", "theta"), (k, 3)),
-        "E": (k, 3, 3),
-        **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),
-        "H": (k, 6, 6 + R),
-        "pose": (e, 13 * K),
-        "answer": (2 + 6 * K + 72 * K * K,),
-        "space": (LAW_MEMORY_SIZE,),
-        "arm": (system.spread.body.size, 9),
-        "signal": (n_signals, 3),
-        **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
-        "g": (m, 24),
-        **dict.fromkeys(("x", "xd", "xc", "base"), (c,)),
-        "xg": (c, 12),
-        **dict.fromkeys(("G", "UG", "UGT"), (m, wide)),
-        "remainder": (0, 0) if system.graph.compact else (n, m),
-        "power": (3,),
-        "driven": (1,),
-        "motor": (system.actions.motor_at.size,),
-        **dict.fromkeys(("residual", "weight", "delta"), (n,)),
-        **dict.fromkeys(("S", "Kt"), square),
-        "Q": (12, 12),
-        "QH": (12, 12 + 2 * R),
-        "lu": (whole, whole),
-        "factor": tuple(system.graph.plan.memory),
-        **dict.fromkeys(("rhs", "scaling", "spare"), (n + m,)),
-        **dict.fromkeys(("U", "U_lu"), redundant),
-    }
-    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    whole_numbers = {"pivot": np.zeros(n + m, dtype=np.int64), "by_blocks": np.zeros(1, int)}
-    return Work(**arrays, **whole_numbers)

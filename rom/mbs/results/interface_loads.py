@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from rom.mbs.equations.equations import balance, evaluate
+from rom.mbs.equations.equations import evaluate, residual
 from rom.mbs.equations.python_laws import apply_laws, laws
-from rom.mbs.kernels.system import Work, workspace
+from rom.mbs.kernels.work import Work, workspace
 from rom.model import Array
 
 
@@ -36,7 +36,7 @@ def _at(solution: Any, W: Work, forces: Any, i: int) -> None:
     W.signal[:], W.base[:] = solution.signals[i], solution.base[i]
     evaluate(solution.packed.system, W, q, v)
     apply_laws(forces, W, float(solution.t[i]))
-    balance(solution.packed.system, W, q, v, solution.a[i], solution.lam[i])
+    residual(solution.packed.system, W, q, v, solution.a[i], solution.lam[i])
 
 
 def of_body(solution: Any, body: str, loads: tuple[Array, Array], frame: str) -> dict[Any, Array]:

@@ -14,7 +14,7 @@ from rom.mbs.kernels.algebra import add, cross, mtv, mv, put, scale, vec
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.inertia import body_energy
 from rom.mbs.kernels.integrals import dual
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.model import Array
 
 

@@ -15,7 +15,7 @@ from rom.errors import RomWarning
 from rom.mbs.equations.equations import evaluate, residual, tangents
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.simulation import simulate
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 
 

@@ -19,7 +19,7 @@ from rom.mbs.elements.nonlinear import Elements, Frames
 from rom.mbs.equations.equations import retract
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import initial_state
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.view.scenes.film import shades_of
 
 ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x

@@ -22,7 +22,7 @@ from rom.components.wind.wind_turbine import RATED_SPEED, blade
 from rom.errors import ConfigError
 from rom.mbs.equations.equations import retract
 from rom.mbs.equations.packing import pack
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 
 WIND = 11.4
 

@@ -301,7 +301,7 @@ def test_states_that_do_not_fit_are_named():
         rom.linearize(chain(held=True), good)
     with pytest.raises(ConfigError, match="frame: no body"):
         rom.linearize(mech, good, frame={"bib": "world"})
-    with pytest.raises(ConfigError, match="it is 'body' or 'world'"):
+    with pytest.raises(ConfigError, match="is none of 'body', 'world'"):
         rom.linearize(mech, good, frame="hub")
     with pytest.raises(ConfigError, match="must be of type Mechanism"):
         rom.linearize(good)

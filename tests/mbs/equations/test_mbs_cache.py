@@ -17,9 +17,14 @@ def test_only_sources_of_kernels_drop_them(tmp_path):
     assert not drop_stale_cache(tmp_path, stamp)
     plain.write_text("text = 2\n")
     assert not drop_stale_cache(tmp_path, stamp) and code.exists()
-    for source in (kernels, tmp_path / "system.py"):
+    layout = tmp_path / "kernels" / "layout.py"
+    layout.parent.mkdir()
+    for source, text in (
+        (kernels, "from rom.mbs.kernels.compiled import inner\n"),
+        (layout, "SIZE = 3\n"),
+    ):
         code.write_text("machine code")
-        source.write_text("from rom.mbs.kernels.compiled import inner\n")
+        source.write_text(text)
         assert drop_stale_cache(tmp_path, stamp) and not code.exists()
 
 

@@ -18,7 +18,7 @@ from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.integrate.step_memory import across
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 
 Z, GRAVITY = (0, 0, 1), 9.81
@@ -272,7 +272,7 @@ def lengths(mech):
     plan = packed.system.graph.plan
     d, c = plan.size.astype(float), plan.wide.astype(float)
     W = workspace(packed.system, len(packed.signals))
-    small = sum(x.size for name, x in W._asdict().items() if name != "lu")
+    small = sum(x.size for name, x in W.items() if name != "lu")
     return np.array([plan.memory[0], (d**3 * 2 / 3 + 2 * d * d * c + 2 * d * c * c).sum(), small])
 
 

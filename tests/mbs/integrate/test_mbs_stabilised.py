@@ -12,7 +12,7 @@ from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.integrate.bdf import joined, multistep_coefficients
-from rom.mbs.kernels.system import workspace
+from rom.mbs.kernels.work import workspace
 
 BDF = [{"method": "bdf", "order": k} for k in (1, 3, 4, 5)]
 STABILISED = [{"stabilised": True}, {"method": "bdf", "stabilised": True}]

@@ -1,0 +1,128 @@
+"""Stages: kernels that are compiled alone, and called by other kernels through their address.
+
+A kernel that calls another one takes its code into its own, and all of it is optimised once more.
+A stage is compiled once, whoever calls it, and only for systems that need it; its address stands
+in a table that the system begins with.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils, config
+from numba.core.errors import TypingError
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import lower_builtin
+
+from rom.mbs.kernels.compiled import OPTIONS
+from rom.mbs.kernels.tables import TABLE_WORD
+
+REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
+REAL_MATRIX = types.Array(types.float64, 2, "C")
+THREE_FACTORS = types.UniTuple(types.float64, 3)
+# of tangents: factors of stiffness and damping, and the matrices they are added to
+TANGENT_TYPES = (types.float64, types.float64, REAL_MATRIX, REAL_MATRIX)
+# Compiled code knows a stage by its place here, whatever is imported first.
+STAGE_NAMES = (
+    "evaluate",
+    "residual",
+    "tangents",
+    "constraint_gradient",
+    "factorise_bordered",
+    "solve_bordered",
+    "applied_wrenches",
+    "force_tangents",
+    "action_wrenches",
+    "action_tangents",
+    "bushing_wrenches",
+    "bushing_tangents",
+    "contact_wrenches",
+    "contact_tangents",
+    "spread_residuals",
+    "spread_tangents",
+    "nonlinear_residuals",
+    "nonlinear_tangents",
+)
+STAGE_KERNELS: dict[str, "Stage"] = {}
+STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked
+
+
+def _always(_: Any) -> bool:
+    return True
+
+
+class Stage:
+    """A kernel with a fixed signature, callable from Python and, once linked, from kernels.
+
+    Its first argument is the system. A call in a kernel does nothing, and answers 0, unless some
+    system of this process needed it.
+
+    Attributes:
+        signature: types of result and arguments.
+        kernel: the compiled function.
+        needed: whether a system asks for it.
+        slot: its place in `STAGE_ADDRESSES`.
+    """
+
+    def __init__(self, function: Callable[..., Any], types_: Any, needed: Callable[[Any], Any]):
+        result, *arguments = (getattr(kind, "_numba_type_", kind) for kind in types_)
+        self.signature, self.needed = result(*arguments), needed
+        self.kernel = njit(**OPTIONS, no_cfunc_wrapper=True)(function)
+        self.slot = STAGE_NAMES.index(function.__name__)
+        STAGE_KERNELS[function.__name__] = self
+        called = {"key": self, "generic": lambda typing, given, _: self._typed(typing, given)}
+        infer_global(self, types.Function(type(function.__name__, (AbstractTemplate,), called)))
+        lower_builtin(self, types.VarArg(types.Any))(self._call)
+
+    def link(self) -> None:
+        """Compile it, or take it from the cache, unless that has been done."""
+        if STAGE_ADDRESSES[self.slot] or config.DISABLE_JIT:
+            return
+        self.kernel.compile(self.signature)
+        self.kernel.disable_compile()
+        compiled = self.kernel.overloads[self.signature.args]
+        name = compiled.fndesc.llvm_func_name
+        STAGE_ADDRESSES[self.slot] = compiled.library.get_pointer_to_function(name)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run it from Python."""
+        return self.kernel(*arguments)
+
+    def _typed(self, typing: Any, given: Any) -> Any:
+        """The signature, for a call in a kernel."""
+        for kind, asked in zip(given, self.signature.args, strict=True):
+            if typing.context.can_convert(kind, asked) is None:
+                raise TypingError(f"{self.kernel.__name__} takes {asked}, not {kind}.")
+        return self.signature
+
+    def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        """What a call in a kernel becomes."""
+        addresses = builder.inttoptr(builder.load(values[0]), TABLE_WORD.as_pointer())
+        address = builder.load(builder.gep(addresses, [ir.Constant(TABLE_WORD, self.slot)]))
+        kind = context.call_conv.get_function_type(signature.return_type, signature.args)
+        code = builder.inttoptr(address, kind.as_pointer())
+        nothing = context.get_constant_null(signature.return_type)
+        answer = cgutils.alloca_once_value(builder, nothing)
+        with builder.if_then(cgutils.is_not_null(builder, code), likely=True):
+            shape = signature.return_type, signature.args
+            builder.store(context.call_conv.call_function(builder, code, *shape, values)[1], answer)
+        return builder.load(answer)
+
+
+def stage(*types_: Any, needed: Callable[[Any], Any] = _always) -> Callable[[Any], Stage]:
+    """Make a function a stage.
+
+    Args:
+        types_: of the result and of the arguments, classes of tables or types of Numba.
+        needed: system -> whether it asks for this stage; always unless told.
+    """
+    return lambda function: Stage(function, types_, needed)
+
+
+def link(system: Any) -> None:
+    """Compile all stages that a system needs, before kernels call them."""
+    for one in STAGE_KERNELS.values():
+        if one.needed(system):
+            one.link()

@@ -1,0 +1,137 @@
+"""Memory for what is computed of a system at one instant."""
+
+import numpy as np
+
+from rom.mbs.kernels.stages import link
+from rom.mbs.kernels.system import LAW_MEMORY_SIZE, System
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Table, table
+
+# velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
+# case that a block of a body or joint is singular for itself
+LARGEST_WHOLE = 2000
+
+
+@table
+class Work(Table):
+    """Memory for the quantities of one instant; nothing is allocated during a time step."""
+
+    A: Array3  # (b, 3, 3) orientation
+    Ct: Array3  # (b, 3, R) first moment per elastic coordinate
+    d: Array2  # (b, 3) first moment
+    dd: Array2  # (b, 3) rate of the first moment in the body frame
+    J: Array3  # (b, 3, 3) inertia about the origin
+    SP: Array3  # (b, R, 9) integral of rho P phi_k, P the deformed position
+    Sd: Array3  # (b, R, 9) integral of rho (dP/dt) phi_k
+    SPd: Array3  # (b, 3, 3) integral of rho P (dP/dt)
+    Sa: Array2  # (R, 9) integral of rho (d2P/dt2) phi_k
+    Td: Array3  # (b, R, 3) integral of rho psi_kl dq_l/dt
+    T1d: Array3  # (b, R, 9) integral of rho X psi_kl dq_l/dt
+    Ta: Array2  # (R, 3) integral of rho psi_kl d2q_l/dt2
+    T1a: Array2  # (R, 9) integral of rho X psi_kl d2q_l/dt2
+    line: Array1  # (9 R,) the rows of a contraction, one after the other
+    P: Array2  # (k, 3) marker positions
+    E: Array3  # (k, 3, 3) marker axes
+    V: Array2  # (k, 6) marker twists
+    conv: Array2  # (k, 6) marker accelerations at zero accelerations of the coordinates
+    H: Array3  # (k, 6, 6 + R) marker twist as a function of the body velocities
+    move: Array3  # (k, 6, R) displacement and rotation of a marker per elastic rate, body frame
+    u: Array2  # (k, 3) marker positions in the body frame
+    theta: Array2  # (k, 3) marker rotation vectors
+    wrench: Array2  # (k, 6) force and moment on each marker
+    user: Array2  # (k, 6) force and moment from Python functions
+    arm: Array2  # (l, 9) sum of positions and forces of spread loads, body frame
+    pose: Array2  # (e, 13 K) frames of non-linear elements: position, quaternion, velocities
+    answer: Array1  # (2 + 6 K + 72 K^2,) what the law of an element says
+    space: Array1  # (LAW_MEMORY_SIZE,) for the laws to use as they like
+    signal: Array2  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
+    x: Array1  # (c,) joint coordinates, angles followed over whole turns
+    xd: Array1  # (c,) their rates
+    xc: Array1  # (c,) their convective accelerations
+    xg: Array2  # (c, 12) their gradients in the twists of their two markers
+    value: Array1  # (m,) constraint residual
+    g: Array2  # (m, 24) constraint gradient in the twists of its two or four markers
+    gamma: Array1  # (m,) convective term of the constraint acceleration
+    G: Array2  # (m, n) constraint gradient in the velocities; blocks in a row if they are stored
+    base: Array1  # (c,) joint coordinates at the last accepted instant
+    power: Array1  # (3,) of drives and motors, of forces, lost in dampers and friction
+    driven: Array1  # (1,) power of motors
+    motor: Array1  # (k,) forces of motors whose law is in Python
+    residual: Array1  # (n,) equations of motion
+    S: Array2  # (n, n) mass and damping part of the iteration matrix; or blocks below each other
+    Kt: Array2  # as S: stiffness part
+    Q: Array2  # (12, 12) stiffness of a pair of markers
+    QH: Array2  # (12, 12 + 2 R)
+    lu: Array2  # (n + m, n + m)
+    factor: Array1  # the factor by blocks, see rom.mbs.kernels.plan.Plan
+    by_blocks: Index1  # (1,) whether the factor at hand is the one by blocks
+    pivot: Index1  # (n + m,)
+    spare: Array1  # (n + m,)
+    rhs: Array1  # (n + m,)
+    scaling: Array1  # (n + m,)
+    weight: Array1  # (n,) mass weights of the norm of increments
+    U: Array2  # (m, m) range of the constraints, leading rows
+    U_lu: Array2  # (m, m) the range that is built into lu
+    UG: Array2  # (m, n) U_lu^T G, leading rows
+    UGT: Array2  # (m, n) the same in increments of the rotation vectors of a step
+    remainder: Array2  # (n, m)
+    part: Array1  # (m,)
+    delta: Array1  # (n,) increment
+    dlam: Array1  # (m,) increment of the multipliers
+
+
+def workspace(system: System, n_signals: int) -> Work:
+    """Zeroed memory that fits the system, whose stages are linked: no kernel runs without it."""
+    link(system)
+    bodies, markers, rows = system.bodies, system.markers, system.rows
+    b, k, m, c = bodies.mass.size, markers.body.size, rows.kind.size, system.coordinates.kind.size
+    R = bodies.K.shape[1]
+    n = int(6 * b + bodies.r.sum())
+    square, wide, whole = (n, n), n, n + m
+    if system.graph.compact:
+        square = (int(np.repeat(6 + bodies.r, np.diff(system.graph.first)).sum()), 6 + R)
+        moved = system.graph.body
+        wide = int((system.graph.at + 6 + bodies.r[moved])[moved >= 0].max(initial=0))
+        whole = n + m if n + m <= LARGEST_WHOLE else 0
+    redundant = (0, 0) if system.graph.compact else (m, m)
+    e, K = system.nonlinear.body.shape
+    shapes = {
+        **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
+        **dict.fromkeys(("d", "dd"), (b, 3)),
+        **dict.fromkeys(("SP", "Sd"), (b, R, 9)),
+        "Ct": (b, 3, R),
+        "Td": (b, R, 3),
+        "T1d": (b, R, 9),
+        "Ta": (R, 3),
+        **dict.fromkeys(("Sa", "T1a"), (R, 9)),
+        "line": (9 * R,),
+        "move": (k, 6, R),
+        **dict.fromkeys(("P", "u", "theta"), (k, 3)),
+        "E": (k, 3, 3),
+        **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),
+        "H": (k, 6, 6 + R),
+        "pose": (e, 13 * K),
+        "answer": (2 + 6 * K + 72 * K * K,),
+        "space": (LAW_MEMORY_SIZE,),
+        "arm": (system.spread.body.size, 9),
+        "signal": (n_signals, 3),
+        **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
+        "g": (m, 24),
+        **dict.fromkeys(("x", "xd", "xc", "base"), (c,)),
+        "xg": (c, 12),
+        **dict.fromkeys(("G", "UG", "UGT"), (m, wide)),
+        "remainder": (0, 0) if system.graph.compact else (n, m),
+        "power": (3,),
+        "driven": (1,),
+        "motor": (system.actions.motor_at.size,),
+        **dict.fromkeys(("residual", "weight", "delta"), (n,)),
+        **dict.fromkeys(("S", "Kt"), square),
+        "Q": (12, 12),
+        "QH": (12, 12 + 2 * R),
+        "lu": (whole, whole),
+        "factor": tuple(system.graph.plan.memory),
+        **dict.fromkeys(("rhs", "scaling", "spare"), (n + m,)),
+        **dict.fromkeys(("U", "U_lu"), redundant),
+    }
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    whole_numbers = {"pivot": np.zeros(n + m, dtype=np.int64), "by_blocks": np.zeros(1, int)}
+    return Work(**arrays, **whole_numbers)

@@ -1,0 +1,162 @@
+"""Tables and stages: what compiled code is told of arrays, and which kernels a system asks for."""
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rom
+from cases.command import environment
+from cases.mbs.mechanisms import random_body
+from rom.components.cosserat import body, straight
+from rom.mbs.equations.packing import pack
+from rom.mbs.kernels.compiled import kernel
+from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES
+from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
+
+
+@table
+class Inner(Table):
+    """Numbers below another table."""
+
+    x: Array1
+    n: int
+
+
+@table
+class Outer(Table):
+    """A table with another one."""
+
+    blocks: Array3
+    at: Index2
+    inner: Inner | None
+
+
+@kernel
+def probed(t, out):
+    """Write a number from every field, and into one."""
+    out[0], out[1], out[2] = t.blocks[1, 2, 3], t.at[2, 1], t.inner.x[1]
+    out[3], out[4], out[5] = t.inner.n, t.blocks.shape[2], t.at.strides[0]
+    t.inner.x[0] = -1.0
+
+
+def outer():
+    blocks = np.arange(24.0).reshape(2, 3, 4)
+    return Outer(blocks, np.arange(6).reshape(3, 2), Inner(np.array([0.5, 1.5]), 7))
+
+
+def test_compiled_code_reads_and_writes_the_arrays_of_a_table():
+    t, out = outer(), np.zeros(6)
+    probed(t, out)
+    np.testing.assert_array_equal(out, [t.blocks[1, 2, 3], 5, 1.5, 7, 4, 16])
+    assert t.inner.x[0] == -1.0
+
+
+def test_a_table_is_copied_with_its_arrays_only():
+    t = outer()
+    again, changed = pickle.loads(pickle.dumps(t)), t.replace(inner=Inner(np.array([3.0, 4.0]), 8))
+    out = np.zeros((2, 6))
+    probed(again, out[0])
+    probed(changed, out[1])
+    np.testing.assert_array_equal(out, [[23, 5, 1.5, 7, 4, 16], [23, 5, 4.0, 8, 4, 16]])
+    assert t.inner.x[0] == 0.5 and changed.blocks is t.blocks
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros(3),
+        np.zeros((2, 3, 4), dtype=int),
+        np.zeros((4, 3, 2)).T,
+        np.zeros((2, 3, 8))[..., ::2],
+    ],
+)
+def test_an_array_that_compiled_code_would_misread_is_refused(wrong):
+    with pytest.raises(TypeError, match=r"Outer.blocks is an array of"):
+        outer().replace(blocks=wrong)
+
+
+def pair():
+    """Two bodies that slide on a line, for elements between them."""
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    bodies = [
+        mech.add_rigid(n, mass=1.0, inertia=(0.1,) * 3, at=(x, 0, 0), markers={"p": (0, 0, 0)})
+        for n, x in (("a", 0.0), ("b", 1.0))
+    ]
+    a, b = (body.marker("p") for body in bodies)
+    mech.prismatic("slide", a, b, axis=(1, 0, 0))
+    return mech, a, b
+
+
+def loaded_body(mech):
+    soft = random_body(np.random.default_rng(1))
+    part = mech.add_flexible("c", soft)
+    mech.spread_load("weight", part, rom.mass_load(soft, (0, 0, -1.0)))
+
+
+ROD = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0, "inertia": (1e-2,) * 3}
+LAW = rom.mbs.Impact(stiffness=1e5)
+ELEMENTS = {  # stages -> what asks for them
+    "bushing_wrenches bushing_tangents": [
+        lambda m, a, b: m.bushing("e", a, b, stiffness=[1.0] * 6)
+    ],
+    "contact_wrenches contact_tangents": [
+        lambda m, a, b: m.sphere_on_sphere("e", a, b, LAW, radius1=0.1, radius2=0.1),
+    ],
+    "action_wrenches action_tangents": [
+        lambda m, a, b: m.motor("e", "slide", lambda t, x, v: -x),
+        lambda m, a, b: m.friction("e", "slide", coulomb=1.0, transition_speed=0.1),
+        lambda m, a, b: m.stop("e", "slide", LAW, upper=2.0),
+    ],
+    "force_tangents": [
+        lambda m, a, b: m.spring_damper("e", a, b, stiffness=1.0),
+        lambda m, a, b: m.force("e", a, (1, 0, 0)),
+    ],
+    "spread_residuals spread_tangents": [lambda m, a, b: loaded_body(m)],
+    "nonlinear_residuals nonlinear_tangents": [
+        lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("stages", "add"), [(k, add) for k, adds in ELEMENTS.items() for add in adds]
+)
+def test_a_mechanism_asks_for_the_stages_of_its_elements(stages, add):
+    """Without them it would move as if the elements were not there."""
+    mech, a, b = pair()
+    bare = pack(mech).system
+    add(mech, a, b)
+    more = {
+        n for n, s in STAGE_KERNELS.items() if s.needed(pack(mech).system) and not s.needed(bare)
+    }
+    assert more == set(stages.split())
+
+
+def test_every_stage_is_asked_for_by_all_mechanisms_or_by_an_element():
+    mech, *_ = pair()
+    always = {n for n, s in STAGE_KERNELS.items() if s.needed(pack(mech).system)}
+    assert set(STAGE_KERNELS) == set(STAGE_NAMES) == always.union(*map(str.split, ELEMENTS))
+
+
+def test_compiled_code_finds_its_stages_whatever_is_imported_first(tmp_path):
+    """It was compiled in a process that had imported them in another order."""
+    code = """
+import importlib, sys
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+import rom
+mech = rom.Mechanism(gravity=(0, 0, -9.81))
+ball = mech.add_rigid("ball", mass=1.0, inertia=(0.1,) * 3, at=(1, 0, 0), markers={"p": (-1, 0, 0)})
+mech.revolute("hinge", mech.ground.marker((0, 0, 0)), ball.marker("p"), axis=(0, 1, 0))
+print(rom.simulate(mech, t_end=0.01, dt=1e-3, progress=False).position("ball")[-1].tolist())
+"""
+    orders = [(), ("rom.mbs.elements.contact", "rom.mbs.equations.linear_solve")]
+    said = {
+        subprocess.run([sys.executable, "-c", code, *order], env=environment(), text=True,
+                       capture_output=True, check=True, timeout=300).stdout
+        for order in orders
+    }  # fmt: skip
+    assert len(said) == 1
