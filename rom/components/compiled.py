@@ -1,22 +1,31 @@
 """The compiler of components' kernels, which may make arrays; those of `rom.mbs` may not."""
 
+from pathlib import Path
 from typing import Any
 
-from numba import cfunc, njit
+from numba import njit
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE, Elements
-from rom.mbs.kernels.compiled import OPTIONS, drop_stale_cache
+from rom.mbs.kernels.compiled import OPTIONS, guard, kept
 from rom.model import Array, Index
-
-__all__ = ["drop_stale_cache", "elements", "inner", "kernel", "law"]
 
 _OPTIONS = OPTIONS | {"_nrt": True}
 # callable from Python
-kernel = njit(**_OPTIONS)
+kernel = kept(njit(**_OPTIONS))
 # callable from other kernels only
-inner = njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-# of the elements of non-linear bodies, see `rom.mbs.elements.nonlinear`
-law = cfunc(LAW_SIGNATURE, **_OPTIONS)
+inner = kept(njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True))
+
+
+def law(function: Any) -> Any:
+    """Compile a law of non-linear elements, see `rom.mbs.elements.nonlinear`."""
+    options = {name: value for name, value in _OPTIONS.items() if name != "cache"}
+    made = CFunc(function, normalize_signature(LAW_SIGNATURE), {}, options)
+    made.enable_caching()
+    guard(made._cache, Path(function.__code__.co_filename))
+    made.compile()
+    return made
 
 
 def elements(compiled: Any, frames: Index, numbers: Array) -> Elements:

@@ -207,41 +207,33 @@ def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeyp
     capsys.readouterr()
 
 
-KERNELS = """
-import sys
-from pathlib import Path
-from rom.mbs.kernels.compiled import drop_stale_cache
-folder = Path(__file__).parent
-for _ in range({drops}):
-    drop_stale_cache(folder, folder / "__pycache__" / "stamp")
-import toy
-assert toy.outer(3) == 12 and toy.outer(3.0) == 12.0
-print(sum(toy.outer.stats.cache_hits.values()))
-"""
 TOY = """
-from numba import njit
+from rom.mbs.kernels.compiled import inner, kernel
 
-@njit(cache=True)
-def inner(x):
+@inner
+def twice(x):
     return 2 * x
 
-@njit(cache=True)  # as in rom.mbs.kernels.compiled import kernel
+@kernel
 def outer(x):
-    return 2 * inner(x)
+    return 2 * twice(x)
+
+if __name__ == "__main__":
+    import toy
+    assert toy.outer(3) == 12 and toy.outer(3.0) == 12.0
+    print(sum(toy.outer.stats.cache_hits.values()))
 """
 
 
 def test_kernels_compiled_by_several_processes_at_once_work_and_are_kept(tmp_path):
-    """Also where one drops the cache while another one fills it."""
     (tmp_path / "toy.py").write_text(TOY)
-    for name, drops in (("a.py", 1), ("b.py", 1), ("c.py", 2000)):
-        (tmp_path / name).write_text(KERNELS.format(drops=drops))
-    run = [subprocess.Popen([sys.executable, tmp_path / name], env=environment(), text=True,
+    command = [sys.executable, tmp_path / "toy.py"]
+    run = [subprocess.Popen(command, env=environment(), text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-           for name in ("a.py", "b.py", "c.py")]  # fmt: skip
+           for _ in range(3)]  # fmt: skip
     said = [process.communicate(timeout=60) for process in run]
     assert [process.returncode for process in run] == [0, 0, 0], said
-    last = subprocess.run([sys.executable, tmp_path / "a.py"], env=environment(), text=True,
+    last = subprocess.run(command, env=environment(), text=True,
                           capture_output=True, timeout=60, check=True)  # fmt: skip
     assert last.stdout.strip() == "2", "the last one has nothing to compile"
 

@@ -17,16 +17,13 @@ Source:
 """
 
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from rom.components.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.model import Array
 
-HERE = Path(__file__).parent
-drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span several modules
 HALF_BANDWIDTH = 8  # columns on either side of the diagonal
 BAND_WIDTH = 3 * HALF_BANDWIDTH + 1  # columns of the band with room for pivoting
 

@@ -10,17 +10,14 @@ its unknown: oil from nowhere (Reynolds) or its filling (mass-conserving).
 """
 
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from rom.components.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.components.journal_bearing.band import back_substitute, factor
 from rom.model import Array, Index
 
-HERE = Path(__file__).parent
-drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")
 FULL, REYNOLDS, JFO = 0, 1, 2  # no cavitation; oil from nowhere; oil is conserved
 N_MOTIONS = 4  # journal centre x, y and tilt about x, y
 MAX_ITERATIONS = 100  # changes of the cavitated region

@@ -5,16 +5,13 @@ momentum. Its edges stay straight between their corners.
 """
 
 import math
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rom.components.compiled import drop_stale_cache, inner, kernel
+from rom.components.compiled import inner, kernel
 from rom.model import Array, Index
 
-HERE = Path(__file__).parent
-drop_stale_cache(HERE, HERE / "__pycache__" / "kernels.sha256")  # kernels span two modules
 OPEN, SLIDES, STICKS = 0, 1, 2
 ADMITTED = -math.sin(math.radians(3.0))  # edges of a corner may dive so far below an edge it meets
 # of the edge's length: distance beyond its end at which corners still touch

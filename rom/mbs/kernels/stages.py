@@ -16,7 +16,7 @@ from numba.core.errors import TypingError
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.kernels.compiled import OPTIONS
+from rom.mbs.kernels.compiled import OPTIONS, kept
 from rom.mbs.kernels.tables import TABLE_WORD
 
 REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
@@ -69,7 +69,7 @@ class Stage:
     def __init__(self, function: Callable[..., Any], types_: Any, needed: Callable[[Any], Any]):
         result, *arguments = (getattr(kind, "_numba_type_", kind) for kind in types_)
         self.signature, self.needed = result(*arguments), needed
-        self.kernel = njit(**OPTIONS, no_cfunc_wrapper=True)(function)
+        self.kernel = kept(njit(**OPTIONS, no_cfunc_wrapper=True))(function)
         self.slot = STAGE_NAMES.index(function.__name__)
         STAGE_KERNELS[function.__name__] = self
         called = {"key": self, "generic": lambda typing, given, _: self._typed(typing, given)}

@@ -1,31 +1,65 @@
 """Compiled kernels: dropped when a source of theirs changes, and what they leave out."""
 
+import shutil
+import subprocess
+import sys
+
 import numpy as np
+import pytest
 from numba import njit
 
+from cases.command import environment
+from cases.paths import ROOT
 from rom.mbs.kernels import compiled
-from rom.mbs.kernels.compiled import drop_stale_cache
+
+OUTER = """
+from rom.toy.inner import SIZE, inside
+from rom.mbs.kernels.compiled import kernel
+{more}
+@kernel
+def outer(x):
+    return SIZE * inside(x)
+
+if __name__ == "__main__":
+    from rom.toy import outer as built
+    print(built.outer(1.0), sum(built.outer.stats.cache_hits.values()))
+"""
+INNER = """
+from rom.mbs.kernels.compiled import inner
+from rom.toy.plain import UNITS
+SIZE = {size}
+
+@inner
+def inside(x):
+    return x + {added}
+"""
 
 
-def test_only_sources_of_kernels_drop_them(tmp_path):
-    kernels, plain = tmp_path / "motion.py", tmp_path / "mechanism.py"
-    kernels.write_text("from rom.mbs.kernels.compiled import kernel\n")
-    plain.write_text("text = 1\n")
-    stamp, code = tmp_path / "cache" / "stamp", tmp_path / "cache" / "motion.advance-1.py311.nbi"
-    assert drop_stale_cache(tmp_path, stamp)
-    code.write_text("machine code")
-    assert not drop_stale_cache(tmp_path, stamp)
-    plain.write_text("text = 2\n")
-    assert not drop_stale_cache(tmp_path, stamp) and code.exists()
-    layout = tmp_path / "kernels" / "layout.py"
-    layout.parent.mkdir()
-    for source, text in (
-        (kernels, "from rom.mbs.kernels.compiled import inner\n"),
-        (layout, "SIZE = 3\n"),
-    ):
-        code.write_text("machine code")
-        source.write_text(text)
-        assert drop_stale_cache(tmp_path, stamp) and not code.exists()
+@pytest.mark.parametrize("elsewhere", [True, False])
+def test_no_kernel_runs_that_was_made_of_other_sources(elsewhere, tmp_path):
+    """A constant and a function built in from another file; a file without kernels is no source."""
+    package = tmp_path / "rom"
+    shutil.copytree(ROOT / "rom", package, ignore=shutil.ignore_patterns("__pycache__"))
+    toy = package / "toy"
+    toy.mkdir()
+    (toy / "__init__.py").touch()
+    env = environment(PYTHONPATH=str(tmp_path))
+    env["NUMBA_CACHE_DIR"] = str(tmp_path / "cache") if elsewhere else ""
+
+    def answer(size, added, more="", units=1):
+        (toy / "plain.py").write_text(f"UNITS = {units}")
+        (toy / "inner.py").write_text(INNER.format(size=size, added=added))
+        (toy / "outer.py").write_text(OUTER.format(more=more))
+        done = subprocess.run([sys.executable, "-m", "rom.toy.outer"], env=env, cwd=tmp_path,
+                              capture_output=True, text=True, check=True)  # fmt: skip
+        return done.stdout.split()
+
+    assert answer(2, 1) == ["4.0", "0"]
+    assert answer(2, 1) == ["4.0", "1"]
+    assert answer(2, 1, units=5) == ["4.0", "1"]
+    assert answer(3, 1) == ["6.0", "0"]
+    assert answer(3, 2) == ["9.0", "0"]
+    assert answer(3, 2, more="# text") == ["9.0", "0"]
 
 
 def test_kernels_copy_arrays_and_count_no_references():
