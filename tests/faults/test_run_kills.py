@@ -37,8 +37,8 @@ vector = [0, 0, 1]
 factor = { kind = "harmonic", amplitude = 1.0, frequency = 3.0 }
 [simulation]
 t_end = 1.0
-dt = 1e-5
-save_every = 100
+dt = 4e-6
+save_every = 250
 """
 RUN = ("simulate", "pendulum.toml", "-o", "out")
 
@@ -138,7 +138,7 @@ CHANGES = [
     (("--dt", "8e-6"), "another dt"),
     (("--gravity", "0,0,-1"), "another gravity"),
     (("mass = 1.0", "mass = 2.0"), "another bodies 'one'"),
-    (("save_every = 100", "save_every = 3"), "another save_every"),
+    (("save_every = 250", "save_every = 3"), "another save_every"),
     (("--t-end", "1.000001"), "would change the steps"),
 ]
 
