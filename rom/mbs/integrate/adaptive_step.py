@@ -110,8 +110,8 @@ class _Run:
         """Go on where `remembered` was asked."""
         arrays = state.memory.arrays
         recall(state.memory, self.W, self.T)
-        for name in dict(self.T.items()):
-            getattr(self.T, name)[:] = arrays[STEP_PREFIX + name]
+        for name, x in self.T.items():
+            x[:] = arrays[STEP_PREFIX + name]
         for name, x in zip(NUMBERS, arrays["numbers"], strict=True):
             setattr(self, name, float(x))
         self.rejected, self.uneven = int(self.rejected), bool(self.uneven)

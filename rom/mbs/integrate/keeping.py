@@ -19,6 +19,7 @@ from rom.errors import ConfigError, FileFormatError
 from rom.io.archive import Kind, digest, read_archive, write_archive
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.events import Noted
+from rom.mbs.kernels.tables import Table
 from rom.mbs.results.checkpoint import STATE_KIND as STATE
 from rom.mbs.results.checkpoint import packed_state, unpacked_state
 from rom.mbs.results.state import Memory, State
@@ -218,12 +219,12 @@ def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _numbers(table: Any) -> list[Array]:
+def _numbers(table: Table) -> list[Array]:
     """All arrays of nested tables that are the same in every process."""
     found: list[Array] = []
     for name, value in table.items():
         if name not in PASSING_FIELDS:
-            found += _numbers(value) if hasattr(value, "items") else [np.asarray(value)]
+            found += _numbers(value) if isinstance(value, Table) else [np.asarray(value)]
     return found
 
 
