@@ -52,10 +52,11 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
      "modes=quadratic_eigen response sensitivity steady=steady_motion tangent "
      "variation=local_equations"),
     ("rom.mbs", "rom.mbs.elements",
-     "actions=joint_kernels bushing=bushing_kernels contact forces=springs_loads_kernels "
-     "impact joint_forces nonlinear nonlinear_forces=nonlinear_kernels spread surface_contact"),
+     "nonlinear spread=spread_loads"),
+    ("rom.mbs", "rom.mbs.elements.contact", "contact=points impact surface_contact=surfaces"),
+    ("rom.mbs.elements", "rom.mbs.elements.contact", "impact surface_contact=surfaces"),
     ("rom.mbs", "rom.mbs.equations",
-     "bordered=linear_solve elements_packing=packing_elements elimination graph "
+     "bordered=linear_solve elimination graph "
      "motion=equations ordering packing user=python_laws"),
     ("rom.mbs", "rom.mbs.integrate",
      "alpha=generalized_alpha ending=event_end events explicit=dop853 first_steps=radau_start "

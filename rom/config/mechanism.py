@@ -305,7 +305,7 @@ def _bushing(first: list[Any], values: dict[str, Any], _place: Place, _t_end: fl
 
 
 def _impact(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:
-    from rom.mbs.elements.impact import Impact
+    from rom.mbs.elements.contact.impact import Impact
 
     numbers = {key.name: values.pop(key.name) for key in IMPACT if key.name in values}
     return [*first, Impact(**numbers)], values

@@ -178,7 +178,7 @@ class Driven:
         W, span = self.W, (state.t, np.inf)
         spacing = 0.05 * float(self.parameters[0])
         W.signal[:] = sample_all(self.packed.signals, np.array([state.t]), span, spacing)[0]
-        W.base[:] = state.base if state.base is not None else 0.0
+        W.base[:] = np.r_[0 * W.x, self.packed.system.memory] if state.base is None else state.base
         evaluate(self.packed.system, W, state.q, state.v)
         return W
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
+from rom.mbs.elements import frictions
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
@@ -100,4 +101,4 @@ class Outputs:
 
 def _coordinate(what: str, k: int) -> Reading:
     """Coordinate or rate that friction k follows."""
-    return lambda W, lam, packed: getattr(W, what)[packed.system.actions.friction_at[k]]
+    return lambda W, lam, packed: getattr(W, what)[packed.elements[frictions.FAMILY].at[k]]

@@ -13,8 +13,9 @@ from rom.mbs.analysis.sensitivity import frequency_sensitivity as frequency_sens
 from rom.mbs.analysis.sensitivity import motion_sensitivity as motion_sensitivity
 from rom.mbs.analysis.steady_motion import SteadyMotion as SteadyMotion
 from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
-from rom.mbs.elements.impact import Impact as Impact
-from rom.mbs.elements.impact import hertz_stiffness as hertz_stiffness
+from rom.mbs.elements.contact.impact import Impact as Impact
+from rom.mbs.elements.contact.impact import hertz_stiffness as hertz_stiffness
+from rom.mbs.elements.family import Family as Family
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE as LAW_SIGNATURE
 from rom.mbs.elements.nonlinear import Elements as Elements
 from rom.mbs.elements.nonlinear import Frames as Frames

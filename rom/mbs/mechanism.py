@@ -1,66 +1,93 @@
 """The mechanism as the user describes it: bodies, joints, drives and forces, by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, MutableMapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import AnyBody, finite, matrix33, number, positive, start_pose, typed
+from rom.arguments import AnyBody, finite, matrix33, positive, start_pose, typed
 from rom.errors import ConfigError
-from rom.mbs.connections import Connections, Drive, TimeFunction
-from rom.mbs.elements.force_elements import Bushing, Contact, Elements, Spread
-from rom.mbs.elements.joint_forces import Friction, JointForces, Motor, Stop
-from rom.mbs.elements.nonlinear import Assembly, NonlinearBodies
-from rom.mbs.elements.surface_contact import SurfaceContacts
+from rom.mbs import connections
+from rom.mbs.connections import Drive
+from rom.mbs.elements import (
+    bushings,
+    frictions,
+    laws,
+    loads,
+    motors,
+    nonlinear,
+    rotational_springs,
+    spread_loads,
+    springs,
+    stops,
+)
+from rom.mbs.elements.contact import points, surfaces
+from rom.mbs.elements.family import Family, check_family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint
 from rom.model import Array
 from rom.names import check_name, check_text
 from rom.notebook import html_table, listed
-from rom.plausible import DAMPING, GRAVITY, SPEED, STIFFNESS, warn_outside
+from rom.plausible import GRAVITY, SPEED, warn_outside
+
+# The list of families: each has its file, and a method or more of `Mechanism`.
+FAMILIES = (
+    springs.FAMILY,
+    rotational_springs.FAMILY,
+    loads.FAMILY,
+    laws.FAMILY,
+    motors.FAMILY,
+    frictions.FAMILY,
+    stops.FAMILY,
+    bushings.FAMILY,
+    points.FAMILY,
+    spread_loads.FAMILY,
+    nonlinear.FAMILY,
+)
+Element = TypeVar("Element")
 
 
-@dataclass(frozen=True, slots=True)
-class Spring:
-    """Spring and damper between two markers, along the line that joins them."""
+class ElementsOf(MutableMapping[str, Element]):
+    """The elements of one kind in a mechanism, by name; they can be exchanged and removed."""
 
-    i: Marker
-    j: Marker
-    stiffness: float
-    damping: float
-    free_length: float
+    def __init__(self, elements: dict[str, tuple[Family, Any]], record: type[Element]):
+        self.elements, self.record = elements, record
+
+    def __getitem__(self, name: str) -> Element:
+        element: Element = self.elements[name][1]
+        if not isinstance(element, self.record):
+            raise KeyError(name)
+        return element
+
+    def __setitem__(self, name: str, element: Element) -> None:
+        _ = self[name]  # only what is there can be exchanged
+        self.elements[name] = self.elements[name][0], element
+
+    def __delitem__(self, name: str) -> None:
+        _ = self[name]  # of another kind it is not here
+        del self.elements[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, (_, x) in self.elements.items() if isinstance(x, self.record))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """Rotational spring and damper about the axis of a joint."""
+class Every(Generic[Element]):
+    """Attribute of a mechanism: its elements of one kind."""
 
-    joint: str
-    stiffness: float
-    damping: float
-    free_angle: float
+    def __init__(self, record: type[Element]):
+        self.record = record
 
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Force or torque on one marker: constant, or a function of time."""
-
-    marker: Marker
-    kind: int
-    vector: Array
-    function: TimeFunction | None
-
-
-@dataclass(frozen=True, slots=True)
-class UserForce:
-    """Force and moment from a Python function of time and of the markers' motion."""
-
-    function: Callable[..., Any]
-    i: Marker
-    j: Marker | None
+    def __get__(self, mechanism: "Mechanism | None", _: Any = None) -> ElementsOf[Element]:
+        return ElementsOf({} if mechanism is None else mechanism.elements, self.record)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +101,7 @@ class Event:
 
 @typed
 @dataclass
-class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBodies):
+class Mechanism:
     """Rigid and flexible bodies, connected and loaded.
 
     Joints are defined in the position in which the bodies are added, flexible bodies
@@ -90,20 +117,57 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
 
     gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
     parts: dict[str, Part] = field(default_factory=dict, init=False)
-    nonlinear: dict[str, Assembly] = field(default_factory=dict, init=False)
     joints: dict[str, Joint] = field(default_factory=dict, init=False)
     drives: dict[str, Drive] = field(default_factory=dict, init=False)
-    springs: dict[str, Spring] = field(default_factory=dict, init=False)
-    turns: dict[str, Turn] = field(default_factory=dict, init=False)
-    loads: dict[str, Load] = field(default_factory=dict, init=False)
-    user_forces: dict[str, UserForce] = field(default_factory=dict, init=False)
+    elements: dict[str, tuple[Family, Any]] = field(default_factory=dict, init=False)
     events: dict[str, Event] = field(default_factory=dict, init=False)
-    motors: dict[str, Motor] = field(default_factory=dict, init=False)
-    frictions: dict[str, Friction] = field(default_factory=dict, init=False)
-    stops: dict[str, Stop] = field(default_factory=dict, init=False)
-    bushings: dict[str, Bushing] = field(default_factory=dict, init=False)
-    contacts: dict[str, Contact] = field(default_factory=dict, init=False)
-    spread_loads: dict[str, Spread] = field(default_factory=dict, init=False)
+
+    revolute = connections.revolute
+    cylindrical = connections.cylindrical
+    prismatic = connections.prismatic
+    spherical = connections.spherical
+    universal = connections.universal
+    fixed = connections.fixed
+    planar = connections.planar
+    screw = connections.screw
+    point_on_line = connections.point_on_line
+    point_on_plane = connections.point_on_plane
+    distance = connections.distance
+    rolling = connections.rolling
+    gear = connections.gear
+    drive = connections.drive
+
+    spring_damper = springs.spring_damper
+    rotational_spring = rotational_springs.rotational_spring
+    force = loads.force
+    torque = loads.torque
+    law = laws.law
+    user_force = laws.user_force
+    motor = motors.motor
+    friction = frictions.friction
+    stop = stops.stop
+    bushing = bushings.bushing
+    sphere_on_plane = points.sphere_on_plane
+    disc_on_plane = points.disc_on_plane
+    sphere_on_sphere = points.sphere_on_sphere
+    sphere_on_cylinder = points.sphere_on_cylinder
+    surface_on_plane = surfaces.surface_on_plane
+    surface_on_sphere = surfaces.surface_on_sphere
+    surface_on_cylinder = surfaces.surface_on_cylinder
+    spread_load = spread_loads.spread_load
+    add_nonlinear = nonlinear.add_nonlinear
+
+    springs = Every(springs.Spring)
+    turns = Every(rotational_springs.Turn)
+    loads = Every(loads.Load)
+    laws = Every(laws.Law)
+    motors = Every(motors.Motor)
+    frictions = Every(frictions.Friction)
+    stops = Every(stops.Stop)
+    bushings = Every(bushings.Bushing)
+    contacts = Every(points.Contact)
+    spread_loads = Every(spread_loads.Spread)
+    nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:
         self.gravity = finite("gravity", self.gravity, (3,))
@@ -196,72 +260,28 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             flexible_part(name, body, start_pose(at, orientation, velocity, omega), elastic)
         )
 
-    def spring_damper(
-        self,
-        name: str,
-        m1: Marker,
-        m2: Marker,
-        *,
-        stiffness: float,
-        damping: float = 0.0,
-        free_length: float | None = None,
-    ) -> None:
-        """Spring [N/m] and damper [N s/m] along the line between two markers.
+    def add(self, name: str, element: Any, family: Family) -> None:
+        """Add an element of any family, one of your own too.
 
         Args:
-            name: name of the spring.
-            m1: one end.
-            m2: other end.
-            stiffness: [N/m].
-            damping: [N s/m].
-            free_length: length without force [m]; None for the length at the start.
+            name: name of the element.
+            element: of the class that the family has for one of its elements.
+            family: see `rom.mbs.elements.family`.
+
+        Raises:
+            ConfigError: for a name in use, a marker that does not exist, or another family.
         """
-        self._check_new(name)
-        self._check_markers(name, m1, m2)
-        gap = self.design_point(m2) - self.design_point(m1)
-        free = np.linalg.norm(gap) if free_length is None else number("free_length", free_length)
-        k, c = self._stiffness_and_damping(name, stiffness, damping)
-        if free < 0.0:
-            raise ConfigError(f"free_length of {name!r} = {free:g} m: a length is not negative.")
-        self.springs[name] = Spring(m1, m2, k, c, float(free))
+        self.check_new(name)
+        check_family(name, element, family)
+        self.check_markers(name, *family.ends(element))
+        self.elements[name] = family, element
 
-    def rotational_spring(
-        self,
-        name: str,
-        joint: str,
-        *,
-        stiffness: float,
-        damping: float = 0.0,
-        free_angle: float = 0.0,
-    ) -> None:
-        """Spring [N m/rad] and damper [N m s/rad] about the axis of a revolute joint."""
-        self._check_new(name)
-        if self._joint_with_axis(joint, "rotational spring").turn is None:
-            raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
-        k, c = self._stiffness_and_damping(name, stiffness, damping)
-        self.turns[name] = Turn(joint, k, c, number("free_angle", free_angle))
-
-    def force(self, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
-        """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker."""
-        self._load(name, marker, vector, frame, 0)
-
-    def torque(self, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
-        """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker."""
-        self._load(name, marker, vector, frame, 2)
-
-    def user_force(
-        self, name: str, function: Callable[..., Any], m1: Marker, m2: Marker | None = None
-    ) -> None:
-        """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
-
-        ``a`` and ``b`` are `rom.mbs.equations.python_laws.MarkerMotion`. The function returns
-        (force, moment) in the world that act on the first marker; the reaction, at the same place
-        in space, acts on the body of the second one, so that momentum is conserved whatever the
-        law.
-        """
-        self._check_new(name)
-        self._check_markers(name, m1, *(() if m2 is None else (m2,)))
-        self.user_forces[name] = UserForce(function, m1, m2)
+    def families(self) -> dict[Family, dict[str, Any]]:
+        """The families that occur, those of `FAMILIES` first, with their elements by name."""
+        found: dict[Family, dict[str, Any]] = {family: {} for family in FAMILIES}
+        for name, (family, element) in self.elements.items():
+            found.setdefault(family, {})[name] = element
+        return {family: elements for family, elements in found.items() if elements}
 
     def event(
         self,
@@ -281,7 +301,7 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
             direction: 1 counts rising values only, -1 falling ones, 0 both.
             terminal: end the run there.
         """
-        self._check_new(name)
+        self.check_new(name)
         if direction not in (-1, 0, 1):
             raise ConfigError(f"direction of event {name!r} is {direction!r}; it is -1, 0 or 1.")
         self.events[name] = Event(function, int(direction), bool(terminal))
@@ -304,38 +324,29 @@ class Mechanism(Connections, JointForces, Elements, SurfaceContacts, NonlinearBo
         return self.parts[name]
 
     def _enter(self, part: Part) -> Part:
-        self._check_new(part.name)
+        self.check_new(part.name)
         warn_outside(SPEED, float(np.linalg.norm(part.velocity)), f"body {part.name!r}")
         self.parts[part.name] = part
         return part
 
-    def _load(self, name: str, marker: Marker, vector: Any, frame: str, kind: int) -> None:
-        self._check_new(name)
-        self._check_markers(name, marker)
-        if frame not in ("world", "body"):
-            raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
-        function = vector if callable(vector) else None
-        constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
-        self.loads[name] = Load(marker, kind + (frame == "body"), constant, function)
+    def check_new(self, name: str) -> None:
+        """Refuse a name that is no name, or in use.
 
-    def _stiffness_and_damping(
-        self, name: str, stiffness: Any, damping: Any
-    ) -> tuple[float, float]:
-        k, c = number("stiffness", stiffness), number("damping", damping)
-        warn_outside(STIFFNESS, k, repr(name))
-        warn_outside(DAMPING, c, repr(name))
-        return k, c
-
-    def _check_new(self, name: str) -> None:
+        Raises:
+            ConfigError: listing the names in use.
+        """
         check_name(name, "a part of the mechanism")
         taken = [
-            *(GROUND, *self.parts, *self.nonlinear, *self.joints, *self.drives, *self.springs),
-            *(*self.turns, *self.loads, *self.user_forces, *self.motors, *self.frictions),
-            *(*self.stops, *self.bushings, *self.contacts, *self.spread_loads, *self.events),
+            *(GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events),
         ]
         if name in taken:
             raise ConfigError(f"the name {name!r} is used twice; in use are {sorted(taken)}.")
 
-    def _check_markers(self, name: str, *markers: Marker) -> None:
+    def check_markers(self, name: str, *markers: Marker) -> None:
+        """Refuse markers of bodies that are not in this mechanism, or of places they have not.
+
+        Raises:
+            ConfigError: naming what there is.
+        """
         for marker in markers:
             self.part(marker.body).point(marker)

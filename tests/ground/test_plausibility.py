@@ -18,7 +18,7 @@ from rom.errors import ConfigError, ModelError, RomWarning
 from rom.fe.mesh.validate import checked
 from rom.io.matrices.op4 import write_op4
 from rom.io.native import body_arrays
-from rom.mbs.elements.impact import Impact
+from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.parts.jumps import Examined
 from rom.plausible import far_doubt, scaled_doubt
 

@@ -62,7 +62,6 @@ FRONTS = {
     "rom.bench": "rom.bench.benchmarks",
     "rom.mbs.integrate": "rom.mbs.integrate.simulation",
     "rom.mbs.parts": "rom.mbs.parts.bodies",
-    "rom.mbs.elements": "rom.mbs.elements.force_elements",
     "rom.fe.mesh": "rom.fe.mesh.read",
     "rom.io.sid": "rom.io.sid.format",
     "rom.components.masonry": "rom.components.masonry.stones",

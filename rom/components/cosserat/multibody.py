@@ -26,8 +26,7 @@ from rom.components.cosserat.elements import (
 )
 from rom.components.cosserat.shape import Shape, reference
 from rom.errors import ModelError
-from rom.mbs.elements.nonlinear import Elements, Frames
-from rom.mbs.kernels.system import LAW_MEMORY_SIZE
+from rom.mbs.elements.nonlinear import LAW_MEMORY_SIZE, Elements, Frames
 from rom.model import Array
 
 POSE_SIZE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity

@@ -143,7 +143,7 @@ class _Search:
                 break
             q = now.shifted(state.q, factor * step)
             now.evaluate(q, state.v)
-            now.W.base[:] = now.W.x
+            now.W.base[: now.W.x.size] = now.W.x
             state = self.steady(replace(state, q=q, lam=state.lam + factor * dlam))
             state = replace(state, base=now.W.base.copy())
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):

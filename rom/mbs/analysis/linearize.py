@@ -261,8 +261,7 @@ def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) 
 
 def _virtual(now: Instant, state: State, basis: Array) -> Array:
     """Motions in which the reactions do no work; friction adds to what reactions do."""
-    friction = now.packed.system.actions.friction
-    if not friction[:, 1].any():
+    if not now.packed.loaded_rows.size:
         return basis
     R = now.reactions(state)
     return basis - np.linalg.lstsq(R.T, R.T @ basis, rcond=1e-9)[0]

@@ -40,7 +40,6 @@ class Instant:
         W: memory.
         t: time [s].
         laws: forces of Python functions.
-        signal: (s, 3) drives and loads at that time.
         load: factor of gravity, of loads and of forces of Python functions.
     """
 
@@ -48,29 +47,23 @@ class Instant:
     W: Work
     t: float
     laws: Laws
-    signal: Array
     load: float = 1.0
 
     def scaled(self, load: float) -> "Instant":
         """The same with another factor of the loads; the memory is shared."""
-        vectors = [k for k, signal in enumerate(self.packed.signals) if signal.width == 3]
-        self.W.signal[vectors] = load * self.signal[vectors]
+        self.W.load[0] = load
         return replace(self, load=load)
 
     @property
     def system(self) -> Any:
-        """The arrays of the mechanism, gravity and loads times their factor."""
+        """The arrays of the mechanism, gravity times the factor of the loads."""
         s = self.packed.system
-        forces = s.forces.replace(load=self.load * s.forces.load)
-        bodies = s.bodies.replace(gravity=self.load * s.bodies.gravity)
-        spread = s.spread.replace(amplitude=self.load * s.spread.amplitude)
-        return s.replace(bodies=bodies, forces=forces, spread=spread)
+        return s.replace(bodies=s.bodies.replace(gravity=self.load * s.bodies.gravity))
 
     def evaluate(self, q: Array, v: Array) -> None:
         """Everything that depends on coordinates and velocities, Python forces included."""
         evaluate(self.packed.system, self.W, q, v)
         apply_laws(self.laws, self.W, self.t)
-        self.W.user[:] *= self.load
 
     def residual(self, q: Array, v: Array, a: Array, lam: Array) -> Array:
         """(n,) equations of motion M a + h - Q + G^T lam."""
@@ -110,14 +103,11 @@ class Instant:
         They leave out how laws in Python change, how the rates that forces depend on change with
         the position, and what finite elastic rotations of markers do to moments.
         """
-        s, stiff = self.packed.system, self.W.theta
         self.evaluate(state.q, state.v)
-        by_rate = s.forces.spring[:, 1].any() or s.forces.turn[:, 1].any() or s.bushings.i.size
-        by_rate = by_rate or s.contacts.i.size or s.actions.motor_at.size
-        by_rate = by_rate or s.actions.friction_at.size or s.actions.stop_at.size
-        by_rate = by_rate or s.nonlinear.address.size
-        rests = not state.v.any() or not by_rate
-        return bool(not self.laws and rests and np.abs(stiff).max(initial=0.0) < ELASTIC_TURN)
+        rests = not state.v.any() or not self.packed.by_rate
+        return bool(
+            not self.laws and rests and np.abs(self.W.theta).max(initial=0.0) < ELASTIC_TURN
+        )
 
     def matrices(self, state: State) -> tuple[Array, Array, Array]:
         """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
@@ -172,7 +162,7 @@ def instant(mechanism: Any, t: float) -> Instant:
     if not good:
         raise failure
     W.signal[:] = table[0]
-    return Instant(packed, W, float(t), laws(mechanism, packed), table[0])
+    return Instant(packed, W, float(t), laws(mechanism, packed))
 
 
 def consistent(now: Instant, state: Any) -> State:

@@ -1,9 +1,8 @@
-"""Elements of force, as users describe them and as compiled laws.
+"""Elements of force, one family in one file: as users describe them, their arrays and kernels.
 
-`force_elements` has bushings, contacts by the laws of `impact`, and spread loads, compiled in
-`bushing_kernels`, `contact` and `spread`; `joint_forces` motors, friction and stops, in
-`joint_kernels`; `nonlinear` bodies, in `nonlinear_kernels`; `surface_contact` that of surfaces;
-`springs_loads_kernels` springs and loads.
+`family` says what a family is. There are `springs`, `rotational_springs`, `loads`, `motors`,
+`frictions`, `stops`, `bushings`, `spread_loads`, `nonlinear` bodies, and `laws` of the user;
+`contact` has a folder of its own.
 """
 
 from rom.lazy import front

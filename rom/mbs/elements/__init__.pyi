@@ -1,6 +1,10 @@
-from rom.mbs.elements.force_elements import DIRECTIONS as DIRECTIONS
-from rom.mbs.elements.force_elements import Bushing as Bushing
-from rom.mbs.elements.force_elements import Contact as Contact
-from rom.mbs.elements.force_elements import Curves as Curves
-from rom.mbs.elements.force_elements import Elements as Elements
-from rom.mbs.elements.force_elements import Spread as Spread
+from rom.mbs.elements.bushings import DIRECTIONS as DIRECTIONS
+from rom.mbs.elements.bushings import Bushing as Bushing
+from rom.mbs.elements.bushings import Curves as Curves
+from rom.mbs.elements.contact.points import Contact as Contact
+from rom.mbs.elements.family import Family as Family
+from rom.mbs.elements.family import Places as Places
+from rom.mbs.elements.laws import Answer as Answer
+from rom.mbs.elements.laws import Law as Law
+from rom.mbs.elements.laws import Motion as Motion
+from rom.mbs.elements.spread_loads import Spread as Spread

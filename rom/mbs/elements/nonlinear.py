@@ -15,27 +15,45 @@ velocity. It writes, with n = 6 k and the rows force in the world, moment in the
 energy [J]; lost power [W]; (n,) forces of energy and damping that resist the motion; and, if
 ``wanted`` is not zero, (n, n) their derivative by displacements in the world and rotations in the
 frame; (n, n) their derivative by the velocities. ``space`` is memory for
-`rom.mbs.kernels.system.SPACE` numbers. Such a function is made with ``numba.cfunc`` or by any
+LAW_MEMORY_SIZE numbers. Such a function is made with ``numba.cfunc`` or by any
 compiler.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 from rom import rotation
 from rom.arguments import finite, start_pose, typed
 from rom.errors import ConfigError, ModelError
+from rom.mbs.elements.family import Family, Places, integers, on_joint
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import block_of
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.tables import (
+    Address1,
+    Array2,
+    Index1,
+    Index2,
+    Scratch1,
+    Scratch2,
+    Table,
+    table,
+)
 from rom.mbs.parts.bodies import Marker, Part
-from rom.mbs.parts.joints import Joint
+from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
 
 # of a law, as numba.cfunc takes it
 LAW_SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
+LAW_MEMORY_SIZE = 256  # numbers that a law may use as memory
 QUATERNION_ATOL = 1e-9  # difference of a quaternion from unit length
 
 
@@ -130,53 +148,43 @@ class Assembly:
         return float(sum(np.linalg.norm(b.at - a.at) for a, b in pairwise(self.parts)))
 
 
-@typed
-class NonlinearBodies:
-    """The non-linear bodies of a `rom.mbs.mechanism.Mechanism`."""
+def add_nonlinear(
+    self: Whole,
+    name: str,
+    body: NonlinearBody,
+    *,
+    at: npt.ArrayLike = (0.0, 0.0, 0.0),
+    orientation: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+    omega: npt.ArrayLike | None = None,
+) -> Assembly:
+    """Add a non-linear flexible body, e.g. a rod; see `rom.components.cosserat.body`.
 
-    parts: dict[str, Part]
-    joints: dict[str, Joint]
-    nonlinear: dict[str, Assembly]
-    spherical: Callable[..., None]
-    _check_new: Callable[[str], None]
+    Args:
+        name: name of the body; its frames become bodies ``name.0``, ``name.1``, ...
+        body: see `NonlinearBody`.
+        at: (3,) origin of the body at the start, world [m].
+        orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+        velocity: (3,) of that origin, world [m/s].
+        omega: (3,) angular velocity of the body as a whole, axes of the body [rad/s].
 
-    def add_nonlinear(
-        self,
-        name: str,
-        body: NonlinearBody,
-        *,
-        at: npt.ArrayLike = (0.0, 0.0, 0.0),
-        orientation: npt.ArrayLike | None = None,
-        velocity: npt.ArrayLike | None = None,
-        omega: npt.ArrayLike | None = None,
-    ) -> Assembly:
-        """Add a non-linear flexible body, e.g. a rod; see `rom.components.cosserat.body`.
-
-        Args:
-            name: name of the body; its frames become bodies ``name.0``, ``name.1``, ...
-            body: see `NonlinearBody`.
-            at: (3,) origin of the body at the start, world [m].
-            orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
-            velocity: (3,) of that origin, world [m/s].
-            omega: (3,) angular velocity of the body as a whole, axes of the body [rad/s].
-
-        Raises:
-            ConfigError: for a name in use, a wrong shape or a number that is not finite.
-            ModelError: naming a frame without mass or inertia.
-        """
-        self._check_new(name)
-        _check(name, body)
-        pose = start_pose(at, orientation, velocity, omega)
-        parts = tuple(_frame_part(f"{name}.{k}", body.frames, k, pose)
-                      for k in range(len(body.frames.x)))  # fmt: skip
-        for part in parts:
-            self._check_new(part.name)
-        assembly = Assembly(name, body, parts)
-        self.parts.update({part.name: part for part in parts})
-        self.nonlinear[name] = assembly
-        for a, b in body.coincident:
-            self.spherical(f"{name}.{a} and {b}", assembly.marker(a), assembly.marker(b))
-        return assembly
+    Raises:
+        ConfigError: for a name in use, a wrong shape or a number that is not finite.
+        ModelError: naming a frame without mass or inertia.
+    """
+    self.check_new(name)
+    _check(name, body)
+    pose = start_pose(at, orientation, velocity, omega)
+    parts = tuple(_frame_part(f"{name}.{k}", body.frames, k, pose)
+                  for k in range(len(body.frames.x)))  # fmt: skip
+    assembly = Assembly(name, body, parts)
+    for part in parts:
+        self.check_new(part.name)
+    self.parts.update({part.name: part for part in parts})
+    self.add(name, assembly, FAMILY)
+    for a, b in body.coincident:
+        self.spherical(f"{name}.{a} and {b}", assembly.marker(a), assembly.marker(b))
+    return assembly
 
 
 def _frame_part(name: str, frames: Frames, k: int, pose: tuple[Array, ...]) -> Part:
@@ -218,3 +226,158 @@ def _check(name: str, body: Any) -> None:
             raise ModelError(f"an element connects a frame beyond the {n} there are.", where=name)
         if not group.address:
             raise ModelError("elements have no compiled law.", where=name)
+
+
+@table
+class Nonlinear(Table):
+    """Elements of non-linear bodies between up to K frames, each with a compiled law.
+
+    Attributes:
+        address: (e,) of the laws.
+        count: (e,) number of frames.
+        body: (e, K) their bodies, -1 beyond.
+        numbers: (e, c) what the law knows of the element.
+        pose: (e, 13 K) frames at the last residual: position, quaternion, velocities.
+        answer: (2 + 6 K + 72 K^2,) what a law says.
+        space: (LAW_MEMORY_SIZE,) for the laws to use as they like.
+    """
+
+    address: Address1
+    count: Index1
+    body: Index2
+    numbers: Array2
+    pose: Scratch2
+    answer: Scratch1
+    space: Scratch1
+
+
+def pack(bodies: Any, places: Places) -> Nonlinear:
+    """The elements of all bodies as arrays."""
+    groups = [
+        (group, np.array([places.body[part.name] for part in whole.parts])[group.frames])
+        for whole in bodies.values()
+        for group in whole.body.elements
+    ]
+    e = sum(len(rows) for _, rows in groups)
+    K = max((rows.shape[1] for _, rows in groups), default=1)
+    c = max((group.numbers.shape[1] for group, _ in groups), default=1)
+    body, numbers = np.full((e, K), -1, dtype=np.int64), np.zeros((e, c))
+    address, count, at = integers([0] * e), integers([0] * e), 0
+    for group, rows in groups:
+        mine = slice(at, at + len(rows))
+        address[mine], count[mine] = group.address, rows.shape[1]
+        body[mine, : rows.shape[1]] = rows
+        numbers[mine, : group.numbers.shape[1]] = group.numbers
+        at += len(rows)
+    scratch = np.zeros((e, 13 * K)), np.zeros(2 + 6 * K + 72 * K * K), np.zeros(LAW_MEMORY_SIZE)
+    return Nonlinear(address, count, body, numbers, *scratch)
+
+
+@intrinsic
+def ask(context, address, numbers, pose, wanted, answer, space):
+    """Call the law at an address with arrays; its signature is told above."""
+    arrays = numbers, pose, answer, space
+    signature = types.void(address, numbers, pose, wanted, answer, space)
+
+    def build(context, builder, signature, arguments):
+        def data(k):
+            return context.make_array(signature.args[k])(context, builder, arguments[k]).data
+
+        whole = ir.IntType(64)
+        numbers = ir.DoubleType().as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [numbers, numbers, whole, numbers, numbers])
+        law = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(law, [data(1), data(2), arguments[3], data(4), data(5)])
+        return context.get_dummy_value()
+
+    return (signature, build) if all(isinstance(a, types.Array) for a in arrays) else None
+
+
+@inner
+def take_frames(s, elements, e, q, v):
+    """Copy the frames of element e to its row of poses."""
+    bodies = s.bodies
+    for k in range(elements.count[e]):
+        at, vt = bodies.q_at[elements.body[e, k]], bodies.v_at[elements.body[e, k]]
+        for i in range(7):
+            elements.pose[e, 13 * k + i] = q[at + i]
+        for i in range(6):
+            elements.pose[e, 13 * k + 7 + i] = v[vt + i]
+
+
+@residuals.of(Nonlinear)
+def nonlinear_residuals(s, W, elements, q, v, _lam):
+    """Add the forces of all elements to W.residual, and the power they lose to W.power[2]."""
+    for e in range(elements.address.size):
+        take_frames(s, elements, e, q, v)
+        ask(
+            elements.address[e],
+            elements.numbers[e],
+            elements.pose[e],
+            0,
+            elements.answer,
+            elements.space,
+        )
+        W.power[2] += elements.answer[1]
+        for k in range(elements.count[e]):
+            t = s.bodies.v_at[elements.body[e, k]]
+            for i in range(6):
+                W.residual[t + i] += elements.answer[2 + 6 * k + i]
+
+
+@tangents.of(Nonlinear)
+def nonlinear_tangents(s, W, elements, _lam, ck, cc):
+    """Add stiffness times ck and damping times cc to W.Kt and W.S; `nonlinear_residuals` first."""
+    graph = s.graph
+    for e in range(elements.address.size):
+        ask(
+            elements.address[e],
+            elements.numbers[e],
+            elements.pose[e],
+            1,
+            elements.answer,
+            elements.space,
+        )
+        n = 6 * elements.count[e]
+        for k in range(elements.count[e]):
+            for l in range(elements.count[e]):
+                block = block_of(graph, elements.body[e, k], elements.body[e, l])
+                x, y = graph.x[block], graph.y[block]
+                for i in range(6):
+                    at = 2 + n + (6 * k + i) * n + 6 * l
+                    for j in range(6):
+                        W.Kt[x + i, y + j] += ck * elements.answer[at + j]
+                        W.S[x + i, y + j] += cc * elements.answer[at + n * n + j]
+
+
+@energy.of(Nonlinear)
+def nonlinear_energy(s, _W, elements, q, v):
+    """Energy stored in all elements."""
+    total = 0.0
+    for e in range(elements.address.size):
+        take_frames(s, elements, e, q, v)
+        ask(
+            elements.address[e],
+            elements.numbers[e],
+            elements.pose[e],
+            0,
+            elements.answer,
+            elements.space,
+        )
+        total += elements.answer[0]
+    return total
+
+
+def _couples(elements: Any, _body: Index) -> list[Index]:
+    return [bodies[:n] for n, bodies in zip(elements.count, elements.body, strict=True)]
+
+
+def _outside(whole: Assembly) -> bool:
+    """Elements of one frame alone push it from outside, as wind does."""
+    return any(group.frames.shape[1] == 1 for group in whole.body.elements)
+
+
+FAMILY = Family(
+    "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
+    ends=on_joint, outside=_outside, couples=_couples,
+)  # fmt: skip

@@ -1,6 +1,6 @@
 """The equations of motion.
 
-`packing` and `packing_elements` make arrays of a mechanism along its `graph`; `equations` has
+`packing` makes arrays of a mechanism along its `graph`; `equations` has
 residual and tangents, with forces of `python_laws`; `elimination` and `linear_solve` solve with
 them, in the `ordering` found before.
 """

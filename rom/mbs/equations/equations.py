@@ -2,12 +2,6 @@
 
 from numba import types
 
-from rom.mbs.elements.bushing_kernels import bushing_tangents, bushing_wrenches
-from rom.mbs.elements.contact import contact_tangents, contact_wrenches
-from rom.mbs.elements.joint_kernels import action_tangents, action_wrenches, friction_by_load
-from rom.mbs.elements.nonlinear_kernels import nonlinear_residuals, nonlinear_tangents
-from rom.mbs.elements.spread import spread_residuals, spread_tangents
-from rom.mbs.elements.springs_loads_kernels import applied_wrenches, force_tangents
 from rom.mbs.equations.linear_solve import border, factorise_bordered, solve_bordered
 from rom.mbs.kernels.algebra import range_basis, scale, turned, vec
 from rom.mbs.kernels.compiled import copy, inner, kernel
@@ -18,6 +12,12 @@ from rom.mbs.kernels.constraints import (
     row_states,
 )
 from rom.mbs.kernels.coordinates import coordinate_states, coupling_stiffness, follow_coordinates
+from rom.mbs.kernels.element_calls import (
+    energy,
+    multiplier_columns,
+    residuals,
+)
+from rom.mbs.kernels.element_calls import tangents as element_tangents
 from rom.mbs.kernels.inertia import (
     body_damping,
     body_mass,
@@ -64,13 +64,11 @@ def residual(s, W, q, v, a, lam):
     """Set W.residual = M a + h - Q + G^T lam at the state of the last `evaluate`."""
     W.residual[:] = 0.0
     W.power[:] = 0.0
+    W.driven[0] = 0.0
+    W.wrench[:] = 0.0
     body_residuals(s.bodies, W, q, v, a)
-    spread_residuals(s, W, q, v)
-    nonlinear_residuals(s, W, q, v)
-    applied_wrenches(s, W)
-    action_wrenches(s, W, lam)
-    bushing_wrenches(s, W)
-    contact_wrenches(s, W)
+    for k in range(s.elements.shape[0]):
+        residuals(s, k, W, q, v, lam)
     constraint_wrench(s, W, lam)
     spread_wrench(s, W, -1.0, W.residual)
     drive_power(s, W, lam)
@@ -94,15 +92,28 @@ def tangents(s, W, v, a, lam, c):
         body_mass(s.bodies, W, b, c[0], own_block(s, b, W.S))
         body_damping(s.bodies, W, b, v, c[1], own_block(s, b, W.S))
         body_stiffness(s.bodies, W, b, v, a, c[2], own_block(s, b, W.Kt))
-    spread_tangents(s, W, c[2], W.Kt)
-    nonlinear_tangents(s, W, c[2], c[1], W.Kt, W.S)
     wrench_stiffness(s, W, c[2], W.Kt)
     constraint_stiffness(s, W, lam, c[2], W.Kt)
     coupling_stiffness(s, W, lam, c[2], W.Kt)
-    force_tangents(s, W, c[2], c[1], W.Kt, W.S)
-    action_tangents(s, W, lam, c[2], c[1], W.Kt, W.S)
-    bushing_tangents(s, W, c[2], c[1], W.Kt, W.S)
-    contact_tangents(s, W, c[2], c[1], W.Kt, W.S)
+    for k in range(s.elements.shape[0]):
+        element_tangents(s, k, W, lam, c[2], c[1])
+
+
+@inner
+def load_columns(s, W, lam, rank):
+    """Add to W.UG what forces change with the multipliers of the joints they depend on."""
+    if s.by_multipliers != 0:
+        for k in range(s.elements.shape[0]):
+            multiplier_columns(s, k, W, lam, rank)
+
+
+@inner
+def element_energy(s, W, q, v):
+    """Energy stored in elements."""
+    total = 0.0
+    for k in range(s.elements.shape[0]):
+        total += energy(s, k, W, q, v)
+    return total
 
 
 @inner
@@ -173,7 +184,7 @@ def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code
     if not factorise_bordered(s, W, rank):
         return False
     lam[:] = 0.0
-    for _ in range(MAX_PASSES if friction_by_load(s) else 1):
+    for _ in range(MAX_PASSES if s.by_multipliers != 0 else 1):
         a[:] = 0.0
         residual(s, W, q, v, a, lam)
         for i in range(n):

@@ -3,6 +3,7 @@
 Whole matrices are quicker for a few bodies, and needed where constraints repeat others or roll.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from rom.mbs.equations.ordering import Group, Ordering, forest
 from rom.mbs.kernels.plan import Graph, Plan
 from rom.mbs.kernels.system import ROLL
-from rom.mbs.kernels.tables import Table
 from rom.model import Index
 
 # operations of a whole factorisation over those by blocks, from which blocks are quicker: measured
@@ -18,14 +18,15 @@ from rom.model import Index
 BLOCK_GAIN = 4.0
 
 
-def graph_of(system: Any, *, whole: bool = False) -> Graph:
+def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Graph:
     """Storage and elimination plan of a mechanism whose other arrays are complete.
 
     Args:
         system: the arrays of the mechanism.
+        coupled: groups of bodies that elements couple.
         whole: store whole matrices whatever they cost.
     """
-    neighbours, groups = _neighbours(system), _groups(system)
+    neighbours, groups = _neighbours(system, coupled), _groups(system)
     plan = None if whole or (system.rows.kind == ROLL).any() else _plan(system, neighbours, groups)
     compact = plan is not None
     width, bodies = 6 + system.bodies.r, system.bodies
@@ -45,21 +46,16 @@ def graph_of(system: Any, *, whole: bool = False) -> Graph:
     )  # fmt: skip
 
 
-def _neighbours(system: Any) -> list[list[int]]:
+def _neighbours(system: Any, coupled: Sequence[Any]) -> list[list[int]]:
     """Bodies that each body is coupled to by the stiffness of joints and forces, and itself."""
     found: list[set[int]] = [{b} for b in range(system.bodies.mass.size)]
-    for _, part in system.items():
-        for name, markers in part.items() if isinstance(part, Table) else ():
-            if (name != "i" and not name.endswith("_i")) or markers.ndim > 1:
-                continue
-            markers = markers, getattr(part, name[:-1] + "j")
-            for a, b in zip(*(system.markers.body[m] for m in markers), strict=True):
-                if a >= 0 and b >= 0:
-                    found[a].add(int(b))
-                    found[b].add(int(a))
-    for count, bodies in zip(system.nonlinear.count, system.nonlinear.body, strict=True):
-        for b in bodies[:count]:
-            found[b].update(map(int, bodies[:count]))
+    body, rows, C = system.markers.body, system.rows, system.coordinates
+    sides = ((rows.i, rows.j), (rows.joint_i, rows.joint_j), (C.i, C.j))
+    pairs = [group for i, j in sides for group in zip(body[i], body[j], strict=True)]
+    for group in (*pairs, *coupled):
+        moved = {int(b) for b in group if b >= 0}
+        for b in moved:
+            found[b] |= moved
     return [sorted(others) for others in found]
 
 

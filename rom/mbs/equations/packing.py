@@ -6,32 +6,24 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, warn
+from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of
 from rom.mbs.equations.graph import graph_of
-from rom.mbs.equations.packing_elements import (
-    actions,
-    bushings,
-    contacts,
-    integers,
-    nonlinear,
-    spread_loads,
-    table,
-)
+from rom.mbs.kernels.element_calls import ROW_WORDS
 from rom.mbs.kernels.stages import STAGE_ADDRESSES
 from rom.mbs.kernels.system import (
     ALONG,
     LENGTHS,
     Bodies,
-    Coordinates,
-    Forces,
     Markers,
     Rows,
     System,
 )
+from rom.mbs.kernels.tables import Table
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Marker, Part
 from rom.mbs.parts.joints import Joint, Row
-from rom.mbs.parts.signals import Signal, clock_signal, drive_signal, load_signal
-from rom.model import Array
+from rom.mbs.parts.signals import Signal, drive_signal
+from rom.model import Array, Index
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
 
@@ -49,6 +41,8 @@ class Packed:
         q, v: coordinates and velocities as given by the user.
         length: size of the mechanism [m].
         mass: total mass [kg].
+        elements: {family: its table}, in the order of the arrays.
+        asked: laws that stay in Python.
     """
 
     system: System
@@ -60,6 +54,24 @@ class Packed:
     v: Array
     length: float
     mass: float
+    elements: dict[Family, Any]
+    asked: tuple[Asked, ...]
+
+    @property
+    def followed(self) -> int:
+        """Joint coordinates and memories of laws that go from one instant to the next."""
+        return int(self.system.coordinates.kind.size + self.system.memory.size)
+
+    @property
+    def loaded_rows(self) -> Index:
+        """Constraint rows whose multipliers forces depend on."""
+        rows = [family.loaded_rows(table) for family, table in self.elements.items()]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *rows])
+
+    @property
+    def by_rate(self) -> bool:
+        """Whether any force of an element depends on velocities."""
+        return any(family.by_rate(table) for family, table in self.elements.items())
 
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""
@@ -80,8 +92,12 @@ class Packed:
 
     def whole(self) -> "Packed":
         """The same with whole matrices, which constraints that repeat others need."""
-        graph = graph_of(self.system, whole=True)
+        graph = graph_of(self.system, self.coupled(), whole=True)
         return replace(self, system=self.system.replace(graph=graph))
+
+    def coupled(self) -> list[Any]:
+        """Groups of bodies that elements couple."""
+        return coupled_by(self.elements, self.system.markers.body)
 
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""
@@ -103,57 +119,53 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")
     handles = _all_markers(mechanism, parts)
     index = {marker: k for k, marker in enumerate(handles)}
-    coordinates = _Coordinates()
-    rows, owners, signals = _rows(mechanism, index, coordinates)
-    forces, loads = _forces(mechanism, index, len(signals), coordinates)
-    spread, more = spread_loads(mechanism, len(signals) + len(loads), max(p.r for p in parts))
-    loads += more
-    clock = (clock_signal(),) if mechanism.motors else ()
+    R, number = max(part.r for part in parts), {name: b for b, name in enumerate(mechanism.parts)}
+    places = Places(number, index, mechanism.joints, R)
+    rows = _rows(mechanism, places)
     _doubt_place(mechanism, _length(parts))
-    moved_by = actions(
-        mechanism,
-        coordinates,
-        lambda joint: (owners.index(joint), owners.count(joint)),
-        len(signals) + len(loads) if clock else -1,
-    )
-    R = max(part.r for part in parts)
+    families = mechanism.families()
+    elements = {family: family.pack(found, places) for family, found in families.items()}
+    followed = len(places.coordinates)
+    markers = _markers(mechanism, handles, R)
     system = System(
         STAGE_ADDRESSES,
         _bodies(parts, R, np.asarray(mechanism.gravity)),
-        _markers(mechanism, handles, R),
+        markers,
         rows,
-        coordinates.packed(index),
-        forces,
-        moved_by,
-        bushings(mechanism, index),
-        contacts(mechanism, index),
-        spread,
-        nonlinear(mechanism),
+        places.packed_coordinates(),
+        integers(family.row(table) for family, table in elements.items()).reshape(-1, ROW_WORDS),
+        int(any(family.loaded_rows(table).size for family, table in elements.items())),
+        np.concatenate([np.zeros(0), *places.remembered]),
     )
     return Packed(
-        system.replace(graph=graph_of(system, whole=whole)),
+        system.replace(graph=graph_of(system, coupled_by(elements, markers.body), whole=whole)),
         tuple(mechanism.parts),
         index,
-        owners,
-        (*signals, *loads, *clock),
+        tuple(places.owners),
+        tuple(places.signals),
         np.concatenate([np.r_[part.at, part.p, part.q] for part in parts]),
         np.concatenate([np.r_[part.velocity, part.omega, part.qd] for part in parts]),
         max([_length(parts), *(whole.reach for whole in mechanism.nonlinear.values())]),
         sum(part.mass for part in parts),
+        elements,
+        tuple(
+            law
+            for family, found in families.items()
+            for law in family.asked(found, elements[family], followed)
+        ),
     )
+
+
+def coupled_by(elements: dict[Family, Table], body: Index) -> list[Any]:
+    """Groups of bodies that elements couple, -1 for the ground."""
+    return [group for family, table in elements.items() for group in family.couples(table, body)]
 
 
 def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
     """Every named marker, every marker in use, and the origin of every body."""
     found = [Marker(part.name, name) for part in parts for name in part.names]
     found += [m for joint in mechanism.joints.values() for m in joint.markers]
-    found += [m for s in mechanism.springs.values() for m in (s.i, s.j)]
-    pairs: tuple[Any, ...] = (*mechanism.bushings.values(), *mechanism.contacts.values())
-    for pair in pairs:
-        found += [pair.i, pair.j]
-    found += [load.marker for load in mechanism.loads.values()]
-    for law in mechanism.user_forces.values():
-        found += [law.i] if law.j is None else [law.i, law.j]
+    found += [m for family, x in mechanism.elements.values() for m in family.ends(x)]
     return list(dict.fromkeys([*found, Marker(GROUND, (0.0, 0.0, 0.0))]))
 
 
@@ -264,50 +276,25 @@ def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
     )
 
 
-class _Coordinates:
-    """Joint coordinates that something acts on, each once."""
-
-    def __init__(self) -> None:
-        self.found: list[tuple[tuple[Marker, Marker], Row]] = []
-
-    def number(self, markers: tuple[Marker, ...], row: Row) -> int:
-        """Number of the coordinate that ``row`` measures between two markers."""
-        for k, (_, known) in enumerate(self.found):
-            if known is row:
-                return k
-        self.found.append(((markers[0], markers[1]), row))
-        return len(self.found) - 1
-
-    def packed(self, index: dict[Marker, int]) -> Coordinates:
-        """All of them as arrays."""
-        rows = [row for _, row in self.found]
-        return Coordinates(
-            integers([row.kind for row in rows]),
-            *(integers([index[m[side]] for m, _ in self.found]) for side in (0, 1)),
-            *(table((getattr(row, axis) for row in rows), 3) for axis in "abc"),
-            np.array([row.offset for row in rows], dtype=float),
-        )
-
-
-def _rows(
-    mechanism: Mechanism, index: dict[Marker, int], coordinates: _Coordinates
-) -> tuple[Rows, tuple[str, ...], list[Signal]]:
-    entries, signals = [], list[Signal]()
+def _rows(mechanism: Mechanism, places: Places) -> Rows:
+    """The constraint rows; their owners and the functions of drives go to the places."""
+    entries, index = [], places.marker
     for pair, (name, joint) in enumerate(mechanism.joints.items()):
         entries += [(name, pair, joint, row, -1) for row in joint.rows]
     for name, drive in mechanism.drives.items():
         joint = mechanism.joints[drive.joint]
         pair = list(mechanism.joints).index(drive.joint)
-        entries.append((name, pair, joint, joint.coordinate, len(signals)))
-        signals.append(drive_signal(name, drive))
+        entries.append((name, pair, joint, joint.coordinate, len(places.signals)))
+        places.signals.append(drive_signal(name, drive))
     sides = [[_marker(index, joint, row, k) for _, _, joint, row, _ in entries] for k in range(4)]
     joint_sides = [[index[j.markers[side]] for j in mechanism.joints.values()] for side in (0, 1)]
     rows = [row for _, _, _, row, _ in entries]
-    terms = [_terms(joint, row, coordinates) for _, _, joint, row, _ in entries]
-    packed = Rows(
+    terms = [_terms(joint, row, places) for _, _, joint, row, _ in entries]
+    places.owners.extend(entry[0] for entry in entries)
+    return Rows(
         integers([row.kind for row in rows]),
         *(integers(side) for side in sides),
-        *(table((getattr(row, axis) for row in rows), 3) for axis in "abc"),
+        *(rows_of((getattr(row, axis) for row in rows), 3) for axis in "abc"),
         integers([at for at, _ in terms]).reshape(-1, 2),
         np.array([factor for _, factor in terms], dtype=float).reshape(-1, 2),
         np.array([row.offset for row in rows], dtype=float),
@@ -316,7 +303,6 @@ def _rows(
         integers(joint_sides[0]),
         integers(joint_sides[1]),
     )
-    return packed, tuple(entry[0] for entry in entries), signals
 
 
 def _marker(index: dict[Marker, int], joint: Joint, row: Row, k: int) -> int:
@@ -326,36 +312,10 @@ def _marker(index: dict[Marker, int], joint: Joint, row: Row, k: int) -> int:
     return index[joint.markers[k % len(joint.markers)]]
 
 
-def _terms(
-    joint: Joint, row: Row, coordinates: _Coordinates
-) -> tuple[tuple[int, int], tuple[float, float]]:
+def _terms(joint: Joint, row: Row, places: Places) -> tuple[tuple[int, int], tuple[float, float]]:
     """Joint coordinates of a coupling and their factors; the radius of a rolling row."""
     if not row.terms:
         return (-1, -1), (row.radius, 0.0)
     (one, f1), (two, f2) = row.terms
     markers = joint.markers
-    at = coordinates.number(markers[:2], one), coordinates.number(markers[-2:], two)
-    return at, (f1, f2)
-
-
-def _forces(
-    mechanism: Mechanism, index: dict[Marker, int], n_drives: int, coordinates: _Coordinates
-) -> tuple[Forces, list[Signal]]:
-    springs, loads, turns = mechanism.springs.values(), mechanism.loads, mechanism.turns.values()
-    coiled = [mechanism.joints[t.joint] for t in turns]
-    signals, at = list[Signal](), []
-    for name, load in loads.items():
-        at.append(n_drives + len(signals) if load.function else -1)
-        signals += [load_signal(name, load.function)] if load.function else []
-    forces = Forces(
-        integers([index[s.i] for s in springs]),
-        integers([index[s.j] for s in springs]),
-        table([(s.stiffness, s.damping, s.free_length) for s in springs], 3),
-        integers([index[load.marker] for load in loads.values()]),
-        integers([load.kind for load in loads.values()]),
-        table([load.vector for load in loads.values()], 3),
-        integers(at),
-        integers([coordinates.number(joint.markers, joint.turn) for joint in coiled]),
-        table([(t.stiffness, t.damping, t.free_angle) for t in turns], 3),
-    )
-    return forces, signals
+    return (places.between(markers[:2], one), places.between(markers[-2:], two)), (f1, f2)

@@ -227,8 +227,7 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
 
 
 def _refuse_shared_friction(packed: Packed, names: Any) -> None:
-    actions = packed.system.actions
-    for first in actions.load_first[actions.friction[:, 1] != 0.0]:
+    for first in packed.loaded_rows:
         if packed.row_owner[first] in names:
             raise ModelError(
                 "friction depends on the load of a joint that shares it with others as only "

@@ -12,11 +12,11 @@ import math
 
 import numpy as np
 
-from rom.mbs.elements.joint_kernels import load_columns
 from rom.mbs.equations.equations import (
     drive_power,
     evaluate,
     least_multipliers,
+    load_columns,
     residual,
     retract,
     tangents,

@@ -34,8 +34,6 @@ EVENTS_PREFIX = "events/"
 MIN_INTERVAL, WRITE_TIME_FACTOR = 1.0, 60.0
 # of the time spent so far: what a long run risks, so that it does not leave thousands of parts
 MAX_LOSS_RATIO = 1 / 500
-# of a system: addresses differ between processes, the graph follows from the rest
-PASSING_FIELDS = {"graph", "address", "motor", "stages"}
 
 Block = tuple[Array, ...]
 
@@ -212,7 +210,8 @@ def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
     """Digests by which a run is known: one of each argument, and one of the mechanism."""
     hashed = hashlib.sha256(repr((packed.names, packed.row_owner)).encode())
     hashed.update(repr([signal.name for signal in packed.signals]).encode())
-    for A in (*_numbers(packed.system), packed.q, packed.v):
+    tables = (packed.system, *packed.elements.values())
+    for A in (*(A for table in tables for A in _numbers(table)), packed.q, packed.v):
         hashed.update(digest(A).encode())
     return {name: repr(value) for name, value in arguments.items()} | {
         "mechanism": hashed.hexdigest()
@@ -220,10 +219,10 @@ def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _numbers(table: Table) -> list[Array]:
-    """All arrays of nested tables that are the same in every process."""
+    """All arrays of nested tables that tell a mechanism from another, its graph included."""
     found: list[Array] = []
     for name, value in table.items():
-        if name not in PASSING_FIELDS:
+        if name != "graph" and name not in table._passing:
             found += _numbers(value) if isinstance(value, Table) else [np.asarray(value)]
     return found
 

@@ -112,7 +112,7 @@ class Settings:
             ResourceError: with their number and size.
         """
         rows = 2 + (0 if self.dt is None else self.steps // int(self.save_every))
-        signals, followed = len(packed.signals), packed.system.coordinates.kind.size
+        signals, followed = len(packed.signals), packed.followed
         wide = 4 + packed.q.size + 2 * packed.v.size + packed.system.rows.kind.size + followed
         # the blocks, joined, and the prescribed functions beside them
         need, there = 8.0 * rows * (2 * wide + 3 * signals), free_bytes()

@@ -205,7 +205,7 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
 
 def _check_fit(state: Any, packed: Packed) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
-    followed = packed.system.coordinates.kind.size
+    followed = packed.followed
     base = np.zeros(followed) if state.base is None else state.base
     q, v, lam, angles = (np.size(x) for x in (state.q, state.v, state.lam, base))
     needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size, followed)

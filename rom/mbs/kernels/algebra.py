@@ -284,3 +284,36 @@ def clean(U, k):
     s = 1.0 / math.sqrt(s)
     for i in range(m):
         U[k, i] *= s
+
+
+@inner
+def inverse_coefficient(x):
+    """Coefficient c of the inverse tangent operator 1 - skew / 2 + c skew^2, and its derivative.
+
+    x = angle^2, c = (1 - (a / 2) cot(a / 2)) / a^2; power series where the quotients cancel.
+    """
+    if x < 0.05:
+        c = 1 / 12 + x * (1 / 720 + x * (1 / 30240 + x * (1 / 1209600 + x / 47900160)))
+        return c, 1 / 720 + x * (2 / 30240 + x * (3 / 1209600 + x * 4 / 47900160))
+    a = math.sqrt(x)
+    s, t = math.sin(0.5 * a), math.cos(0.5 * a)
+    c = (1.0 - 0.5 * a * t / s) / x
+    return c, (0.125 * (1.0 / (s * s) - 2.0 * t / (a * s)) - c) / x
+
+
+@inner
+def inverse_tangent(theta, sign, x):
+    """Inverse of the spatial tangent operator of exp(theta) times x; transposed for sign = -1."""
+    c, _ = inverse_coefficient(dot(theta, theta))
+    once = cross(theta, x)
+    return add(x, add(scale(-0.5 * sign, once), scale(c, cross(theta, once))))
+
+
+@inner
+def transposed_rate(theta, d, x):
+    """Change of the transposed inverse times x while theta changes by d."""
+    c, dc = inverse_coefficient(dot(theta, theta))
+    once = cross(theta, x)
+    both = add(cross(d, once), cross(theta, cross(d, x)))
+    along = scale(2.0 * dc * dot(theta, d), cross(theta, once))
+    return add(add(scale(0.5, cross(d, x)), scale(c, both)), along)

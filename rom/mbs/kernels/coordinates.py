@@ -1,7 +1,7 @@
 """Joint coordinates: how they move, what couples them, and forces that act along them."""
 
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
-from rom.mbs.kernels.compiled import copy, inner
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import (
     angle_state,
     pair_stiffness,
@@ -38,8 +38,11 @@ def coordinate_states(C, W):
 
 @inner
 def follow_coordinates(W):
-    """Accept the present angles as those the next ones are followed from."""
-    copy(W.x, W.base)
+    """Accept the present angles as those the next ones are followed from, and memories of laws."""
+    for k in range(W.x.size):
+        W.base[k] = W.x[k]
+    for k in range(W.fresh.size):
+        W.base[W.x.size + k] = W.fresh[k]
 
 
 @inner

@@ -32,18 +32,6 @@ STAGE_NAMES = (
     "constraint_gradient",
     "factorise_bordered",
     "solve_bordered",
-    "applied_wrenches",
-    "force_tangents",
-    "action_wrenches",
-    "action_tangents",
-    "bushing_wrenches",
-    "bushing_tangents",
-    "contact_wrenches",
-    "contact_tangents",
-    "spread_residuals",
-    "spread_tangents",
-    "nonlinear_residuals",
-    "nonlinear_tangents",
 )
 STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked
@@ -78,13 +66,8 @@ class Stage:
 
     def link(self) -> None:
         """Compile it, or take it from the cache, unless that has been done."""
-        if STAGE_ADDRESSES[self.slot] or config.DISABLE_JIT:
-            return
-        self.kernel.compile(self.signature)
-        self.kernel.disable_compile()
-        compiled = self.kernel.overloads[self.signature.args]
-        name = compiled.fndesc.llvm_func_name
-        STAGE_ADDRESSES[self.slot] = compiled.library.get_pointer_to_function(name)
+        if not STAGE_ADDRESSES[self.slot] and not config.DISABLE_JIT:
+            STAGE_ADDRESSES[self.slot] = address_of(self.kernel, self.signature)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run it from Python."""
@@ -101,14 +84,27 @@ class Stage:
         """What a call in a kernel becomes."""
         addresses = builder.inttoptr(builder.load(values[0]), TABLE_WORD.as_pointer())
         address = builder.load(builder.gep(addresses, [ir.Constant(TABLE_WORD, self.slot)]))
-        kind = context.call_conv.get_function_type(signature.return_type, signature.args)
-        code = builder.inttoptr(address, kind.as_pointer())
-        nothing = context.get_constant_null(signature.return_type)
-        answer = cgutils.alloca_once_value(builder, nothing)
-        with builder.if_then(cgutils.is_not_null(builder, code), likely=True):
-            shape = signature.return_type, signature.args
-            builder.store(context.call_conv.call_function(builder, code, *shape, values)[1], answer)
-        return builder.load(answer)
+        return call_at(context, builder, signature, address, values)
+
+
+def address_of(kernel: Any, signature: Any) -> int:
+    """Address of the compiled form of a kernel, which takes no other types from then on."""
+    kernel.compile(signature)
+    kernel.disable_compile()
+    compiled = kernel.overloads[signature.args]
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+
+
+def call_at(context: Any, builder: Any, signature: Any, address: Any, values: Any) -> Any:
+    """What a call of the kernel at an address becomes: its answer, 0 if the address is 0."""
+    result, arguments = signature.return_type, signature.args
+    kind = context.call_conv.get_function_type(result, arguments)
+    code = builder.inttoptr(address, kind.as_pointer())
+    answer = cgutils.alloca_once_value(builder, context.get_constant_null(result))
+    with builder.if_then(cgutils.is_not_null(builder, code), likely=True):
+        _, given = context.call_conv.call_function(builder, code, result, arguments, values)
+        builder.store(given, answer)
+    return builder.load(answer)
 
 
 def stage(*types_: Any, needed: Callable[[Any], Any] = _always) -> Callable[[Any], Stage]:

@@ -7,18 +7,23 @@ body frame (3), elastic (r). A marker twist is velocity (3), then angular veloci
 """
 
 from rom.mbs.kernels.plan import Graph
-from rom.mbs.kernels.tables import Array1, Array2, Array3, Array4, Index1, Index2, Table, table
+from rom.mbs.kernels.tables import (
+    Address1,
+    Address2,
+    Array1,
+    Array2,
+    Array3,
+    Array4,
+    Index1,
+    Index2,
+    Table,
+    table,
+)
 
 # kinds of constraint rows
 POINT, ALONG, NORMAL, ANGLE, DISTANCE, COUPLING, TOUCH, ROLL = range(8)
 # those that measure lengths; a row of kind ROLL measures a velocity
 LENGTHS = (POINT, ALONG, DISTANCE, TOUCH)
-# kinds of contacts
-PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
-# kinds of loads
-FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
-# numbers that the law of a non-linear element may use as memory
-LAW_MEMORY_SIZE = 256
 # columns of the work done since the start
 WORK = ("drives", "forces", "damping")
 
@@ -140,154 +145,23 @@ class Coordinates(Table):
 
 
 @table
-class Forces(Table):
-    """Springs, loads and rotational springs.
-
-    Attributes:
-        spring_i, spring_j: (s,) markers.
-        spring: (s, 3) stiffness [N/m], damping [N s/m], free length [m].
-        load_at: (l,) markers; load_kind: (l,) FORCE_WORLD to TORQUE_BODY; load: (l, 3) vector;
-        load_signal: (l,) function of time added to the vector, -1 for none.
-        turn_at: (t,) joint coordinates of rotational springs;
-        turn: (t, 3) stiffness [N m/rad], damping [N m s/rad], free angle [rad].
-    """
-
-    spring_i: Index1
-    spring_j: Index1
-    spring: Array2
-    load_at: Index1
-    load_kind: Index1
-    load: Array2
-    load_signal: Index1
-    turn_at: Index1
-    turn: Array2
-
-
-@table
-class Actions(Table):
-    """Motors, friction and stops on joint coordinates.
-
-    Attributes:
-        motor_at: (k,) joint coordinates; motor: (k,) addresses of compiled laws, 0 for Python.
-        clock: (1,) signal that tells the time, -1 for none.
-        friction_at: (f,) joint coordinates; friction: (f, 6) constant level [N or N m], level per
-            load of the joint [1 or m], share by which the level is higher at rest, speed over
-            which that fades, viscous coefficient, speed over which the sign changes.
-        load_first, load_count: (f,) constraint rows of the joint.
-        stop_at: (l,) joint coordinates; stop: (l, 5) side +1 or -1, limit, stiffness, exponent,
-            damping factor [s/m or s/rad].
-    """
-
-    motor_at: Index1
-    motor: Index1
-    clock: Index1
-    friction_at: Index1
-    friction: Array2
-    load_first: Index1
-    load_count: Index1
-    stop_at: Index1
-    stop: Array2
-
-
-@table
-class Bushings(Table):
-    """Springs and dampers in six directions.
-
-    Attributes:
-        i, j: (b,) markers.
-        frame_i, frame_j: (b, 3, 3) axes of the bushing in those of its markers.
-        zero: (b, 3) position of j in these axes without force [m].
-        stiffness, damping: (b, 6, 6) translations, then rotations.
-        curve: (b, 6) first piece of a force over displacement, -1 for none; pieces: (b, 6).
-        piece: (n, 7) lower end, origin, four coefficients of powers, energy at the origin.
-    """
-
-    i: Index1
-    j: Index1
-    frame_i: Array3
-    frame_j: Array3
-    zero: Array2
-    stiffness: Array3
-    damping: Array3
-    curve: Index2
-    pieces: Index2
-    piece: Array2
-
-
-@table
-class Contacts(Table):
-    """A sphere or disc on marker j that touches something on marker i.
-
-    Attributes:
-        kind: (c,) PLANE, SPHERE, CYLINDER, BORE or DISC.
-        i, j: (c,) markers.
-        e: (c, 3) normal of the plane or axis of the cylinder in the axes of i.
-        s: (c, 3) axis of the disc in the axes of j.
-        radius: (c, 2) on j, and on i [m].
-        law: (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over
-            which friction changes its sign [m/s].
-    """
-
-    kind: Index1
-    i: Index1
-    j: Index1
-    e: Array2
-    s: Array2
-    radius: Array2
-    law: Array2
-
-
-@table
-class Spread(Table):
-    """Loads spread over bodies.
-
-    Attributes:
-        body: (l,) body; world: (l,) 1 if the forces keep their direction in the world, else 0.
-        force: (l, 3) sum of the forces f [N].
-        first: (l, 9) entry 3 a + b: sum of X_a f_b [N m].
-        shapes: (l, R, 9) entry 3 a + b: sum of phi_k,a f_b.
-        amplitude: (l,) factor; signal: (l,) function of time added to it, -1 for none.
-    """
-
-    body: Index1
-    world: Index1
-    force: Array2
-    first: Array2
-    shapes: Array3
-    amplitude: Array1
-    signal: Index1
-
-
-@table
-class Nonlinear(Table):
-    """Elements of non-linear bodies between up to K frames, each with a compiled law.
-
-    Attributes:
-        address: (e,) of the laws, see `rom.mbs.elements.nonlinear`.
-        count: (e,) number of frames.
-        body: (e, K) their bodies, -1 beyond.
-        numbers: (e, c) what the law knows of the element.
-    """
-
-    address: Index1
-    count: Index1
-    body: Index2
-    numbers: Array2
-
-
-@table
 class System(Table):
-    """Everything that stays constant during a run; first the addresses of the stages."""
+    """Everything that stays constant during a run.
 
-    stages: Index1
+    Attributes:
+        stages: addresses of the stages, first of all.
+        elements: (e, 5) of each family of elements that occurs, see
+            `rom.mbs.kernels.element_calls`.
+        by_multipliers: 1 if forces depend on the loads of joints.
+        memory: (p,) what laws remember from one instant to the next, at the start.
+    """
+
+    stages: Address1
     bodies: Bodies
     markers: Markers
     rows: Rows
     coordinates: Coordinates
-    forces: Forces
-    actions: Actions
-    bushings: Bushings
-    contacts: Contacts
-    spread: Spread
-    nonlinear: Nonlinear
+    elements: Address2
+    by_multipliers: int
+    memory: Array1
     graph: Graph | None = None

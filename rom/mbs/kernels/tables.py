@@ -26,6 +26,13 @@ Array3 = Annotated[Array, types.Array(types.float64, 3, "C")]
 Array4 = Annotated[Array, types.Array(types.float64, 4, "C")]
 Index1 = Annotated[Index, types.Array(types.int64, 1, "C")]
 Index2 = Annotated[Index, types.Array(types.int64, 2, "C")]
+# of fields that differ between processes or from one instant to the next: they do not tell a
+# mechanism from another
+PASSING = "passing"
+Address1 = Annotated[Index, types.Array(types.int64, 1, "C"), PASSING]
+Address2 = Annotated[Index, types.Array(types.int64, 2, "C"), PASSING]
+Scratch1 = Annotated[Array, types.Array(types.float64, 1, "C"), PASSING]
+Scratch2 = Annotated[Array, types.Array(types.float64, 2, "C"), PASSING]
 TABLE_WORD = ir.IntType(64)
 WORD_SIZE = 8  # of all entries, real and whole numbers both [bytes]
 T = TypeVar("T")
@@ -47,6 +54,7 @@ class Table:
     _words: Any
     _numba_type_: Any
     _layout: dict[str, tuple[int, Any]]  # first word and type of each field
+    _passing: frozenset[str]  # fields marked so
 
     def __post_init__(self) -> None:
         words: list[int] = []
@@ -77,7 +85,9 @@ def table(cls: type[T]) -> type[T]:
     made: Any = dataclass(frozen=True, eq=False, slots=True)(cls)
     made._numba_type_ = TableType(made)
     made._layout, at = {}, 0
-    for name, hint in get_type_hints(made, include_extras=True).items():
+    hints = get_type_hints(made, include_extras=True)
+    made._passing = frozenset(name for name, hint in hints.items() if PASSING in get_args(hint))
+    for name, hint in hints.items():
         if name.startswith("_"):
             continue
         kind = _kind(hint)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rom.mbs.kernels.stages import link
-from rom.mbs.kernels.system import LAW_MEMORY_SIZE, System
+from rom.mbs.kernels.system import System
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Table, table
 
 # velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
@@ -38,11 +38,7 @@ class Work(Table):
     u: Array2  # (k, 3) marker positions in the body frame
     theta: Array2  # (k, 3) marker rotation vectors
     wrench: Array2  # (k, 6) force and moment on each marker
-    user: Array2  # (k, 6) force and moment from Python functions
-    arm: Array2  # (l, 9) sum of positions and forces of spread loads, body frame
-    pose: Array2  # (e, 13 K) frames of non-linear elements: position, quaternion, velocities
-    answer: Array1  # (2 + 6 K + 72 K^2,) what the law of an element says
-    space: Array1  # (LAW_MEMORY_SIZE,) for the laws to use as they like
+    load: Array1  # (1,) factor of loads, one but where statics lets them grow
     signal: Array2  # (s, 3) prescribed values, rates, accelerations; or vectors of loads
     x: Array1  # (c,) joint coordinates, angles followed over whole turns
     xd: Array1  # (c,) their rates
@@ -52,10 +48,10 @@ class Work(Table):
     g: Array2  # (m, 24) constraint gradient in the twists of its two or four markers
     gamma: Array1  # (m,) convective term of the constraint acceleration
     G: Array2  # (m, n) constraint gradient in the velocities; blocks in a row if they are stored
-    base: Array1  # (c,) joint coordinates at the last accepted instant
+    base: Array1  # (c + p,) joint coordinates and memory of laws at the last accepted instant
+    fresh: Array1  # (p,) memory of laws, if this instant is accepted
     power: Array1  # (3,) of drives and motors, of forces, lost in dampers and friction
     driven: Array1  # (1,) power of motors
-    motor: Array1  # (k,) forces of motors whose law is in Python
     residual: Array1  # (n,) equations of motion
     S: Array2  # (n, n) mass and damping part of the iteration matrix; or blocks below each other
     Kt: Array2  # as S: stiffness part
@@ -93,7 +89,6 @@ def workspace(system: System, n_signals: int) -> Work:
         wide = int((system.graph.at + 6 + bodies.r[moved])[moved >= 0].max(initial=0))
         whole = n + m if n + m <= LARGEST_WHOLE else 0
     redundant = (0, 0) if system.graph.compact else (m, m)
-    e, K = system.nonlinear.body.shape
     shapes = {
         **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
         **dict.fromkeys(("d", "dd"), (b, 3)),
@@ -107,22 +102,20 @@ def workspace(system: System, n_signals: int) -> Work:
         "move": (k, 6, R),
         **dict.fromkeys(("P", "u", "theta"), (k, 3)),
         "E": (k, 3, 3),
-        **dict.fromkeys(("V", "conv", "wrench", "user"), (k, 6)),
+        **dict.fromkeys(("V", "conv", "wrench"), (k, 6)),
         "H": (k, 6, 6 + R),
-        "pose": (e, 13 * K),
-        "answer": (2 + 6 * K + 72 * K * K,),
-        "space": (LAW_MEMORY_SIZE,),
-        "arm": (system.spread.body.size, 9),
+        "load": (1,),
         "signal": (n_signals, 3),
         **dict.fromkeys(("value", "gamma", "part", "dlam"), (m,)),
         "g": (m, 24),
-        **dict.fromkeys(("x", "xd", "xc", "base"), (c,)),
+        **dict.fromkeys(("x", "xd", "xc"), (c,)),
+        "base": (c + system.memory.size,),
+        "fresh": (system.memory.size,),
         "xg": (c, 12),
         **dict.fromkeys(("G", "UG", "UGT"), (m, wide)),
         "remainder": (0, 0) if system.graph.compact else (n, m),
         "power": (3,),
         "driven": (1,),
-        "motor": (system.actions.motor_at.size,),
         **dict.fromkeys(("residual", "weight", "delta"), (n,)),
         **dict.fromkeys(("S", "Kt"), square),
         "Q": (12, 12),
@@ -133,5 +126,7 @@ def workspace(system: System, n_signals: int) -> Work:
         **dict.fromkeys(("U", "U_lu"), redundant),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    arrays["load"][0] = 1.0
+    arrays["base"][c:] = system.memory
     whole_numbers = {"pivot": np.zeros(n + m, dtype=np.int64), "by_blocks": np.zeros(1, int)}
     return Work(**arrays, **whole_numbers)

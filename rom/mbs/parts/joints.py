@@ -1,5 +1,6 @@
 """Joints, written as scalar constraints between two markers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -210,3 +211,36 @@ def coupling(name: str, first: Joint, second: Joint, rows: Any, ratio: float) ->
     """The second joint coordinate is a multiple of the first."""
     row = Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=((rows[1], 1.0), (rows[0], -ratio)))
     return Joint(name, "coupling", (*second.markers, *first.markers), (row,))
+
+
+def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint:
+    """The joint of a name, which must have a coordinate.
+
+    Raises:
+        ConfigError: if it is unknown, or has none.
+    """
+    if joint not in joints:
+        raise ConfigError(f"{what}: no joint {joint!r}; there are {sorted(joints)}.")
+    if joints[joint].coordinate is None:
+        raise ConfigError(
+            f"{what}: joint {joint!r} is {joints[joint].kind}; only revolute, "
+            "cylindrical, screw, planar, prismatic and point on line joints have a coordinate."
+        )
+    return joints[joint]
+
+
+def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, what: str) -> Row:
+    """The row of the coordinate "angle" or "displacement" of a joint; None for the first.
+
+    Raises:
+        ConfigError: if the joint is unknown, or has no such coordinate.
+    """
+    found = joint_with_axis(joints, joint, what)
+    rows = {None: found.coordinate, "angle": found.turn, "displacement": found.displacement}
+    rows["way"] = found.displacement  # as it was called before
+    if which not in rows:
+        raise ConfigError(f"coordinate {which!r} of {joint!r}: it is 'angle' or 'displacement'.")
+    row = rows[which]
+    if row is None:
+        raise ConfigError(f"joint {joint!r} is {found.kind}: it has no coordinate {which!r}.")
+    return row

@@ -61,13 +61,7 @@ def _energy(solution: Solution) -> list[Row]:
 def _momentum(solution: Solution) -> list[Row]:
     mechanism = solution.mechanism
     grounded = any(m.body == "ground" for j in mechanism.joints.values() for m in j.markers)
-    pushed = bool(mechanism.loads or mechanism.spread_loads or np.any(mechanism.gravity))
-    pushed = pushed or any(u.j is None for u in mechanism.user_forces.values())
-    groups = [group for rod in mechanism.nonlinear.values() for group in rod.body.elements]
-    pushed = pushed or any(group.frames.shape[1] == 1 for group in groups)
-    between = (mechanism.springs, mechanism.user_forces, mechanism.bushings, mechanism.contacts)
-    for law in (law for laws in between for law in laws.values()):
-        pushed = pushed or "ground" in (law.i.body, law.j.body if law.j else "")
+    pushed = np.any(mechanism.gravity) or any(f.pushes(x) for f, x in mechanism.elements.values())
     if grounded or pushed:
         return []
     # what starts at rest has no momentum as a whole: its parts have, as much as their energy allows

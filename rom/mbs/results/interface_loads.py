@@ -14,8 +14,8 @@ def marker_loads(solution: Any) -> tuple[Array, Array]:
     """Loads on all markers along a motion, and their axes.
 
     Returns:
-        (n_t, k, 6) force [N] and moment about the marker [N m], world, of joints, drives, springs,
-        bushings, contacts, loads and Python forces together; (n_t, k, 3, 3) axes of the body.
+        (n_t, k, 6) force [N] and moment about the marker [N m], world, of joints, drives, loads
+        and all elements together; (n_t, k, 3, 3) axes of the body.
     """
     packed = solution.packed
     W = workspace(packed.system, len(packed.signals))

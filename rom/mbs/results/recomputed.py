@@ -4,12 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rom.mbs.elements.bushing_kernels import bushing_energy
-from rom.mbs.elements.contact import contact_energy
-from rom.mbs.elements.joint_kernels import stop_energy
-from rom.mbs.elements.nonlinear_kernels import nonlinear_energy
-from rom.mbs.elements.springs_loads_kernels import spring_energy
-from rom.mbs.equations.equations import evaluate
+from rom.mbs.equations.equations import element_energy, evaluate
 from rom.mbs.kernels.algebra import add, cross, mtv, mv, put, scale, vec
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.inertia import body_energy
@@ -64,9 +59,7 @@ def track(s, W, motion, marker, rows, out):
         for row in rows:
             for p in range(6):
                 out.reaction[k, p] -= L[k, row] * W.g[row, 6 + p]
-        out.energy[k, 1] = spring_energy(s, W) + stop_energy(s, W)
-        out.energy[k, 1] += bushing_energy(s, W) + contact_energy(s, W)
-        out.energy[k, 1] += nonlinear_energy(s, W, Q[k], V[k])
+        out.energy[k, 1] = element_energy(s, W, Q[k], V[k])
         for b in range(s.bodies.mass.size):
             kinetic, strain, height = body_energy(s.bodies, W, b, Q[k], V[k])
             out.energy[k, 0] += kinetic

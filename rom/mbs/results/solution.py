@@ -42,7 +42,7 @@ class Energy:
 
     Attributes:
         kinetic: of all bodies.
-        strain: elastic energy of bodies, springs, bushings, stops and contacts.
+        strain: elastic energy of bodies and elements.
         potential: of gravity.
         drives: work done by drives and motors.
         forces: work done by forces, torques and user forces.

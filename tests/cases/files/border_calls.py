@@ -19,7 +19,7 @@ from cases.solid import STEEL, block, composite
 from cases.wheels import beam_ring, bladed_model, bladed_ring
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
-from rom.mbs.elements.impact import Impact
+from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.reduction.interfaces.connection import connect

@@ -12,7 +12,7 @@ import rom
 from cases.beam import stiffened_beam
 from cases.mbs.mechanisms import slider_crank
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.mbs.elements.impact import Impact
+from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.mechanism import Mechanism
 
 g = 9.81

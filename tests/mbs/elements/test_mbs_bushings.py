@@ -16,8 +16,8 @@ from cases.mbs.mechanisms import (
 from cases.mbs.tangents import check_tangents, difference, shifted
 from rom import rotation
 from rom.errors import ConfigError
-from rom.mbs.elements.bushing_kernels import bushing_energy
-from rom.mbs.equations.equations import evaluate
+from rom.mbs.elements import bushings
+from rom.mbs.equations.equations import element_energy, evaluate
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
@@ -29,7 +29,7 @@ TILT = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])
 @njit
 def stored_at(s, W, q, v):
     evaluate(s, W, q, v)
-    return bushing_energy(s, W)
+    return element_energy(s, W, q, v)
 
 
 def full_matrix(rng, size=30.0):
@@ -70,8 +70,8 @@ def test_forces_are_the_gradient_of_the_energy(seed):
     gradient = difference(energy, v.size)[0]
     residual_at(s, W, q, none, none, lam)
     body = W.residual.copy()
-    s.bushings.stiffness[:] = 0.0
-    s.bushings.curve[:] = -1
+    packed.elements[bushings.FAMILY].stiffness[:] = 0.0
+    packed.elements[bushings.FAMILY].curve[:] = -1
     residual_at(s, W, q, none, none, lam)
     assert_allclose(body - W.residual, gradient, atol=1e-7 * np.abs(gradient).max())
 
@@ -87,7 +87,7 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     C = difference(lambda x: _residual(packed, W, q, v + x, a, lam), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
-    s.bushings.damping[:] = 0.0
+    packed.elements[bushings.FAMILY].damping[:] = 0.0
     check_tangents(packed, W, state, np.eye(zero.size), 1e-6)
 
 

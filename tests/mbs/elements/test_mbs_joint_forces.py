@@ -18,8 +18,9 @@ from cases.mbs.mechanisms import (
 )
 from cases.mbs.tangents import difference, shifted
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.elements.impact import Impact
-from rom.mbs.elements.joint_kernels import load_columns
+from rom.mbs.elements import motors
+from rom.mbs.elements.contact.impact import Impact
+from rom.mbs.equations.equations import load_columns
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.mechanism import Mechanism
@@ -141,7 +142,7 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     packed, W = prepared(loaded(rng))
     packed.system.markers.twist[:] *= 1e-3
     s, (q, v, a, lam) = packed.system, random_state(rng, packed)
-    W.motor[:] = 1.7
+    packed.elements[motors.FAMILY].answer[:] = 1.7
     n, m = v.size, lam.size
 
     def at(dq, dv, dlam):
@@ -157,7 +158,10 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     columns_at(s, W, lam)
     assert_allclose(W.UG.T, by_load, atol=1e-6 * np.abs(by_load).max())
     assert np.abs(W.UG - W.G).max() > 0.01
-    v[:], W.motor[:] = 0.0, 0.0  # the turning of a torque axis holds where the joint is closed
+    v[:], packed.elements[motors.FAMILY].answer[:] = (
+        0.0,
+        0.0,
+    )  # the turning of a torque axis holds where the joint is closed
     K = difference(lambda x: at(x, no, still), n)
     tangents_at(s, W, q, v, a, lam, (0.0, 0.0, 1.0))
     assert_allclose(W.Kt, K, atol=1e-6 * np.abs(K).max())

@@ -10,7 +10,7 @@ import rom
 from cases.solid import block
 from rom import rotation
 from rom.errors import ConfigError, ModelError
-from rom.mbs.elements.impact import Impact
+from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.parts.bodies import Marker, surface_place
 
 SIZE, G = (0.4, 0.3, 0.2), 9.81

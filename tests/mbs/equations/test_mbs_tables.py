@@ -15,6 +15,7 @@ from rom.mbs.equations.packing import pack
 from rom.mbs.kernels.compiled import kernel
 from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES
 from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
+from rom.mbs.mechanism import FAMILIES
 
 
 @table
@@ -98,47 +99,50 @@ def loaded_body(mech):
 
 ROD = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0, "inertia": (1e-2,) * 3}
 LAW = rom.mbs.Impact(stiffness=1e5)
-ELEMENTS = {  # stages -> what asks for them
-    "bushing_wrenches bushing_tangents": [
-        lambda m, a, b: m.bushing("e", a, b, stiffness=[1.0] * 6)
-    ],
-    "contact_wrenches contact_tangents": [
-        lambda m, a, b: m.sphere_on_sphere("e", a, b, LAW, radius1=0.1, radius2=0.1),
-    ],
-    "action_wrenches action_tangents": [
-        lambda m, a, b: m.motor("e", "slide", lambda t, x, v: -x),
-        lambda m, a, b: m.friction("e", "slide", coulomb=1.0, transition_speed=0.1),
-        lambda m, a, b: m.stop("e", "slide", LAW, upper=2.0),
-    ],
-    "force_tangents": [
-        lambda m, a, b: m.spring_damper("e", a, b, stiffness=1.0),
-        lambda m, a, b: m.force("e", a, (1, 0, 0)),
-    ],
-    "spread_residuals spread_tangents": [lambda m, a, b: loaded_body(m)],
-    "nonlinear_residuals nonlinear_tangents": [
-        lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
-    ],
+ELEMENTS = {  # family -> what asks for it
+    "springs": lambda m, a, b: m.spring_damper("e", a, b, stiffness=1.0),
+    "turns": lambda m, a, b: m.rotational_spring("e", hinge(m, b), stiffness=1.0),
+    "loads": lambda m, a, b: m.force("e", a, (1, 0, 0)),
+    "laws": lambda m, a, b: m.law("e", lambda t, p, motion, memory, out: None, a),
+    "motors": lambda m, a, b: m.motor("e", "slide", lambda t, x, v: -x),
+    "frictions": lambda m, a, b: m.friction("e", "slide", coulomb=1.0, transition_speed=0.1),
+    "stops": lambda m, a, b: m.stop("e", "slide", LAW, upper=2.0),
+    "bushings": lambda m, a, b: m.bushing("e", a, b, stiffness=[1.0] * 6),
+    "contacts": lambda m, a, b: m.sphere_on_sphere("e", a, b, LAW, radius1=0.1, radius2=0.1),
+    "spread_loads": lambda m, a, b: loaded_body(m),
+    "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
 }
+KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
 
 
-@pytest.mark.parametrize(
-    ("stages", "add"), [(k, add) for k, adds in ELEMENTS.items() for add in adds]
-)
-def test_a_mechanism_asks_for_the_stages_of_its_elements(stages, add):
+def hinge(mech, b):
+    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.1,) * 3, at=(1, 0, 0))
+    mech.revolute("hinge", b, wheel.marker((0, 0, 0)), axis=(0, 0, 1))
+    return "hinge"
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_a_mechanism_has_the_kernels_of_its_elements_and_no_others(name):
     """Without them it would move as if the elements were not there."""
     mech, a, b = pair()
-    bare = pack(mech).system
-    add(mech, a, b)
-    more = {
-        n for n, s in STAGE_KERNELS.items() if s.needed(pack(mech).system) and not s.needed(bare)
-    }
-    assert more == set(stages.split())
+    assert pack(mech).system.elements.shape == (0, 5)
+    ELEMENTS[name](mech, a, b)
+    packed = pack(mech)
+    ((family, table),) = packed.elements.items()
+    addresses = [getattr(getattr(family, kernel), "address", 0) for kernel in KERNELS]
+    assert family.name == name
+    assert packed.system.elements.tolist() == [[table._address, *addresses]]
+    assert addresses[0] and addresses[1]
 
 
-def test_every_stage_is_asked_for_by_all_mechanisms_or_by_an_element():
+def test_every_family_of_the_list_is_tried():
+    assert [family.name for family in FAMILIES] == [*ELEMENTS]
+
+
+def test_every_stage_is_asked_for():
     mech, *_ = pair()
-    always = {n for n, s in STAGE_KERNELS.items() if s.needed(pack(mech).system)}
-    assert set(STAGE_KERNELS) == set(STAGE_NAMES) == always.union(*map(str.split, ELEMENTS))
+    assert set(STAGE_KERNELS) == set(STAGE_NAMES)
+    assert {n for n, s in STAGE_KERNELS.items() if s.needed(pack(mech).system)} == set(STAGE_NAMES)
 
 
 def test_compiled_code_finds_its_stages_whatever_is_imported_first(tmp_path):
@@ -153,7 +157,7 @@ ball = mech.add_rigid("ball", mass=1.0, inertia=(0.1,) * 3, at=(1, 0, 0), marker
 mech.revolute("hinge", mech.ground.marker((0, 0, 0)), ball.marker("p"), axis=(0, 1, 0))
 print(rom.simulate(mech, t_end=0.01, dt=1e-3, progress=False).position("ball")[-1].tolist())
 """
-    orders = [(), ("rom.mbs.elements.contact", "rom.mbs.equations.linear_solve")]
+    orders = [(), ("rom.mbs.elements.contact.points", "rom.mbs.equations.linear_solve")]
     said = {
         subprocess.run([sys.executable, "-c", code, *order], env=environment(), text=True,
                        capture_output=True, check=True, timeout=300).stdout

@@ -1,0 +1,389 @@
+"""Bushings: elastic and damped in six directions, large rotations of the whole included.
+
+The state is the position of marker j in the axes of the bushing on marker i, and the rotation
+vector between both; forces are work-conjugate to it, so that a constant or tabulated stiffness
+has a potential whatever the rotation.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+from rom import rotation
+from rom.arguments import finite, unit_quaternion
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.kernels.algebra import (
+    add,
+    cross,
+    dot,
+    inverse_tangent,
+    mtv,
+    mv,
+    row,
+    scale,
+    sub,
+    transposed_rate,
+    turn,
+    unit,
+    unit_twist,
+)
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.tables import Array2, Array3, Index1, Index2, Table, table
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.whole import Whole
+from rom.model import Array
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+Curves = dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]
+
+
+@dataclass(frozen=True, slots=True)
+class Bushing:
+    """Six springs and dampers between two markers; numbers as in `Bushings`."""
+
+    i: Marker
+    j: Marker
+    frames: tuple[Array, Array]
+    zero: Array
+    stiffness: Array
+    damping: Array
+    curves: tuple[tuple[int, Array], ...]
+
+
+def bushing(  # noqa: PLR0913  one keyword per property
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    *,
+    stiffness: npt.ArrayLike,
+    damping: npt.ArrayLike | None = None,
+    axes: npt.ArrayLike | None = None,
+    curves: Curves | None = None,
+) -> None:
+    """Elastic and damped connection in six directions, without force at the start.
+
+    Args:
+        name: name of the bushing.
+        m1: marker that carries the axes.
+        m2: other marker; turned by less than half a turn against the first.
+        stiffness: (6,) or symmetric (6, 6) [N/m, N/rad; N m/m, N m/rad], translations first,
+            then rotations (vector of the rotation).
+        damping: likewise, times the rates; None for none.
+        axes: (3, 3) or quaternion, axes of the bushing to world at the start; None: world.
+        curves: {"x": (displacements, forces), ..., "rz": (angles, moments)} added to the
+            stiffness: monotone cubic between ascending points, straight beyond them.
+
+    Raises:
+        ConfigError: for matrices without an energy, or tables that do not ascend.
+    """
+    if m1.body == m2.body:
+        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself.")
+    world = rotation.matrix(unit_quaternion(axes))
+    A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
+    gap = self.design_point(m2) - self.design_point(m1)
+    K = _matrix66(f"stiffness of {name}", stiffness)
+    C = _matrix66(f"damping of {name}", np.zeros(6) if damping is None else damping)
+    tables = tuple(_curve(name, *item) for item in (curves or {}).items())
+    frames = (A1.T @ world, A2.T @ world)
+    self.add(name, Bushing(m1, m2, frames, world.T @ gap, K, C, tables), FAMILY)
+
+
+def _matrix66(name: str, value: Any) -> Array:
+    """Symmetric, not negative (6, 6) matrix from itself or its diagonal."""
+    A = np.diag(finite(name, value, (6,))) if np.shape(value) == (6,) else None
+    A = finite(name, value, (6, 6)) if A is None else A
+    size = np.abs(A).max()
+    if np.abs(A - A.T).max() > 1e-9 * size:
+        raise ConfigError(f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}: no energy.")
+    if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
+        raise ConfigError(f"{name} is negative in some direction: it would drive the motion.")
+    return 0.5 * (A + A.T)
+
+
+def _curve(name: str, direction: str, table: Any) -> tuple[int, Array]:
+    """Direction and pieces (n, 7) of a tabulated force, see `Bushings`."""
+    if direction not in DIRECTIONS:
+        raise ConfigError(f"curve {direction!r} of bushing {name!r}: it is one of {DIRECTIONS}.")
+    n = np.size(table[0])
+    x, force = (finite(f"curve {direction} of {name}", values, (n,)) for values in table)
+    if n < 2 or np.diff(x).min() <= 0.0:
+        raise ConfigError(
+            f"curve {direction} of bushing {name!r} needs two or more ascending displacements."
+        )
+    cubic = PchipInterpolator(x, force)
+    energy = cubic.antiderivative()
+    slopes = cubic.derivative()(x[[0, -1]])
+    inner = np.column_stack([x[:-1], x[:-1], cubic.c[::-1].T, energy(x[:-1])])
+    left = [-np.inf, x[0], force[0], slopes[0], 0.0, 0.0, energy(x[0])]
+    right = [x[-1], x[-1], force[-1], slopes[1], 0.0, 0.0, energy(x[-1])]
+    return DIRECTIONS.index(direction), np.vstack([left, inner, right])
+
+
+@table
+class Bushings(Table):
+    """All bushings.
+
+    Attributes:
+        i, j: (b,) markers.
+        frame_i, frame_j: (b, 3, 3) axes of the bushing in those of its markers.
+        zero: (b, 3) position of j in these axes without force [m].
+        stiffness, damping: (b, 6, 6) translations, then rotations.
+        curve: (b, 6) first piece of a force over displacement, -1 for none; pieces: (b, 6).
+        piece: (n, 7) lower end, origin, four coefficients of powers, energy at the origin.
+    """
+
+    i: Index1
+    j: Index1
+    frame_i: Array3
+    frame_j: Array3
+    zero: Array2
+    stiffness: Array3
+    damping: Array3
+    curve: Index2
+    pieces: Index2
+    piece: Array2
+
+
+def pack(bushings: Any, places: Places) -> Bushings:
+    """Bushings with the pieces of their curves."""
+    found = list(bushings.values())
+    curve, pieces = np.full((len(found), 6), -1), np.zeros((len(found), 6))
+    stack, n = [np.zeros((0, 7))], 0
+    for k, bushing in enumerate(found):
+        for p, piece in bushing.curves:
+            curve[k, p], pieces[k, p] = n, len(piece)
+            stack.append(piece)
+            n += len(piece)
+    return Bushings(
+        integers(places.marker[b.i] for b in found),
+        integers(places.marker[b.j] for b in found),
+        *(rows_of((b.frames[side] for b in found), 3, 3) for side in (0, 1)),
+        rows_of((b.zero for b in found), 3),
+        rows_of((b.stiffness for b in found), 6, 6),
+        rows_of((b.damping for b in found), 6, 6),
+        curve.astype(np.int64),
+        pieces.astype(np.int64),
+        np.concatenate(stack),
+    )
+
+
+@inner
+def rotation_vector(bushings, k, W):
+    """Rotation from the bushing axes on i to those on j, in those on i; less than half a turn."""
+    i, j = bushings.i[k], bushings.j[k]
+    r = 0.0
+    w = (0.0, 0.0, 0.0)
+    for p in range(3):
+        a = to_local(W, i, bushings.frame_i[k], turn(W.E, j, mv(bushings.frame_j[k], unit(p))))
+        w = add(w, scale(0.5, cross(unit(p), a)))
+        r += a[p]
+    sine, cosine = math.sqrt(dot(w, w)), 0.5 * (r - 1.0)
+    if sine < 1e-8:
+        return w
+    return scale(math.atan2(sine, cosine) / sine, w)
+
+
+@inner
+def to_local(W, i, frame, x):
+    """World vector in the bushing axes on marker i."""
+    y = mtv(W.E[i], x)
+    return mtv(frame, y)
+
+
+@inner
+def to_world(W, i, frame, x):
+    """Vector in the bushing axes on marker i in the world."""
+    return turn(W.E, i, mv(frame, x))
+
+
+@inner
+def bushing_state(bushings, k, W):
+    """Gap in the world, position and rotation vector, and their rates."""
+    i, j, frame = bushings.i[k], bushings.j[k], bushings.frame_i[k]
+    gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), row(W.V, i, 0))
+    x = sub(to_local(W, i, frame, gap), row(bushings.zero, k, 0))
+    theta = rotation_vector(bushings, k, W)
+    xd = to_local(W, i, frame, sub(slide, cross(row(W.V, i, 3), gap)))
+    spin = to_local(W, i, frame, sub(row(W.V, j, 3), row(W.V, i, 3)))
+    return gap, x, theta, xd, inverse_tangent(theta, 1.0, spin)
+
+
+@inner
+def curve_state(bushings, k, p, x):
+    """Force, slope and energy of direction p at the displacement x."""
+    if bushings.curve[k, p] < 0:
+        return 0.0, 0.0, 0.0
+    at = bushings.curve[k, p] + bushings.pieces[k, p] - 1
+    while x < bushings.piece[at, 0]:
+        at -= 1
+    c, d = bushings.piece[at], x - bushings.piece[at, 1]
+    force = c[2] + d * (c[3] + d * (c[4] + d * c[5]))
+    slope = c[3] + d * (2 * c[4] + 3 * d * c[5])
+    return force, slope, c[6] + d * (c[2] + d * (c[3] / 2 + d * (c[4] / 3 + d * c[5] / 4)))
+
+
+@inner
+def six(a, b, p):
+    """Entry p of the pair of vectors a, b."""
+    return a[p] if p < 3 else b[p - 3]
+
+
+@inner
+def resisting(matrix, a, b, at):
+    """Three rows of a (6, 6) matrix from ``at`` times the pair of vectors a, b."""
+    y = (0.0, 0.0, 0.0)
+    for q in range(6):
+        z = six(a, b, q)
+        y = add(y, (matrix[at, q] * z, matrix[at + 1, q] * z, matrix[at + 2, q] * z))
+    return y
+
+
+@inner
+def along_curves(bushings, k, a, b, at, which):
+    """Force (which = 0) or slope (1) of the curves of three directions from ``at``."""
+    return (
+        curve_state(bushings, k, at, six(a, b, at))[which],
+        curve_state(bushings, k, at + 1, six(a, b, at + 1))[which],
+        curve_state(bushings, k, at + 2, six(a, b, at + 2))[which],
+    )
+
+
+@inner
+def bushing_loads(bushings, k, state):
+    """Elastic and damping forces and moments that resist the state."""
+    _, x, theta, xd, rate = state
+    K, C = bushings.stiffness[k], bushings.damping[k]
+    pull = add(resisting(K, x, theta, 0), along_curves(bushings, k, x, theta, 0, 0))
+    twist = add(resisting(K, x, theta, 3), along_curves(bushings, k, x, theta, 3, 0))
+    return pull, twist, resisting(C, xd, rate, 0), resisting(C, xd, rate, 3)
+
+
+@inner
+def bushing_force(bushings, k, W, state):
+    """Force and moment of bushing k on marker j, world, and the power lost."""
+    i, frame = bushings.i[k], bushings.frame_i[k]
+    _, _, theta, xd, rate = state
+    pull, twist, drag, brake = bushing_loads(bushings, k, state)
+    force = to_world(W, i, frame, scale(-1.0, add(pull, drag)))
+    moment = inverse_tangent(theta, -1.0, scale(-1.0, add(twist, brake)))
+    return force, to_world(W, i, frame, moment), dot(drag, xd) + dot(brake, rate)
+
+
+@residuals.of(Bushings)
+def bushing_wrenches(_s, W, bushings, _q, _v, _lam):
+    """Add the bushings to the wrenches on the markers; add up the power lost."""
+    for k in range(bushings.i.size):
+        i, j = bushings.i[k], bushings.j[k]
+        state = bushing_state(bushings, k, W)
+        force, moment, lost = bushing_force(bushings, k, W, state)
+        turned = add(moment, cross(state[0], force))
+        for p in range(3):
+            W.wrench[j, p] += force[p]
+            W.wrench[j, 3 + p] += moment[p]
+            W.wrench[i, p] -= force[p]
+            W.wrench[i, 3 + p] -= turned[p]
+        W.power[2] += lost
+
+
+@inner
+def column(Q, p, c, dforce, dmoment, lever):
+    """Add c times a change of the wrenches on both markers to column p."""
+    for q in range(3):
+        Q[q, p] -= c * dforce[q]
+        Q[3 + q, p] -= c * (dmoment[q] + lever[q])
+        Q[6 + q, p] += c * dforce[q]
+        Q[9 + q, p] += c * dmoment[q]
+
+
+@tangents.of(Bushings)
+def bushing_tangents(s, W, bushings, _lam, ck, cc):
+    """Add the stiffness (times ck) and damping (times cc) of all bushings to W.Kt and W.S.
+
+    The change of the rates with the position is left out.
+    """
+    for k in range(bushings.i.size):
+        i, j = bushings.i[k], bushings.j[k]
+        state = bushing_state(bushings, k, W)
+        W.Q[:] = 0.0
+        for p in range(12):
+            stiffness_column(bushings, W, k, state, p, -ck)
+        pair_stiffness(s, W, i, j, W.Kt)
+        W.Q[:] = 0.0
+        for p in range(12):
+            damping_column(bushings, W, k, state, p, -cc)
+        pair_stiffness(s, W, i, j, W.S)
+
+
+@inner
+def local_motion(bushings, W, k, state, p):
+    """Change of position and rotation vector in unit motion p."""
+    i, frame = bushings.i[k], bushings.frame_i[k]
+    vi, wi, vj, wj = unit_twist(p)
+    dx = to_local(W, i, frame, sub(sub(vj, vi), cross(wi, state[0])))
+    return dx, inverse_tangent(state[2], 1.0, to_local(W, i, frame, sub(wj, wi)))
+
+
+@inner
+def stiffness_column(bushings, W, k, state, p, c):
+    """Add c times the change of the wrenches in unit motion p to W.Q."""
+    i, frame, x, theta = bushings.i[k], bushings.frame_i[k], state[1], state[2]
+    vi, wi, vj, _ = unit_twist(p)
+    force, moment, _ = bushing_force(bushings, k, W, state)
+    _, twist, _, brake = bushing_loads(bushings, k, state)
+    dx, dtheta = local_motion(bushings, W, k, state, p)
+    a, b = along_curves(bushings, k, x, theta, 0, 1), along_curves(bushings, k, x, theta, 3, 1)
+    pull = add(resisting(bushings.stiffness[k], dx, dtheta, 0), times(a, dx))
+    back = add(resisting(bushings.stiffness[k], dx, dtheta, 3), times(b, dtheta))
+    turning = transposed_rate(theta, dtheta, add(twist, brake))
+    back = add(inverse_tangent(theta, -1.0, back), turning)
+    dforce = sub(cross(wi, force), to_world(W, i, frame, pull))
+    dmoment = sub(cross(wi, moment), to_world(W, i, frame, back))
+    lever = add(cross(sub(vj, vi), force), cross(state[0], dforce))
+    column(W.Q, p, c, dforce, dmoment, lever)
+
+
+@inner
+def damping_column(bushings, W, k, state, p, c):
+    """Add c times the change of the wrenches with unit velocity p to W.Q."""
+    dx, dtheta = local_motion(bushings, W, k, state, p)
+    drag, brake = (
+        resisting(bushings.damping[k], dx, dtheta, 0),
+        resisting(bushings.damping[k], dx, dtheta, 3),
+    )
+    dforce = to_world(W, bushings.i[k], bushings.frame_i[k], scale(-1.0, drag))
+    moment = inverse_tangent(state[2], -1.0, scale(-1.0, brake))
+    dmoment = to_world(W, bushings.i[k], bushings.frame_i[k], moment)
+    column(W.Q, p, c, dforce, dmoment, cross(state[0], dforce))
+
+
+@inner
+def times(a, b):
+    """Entries of a times those of b."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+@energy.of(Bushings)
+def bushing_energy(_s, W, bushings, _q, _v):
+    """Elastic energy in bushings."""
+    total = 0.0
+    for k in range(bushings.i.size):
+        _, x, theta, _, _ = bushing_state(bushings, k, W)
+        K = bushings.stiffness[k]
+        total += 0.5 * dot(x, resisting(K, x, theta, 0))
+        total += 0.5 * dot(theta, resisting(K, x, theta, 3))
+        for p in range(6):
+            total += curve_state(bushings, k, p, six(x, theta, p))[2]
+    return total
+
+
+FAMILY = Family(
+    "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy
+)  # fmt: skip

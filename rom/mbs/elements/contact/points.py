@@ -1,0 +1,311 @@
+"""Contact of spheres and discs with planes, spheres and cylinders, with damping and friction.
+
+All functions of one contact take real or complex numbers: the tangents are imaginary parts after
+an imaginary step, exact to round-off.
+
+Source:
+    Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl.
+    Mech. 42 (1975) 440. Complex step: Squire, Trapp, SIAM Review 40 (1998) 110.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom import rotation
+from rom.arguments import positive, unit_vector
+from rom.errors import ConfigError
+from rom.mbs.elements.contact.impact import Impact, checked_law
+from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.tables import Array2, Index1, Table, table
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.whole import Whole
+from rom.model import Array
+
+# kinds of contacts
+PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
+COMPLEX_STEP = 1e-30
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A sphere or disc on j against something on i; numbers as in `Contacts`."""
+
+    kind: int
+    i: Marker
+    j: Marker
+    e: Array
+    s: Array
+    radius: tuple[float, float]
+    law: Impact
+
+
+def sphere_on_plane(
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    law: Impact,
+    *,
+    normal: npt.ArrayLike,
+    radius: float,
+) -> None:
+    """Sphere about m2 against the plane through m1; ``normal`` (3,), world at the start."""
+    _touch(self, name, PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
+
+
+def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    law: Impact,
+    *,
+    normal: npt.ArrayLike,
+    axis: npt.ArrayLike,
+    radius: float,
+) -> None:
+    """Rim of a thin disc about m2 against the plane through m1; two make a cylinder.
+
+    ``normal`` of the plane and ``axis`` of the disc (3,) in the world at the start; the disc
+    must not lie flat.
+    """
+    _touch(self, name, DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
+
+
+def sphere_on_sphere(
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    law: Impact,
+    *,
+    radius1: float,
+    radius2: float,
+) -> None:
+    """Spheres of radius1 about m1 and radius2 about m2 [m]."""
+    radii = positive("radius2", radius2), positive("radius1", radius1)
+    _touch(self, name, SPHERE, (m1, m2), law, (None, None), radii)
+
+
+def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    law: Impact,
+    *,
+    axis: npt.ArrayLike,
+    radius1: float,
+    radius2: float,
+    inside: bool = False,
+) -> None:
+    """Sphere of radius2 about m2 against an endless cylinder of radius1 about m1, or its bore.
+
+    ``axis`` (3,) of the cylinder, world at the start; a disc across a bore with its radius is
+    a pin with clearance.
+    """
+    radii = positive("radius2", radius2), positive("radius1", radius1)
+    if inside and radii[0] >= radii[1]:
+        raise ConfigError(
+            f"contact {name!r}: a sphere of {radii[0]:g} m does not fit into a bore of "
+            f"{radii[1]:g} m."
+        )
+    _touch(self, name, BORE if inside else CYLINDER, (m1, m2), law, (axis, None), radii)
+
+
+def _touch(
+    self: Whole, name: str, kind: int, markers: Any, law: Impact, axes: Any, radius: Any
+) -> None:
+    if markers[0].body == markers[1].body:
+        raise ConfigError(f"contact {name!r} is of body {markers[0].body!r} with itself.")
+    positive("radius", radius[0])
+    directions = [
+        np.zeros(3)
+        if axis is None
+        else rotation.matrix(self.part(marker.body).p).T @ unit_vector(f"axis of {name}", axis)
+        for marker, axis in zip(markers, axes, strict=True)
+    ]
+    i, j = markers
+    e, s = directions
+    self.add(name, Contact(kind, i, j, e, s, radius, checked_law(name, law)), FAMILY)
+
+
+@table
+class Contacts(Table):
+    """A sphere or disc on marker j that touches something on marker i.
+
+    Attributes:
+        kind: (c,) PLANE, SPHERE, CYLINDER, BORE or DISC.
+        i, j: (c,) markers.
+        e: (c, 3) normal of the plane or axis of the cylinder in the axes of i.
+        s: (c, 3) axis of the disc in the axes of j.
+        radius: (c, 2) on j, and on i [m].
+        law: (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over
+            which friction changes its sign [m/s].
+    """
+
+    kind: Index1
+    i: Index1
+    j: Index1
+    e: Array2
+    s: Array2
+    radius: Array2
+    law: Array2
+
+
+def pack(contacts: Any, places: Places) -> Contacts:
+    """The contacts as arrays."""
+    found = contacts.values()
+    laws = [c.law for c in found]
+    numbers = [(x.stiffness, x.exponent, x.damping, x.mu, x.transition_speed) for x in laws]
+    return Contacts(
+        integers(c.kind for c in found),
+        integers(places.marker[c.i] for c in found),
+        integers(places.marker[c.j] for c in found),
+        rows_of((c.e for c in found), 3),
+        rows_of((c.s for c in found), 3),
+        rows_of((c.radius for c in found), 2),
+        rows_of(numbers, 5),
+    )
+
+
+@inner
+def touch(kind, radius, gap, e, s):
+    """Normal from i to j, depth of penetration, and vector from P_j to the touching point."""
+    if kind == PLANE:
+        return e, radius[0] - dot(e, gap), scale(-radius[0], e)
+    if kind == DISC:
+        c = dot(e, s)
+        w = np.sqrt(1.0 - c * c)
+        down = scale(radius[0] / w, sub(scale(c, s), e))
+        return e, radius[0] * w - dot(e, gap), down
+    if kind == SPHERE:
+        across = gap
+    else:
+        across = sub(gap, scale(dot(e, gap), e))
+    far = np.sqrt(dot(across, across))
+    if kind == BORE:
+        n = scale(-1.0 / far, across)
+        return n, far + radius[0] - radius[1], scale(-radius[0], n)
+    n = scale(1.0 / far, across)
+    return n, radius[0] + radius[1] - far, scale(-radius[0], n)
+
+
+@inner
+def contact_force(law, n, depth, down, motion):
+    """Force on j, elastic force, closing speed, and velocity of j over i at the touching point.
+
+    ``motion`` is the gap of the markers, their relative velocity and both angular velocities.
+    """
+    gap, slide, Oi, Oj = motion
+    u = add(slide, sub(cross(Oj, down), cross(Oi, add(gap, down))))
+    closing = -dot(n, u)
+    elastic = law[0] * depth ** law[1]
+    normal = elastic * (1.0 + law[2] * closing)
+    if normal.real < 0.0:
+        normal = 0.0 * normal
+    across = add(u, scale(closing, n))
+    drag = law[3] * normal / np.sqrt(dot(across, across) + law[4] * law[4])
+    return sub(scale(normal, n), scale(drag, across)), elastic, closing, u
+
+
+@inner
+def contact_state(contacts, k, W):
+    """Axes of contact k in the world, and the relative motion of its markers."""
+    i, j = contacts.i[k], contacts.j[k]
+    e, axle = turn(W.E, i, row(contacts.e, k, 0)), turn(W.E, j, row(contacts.s, k, 0))
+    gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), row(W.V, i, 0))
+    return e, axle, (gap, slide, row(W.V, i, 3), row(W.V, j, 3))
+
+
+@residuals.of(Contacts)
+def contact_wrenches(_s, W, contacts, _q, _v, _lam):
+    """Add the contacts to the wrenches on the markers; add up the power lost."""
+    for k in range(contacts.kind.size):
+        e, axle, motion = contact_state(contacts, k, W)
+        n, depth, down = touch(contacts.kind[k], contacts.radius[k], motion[0], e, axle)
+        if not depth > 0.0:
+            continue
+        force, elastic, closing, u = contact_force(contacts.law[k], n, depth, down, motion)
+        at_j, at_i = cross(down, force), cross(add(motion[0], down), force)
+        for p in range(3):
+            W.wrench[contacts.j[k], p] += force[p]
+            W.wrench[contacts.j[k], 3 + p] += at_j[p]
+            W.wrench[contacts.i[k], p] -= force[p]
+            W.wrench[contacts.i[k], 3 + p] -= at_i[p]
+        W.power[2] -= dot(force, u) + elastic * closing
+
+
+@inner
+def stepped(x, dx):
+    """The vector x with an imaginary step along dx."""
+    return (
+        complex(x[0], COMPLEX_STEP * dx[0]),
+        complex(x[1], COMPLEX_STEP * dx[1]),
+        complex(x[2], COMPLEX_STEP * dx[2]),
+    )
+
+
+@inner
+def contact_column(contacts, W, k, p, by_position, c):
+    """Add c times the change of the wrenches in unit motion p, or unit velocity p, to W.Q."""
+    e, axle, (gap, slide, Oi, Oj) = contact_state(contacts, k, W)
+    vi, wi, vj, wj = unit_twist(p)
+    move, rush = (1.0, 0.0) if by_position else (0.0, 1.0)
+    normal = stepped(e, scale(move, cross(wi, e)))
+    spin = stepped(axle, scale(move, cross(wj, axle)))
+    gap = stepped(gap, scale(move, sub(vj, vi)))
+    slide = stepped(slide, scale(rush, sub(vj, vi)))
+    motion = gap, slide, stepped(Oi, scale(rush, wi)), stepped(Oj, scale(rush, wj))
+    n, depth, down = touch(contacts.kind[k], contacts.radius[k], gap, normal, spin)
+    force, _, _, _ = contact_force(contacts.law[k], n, depth, down, motion)
+    at_j, at_i = cross(down, force), cross(add(gap, down), force)
+    for q in range(3):
+        W.Q[q, p] -= c / COMPLEX_STEP * force[q].imag
+        W.Q[3 + q, p] -= c / COMPLEX_STEP * at_i[q].imag
+        W.Q[6 + q, p] += c / COMPLEX_STEP * force[q].imag
+        W.Q[9 + q, p] += c / COMPLEX_STEP * at_j[q].imag
+
+
+@tangents.of(Contacts)
+def contact_tangents(s, W, contacts, _lam, ck, cc):
+    """Add the stiffness (times ck) and damping (times cc) of all contacts to W.Kt and W.S."""
+    for k in range(contacts.kind.size):
+        e, axle, motion = contact_state(contacts, k, W)
+        if not touch(contacts.kind[k], contacts.radius[k], motion[0], e, axle)[1] > 0.0:
+            continue
+        W.Q[:] = 0.0
+        for p in range(12):
+            contact_column(contacts, W, k, p, True, -ck)
+        pair_stiffness(s, W, contacts.i[k], contacts.j[k], W.Kt)
+        W.Q[:] = 0.0
+        for p in range(12):
+            contact_column(contacts, W, k, p, False, -cc)
+        pair_stiffness(s, W, contacts.i[k], contacts.j[k], W.S)
+
+
+@energy.of(Contacts)
+def contact_energy(_s, W, contacts, _q, _v):
+    """Elastic energy in contacts."""
+    total = 0.0
+    for k in range(contacts.kind.size):
+        e, axle, motion = contact_state(contacts, k, W)
+        depth, law = (
+            touch(contacts.kind[k], contacts.radius[k], motion[0], e, axle)[1],
+            contacts.law[k],
+        )
+        if depth > 0.0:
+            total += law[0] * depth ** (law[1] + 1.0) / (law[1] + 1.0)
+    return total
+
+
+FAMILY = Family(
+    "contacts", Contact, pack, contact_wrenches, contact_tangents, contact_energy
+)  # fmt: skip

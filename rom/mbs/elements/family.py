@@ -1,0 +1,212 @@
+"""What a family of elements tells the rest: all there is to know about springs, say, in one file.
+
+A family has a record of one element as the user described it, a table of all of them for compiled
+code, and kernels that take this table. Everything else asks the family: names in use, arrays, which
+bodies it couples, which of its forces depend on rates, whether it conserves momentum. The families
+of `rom.mbs.mechanism.FAMILIES` are the ones with methods of their own; any other enters a mechanism
+by ``mechanism.add``.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from rom.errors import ConfigError
+from rom.mbs.kernels.element_calls import ElementKernel, row_of
+from rom.mbs.kernels.system import Coordinates
+from rom.mbs.kernels.tables import Table
+from rom.mbs.parts.bodies import GROUND, Marker
+from rom.mbs.parts.joints import Row
+from rom.mbs.parts.signals import Signal, clock_signal, load_signal
+from rom.model import Array, Index
+
+NO_ROWS = np.zeros(0, dtype=np.int64)
+
+
+class Asked(Protocol):
+    """A law that stays in Python, asked whenever the forces are."""
+
+    def apply(self, W: Any, t: float) -> None:
+        """Put the answer at time t where the kernels of its family look for it."""
+
+
+def between(element: Any) -> tuple[Marker, ...]:
+    """The two markers of most elements."""
+    return element.i, element.j
+
+
+def on_joint(_: Any) -> tuple[Marker, ...]:
+    """None of its own: the joint has them."""
+    return ()
+
+
+def from_ground(_: Any) -> bool:
+    """Momentum is lost to the ground alone, if one of the markers is there."""
+    return False
+
+
+def from_outside(_: Any) -> bool:
+    """It pushes bodies without pushing others back."""
+    return True
+
+
+def always(_: Table) -> bool:
+    """The forces depend on velocities."""
+    return True
+
+
+def pairs(table: Any, body: Index) -> Iterable[Sequence[int]]:
+    """Bodies of the markers i and j of each element."""
+    return np.column_stack([body[table.i], body[table.j]])
+
+
+def apart(_table: Any, _body: Index) -> Iterable[Sequence[int]]:
+    """No bodies that a joint or a marker does not couple already."""
+    return ()
+
+
+def no_rows(_: Table) -> Index:
+    """The forces do not depend on what joints transmit."""
+    return NO_ROWS
+
+
+def nothing_asked(_elements: Mapping[str, Any], _table: Any, _followed: int) -> Sequence[Asked]:
+    """All laws are compiled."""
+    return ()
+
+
+def integers(values: Any) -> Index:
+    """Whole numbers as an array, empty ones too."""
+    return np.array(list(values), dtype=np.int64)
+
+
+def rows_of(values: Any, *shape: int) -> Array:
+    """Numbers as an array of rows of this shape, empty ones too."""
+    return np.array(list(values), dtype=float).reshape(-1, *shape)
+
+
+@dataclass
+class Places:
+    """Where the arrays of a mechanism have what elements speak of.
+
+    Attributes:
+        body: {name: row} of the bodies.
+        marker: {marker: row}.
+        joints: {name: joint}.
+        R: largest number of elastic coordinates of a body.
+        owners: joint or drive of each constraint row.
+        signals: functions of time so far.
+        coordinates: markers and row of each joint coordinate that something acts on.
+        time: number of the one that tells the time, -1 for none.
+        remembered: numbers that laws remember, at the start.
+    """
+
+    body: Mapping[str, int]
+    marker: Mapping[Marker, int]
+    joints: Mapping[str, Any]
+    R: int = 0
+    owners: list[str] = field(default_factory=list)
+    signals: list[Signal] = field(default_factory=list)
+    coordinates: list[tuple[tuple[Marker, Marker], Row]] = field(default_factory=list)
+    time: int = -1
+    remembered: list[Array] = field(default_factory=list)
+
+    def coordinate(self, joint: str, row: Row) -> int:
+        """Number of a coordinate of a joint."""
+        return self.between(self.joints[joint].markers, row)
+
+    def between(self, markers: Sequence[Marker], row: Row) -> int:
+        """Number of the coordinate that a row measures between two markers."""
+        for k, (_, known) in enumerate(self.coordinates):
+            if known is row:
+                return k
+        self.coordinates.append(((markers[0], markers[1]), row))
+        return len(self.coordinates) - 1
+
+    def signal(self, name: str, function: Callable[[float], Any] | None) -> int:
+        """Number of a function of time with values (3,), -1 for none."""
+        if function is None:
+            return -1
+        self.signals.append(load_signal(name, function))
+        return len(self.signals) - 1
+
+    def clock(self) -> int:
+        """Number of the function that tells the time."""
+        if self.time < 0:
+            self.signals.append(clock_signal())
+            self.time = len(self.signals) - 1
+        return self.time
+
+    def memory(self, start: Array) -> int:
+        """First of some numbers that are kept from one instant to the next, by their start."""
+        self.remembered.append(start)
+        return sum(x.size for x in self.remembered[:-1])
+
+    def packed_coordinates(self) -> Coordinates:
+        """The joint coordinates as arrays."""
+        rows = [row for _, row in self.coordinates]
+        return Coordinates(
+            integers(row.kind for row in rows),
+            *(integers(self.marker[m[side]] for m, _ in self.coordinates) for side in (0, 1)),
+            *(rows_of((getattr(row, axis) for row in rows), 3) for axis in "abc"),
+            np.array([row.offset for row in rows], dtype=float),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A kind of elements.
+
+    Attributes:
+        name: of all of them, e.g. ``"springs"``.
+        record: class of one of them.
+        pack: ({name: record}, `Places`) -> table for compiled code.
+        residuals, tangents, energy, multiplier_columns: kernels, see
+            `rom.mbs.kernels.element_calls`; None for forces that do not change, store no energy,
+            or do not depend on multipliers.
+        ends: record -> the markers it acts on.
+        outside: record -> whether it acts from outside even though no marker is on the ground.
+        couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
+            the ground.
+        by_rate: table -> whether the forces depend on velocities.
+        loaded_rows: table -> constraint rows whose multipliers they depend on.
+        asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
+    """
+
+    name: str
+    record: type
+    pack: Callable[[Mapping[str, Any], Places], Table]
+    residuals: ElementKernel
+    tangents: ElementKernel | None = None
+    energy: ElementKernel | None = None
+    multiplier_columns: ElementKernel | None = None
+    ends: Callable[[Any], tuple[Marker, ...]] = between
+    outside: Callable[[Any], bool] = from_ground
+    couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
+    by_rate: Callable[[Any], bool] = always
+    loaded_rows: Callable[[Any], Index] = no_rows
+    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
+
+    def row(self, table: Table) -> list[int]:
+        """Addresses of the table and of the kernels, which are compiled."""
+        return row_of(table, (self.residuals, self.tangents, self.energy, self.multiplier_columns))
+
+    def pushes(self, element: Any) -> bool:
+        """Whether an element changes the momentum of all bodies together."""
+        return self.outside(element) or any(m.body == GROUND for m in self.ends(element))
+
+
+def check_family(name: str, element: Any, family: Any) -> None:
+    """Refuse what cannot enter a mechanism.
+
+    Raises:
+        ConfigError: if the family is none, or has other records.
+    """
+    if not isinstance(family, Family):
+        raise ConfigError(f"family of {name!r} is {family!r}; a rom.mbs.Family is needed.")
+    if not isinstance(element, family.record):
+        raise ConfigError(
+            f"{name!r} is {element!r}; the {family.name} are of {family.record.__name__}."
+        )

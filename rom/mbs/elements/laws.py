@@ -1,0 +1,604 @@
+"""Laws of force between any markers, written by the user in Python, with Numba or in C.
+
+The law of K markers is a function
+
+``law(t, parameters, motion, memory, out)``
+
+of the time [s], of the numbers it was given, of the `Motion` of its markers in the world, and of
+what it remembered at the last accepted instant; it fills the `Answer` ``out``. In C it is
+
+``void law(double t, const double *parameters, const double *motion, const double *memory,
+double *out)``
+
+with the fields of `Motion` and `Answer` behind each other. The derivatives of forces and moments
+by small motions and by velocities of the markers come from central differences, or from a second
+function ``tangents(t, parameters, motion, memory, K, C)`` that fills both (6 K, 6 K) matrices: rows
+are force and moment of each marker, columns its displacement and small rotation, or its velocity
+and angular velocity, all in the world. In C it gets one array, both matrices row by row.
+
+A law that is asked twice at one instant must give the same answer twice, also when it then finds
+the memory that it wrote itself the first time.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from rom.arguments import finite
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places, integers
+from rom.mbs.kernels.algebra import add, cross, scale, unit
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.tables import (
+    Address1,
+    Array1,
+    Index1,
+    Index2,
+    Scratch1,
+    Scratch2,
+    Table,
+    table,
+)
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.foreign import ask, numbers
+from rom.mbs.parts.whole import Whole
+from rom.model import Array, Index
+
+MOTION_SIZE = 18  # numbers of the motion of a marker
+ENERGY_SIZE = 2  # stored energy, lost power
+# steps of the differences of laws [m and rad], [m/s and rad/s], both relative to one plus the value
+DIFFERENCE_STEP = 1e-6
+PAIR_TEXT = "two vectors of three numbers: force and moment"
+# as numba.cfunc takes it
+LAW_TYPES = "void(f8, CPointer(f8), CPointer(f8), CPointer(f8), CPointer(f8))"
+
+
+class Motion(NamedTuple):
+    """How K markers move, in the world.
+
+    Attributes:
+        position: (K, 3) [m].
+        axes: (K, 3, 3) axes of each marker as columns.
+        velocity: (K, 3) [m/s].
+        omega: (K, 3) angular velocity [rad/s].
+    """
+
+    position: Any
+    axes: Any
+    velocity: Any
+    omega: Any
+
+
+class Answer(NamedTuple):
+    """What a law says; zeros where it leaves a field alone, and the old memory.
+
+    Attributes:
+        force: (K, 3) on each marker, world [N].
+        moment: (K, 3) about each marker, world [N m].
+        energy: (1,) stored [J].
+        lost: (1,) power turned into heat [W].
+        memory: (m,) to be remembered when the step is accepted.
+        outputs: (o,) values for the record.
+    """
+
+    force: Any
+    moment: Any
+    energy: Any
+    lost: Any
+    memory: Any
+    outputs: Any
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerMotion:
+    """How a marker moves.
+
+    Attributes:
+        position: (3,) world [m].
+        axes: (3, 3) orientation of the marker, to world.
+        velocity: (3,) world [m/s].
+        omega: (3,) angular velocity, world [rad/s].
+    """
+
+    position: Array
+    axes: Array
+    velocity: Array
+    omega: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A law of force between markers.
+
+    Attributes:
+        function, tangents: of the user; tangents None for differences.
+        markers: it acts on.
+        parameters, memory: numbers it is given, and that it remembers at the start.
+        outputs: names of its own outputs.
+        stores: whether it accounts for its energy and its losses.
+        compiled: entries in C with attribute ``address``, None where Python is asked.
+    """
+
+    function: Callable[..., Any]
+    tangents: Callable[..., Any] | None
+    markers: tuple[Marker, ...]
+    parameters: Array
+    memory: Array
+    outputs: tuple[str, ...]
+    stores: bool
+    compiled: tuple[Any, Any]
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of markers, remembered numbers and outputs."""
+        return len(self.markers), self.memory.size, len(self.outputs)
+
+
+@dataclass(frozen=True, slots=True)
+class UserForce(Law):
+    """Force and moment from a Python function, on one marker and back on another."""
+
+
+def law(  # noqa: PLR0913  one keyword per property
+    self: Whole,
+    name: str,
+    function: Any,
+    *markers: Marker,
+    parameters: npt.ArrayLike = (),
+    memory: npt.ArrayLike = (),
+    outputs: Sequence[str] = (),
+    energy: bool = False,
+    tangents: Any = None,
+    compiled: bool | None = None,
+) -> None:
+    """Force law of your own between any markers, see `rom.mbs.elements.laws`.
+
+    It takes part in motions, equilibria, linearisation, audit, checkpoints and FMUs as all others.
+    `rom.check_law` looks for mistakes in it.
+
+    Args:
+        name: name of the law.
+        function: ``law(t, parameters, motion, memory, out)``; a function of Python, compiled by
+            Numba when it can be, one of Numba, or anything with an ``address`` in C.
+        markers: at least one, of any bodies or the ground.
+        parameters: (p,) numbers handed to the law.
+        memory: (m,) numbers that the law remembers from step to step, at the start.
+        outputs: names of its own outputs; ``solution.law(name)`` has them.
+        energy: whether it tells stored energy and lost power. If not, all its work is that of an
+            applied force, and equilibria let it grow with the loads.
+        tangents: likewise, of the derivatives; None for differences.
+        compiled: True to insist, False to leave it to Python, None for what works. Compiled laws
+            see outer variables as they were when the law was added.
+
+    Raises:
+        ConfigError: for no marker, or a law that cannot be compiled although it must.
+    """
+    if not markers:
+        raise ConfigError(f"law {name!r} acts on no marker.")
+    given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
+    kept = finite(f"memory of {name}", memory, (np.size(memory),))
+    sizes = len(markers), kept.size, len(outputs)
+    entries = _entries(name, (function, tangents), (given.size, *sizes), compiled)
+    element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, entries)
+    self.add(name, element, FAMILY)
+
+
+def user_force(
+    self: Whole,
+    name: str,
+    function: Callable[..., Any],
+    m1: Marker,
+    m2: Marker | None = None,
+) -> None:
+    """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
+
+    ``a`` and ``b`` are `rom.mbs.elements.laws.MarkerMotion`. The function returns (force, moment)
+    in the world that act on the first marker; the reaction, at the same place in space, acts on the
+    body of the second one, so that momentum is conserved whatever the law.
+    """
+    markers = (m1,) if m2 is None else (m1, m2)
+    none = np.zeros(0)
+    element = UserForce(function, None, markers, none, none, (), False, (None, None))
+    self.add(name, element, FAMILY)
+
+
+def motion_of(flat: Any, n: int) -> Motion:
+    """The fields of the motion of n markers in a vector (18 n,)."""
+    return Motion(
+        flat[: 3 * n].reshape(n, 3),
+        flat[3 * n : 12 * n].reshape(n, 3, 3),
+        flat[12 * n : 15 * n].reshape(n, 3),
+        flat[15 * n : 18 * n].reshape(n, 3),
+    )
+
+
+def answer_of(flat: Any, n: int, n_memory: int) -> Answer:
+    """The fields of the answer of a law of n markers in a vector."""
+    at = 6 * n + ENERGY_SIZE
+    return Answer(
+        flat[: 3 * n].reshape(n, 3),
+        flat[3 * n : 6 * n].reshape(n, 3),
+        flat[6 * n : 6 * n + 1],
+        flat[6 * n + 1 : at],
+        flat[at : at + n_memory],
+        flat[at + n_memory :],
+    )
+
+
+def _entries(name: str, laws: Any, sizes: Any, wanted: bool | None) -> tuple[Any, Any]:
+    """Law and tangents as functions of C; None for what is missing or left to Python."""
+    function, slopes = laws
+    entry = _compiled(name, function, sizes, wanted)
+    if slopes is None or entry is None:
+        return entry, None
+    return entry, _compiled(name, slopes, sizes, True, tangents=True)
+
+
+def _compiled(
+    name: str, function: Any, sizes: Any, wanted: bool | None, *, tangents: bool = False
+) -> Any:
+    if hasattr(function, "address"):
+        return function
+    if wanted is False:
+        return None
+    python = getattr(function, "py_func", function)
+    try:
+        if not inspect.isfunction(python):
+            raise TypeError("not a plain function")
+        return entry_of(numba.njit(python), sizes, tangents=tangents)
+    except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
+        if not wanted:
+            return None
+        raise ConfigError(
+            f"law {name!r} cannot be compiled: {str(error).splitlines()[0]}",
+            hint="Use numbers and arrays of NumPy only, or compiled=False.",
+        ) from error
+
+
+def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool = False) -> Any:
+    """A function of C that calls a compiled law with its arguments in their shapes.
+
+    Args:
+        function: compiled by Numba.
+        sizes: numbers of parameters, markers, remembered numbers, outputs.
+        tangents: whether it is that of the tangents.
+    """
+    p, n, m, o = sizes
+    taken, answered = numba.njit(motion_of), numba.njit(answer_of)
+    n_motion, n_answer, n_rows = MOTION_SIZE * n, 6 * n + ENERGY_SIZE + m + o, 6 * n
+    carray = numba.carray
+
+    def law(t, parameters, motion, memory, out):
+        given, kept = carray(parameters, p), carray(memory, m)
+        moved = taken(carray(motion, n_motion), n)
+        function(t, given, moved, kept, answered(carray(out, n_answer), n, m))
+
+    def slopes(t, parameters, motion, memory, out):
+        given, kept = carray(parameters, p), carray(memory, m)
+        moved, D = taken(carray(motion, n_motion), n), carray(out, (2, n_rows, n_rows))
+        function(t, given, moved, kept, D[0], D[1])
+
+    return numba.cfunc(LAW_TYPES)(slopes if tangents else law)
+
+
+@table
+class Laws(Table):
+    """All laws.
+
+    Attributes:
+        address, slopes: (e,) of laws and of their tangents; 0 for Python, or for differences.
+        count: (e,) markers of each; marker: (e, K) -1 beyond.
+        parameter_at, answer_at, memory_at: (e + 1,) where parameters, answers and remembered
+            numbers of each begin.
+        parameters: (p,) of all; first: (m,) what they remember at the start.
+        stores: (e,) 1 for laws that account for their energy.
+        clock: (1,) function that tells the time.
+        motion: (18 K,) of the markers of the law at hand.
+        answer: (a,) of all; probe: likewise, of one at moved markers.
+        D: (72 K^2,) derivatives of the law at hand by motions and by velocities, row by row.
+    """
+
+    address: Address1
+    slopes: Address1
+    count: Index1
+    marker: Index2
+    parameter_at: Index1
+    answer_at: Index1
+    memory_at: Index1
+    parameters: Array1
+    first: Array1
+    stores: Index1
+    clock: Index1
+    motion: Scratch1
+    answer: Scratch1
+    probe: Scratch2
+    D: Scratch1
+
+
+def pack(laws: Mapping[str, Law], places: Places) -> Laws:
+    """The laws as arrays."""
+    found = list(laws.values())
+    most = max(len(law.markers) for law in found)
+    marker = np.full((len(found), most), -1, dtype=np.int64)
+    for e, law in enumerate(found):
+        marker[e, : len(law.markers)] = [places.marker[m] for m in law.markers]
+    sizes = [6 * n + ENERGY_SIZE + m + o for n, m, o in (law.sizes for law in found)]
+    remembered = [law.memory.size for law in found]
+    return Laws(
+        *(integers(_address(law.compiled[k]) for law in found) for k in (0, 1)),
+        integers(len(law.markers) for law in found),
+        marker,
+        _starts([law.parameters.size for law in found]),
+        _starts(sizes),
+        places.memory(np.concatenate([law.memory for law in found])) + _starts(remembered),
+        np.concatenate([law.parameters for law in found]),
+        np.concatenate([law.memory for law in found]),
+        integers(law.stores and law.compiled[0] is not None for law in found),
+        integers([places.clock()]),
+        np.zeros(MOTION_SIZE * most),
+        np.zeros(sum(sizes)),
+        np.zeros((2, max(sizes))),
+        np.zeros(72 * most * most),
+    )
+
+
+def _address(entry: Any) -> int:
+    return 0 if entry is None else int(entry.address)
+
+
+def _starts(lengths: Sequence[int]) -> Index:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+@intrinsic
+def call(context, address, time, parameters, motion, memory, out):
+    """Call a law, or its tangents, at an address."""
+    arrays = parameters, motion, memory, out
+    signature = types.void(address, time, *arrays)
+
+    def build(context, builder, signature, arguments):
+        def data(k):
+            return context.make_array(signature.args[k])(context, builder, arguments[k]).data
+
+        double, pointer = ir.DoubleType(), ir.DoubleType().as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [double, *[pointer] * 4])
+        law = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(law, [arguments[1], *map(data, range(2, 6))])
+        return context.get_dummy_value()
+
+    return (signature, build) if all(isinstance(a, types.Array) for a in arrays) else None
+
+
+@inner
+def take_motion(laws, e, W):
+    """Copy the motion of the markers of law e."""
+    n = laws.count[e]
+    for k in range(n):
+        m = laws.marker[e, k]
+        for p in range(3):
+            laws.motion[3 * k + p] = W.P[m, p]
+            laws.motion[12 * n + 3 * k + p] = W.V[m, p]
+            laws.motion[15 * n + 3 * k + p] = W.V[m, 3 + p]
+            for q in range(3):
+                laws.motion[3 * n + 9 * k + 3 * p + q] = W.E[m, p, q]
+
+
+@inner
+def begin(s, laws, e, W, out):
+    """Clear an answer of law e but for the memory; its parameters, memory and the time."""
+    m, at = laws.memory_at[e], 6 * laws.count[e] + 2
+    for k in range(laws.answer_at[e + 1] - laws.answer_at[e]):
+        out[k] = 0.0
+    for k in range(laws.memory_at[e + 1] - m):
+        out[at + k] = W.base[s.coordinates.kind.size + m + k]
+    parameters = laws.parameters[laws.parameter_at[e] : laws.parameter_at[e + 1]]
+    return parameters, W.base[s.coordinates.kind.size + m :], W.signal[laws.clock[0], 0]
+
+
+@inner
+def ask_law(s, laws, e, W, out):
+    """Let law e answer for the motion at hand."""
+    parameters, memory, t = begin(s, laws, e, W, out)
+    call(laws.address[e], t, parameters, laws.motion, memory, out)
+
+
+@residuals.of(Laws)
+def law_wrenches(s, W, laws, _q, _v, _lam):
+    """Add the laws to the wrenches on the markers, their powers, and what they will remember."""
+    for e in range(laws.address.size):
+        n, answer = laws.count[e], laws.answer[laws.answer_at[e] :]
+        if laws.address[e] != 0:
+            take_motion(laws, e, W)
+            ask_law(s, laws, e, W, answer)
+        stores, factor = laws.stores[e] == 1, W.load[0]
+        for k in range(n):
+            m = laws.marker[e, k]
+            for p in range(3):
+                force = answer[3 * k + p] * (1.0 if stores else factor)
+                moment = answer[3 * n + 3 * k + p] * (1.0 if stores else factor)
+                W.wrench[m, p] += force
+                W.wrench[m, 3 + p] += moment
+                if not stores:
+                    W.power[1] += force * W.V[m, p] + moment * W.V[m, 3 + p]
+        if stores:
+            W.power[2] += answer[6 * n + 1]
+        for k in range(laws.memory_at[e + 1] - laws.memory_at[e]):
+            W.fresh[laws.memory_at[e] + k] = answer[6 * n + 2 + k]
+
+
+@tangents.of(Laws)
+def law_tangents(s, W, laws, _lam, ck, cc):
+    """Add ck times the stiffness to W.Kt and cc times the damping to W.S; none of Python's laws."""
+    for e in range(laws.address.size):
+        if laws.address[e] == 0:
+            continue
+        take_motion(laws, e, W)
+        factor = 1.0 if laws.stores[e] == 1 else W.load[0]
+        set_derivatives(s, W, laws, e)
+        for a in range(laws.count[e]):
+            for b in range(laws.count[e]):
+                place_block(s, W, laws, (e, 0, a, b), ck * factor, W.Kt)
+                place_block(s, W, laws, (e, 1, a, b), cc * factor, W.S)
+
+
+@inner
+def place_block(s, W, laws, place, factor, S):
+    """Add minus a factor times the derivative of the wrench on marker a by marker b to S."""
+    e, which, a, b = place
+    n = 6 * laws.count[e]
+    W.Q[:] = 0.0
+    for p in range(6):
+        for q in range(6):
+            at = (which * n + 6 * a + p) * n + 6 * b + q
+            W.Q[p, (0 if a == b else 6) + q] = -factor * laws.D[at]
+    pair_stiffness(s, W, laws.marker[e, a], laws.marker[e, b], S)
+
+
+@inner
+def set_derivatives(s, W, laws, e):
+    """Set laws.D to the derivatives of the wrenches of law e."""
+    n = laws.count[e]
+    if laws.slopes[e] != 0:
+        for k in range(72 * n * n):
+            laws.D[k] = 0.0
+        parameters, memory, t = begin(s, laws, e, W, laws.probe[0])
+        call(laws.slopes[e], t, parameters, laws.motion, memory, laws.D)
+        return
+    for b in range(n):
+        for q in range(6):
+            h = moved_by(laws, e, W, b, q, DIFFERENCE_STEP)
+            ask_law(s, laws, e, W, laws.probe[0])
+            moved_by(laws, e, W, b, q, -DIFFERENCE_STEP)
+            ask_law(s, laws, e, W, laws.probe[1])
+            take_motion(laws, e, W)
+            store_column(laws, n, 6 * b + q, h)
+            at = (12 if q < 3 else 15) * n + 3 * b + q % 3
+            before = laws.motion[at]
+            h = DIFFERENCE_STEP * (1.0 + abs(before))
+            laws.motion[at] = before + h
+            ask_law(s, laws, e, W, laws.probe[0])
+            laws.motion[at] = before - h
+            ask_law(s, laws, e, W, laws.probe[1])
+            laws.motion[at] = before
+            store_column(laws, n, 6 * (n + b) + q, h)
+
+
+@inner
+def moved_by(laws, e, W, b, q, h):
+    """Displace or turn marker b of law e by h from where it is; says by how much."""
+    n, m = laws.count[e], laws.marker[e, b]
+    if q < 3:
+        h *= 1.0 + abs(W.P[m, q])
+        laws.motion[3 * b + q] = W.P[m, q] + h
+        return h
+    for k in range(3):
+        axis = (W.E[m, 0, k], W.E[m, 1, k], W.E[m, 2, k])
+        about = cross(unit(q - 3), axis)
+        # to second order, so that central differences are exact to that order
+        axis = add(axis, add(scale(h, about), scale(0.5 * h * h, cross(unit(q - 3), about))))
+        for p in range(3):
+            laws.motion[3 * n + 9 * b + 3 * p + k] = axis[p]
+    return h
+
+
+@inner
+def store_column(laws, n, motion, h):
+    """Set a column of laws.D to the derivative of all wrenches, from the two probes."""
+    column = motion % (6 * n) + (motion // (6 * n)) * 36 * n * n
+    for a in range(n):
+        for p in range(3):
+            for part in range(2):
+                at = 3 * n * part + 3 * a + p
+                change = laws.probe[0, at] - laws.probe[1, at]
+                laws.D[(6 * a + 3 * part + p) * 6 * n + column] = 0.5 * change / h
+
+
+@energy.of(Laws)
+def law_energy(s, W, laws, _q, _v):
+    """Energy stored by the laws that account for it."""
+    total = 0.0
+    for e in range(laws.address.size):
+        if laws.stores[e] == 1:
+            take_motion(laws, e, W)
+            ask_law(s, laws, e, W, laws.probe[0])
+            total += laws.probe[0, 6 * laws.count[e]]
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class AskedLaw:
+    """A law that stays in Python, and its number."""
+
+    name: str
+    law: Law
+    e: int
+    laws: Laws
+    followed: int
+
+    def apply(self, W: Any, t: float) -> None:
+        """Let it answer for the motion at hand."""
+        e, packed, n, m = self.e, self.laws, *self.law.sizes[:2]
+        flat = packed.answer[packed.answer_at[e] : packed.answer_at[e + 1]]
+        flat[:] = 0.0
+        out = answer_of(flat, n, m)
+        if isinstance(self.law, UserForce):
+            return self._push_back(W, t, out)
+        begin = self.followed + packed.memory_at[e]
+        memory = W.base[begin : begin + m].copy()
+        out.memory[:] = memory
+        at = packed.marker[e, :n]
+        motion = Motion(W.P[at], W.E[at], W.V[at, :3], W.V[at, 3:])
+        what = f"law {self.name!r}"
+        ask(what, t, self.law.function, t, self.law.parameters.copy(), motion, memory, out)
+        numbers(what, t, flat, flat.shape, "finite numbers")
+        return None
+
+    def _push_back(self, W: Any, t: float, out: Answer) -> None:
+        """Force and moment on the first marker, and what that does to the second."""
+        at = self.laws.marker[self.e, : len(self.law.markers)]
+        a, *others = (_motion_at(W, m) for m in at)
+        what = f"user force {self.name!r}"
+        answer = ask(what, t, self.law.function, t, a, *others)
+        out.force[0], out.moment[0] = numbers(what, t, answer, (2, 3), PAIR_TEXT)
+        for b in others:
+            out.force[1] = -out.force[0]
+            out.moment[1] = -out.moment[0] - np.cross(a.position - b.position, out.force[0])
+
+
+def _motion_at(W: Any, m: int) -> MarkerMotion:
+    """Motion of marker m at the state of the last evaluation."""
+    return MarkerMotion(W.P[m].copy(), W.E[m].copy(), W.V[m, :3].copy(), W.V[m, 3:].copy())
+
+
+def asked(laws: Mapping[str, Law], packed: Laws, followed: int) -> list[AskedLaw]:
+    """The laws that are not compiled."""
+    return [
+        AskedLaw(name, law, e, packed, followed)
+        for e, (name, law) in enumerate(laws.items())
+        if law.compiled[0] is None
+    ]
+
+
+def _outside(law: Law) -> bool:
+    """A law knows where things are in the world: only a reaction is sure to conserve momentum."""
+    return not isinstance(law, UserForce) or len(law.markers) == 1
+
+
+def _couples(laws: Any, body: Index) -> list[Index]:
+    return [body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)]
+
+
+FAMILY = Family(
+    "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
+    outside=_outside, couples=_couples, asked=asked,
+)  # fmt: skip

@@ -1,0 +1,194 @@
+"""Motors: forces along joint coordinates from a law of control."""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
+from rom.mbs.kernels.element_calls import residuals, tangents
+from rom.mbs.kernels.tables import Address1, Index1, Scratch1, Table, table
+from rom.mbs.parts.foreign import ask, numbers
+from rom.mbs.parts.joints import Row, coordinate_of
+from rom.mbs.parts.whole import Whole
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """Force along a joint coordinate from a law (t, coordinate, rate)."""
+
+    joint: str
+    row: Row
+    law: Callable[[float, float, float], float]
+    compiled: Any
+
+    @property
+    def address(self) -> int:
+        """Of the compiled law; 0 when it is left to Python."""
+        return self.compiled.address if self.compiled is not None else 0
+
+
+def motor(
+    self: Whole,
+    name: str,
+    joint: str,
+    law: Callable[[float, float, float], float],
+    *,
+    coordinate: str | None = None,
+    compiled: bool | None = None,
+) -> None:
+    """Motor with a control law: force [N] or torque [N m] = ``law(t, coordinate, rate)``.
+
+    It acts along the joint coordinate on the second body and back on the first. The law is
+    compiled by Numba when it can be; a compiled law sees outer variables as they were when
+    the motor was added. What cannot be compiled runs as plain Python, some ten times slower.
+
+    Args:
+        name: name of the motor.
+        joint: joint with a coordinate.
+        law: function of time [s], coordinate [rad or m] and its rate, or one of Numba.
+        coordinate: "angle" or "displacement"; None for the only or the first one.
+        compiled: True to insist, False to leave it to Python, None for what works.
+
+    Raises:
+        ConfigError: if the joint has no such coordinate, or the law is no function of three
+            numbers, or cannot be compiled although it must.
+    """
+    row = coordinate_of(self.joints, joint, coordinate, "motor")
+    self.add(name, Motor(joint, row, law, _compiled(name, law, compiled)), FAMILY)
+
+
+def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
+    """The law as a C function of three doubles, None when it is left to Python."""
+    if wanted is False:
+        return None
+    python = getattr(law, "py_func", law)
+    try:
+        if not inspect.isfunction(python):
+            raise TypeError("not a plain function")
+        return numba.cfunc("float64(float64, float64, float64)")(python)
+    except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
+        if not wanted:
+            return None
+        raise ConfigError(
+            f"law of motor {name!r} cannot be compiled: {str(error).splitlines()[0]}",
+            hint="Use numbers and NumPy functions of numbers only, or compiled=False.",
+        ) from error
+
+
+@table
+class Motors(Table):
+    """All motors.
+
+    Attributes:
+        at: (k,) joint coordinates.
+        address: (k,) of compiled laws, 0 for Python.
+        clock: (1,) function that tells the time.
+        answer: (k,) forces of the motors whose law is in Python.
+    """
+
+    at: Index1
+    address: Address1
+    clock: Index1
+    answer: Scratch1
+
+
+def pack(motors: Any, places: Places) -> Motors:
+    """The motors as arrays."""
+    found = motors.values()
+    return Motors(
+        integers(places.coordinate(m.joint, m.row) for m in found),
+        integers(m.address for m in found),
+        integers([places.clock()]),
+        np.zeros(len(found)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class MotorLaw:
+    """A motor whose law stays in Python: its number."""
+
+    name: str
+    law: Any
+    k: int
+    motors: Motors
+
+    def apply(self, W: Any, t: float) -> None:
+        """Set the force of the motor."""
+        what, at = f"the law of motor {self.name!r}", self.motors.at[self.k]
+        answer = ask(what, t, self.law, t, float(W.x[at]), float(W.xd[at]))
+        self.motors.answer[self.k] = numbers(what, t, answer, (), "a number")
+
+
+def asked(motors: Mapping[str, Motor], packed: Motors, _followed: int) -> Sequence[MotorLaw]:
+    """The motors that could not be compiled."""
+    return [
+        MotorLaw(name, motor.law, k, packed)
+        for k, (name, motor) in enumerate(motors.items())
+        if motor.address == 0
+    ]
+
+
+@intrinsic
+def call(_context, address, time, x, rate):
+    """Value of the compiled law at an address: double (double, double, double)."""
+    signature = types.float64(types.int64, types.float64, types.float64, types.float64)
+
+    def build(_context, builder, _signature, arguments):
+        double = ir.DoubleType()
+        kind = ir.FunctionType(double, [double, double, double])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return signature, build
+
+
+@inner
+def motor_force(motors, W, k, x, rate):
+    """Force of motor k at a coordinate and its rate; a Python law was asked before."""
+    if motors.address[k] == 0:
+        return motors.answer[k]
+    return call(motors.address[k], W.signal[motors.clock[0], 0], x, rate)
+
+
+@inner
+def motor_slopes(motors, W, k, x, rate):
+    """Derivatives of a motor law by coordinate and rate, from central differences."""
+    dx, dv = 1e-6 * (1.0 + abs(x)), 1e-6 * (1.0 + abs(rate))
+    by_x = motor_force(motors, W, k, x + dx, rate) - motor_force(motors, W, k, x - dx, rate)
+    by_rate = motor_force(motors, W, k, x, rate + dv) - motor_force(motors, W, k, x, rate - dv)
+    return 0.5 * by_x / dx, 0.5 * by_rate / dv
+
+
+@residuals.of(Motors)
+def motor_wrenches(s, W, motors, _q, _v, _lam):
+    """Add the motors to the wrenches on the markers, and their power to W.driven."""
+    for k in range(motors.at.size):
+        at = motors.at[k]
+        force = motor_force(motors, W, k, W.x[at], W.xd[at])
+        push_coordinate(s, W, at, force)
+        W.driven[0] += force * W.xd[at]
+
+
+@tangents.of(Motors)
+def motor_tangents(s, W, motors, _lam, ck, cc):
+    """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
+    for k in range(motors.at.size):
+        at = motors.at[k]
+        x, rate = W.x[at], W.xd[at]
+        by_x, by_rate = motor_slopes(motors, W, k, x, rate)
+        law = ck * motor_force(motors, W, k, x, rate), ck * by_x, cc * by_rate
+        coordinate_tangent(s, W, at, law, W.Kt, W.S)
+
+
+FAMILY = Family(
+    "motors", Motor, pack, motor_wrenches, motor_tangents, ends=on_joint, couples=apart, asked=asked
+)  # fmt: skip

@@ -1,0 +1,147 @@
+"""Springs and dampers along the line between two markers."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import number
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.kernels.algebra import add, dot, put, row, scale, sub, unit
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import pair_stiffness, place_relative
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.tables import Array2, Index1, Table, table
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.whole import Whole
+from rom.plausible import DAMPING, STIFFNESS, warn_outside
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """Spring and damper between two markers, along the line that joins them."""
+
+    i: Marker
+    j: Marker
+    stiffness: float
+    damping: float
+    free_length: float
+
+
+def spring_damper(
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    *,
+    stiffness: float,
+    damping: float = 0.0,
+    free_length: float | None = None,
+) -> None:
+    """Spring [N/m] and damper [N s/m] along the line between two markers.
+
+    Args:
+        name: name of the spring.
+        m1: one end.
+        m2: other end.
+        stiffness: [N/m].
+        damping: [N s/m].
+        free_length: length without force [m]; None for the length at the start.
+    """
+    gap = self.design_point(m2) - self.design_point(m1)
+    free = np.linalg.norm(gap) if free_length is None else number("free_length", free_length)
+    k, c = stiffness_and_damping(name, stiffness, damping)
+    if free < 0.0:
+        raise ConfigError(f"free_length of {name!r} = {free:g} m: a length is not negative.")
+    self.add(name, Spring(m1, m2, k, c, float(free)), FAMILY)
+
+
+def stiffness_and_damping(name: str, stiffness: Any, damping: Any) -> tuple[float, float]:
+    """Both numbers of a spring, doubted aloud where they would drive the motion."""
+    k, c = number("stiffness", stiffness), number("damping", damping)
+    warn_outside(STIFFNESS, k, repr(name))
+    warn_outside(DAMPING, c, repr(name))
+    return k, c
+
+
+@table
+class Springs(Table):
+    """All springs.
+
+    Attributes:
+        i, j: (s,) markers.
+        law: (s, 3) stiffness [N/m], damping [N s/m], free length [m].
+    """
+
+    i: Index1
+    j: Index1
+    law: Array2
+
+
+def pack(springs: Any, places: Places) -> Springs:
+    """The springs as arrays."""
+    return Springs(
+        integers(places.marker[s.i] for s in springs.values()),
+        integers(places.marker[s.j] for s in springs.values()),
+        rows_of(((s.stiffness, s.damping, s.free_length) for s in springs.values()), 3),
+    )
+
+
+@inner
+def spring_state(springs, k, W):
+    """Length, direction, relative velocity, rate of length and tension of spring k."""
+    i, j, law = springs.i[k], springs.j[k], springs.law[k]
+    gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), row(W.V, i, 0))
+    length = math.sqrt(dot(gap, gap))
+    e = scale(1.0 / length, gap) if length > 0.0 else (0.0, 0.0, 0.0)
+    rate = dot(e, slide)
+    return length, e, slide, rate, law[0] * (length - law[2]) + law[1] * rate
+
+
+@residuals.of(Springs)
+def spring_wrenches(_s, W, springs, _q, _v, _lam):
+    """Add the springs to the wrenches on the markers; add up the power lost."""
+    for k in range(springs.i.size):
+        _, e, _, rate, tension = spring_state(springs, k, W)
+        put(W.wrench[springs.i[k]], 0, scale(tension, e))
+        put(W.wrench[springs.j[k]], 0, scale(-tension, e))
+        W.power[2] += springs.law[k, 1] * rate * rate
+
+
+@tangents.of(Springs)
+def spring_tangents(s, W, springs, _lam, ck, cc):
+    """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
+    for k in range(springs.i.size):
+        length, e, slide, rate, tension = spring_state(springs, k, W)
+        if length == 0.0:
+            continue
+        stiffness, damping = springs.law[k, 0], springs.law[k, 1]
+        across = sub(slide, scale(rate, e))
+        W.Q[:] = 0.0
+        for p in range(3):
+            radial = scale(stiffness * e[p] + damping * across[p] / length, e)
+            lateral = scale(tension / length, sub(unit(p), scale(e[p], e)))
+            place_relative(W.Q, 0, p, ck, add(radial, lateral))
+        pair_stiffness(s, W, springs.i[k], springs.j[k], W.Kt)
+        if damping != 0.0:
+            W.Q[:] = 0.0
+            for p in range(3):
+                place_relative(W.Q, 0, p, cc * damping * e[p], e)
+            pair_stiffness(s, W, springs.i[k], springs.j[k], W.S)
+
+
+@energy.of(Springs)
+def spring_energy(_s, W, springs, _q, _v):
+    """Energy stored in springs."""
+    total = 0.0
+    for k in range(springs.i.size):
+        total += 0.5 * springs.law[k, 0] * (spring_state(springs, k, W)[0] - springs.law[k, 2]) ** 2
+    return total
+
+
+FAMILY = Family(
+    "springs", Spring, pack, spring_wrenches, spring_tangents, spring_energy,
+    by_rate=lambda springs: springs.law[:, 1].any(),
+)  # fmt: skip

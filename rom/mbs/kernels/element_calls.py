@@ -1,0 +1,110 @@
+"""Kernels of elements, which the equations call through addresses without knowing any of them.
+
+The system has one row of whole numbers per family of elements that occurs in it: the address of
+its table, and those of its kernels. A family is compiled when a mechanism first has one of it.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import config, njit, types
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import lower_builtin
+
+from rom.mbs.kernels.compiled import OPTIONS, kept
+from rom.mbs.kernels.stages import REAL_VECTOR, address_of, call_at
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.tables import TABLE_WORD, Table
+from rom.mbs.kernels.work import Work
+
+ROW_WORDS = 5  # of a family: its table, then its kernels in the order of their columns
+UNCOMPILED: dict[int, Any] = {}  # tables and kernels by address, where Python runs the kernels
+_S, _W = System._numba_type_, Work._numba_type_
+
+
+class ElementKernel:
+    """A kernel of one family, compiled when it is first needed.
+
+    Attributes:
+        kernel: the function, which takes system, work, and the table of the family first.
+        signature: its types.
+    """
+
+    def __init__(self, function: Callable[..., Any], signature: Any):
+        compiler = njit(**OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        self.kernel, self.signature = kept(compiler)(function), signature
+        self._address = 0
+
+    @property
+    def address(self) -> int:
+        """Of the compiled code."""
+        if config.DISABLE_JIT:
+            UNCOMPILED[id(self)] = self.kernel
+            return id(self)
+        if not self._address:
+            self._address = address_of(self.kernel, self.signature)
+        return self._address
+
+
+class Role:
+    """What a kernel is for: ``role(s, k, W, ...)`` in a kernel calls that of family k.
+
+    Args:
+        column: of the row of a family.
+        result: type.
+        types_: of the arguments behind system, work and table.
+    """
+
+    def __init__(self, column: int, result: Any, *types_: Any):
+        self.column, self.result, self.types = column, result, types_
+        called = {"key": self, "generic": lambda typing, given, _: self._typed()}
+        infer_global(self, types.Function(type(f"Role{column}", (AbstractTemplate,), called)))
+        lower_builtin(self, types.VarArg(types.Any))(self._call)
+
+    def of(self, table: Any) -> Callable[[Callable[..., Any]], ElementKernel]:
+        """Make a function the kernel in this role of the family with this class of table."""
+        signature = self.result(_S, _W, table._numba_type_, *self.types)
+        return lambda function: ElementKernel(function, signature)
+
+    def __call__(self, s: Any, k: int, W: Any, *arguments: Any) -> Any:
+        """The call where Python runs the kernels."""
+        table, kernel = (int(s.elements[k, c]) for c in (0, self.column))
+        return UNCOMPILED[kernel](s, W, UNCOMPILED[table], *arguments) if kernel else 0.0
+
+    def _typed(self) -> Any:
+        return self.result(_S, types.intp, _W, *self.types)
+
+    def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        s, k, W, *arguments = values
+        at = ir.Constant(TABLE_WORD, System._layout["elements"][0])
+        rows = builder.inttoptr(builder.load(builder.gep(s, [at])), TABLE_WORD.as_pointer())
+        first = builder.mul(k, ir.Constant(TABLE_WORD, ROW_WORDS))
+
+        def word(column: int) -> Any:
+            place = builder.add(first, ir.Constant(TABLE_WORD, column))
+            return builder.load(builder.gep(rows, [place]))
+
+        table = builder.inttoptr(word(0), TABLE_WORD.as_pointer())
+        # all tables are one address to compiled code: that of any class stands for the others
+        called = self.result(_S, _W, _S, *self.types)
+        values = [s, W, table, *arguments]
+        return call_at(context, builder, called, word(self.column), values)
+
+
+# (s, k, W, q, v, lam): add wrenches on markers, forces to W.residual and powers to W.power
+residuals = Role(1, types.void, REAL_VECTOR, REAL_VECTOR, REAL_VECTOR)
+# (s, k, W, lam, ck, cc): add stiffness times ck to W.Kt and damping times cc to W.S, all of it
+# right after the residuals
+tangents = Role(2, types.void, REAL_VECTOR, types.float64, types.float64)
+# (s, k, W, q, v): stored energy
+energy = Role(3, types.float64, REAL_VECTOR, REAL_VECTOR)
+# (s, k, W, lam, rank): add to W.UG how the forces change with the multipliers
+multiplier_columns = Role(4, types.void, REAL_VECTOR, types.int64)
+
+
+def row_of(table: Table, kernels: tuple[ElementKernel | None, ...]) -> list[int]:
+    """The row of a family; its kernels are compiled."""
+    if config.DISABLE_JIT:
+        UNCOMPILED[table._address] = table
+    return [table._address, *(0 if kernel is None else kernel.address for kernel in kernels)]
