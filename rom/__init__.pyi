@@ -77,6 +77,7 @@ from rom.io.sid.dialect import read_sid as read_sid
 from rom.mbs.analysis.campbell import campbell as campbell
 from rom.mbs.analysis.equilibrium import equilibrium as equilibrium
 from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynamics
+from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import linearize as linearize
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility

@@ -2,6 +2,7 @@ from rom.mbs.analysis.campbell import Campbell as Campbell
 from rom.mbs.analysis.campbell import campbell as campbell
 from rom.mbs.analysis.equilibrium import equilibrium as equilibrium
 from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynamics
+from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import Linearization as Linearization
 from rom.mbs.analysis.linearize import linearize as linearize
 from rom.mbs.analysis.response import FrequencyResponse as FrequencyResponse

@@ -2,5 +2,5 @@
 
 Rest, tangents and modes: `equilibrium`, `linearize`, `campbell`, `response`, `steady_motion`,
 `sensitivity`, `inverse_dynamics`; `local_equations`, `tangent`, `moving_axes` and
-`quadratic_eigen` are what they are made of.
+`quadratic_eigen` are what they are made of. `law_check` looks for mistakes in laws of the user.
 """

@@ -87,6 +87,11 @@ def rows_of(values: Any, *shape: int) -> Array:
     return np.array(list(values), dtype=float).reshape(-1, *shape)
 
 
+def no_answers(_: Table) -> Sequence[Any]:
+    """None of the laws is the user's."""
+    return ()
+
+
 @dataclass
 class Places:
     """Where the arrays of a mechanism have what elements speak of.
@@ -173,6 +178,7 @@ class Family:
         by_rate: table -> whether the forces depend on velocities.
         loaded_rows: table -> constraint rows whose multipliers they depend on.
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
+        answers: table -> (e, ...) what each law of a user answered last, None if there is none.
     """
 
     name: str
@@ -188,6 +194,7 @@ class Family:
     by_rate: Callable[[Any], bool] = always
     loaded_rows: Callable[[Any], Index] = no_rows
     asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
+    answers: Callable[[Any], Sequence[Any]] = no_answers
 
     def row(self, table: Table) -> list[int]:
         """Addresses of the table and of the kernels, which are compiled."""
@@ -198,14 +205,12 @@ class Family:
         return self.outside(element) or any(m.body == GROUND for m in self.ends(element))
 
 
-def check_family(name: str, element: Any, family: Any) -> None:
+def check_family(name: str, element: Any, family: Family) -> None:
     """Refuse what cannot enter a mechanism.
 
     Raises:
-        ConfigError: if the family is none, or has other records.
+        ConfigError: if the family has other records.
     """
-    if not isinstance(family, Family):
-        raise ConfigError(f"family of {name!r} is {family!r}; a rom.mbs.Family is needed.")
     if not isinstance(element, family.record):
         raise ConfigError(
             f"{name!r} is {element!r}; the {family.name} are of {family.record.__name__}."

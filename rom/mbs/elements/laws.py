@@ -23,6 +23,7 @@ the memory that it wrote itself the first time.
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numba
@@ -50,7 +51,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.foreign import ask, numbers
+from rom.mbs.parts.foreign import ask, numbers, why_not_compiled
 from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
 
@@ -260,7 +261,7 @@ def _compiled(
         if not wanted:
             return None
         raise ConfigError(
-            f"law {name!r} cannot be compiled: {str(error).splitlines()[0]}",
+            f"law {name!r} cannot be compiled: {why_not_compiled(error)}",
             hint="Use numbers and arrays of NumPy only, or compiled=False.",
         ) from error
 
@@ -598,7 +599,11 @@ def _couples(laws: Any, body: Index) -> list[Index]:
     return [body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)]
 
 
+def _answers(laws: Any) -> list[Array]:
+    return [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
+
+
 FAMILY = Family(
     "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
-    outside=_outside, couples=_couples, asked=asked,
+    outside=_outside, couples=_couples, asked=asked, answers=_answers,
 )  # fmt: skip

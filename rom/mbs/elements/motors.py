@@ -17,7 +17,7 @@ from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.tables import Address1, Index1, Scratch1, Table, table
-from rom.mbs.parts.foreign import ask, numbers
+from rom.mbs.parts.foreign import ask, numbers, why_not_compiled
 from rom.mbs.parts.joints import Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
@@ -80,7 +80,7 @@ def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
         if not wanted:
             return None
         raise ConfigError(
-            f"law of motor {name!r} cannot be compiled: {str(error).splitlines()[0]}",
+            f"law of motor {name!r} cannot be compiled: {why_not_compiled(error)}",
             hint="Use numbers and NumPy functions of numbers only, or compiled=False.",
         ) from error
 
@@ -93,7 +93,7 @@ class Motors(Table):
         at: (k,) joint coordinates.
         address: (k,) of compiled laws, 0 for Python.
         clock: (1,) function that tells the time.
-        answer: (k,) forces of the motors whose law is in Python.
+        answer: (k,) forces at the last residual; those of laws in Python before it.
     """
 
     at: Index1
@@ -174,6 +174,7 @@ def motor_wrenches(s, W, motors, _q, _v, _lam):
     for k in range(motors.at.size):
         at = motors.at[k]
         force = motor_force(motors, W, k, W.x[at], W.xd[at])
+        motors.answer[k] = force
         push_coordinate(s, W, at, force)
         W.driven[0] += force * W.xd[at]
 
@@ -190,5 +191,6 @@ def motor_tangents(s, W, motors, _lam, ck, cc):
 
 
 FAMILY = Family(
-    "motors", Motor, pack, motor_wrenches, motor_tangents, ends=on_joint, couples=apart, asked=asked
+    "motors", Motor, pack, motor_wrenches, motor_tangents, ends=on_joint, couples=apart,
+    asked=asked, answers=lambda motors: motors.answer,
 )  # fmt: skip

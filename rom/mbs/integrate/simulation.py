@@ -134,7 +134,7 @@ def _moved(record: Record, t_start: float) -> Solution:
     if record.given is None:
         record.given = initial_state(packed, t_start, settings.spacing)
     state = record.given
-    _check_fit(state, packed)
+    _check_fit(state, packed, record.mechanism)
     if packed.by_blocks and state.rank < state.lam.size:
         record.packed = packed = packed.whole()
     record.watch = watch_of(record.mechanism, packed, t_start)
@@ -203,14 +203,17 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
     return solution
 
 
-def _check_fit(state: Any, packed: Packed) -> None:
+def _check_fit(state: Any, packed: Packed, mechanism: Mechanism) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
     followed = packed.followed
     base = np.zeros(followed) if state.base is None else state.base
     q, v, lam, angles = (np.size(x) for x in (state.q, state.v, state.lam, base))
     needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size, followed)
     if (q, v, lam, angles) != needed:
+        remembering = [name for name, law in mechanism.laws.items() if law.memory.size]
         raise ConfigError(
             f"the state has {q} coordinates and {v} velocities, {lam} constraints and {angles} "
-            "followed joint coordinates; this mechanism has {}, {}, {} and {}.".format(*needed)
+            "followed joint coordinates and remembered numbers; this mechanism has {}, {}, {} and "
+            "{}.".format(*needed),
+            hint=f"Its laws that remember are {remembering}." if remembering else "",
         )

@@ -44,6 +44,12 @@ def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> A
         raise _failure(what, t, error) from error
 
 
+def why_not_compiled(error: Exception) -> str:
+    """The line in which Numba says what it cannot compile."""
+    lines = (line.strip() for line in str(error).splitlines())
+    return next((x for x in lines if x and not x.startswith("Failed in")), type(error).__name__)
+
+
 def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
     """The answer as finite numbers.
 

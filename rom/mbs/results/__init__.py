@@ -1,5 +1,6 @@
 """What a motion leaves.
 
 `state` is one instant, `solution` all of them, with `interpolation` between; `recomputed` and
-`interface_loads` follow from it; `audit` and `validity` judge it, `checkpoint` saves it.
+`interface_loads` and the `law_record` of a law follow from it; `audit` and `validity` judge it,
+`checkpoint` saves it.
 """

@@ -1,5 +1,6 @@
 """What acts on the markers of bodies during a motion, and on what drives it."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,26 +18,30 @@ def marker_loads(solution: Any) -> tuple[Array, Array]:
         (n_t, k, 6) force [N] and moment about the marker [N m], world, of joints, drives, loads
         and all elements together; (n_t, k, 3, 3) axes of the body.
     """
-    packed = solution.packed
-    W = workspace(packed.system, len(packed.signals))
-    forces = laws(solution.mechanism, packed)
-    n, k = solution.t.size, packed.system.markers.body.size
+    markers = solution.packed.system.markers
+    n, k, on_bodies = solution.t.size, markers.body.size, markers.body >= 0
     wrench, axes = np.zeros((n, k, 6)), np.tile(np.eye(3), (n, k, 1, 1))
-    on_bodies = packed.system.markers.body >= 0
-    for i in range(n):
-        _at(solution, W, forces, i)
+    for i, W in enumerate(at_instants(solution)):
         wrench[i] = W.wrench
-        axes[i, on_bodies] = W.A[packed.system.markers.body[on_bodies]]
+        axes[i, on_bodies] = W.A[markers.body[on_bodies]]
     return wrench, axes
 
 
-def _at(solution: Any, W: Work, forces: Any, i: int) -> None:
-    """Evaluate the equations of motion at one instant; W.wrench is then complete."""
-    q, v = solution.q[i], solution.v[i]
-    W.signal[:], W.base[:] = solution.signals[i], solution.base[i]
-    evaluate(solution.packed.system, W, q, v)
-    apply_laws(forces, W, float(solution.t[i]))
-    residual(solution.packed.system, W, q, v, solution.a[i], solution.lam[i])
+def at_instants(solution: Any) -> Iterator[Work]:
+    """The memory after the equations of motion were evaluated at each instant, one by one."""
+    packed, system = solution.packed, solution.packed.system
+    W, forces = workspace(system, len(packed.signals)), laws(solution.mechanism, packed)
+    rows = zip(
+        *(solution.t, solution.q, solution.v, solution.a, solution.lam),
+        *(solution.signals, solution.base),
+        strict=True,
+    )
+    for t, q, v, a, lam, signals, base in rows:
+        W.signal[:], W.base[:] = signals, base
+        evaluate(system, W, q, v)
+        apply_laws(forces, W, float(t))
+        residual(system, W, q, v, a, lam)
+        yield W
 
 
 def of_body(solution: Any, body: str, loads: tuple[Array, Array], frame: str) -> dict[Any, Array]:

@@ -15,6 +15,7 @@ from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.interface_loads import marker_loads, of_body
 from rom.mbs.results.interpolation import Point, between
+from rom.mbs.results.law_record import LawRecord, law_record
 from rom.mbs.results.recomputed import Tracks, follow
 from rom.mbs.results.state import State
 from rom.model import Array
@@ -262,6 +263,16 @@ class Solution:
         self.mechanism.part(body)
         one_of("frame", frame, ("body", "world"))
         return of_body(self, body, self._marker_loads, frame)
+
+    def law(self, name: str) -> LawRecord:
+        """What a law of the user said over time: forces, energy, memory and its own outputs.
+
+        Raises:
+            ConfigError: for a name that no law has.
+        """
+        if name not in self.mechanism.laws:
+            raise ConfigError(f"no law {name!r}; there are {sorted(self.mechanism.laws)}.")
+        return law_record(self, name)
 
     @cached_property
     def _marker_loads(self) -> tuple[Array, Array]:

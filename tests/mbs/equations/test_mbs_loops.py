@@ -204,6 +204,7 @@ def test_a_state_without_the_coil_is_refused():
     bare.turns.clear()
     state = simulate(bare, t_end=0.01, dt=1e-3).final
     with pytest.raises(
-        ConfigError, match="0 followed joint coordinates; this mechanism has 7, 6, 5 and 1"
+        ConfigError,
+        match="0 followed joint coordinates and remembered numbers; this mechanism has 7, 6, 5",
     ):
         simulate(wound, t_end=0.02, dt=1e-3, state=state)

@@ -1,0 +1,244 @@
+"""Mistakes in force laws of the user, found by asking them at many motions of their markers."""
+
+import ctypes
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom import rotation
+from rom.arguments import typed
+from rom.errors import ConfigError
+from rom.mbs.elements.laws import ENERGY_SIZE, MOTION_SIZE, Law, UserForce, answer_of, motion_of
+from rom.mbs.mechanism import Mechanism
+from rom.model import Array, Mask, Report, Row
+
+ENTRY = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
+GUARD_SIZE, GUARD_VALUE = 64, -7.25e77  # numbers on either side of an array, which nobody writes
+DIFFERENCE_STEP = 1e-5
+TANGENT_RTOL = 1e-6  # of the largest derivative: what central differences leave
+ENERGY_RTOL = 1e-6  # of the powers that add up to nothing
+SPREAD_SHARE, TURN_SPREAD = 0.1, 0.3  # of the probed motions: of the size of the mechanism; [rad]
+AXES = "xyz"
+
+
+@typed
+def check_law(
+    mechanism: Mechanism,
+    name: str,
+    *,
+    t: float = 0.0,
+    samples: int = 5,
+    rng: np.random.Generator | None = None,
+) -> Report:
+    """Ask a law at random motions around the start, and look for what would spoil a run.
+
+    Checked are: numbers that are not finite; writing beyond its arrays, or into what it is only to
+    read; other answers when it is asked again, or when it finds the memory it has just written;
+    tangents of its own against central differences; and, of laws that account for their energy,
+    that the power of the forces, the rate of the stored energy and the lost power add up to
+    nothing. The worst entry is named.
+
+    Args:
+        mechanism: with the law.
+        name: of the law.
+        t: time [s].
+        samples: number of motions.
+        rng: source of the motions; None for always the same.
+
+    Returns:
+        Report with a row per check.
+
+    Raises:
+        ConfigError: for a name that no law has.
+        Exception: whatever a law in Python raises.
+    """
+    law = mechanism.laws.get(name)
+    if law is None or isinstance(law, UserForce):
+        raise ConfigError(f"no law {name!r}; there are {sorted(mechanism.laws)}.")
+    rng = np.random.default_rng(0) if rng is None else rng
+    asked = _Asked(law, t)
+    found = [_looked(asked, motion) for motion in _motions(mechanism, law, samples, rng)]
+    rows = [max(row, key=lambda one: one.value / one.limit) for row in zip(*found, strict=True)]
+    return Report(f"law {name!r} at {samples} motions", tuple(row.row for row in rows))
+
+
+@dataclass(frozen=True)
+class _Finding:
+    """How much of something, where it was worst, and what is allowed."""
+
+    what: str
+    where: str
+    value: float
+    limit: float
+
+    @property
+    def row(self) -> Row:
+        where = f": {self.where}" if self.where and not self.value <= self.limit else ""
+        ok = bool(self.value <= self.limit)
+        return Row(f"{self.what}{where}", self.value, f"<= {self.limit:g}", ok)
+
+
+class _Asked:
+    """A law with guarded memory around all that it is given."""
+
+    def __init__(self, law: Law, t: float):
+        self.law, self.t = law, t
+        n, m, o = law.sizes
+        self.fields = [
+            *(f"{what} on marker {k}, {a}" for what in ("force", "moment")
+              for k in range(n) for a in AXES),
+            "energy", "lost power", *(f"memory {k}" for k in range(m)), *law.outputs,
+        ]  # fmt: skip
+        self.motions = [f"{what} {k} {how} {a}" for k in range(n)
+                        for what, how in (("way of marker", "along"), ("turn of marker", "about"))
+                        for a in AXES]  # fmt: skip
+        self.size = 6 * n + ENERGY_SIZE + m + o
+        self.harm = 0.0  # numbers that were written where none may be
+
+    def answer(self, motion: Array, memory: Array | None = None) -> Array:
+        """What the law says of a motion."""
+        out = np.zeros(self.size)
+        n, m, _ = self.law.sizes
+        memory = self.law.memory if memory is None else memory
+        out[6 * n + ENERGY_SIZE : 6 * n + ENERGY_SIZE + m] = memory
+        return self._call(0, motion, memory, out)
+
+    def tangents(self, motion: Array) -> Array:
+        """(2, 6 K, 6 K) what the law says of its derivatives."""
+        n = 6 * len(self.law.markers)
+        return self._call(1, motion, self.law.memory, np.zeros(2 * n * n)).reshape(2, n, n)
+
+    def _call(self, which: int, motion: Array, memory: Array, out: Array) -> Array:
+        entry = self.law.compiled[which]
+        given = [_guarded(x) for x in (self.law.parameters, motion, memory, out)]
+        before = [x.copy() for x in given]
+        if entry is not None:
+            inner = [x[GUARD_SIZE:].ctypes.data for x in given]
+            ENTRY(entry.address)(self.t, *inner)
+        else:
+            self._ask_python(*(x[GUARD_SIZE:-GUARD_SIZE] for x in given))
+        for x, y in zip(given[:3], before[:3], strict=True):
+            self.harm += float((x != y).sum())
+        mine = slice(GUARD_SIZE, -GUARD_SIZE)
+        self.harm += float((given[3] != GUARD_VALUE).sum() - (given[3][mine] != GUARD_VALUE).sum())
+        return given[3][mine].copy()
+
+    def _ask_python(self, parameters: Array, motion: Array, memory: Array, out: Array) -> None:
+        n, m, _ = self.law.sizes
+        moved = motion_of(motion, n)
+        self.law.function(self.t, parameters, moved, memory, answer_of(out, n, m))
+
+
+def _guarded(x: Array) -> Array:
+    return np.pad(np.asarray(x, dtype=float), GUARD_SIZE, constant_values=GUARD_VALUE)
+
+
+def _motions(mechanism: Mechanism, law: Law, samples: int, rng: np.random.Generator) -> Any:
+    """Motions of the markers around the start, each (18 K,)."""
+    points = np.array([mechanism.design_point(m) for m in law.markers])
+    axes = np.array([rotation.matrix(mechanism.part(m.body).p) for m in law.markers])
+    size = max(float(np.ptp(points, axis=0).max()), 1.0)
+    for _ in range(samples):
+        n = len(points)
+        turns = [_turned(TURN_SPREAD * rng.normal(size=3)) for _ in range(n)]
+        moved = points + SPREAD_SHARE * size * rng.normal(size=(n, 3))
+        yield np.concatenate([
+            moved.ravel(), (np.array(turns) @ axes).ravel(), rng.normal(size=6 * n)
+        ])  # fmt: skip
+
+
+def _turned(x: Array) -> Array:
+    """(3, 3) rotation by a vector."""
+    angle = float(np.linalg.norm(x))
+    half = np.sinc(angle / (2 * np.pi)) / 2
+    return rotation.matrix(np.r_[np.cos(angle / 2), half * x])
+
+
+def _looked(asked: _Asked, motion: Array) -> list[_Finding]:
+    """All checks at one motion, in the same order each time."""
+    law = asked.law
+    n, m, _ = law.sizes
+    answer = asked.answer(motion)
+    bad = ~np.isfinite(answer)
+    remembered = answer[6 * n + ENERGY_SIZE : 6 * n + ENERGY_SIZE + m]
+    found = [_Finding("numbers that are not finite", _first(bad, asked.fields), bad.sum(), 0.5)]
+    for what, again in (("asked again", law.memory), ("it finds its own memory", remembered)):
+        other = ~np.isclose(asked.answer(motion, again), answer, rtol=1e-12, equal_nan=True)
+        text = f"answers that change when {what}"
+        found.append(_Finding(text, _first(other, asked.fields), other.sum(), 0.5))
+    if law.compiled[1] is not None:
+        found += _slopes(asked, motion)
+    if law.stores:
+        found.append(_balance(asked, motion, answer))
+    found.append(_Finding("numbers written where none may be", "", asked.harm, 0.5))
+    return found
+
+
+def _first(which: Mask, names: list[str]) -> str:
+    return names[int(np.argmax(which))] if np.any(which) else ""
+
+
+def _slopes(asked: _Asked, motion: Array) -> list[_Finding]:
+    """Tangents of the law against central differences, the worst entry named."""
+    told, found = asked.tangents(motion), []
+    for k, what in enumerate(("stiffness", "damping")):
+        n = told.shape[1]
+        columns = [_change(asked, motion, p, k) for p in range(n)]
+        miss = np.abs(told[k] - np.array(columns).T)
+        scale = max(np.abs(columns).max(), np.abs(told[k]).max(), 1e-300)
+        i, j = np.unravel_index(np.argmax(miss), miss.shape)
+        n_force = 3 * (n // 6)
+        field = asked.fields[(i // 3 % 2) * n_force + 3 * (i // 6) + i % 3]
+        where = f"{field}, by {asked.motions[j]}: {told[k][i, j]:.6g}, not {columns[j][i]:.6g}"
+        text = f"error of the {what} / largest"
+        found.append(_Finding(text, where, float(miss.max() / scale), TANGENT_RTOL))
+    return found
+
+
+def _change(asked: _Asked, motion: Array, p: int, by_velocity: int) -> Array:
+    """(6 K,) derivative of all wrenches by one motion or velocity of a marker."""
+    sides = [asked.answer(_shifted(motion, p, h, by_velocity))
+             for h in (DIFFERENCE_STEP, -DIFFERENCE_STEP)]  # fmt: skip
+    n = motion.size // MOTION_SIZE
+    force, moment = ((sides[0] - sides[1])[: 6 * n] / (2 * DIFFERENCE_STEP)).reshape(2, n, 3)
+    return np.concatenate([force, moment], axis=1).ravel()
+
+
+def _shifted(motion: Array, p: int, h: float, by_velocity: int) -> Array:
+    """The motion with marker p // 6 displaced, turned or quickened by h."""
+    n, k, a = motion.size // MOTION_SIZE, p // 6, p % 6
+    out = motion.copy()
+    moved = motion_of(out, n)
+    if by_velocity:
+        (moved.velocity if a < 3 else moved.omega)[k, a % 3] += h
+    elif a < 3:
+        moved.position[k, a] += h
+    else:
+        moved.axes[k] = _turned(h * np.eye(3)[a - 3]) @ moved.axes[k]
+    return out
+
+
+def _balance(asked: _Asked, motion: Array, answer: Array) -> _Finding:
+    """Power of the forces, rate of the stored energy and lost power, which add up to nothing."""
+    n, m, _ = asked.law.sizes
+    moved, said = motion_of(motion, n), answer_of(answer, n, m)
+    power = float((said.force * moved.velocity).sum() + (said.moment * moved.omega).sum())
+    h = DIFFERENCE_STEP
+    energies = [answer_of(asked.answer(_later(motion, s)), n, m).energy[0] for s in (h, -h)]
+    rate, lost = (energies[0] - energies[1]) / (2 * h), float(said.lost[0])
+    scale = max(abs(power), abs(rate), abs(lost), 1e-300)
+    where = f"power {power:.6g} W, stored {rate:.6g} W, lost {lost:.6g} W"
+    return _Finding("power + stored + lost / largest", where, abs(power + rate + lost) / scale,
+                    ENERGY_RTOL)  # fmt: skip
+
+
+def _later(motion: Array, h: float) -> Array:
+    """The motion a moment h later, with the same velocities."""
+    n = motion.size // MOTION_SIZE
+    out = motion.copy()
+    moved = motion_of(out, n)
+    moved.position[:] += h * moved.velocity
+    for k in range(n):
+        moved.axes[k] = _turned(h * moved.omega[k]) @ moved.axes[k]
+    return out
