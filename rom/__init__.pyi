@@ -87,7 +87,7 @@ from rom.mbs.analysis.sensitivity import motion_sensitivity as motion_sensitivit
 from rom.mbs.analysis.steady_motion import SteadyMotion as SteadyMotion
 from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
 from rom.mbs.integrate.keeping import Keeping as Keeping
-from rom.mbs.integrate.release import release as release
+from rom.mbs.integrate.simulation import release as release
 from rom.mbs.integrate.simulation import simulate as simulate
 from rom.mbs.mechanism import Mechanism as Mechanism
 from rom.mbs.results.audit import audit as audit

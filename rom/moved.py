@@ -60,7 +60,7 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
      "motion=equations ordering packing user=python_laws"),
     ("rom.mbs", "rom.mbs.integrate",
      "alpha=generalized_alpha ending=event_end events explicit=dop853 first_steps=radau_start "
-     "implicit=fixed_step multistep=bdf record=run release stabilised=index2 "
+     "implicit=fixed_step multistep=bdf record=run release=simulation stabilised=index2 "
      "starting=step_memory state=consistent_start variable=adaptive_step"),
     ("rom.mbs", "rom.mbs.kernels",
      "algebra arrays=system compiled constraints coordinates dynamics=inertia integrals "

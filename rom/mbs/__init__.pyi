@@ -22,7 +22,7 @@ from rom.mbs.elements.nonlinear import Elements as Elements
 from rom.mbs.elements.nonlinear import Frames as Frames
 from rom.mbs.integrate.events import Instant as Instant
 from rom.mbs.integrate.keeping import Keeping as Keeping
-from rom.mbs.integrate.release import release as release
+from rom.mbs.integrate.simulation import release as release
 from rom.mbs.integrate.simulation import simulate as simulate
 from rom.mbs.mechanism import Mechanism as Mechanism
 from rom.mbs.parts.bodies import Marker as Marker

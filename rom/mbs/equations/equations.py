@@ -163,43 +163,61 @@ def coordinate_rates(s, q, v, out):
             out[at + 7 + k] = v[vt + 6 + k]
 
 
+@stage(types.boolean, System, Work, types.int64, types.boolean)
+def factorise_motion(s, W, rank, accepted):
+    """Factorise [M G^T; G 0], the equations of accelerations; `evaluate` first.
+
+    At accepted states the range of the constraints is renewed. False when they are singular.
+    """
+    body_masses(s, W)
+    constraint_gradient(s, W)
+    if accepted and rank < W.part.size:
+        range_basis(W.G, rank, W.remainder, W.U_lu)
+    border(W, rank)
+    return factorise_bordered(s, W, rank)
+
+
+@stage(types.void, System, Work, *4 * (REAL_VECTOR,), types.int64)
+def accelerate(s, W, q, v, a, lam, rank):
+    """Set a and lam to accelerations and multipliers; `factorise_motion` first.
+
+    Friction that depends on the loads of its joint is found by passes with the loads of the pass
+    before.
+    """
+    lam[:] = 0.0
+    for _ in range(MAX_PASSES if s.by_multipliers != 0 else 1):
+        a[:] = 0.0
+        residual(s, W, q, v, a, lam)
+        for i in range(a.size):
+            W.rhs[i] = -W.residual[i]
+        for k in range(lam.size):
+            drive = W.signal[s.rows.signal[k], 2] if s.rows.signal[k] >= 0 else 0.0
+            W.part[k] = drive - W.gamma[k]
+        solve_bordered(s, W, rank, a, W.dlam)
+        change, size = 0.0, 0.0
+        for k in range(lam.size):
+            lam[k] += W.dlam[k]
+            change, size = change + W.dlam[k] ** 2, size + lam[k] ** 2
+        if change <= 1e-30 * size:
+            break
+    drive_power(s, W, lam)
+
+
 @kernel
 def rates(s, W, y, rank, accepted, a, lam, out):  # noqa: PLR0913  compiled code has no keywords
     """Rates of coordinates, velocities and works in y; False when the equations are singular.
 
     Accelerations a and multipliers lam solve [M G^T; G 0]. At accepted states the range of the
     constraints is renewed, which makes the multipliers those of least norm; in between the range
-    of the last one gives the same accelerations. Friction that depends on the loads of its joint
-    is found by passes with the loads of the pass before.
+    of the last one gives the same accelerations.
     """
-    n, m = a.size, lam.size
+    n = a.size
     n_q = y.size - n - 3
     q, v = y[:n_q], y[n_q : n_q + n]
     evaluate(s, W, q, v)
-    body_masses(s, W)
-    constraint_gradient(s, W)
-    if accepted and rank < m:
-        range_basis(W.G, rank, W.remainder, W.U_lu)
-    border(W, rank)
-    if not factorise_bordered(s, W, rank):
+    if not factorise_motion(s, W, rank, accepted):
         return False
-    lam[:] = 0.0
-    for _ in range(MAX_PASSES if s.by_multipliers != 0 else 1):
-        a[:] = 0.0
-        residual(s, W, q, v, a, lam)
-        for i in range(n):
-            W.rhs[i] = -W.residual[i]
-        for k in range(m):
-            drive = W.signal[s.rows.signal[k], 2] if s.rows.signal[k] >= 0 else 0.0
-            W.part[k] = drive - W.gamma[k]
-        solve_bordered(s, W, rank, a, W.dlam)
-        change, size = 0.0, 0.0
-        for k in range(m):
-            lam[k] += W.dlam[k]
-            change, size = change + W.dlam[k] ** 2, size + lam[k] ** 2
-        if change <= 1e-30 * size:
-            break
-    drive_power(s, W, lam)
+    accelerate(s, W, q, v, a, lam, rank)
     if accepted:
         follow_coordinates(W)
     coordinate_rates(s, q, v, out[:n_q])

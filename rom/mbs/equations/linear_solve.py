@@ -132,7 +132,7 @@ def solve_bordered(s, W, rank, x, lam):
                 lam[p] += W.U_lu[k, p] * W.scaling[n + k] * W.rhs[n + k]
 
 
-@kernel
+@stage(types.void, System, Work, REAL_VECTOR, types.boolean, REAL_VECTOR)
 def gradient_times(s, W, x, absolute, out):
     """Set out (m,) to G x, or to the sums of absolute values, G as last evaluated."""
     graph = s.graph

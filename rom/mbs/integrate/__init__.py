@@ -2,7 +2,8 @@
 
 `simulation` is the entry and `run` the loop; `consistent_start` and `step_memory` begin;
 `generalized_alpha`, `bdf`, `index2`, `dop853` and `radau_start` take steps, of `fixed_step` or
-`adaptive_step`; `events`, `event_end` and `release` interrupt; `keeping` saves what there is.
+`adaptive_step`, whose length `step_control` chooses; `events` and `event_end` interrupt; `keeping`
+saves what there is.
 """
 
 from rom.lazy import front

@@ -1,9 +1,7 @@
 """Steps of chosen length for generalised-alpha and BDF: the errors of all steps add up to rtol.
 
-The error of a step is its difference from the step that follows from the accelerations at both of
-its ends with one order more; lengths are relative to the size of the mechanism, velocities to the
-largest so far, both weighted by mass. What is saved fits the constraints in its velocities and
-accelerations too, which a method of index 3 leaves to its truncation error.
+Compiled steps in pieces, see `rom.mbs.integrate.step_control`; here is what they come back for:
+signals, forces in Python, events, what is kept, and errors.
 """
 
 from dataclasses import replace
@@ -15,255 +13,264 @@ import numpy as np
 from rom.errors import SolverError
 from rom.mbs.equations.python_laws import apply_laws, laws
 from rom.mbs.integrate import generalized_alpha as alpha
-from rom.mbs.integrate.consistent_start import fitting_velocity
+from rom.mbs.integrate import step_control as control
+from rom.mbs.integrate.consistent_start import check_velocity
 from rom.mbs.integrate.event_end import kept_before_the_end
-from rom.mbs.integrate.fixed_step import counts, failed_step, space
+from rom.mbs.integrate.fixed_step import CHUNK_SECONDS, LARGEST_CHUNK, counts, failed_step
 from rom.mbs.integrate.run import FIRST_STEP_RATIO, RUN_KEY, Record, of, standing_at
-from rom.mbs.integrate.step_memory import (
-    accelerated,
-    across,
-    begin,
-    recall,
-    remember,
-    shift_ahead,
-    signals_at,
-)
+from rom.mbs.integrate.step_control import Control, Trial
+from rom.mbs.integrate.step_memory import FACTOR_FIELDS, begin, recall, remember
 from rom.mbs.kernels.work import Work, workspace
-from rom.mbs.parts.signals import sampled
+from rom.mbs.parts.signals import padded, sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
-# a step is at most so much longer or shorter than the last, and aims below the tolerance
-MAX_STEP_GROWTH, MIN_STEP_GROWTH, ERROR_AIM = 2.0, 0.2, 0.8
-# errors of early steps grow on the way to the end
-ERROR_MARGIN = 3.0
-MIN_WORTHWHILE_GROWTH = 1.3  # of a step that justifies a new factorisation
-# smallest step relative to the duration
-MIN_STEP_RATIO = 1e-12
-# what a step changes and a rejected one gives back
-CHANGED_FIELDS = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "count")
+FIRST_CHUNK = 16  # steps, before it is known how long they take
 # what a run remembers beside its step memory, whose arrays have this in front of their names
-NUMBERS = ("h", "before", "fastest", "shortest", "longest", "rejected", "uneven")
+NUMBERS = (control.LENGTH, control.BEFORE, control.FASTEST, control.SHORTEST, control.LONGEST)
+COUNTS = (control.REJECTED, control.UNEVEN)
 STEP_PREFIX = "step."
-
-
-def increment(turns: Any, h: float, left: tuple[Array, Array], right: tuple[Array, Array]) -> Array:
-    """Increment of a step from (velocities, accelerations) at its ends, to fourth order.
-
-    Angular velocities begin at ``turns``; their rotation vector has the term of Magnus besides.
-    """
-    (v0, a0), (v1, a1) = left, right
-    out = h * v0 + h**2 / 6 * (2 * a0 + a1)
-    for t in turns:
-        out[t : t + 3] += h**2 / 12 * np.cross(v0[t : t + 3], v1[t : t + 3])
-    return out
+# what belongs to the method and its length
+METHOD_FIELDS = ("q", "v", "a", "vd", "lam", "psi", "work", "lost", "method", "bdf")
+INSTANT_FIELDS = ("v", "a", "lam", "base")
+# instants at which signals are sampled at once while the length of the steps stays: a function
+# that takes arrays is asked for four in any case
+LEAST_AHEAD, MOST_AHEAD = 4, 64
 
 
 def run_variable(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha or BDF with steps that meet a tolerance."""
+    alpha.advance.link()
     goes_on = record.settings.begun > 0
     run = _Run(record, W, state if goes_on else replace(state, algorithmic=None, memory=None))
+    limit = FIRST_CHUNK
     while record.t < record.settings.t_end and not record.stopped:
-        before = record.final if run.T.count[alpha.STEPS] else record.given
-        with standing_at(record, before):
-            run.step()
+        clock = perf_counter()
+        taken = run.chunk(1 if record.watch else limit)
+        spent = max(perf_counter() - clock, 1e-6)
+        limit = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
         record.pause()
     record.reach(replace(record.final, memory=None))
     if not record.stopped and record.blocks[-1][0][-1] < record.t:
-        run.keep()
+        record.keep_state(record.final, run.T.work)
 
 
 class _Run:
-    """A run with its step memory; ``T`` is prepared for a next step of length ``h``."""
+    """A run with its step memory; ``T`` is prepared for a next step."""
 
     def __init__(self, record: Record, W: Work, state: State):
-        self.record, self.W, self.forces = record, W, laws(record.mechanism, record.packed)
-        self.duration = record.settings.t_end - record.settings.t_start
-        self.beside = workspace(record.packed.system, len(record.packed.signals))
-        self.state, self.bdf, self.uneven = state, record.settings.method == "bdf", False
-        bare = replace(state, memory=None)
-        self.T, start = begin(record, W, bare, self.forces, FIRST_STEP_RATIO * self.duration)
-        self.old = self.T.replace(**{name: getattr(self.T, name).copy() for name in CHANGED_FIELDS})
-        self.out, self.base = space(W, self.T, 1), W.base.copy()
-        self.h = self.before = FIRST_STEP_RATIO * self.duration
-        self.fastest, self.rejected = record.packed.length / self.duration, 0
-        self.shortest, self.longest = np.inf, 0.0
-        self.jerk, self.next = np.zeros_like(state.v), start
-        if record.settings.begun:
+        self.record, self.forces = record, laws(record.mechanism, record.packed)
+        settings, signals = record.settings, len(record.packed.signals)
+        self.state, duration = state, settings.t_end - settings.t_start
+        bare, h = replace(state, memory=None), FIRST_STEP_RATIO * duration
+        step, start = begin(record, W, bare, self.forces, h)
+        start = state if settings.begun else start
+        self.W, self.now = _control(W, step, start)
+        self.T, self.back = self.now.step, _control(W, step, start)[1]
+        self.beside, self.trial = _trial(record, start, workspace(record.packed.system, signals))
+        self.ahead, number, count = LEAST_AHEAD, self.now.number, self.now.count
+        number[[control.TIME, control.END]] = start.t, settings.t_end
+        number[[control.LENGTH, control.BEFORE, control.SHORTEST]] = h, h, np.inf
+        number[[control.DURATION, control.RTOL]] = duration, settings.rtol
+        number[control.FASTEST] = record.packed.length / duration
+        count[control.IS_BDF] = settings.method == "bdf"
+        count[control.EVERY] = 1 if record.watch else settings.save_every
+        if settings.begun:
             self.recall(state)
-        record.start(self.next, self.T.work)
+        record.start(start, self.T.work)
         record.clock = perf_counter()
 
     def remembered(self) -> Memory:
         """All that the next step depends on and the state does not tell."""
-        record, memory = self.record, remember(self.record.settings, self.W, self.T, 0)
-        steps = {STEP_PREFIX + name: x.copy() for name, x in self.T.items()}
-        arrays = memory.arrays | steps
-        arrays["numbers"] = np.array([getattr(self, name) for name in NUMBERS], dtype=float)
+        record, now = self.record, self.now
+        memory = remember(record.settings, self.W, self.T, 0)
+        arrays = memory.arrays | {STEP_PREFIX + name: x.copy() for name, x in self.T.items()}
+        arrays["numbers"] = np.append(now.number[list(NUMBERS)], now.count[list(COUNTS)])
         # joint coordinates are followed apart from those of the saved instants
-        arrays["jerk"], arrays["base"] = self.jerk.copy(), self.W.base.copy()
+        arrays["jerk"], arrays["base"] = now.jerk.copy(), self.W.base.copy()
         arrays[RUN_KEY] = of(record.final)
-        taken = int(self.T.count[alpha.STEPS])
-        return replace(memory, h=self.h, origin=record.settings.t_start, taken=taken, arrays=arrays)
+        taken, h = int(self.T.count[alpha.STEPS]), float(now.number[control.LENGTH])
+        return replace(memory, h=h, origin=record.settings.t_start, taken=taken, arrays=arrays)
 
     def recall(self, state: State) -> None:
         """Go on where `remembered` was asked."""
-        arrays = state.memory.arrays
+        arrays, now = state.memory.arrays, self.now
         recall(state.memory, self.W, self.T)
         for name, x in self.T.items():
             x[:] = arrays[STEP_PREFIX + name]
-        for name, x in zip(NUMBERS, arrays["numbers"], strict=True):
-            setattr(self, name, float(x))
-        self.rejected, self.uneven = int(self.rejected), bool(self.uneven)
-        self.W.base[:] = arrays["base"]
-        self.jerk, self.next = arrays["jerk"].copy(), state
+        now.number[list(NUMBERS)] = arrays["numbers"][: len(NUMBERS)]
+        now.count[list(COUNTS)] = arrays["numbers"][len(NUMBERS) :]
+        self.W.base[:], now.jerk[:] = arrays["base"], arrays["jerk"]
 
-    def step(self) -> None:
-        """Take one step that meets the tolerance: shorten it until it does."""
-        end = self.record.settings.t_end
-        left = end - self.record.t
-        if 2 * self.h > left:  # two equal last steps instead of a tiny one
-            self.prepare(left if 1.001 * self.h > left else 0.5 * left)
-        error = np.inf
-        while error > 1.0:
-            t = end if self.h >= left else self.record.t + self.h
-            answer = self.attempt(t)
-            if answer == alpha.CONVERGED:
-                self.next = self.consistent(t)
-                error = self.error() * self.duration / (self.h * self.record.settings.rtol)
-            if error > 1.0:
-                self.reject(answer, error, t)
-        self.accept(t)
-        factor = min(ERROR_AIM / np.sqrt(max(error, 1e-6)), MAX_STEP_GROWTH)
-        if self.record.stopped or t >= end:
-            return
-        if factor > MIN_WORTHWHILE_GROWTH or factor < ERROR_AIM:
-            self.prepare(factor * self.h)
-        elif self.bdf and self.uneven:
-            self.prepare(self.h)
-        self.record.reach(replace(self.record.final, memory=self.remembered()))
+    def chunk(self, limit: int) -> int:
+        """Take up to so many steps and keep what is to be saved; returns how many were taken."""
+        record, count = self.record, self.now.count
+        before = record.final if self.T.count[alpha.STEPS] else record.given
+        count[control.LIMIT], count[control.TAKEN], count[control.SAVED] = limit, 0, 0
+        rows = np.zeros((limit // int(count[control.EVERY]) + 1, self.trial.rows.shape[1]))
+        self.trial = self.trial.replace(rows=rows)
+        try:
+            self.take()
+        finally:
+            with standing_at(record, before):
+                self.note(before)
+        return int(count[control.TAKEN])
 
-    def attempt(self, t: float) -> int:
-        """Take the step to a time; says how it went."""
-        step, W, settings, packed = self.T, self.W, self.record.settings, self.record.packed
-        for name in CHANGED_FIELDS:
-            getattr(self.old, name)[:] = getattr(step, name)
-        self.base[:] = W.base
-        times = np.array([t])
-        h = settings.spacing
-        table, failure = sampled(packed.signals, times, settings.span, h, h)
-        if failure is not None:
-            raise failure
-        step.count[alpha.STEPS_BEFORE], rank = step.count[alpha.STEPS], self.record.final.rank
-        answer = alpha.NEEDS_LAWS
-        while answer == alpha.NEEDS_LAWS:
-            clock = perf_counter()
-            answer = alpha.advance(packed.system, W, step, rank, table, 1, self.out)
-            self.record.compiled += perf_counter() - clock
-            if answer == alpha.NEEDS_LAWS:
-                apply_laws(self.forces, W, t)
-        return answer
-
-    def error(self) -> float:
-        """Error of the step just taken, relative to length and speed."""
-        step, last, now, h = self.T, self.record.final, self.next, self.h
-        turns = self.record.packed.system.bodies.v_at + 3
-        shift = step.psi - increment(turns, h, (last.v, last.a), (now.v, now.a))
-        change = now.v - last.v - h / 2 * (last.a + now.a)
-        self.fastest = max(self.fastest, self.length(now.v))
-        return ERROR_MARGIN * max(
-            self.length(shift) / step.size[1], self.length(change) / self.fastest
-        )
-
-    def length(self, x: Array) -> float:
-        """Length of a change of velocities or coordinates, weighted by mass."""
-        return float(np.sqrt(self.W.weight @ x**2))
-
-    def reject(self, answer: int, error: float, t: float) -> None:
-        """Go back to where the step began and prepare a shorter one.
+    def take(self) -> None:
+        """Take steps, and do all that they come back for.
 
         Raises:
-            SolverError: if that would be too short.
+            RomError: of a step that cannot be taken, a signal or a law.
         """
-        spent = self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]]
-        for name in CHANGED_FIELDS:
-            getattr(self.T, name)[:] = getattr(self.old, name)
-        self.W.base[:] = self.base
-        self.T.count[[alpha.ITERATIONS, alpha.FACTORISATIONS]] = spent
-        self.rejected += 1
-        h = self.h * max(MIN_STEP_GROWTH, ERROR_AIM / np.sqrt(error))
-        if h < MIN_STEP_RATIO * self.duration:
-            why = f"its error is {error:.3g} times the tolerance"
-            if answer != alpha.CONVERGED:
-                why = failed_step(self.record, self.W, self.T, answer, t).message
-            raise SolverError(
-                f"the step became too small at t = {self.record.t:.9g} s ({self.h:.3g} s): {why}.",
-                hint="A force jumps there, or the mechanism is near a singular position; or ask "
-                f"for less than rtol = {self.record.settings.rtol:.3g}. The motion up to there is "
-                "kept in error.solution.",
-            )
-        self.prepare(h)
+        record, now = self.record, self.now
+        tables = (self.W, self.beside, now, self.back, self.trial)
+        todo = {
+            alpha.NEEDS_LAWS: lambda: self.apply_laws(self.W),
+            control.NEEDS_LAWS_THERE: lambda: self.apply_laws(self.beside),
+            control.NEEDS_SIGNALS: self.sample,
+            control.NEEDS_START: self.begin_again,
+        }
+        while True:
+            clock = perf_counter()
+            answer = control.take_steps(record.packed.system, *tables, record.final.rank)
+            record.compiled += perf_counter() - clock
+            if answer == control.PAUSED:
+                return
+            if answer not in todo:
+                raise self.failure(answer)
+            todo[answer]()
 
-    def prepare(self, h: float) -> None:
-        """Let the next step have another length."""
-        step = self.T
-        if step.count[alpha.STEPS] == 0:
-            spent = step.count.copy()
-            fresh, _ = begin(self.record, self.W, self.state, self.forces, h)
-            for name in (*CHANGED_FIELDS, "method", "bdf"):
-                getattr(step, name)[:] = getattr(fresh, name)
-            step.count[:] = spent
-        elif self.bdf:
-            step.method[:], step.bdf[:] = alpha.bdf_coefficients(h, self.before)
-            self.uneven = h != self.before
-        else:
-            step.a[:] += (step.method[3] - step.method[4]) * (h - self.h) * self.jerk
-            step.method[0] = h
-            self.reset_across()
-        step.count[alpha.HAS_FACTOR], self.h = 0, h
+    def apply_laws(self, W: Work) -> None:
+        """Ask for the forces in Python at the time of the step."""
+        apply_laws(self.forces, W, float(self.now.number[control.REACHED]))
 
-    def reset_across(self) -> None:
-        """Begin anew across the constraints, where another length of steps would excite them."""
-        record, W, step, now = self.record, self.beside, self.T, self.record.final
-        h = step.method[0]
-        lag, shift = (
-            step.method[3] - step.method[4],
-            shift_ahead(record, now, step.method, self.jerk),
+    def sample(self) -> None:
+        """Sample signals at the time of the step, and at those to come if its length stays.
+
+        Raises:
+            RomError: of a signal that fails at the time of the step; a later one may never be met.
+        """
+        settings, (t, h) = self.record.settings, self.now.number[[control.REACHED, control.LENGTH]]
+        used_up = 0 < self.now.count[control.KNOWN] == self.now.count[control.ROW]
+        self.ahead = min(2 * self.ahead, MOST_AHEAD) if used_up else LEAST_AHEAD
+        times = [t]
+        while len(times) < self.ahead and times[-1] + 2 * h <= settings.t_end:
+            times.append(times[-1] + h)
+        how = settings.span, settings.spacing, settings.spacing
+        table, failure = sampled(self.record.packed.signals, padded(np.array(times)), *how)
+        good = min(len(table), len(times))
+        if failure is not None and not good:
+            raise failure
+        self.trial.times[:good], self.trial.table[:good] = times[:good], table[:good]
+        self.now.count[control.ROW], self.now.count[control.KNOWN] = 0, good
+
+    def begin_again(self) -> None:
+        """Begin with another length of the first step."""
+        h = self.now.number[control.LENGTH] = float(self.now.number[control.WANTED])
+        fresh, _ = begin(self.record, self.W, self.state, self.forces, h)
+        for name in METHOD_FIELDS:
+            getattr(self.T, name)[:] = getattr(fresh, name)
+        self.T.count[[alpha.HAS_FACTOR, alpha.STEP_PASSES]] = 0
+        self.now.count[control.STAGE] = self.now.count[control.NEXT]
+
+    def failure(self, answer: int) -> SolverError:
+        """The error by which a run ends."""
+        number, count, record = self.now.number, self.now.count, self.record
+        t, h, error = (float(number[k]) for k in (control.REACHED, control.WANTED, control.ERROR))
+        if answer == control.CONTRADICTED:
+            check_velocity(record.packed, self.beside, self.trial.v)
+        if answer != control.TOO_SHORT:
+            fits = count[control.STAGE] == control.FITS
+            where = f"at t = {t:.9g} s" if fits else "where constraints are met"
+            return SolverError(f"the equations of motion are singular {where}.")
+        why = f"its error is {error:.3g} times the tolerance"
+        if count[control.ANSWER] != alpha.CONVERGED:
+            why = failed_step(record, self.W, self.T, int(count[control.ANSWER]), t).message
+        return SolverError(
+            f"the step became too small at t = {number[control.TIME]:.9g} s ({h:.3g} s): {why}.",
+            hint="A force jumps there, or the mechanism is near a singular position; or ask "
+            f"for less than rtol = {record.settings.rtol:.3g}. The motion up to there is "
+            "kept in error.solution.",
         )
-        wanted = (now.v + h**2 * shift, now.a + lag * h * self.jerk, now.a)
-        present = (step.v, step.a, step.vd)
-        change = across(record, W, now, (np.array(wanted) - np.array(present)).T)
-        for x, y in zip(present, change.T, strict=True):
-            x += y
 
-    def consistent(self, t: float) -> State:
-        """The present instant with velocities, accelerations and multipliers that fit."""
-        step, rank = self.T, self.record.final.rank
-        self.beside.base[:] = self.base
-        signals_at(self.record, self.beside, t)
-        v = fitting_velocity(self.record.packed, self.beside, step.q, step.v)
-        state = State(t, step.q.copy(), v, step.vd, step.lam, rank, None, self.base)
-        at_rest = np.zeros_like(step.v)
-        return accelerated(self.record, self.beside, state, self.forces, 0.0, at_rest)
+    def columns(self, rows: Array) -> tuple[Array, ...]:
+        """Times, q, v, a, lam, work and base of saved rows."""
+        T, now = self.T, self.now
+        sizes = [1, T.q.size, now.v.size, now.v.size, now.lam.size, now.base.size]
+        t, q, v, a, lam, base, work = np.split(rows, np.cumsum(sizes), axis=1)
+        return t[:, 0], q, v, a, lam, work, base
 
-    def accept(self, t: float) -> None:
-        """Go on from the new instant."""
-        record, step, state = self.record, self.T, self.next
-        self.jerk, self.before = (state.a - record.final.a) / self.h, self.h
-        self.shortest, self.longest = min(self.shortest, self.h), max(self.longest, self.h)
-        record.counts = counts(step) | {"rejected": self.rejected}
-        record.counts |= {"shortest": self.shortest, "longest": self.longest}
-        saved = np.array([step.count[alpha.STEPS] % record.settings.save_every == 0])
-        row = (state.q, state.v, state.a, state.lam, step.work.copy(), state.base)
-        out = tuple(x[None] for x in row)
+    def give_back(self) -> None:
+        """Go back to where the step under way began."""
+        for name in ("reals", "wholes", "lu"):
+            getattr(self.now, name)[:] = getattr(self.back, name)
+
+    def note(self, before: State) -> None:
+        """Keep the saved instants and stand at the last one, where the step under way began."""
+        record, now = self.record, self.now
+        if now.count[control.STAGE] != control.BEGINS:
+            self.give_back()
+        rejected = {"rejected": int(now.count[control.REJECTED])}
+        extremes = {"shortest": control.SHORTEST, "longest": control.LONGEST}
+        extremes = {name: float(now.number[k]) for name, k in extremes.items()}
+        record.counts = counts(self.T) | rejected | extremes
+        if not now.count[control.TAKEN]:
+            record.reach(before, record.noted)
+            return
+        every, kept = record.settings.save_every, int(now.count[control.SAVED])
+        t, *out = self.columns(self.trial.rows[:kept])
+        saved = np.full(kept, not record.watch or self.T.count[alpha.STEPS] % every == 0)
         if record.watch and kept_before_the_end(
-            record, self.beside, self.forces, np.array([t]), out, saved
+            record, self.beside, self.forces, t, tuple(out), saved
         ):
             return
-        record.t, record.final = t, state
-        if saved[0]:
-            self.keep()
+        if saved.any():
+            record.keep(t, *out)
+        record.t = float(now.number[control.TIME])
+        arrays = (x.copy() for x in (self.T.q, now.v, now.a, now.lam))
+        record.reach(State(record.t, *arrays, record.final.rank, None, now.base.copy()))
+        record.reach(replace(record.final, memory=self.remembered()))
 
-    def keep(self) -> None:
-        """Save the present instant."""
-        self.record.keep_state(self.record.final, self.T.work)
+
+def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
+    """What changes from step to step, at the start; and the memory of the method, which shares it.
+
+    The memory keeps of a step its factor, and what belongs to it.
+    """
+    base = W.base if start.base is None else start.base
+    own = {"v": start.v, "a": start.a, "lam": start.lam, "base": base, "jerk": 0 * start.v}
+    own["number"] = np.zeros(control.ERROR + 1)
+    counts = {"count": np.zeros(control.ANSWER + 1, dtype=np.int64)}
+    kept = {f"W {name}": getattr(W, name) for name in ("base", *FACTOR_FIELDS, "factor")}
+    steps = {f"step {name}": x for name, x in step.items()}
+    reals, wholes = (
+        _one_piece({name: x for name, x in {**mine, **steps, **kept}.items() if x.dtype == kind})
+        for mine, kind in ((own, np.float64), (counts, np.int64))
+    )
+    parts = reals[1] | wholes[1]
+    W = W.replace(**{name: parts[f"W {name}"] for name in ("base", *FACTOR_FIELDS, "factor")})
+    fields = {name: parts[name] for name in (*own, *counts)}
+    fields |= {"reals": reals[0], "wholes": wholes[0], "lu": W.lu.reshape(-1)}
+    fields["instant"] = reals[0][: sum(own[name].size for name in INSTANT_FIELDS)]
+    fields["step"] = alpha.Step(**{name: parts[f"step {name}"] for name, _ in step.items()})
+    return W, Control(**fields, by_blocks=W.by_blocks, W_base=W.base, weight=W.weight)
+
+
+def _trial(record: Record, start: State, E: Work) -> tuple[Work, Trial]:
+    """Room for the instant at the end of a step, and the memory it is computed in."""
+    n, m, signals = start.v.size, start.lam.size, len(record.packed.signals)
+    parts = dict(zip(INSTANT_FIELDS, map(np.zeros, (n, n, m, E.base.size)), strict=True))
+    instant, parts = _one_piece(parts)
+    ahead = {"times": np.zeros(MOST_AHEAD), "table": np.zeros((MOST_AHEAD, signals, 3))}
+    rows = np.zeros((0, 1 + start.q.size + instant.size + 3))
+    none, signal = np.zeros((0, 0)), np.zeros((1, signals, 3))
+    trial = Trial(instant=instant, **parts, **ahead, signal=signal, rows=rows, none=none)
+    return E.replace(base=trial.base, signal=signal[0]), trial
+
+
+def _one_piece(arrays: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """An array with the content of all, and its parts by their names and in their shapes."""
+    piece = np.concatenate([x.ravel() for x in arrays.values()])
+    parts = np.split(piece, np.cumsum([x.size for x in arrays.values()])[:-1])
+    shaped = zip(arrays.items(), parts, strict=True)
+    return piece, {name: part.reshape(x.shape) for (name, x), part in shaped}

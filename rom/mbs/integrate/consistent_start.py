@@ -171,10 +171,22 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
         return v.copy()
     linearize_constraints(packed.system, W, q, v)
     weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
-    now, size, every = np.zeros_like(wanted), np.zeros_like(wanted), np.arange(wanted.size)
+    now, every = np.zeros_like(wanted), np.arange(wanted.size)
     for _ in range(2):  # the second pass removes the round-off of the first
         gradient_times(packed.system, W, v, False, now)
         v = v + _least_change(packed, W, wanted - now, weight, every)
+    check_velocity(packed, W, v)
+    return v
+
+
+def check_velocity(packed: Packed, W: Work, v: Array) -> None:
+    """Refuse velocities that do not satisfy joints and drives as linearised last.
+
+    Raises:
+        ModelError: naming a joint or drive that contradicts others.
+    """
+    wanted = _prescribed(packed, W, 1)
+    now, size = np.zeros_like(wanted), np.zeros_like(wanted)
     gradient_times(packed.system, W, v, False, now)
     gradient_times(packed.system, W, v, True, size)
     miss, size = np.abs(now - wanted), size + np.abs(wanted)
@@ -186,7 +198,6 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
             f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
             where=packed.row_owner[k],
         )
-    return v
 
 
 def _prescribed(packed: Packed, W: Work, derivative: int) -> Array:

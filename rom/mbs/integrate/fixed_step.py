@@ -28,8 +28,7 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha or BDF with steps of one length."""
     forces, settings = laws(record.mechanism, record.packed), record.settings
     step, state = begin(record, W, state, forces, settings.h)
-    none = np.zeros((0, len(record.packed.signals), 3))
-    alpha.advance(record.packed.system, W, step, state.rank, none, 1, space(W, step, 1))
+    alpha.advance.link()
     record.start(state, step.work)
     record.clock = perf_counter()
     done, chunk, n = settings.begun, 16, settings.steps
@@ -136,7 +135,7 @@ def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: tuple[Any
     answer = alpha.NEEDS_LAWS
     while answer == alpha.NEEDS_LAWS:
         clock = perf_counter()
-        every = 1 if record.watch else settings.save_every
+        every = 1 if record.watch else int(settings.save_every)
         answer = alpha.advance(system, W, step, rank, table, every, out)
         record.compiled += perf_counter() - clock
         if answer == alpha.NEEDS_LAWS:

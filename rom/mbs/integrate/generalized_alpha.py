@@ -11,6 +11,7 @@ Source:
 import math
 
 import numpy as np
+from numba import types
 
 from rom.mbs.equations.equations import (
     drive_power,
@@ -25,12 +26,14 @@ from rom.mbs.equations.linear_solve import border, factorise_bordered, solve_bor
 from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
 from rom.mbs.kernels.algebra import dot, range_basis, row, scale, spatial_tangent, unit, vec
-from rom.mbs.kernels.compiled import copy, inner, kernel
+from rom.mbs.kernels.compiled import copy, inner
 from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.kernels.coordinates import follow_coordinates
 from rom.mbs.kernels.markers import own_block
-from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH
+from rom.mbs.kernels.stages import REAL_MATRIX, stage
+from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
 from rom.mbs.kernels.tables import Array1, Array3, Index1, Table, table
+from rom.mbs.kernels.work import Work
 from rom.model import Array
 
 # what a corrector pass says
@@ -57,6 +60,8 @@ INCREMENT_SHARE = 1e-3
 # gap in a joint, in rad or lengths of the mechanism, that may remain: the norm of increments hardly
 # sees a light body that spins fast
 JOINT_GAP_TOL = 1e-11
+# of `advance`: signals by step, and the arrays of instants to be saved
+SIGNALS, ROWS = types.Array(types.float64, 3, "C"), types.UniTuple(REAL_MATRIX, 6)
 
 
 @table
@@ -117,10 +122,15 @@ def bdf_coefficients(h: float, before: float) -> tuple[Array, Array]:
     The order is two, or one if there was no step before (0). The five numbers make an increment
     move velocities and accelerations as the weights do.
     """
-    r = h / before if before else 0.0
-    weights = np.array([(1 + 2 * r) / (1 + r), -(1 + r), r * r / (1 + r)]) / h
+    weights = np.array(bdf_weights(h, before))
     c0h = weights[0] * h
     return np.array([h, 1 / c0h**2, 1 / c0h, 0.0, 0.0]), weights
+
+
+def bdf_weights(h: float, before: float) -> tuple[float, float, float]:
+    """The weights of `bdf_coefficients`; the adaptive steps compile them too."""
+    r = h / before if before else 0.0
+    return (1 + 2 * r) / (1 + r) / h, -(1 + r) / h, r * r / (1 + r) / h
 
 
 @inner
@@ -328,14 +338,16 @@ def accept(s, W, step, rank):
     step.count[STEP_PASSES] = 0
 
 
-@kernel
+@stage(
+    types.int64, System, Work, Step, types.int64, SIGNALS, types.int64, ROWS, needed=lambda _: False
+)
 def advance(s, W, step, rank, signals, every, out):
     """Take one step per row of ``signals``; save every so many. Says how the last one went.
 
     ``out`` holds arrays for q, v, vd, lam, work and base with one row per saved instant. When
     forces of Python functions are to be asked for, step.count[USES_LAWS] is 1: then it returns
     NEEDS_LAWS with everything evaluated, and goes on from there in the next call, which has the
-    same arguments.
+    same arguments. Whoever calls it links it first.
     """
     h, beta, gamma, _, _ = step.method
     c = (mass_factor(step), gamma * h, beta * h * h)

@@ -14,12 +14,14 @@ Source:
 import math
 
 from rom.mbs.equations.equations import evaluate
-from rom.mbs.equations.linear_solve import solve_bordered
+from rom.mbs.equations.linear_solve import gradient_times, solve_bordered
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.system import ROLL
 
 # corrections of the velocities at the end of a step; each gains a digit or more
 MAX_CORRECTIONS = 8
+VELOCITY_GAP_TOL = 1e-8  # of a row of the constraints, relative to its terms
+SMALL_ROW_RATIO = 1e-3  # rows at rest hold nothing but round-off
 
 
 @inner
@@ -70,3 +72,38 @@ def fit_velocities(s, W, step, rank):
         for i in range(n):
             step.v1[i] += W.delta[i]
             step.vd1[i] += c * W.delta[i]
+
+
+@inner
+def project_velocity(s, W, rank, v):
+    """Take v to the velocity nearest in kinetic energy that satisfies the constraints.
+
+    `factorise_motion` first. False if there is none.
+    """
+    for turn in range(3):  # the second removes the round-off of the first, the third looks
+        gradient_times(s, W, v, False, W.part)
+        for k in range(W.part.size):
+            rate = W.signal[s.rows.signal[k], 1] if s.rows.signal[k] >= 0 else 0.0
+            W.part[k] = rate - W.part[k]
+        if turn < 2:
+            least_motion_across(s, W, rank, W.delta)
+            for i in range(v.size):
+                v[i] += W.delta[i]
+    gradient_times(s, W, v, True, W.dlam)
+    largest = 0.0
+    for k in range(W.part.size):
+        rate = W.signal[s.rows.signal[k], 1] if s.rows.signal[k] >= 0 else 0.0
+        W.dlam[k] += abs(rate)
+        largest = max(largest, W.dlam[k])
+    for k in range(W.part.size):
+        if abs(W.part[k]) > VELOCITY_GAP_TOL * max(W.dlam[k], SMALL_ROW_RATIO * largest):
+            return False
+    return True
+
+
+@inner
+def least_motion_across(s, W, rank, out):
+    """Set out to the motion of least energy that changes the gaps by W.part."""
+    for i in range(out.size):
+        W.rhs[i] = 0.0
+    solve_bordered(s, W, rank, out, W.dlam)

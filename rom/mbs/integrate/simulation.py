@@ -1,4 +1,4 @@
-"""Simulate a mechanism in time."""
+"""Simulate a mechanism in time; go on with the same bodies under other joints, drives or forces."""
 
 import sys
 from contextlib import suppress
@@ -112,7 +112,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
     settings, packed = settings.after(state), pack(mechanism)
     settings.check_room(packed)
-    if progress and not compiled.compiled_before(advance):
+    if progress and not compiled.compiled_before(advance.kernel):
         sys.stderr.write("compile the integrator, once on this machine: about half a minute\n")
     record = Record(mechanism, packed, settings, perf_counter(), given=state, keeping=keep)
     with terminable():
@@ -124,6 +124,37 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             if error is raised:
                 raise
             raise error from raised
+
+
+@typed
+def release(mechanism: Mechanism, state: State) -> State:
+    """State of a mechanism in the position and motion of another one with the same bodies.
+
+    What follows when a brake is let go, a latch closes or a drive gives way to a motor: positions
+    and velocities stay, as near as the joints of this mechanism allow; accelerations and reactions
+    are its own. Joint angles count from where its bodies were added, turns beyond one from here.
+
+    Args:
+        mechanism: what moves on; the same bodies added in the same order.
+        state: of the other mechanism, e.g. from `rom.equilibrium` or ``solution.final``.
+
+    Returns:
+        State to go on from: ``rom.simulate(mechanism, state=..., ...)``.
+
+    Raises:
+        ConfigError: if the bodies are not the same.
+        ModelError: naming a joint that is open there.
+    """
+    packed = pack(mechanism)
+    if not isinstance(state, State):
+        raise ConfigError(f"{state!r} is no State.", hint="Take rom.equilibrium(...) or sol.final.")
+    sizes: Any = (state.q.size, state.v.size)
+    if sizes != (packed.q.size, packed.v.size):
+        raise ConfigError(
+            f"the state has {sizes[0]} coordinates and {sizes[1]} velocities, this mechanism "
+            f"{packed.q.size} and {packed.v.size}: their bodies differ."
+        )
+    return initial_state(replace(packed, q=state.q.copy(), v=state.v.copy()), state.t)
 
 
 def _moved(record: Record, t_start: float) -> Solution:

@@ -32,6 +32,10 @@ STAGE_NAMES = (
     "constraint_gradient",
     "factorise_bordered",
     "solve_bordered",
+    "gradient_times",
+    "factorise_motion",
+    "accelerate",
+    "advance",
 )
 STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked

@@ -1,7 +1,10 @@
 """Order of all methods, and steps that are chosen to meet a tolerance."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
@@ -9,12 +12,29 @@ from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import G, errors, falling, free_crank, heavy_top, pendulum
 from rom import rotation
 from rom.errors import ConfigError, SolverError
-from rom.mbs.integrate.adaptive_step import _Run, increment
-from rom.mbs.integrate.generalized_alpha import STEPS, bdf_coefficients
+from rom.mbs.equations.packing import pack
+from rom.mbs.integrate.adaptive_step import _Run
+from rom.mbs.integrate.generalized_alpha import HAS_FACTOR, STEPS, bdf_coefficients
 from rom.mbs.integrate.simulation import simulate
+from rom.mbs.integrate.step_control import LENGTH, increment
 from rom.mbs.integrate.step_memory import across, shift_ahead
+from rom.mbs.kernels.work import workspace
 
 IMPLICIT = ["generalized-alpha", "bdf"]
+
+
+class End(NamedTuple):
+    """Velocities and accelerations at an end of a step."""
+
+    v: np.ndarray
+    a: np.ndarray
+
+
+@njit
+def increment_between(s, h, left, right, out):
+    increment(s, h, left, right, out)
+
+
 STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
 
 
@@ -67,15 +87,16 @@ def test_the_increment_of_a_step_is_known_to_fourth_order():
         w = omega(t)
         return 0.5 * np.concatenate([[-p[1:] @ w], p[0] * w + np.cross(p[1:], w)])
 
-    def ends(t):
+    def end(t):
         v = np.concatenate([[np.cos(t), 0, 0], omega(t)])
-        return v, np.array([-np.sin(t), 0, 0, -np.sin(t), np.cos(2 * t), 0])
+        return End(v, np.array([-np.sin(t), 0, 0, -np.sin(t), np.cos(2 * t), 0]))
 
-    gaps, start = [], 0.4
+    gaps, start, found, body = [], 0.4, np.zeros(6), pack(falling()).system
     for h in (0.2, 0.1):
         p = solve_ivp(rate, (start, start + h), [1.0, 0, 0, 0], rtol=1e-12, atol=1e-13).y[:, -1]
         psi = np.concatenate([[np.sin(start + h) - np.sin(start), 0, 0], rotation.log(p)])
-        gaps.append(np.abs(psi - increment([3], h, ends(start), ends(start + h))))
+        increment_between(body, h, end(start), end(start + h), found)
+        gaps.append(np.abs(psi - found))
     ratio = gaps[0][[0, 3, 4, 5]] / gaps[1][[0, 3, 4, 5]]
     assert (ratio > 13).all()
 
@@ -83,24 +104,26 @@ def test_the_increment_of_a_step_is_known_to_fourth_order():
 def test_another_length_of_steps_prepares_the_method_for_it(monkeypatch):
     """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
     seen = []
-    original = _Run.prepare
+    original = _Run.chunk
 
-    def prepare(self, h):
-        original(self, h)
-        if self.T.count[STEPS] < 5:
-            return
-        now, T = self.record.final, self.T
-        lag = (T.method[3] - T.method[4]) * h * self.jerk
-        ahead = h**2 * shift_ahead(self.record, now, T.method, self.jerk)
-        across_ahead = across(self.record, self.beside, now, ahead)
+    def chunk(self, limit):
+        before = self.now.number[LENGTH]
+        taken, h = original(self, 1), self.now.number[LENGTH]
+        if self.T.count[STEPS] < 5 or h == before or self.T.count[HAS_FACTOR]:
+            return taken
+        now, T, record = self.record.final, self.T, self.record
+        lag = (T.method[3] - T.method[4]) * h * self.now.jerk
+        ahead = h**2 * shift_ahead(record, now, T.method, self.now.jerk)
+        across_ahead = across(record, workspace(record.packed.system, 0), now, ahead)
         seen.append(
             [
                 np.linalg.norm(T.a - now.a - lag) / np.linalg.norm(lag),
                 np.linalg.norm(T.v - now.v - across_ahead) / np.linalg.norm(across_ahead),
             ]
         )
+        return taken
 
-    monkeypatch.setattr(_Run, "prepare", prepare)
+    monkeypatch.setattr(_Run, "chunk", chunk)
     simulate(pendulum(), t_end=0.3, rtol=1e-3, rho_inf=0.0)
     assert len(seen) > 2
     assert np.max(seen, axis=0)[0] < 0.3
