@@ -8,7 +8,7 @@ import resource
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import pi
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,9 @@ from rom.bench.models import (
     bar,
     chain_of,
     geometry,
+    rigid_chain,
     slider_crank,
+    top,
 )
 from rom.model import FEModel
 from rom.reduction.bases.method import CraigBampton
@@ -131,6 +133,46 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     grown = per_link[-1] / per_link[len(per_link) // 2]
     case = f"{lengths[-1]} against {lengths[len(lengths) // 2]} links"
     yield Figure("chain", case, "time per step and link", grown, "", "below 2")
+
+
+def adaptive(
+    duration: float = 20.0, links: int = 4, turns: int = 40, top_time: float = 2.0
+) -> Iterator[Figure]:
+    """Steps of chosen length against those of one length, per second of the processor.
+
+    A pendulum of one link, a chain, a slider-crank with a drive, all rigid; then a fast top with a
+    small tolerance. Needs no FEniCSx.
+
+    Args:
+        duration: of the swings [s].
+        links: of the chain.
+        turns: of the crank.
+        top_time: how long the top spins [s].
+    """
+    from rom.mbs.integrate.simulation import simulate
+
+    turn = 2 * pi / CRANK_SPEED
+    cases = {
+        "pendulum": (rigid_chain(1), duration, 1e-3),
+        f"{links} links": (rigid_chain(links), duration / 10, 1e-3),
+        "slider-crank": (slider_crank(), turns * turn, turn / 1000),
+    }
+    for case, (mechanism, t_end, dt) in cases.items():
+        speeds = []
+        for step in (dt, None):
+            simulate(mechanism, t_end=t_end / 100, dt=step)
+            start = process_time()
+            run = simulate(mechanism, t_end=t_end, dt=step)
+            speeds.append(run.statistics["steps"] / (process_time() - start))
+        yield Figure("adaptive", case, "steps per second, one length", speeds[0], "1/s")
+        yield Figure("adaptive", case, "steps per second, chosen length", speeds[1], "1/s")
+        yield Figure(
+            "adaptive", case, "chosen over one length", speeds[1] / speeds[0], "", "above 1/3"
+        )
+    start = process_time()
+    run = simulate(top(), t_end=top_time, rtol=1e-6)
+    case = f"top, rtol 1e-6, {run.statistics['steps']} steps"
+    yield Figure("adaptive", case, "processor time", process_time() - start, "s", "below 30")
 
 
 def peers(meshes: tuple[float, ...] = (0.0047, 0.00257)) -> Iterator[Figure]:
@@ -303,6 +345,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "transmission": transmission,
     "integrator": integrator,
     "chain": chain,
+    "adaptive": adaptive,
     "loops": loops,
     "reduction": reduction,
     "large-reduction": large_reduction,

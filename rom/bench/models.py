@@ -70,13 +70,16 @@ def _line(length: float, cells: int) -> dict[tuple[int, int], Any]:
     return {key: csr_matrix(matrix) for key, matrix in whole.items()}
 
 
-def slider_crank(rod: Any) -> Any:
-    """Crank of 40 mm at full speed, the rod, and a slider of 0.3 kg."""
+def slider_crank(rod: Any = None) -> Any:
+    """Crank of 40 mm at full speed, a flexible rod or a rigid one of 160 mm, a slider of 0.3 kg."""
     from rom.mbs.mechanism import Mechanism
 
     mech, radius = Mechanism(gravity=(0, -9.81, 0)), 0.04
-    a, b = rod.marker("root").point, rod.marker("tip").point
-    moving = {"velocity": (0, CRANK_SPEED * radius, 0)}
+    ends = {"root": np.array([-0.08, 0, 0]), "tip": np.array([0.08, 0, 0])}
+    if rod is not None:
+        ends = {name: rod.marker(name).point for name in ends}
+    a, b = ends["root"], ends["tip"]
+    moving: dict[str, Any] = {"velocity": (0, CRANK_SPEED * radius, 0)}
     crank = mech.add_rigid(
         "crank",
         mass=1.0,
@@ -85,7 +88,12 @@ def slider_crank(rod: Any) -> Any:
         omega=(0, 0, CRANK_SPEED),
         markers={"pin": (radius, 0, 0)},
     )
-    bar = mech.add_flexible("rod", rod, at=np.array([radius, 0, 0]) - a, **moving)
+    at = np.array([radius, 0, 0]) - a
+    if rod is None:
+        shape: dict[str, Any] = {"mass": 0.3, "inertia": (1e-5, 7e-4, 7e-4), "markers": ends}
+        bar = mech.add_rigid("rod", at=at, **shape, **moving)
+    else:
+        bar = mech.add_flexible("rod", rod, at=at, **moving)
     end = np.array([radius, 0, 0]) + b - a
     slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=end)
     z, origin = (0, 0, 1), (0.0, 0.0, 0.0)
@@ -108,6 +116,36 @@ def chain_of(link: Any, n: int) -> Any:
         part = mech.add_flexible(f"link {k}", link, at=k * step - link.marker("root").point)
         mech.revolute(f"pin {k}", before, part.marker("root"), axis=(0, 0, 1))
         before = part.marker("tip")
+    return mech
+
+
+def rigid_chain(n: int) -> Any:
+    """So many rigid links of half a metre in a row along x, hinged as those of `chain_of`."""
+    from rom.mbs.mechanism import Mechanism
+
+    mech, ends = Mechanism(gravity=(0, -9.81, 0)), {"a": (-0.25, 0, 0), "b": (0.25, 0, 0)}
+    before = mech.ground.marker((0.0, 0.0, 0.0))
+    for k in range(n):
+        kept: dict[str, Any] = {"mass": 1.0, "inertia": (1e-3, 0.02, 0.02), "markers": ends}
+        link = mech.add_rigid(f"link {k}", at=(0.25 + 0.5 * k, 0, 0), **kept)
+        mech.revolute(f"pin {k}", before, link.marker("a"), axis=(0, 0, 1))
+        before = link.marker("b")
+    return mech
+
+
+def top() -> Any:
+    """A top of 15 kg on its tip, which spins with 150 rad/s a metre away from it.
+
+    Source:
+        Bruels, Cardona, Arnold, Mech. Mach. Theory 48 (2012) 121.
+    """
+    from rom.mbs.mechanism import Mechanism
+
+    mech, centre, omega = Mechanism(gravity=(0, 0, -9.81)), (0.0, 1.0, 0.0), (0.0, 150.0, -4.61538)
+    kept: dict[str, Any] = {"mass": 15.0, "inertia": (0.234375, 0.46875, 0.234375), "omega": omega}
+    velocity = np.cross(omega, centre)
+    body = mech.add_rigid("top", at=centre, velocity=velocity, markers={"tip": (0, -1, 0)}, **kept)
+    mech.spherical("tip", mech.ground.marker((0.0, 0.0, 0.0)), body.marker("tip"))
     return mech
 
 

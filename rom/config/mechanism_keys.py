@@ -224,7 +224,7 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
 }  # fmt: skip
 SIMULATION = Table("How it is moved.", (
     Key("t_end", Quantity("s", positive=True), "End.", ...),
-    Key("dt", Quantity("s", positive=True), "Time step; chosen by rtol if missing."),
+    Key("dt", Quantity("s", positive=True), "Step, or interval of dop853; by rtol if missing."),
     Key("method", Text(("generalized-alpha", "bdf", "dop853")), "Integrator.", "generalized-alpha"),
     Key("rho_inf", Quantity(), "Spectral radius at infinite frequency, 0 to 1.", 0.9),
     Key("tolerance", Quantity("1", positive=True), "Of the Newton iteration.", 1e-9),

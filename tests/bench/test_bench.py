@@ -101,6 +101,15 @@ def test_chains_of_all_lengths_are_measured():
     assert all(figure.value > 0.0 for figure in figures)
 
 
+def test_steps_of_chosen_length_are_measured_against_those_of_one_length():
+    figures = list(benchmarks.adaptive(duration=0.5, links=2, turns=1, top_time=0.01))
+    cases = ["pendulum"] * 3 + ["2 links"] * 3 + ["slider-crank"] * 3
+    assert [figure.case for figure in figures[:-1]] == cases
+    assert figures[-1].case.startswith("top, rtol 1e-6, ")
+    for one, chosen, ratio in zip(*(figures[k:-1:3] for k in range(3)), strict=True):
+        assert ratio.value == chosen.value / one.value > 0.0
+
+
 def test_other_programs_reduce_the_same_model(bar, tmp_path):
     """The script that other programs run, here with SciPy: its body has our frequencies."""
     from rom.bench.peers.compare import SCRIPT_FILE

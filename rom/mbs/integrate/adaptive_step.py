@@ -66,7 +66,8 @@ class _Run:
         step, start = begin(record, W, bare, self.forces, h)
         start = state if settings.begun else start
         self.W, self.now = _control(W, step, start)
-        self.T, self.back = self.now.step, _control(W, step, start)[1]
+        self.T, back = self.now.step, _control(W, step, start)[1]
+        self.back = back.replace(lu=np.zeros_like(self.now.lu))
         self.beside, self.trial = _trial(record, start, workspace(record.packed.system, signals))
         self.ahead, number, count = LEAST_AHEAD, self.now.number, self.now.count
         number[[control.TIME, control.END]] = start.t, settings.t_end
@@ -210,10 +211,9 @@ class _Run:
         record, now = self.record, self.now
         if now.count[control.STAGE] != control.BEGINS:
             self.give_back()
-        rejected = {"rejected": int(now.count[control.REJECTED])}
-        extremes = {"shortest": control.SHORTEST, "longest": control.LONGEST}
-        extremes = {name: float(now.number[k]) for name, k in extremes.items()}
-        record.counts = counts(self.T) | rejected | extremes
+        shortest, longest = now.number[[control.SHORTEST, control.LONGEST]].tolist()
+        record.counts = counts(self.T) | {"rejected": int(now.count[control.REJECTED])}
+        record.counts |= {"shortest": shortest, "longest": longest}
         if not now.count[control.TAKEN]:
             record.reach(before, record.noted)
             return
@@ -227,8 +227,8 @@ class _Run:
         if saved.any():
             record.keep(t, *out)
         record.t = float(now.number[control.TIME])
-        arrays = (x.copy() for x in (self.T.q, now.v, now.a, now.lam))
-        record.reach(State(record.t, *arrays, record.final.rank, None, now.base.copy()))
+        q, v, a, lam, base = (x.copy() for x in (self.T.q, now.v, now.a, now.lam, now.base))
+        record.reach(State(record.t, q, v, a, lam, record.final.rank, None, base))
         record.reach(replace(record.final, memory=self.remembered()))
 
 
@@ -238,7 +238,13 @@ def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
     The memory keeps of a step its factor, and what belongs to it.
     """
     base = W.base if start.base is None else start.base
-    own = {"v": start.v, "a": start.a, "lam": start.lam, "base": base, "jerk": 0 * start.v}
+    own: dict[str, Any] = {
+        "v": start.v,
+        "a": start.a,
+        "lam": start.lam,
+        "base": base,
+        "jerk": 0 * start.v,
+    }
     own["number"] = np.zeros(control.ERROR + 1)
     counts = {"count": np.zeros(control.ANSWER + 1, dtype=np.int64)}
     kept = {f"W {name}": getattr(W, name) for name in ("base", *FACTOR_FIELDS, "factor")}
@@ -249,7 +255,7 @@ def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
     )
     parts = reals[1] | wholes[1]
     W = W.replace(**{name: parts[f"W {name}"] for name in ("base", *FACTOR_FIELDS, "factor")})
-    fields = {name: parts[name] for name in (*own, *counts)}
+    fields: dict[str, Any] = {name: parts[name] for name in (*own, *counts)}
     fields |= {"reals": reals[0], "wholes": wholes[0], "lu": W.lu.reshape(-1)}
     fields["instant"] = reals[0][: sum(own[name].size for name in INSTANT_FIELDS)]
     fields["step"] = alpha.Step(**{name: parts[f"step {name}"] for name, _ in step.items()})

@@ -1,6 +1,7 @@
 """Accelerations from the equations of motion, integrated by an explicit method of high order.
 
 Constraints enter on acceleration level; their drift stays at the tolerance of the integrator.
+Instants of output are a given interval apart, interpolated, or else the ends of the steps.
 """
 
 from dataclasses import replace
@@ -117,7 +118,7 @@ def _memory(record: Record, equations: Equations, solver: DOP853, due: int) -> M
 
 
 def _step(record: Record, equations: Equations, solver: DOP853, due: int) -> int:
-    """Take one step and save what it has passed; returns the next output due."""
+    """Take one step and save what it has passed, or its end; returns the next output due."""
     message = solver.step()
     if solver.status == "failed":
         raise SolverError(
@@ -157,6 +158,11 @@ def _unit(record: Record, y: Array) -> Array:
 def _output(record: Record, equations: Equations, solver: DOP853, due: int) -> int:
     """Save all instants that the last step has passed; returns the next one due."""
     settings, dense = record.settings, None
+    if settings.dt is None:
+        last = solver.t == settings.t_end
+        if not record.stopped and (last or due % settings.save_every == 0):
+            _save(record, equations, solver.t, solver.y.copy())
+        return due + 1
     while due <= settings.steps:
         t = settings.time(due) if due < settings.steps else settings.t_end
         if t > solver.t or (record.stopped and t >= record.stopped):

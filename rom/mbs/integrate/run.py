@@ -58,7 +58,7 @@ class Settings:
         numbers = ("t_start", "t_end", "dt", "rho_inf", "tolerance", "rtol", "atol", "save_every")
         for name in numbers:
             value = getattr(self, name)
-            if name == "dt" and value is None and self.method != "dop853":
+            if name == "dt" and value is None:
                 continue
             if not _is_finite(value):
                 raise ConfigError(f"{name} = {value!r} is not a finite number.")
@@ -149,8 +149,7 @@ class Settings:
     @property
     def kind(self) -> str:
         """What a memory must be of to go on with it."""
-        fixed = self.dt is not None or self.method == "dop853"
-        return self.method if fixed else f"{self.method}, steps of chosen length"
+        return self.method if self.dt else f"{self.method}, steps of chosen length"
 
     @property
     def both(self) -> bool:

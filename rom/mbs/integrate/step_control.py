@@ -155,15 +155,17 @@ def copy(x, out):
 
 @inner
 def begin_step(now, back):
-    """Remember where a step begins; two equal last steps instead of a tiny one."""
-    left = now.number[END] - now.number[TIME]
+    """Remember all that a step changes; two equal last steps instead of a tiny one."""
+    h, left = now.number[LENGTH], now.number[END] - now.number[TIME]
     if now.count[TAKEN] == now.count[LIMIT] or not left > 0.0:
         return PAUSED
-    keep(now, back)
+    copy(now.reals, back.reals)
+    copy(now.wholes, back.wholes)
+    if now.by_blocks[0] == 0:
+        copy(now.lu, back.lu)
     now.count[STAGE] = TRIES
-    if 2 * now.number[LENGTH] > left:
-        whole = 1.001 * now.number[LENGTH] > left
-        ask_for(now, left if whole else 0.5 * left, TRIES)
+    if 2 * h > left:
+        ask_for(now, left if 1.001 * h > left else 0.5 * left, TRIES)
     return CONVERGED
 
 
@@ -171,15 +173,6 @@ def begin_step(now, back):
 def ask_for(now, h, then):
     """Let the next steps have another length; ``then`` is the stage that follows."""
     now.number[WANTED], now.count[STAGE], now.count[NEXT] = h, PREPARES, then
-
-
-@inner
-def keep(now, back):
-    """Copy all that a step changes."""
-    copy(now.reals, back.reals)
-    copy(now.wholes, back.wholes)
-    if now.by_blocks[0] == 0:
-        copy(now.lu, back.lu)
 
 
 @inner
@@ -231,18 +224,10 @@ def project(s, E, now, trial, rank):
 
 @inner
 def judge_step(s, E, now, trial, rank):
-    """Accelerations that fit; accept the step by its error, or reject it."""
-    accelerate(s, E, now.step.q, trial.v, trial.a, trial.lam, rank)
-    follow_coordinates(E)
-    set_error(s, E, now, trial)
-    now.count[STAGE] = ACCEPTS if now.number[ERROR] <= 1.0 else REJECTS
-    return CONVERGED
-
-
-@inner
-def set_error(s, E, now, trial):
-    """Error of the step just taken, relative to length and speed, over what it may be."""
+    """Accelerations that fit; the error, relative to length and speed, over what it may be."""
     step, number, h = now.step, now.number, now.number[LENGTH]
+    accelerate(s, E, step.q, trial.v, trial.a, trial.lam, rank)
+    follow_coordinates(E)
     increment(s, h, now, trial, E.delta)
     missed, change, speed = 0.0, 0.0, 0.0
     for i in range(step.psi.size):
@@ -250,12 +235,13 @@ def set_error(s, E, now, trial):
         missed += now.weight[i] * (step.psi[i] - E.delta[i]) ** 2
         change += now.weight[i] * gain**2
         speed += now.weight[i] * trial.v[i] ** 2
-    number[ERROR] = math.inf
-    if not math.isfinite(missed + change + speed):
-        return
-    number[FASTEST] = max(number[FASTEST], math.sqrt(speed))
-    error = max(math.sqrt(missed) / step.size[1], math.sqrt(change) / number[FASTEST])
-    number[ERROR] = ERROR_MARGIN * error * number[DURATION] / (h * number[RTOL])
+    number[ERROR], now.count[STAGE] = math.inf, REJECTS
+    if math.isfinite(missed + change + speed):
+        number[FASTEST] = max(number[FASTEST], math.sqrt(speed))
+        error = max(math.sqrt(missed) / step.size[1], math.sqrt(change) / number[FASTEST])
+        number[ERROR] = ERROR_MARGIN * error * number[DURATION] / (h * number[RTOL])
+        now.count[STAGE] = ACCEPTS if number[ERROR] <= 1.0 else REJECTS
+    return CONVERGED
 
 
 @inner

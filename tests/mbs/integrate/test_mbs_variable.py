@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import G, errors, falling, free_crank, heavy_top, pendulum
 from rom import rotation
-from rom.errors import ConfigError, SolverError
+from rom.errors import SolverError
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.adaptive_step import _Run
 from rom.mbs.integrate.generalized_alpha import HAS_FACTOR, STEPS, bdf_coefficients
@@ -205,8 +205,3 @@ def test_a_force_that_jumps_all_the_time_makes_the_step_too_small(method):
     ) as caught:
         simulate(mech, t_end=1.0, method=method, rtol=1e-6)
     assert caught.value.solution.t[-1] < 1.0
-
-
-def test_dop853_needs_an_interval_of_output():
-    with pytest.raises(ConfigError, match="dt = None is not a finite number"):
-        simulate(pendulum(), t_end=1.0, method="dop853")
