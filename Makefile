@@ -1,15 +1,15 @@
 # make setup   Debian packages, .venv over them, .venv-light without FEniCSx; seconds when done
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
 # make test    style, types, all tests, then those of the light half without FEniCSx
-# make long    what takes minutes: every signal at ten instants, every method with every fault
+# make long    what takes minutes: all demos under mpirun, signals at ten instants, slow tests twice
 # make docs    the site, in build/site/; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
 # tests that try more where there is time
-LONG = $(shell grep -rl ROM_LONG tests --include='test_*.py')
-# test files that run side by side
-WORKERS = 2
+LONG = $(shell grep -rl cases.long tests --include='test_*.py')
+# test files side by side, in the order of tests/conftest.py, so that none of the long ones is last
+SIDE_BY_SIDE = -n 2 --dist loadfile --no-loadscope-reorder
 # its own cache: two versions of Numba would compile over each other's code
 LIGHT = NUMBA_CACHE_DIR=$(CURDIR)/.venv-light/numba .venv-light/bin/python
 
@@ -24,11 +24,12 @@ test: setup
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
-	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile
-	$(LIGHT) -m pytest -m "not fenicsx" -p no:cacheprovider -n $(WORKERS) --dist loadfile
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE)
+	$(LIGHT) -m pytest -m "not fenicsx and not once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 long: setup
 	ROM_LONG=1 $(PYTHON) -m pytest $(LONG)
+	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider
 
 docs: setup
 	$(PYTHON) -m sphinx -W -n -q docs build/site

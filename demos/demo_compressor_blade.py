@@ -6,7 +6,7 @@
 # interface meets the same question here: a blade whose flanks sit on an elastic disk.
 #
 # Run: `python demos/demo_compressor_blade.py`, or under `mpirun -n 2`; `--crown 0.03` for curved
-# flanks
+# flanks, `--lc-flank 0.0036` for a third of a minute
 # Writes: `compressor_blade.png` into `out/`; another folder with `--out`
 
 import argparse
@@ -26,6 +26,7 @@ from rom.eigen import rigid_motions
 options = argparse.ArgumentParser(description="kinds of interfaces on a compressor blade")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("--crown", type=float, default=0.0, help="radius of the flanks [m]; 0: plane")
+options.add_argument("--lc-flank", type=float, default=0.0028, help="size of elements there [m]")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
 first = MPI.COMM_WORLD.rank == 0
@@ -43,7 +44,7 @@ FLANKS = ("flank_left", "flank_right")
 given = {
     "path": Path(__file__).parents[1] / "meshes" / "compressor_blade.geo",
     "material": rom.Material(E=E, nu=0.33, rho=rho),
-    "parameters": {"lc": 0.008, "lc_flank": 0.0028, "crown": options.crown},
+    "parameters": {"lc": 0.008, "lc_flank": options.lc_flank, "crown": options.crown},
     "order": 2,  # on crowned flanks, nodes between corners lie on the cylinder as well
 }
 model = rom.fe.model(**given)

@@ -22,6 +22,7 @@ from rom import view
 
 parser = argparse.ArgumentParser(description="a gear housing on a coarse and on a fine mesh")
 parser.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
+parser.add_argument("--lc", type=float, nargs=2, default=(0.016, 0.012), help="element sizes [m]")
 parser.add_argument("--million", action="store_true", help="a million dofs; 16 GB and some minutes")
 parser.add_argument("--solver", default="direct", help="of the fine mesh, see rom.fe.model")
 parser.add_argument("-q", "--quiet", action="store_true", help="no tables")
@@ -48,8 +49,8 @@ def gigabytes() -> float:
 
 bodies = {}
 for mesh, lc, solver in (
-    ("coarse", 0.016, "direct"),
-    ("fine", 0.00475 if options.million else 0.012, options.solver),
+    ("coarse", options.lc[0], "direct"),
+    ("fine", 0.00475 if options.million else options.lc[1], options.solver),
 ):
     clock = perf_counter()
     model = rom.fe.model(GEOMETRY, material=GREY_IRON, parameters={"lc": lc}, solver=solver)

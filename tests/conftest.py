@@ -1,7 +1,10 @@
-"""Set before anything numerical is loaded: one thread per process, and mpirun may run as root."""
+"""Before anything numerical is loaded: one thread per process, mpirun as root; what begins."""
 
 import os
 import signal
+
+from cases.long import LONGEST_FIRST
+from cases.paths import TESTS
 
 # a shell lets what it starts in the background ignore Ctrl-C, and processes pass that on
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -12,3 +15,9 @@ os.environ.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
 os.environ.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
 # processes that wait for others leave the core to them
 os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with what takes longest; all else stays in its order."""
+    rank = {TESTS / name: k for k, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: rank.get(item.path, len(rank)))

@@ -13,6 +13,7 @@ from scipy.linalg import eigh, eigvalsh
 
 import rom
 from cases.beam import gauss_hermite, hermite_beam
+from cases.long import SHARED_BY
 from cases.ranks.environment import ENVIRONMENT
 from rom.body.prestress import _turning, centrifugal
 from rom.body.rotating import rotating_matrices
@@ -277,7 +278,7 @@ if model.operators.first == 0:
 @pytest.mark.mpi
 def test_the_number_of_processes_does_not_matter(tmp_path):
     bodies = []
-    for n in (1, 2, 3):
+    for n in (1, *SHARED_BY):
         path = tmp_path / f"{n}.rom.npz"
         command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-c", SCRIPT, path]
         done = subprocess.run(

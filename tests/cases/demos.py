@@ -1,10 +1,25 @@
-"""The demos, and what they leave behind."""
+"""The demos, how each of them runs, what its numbers must be, and what it leaves behind.
 
+In `make test` each runs once, those of `ON_TWO_PROCESSES` under mpirun; in `make long` all run
+alone, and all with a mesh under mpirun, too.
+"""
+
+import pytest
+
+from cases.long import ROM_LONG
 from cases.paths import ROOT
 
 DEMOS = sorted((ROOT / "demos").glob("demo_*.py"))
-
-
+MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
+# of each kind of work on a mesh one: modes, files, wheels, families, rotation, prestress
+ON_TWO_PROCESSES = {
+    "demo_beam", "demo_exchange", "demo_mistuning", "demo_parameters", "demo_rotor", "demo_spin_up",
+}  # fmt: skip
+# the meshes of these take a minute; the same limits hold on coarser ones
+COARSER = {
+    "demo_compressor_blade": ("--lc-flank", "0.0036"),
+    "demo_large_mesh": ("--lc", "0.022", "0.016"),
+}
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
     "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
@@ -45,3 +60,16 @@ LEFT_BEHIND = {
     },
     "demo_transmission": {"transmission.png", "transmission_fields.png"},
 }  # fmt: skip
+
+
+def options_of(demo, folder):
+    """Words behind the name of a demo."""
+    return ["--quiet", "--out", str(folder), *(() if ROM_LONG else COARSER.get(demo.stem, ()))]
+
+
+def check(demo, results, folder):
+    """Four numbers or more, each as expected within its tolerance; the files, and no others."""
+    assert len(results) >= 4
+    for name, (value, expected, tolerance) in results.items():
+        assert value == pytest.approx(expected, rel=tolerance, abs=0), (name, value, expected)
+    assert {path.name for path in folder.iterdir()} == LEFT_BEHIND[demo.stem]

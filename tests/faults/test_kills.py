@@ -1,6 +1,6 @@
 """Signals at any instant: no process is left behind, and no folder but by SIGKILL, for one run.
 
-Three seeded instants of each kind; ten with ROM_LONG=1 in the environment.
+One seeded instant of each kind, and the instant that matters; ten with ROM_LONG=1.
 """
 
 import os
@@ -15,13 +15,14 @@ from pathlib import Path
 import pytest
 
 from cases.command import environment
+from cases.long import ROM_LONG
 from rom.process import child
 
 pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc"),
     pytest.mark.fenicsx,
 ]
-INSTANTS = 10 if os.environ.get("ROM_LONG") else 3
+INSTANTS = 10 if ROM_LONG else 1
 PATIENCE = 2.0  # seconds in which everything must be gone
 SLOW = """SetFactory("OpenCASCADE");
 Box(1) = {0, 0, 0, 1, 1, 1};

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 import rom
+from cases.long import ROM_LONG
 from rom.cli.main import main
 from rom.mbs.integrate import keeping
 
-KILLS = 10 if os.environ.get("ROM_LONG") else 3
+KILLS = 10 if ROM_LONG else 3
 MECHANISM = """
 gravity = [0, 0, -9.81]
 ground.place = [0, 0, 0]

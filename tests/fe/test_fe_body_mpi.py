@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.long import SHARED_BY
 from cases.paths import ROOT
 from cases.ranks.environment import ENVIRONMENT
 
@@ -22,9 +23,9 @@ KINDS = {
 
 @pytest.fixture(scope="module", params=KINDS)
 def bodies(request, tmp_path_factory):
-    """The same command on one, two and three processes."""
+    """The same command on one process and on several."""
     folder, written = tmp_path_factory.mktemp("bodies"), {}
-    for n in (1, 2, 3):
+    for n in (1, *SHARED_BY):
         written[n] = folder / f"{n}.rom.npz"
         command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-m", "rom", "reduce"]
         command += [str(ROD), "-p", "lc=8e-3", "--E", "210e9", "--nu", "0.3", "--rho", "7850"]
@@ -54,7 +55,7 @@ def contents(body):
     yield "shapes", body.surface.shape, shape
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", SHARED_BY)
 def test_the_body_has_the_same_content_on_any_number_of_processes(bodies, n):
     for (name, one, size), (_, many, _) in zip(
         contents(bodies[1]), contents(bodies[n]), strict=True

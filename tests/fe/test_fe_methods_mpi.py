@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from cases.long import SHARED_BY
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 
@@ -18,7 +19,7 @@ SCRIPT = RANKS / "methods_under_mpi.py"
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     folder, frequencies = tmp_path_factory.mktemp("methods"), {}
-    for n in (1, 2, 3):
+    for n in (1, *SHARED_BY):
         file = folder / f"{n}.json"
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, str(SCRIPT), str(file)],
@@ -30,7 +31,7 @@ def found(tmp_path_factory):
     return frequencies
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", SHARED_BY)
 def test_every_method_is_blind_to_the_number_of_processes(found, n):
     assert len(found[1]) == 14
     for name, one in found[1].items():

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.long import SHARED_BY
 from cases.panels import ALLOY, FOAM, KINDS, PARAMETERS, ROOT, panel
 from cases.paths import RANKS
 from cases.ranks.environment import ENVIRONMENT
@@ -143,21 +144,21 @@ def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
 
 @pytest.fixture(scope="module")
 def families(tmp_path_factory):
-    """The same script on one, two and three processes."""
+    """The same script on one process and on several."""
     folder = tmp_path_factory.mktemp("families")
-    for n in (1, 2, 3):
+    for n in (1, *SHARED_BY):
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
              str(RANKS / "family_under_mpi.py"), "material", str(folder / f"{n}.npz")],
             env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip
         assert (folder / f"{n}.npz").exists(), done.stderr
-    return {n: rom.load(folder / f"{n}.npz") for n in (1, 2, 3)}
+    return {n: rom.load(folder / f"{n}.npz") for n in (1, *SHARED_BY)}
 
 
 @pytest.mark.mpi
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", SHARED_BY)
 def test_a_family_is_blind_to_the_number_of_processes(families, n):
     one, many = families[1], families[n]
     assert many.body.n_modes == one.body.n_modes

@@ -11,6 +11,7 @@ from scipy.sparse import csr_matrix
 
 import rom
 from cases.layers import KINDS, LAYERS, ROOT, families, panel
+from cases.long import SHARED_BY
 from cases.paths import RANKS
 from cases.solid import STEEL, block
 from rom.body.reference import rigid_elastic
@@ -256,7 +257,7 @@ def test_layers_are_blind_to_the_number_of_processes(tmp_path):
     from cases.ranks.environment import ENVIRONMENT
 
     found = {}
-    for n in (1, 2, 3):
+    for n in (1, *SHARED_BY):
         path = tmp_path / f"{n}.npz"
         done = subprocess.run(
             ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
@@ -266,5 +267,5 @@ def test_layers_are_blind_to_the_number_of_processes(tmp_path):
         assert path.exists(), done.stderr
         family = rom.load(path)
         found[n] = [family.at(**p).frequencies(14)[6:] for p in ({}, POINT)]
-    for n in (2, 3):
+    for n in SHARED_BY:
         assert_allclose(found[n], found[1], rtol=1e-9)

@@ -8,6 +8,7 @@ import pytest
 
 from cases.paths import ROOT
 
+pytestmark = pytest.mark.once
 PAGE = ROOT / "docs" / "contributing.md"
 PATH = re.compile(r"`((?:rom|tests|docs|demos|meshes)/[\w./]*)`")
 NAMED = re.compile(r"`([A-Z_]+)` of `([\w./]+)`")

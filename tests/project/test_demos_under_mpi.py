@@ -1,30 +1,37 @@
-"""Every demo with finite elements runs unchanged on two processes."""
+"""Every demo with finite elements runs unchanged on two processes, and ends in the same numbers."""
 
-import os
+import json
 import subprocess
 import sys
 
 import pytest
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
-from cases.demos import DEMOS, LEFT_BEHIND
+from cases.demos import MESHED, ON_TWO_PROCESSES, check, options_of
+from cases.long import ROM_LONG
+from cases.paths import RANKS
+from cases.ranks.environment import ENVIRONMENT
 
 # another test file may run on the same two cores
 pytestmark = [
     pytest.mark.fenicsx, pytest.mark.slow, pytest.mark.mpi, pytest.mark.timeout(1800),
 ]  # fmt: skip
-MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
+SHARED = [demo for demo in MESHED if ROM_LONG or demo.stem in ON_TWO_PROCESSES]
 
 
-@pytest.mark.parametrize("demo", MESHED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("demo", SHARED, ids=lambda path: path.stem)
 def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
-    allow = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    out, file = tmp_path / "out", tmp_path / "results.json"
     done = subprocess.run(
-        ["mpirun", "-n", "2", "--oversubscribe", sys.executable, str(demo), "-q", "--out",
-         str(tmp_path)],
-        env=os.environ | allow | {"OMP_NUM_THREADS": "1"},
-        capture_output=True, text=True, timeout=1740, check=False,
+        ["mpirun", "-n", "2", "--oversubscribe", sys.executable, str(RANKS / "demo_under_mpi.py"),
+         str(file), str(demo), *options_of(demo, out)],
+        env=ENVIRONMENT, capture_output=True, text=True, timeout=1740, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("mass [kg]: ") == 1
-    assert {path.name for path in tmp_path.iterdir()} == LEFT_BEHIND[demo.stem]
+    check(demo, json.loads(file.read_text()), out)
+
+
+def test_what_runs_on_two_processes_has_a_mesh():
+    """A name that is none would let a demo run nowhere, or only alone."""
+    assert {demo.stem for demo in MESHED} >= ON_TWO_PROCESSES

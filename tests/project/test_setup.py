@@ -13,6 +13,7 @@ from cases.paths import ROOT
 from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
 from rom.doctor.machine import SLOW_ADVICE
 
+pytestmark = pytest.mark.once
 SETUP = ROOT / ".ci" / "setup.sh"
 
 
@@ -79,8 +80,9 @@ def test_ci_runs_what_a_user_runs():
 def test_make_test_covers_style_types_and_both_environments():
     makefile = (ROOT / "Makefile").read_text()
     recipe = makefile.partition("\ntest: setup\n")[2].partition("\n\n")[0]
-    for part in ("ruff check", "ruff format --check", "-m mypy", "$(PYTHON) -m pytest -n",
-                 '$(LIGHT) -m pytest -m "not fenicsx"'):  # fmt: skip
+    for part in ("ruff check", "ruff format --check", "-m mypy",
+                 "$(PYTHON) -m pytest $(SIDE_BY_SIDE)",
+                 '$(LIGHT) -m pytest -m "not fenicsx and not once"'):  # fmt: skip
         assert part in recipe + "\n"
     assert "ignore" not in recipe and "-k" not in recipe
 

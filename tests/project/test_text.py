@@ -64,6 +64,7 @@ def test_files_named_in_the_readme_exist():
         assert (ROOT / name).exists(), name
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_no_forgotten_f_prefix_in_a_message(path):
     assert not forgotten(ast.parse(path.read_text()))
@@ -109,6 +110,7 @@ def test_every_error_has_an_exit_code_the_help_explains():
     assert documented == [str(code) for code in range(8)]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     "pattern", [PLACES, HOSTS, UNFINISHED], ids=["places", "hosts", "unfinished"]
 )

@@ -27,6 +27,7 @@ def found(lossy):
     return steady(lossy, steps=STEPS)
 
 
+@pytest.mark.once
 def test_it_is_where_motion_through_time_settles(lossy, found):
     """But for the little that its steps damp."""
     run = simulate(lossy, periods=8, steps=STEPS)

@@ -9,13 +9,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
+from cases.long import ROM_LONG
 from cases.mbs.mechanisms import simulate_quietly
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, SolverError
 from rom.mbs.integrate import keeping, simulation
 from rom.mbs.integrate.run import Record
 from rom.mbs.mechanism import Mechanism
 
-FAULTS_EACH = 10 if os.environ.get("ROM_LONG") else 2
+FAULTS_EACH = 10 if ROM_LONG else 2
 
 PARTS = ("t", "q", "v", "a", "lam", "work", "base", "signals")
 T_END = 0.072

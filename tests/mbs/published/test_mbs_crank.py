@@ -32,6 +32,7 @@ def compare(sol, want, positions, velocities):
     assert_allclose(-drive[5], want["drive"], rtol=velocities)
 
 
+@pytest.mark.once
 def test_published_solution_of_the_flexible_slider_crank():
     """C2: 13 digits of an independent formulation, with its own inertia integrals."""
     sol = simulate_quietly(
@@ -40,6 +41,7 @@ def test_published_solution_of_the_flexible_slider_crank():
     compare(sol, REFERENCE["published"], 2e-9, 2e-8)
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_physical_flexible_slider_crank():
     """With the consistent axial mass, fifteen times lighter and four times faster."""

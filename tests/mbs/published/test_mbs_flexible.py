@@ -199,6 +199,7 @@ def hinged(body, tip_mass=0.5, scale=1.0):
     return mech
 
 
+@pytest.mark.once
 def test_the_frame_changes_the_motion_at_second_order_in_the_deformation_only(beam):
     """Ten times the load, ten times the deformation: a hundred times the difference of frames."""
     apart, bent = [], []

@@ -330,6 +330,7 @@ def test_a_flyball_governor_with_stiff_couplers():
 # A chain that falls ------------------------------------------------------------------------------
 
 
+@pytest.mark.once
 def test_a_folded_chain_falls():
     """Four links hang, four stand beside them and are let go."""
     n, length = 8, 0.25
