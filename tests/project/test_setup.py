@@ -6,10 +6,12 @@ import subprocess
 import time
 import tomllib
 from itertools import chain
+from pathlib import Path
 
 import pytest
 
-from cases.paths import ROOT
+from cases.long import LONGEST_FIRST
+from cases.paths import ROOT, TESTS
 from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
 from rom.doctor.machine import SLOW_ADVICE
 
@@ -85,6 +87,20 @@ def test_make_test_covers_style_types_and_both_environments():
                  '$(LIGHT) -m pytest -m "not fenicsx and not once"'):  # fmt: skip
         assert part in recipe + "\n"
     assert "ignore" not in recipe and "-k" not in recipe
+
+
+def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
+    """A file under another name would come last again; `make long` finds files by what they say."""
+    assert [name for name in LONGEST_FIRST if not (TESTS / name).is_file()] == []
+    importing = {path for path in TESTS.rglob("*.py") if "cases.long" in path.read_text()}
+    apart = {TESTS / "conftest.py", TESTS / "cases" / "demos.py", Path(__file__)}
+    assert importing >= apart
+    assert all(path.name.startswith("test_") for path in importing - apart)
+    makefile = (ROOT / "Makefile").read_text()
+    recipe = makefile.partition("\nlong: setup\n")[2].partition("\n\n")[0]
+    assert "LONG = $(shell grep -rl cases.long tests --include='test_*.py')" in makefile
+    assert "ROM_LONG=1 $(PYTHON) -m pytest $(LONG)" in recipe
+    assert 'ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once"' in recipe
 
 
 def test_the_doctor_advises_packages_the_setup_installs():
