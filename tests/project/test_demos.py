@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from cases.demos import DEMOS, ON_TWO_PROCESSES, check, options_of
+from cases.files.demos import DEMOS, ON_TWO_PROCESSES, check, options_of
 from cases.long import ROM_LONG
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")

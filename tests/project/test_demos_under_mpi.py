@@ -7,7 +7,7 @@ import sys
 import pytest
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
-from cases.demos import MESHED, ON_TWO_PROCESSES, check, options_of
+from cases.files.demos import MESHED, ON_TWO_PROCESSES, check, options_of
 from cases.long import ROM_LONG
 from cases.paths import RANKS
 from cases.ranks.environment import ENVIRONMENT

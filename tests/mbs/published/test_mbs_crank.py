@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.long import ROM_LONG
 from cases.mbs.mechanisms import CRANK, simeon_crank, simulate_quietly, slider_crank
 from cases.paths import TESTS
 from cases.solid import block
@@ -43,6 +44,7 @@ def test_published_solution_of_the_flexible_slider_crank():
 
 @pytest.mark.once
 @pytest.mark.slow
+@pytest.mark.skipif(not ROM_LONG, reason="half a minute; the same kernels as above")
 def test_physical_flexible_slider_crank():
     """With the consistent axial mass, fifteen times lighter and four times faster."""
     sol = simulate_quietly(

@@ -11,10 +11,8 @@ from cases.paths import ROOT
 
 DEMOS = sorted((ROOT / "demos").glob("demo_*.py"))
 MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
-# of each kind of work on a mesh one: modes, files, wheels, families, rotation, prestress
-ON_TWO_PROCESSES = {
-    "demo_beam", "demo_exchange", "demo_mistuning", "demo_parameters", "demo_rotor", "demo_spin_up",
-}  # fmt: skip
+# one each that writes files, and is about wheels, rotation and prestress
+ON_TWO_PROCESSES = {"demo_exchange", "demo_mistuning", "demo_rotor", "demo_spin_up"}
 # the meshes of these take a minute; the same limits hold on coarser ones
 COARSER = {
     "demo_compressor_blade": ("--lc-flank", "0.0036"),
