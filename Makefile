@@ -1,4 +1,5 @@
-# make setup   Debian packages, .venv over them, .venv-light without FEniCSx; seconds when done
+# make setup   Debian packages, .venv over them, .venv-light without FEniCSx, and for both what first
+#              motions need, compiled on all cores; seconds when done
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
 # make test    style, types, all tests, then those of the light half without FEniCSx
 # make long    what takes minutes: all demos under mpirun, signals at ten instants, slow tests twice
@@ -10,8 +11,7 @@ PYTHON = .venv/bin/python
 LONG = $(shell grep -rl cases.long tests --include='test_*.py')
 # test files side by side, in the order of tests/conftest.py, so that none of the long ones is last
 SIDE_BY_SIDE = -n 2 --dist loadfile --no-loadscope-reorder
-# its own cache: two versions of Numba would compile over each other's code
-LIGHT = NUMBA_CACHE_DIR=$(CURDIR)/.venv-light/numba .venv-light/bin/python
+LIGHT = .venv-light/bin/python
 
 .PHONY: setup demo test long docs pictures clean
 setup:

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Sets up a Debian machine: system packages, a virtual environment over them, the package itself,
-# and a second environment without FEniCSx for the tests of the light half.
+# a second environment without FEniCSx for the tests of the light half, and for both the compiled
+# code that first motions need.
 # Safe to run again: what is there is left alone, and then no network is needed.
 set -eu
 cd "$(dirname "$0")/.."
@@ -80,3 +81,19 @@ for folder in .venv/lib/python3*/site-packages; do
   env -u OPENBLAS_CORETYPE PYTHONPATH=. /usr/bin/python3 -m rom.doctor.core \
     >"$folder/openblas_core.pth"
 done
+
+# What is compiled lies beside the sources, under names with the version of Numba; so does the stamp.
+made_of=$({ dpkg-query -W python3-numba; cat .ci/light.txt; echo "${NUMBA_CACHE_DIR:-}"
+  find rom -name '*.py' | LC_ALL=C sort | xargs cat; } | sha256sum)
+
+compile_ahead() { # environment
+  stamp="rom/__pycache__/$1.compiled"
+  [ "$(cat "$stamp" 2>/dev/null)" = "$made_of" ] && return
+  echo "setup: compiling what first motions need, for $1"
+  "$1/bin/python" -m rom doctor --compile demo >/dev/null && echo "$made_of" >"$stamp"
+}
+
+compile_ahead .venv-light &
+light=$!
+compile_ahead .venv || fail "kernels could not be compiled for .venv, see above"
+wait "$light" || fail "kernels could not be compiled for .venv-light, see above"

@@ -339,6 +339,18 @@ def loops(*sizes: int) -> Iterator[Figure]:
         yield Figure("loops", case, quantity, value, unit, aim)
 
 
+def start(**cases: tuple[str, ...]) -> Iterator[Figure]:
+    """Processor time of first uses with nothing compiled, and of first motions after set-up.
+
+    Args:
+        cases: as `rom.bench.first_use.started` takes them.
+    """
+    from rom.bench.first_use import started
+
+    for case, quantity, value, unit, aim in started(**cases):
+        yield Figure("start", case, quantity, value, unit, aim)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
@@ -353,6 +365,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "peers": peers,
     "motion": motion,
     "rods": rods,
+    "start": start,
 }
 
 

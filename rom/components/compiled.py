@@ -1,6 +1,5 @@
 """The compiler of components' kernels, which may make arrays; those of `rom.mbs` may not."""
 
-from pathlib import Path
 from typing import Any
 
 from numba import njit
@@ -8,7 +7,8 @@ from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE, Elements
-from rom.mbs.kernels.compiled import OPTIONS, guard, kept
+from rom.mbs.kernels.cache import guard, kept
+from rom.mbs.kernels.compiled import OPTIONS
 from rom.model import Array, Index
 
 _OPTIONS = OPTIONS | {"_nrt": True}
@@ -23,7 +23,7 @@ def law(function: Any) -> Any:
     options = {name: value for name, value in _OPTIONS.items() if name != "cache"}
     made = CFunc(function, normalize_signature(LAW_SIGNATURE), {}, options)
     made.enable_caching()
-    guard(made._cache, Path(function.__code__.co_filename))
+    guard(made, function)
     made.compile()
     return made
 

@@ -97,6 +97,7 @@ ORDER = {
         "models",
         "peers",
         "loops",
+        "first_use",
         "wheel",
         "benchmarks",
     ),

@@ -1,9 +1,12 @@
 """Say which versions are installed, what works, and what to type for the rest.
 
 Exit code 0 also when an optional part is missing; 5 when something is installed and does not work.
+With --compile, what is compiled at first use is compiled now, and 5 says that something cannot be.
 """
 
 import argparse
+import logging
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -12,23 +15,30 @@ from rom.cli.answer import Answer
 if TYPE_CHECKING:
     from rom.doctor.probes import Finding
 
+log = logging.getLogger("rom")
 SUMMARY = "versions, speed of the linear algebra, display, caches, advice"
 EXAMPLES = """\
   rom doctor
-  rom doctor --fix        # also remove what killed runs left in the caches
+  rom doctor --fix            # also remove what killed runs left in the caches
+  rom doctor --compile        # compile now, on all cores, what the first use would wait for
+  rom doctor --compile demo   # only what `make demo` and the first page of the manual need
 """
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("--fix", action="store_true", help="remove damaged files from the caches")
+    parser.add_argument(
+        "--compile", nargs="?", const="all", choices=("all", "demo"), metavar="demo",
+        help="compile what is not yet; with 'demo' only what first motions need",
+    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Examine and report."""
     from rom import __version__
 
-    found = _diagnosed(args.fix)
+    found = list(_compiled(args.compile)) if args.compile else _diagnosed(args.fix)
     broken = tuple(f"{f.name} is broken: {f.value}" for f in found if f.state == "broken")
     data = {"rom": __version__, "findings": [asdict(f) for f in found]}
     return Answer(data, f"rom {__version__}\n{_text(found)}", failed=broken)
@@ -50,6 +60,17 @@ def _diagnosed(fix: bool) -> "list[Finding]":
         *machine.caches(answers.get("forms", {}), fix=fix),
         *machine.machine(),
     ]
+
+
+def _compiled(what: str) -> "Iterator[Finding]":
+    """Findings of all cases, each said as soon as it is done: some take a minute."""
+    from rom.bench import first_use
+    from rom.doctor.compilation import compiled
+
+    cases = first_use.DEMO_CASES if what == "demo" else tuple(first_use.CASES)
+    for count, finding in enumerate(compiled(first_use.MODULE, cases), 1):
+        log.info("%d of %d, %s: %s", count, len(cases), finding.name, finding.value)
+        yield finding
 
 
 def _text(found: "list[Finding]") -> str:

@@ -1,6 +1,5 @@
 """Simulate a mechanism in time; go on with the same bodies under other joints, drives or forces."""
 
-import sys
 from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
@@ -16,10 +15,8 @@ from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.integrate.dop853 import run_explicit
 from rom.mbs.integrate.events import watch_of
 from rom.mbs.integrate.fixed_step import run_implicit
-from rom.mbs.integrate.generalized_alpha import advance
 from rom.mbs.integrate.keeping import Keeping, digests_of
 from rom.mbs.integrate.run import Record, Settings
-from rom.mbs.kernels import compiled
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
@@ -113,8 +110,6 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
     settings, packed = settings.after(state), pack(mechanism)
     settings.check_room(packed)
-    if progress and not compiled.compiled_before(advance.kernel):
-        sys.stderr.write("compile the integrator, once on this machine: about half a minute\n")
     record = Record(mechanism, packed, settings, perf_counter(), given=state, keeping=keep)
     with terminable():
         try:

@@ -16,7 +16,8 @@ from numba.core.errors import TypingError
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.kernels.compiled import OPTIONS, kept
+from rom.mbs.kernels.cache import CODE_FILES, EXPECTED, kept
+from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.kernels.tables import TABLE_WORD
 
 REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
@@ -68,9 +69,14 @@ class Stage:
         infer_global(self, types.Function(type(function.__name__, (AbstractTemplate,), called)))
         lower_builtin(self, types.VarArg(types.Any))(self._call)
 
+    @property
+    def linked(self) -> bool:
+        """Whether kernels can call it; as they are in Python they always can."""
+        return bool(STAGE_ADDRESSES[self.slot]) or config.DISABLE_JIT
+
     def link(self) -> None:
         """Compile it, or take it from the cache, unless that has been done."""
-        if not STAGE_ADDRESSES[self.slot] and not config.DISABLE_JIT:
+        if not self.linked:
             STAGE_ADDRESSES[self.slot] = address_of(self.kernel, self.signature)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -122,7 +128,17 @@ def stage(*types_: Any, needed: Callable[[Any], Any] = _always) -> Callable[[Any
 
 
 def link(system: Any) -> None:
-    """Compile all stages that a system needs, before kernels call them."""
-    for one in STAGE_KERNELS.values():
-        if one.needed(system):
+    """Compile all stages that a system needs, before kernels call them.
+
+    What another process compiles just now comes last, so that two share the work.
+    """
+    needed = [one for one in STAGE_KERNELS.values() if one.needed(system) and not one.linked]
+    EXPECTED.update(one.kernel.py_func for one in needed)
+    later = []
+    for one in needed:
+        if CODE_FILES[one.kernel.py_func].made_elsewhere():
+            later.append(one)
+        else:
             one.link()
+    for one in later:
+        one.link()

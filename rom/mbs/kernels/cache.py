@@ -1,0 +1,211 @@
+"""Where compiled code of kernels is kept, and who compiles it.
+
+Numba keeps compiled code beside the source and notices when that file changes, but not when
+another file changes whose functions or layouts were built in. Therefore what it keeps says from
+which sources it was made; code of others is never loaded, wherever Numba keeps it. Of several
+processes one compiles what the others wait for, and who waits is told so.
+"""
+
+import functools
+import hashlib
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import IndexDataCacheFile
+from numba.core.compiler_lock import global_compiler_lock
+
+from rom.places import PACKAGE
+from rom.process.child import lasting_scratch
+from rom.process.patience import Patience
+from rom.process.turns import Turns
+
+IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
+# in sources of kernels, and the folder of what they contain: constants and layouts
+KERNEL_MARK, LAYOUT_FOLDER = b"compiled import", "kernels"
+COMPILE_RATE = 5e-4  # [s] of compiling per byte of a function in Python; 4e-4 to 6e-4 measured
+TURNS, PATIENCE = Turns(), Patience(COMPILE_RATE)
+WAITING = "another process compiles what this one needs: waiting for it"
+CODE_FILES: dict[Any, "CodeFiles"] = {}  # of the functions in Python
+EXPECTED: set[Any] = set()  # those that will be called, as far as is known
+COMPILED: list[Any] = []  # by this process, none taken from a file
+
+
+class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
+    """Where compiled code of one function is kept, made by one process at a time.
+
+    Numba counts the files of code and writes the index first: two processes that add signatures
+    would give both the same number, and a reader between index and code would run that of older
+    sources. Here no two codes share a name, and an index names only what is there.
+    """
+
+    def __init__(self, cache: Any, function: Any):
+        made_of = f"Numba {numba.__version__}, {digest(Path(function.__code__.co_filename))}"
+        name = f"{cache._impl.filename_base}.numba-{numba.__version__}"
+        super().__init__(cache._cache_path, name, made_of)
+        self._version = made_of  # compared before anything else is read
+        self.path, self.function = Path(self._index_path), function
+
+    def load(self, key: Any) -> Any:
+        """Compiled code, if need be of a process that makes it just now; None to make it."""
+        found = super().load(key)
+        if found is not None:
+            return found
+        if not TURNS.take(self.path, wait=False):
+            with PATIENCE.blocked(WAITING):
+                TURNS.take(self.path)
+        found = super().load(key)
+        if found is None:
+            PATIENCE.begin()
+        else:
+            TURNS.end(self.path)
+        return found
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep compiled code, and drop that of other sources."""
+        known = self._load_index()
+        made_of = hashlib.sha256(f"{self._source_stamp} {key}".encode()).hexdigest()
+        known[key] = f"{self.path.stem}.{made_of[:16]}.nbc"
+        self._save_data(known[key], data)
+        self._save_index(known)
+        for path in self.path.parent.glob(f"{self.path.stem}.*.nbc"):
+            if path.name not in known.values():
+                path.unlink(missing_ok=True)
+        TURNS.end(self.path)
+        COMPILED.append(self.function)
+        PATIENCE.advance(_size(self.function), _size_of_rest, self._foretold)
+
+    def full(self) -> bool:
+        """Whether some process has left compiled code."""
+        return bool(self._load_index())
+
+    def made_elsewhere(self) -> bool:
+        """Whether another process compiles the function just now."""
+        free = TURNS.take(self.path, wait=False)
+        TURNS.end(self.path)
+        return not free
+
+    def _foretold(self, seconds: int) -> str:
+        package = ".".join(self.function.__module__.split(".")[:2])
+        return (
+            f"compiling {package} for this machine takes about {seconds} s more, this once: the "
+            f"code is kept in {self.path.parent} (all of it ahead: rom doctor --compile)"
+        )
+
+
+def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[Any], Any]:
+    """A decorator of Numba whose cache knows the sources that a function is made of.
+
+    Args:
+        compiler: the decorator.
+        entry: whether its functions are called wherever mechanisms are.
+    """
+
+    def compiled(function: Any) -> Any:
+        dispatcher = _with_a_place(compiler, function)
+        if not numba.config.DISABLE_JIT:
+            guard(dispatcher, function)
+            if entry:
+                EXPECTED.add(function)
+        return dispatcher
+
+    return compiled
+
+
+def _with_a_place(compiler: Callable[[Any], Any], function: Any) -> Any:
+    """What Numba compiles a function by; where no folder can be written, its code is not kept."""
+    try:
+        return compiler(function)
+    except RuntimeError:
+        numba.config.CACHE_DIR = str(lasting_scratch("code"))
+        return compiler(function)
+
+
+def guard(made: Any, function: Any) -> None:
+    """Let Numba load only what the present sources and version of Numba have made of a function.
+
+    Args:
+        made: what Numba compiles it by, with a cache.
+        function: in Python.
+    """
+    compile_it = made.compile
+
+    def in_turn(*signature: Any) -> Any:
+        with _at_work(function):
+            return compile_it(*signature)
+
+    made.compile = in_turn
+    CODE_FILES[function] = made._cache._cache_file = CodeFiles(made._cache, function)
+
+
+_under_way: list[Any] = []  # functions that are compiled, each for the one before it
+
+
+@contextmanager
+def _at_work(function: Any) -> Iterator[None]:
+    """Around a compilation, within which others may be; when all have ended, nothing is held."""
+    with global_compiler_lock:
+        _under_way.append(function)
+        try:
+            yield
+        finally:
+            _under_way.pop()
+            if not _under_way:
+                TURNS.end_all()
+                PATIENCE.end()
+
+
+def _size(function: Any) -> int:
+    """What the time to compile a function grows with: the length of its code in Python."""
+    return len(function.__code__.co_code)
+
+
+def _size_of_rest() -> int:
+    """Of all functions that are expected, and those they call, what no process has compiled."""
+    found: set[Any] = set()
+    for function in (*EXPECTED, *_under_way):
+        _collect_called(function, found)
+    return sum(_size(function) for function in found if not CODE_FILES[function].full())
+
+
+def _collect_called(function: Any, found: set[Any]) -> None:
+    found.add(function)
+    for name in function.__code__.co_names:
+        called = getattr(function.__globals__.get(name), "py_func", None)
+        if called in CODE_FILES and called not in found:
+            _collect_called(called, found)
+
+
+@functools.cache
+def digest(source: Path) -> str:
+    """Of a source and all that its kernels are made of."""
+    found: set[Path] = set()
+    _collect(source, found)
+    return hashlib.sha256(b"".join(_read(path)[0] for path in sorted(found))).hexdigest()
+
+
+def _collect(source: Path, found: set[Path]) -> None:
+    found.add(source)
+    for path in _read(source)[1]:
+        if path not in found:
+            _collect(path, found)
+
+
+@functools.cache
+def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """The text of a source, and the files with kernels or layouts that it imports."""
+    text = source.read_bytes()
+    paths = set()
+    for module, names in IMPORTS.findall(text):
+        place = PACKAGE.joinpath(*module.decode().split(".")[1:])
+        paths |= {place / f"{name.decode()}.py" for name in re.findall(rb"\w+", names)}
+        paths.add(place.with_suffix(".py"))
+    return text, tuple(sorted(path for path in paths if path.is_file() and _has_kernels(path)))
+
+
+@functools.cache
+def _has_kernels(path: Path) -> bool:
+    return path.parent.name == LAYOUT_FOLDER or KERNEL_MARK in path.read_bytes()

@@ -1,0 +1,74 @@
+"""What takes long and is done only once says so, with an estimate from what has been done."""
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Timer
+from time import perf_counter
+
+from rom.process.launcher import ranks
+
+log = logging.getLogger("rom")
+SHORT_WAIT = 2.0  # [s] that nobody needs to be told about
+MAX_OVERRUN = 3.0  # times the time foretold, after which it is foretold anew
+
+
+class Patience:
+    """How long a user waits for one kind of work, by the clock.
+
+    A line is logged as a warning, on the first rank, when some seconds have passed and more are to
+    come; another one only when far more have passed than were foretold.
+
+    Args:
+        rate: seconds per unit of size on some machine, from which the first seconds start.
+    """
+
+    def __init__(self, rate: float):
+        self._spent, self._done, self._foretold = 0.0, SHORT_WAIT / rate, SHORT_WAIT
+        self._began: float | None = None
+        self._blocked = False
+
+    def begin(self) -> None:
+        """Count the time from now on, unless that is so already."""
+        if self._began is None:
+            self._began = perf_counter()
+
+    def end(self) -> None:
+        """Count no longer."""
+        self._spent, self._began = self._so_far(), None
+
+    def advance(self, size: int, rest: Callable[[], int], say: Callable[[int], str]) -> None:
+        """Note that a part is done, and say how long the rest will take if that is long.
+
+        Args:
+            size: of the part, in any unit that time grows with.
+            rest: gives the size of all parts to come.
+            say: gives the line from the seconds to come.
+        """
+        self._done += size
+        spent = self._so_far()
+        if spent < self._foretold or ranks()[0]:
+            return
+        coming = (spent + SHORT_WAIT) * rest() / self._done
+        if coming > SHORT_WAIT:
+            self._foretold = spent + MAX_OVERRUN * coming
+            log.warning(say(5 * max(1, round(coming / 5))))
+
+    @contextmanager
+    def blocked(self, why: str) -> Iterator[None]:
+        """Around waiting for another process, which is said once if it takes long."""
+        timer = Timer(SHORT_WAIT, self._say_blocked, (why,))
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def _so_far(self) -> float:
+        return self._spent + (0.0 if self._began is None else perf_counter() - self._began)
+
+    def _say_blocked(self, why: str) -> None:
+        if not self._blocked and not ranks()[0]:
+            self._blocked = True
+            log.warning(why)
