@@ -68,6 +68,29 @@ def test_programs_to_compare_with_are_not_needed(tmp_path):
     assert 'optional="calculix-ccx"' in SETUP.read_text()
 
 
+def compile_ahead(folder, code, sources="one"):
+    """Exit code and calls of Python of the function of the script, with a Python that ends so."""
+    function = re.search(r"^compile_ahead\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
+    python = folder / ".venv" / "bin" / "python"
+    python.parent.mkdir(parents=True, exist_ok=True)
+    (folder / "rom" / "__pycache__").mkdir(parents=True, exist_ok=True)
+    python.write_text(f'#!/bin/sh\necho "$@" >>calls\nexit {code}\n')
+    python.chmod(0o755)
+    (folder / "calls").write_text("")
+    script = f"set -eu\nmade_of={sources}\n{function}\ncompile_ahead .venv || exit 9\n"
+    done = subprocess.run(["sh", "-c", script], cwd=folder, timeout=20, check=False)
+    return done.returncode, (folder / "calls").read_text().splitlines()
+
+
+def test_what_first_motions_need_is_compiled_until_it_is_and_when_sources_change(tmp_path):
+    asked = ["-m rom doctor --compile demo"]
+    assert compile_ahead(tmp_path, 5) == (9, asked)
+    assert compile_ahead(tmp_path, 0) == (0, asked)
+    assert compile_ahead(tmp_path, 5) == (0, [])
+    assert compile_ahead(tmp_path, 0, "two") == (0, asked)
+    assert SETUP.read_text().count("compiled for .venv") == 2  # both environments, or an error
+
+
 def test_scripts_are_valid_shell():
     for script in (SETUP, ROOT / ".ci" / "run", ROOT / ".ci" / "newer_dolfinx.sh"):
         assert os.access(script, os.X_OK), f"{script} is not executable"

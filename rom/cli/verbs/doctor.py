@@ -6,7 +6,6 @@ With --compile, what is compiled at first use is compiled now, and 5 says that s
 
 import argparse
 import logging
-from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -38,7 +37,7 @@ def run(args: argparse.Namespace) -> Answer:
     """Examine and report."""
     from rom import __version__
 
-    found = list(_compiled(args.compile)) if args.compile else _diagnosed(args.fix)
+    found = _compiled(args.compile) if args.compile else _diagnosed(args.fix)
     broken = tuple(f"{f.name} is broken: {f.value}" for f in found if f.state == "broken")
     data = {"rom": __version__, "findings": [asdict(f) for f in found]}
     return Answer(data, f"rom {__version__}\n{_text(found)}", failed=broken)
@@ -62,15 +61,17 @@ def _diagnosed(fix: bool) -> "list[Finding]":
     ]
 
 
-def _compiled(what: str) -> "Iterator[Finding]":
+def _compiled(what: str) -> "list[Finding]":
     """Findings of all cases, each said as soon as it is done: some take a minute."""
     from rom.bench import first_use
     from rom.doctor.compilation import compiled
 
     cases = first_use.DEMO_CASES if what == "demo" else tuple(first_use.CASES)
-    for count, finding in enumerate(compiled(first_use.MODULE, cases), 1):
-        log.info("%d of %d, %s: %s", count, len(cases), finding.name, finding.value)
-        yield finding
+    found = {}
+    for finding in compiled(first_use.MODULE, cases):
+        found[finding.name] = finding
+        log.info("%d of %d, %s: %s", len(found), len(cases), finding.name, finding.value)
+    return [found[case] for case in cases]
 
 
 def _text(found: "list[Finding]") -> str:

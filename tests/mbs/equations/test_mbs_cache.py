@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from numba import njit
 
 from cases.command import environment
 from cases.paths import ROOT
-from rom.mbs.kernels import compiled
+from rom.mbs.kernels import compiled, stages
+from rom.mbs.kernels.cache import CodeFiles
 
 OUTER = """
 from rom.toy.inner import SIZE, inside
@@ -35,8 +37,20 @@ def inside(x):
 """
 
 
-@pytest.mark.parametrize("elsewhere", [True, False])
-def test_no_kernel_runs_that_was_made_of_other_sources(elsewhere, tmp_path):
+def place_for_code(where, tmp_path, toy):
+    """Variables by which Numba keeps code there; a file where a folder would be is not writable."""
+    if where == "own folder":
+        return {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    if where != "beside":
+        (toy / "__pycache__").touch()
+    home = tmp_path / "home"
+    if where == "nowhere":
+        home.touch()
+    return {"NUMBA_CACHE_DIR": "", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
+
+
+@pytest.mark.parametrize("where", ["beside", "own folder", "of the user", "nowhere"])
+def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     """A constant and a function built in from another file; a file without kernels is no source."""
     package = tmp_path / "rom"
     shutil.copytree(ROOT / "rom", package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -44,7 +58,8 @@ def test_no_kernel_runs_that_was_made_of_other_sources(elsewhere, tmp_path):
     toy.mkdir()
     (toy / "__init__.py").touch()
     env = environment(PYTHONPATH=str(tmp_path))
-    env["NUMBA_CACHE_DIR"] = str(tmp_path / "cache") if elsewhere else ""
+    env |= place_for_code(where, tmp_path, toy)
+    kept = "0" if where == "nowhere" else "1"
 
     def answer(size, added, more="", units=1):
         (toy / "plain.py").write_text(f"UNITS = {units}")
@@ -55,11 +70,122 @@ def test_no_kernel_runs_that_was_made_of_other_sources(elsewhere, tmp_path):
         return done.stdout.split()
 
     assert answer(2, 1) == ["4.0", "0"]
-    assert answer(2, 1) == ["4.0", "1"]
-    assert answer(2, 1, units=5) == ["4.0", "1"]
+    assert answer(2, 1) == ["4.0", kept]
+    assert answer(2, 1, units=5) == ["4.0", kept]
     assert answer(3, 1) == ["6.0", "0"]
     assert answer(3, 2) == ["9.0", "0"]
     assert answer(3, 2, more="# text") == ["9.0", "0"]
+    folder = {"beside": toy, "own folder": tmp_path / "cache", "of the user": tmp_path / "home"}
+    if where in folder:  # nothing of earlier sources is left
+        assert len(list(folder[where].rglob("outer.outer*.nbc"))) == 1
+
+
+SLOW = """
+from rom.process import patience
+patience.SHORT_WAIT = 1e-3
+from rom.mbs.kernels.compiled import inner, kernel
+
+@inner
+def first(x):
+    return x + 1
+
+@inner
+def second(x):
+    return x + 2
+
+@kernel
+def outer(x):
+    return first(x) * second(x)
+
+if __name__ == "__main__":
+    import logging, sys
+    logging.getLogger("rom").setLevel(sys.argv[1])
+    import slow
+    assert slow.outer(1.0) == 6.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("level", "rank", "said"), [("INFO", "0", 1), ("ERROR", "0", 0), ("INFO", "1", 0)]
+)
+def test_who_waits_for_the_compiler_is_told_once(tmp_path, level, rank, said):
+    """From Python, without any option; then nothing is left to wait for."""
+    (tmp_path / "slow.py").write_text(SLOW)
+    env = environment(OMPI_COMM_WORLD_RANK=rank, OMPI_COMM_WORLD_SIZE="2")
+    for expected in (said, 0):
+        done = subprocess.run([sys.executable, tmp_path / "slow.py", level], env=env, text=True,
+                              capture_output=True, check=True)  # fmt: skip
+        lines = done.stderr.splitlines()
+        assert len(lines) == expected, lines
+        assert all(" takes about 5 s more, this once: the code is kept in " in x for x in lines)
+        assert all(str(tmp_path / "__pycache__") in line for line in lines)
+
+
+@pytest.mark.parametrize("busy", [[], [0], [0, 1], [2]])
+def test_stages_that_another_process_compiles_are_asked_for_last(monkeypatch, busy):
+    """So that two processes share the work; all are linked in the end."""
+    linked, kernels, files = [], {}, {}
+    for k in range(3):
+        function = SimpleNamespace(py_func=k)
+        files[k] = SimpleNamespace(made_elsewhere=lambda k=k: k in busy)
+        kernels[k] = SimpleNamespace(
+            kernel=function, linked=False, needed=bool, link=lambda k=k: linked.append(k)
+        )
+    kernels[3] = SimpleNamespace(kernel=None, linked=False, needed=lambda system: not system)
+    monkeypatch.setattr(stages, "STAGE_KERNELS", kernels)
+    monkeypatch.setattr(stages, "CODE_FILES", files)
+    monkeypatch.setattr(stages, "EXPECTED", set())
+    stages.link("a system")
+    assert linked == [k for k in range(3) if k not in busy] + busy
+    assert stages.EXPECTED == {0, 1, 2}
+
+
+def files_of(tmp_path, sources):
+    """Where code of one function is kept, made of some sources."""
+    cache = SimpleNamespace(_impl=SimpleNamespace(filename_base="f"), _cache_path=str(tmp_path))
+    files = CodeFiles(cache, files_of)
+    files._version = files._source_stamp = sources
+    return files
+
+
+def test_a_reader_never_finds_code_of_older_sources_under_a_new_index(tmp_path, monkeypatch):
+    """Whichever of the two files a process has written when it is killed, or looked at."""
+    files_of(tmp_path, "old").save("key", "old code")
+    for last in ("_save_data", "_save_index"):
+        new = files_of(tmp_path, "new")
+        write = getattr(new, last)
+
+        def killed(*what, write=write):
+            write(*what)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(new, last, killed)
+        with pytest.raises(KeyboardInterrupt):
+            new.save("key", "new code")
+        assert files_of(tmp_path, "new").load("key") in (None, "new code")
+        assert files_of(tmp_path, "old").load("key") in (None, "old code")
+
+
+def writes(files, key, monkeypatch):
+    """What one who has read an empty index writes: calls and their arguments, in their order."""
+    planned = []
+    monkeypatch.setattr(files, "_load_index", dict)
+    for part in ("_save_data", "_save_index"):
+        write = getattr(files, part)
+        monkeypatch.setattr(files, part, lambda *what, write=write: planned.append((write, what)))
+    files.save(key, f"code of {key}")
+    return planned
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (0, 2, 1, 3), (0, 2, 3, 1)])
+def test_two_writers_without_locks_never_mix_their_code(tmp_path, monkeypatch, order):
+    """Each writes two files, and in between the other one does."""
+    planned = [w for key in "ab" for w in writes(files_of(tmp_path, "same"), key, monkeypatch)]
+    for write, what in (planned[k] for k in order):
+        write(*what)
+    found = {key: files_of(tmp_path, "same").load(key) for key in "ab"}
+    assert all(found[key] in (None, f"code of {key}") for key in "ab")
+    assert any(found.values())
 
 
 def test_kernels_copy_arrays_and_count_no_references():
