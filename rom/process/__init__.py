@@ -1,6 +1,7 @@
 """How this program runs as a process.
 
 `launcher` tells ranks and threads, `interruption` makes signals exceptions, `child` starts every
-other process by way of `child_entry`, `memory` says what may be taken. Nothing is imported here:
-the package comes by before the working folder is off the path of modules.
+other process by way of `child_entry`, `memory` says what may be taken. Processes that would make
+the same file take `turns`, and `patience` says how long a user waits. Nothing is imported here: the
+package comes by before the working folder is off the path of modules.
 """

@@ -26,8 +26,9 @@ for name in sys.argv[1].split(","):
 
 def hold(*paths):
     """A process that takes turns, the next with every line it is sent; the first is taken."""
-    process = subprocess.Popen([sys.executable, "-c", HOLD, ",".join(map(str, paths))], text=True,
-                               env=environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # fmt: skip
+    command = [sys.executable, "-c", HOLD, ",".join(map(str, paths))]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    process = subprocess.Popen(command, text=True, env=environment(), **pipes)
     assert process.stdout.readline() == "True\n"
     return process
 
