@@ -20,7 +20,7 @@ from rom.process import child
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
 
-MODULE = "rom.bench.first_use"  # also where it is run as a program
+MODULE_NAME = "rom.bench.first_use"  # also where it is run as a program
 ORIGIN, Z_AXIS = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 STEPS = {"t_end": 2e-4, "dt": 1e-4}
 
@@ -245,7 +245,7 @@ def _of_process(name: str, variables: Mapping[str, str]) -> tuple[int, float]:
     Raises:
         SolverError: if the process does not come to its end.
     """
-    ended = child.run(child.python(MODULE, name), variables=variables)
+    ended = child.run(child.python(MODULE_NAME, name), variables=variables)
     if ended.code:
         raise SolverError(f"{name}: {ended.last}")
     found = json.loads(ended.out)
@@ -256,10 +256,10 @@ def measured(name: str) -> dict[str, Any]:
     """Do a case; functions compiled and time of the processor [s], with that of imports."""
     began = process_time()
     CASES[name]()
-    from rom.mbs.kernels.cache import COMPILED
+    from rom.mbs.kernels.cache import COMPILED_FUNCTIONS
 
-    count = len(COMPILED)
-    COMPILED.clear()
+    count = len(COMPILED_FUNCTIONS)
+    COMPILED_FUNCTIONS.clear()
     return {"name": name, "functions": count, "seconds": round(process_time() - began, 2)}
 
 

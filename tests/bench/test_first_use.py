@@ -1,6 +1,7 @@
 """First uses: what is compiled for them ahead, and what is then left to compile."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from cases.command import environment
 from cases.command import rom as command
 from rom.bench import first_use
 from rom.bench.benchmarks import start
+from rom.doctor.compilation import compiled
 
 USED = """
 import importlib, pkgutil
@@ -106,6 +108,32 @@ def test_the_doctor_says_what_it_compiles_unless_asked_not_to(how):
     said = done.stderr.splitlines()
     assert len(said) == (2 if how == "aloud" else 0)
     assert all(line.startswith(f"{k} of 2, ") for k, line in enumerate(said, 1))
+
+
+MEETING = """
+import json, pathlib, sys, time
+here, case = pathlib.Path(__file__).parent, sys.argv[1]
+(here / f"{case}.met").touch()
+end = time.monotonic() + 30
+while len(list(here.glob("*.met"))) < 2 and time.monotonic() < end:
+    time.sleep(0.01)
+if case == "crash":
+    import os
+    os.abort()
+print(json.dumps({"name": case, "functions": int(time.monotonic() < end), "seconds": 1.25}))
+"""
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="there is one core")
+def test_cases_are_compiled_side_by_side_and_one_that_crashes_takes_none_with_it(
+    tmp_path, monkeypatch
+):
+    """Each of the first two waits for the other one."""
+    (tmp_path / "meeting.py").write_text(MEETING)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    found = {f.name: f for f in compiled("meeting", ("one", "crash", "two"))}
+    assert found["one"].value == found["two"].value == "1 functions in 1.2 s of the processor"
+    assert (found["crash"].state, found["crash"].value) == ("broken", "crashed (SIGABRT)")
 
 
 def test_what_cannot_be_compiled_is_an_error(monkeypatch, capsys):

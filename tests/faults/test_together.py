@@ -23,6 +23,7 @@ from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
 from rom.io.claim import LOCK_NAME, claimed
 from rom.io.files import write_whole
+from rom.process.turns import Turns
 from rom.report.html import paragraph, write_report
 
 FORK = multiprocessing.get_context("fork")
@@ -208,7 +209,8 @@ def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeyp
 
 
 TOY = """
-from rom.mbs.kernels.cache import COMPILED
+import sys
+from rom.mbs.kernels.cache import COMPILED_FUNCTIONS
 from rom.mbs.kernels.compiled import inner, kernel
 
 @inner
@@ -222,23 +224,60 @@ def outer(x):
 if __name__ == "__main__":
     import toy
     assert toy.outer(3) == 12 and toy.outer(3.0) == 12.0
-    print(sum(toy.outer.stats.cache_hits.values()), len(COMPILED))
+    hits = sum(toy.outer.stats.cache_hits.values())
+    sys.stdout.write(f"{hits} {len(COMPILED_FUNCTIONS)}\\n")
 """
 
 
-def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_kept(tmp_path):
+RANKS_COMMAND = ["mpirun", "--oversubscribe", "-n", "3"]
+
+
+@pytest.mark.parametrize("launcher", [[], pytest.param(RANKS_COMMAND, marks=pytest.mark.mpi)])
+def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_kept(
+    tmp_path, launcher
+):
     """Two functions for two types: four compilations, whoever makes them."""
     (tmp_path / "toy.py").write_text(TOY)
     command = [sys.executable, tmp_path / "toy.py"]
-    run = [subprocess.Popen(command, env=environment(), text=True,
+    run = [subprocess.Popen([*launcher, *command], env=environment(), text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-           for _ in range(3)]  # fmt: skip
+           for _ in range(1 if launcher else 3)]  # fmt: skip
     said = [process.communicate(timeout=60) for process in run]
-    assert [process.returncode for process in run] == [0, 0, 0], said
-    assert sum(int(out.split()[1]) for out, _ in said) == 4
+    assert not any(process.returncode for process in run), said
+    counts = [int(line.split()[1]) for out, _ in said for line in out.splitlines()]
+    assert len(counts) == 3 and sum(counts) == 4
     last = subprocess.run(command, env=environment(), text=True,
                           capture_output=True, timeout=60, check=True)  # fmt: skip
     assert last.stdout.split() == ["2", "0"], "the last one has nothing to compile"
+
+
+BROKEN = """
+from rom.mbs.kernels.cache import CODE_FILES
+from rom.mbs.kernels.compiled import kernel
+
+@kernel
+def broken(x):
+    return x.nothing
+
+if __name__ == "__main__":
+    try:
+        broken(1.0)
+    except Exception as error:
+        print(type(error).__name__)
+    print(CODE_FILES[broken.py_func].path, flush=True)
+    input()
+"""
+
+
+def test_a_kernel_that_cannot_be_compiled_is_left_to_others(tmp_path):
+    """While the process that tried it lives on, as a notebook does."""
+    (tmp_path / "broken.py").write_text(BROKEN)
+    with subprocess.Popen([sys.executable, tmp_path / "broken.py"], env=environment(), text=True,
+                          stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:  # fmt: skip
+        assert process.stdout.readline() == "TypingError\n"
+        path = Path(process.stdout.readline().strip())
+        assert path.parent.parent == tmp_path
+        assert Turns().take(path, wait=False)
 
 
 FORM = """

@@ -68,7 +68,7 @@ def _compiled(what: str) -> "list[Finding]":
 
     cases = first_use.DEMO_CASES if what == "demo" else tuple(first_use.CASES)
     found = {}
-    for finding in compiled(first_use.MODULE, cases):
+    for finding in compiled(first_use.MODULE_NAME, cases):
         found[finding.name] = finding
         log.info("%d of %d, %s: %s", len(found), len(cases), finding.name, finding.value)
     return [found[case] for case in cases]

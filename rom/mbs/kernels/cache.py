@@ -8,6 +8,7 @@ processes one compiles what the others wait for, and who waits is told so.
 
 import functools
 import hashlib
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,11 +28,12 @@ IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
 # in sources of kernels, and the folder of what they contain: constants and layouts
 KERNEL_MARK, LAYOUT_FOLDER = b"compiled import", "kernels"
 COMPILE_RATE = 5e-4  # [s] of compiling per byte of a function in Python; 4e-4 to 6e-4 measured
-TURNS, PATIENCE = Turns(), Patience(COMPILE_RATE)
-WAITING = "another process compiles what this one needs: waiting for it"
+COMPILE_TURNS, COMPILE_PATIENCE = Turns(), Patience(COMPILE_RATE)
+AHEAD_HINT = "rom doctor --compile compiles all ahead"
+WAIT_SENTENCE = "another process compiles what this one needs: waiting for it"
 CODE_FILES: dict[Any, "CodeFiles"] = {}  # of the functions in Python
-EXPECTED: set[Any] = set()  # those that will be called, as far as is known
-COMPILED: list[Any] = []  # by this process, none taken from a file
+EXPECTED_FUNCTIONS: set[Any] = set()  # those that will be called, as far as is known
+COMPILED_FUNCTIONS: list[Any] = []  # by this process, none taken from a file
 
 
 class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
@@ -54,14 +56,14 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
         found = super().load(key)
         if found is not None:
             return found
-        if not TURNS.take(self.path, wait=False):
-            with PATIENCE.blocked(WAITING):
-                TURNS.take(self.path)
+        if not COMPILE_TURNS.take(self.path, wait=False):
+            with COMPILE_PATIENCE.blocked(WAIT_SENTENCE):
+                COMPILE_TURNS.take(self.path)
         found = super().load(key)
         if found is None:
-            PATIENCE.begin()
+            COMPILE_PATIENCE.begin()
         else:
-            TURNS.end(self.path)
+            COMPILE_TURNS.end(self.path)
         return found
 
     def save(self, key: Any, data: Any) -> None:
@@ -74,9 +76,9 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
         for path in self.path.parent.glob(f"{self.path.stem}.*.nbc"):
             if path.name not in known.values():
                 path.unlink(missing_ok=True)
-        TURNS.end(self.path)
-        COMPILED.append(self.function)
-        PATIENCE.advance(_size(self.function), _size_of_rest, self._foretold)
+        COMPILE_TURNS.end(self.path)
+        COMPILED_FUNCTIONS.append(self.function)
+        COMPILE_PATIENCE.advance(_size(self.function), _size_of_rest, self._foretold)
 
     def full(self) -> bool:
         """Whether some process has left compiled code."""
@@ -84,16 +86,16 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
 
     def made_elsewhere(self) -> bool:
         """Whether another process compiles the function just now."""
-        free = TURNS.take(self.path, wait=False)
-        TURNS.end(self.path)
+        free = COMPILE_TURNS.take(self.path, wait=False)
+        COMPILE_TURNS.end(self.path)
         return not free
 
     def _foretold(self, seconds: int) -> str:
         package = ".".join(self.function.__module__.split(".")[:2])
-        return (
-            f"compiling {package} for this machine takes about {seconds} s more, this once: the "
-            f"code is kept in {self.path.parent} (all of it ahead: rom doctor --compile)"
-        )
+        often = f"this once: the code is kept in {self.path.parent} ({AHEAD_HINT})"
+        if numba.config.CACHE_DIR != os.environ.get("NUMBA_CACHE_DIR", ""):
+            often = "in each run, as no folder can be written: set NUMBA_CACHE_DIR to one"
+        return f"compiling {package} for this machine takes about {seconds} s more, {often}"
 
 
 def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[Any], Any]:
@@ -109,7 +111,7 @@ def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[An
         if not numba.config.DISABLE_JIT:
             guard(dispatcher, function)
             if entry:
-                EXPECTED.add(function)
+                EXPECTED_FUNCTIONS.add(function)
         return dispatcher
 
     return compiled
@@ -154,8 +156,8 @@ def _at_work(function: Any) -> Iterator[None]:
         finally:
             _under_way.pop()
             if not _under_way:
-                TURNS.end_all()
-                PATIENCE.end()
+                COMPILE_TURNS.end_all()
+                COMPILE_PATIENCE.end()
 
 
 def _size(function: Any) -> int:
@@ -166,7 +168,7 @@ def _size(function: Any) -> int:
 def _size_of_rest() -> int:
     """Of all functions that are expected, and those they call, what no process has compiled."""
     found: set[Any] = set()
-    for function in (*EXPECTED, *_under_way):
+    for function in (*EXPECTED_FUNCTIONS, *_under_way):
         _collect_called(function, found)
     return sum(_size(function) for function in found if not CODE_FILES[function].full())
 

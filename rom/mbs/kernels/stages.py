@@ -16,7 +16,7 @@ from numba.core.errors import TypingError
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.kernels.cache import CODE_FILES, EXPECTED, kept
+from rom.mbs.kernels.cache import CODE_FILES, EXPECTED_FUNCTIONS, kept
 from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.kernels.tables import TABLE_WORD
 
@@ -133,7 +133,7 @@ def link(system: Any) -> None:
     What another process compiles just now comes last, so that two share the work.
     """
     needed = [one for one in STAGE_KERNELS.values() if one.needed(system) and not one.linked]
-    EXPECTED.update(one.kernel.py_func for one in needed)
+    EXPECTED_FUNCTIONS.update(one.kernel.py_func for one in needed)
     later = []
     for one in needed:
         if CODE_FILES[one.kernel.py_func].made_elsewhere():
