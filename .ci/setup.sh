@@ -90,6 +90,7 @@ compile_ahead() { # environment
   stamp="rom/__pycache__/$1.compiled"
   [ "$(cat "$stamp" 2>/dev/null)" = "$made_of" ] && return
   echo "setup: compiling what first motions need, for $1"
+  mkdir -p rom/__pycache__
   "$1/bin/python" -m rom doctor --compile demo >/dev/null && echo "$made_of" >"$stamp"
 }
 

@@ -73,7 +73,6 @@ def compile_ahead(folder, code, sources="one"):
     function = re.search(r"^compile_ahead\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
     python = folder / ".venv" / "bin" / "python"
     python.parent.mkdir(parents=True, exist_ok=True)
-    (folder / "rom" / "__pycache__").mkdir(parents=True, exist_ok=True)
     python.write_text(f'#!/bin/sh\necho "$@" >>calls\nexit {code}\n')
     python.chmod(0o755)
     (folder / "calls").write_text("")

@@ -171,6 +171,8 @@ def test_a_reader_never_finds_code_of_older_sources_under_a_new_index(tmp_path, 
         monkeypatch.setattr(new, last, killed)
         with pytest.raises(KeyboardInterrupt):
             new.save("key", "new code")
+        named = files_of(tmp_path, "new")._load_index().values()
+        assert all((tmp_path / name).exists() for name in named)
         assert files_of(tmp_path, "new").load("key") in (None, "new code")
         assert files_of(tmp_path, "old").load("key") in (None, "old code")
 
