@@ -209,7 +209,7 @@ def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeyp
 
 
 TOY = """
-import sys
+import os, pathlib, sys, time
 from rom.mbs.kernels.cache import COMPILED_FUNCTIONS
 from rom.mbs.kernels.compiled import inner, kernel
 
@@ -223,6 +223,10 @@ def outer(x):
 
 if __name__ == "__main__":
     import toy
+    here = pathlib.Path(toy.__file__).parent
+    (here / f"{os.getpid()}.here").touch()
+    while len(list(here.glob("*.here"))) < 3:
+        time.sleep(0.001)
     assert toy.outer(3) == 12 and toy.outer(3.0) == 12.0
     hits = sum(toy.outer.stats.cache_hits.values())
     sys.stdout.write(f"{hits} {len(COMPILED_FUNCTIONS)}\\n")
