@@ -11,7 +11,7 @@ from numba import njit
 
 from cases.command import environment
 from cases.paths import ROOT
-from rom.mbs.kernels import compiled, stages
+from rom.mbs.kernels import cache, compiled, stages
 from rom.mbs.kernels.cache import CodeFiles
 
 OUTER = """
@@ -119,6 +119,31 @@ def test_who_waits_for_the_compiler_is_told_once(tmp_path, level, rank, said):
         assert len(lines) == expected, lines
         assert all(" takes about 5 s more, this once: the code is kept in " in x for x in lines)
         assert all(str(tmp_path / "__pycache__") in line for line in lines)
+
+
+def called(x):
+    """As a kernel that another one calls."""
+    return x
+
+
+def calling(x):
+    """As a kernel that is waited for."""
+    return CALLED_KERNEL(x) + 1
+
+
+CALLED_KERNEL = SimpleNamespace(py_func=called)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_the_rest_is_what_is_expected_with_all_it_calls_but_for_what_is_kept(monkeypatch, kept):
+    files = {
+        calling: SimpleNamespace(full=lambda: False),
+        called: SimpleNamespace(full=lambda: kept),
+    }
+    monkeypatch.setattr(cache, "CODE_FILES", files)
+    monkeypatch.setattr(cache, "EXPECTED_FUNCTIONS", {calling})
+    sizes = [len(function.__code__.co_code) for function in (calling, called)]
+    assert cache._size_of_rest() == (sizes[0] if kept else sum(sizes))
 
 
 def test_who_can_keep_nothing_is_told_so(tmp_path):
