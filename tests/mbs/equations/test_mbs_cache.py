@@ -182,24 +182,24 @@ def files_of(tmp_path, sources):
     return files
 
 
-def test_a_reader_never_finds_code_of_older_sources_under_a_new_index(tmp_path, monkeypatch):
+@pytest.mark.parametrize("last", ["_save_data", "_save_index"])
+def test_a_reader_never_finds_code_of_older_sources_under_a_new_index(tmp_path, monkeypatch, last):
     """Whichever of the two files a process has written when it is killed, or looked at."""
     files_of(tmp_path, "old").save("key", "old code")
-    for last in ("_save_data", "_save_index"):
-        new = files_of(tmp_path, "new")
-        write = getattr(new, last)
+    new = files_of(tmp_path, "new")
+    write = getattr(new, last)
 
-        def killed(*what, write=write):
-            write(*what)
-            raise KeyboardInterrupt
+    def killed(*what):
+        write(*what)
+        raise KeyboardInterrupt
 
-        monkeypatch.setattr(new, last, killed)
-        with pytest.raises(KeyboardInterrupt):
-            new.save("key", "new code")
-        named = files_of(tmp_path, "new")._load_index().values()
-        assert all((tmp_path / name).exists() for name in named)
-        assert files_of(tmp_path, "new").load("key") in (None, "new code")
-        assert files_of(tmp_path, "old").load("key") in (None, "old code")
+    monkeypatch.setattr(new, last, killed)
+    with pytest.raises(KeyboardInterrupt):
+        new.save("key", "new code")
+    named = files_of(tmp_path, "new")._load_index().values()
+    assert all((tmp_path / name).exists() for name in named)
+    assert files_of(tmp_path, "new").load("key") in (None, "new code")
+    assert files_of(tmp_path, "old").load("key") in (None, "old code")
 
 
 def writes(files, key, monkeypatch):
