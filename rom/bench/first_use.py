@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from rom.bench.models import KINDS, bar, slider_crank
-from rom.body.spread import mass_load
 from rom.errors import SolverError
 from rom.process import child
 from rom.reduction.bases.method import CraigBampton
@@ -68,47 +67,15 @@ def _slider_crank() -> None:
     _move(mech, t_end=4e-4, state=moved.final)
 
 
-def _bushing() -> None:
+def _elements() -> None:
+    """The kernels of all families of elements, and a law of a user."""
+    from rom.mbs.mechanism import FAMILIES
+
+    for family in FAMILIES:
+        for kernel in family.kernels:
+            kernel.link()
     mech = pendulum()
-    mark = mech.part("bob").marker(ORIGIN)
-    curves = {"x": ([-0.1, 0.0, 0.1], [-10.0, 0.0, 10.0])}
-    mech.bushing("mount", mech.ground.marker((0.0, -0.3, 0.0)), mark, stiffness=np.ones(6),
-                 damping=np.ones(6), curves=curves)  # fmt: skip
-    _move(mech)
-
-
-def _contact() -> None:
-    from rom.mbs.elements.impact import Impact
-
-    mech, law = pendulum(), Impact(1e4, 1.5, damping=0.1, mu=0.2, transition_speed=0.01)
-    mark, floor = mech.part("bob").marker(ORIGIN), mech.ground.marker((0.0, -0.4, 0.0))
-    mech.sphere_on_plane("floor", floor, mark, law, normal=(0.0, 1.0, 0.0), radius=0.1)
-    _move(mech)
-
-
-def _forces_of_joints() -> None:
-    """Motor, friction and stops on one hinge; springs and loads beside them."""
-    from rom.mbs.elements.impact import Impact
-
-    mech = pendulum()
-    mark = mech.part("bob").marker(ORIGIN)
-    mech.motor("motor", "hinge", lambda t, angle, rate: 0.1 - rate, compiled=False)
-    mech.friction("pin", "hinge", transition_speed=0.1, mu=0.1, radius=0.01, viscous=0.1)
-    mech.stop("buffer", "hinge", Impact(100.0), upper=0.5)
-    mech.spring_damper(
-        "coil", mech.ground.marker((1.0, 0.0, 0.0)), mark, stiffness=1.0, damping=1.0
-    )
-    mech.rotational_spring("twist", "hinge", stiffness=1.0, damping=1.0)
-    mech.force("push", mark, (0.1, 0.0, 0.0))
-    _move(mech)
-
-
-def _spread_load() -> None:
-    from rom.mbs.mechanism import Mechanism
-
-    mech, beam = Mechanism(), _beam()
-    part = mech.add_flexible("beam", beam)
-    mech.spread_load("weight", part, mass_load(beam, (0.0, -9.81, 0.0)), frame="world")
+    mech.law("law", lambda t, parameters, motion, memory, out: None, mech.ground.marker(ORIGIN))
     _move(mech)
 
 
@@ -202,10 +169,7 @@ CASES: dict[str, Callable[[], object]] = {
     "bdf of order 4": lambda: _move(pendulum(), method="bdf", order=4, t_end=6e-4),
     "stabilised": lambda: _move(pendulum(), stabilised=True),
     "dop853": lambda: _move(pendulum(), method="dop853"),
-    "bushing": _bushing,
-    "contact": _contact,
-    "forces of joints": _forces_of_joints,
-    "spread load": _spread_load,
+    "elements": _elements,
     "rod": _rod,
     "wind": _wind,
     "rod alone": _rod_alone,

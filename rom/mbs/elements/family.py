@@ -196,6 +196,12 @@ class Family:
     asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
     answers: Callable[[Any], Sequence[Any]] = no_answers
 
+    @property
+    def kernels(self) -> list[ElementKernel]:
+        """Those it has."""
+        roles = self.residuals, self.tangents, self.energy, self.multiplier_columns
+        return [kernel for kernel in roles if kernel is not None]
+
     def row(self, table: Table) -> list[int]:
         """Addresses of the table and of the kernels, which are compiled."""
         return row_of(table, (self.residuals, self.tangents, self.energy, self.multiplier_columns))

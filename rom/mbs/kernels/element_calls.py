@@ -12,7 +12,8 @@ from numba import config, njit, types
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.kernels.compiled import OPTIONS, kept
+from rom.mbs.kernels.cache import kept
+from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.kernels.stages import REAL_VECTOR, address_of, call_at
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.tables import TABLE_WORD, Table
@@ -36,9 +37,8 @@ class ElementKernel:
         self.kernel, self.signature = kept(compiler)(function), signature
         self._address = 0
 
-    @property
-    def address(self) -> int:
-        """Of the compiled code."""
+    def link(self) -> int:
+        """Address of the compiled code."""
         if config.DISABLE_JIT:
             UNCOMPILED[id(self)] = self.kernel
             return id(self)
@@ -107,4 +107,4 @@ def row_of(table: Table, kernels: tuple[ElementKernel | None, ...]) -> list[int]
     """The row of a family; its kernels are compiled."""
     if config.DISABLE_JIT:
         UNCOMPILED[table._address] = table
-    return [table._address, *(0 if kernel is None else kernel.address for kernel in kernels)]
+    return [table._address, *(0 if kernel is None else kernel.link() for kernel in kernels)]

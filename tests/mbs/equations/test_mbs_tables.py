@@ -129,7 +129,8 @@ def test_a_mechanism_has_the_kernels_of_its_elements_and_no_others(name):
     ELEMENTS[name](mech, a, b)
     packed = pack(mech)
     ((family, table),) = packed.elements.items()
-    addresses = [getattr(getattr(family, kernel), "address", 0) for kernel in KERNELS]
+    kernels = [getattr(family, kernel) for kernel in KERNELS]
+    addresses = [0 if kernel is None else kernel.link() for kernel in kernels]
     assert family.name == name
     assert packed.system.elements.tolist() == [[table._address, *addresses]]
     assert addresses[0] and addresses[1]
