@@ -8,14 +8,14 @@ from numba.core.sigutils import normalize_signature
 
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE, Elements
 from rom.mbs.kernels.cache import guard, kept
-from rom.mbs.kernels.compiled import OPTIONS
+from rom.mbs.kernels.compiled import INNER_OPTIONS, OPTIONS
 from rom.model import Array, Index
 
 _OPTIONS = OPTIONS | {"_nrt": True}
 # callable from Python
 kernel = kept(njit(**_OPTIONS))
 # callable from other kernels only
-inner = kept(njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True))
+inner = njit(**INNER_OPTIONS | {"_nrt": True})
 
 
 def law(function: Any) -> Any:

@@ -3,6 +3,7 @@
 import numba
 
 from rom.mbs.kernels.cache import kept
+from rom.mbs.kernels.intermediate import IntermediateCompiler
 
 # reassociation lets sums be vectorised; NaN and infinity keep their meaning. No kernel makes an
 # array, so none counts references to them: a step took four times as long when all did
@@ -13,10 +14,16 @@ OPTIONS = {
     "fastmath": {"contract", "reassoc"},
 }
 
+INNER_OPTIONS = OPTIONS | {
+    "cache": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": IntermediateCompiler,
+}
 # callable from Python
 kernel = kept(numba.njit(**OPTIONS), entry=True)
-# callable from other kernels only: the way in from Python costs most of the compile time
-inner = kept(numba.njit(**OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True))
+# callable from other kernels only, which alone are kept
+inner = numba.njit(**INNER_OPTIONS)
 # for functions that return a part of an array, which compiled functions without counting cannot
 spliced = kept(numba.njit(**OPTIONS, inline="always"))
 
