@@ -2,8 +2,14 @@
 
 from numba import types
 
-from rom.mbs.equations.linear_solve import border, factorise_bordered, solve_bordered
-from rom.mbs.kernels.algebra import range_basis, scale, turned, vec
+from rom.mbs.equations.linear_solve import (
+    border,
+    constraint_range,
+    factorise_bordered,
+    may_repeat_constraints,
+    solve_bordered,
+)
+from rom.mbs.kernels.algebra import scale, turned, vec
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.constraints import (
     constraint_gradient,
@@ -37,10 +43,10 @@ MAX_PASSES = 60
 @stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR)
 def evaluate(s, W, q, v):
     """All quantities that depend on coordinates, velocities and signals only."""
-    body_states(s.bodies, W, q, v)
+    body_states(s, W, q, v)
     marker_states(s, W, q, v)
-    coordinate_states(s.coordinates, W)
-    row_states(s.rows, W)
+    coordinate_states(s, W)
+    row_states(s, W)
 
 
 @inner
@@ -90,8 +96,8 @@ def tangents(s, W, v, a, lam, c):
     W.Kt[:] = 0.0
     for b in range(s.bodies.mass.size):
         body_mass(s.bodies, W, b, c[0], own_block(s, b, W.S))
-        body_damping(s.bodies, W, b, v, c[1], own_block(s, b, W.S))
-        body_stiffness(s.bodies, W, b, v, a, c[2], own_block(s, b, W.Kt))
+        body_damping(s, W, b, v, c[1], own_block(s, b, W.S))
+        body_stiffness(s, W, b, v, a, c[2], own_block(s, b, W.Kt))
     wrench_stiffness(s, W, c[2], W.Kt)
     constraint_stiffness(s, W, lam, c[2], W.Kt)
     coupling_stiffness(s, W, lam, c[2], W.Kt)
@@ -116,11 +122,11 @@ def element_energy(s, W, q, v):
     return total
 
 
-@inner
-def least_multipliers(W, rank, lam):
+@stage(types.void, System, Work, types.int64, REAL_VECTOR, needed=may_repeat_constraints)
+def least_multipliers(s, W, rank, lam):
     """Replace lam by the multipliers of least norm that give the same forces."""
     m = lam.size
-    range_basis(W.G, rank, W.remainder, W.U)
+    constraint_range(s, W, rank, W.U)
     for k in range(rank):
         total = 0.0
         for p in range(m):
@@ -172,7 +178,7 @@ def factorise_motion(s, W, rank, accepted):
     body_masses(s, W)
     constraint_gradient(s, W)
     if accepted and rank < W.part.size:
-        range_basis(W.G, rank, W.remainder, W.U_lu)
+        constraint_range(s, W, rank, W.U_lu)
     border(W, rank)
     return factorise_bordered(s, W, rank)
 

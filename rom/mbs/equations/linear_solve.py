@@ -9,12 +9,23 @@ import math
 from numba import types
 
 from rom.mbs.equations.elimination import eliminate, fill_blocks, substitute
-from rom.mbs.kernels.algebra import back_substitute, factorise
+from rom.mbs.kernels.algebra import back_substitute, factorise, range_basis
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.markers import own_block
-from rom.mbs.kernels.stages import REAL_VECTOR, stage
+from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
+
+
+def may_repeat_constraints(system):
+    """Whether constraints may depend on each other: only whole matrices bear that."""
+    return not system.graph.compact
+
+
+@stage(types.void, System, Work, types.int64, REAL_MATRIX, needed=may_repeat_constraints)
+def constraint_range(s, W, rank, U):
+    """Set the leading rows of U (rank, m) to an orthonormal basis of the range of W.G."""
+    range_basis(W.G, rank, W.remainder, U)
 
 
 @inner
@@ -67,7 +78,11 @@ def fill(W, rank):
             W.lu[j, n + k] = W.UG[k, j] * d[n + k] * d[j]
 
 
-@inner
+def _has_blocks(system):
+    return system.graph.compact
+
+
+@stage(types.void, System, Work, needed=_has_blocks)
 def fill_from_blocks(s, W):
     """The same from blocks."""
     bodies, graph, n, d = s.bodies, s.graph, W.residual.size, W.scaling
@@ -87,6 +102,19 @@ def fill_from_blocks(s, W):
                 W.lu[j, n + k] = W.UG[k, graph.at[k, p] + q] * d[n + k] * d[j]
 
 
+@stage(types.boolean, System, Work, needed=_has_blocks)
+def factorise_blocks(s, W):
+    """Factorise [S, UG^T; UGT, 0] by blocks; False when a node has no safe pivot."""
+    fill_blocks(s, W)
+    return eliminate(s.graph.plan, W.factor, W.pivot, W.spare)
+
+
+@stage(types.void, System, Work, needed=_has_blocks)
+def solve_blocks(s, W):
+    """Solve in place for W.rhs, factorised by blocks before."""
+    substitute(s.graph.plan, W.factor, W.pivot, W.rhs, W.spare)
+
+
 @stage(types.boolean, System, Work, types.int64)
 def factorise_bordered(s, W, rank):
     """Factorise [S, UG^T; UGT, 0]; False when it is singular."""
@@ -94,8 +122,7 @@ def factorise_bordered(s, W, rank):
     set_scaling(s, W, rank)
     W.by_blocks[0] = s.graph.compact
     if s.graph.compact:
-        fill_blocks(s, W)
-        if eliminate(s.graph.plan, W.factor, W.pivot, W.spare):
+        if factorise_blocks(s, W):
             return True
         if W.lu.shape[0] < n + rank:
             return False
@@ -120,7 +147,7 @@ def solve_bordered(s, W, rank, x, lam):
                 total += W.U_lu[k, p] * W.part[p]
         W.rhs[n + k] = total * W.scaling[n + k]
     if W.by_blocks[0]:
-        substitute(s.graph.plan, W.factor, W.pivot, W.rhs, W.spare)
+        solve_blocks(s, W)
     else:
         back_substitute(W.lu, n + rank, W.pivot, W.rhs)
     for i in range(n):
@@ -170,9 +197,8 @@ def factorised(s, W, least):
     P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
     border(W, m)
     set_scaling(s, W, m)
-    fill_blocks(s, W)
     W.by_blocks[0] = 1
-    if not eliminate(P, W.factor, W.pivot, W.spare):
+    if not factorise_blocks(s, W):
         return False
     W.spare[:] = 0.0
     for i in range(m):

@@ -13,9 +13,13 @@ import math
 from math import comb
 
 import numpy as np
+from numba import types
 
 from rom.mbs.kernels.algebra import add, cross, dot, scale, spatial_tangent, sub, vec
 from rom.mbs.kernels.compiled import copy, inner
+from rom.mbs.kernels.stages import stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Step
 from rom.model import Array
 
 LARGEST_ORDER = 5
@@ -34,10 +38,12 @@ def multistep_coefficients(h: float, order: int) -> tuple[Array, Array]:
     return np.array([h, 1 / weights[0] ** 2, 1 / weights[0], 0.0, 0.0]), weights / h
 
 
-@inner
-def is_multistep(step):
+def _is_multistep(step):
     """Whether a step is one of this module: BDF of an order other than two."""
     return step.bdf.size != 3
+
+
+is_multistep = inner(_is_multistep)
 
 
 @inner
@@ -49,7 +55,7 @@ def earlier(step, which, i):
     return total
 
 
-@inner
+@stage(types.void, System, Step, asked=Step, needed=_is_multistep)
 def predict_multistep(s, step):
     """Trial increment for the accelerations of the last step."""
     c0, c1 = step.bdf[0], step.bdf[1]
@@ -59,7 +65,7 @@ def predict_multistep(s, step):
     follow_increment(s, step)
 
 
-@inner
+@stage(types.void, System, Step, asked=Step, needed=_is_multistep)
 def follow_increment(s, step):
     """Set velocities and accelerations to those of the increment, less what closes gaps."""
     c0, c1 = step.bdf[0], step.bdf[1]
@@ -72,7 +78,7 @@ def follow_increment(s, step):
         step.vd1[i] = c0 * step.v1[i] + c1 * step.v[i] + earlier(step, 1, i)
 
 
-@inner
+@stage(types.void, System, Step, asked=Step, needed=_is_multistep)
 def keep_past(s, step):
     """Let the present instant become a past one, and see all of them from the new instant."""
     count = step.past.shape[1]

@@ -22,36 +22,37 @@ from rom.mbs.equations.equations import (
     retract,
     tangents,
 )
-from rom.mbs.equations.linear_solve import border, factorise_bordered, solve_bordered
+from rom.mbs.equations.linear_solve import (
+    border,
+    constraint_range,
+    factorise_bordered,
+    solve_bordered,
+)
 from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
-from rom.mbs.kernels.algebra import dot, range_basis, row, scale, spatial_tangent, unit, vec
+from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
 from rom.mbs.kernels.compiled import copy, inner
 from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.kernels.coordinates import follow_coordinates
 from rom.mbs.kernels.markers import own_block
 from rom.mbs.kernels.stages import REAL_MATRIX, stage
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
-from rom.mbs.kernels.tables import Array1, Array3, Index1, Table, table
+from rom.mbs.kernels.work import BOTH_LEVELS as BOTH_LEVELS
+from rom.mbs.kernels.work import FACTORISATIONS as FACTORISATIONS
+from rom.mbs.kernels.work import HAS_FACTOR as HAS_FACTOR
+from rom.mbs.kernels.work import ITERATIONS as ITERATIONS
+from rom.mbs.kernels.work import LAST_ITERATIONS as LAST_ITERATIONS
+from rom.mbs.kernels.work import LAWS_ASKED as LAWS_ASKED
+from rom.mbs.kernels.work import STEP_PASSES as STEP_PASSES
+from rom.mbs.kernels.work import STEPS as STEPS
+from rom.mbs.kernels.work import STEPS_BEFORE as STEPS_BEFORE
+from rom.mbs.kernels.work import USES_LAWS as USES_LAWS
+from rom.mbs.kernels.work import Step as Step
 from rom.mbs.kernels.work import Work
 from rom.model import Array
 
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
-# entries of Step.count
-#
-(
-    STEPS,
-    ITERATIONS,
-    FACTORISATIONS,
-    LAST_ITERATIONS,
-    HAS_FACTOR,
-    STEP_PASSES,
-    STEPS_BEFORE,
-    USES_LAWS,
-    LAWS_ASKED,
-    BOTH_LEVELS,
-) = range(10)
 MAX_PASSES = 25
 ROUND_OFF = 4e-16
 # share of the round-off of positions that increments are brought to: velocities and accelerations
@@ -62,51 +63,6 @@ INCREMENT_SHARE = 1e-3
 JOINT_GAP_TOL = 1e-11
 # of `advance`: signals by step, and the arrays of instants to be saved
 SIGNALS, ROWS = types.Array(types.float64, 3, "C"), types.UniTuple(REAL_MATRIX, 6)
-
-
-@table
-class Step(Table):
-    """State, the trial state of the step under way, and the method.
-
-    Attributes:
-        q, v, a, vd, lam: coordinates, velocities, algorithmic and true accelerations,
-            multipliers at the last accepted instant.
-        q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
-        work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
-        lost: (3,) the powers at the last accepted instant.
-        count: (10,) steps, iterations, factorisations, iterations of the last step, whether a
-            factorisation is at hand, pass of the present step, steps when the present chunk
-            began, whether Python forces are to be asked for, whether they have been, whether
-            constraints hold for positions and velocities both.
-        size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
-            largest gap in a joint before the last increment.
-        method: (5,) h, beta, gamma, alpha_m, alpha_f.
-        bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
-            BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one
-            velocity, and ``psi`` the last increment until the next step begins.
-        past: (2, order - 1, n) for BDF of other orders: earlier positions as seen from the last
-            accepted instant, see `rom.mbs.integrate.bdf`, and velocities.
-        drift: (n,) part of the increment of such a step that closes gaps.
-    """
-
-    q: Array1
-    v: Array1
-    a: Array1
-    vd: Array1
-    lam: Array1
-    q1: Array1
-    v1: Array1
-    vd1: Array1
-    lam1: Array1
-    psi: Array1
-    work: Array1
-    lost: Array1
-    count: Index1
-    size: Array1
-    method: Array1
-    bdf: Array1
-    past: Array3
-    drift: Array1
 
 
 def coefficients(h: float, rho_inf: float) -> Array:
@@ -198,7 +154,7 @@ def factorise_step(s, W, step, rank):
         for i in range(block.shape[0]):
             W.weight[s.bodies.v_at[b] + i] = block[i, i] / (mass_factor(step) * step.size[3])
     if rank < step.lam.size:
-        range_basis(W.G, rank, W.remainder, W.U_lu)
+        constraint_range(s, W, rank, W.U_lu)
     border(W, rank)
     turn_columns(s, W, step, rank)
     load_columns(s, W, step.lam1, rank)
@@ -327,7 +283,7 @@ def accept(s, W, step, rank):
     copy(step.lam1, step.lam)
     if rank < step.lam.size:
         constraint_gradient(s, W)
-        least_multipliers(W, rank, step.lam)
+        least_multipliers(s, W, rank, step.lam)
     follow_coordinates(W)
     drive_power(s, W, step.lam)  # the last correction moved the multipliers
     for k in range(3):

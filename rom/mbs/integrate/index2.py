@@ -13,10 +13,14 @@ Source:
 
 import math
 
+from numba import types
+
 from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.linear_solve import gradient_times, solve_bordered
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.stages import REAL_VECTOR, stage
+from rom.mbs.kernels.system import ROLL, System
+from rom.mbs.kernels.work import BOTH_LEVELS, Step, Work
 
 # corrections of the velocities at the end of a step; each gains a digit or more
 MAX_CORRECTIONS = 8
@@ -24,7 +28,11 @@ VELOCITY_GAP_TOL = 1e-8  # of a row of the constraints, relative to its terms
 SMALL_ROW_RATIO = 1e-3  # rows at rest hold nothing but round-off
 
 
-@inner
+def _is_stabilised(step):
+    return step.count[BOTH_LEVELS] == 1
+
+
+@stage(types.void, System, Work, REAL_VECTOR, asked=Step, needed=_is_stabilised)
 def velocity_gaps(s, W, out):
     """Velocities with which the constraints are violated; `evaluate` first."""
     rows = s.rows
@@ -38,7 +46,11 @@ def velocity_gaps(s, W, out):
             out[k] -= W.signal[rows.signal[k], 1]
 
 
-@inner
+@stage(
+    *(types.void, System, Work, types.int64, types.int64, types.float64),
+    asked=Step,
+    needed=_is_stabilised,
+)
 def close_gaps(s, W, n, rank, lead):
     """Set W.delta to the positions that close the gaps when `lead` times the velocity gaps go."""
     velocity_gaps(s, W, W.part)
@@ -50,7 +62,7 @@ def close_gaps(s, W, n, rank, lead):
     solve_bordered(s, W, rank, W.delta, W.dlam)
 
 
-@inner
+@stage(types.void, System, Work, Step, types.int64, asked=Step, needed=_is_stabilised)
 def fit_velocities(s, W, step, rank):
     """Remove the velocity gaps that the last correction left, to round-off."""
     h, _, gamma, alpha_m, alpha_f = step.method

@@ -11,10 +11,10 @@ from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.bdf import multistep_coefficients
 from rom.mbs.integrate.consistent_start import with_accelerations
-from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.run import Record, Settings
+from rom.mbs.kernels.stages import link
 from rom.mbs.kernels.system import ROLL
-from rom.mbs.kernels.work import Work
+from rom.mbs.kernels.work import Step, Work
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
@@ -65,6 +65,7 @@ def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tupl
     power = _power(record, W, state, forces)
     past = np.zeros((2, weights.size - 2, n))
     step = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
+    link(step)
     if goes_on:
         recall(state.memory, W, step)
     if goes_on and settings.begun:

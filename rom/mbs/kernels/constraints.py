@@ -65,16 +65,16 @@ def angle_state(a, c, b, Oi, Oj, ci, cj):
 
 
 @inner
-def row_states(rows, W):
+def row_states(s, W):
     """Residual, gradient and convective term of all constraint rows."""
-    zero = (0.0, 0.0, 0.0)
+    rows, zero = s.rows, (0.0, 0.0, 0.0)
     for k in range(rows.kind.size):
         i, j, kind = rows.i[k], rows.j[k], rows.kind[k]
         if kind == COUPLING:
-            coupling_row(rows, k, W)
+            coupling_row(s, W, k)
             continue
         if kind in (TOUCH, ROLL):
-            rolling_row(rows, k, W)
+            rolling_row(s, W, k)
             continue
         Oi, Oj, qi, qj = row(W.V, i, 3), row(W.V, j, 3), row(W.conv, i, 3), row(W.conv, j, 3)
         gap = sub(row(W.P, j, 0), row(W.P, i, 0))
@@ -124,9 +124,15 @@ def distance_state(gap, slide, pull):
     return length, e, dot(e, pull) + (dot(slide, slide) - rate * rate) / length
 
 
-@inner
-def coupling_row(rows, k, W):
+def has_couplings(system):
+    """Whether a system has rows of that kind."""
+    return (system.rows.kind == COUPLING).any()
+
+
+@stage(types.void, System, Work, types.int64, needed=has_couplings)
+def coupling_row(s, W, k):
     """Row k as the weighted sum of two joint coordinates, which are evaluated first."""
+    rows = s.rows
     W.value[k], W.gamma[k] = -rows.offset[k], 0.0
     for side in range(2):
         at, factor = rows.at[k, side], rows.factor[k, side]
@@ -291,7 +297,7 @@ def constraint_stiffness(s, W, lam, c, S):
                 gap = sub(row(W.P, j, 0), row(W.P, i, 0))
                 row_stiffness(rows.kind[k], a, b, gap, row(W.g, k, 9), c * lam[k], W.Q)
                 if rows.kind[k] in (TOUCH, ROLL):
-                    rolling_stiffness(rows, k, W, c * lam[k])
+                    rolling_stiffness(s, W, k, c * lam[k])
                 found = True
         if found:
             pair_stiffness(s, W, rows.joint_i[joint], rows.joint_j[joint], S)

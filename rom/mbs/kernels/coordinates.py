@@ -1,21 +1,26 @@
 """Joint coordinates: how they move, what couples them, and forces that act along them."""
 
+from numba import types
+
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import (
     angle_state,
+    has_couplings,
     pair_stiffness,
     row_stiffness,
     set_gradient,
     wrapped,
 )
-from rom.mbs.kernels.system import ALONG, COUPLING
+from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
+from rom.mbs.kernels.system import ALONG, COUPLING, System
+from rom.mbs.kernels.work import Work
 
 
-@inner
-def coordinate_states(C, W):
+@stage(types.void, System, Work, needed=lambda s: s.coordinates.kind.size)
+def coordinate_states(s, W):
     """Joint coordinates, rates, convective terms and gradients; angles near the last accepted."""
-    zero = (0.0, 0.0, 0.0)
+    C, zero = s.coordinates, (0.0, 0.0, 0.0)
     for k in range(C.kind.size):
         i, j = C.i[k], C.j[k]
         a = turn(W.E, i, row(C.a, k, 0))
@@ -55,7 +60,7 @@ def coordinate_stiffness(s, W, at, c):
     row_stiffness(C.kind[at], a, b, gap, row(W.xg, at, 9), c, W.Q)
 
 
-@inner
+@stage(*(types.void, System, Work, REAL_VECTOR, types.float64, REAL_MATRIX), needed=has_couplings)
 def coupling_stiffness(s, W, lam, c, S):
     """Add c times the derivative of G^T lam to S for the couplings."""
     rows, C = s.rows, s.coordinates

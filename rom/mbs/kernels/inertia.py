@@ -5,6 +5,8 @@ order in the elastic coordinates. The rows are force in the world, moment about 
 body in the body frame, and generalised force of each elastic coordinate.
 """
 
+from numba import types
+
 from rom.mbs.kernels.algebra import (
     add,
     col,
@@ -24,18 +26,26 @@ from rom.mbs.kernels.algebra import (
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.integrals import contract, dual, times, trace, transposed_times
 from rom.mbs.kernels.second_order import bent_integrals, bent_push, bent_stiffness, bent_twist
+from rom.mbs.kernels.stages import REAL_BLOCK, REAL_VECTOR, stage
+from rom.mbs.kernels.system import System
+from rom.mbs.kernels.work import Work
+
+
+def _has_elastic(system):
+    return system.bodies.r.any()
 
 
 @inner
-def body_states(bodies, W, q, v):
+def body_states(s, W, q, v):
     """Orientation and inertia integrals of the deformed bodies at the coordinates q."""
+    bodies = s.bodies
     for b in range(bodies.mass.size):
         f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
         rotation(q, at + 3, W.A[b])
         shape_integrals(bodies, W, b, q, v)
         SP, Ct, SPd, J = W.SP[b], W.Ct[b], W.SPd[b], W.J[b]
         if bodies.stiffened[b] == 1:
-            bent_integrals(bodies, W, b, q, v)
+            bent_integrals(s, W, b, q, v)
         for i in range(3):
             moment, rate = bodies.first[b, i], 0.0
             for k in range(r):
@@ -137,9 +147,9 @@ def body_mass(bodies, W, b, c, S):
 
 
 @inner
-def body_damping(bodies, W, b, v, c, S):
+def body_damping(s, W, b, v, c, S):
     """Add c times the derivative of the residual of body b by its velocities to its block S."""
-    f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
+    t = s.bodies.v_at[b]
     w, d, dd, A, J = vec(v, t + 3), vec(W.d[b], 0), vec(W.dd[b], 0), W.A[b], W.J[b]
     SPd = W.SPd[b]
     spread = SPd[0, 0] + SPd[1, 1] + SPd[2, 2]
@@ -150,14 +160,26 @@ def body_damping(bodies, W, b, v, c, S):
         moment = add(cross(w, mv(J, e)), cross(e, mv(J, w)))
         moment = add(moment, scale(2.0, sub(scale(spread, e), mtv(SPd, e))))
         place(S, 3, 3 + j, c, moment)
+    if s.bodies.r[b] > 0:
+        elastic_damping(s, W, b, v, c, S)
+
+
+@stage(
+    *(types.void, System, Work, types.int64, REAL_VECTOR, types.float64, REAL_BLOCK),
+    needed=_has_elastic,
+)
+def elastic_damping(s, W, b, v, c, S):
+    """The rows and columns of `body_damping` that belong to the elastic coordinates."""
+    bodies, A = s.bodies, W.A[b]
+    f, r, w = bodies.flex[b], bodies.r[b], vec(v, bodies.v_at[b] + 3)
     for k in range(r):
-        s, e = W.SP[b, k], 6 + k
+        SP, e = W.SP[b, k], 6 + k
         place(S, 0, e, c, mv(A, scale(2.0, cross(w, col(W.Ct[b], k)))))
-        spin = sub(scale(trace(s, 0), w), transposed_times(s, w))
+        spin = sub(scale(trace(SP, 0), w), transposed_times(SP, w))
         place(S, 3, e, c, scale(2.0, spin))
-        row = add(times(s, w), transposed_times(s, w))
+        row = add(times(SP, w), transposed_times(SP, w))
         row = add(row, scale(2.0, dual(W.Sd[b, k], 0)))
-        place_row(S, e, 3, c, sub(row, scale(2.0 * trace(s, 0), w)))
+        place_row(S, e, 3, c, sub(row, scale(2.0 * trace(SP, 0), w)))
         for l in range(r):
             coriolis = 2.0 * dot(w, dual(bodies.S2[f, l], 9 * k))
             S[e, 6 + l] += c * (bodies.C[f, k, l] + coriolis)
@@ -167,11 +189,12 @@ def body_damping(bodies, W, b, v, c, S):
 
 
 @inner
-def body_stiffness(bodies, W, b, v, a, c, S):
+def body_stiffness(s, W, b, v, a, c, S):
     """Add c times the derivative of the residual of body b by its coordinates to its block S.
 
     Rotations are perturbed in the body frame: dA = A skew(dtheta).
     """
+    bodies = s.bodies
     r, t = bodies.r[b], bodies.v_at[b]
     w, dw, d, A = vec(v, t + 3), vec(a, t + 3), vec(W.d[b], 0), W.A[b]
     a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
@@ -187,14 +210,19 @@ def body_stiffness(bodies, W, b, v, a, c, S):
         place(S, 3, 3 + j, c, cross(d, turned_a_minus_g))
         for k in range(r):
             S[6 + k, 3 + j] += c * dot(col(W.Ct[b], k), turned_a_minus_g)
-    elastic_stiffness(bodies, W, b, v, a, c, S)
+    if r > 0:
+        elastic_stiffness(s, W, b, v, a, c, S)
     if bodies.stiffened[b] == 1:
-        bent_stiffness(bodies, W, b, v, a, c, S)
+        bent_stiffness(s, W, b, v, a, c, S)
 
 
-@inner
-def elastic_stiffness(bodies, W, b, v, a, c, S):
+@stage(
+    *(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, types.float64, REAL_BLOCK),
+    needed=_has_elastic,
+)
+def elastic_stiffness(s, W, b, v, a, c, S):
     """The columns of `body_stiffness` that belong to the elastic coordinates."""
+    bodies = s.bodies
     f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
     w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
     a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
@@ -203,11 +231,11 @@ def elastic_stiffness(bodies, W, b, v, a, c, S):
             W.Sa[k, p] = 0.0
     contract(bodies.S2[f], a, t + 6, r, W.line, W.Sa)
     for l in range(r):
-        s, e, S_l = W.SP[b, l], 6 + l, col(W.Ct[b], l)
+        SP, e, S_l = W.SP[b, l], 6 + l, col(W.Ct[b], l)
         place(S, 0, e, c, mv(A, add(cross(dw, S_l), cross(w, cross(w, S_l)))))
-        tr = 2.0 * trace(s, 0)
-        Jdw = sub(scale(tr, dw), add(times(s, dw), transposed_times(s, dw)))
-        Jw = sub(scale(tr, w), add(times(s, w), transposed_times(s, w)))
+        tr = 2.0 * trace(SP, 0)
+        Jdw = sub(scale(tr, dw), add(times(SP, dw), transposed_times(SP, dw)))
+        Jw = sub(scale(tr, w), add(times(SP, w), transposed_times(SP, w)))
         moment = add(add(cross(S_l, a_minus_g), Jdw), cross(w, Jw))
         moment = sub(moment, dual(W.Sa[l], 0))
         Sd = W.Sd[b, l]

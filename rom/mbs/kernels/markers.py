@@ -16,6 +16,7 @@ from rom.mbs.kernels.algebra import (
     vec,
 )
 from rom.mbs.kernels.compiled import inner, spliced
+from rom.mbs.kernels.second_order import bent_motion, bent_wrench_stiffness
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -54,12 +55,10 @@ def marker_states(s, W, q, v):
         u = add(row(markers.point, m, 0), elastic_sum(shape, q, at + 7, r))
         theta, second_order, second_order_angular = elastic_sum(twist, q, at + 7, r), ZERO, ZERO
         if bodies.stiffened[b] == 1:
-            bent_shapes(markers, m, q, at + 7, r, W.move[m])
+            second_order, second_order_angular = bent_motion(s, W, m, q, v)
             shape, twist = W.move[m, :3], W.move[m, 3:]
             u = scale(0.5, add(add(u, row(markers.point, m, 0)), elastic_sum(shape, q, at + 7, r)))
             theta = scale(0.5, add(theta, elastic_sum(twist, q, at + 7, r)))
-            second_order = bent_sum(markers.bend[m], 0, v, vt + 6, r)
-            second_order_angular = bent_sum(markers.bend[m], 3, v, vt + 6, r)
         slip, rate = elastic_sum(shape, v, vt + 6, r), elastic_sum(twist, v, vt + 6, r)
         spin = spatial_tangent(theta, rate)
         convective_angular = add(cross(w, spin), spatial_tangent_rate(theta, rate))
@@ -74,30 +73,6 @@ def marker_states(s, W, q, v):
         write(W.conv, m, 3, mv(A, convective_angular))
         axes_of(A, theta, W.E[m])
         marker_jacobian(shape, twist, A, u, theta, r, W.H[m])
-
-
-@inner
-def bent_shapes(markers, m, q, at, r, move):
-    """Displacement and rotation of a marker per elastic rate, second order included."""
-    for p in range(3):
-        for k in range(r):
-            move[p, k], move[3 + p, k] = markers.shape[m, p, k], markers.twist[m, p, k]
-            for l in range(r):
-                move[p, k] += markers.bend[m, p, k, l] * q[at + l]
-                move[3 + p, k] += markers.bend[m, 3 + p, k, l] * q[at + l]
-
-
-@inner
-def bent_sum(bend, p, x, at, r):
-    """Sum of bend[p : p + 3, k, l] x_k x_l."""
-    a0, a1, a2 = 0.0, 0.0, 0.0
-    for k in range(r):
-        for l in range(r):
-            square = x[at + k] * x[at + l]
-            a0 += bend[p, k, l] * square
-            a1 += bend[p + 1, k, l] * square
-            a2 += bend[p + 2, k, l] * square
-    return a0, a1, a2
 
 
 @inner
@@ -164,7 +139,7 @@ def wrench_stiffness(s, W, c, S):
         shape, twist = markers.shape[m], markers.twist[m]
         if bodies.stiffened[b] == 1:
             shape, twist = W.move[m, :3], W.move[m, 3:]
-            bent_wrench_stiffness(markers.bend[m], f, n, theta, r, c, block)
+            bent_wrench_stiffness(s, W, m, f, n, c, block)
         for j in range(3):
             e = unit(j)
             df, dn = cross(f, e), cross(n, e)
@@ -177,13 +152,3 @@ def wrench_stiffness(s, W, c, S):
             half = scale(0.5, cross(n, col(twist, l)))
             for k in range(r):
                 block[6 + k, 6 + l] -= c * dot(col(twist, k), half)
-
-
-@inner
-def bent_wrench_stiffness(bend, f, n, theta, r, c, S):
-    """Stiffness that the force and moment on a marker give to its body, in its block S."""
-    for k in range(r):
-        for l in range(r):
-            move = (bend[0, k, l], bend[1, k, l], bend[2, k, l])
-            spin = spatial_tangent(theta, (bend[3, k, l], bend[4, k, l], bend[5, k, l]))
-            S[6 + k, 6 + l] -= c * (dot(f, move) + dot(n, spin))

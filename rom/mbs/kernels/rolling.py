@@ -2,9 +2,18 @@
 
 import math
 
+import numpy as np
+from numba import types
+
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.stages import stage
+from rom.mbs.kernels.system import ROLL, TOUCH, System
+from rom.mbs.kernels.work import Work
+
+
+def _has_rolling(system):
+    return np.isin(system.rows.kind, (TOUCH, ROLL)).any()
 
 
 @inner
@@ -49,13 +58,14 @@ def gradient_rate(vectors, radius, slide, Oi, Oj):
     return scale(-1.0, da), scale(-1.0, turning), da, add(cross(sink, a), cross(down, da))
 
 
-@inner
-def rolling_row(rows, k, W):
+@stage(types.void, System, Work, types.int64, needed=_has_rolling)
+def rolling_row(s, W, k):
     """Residual, gradient and convective term of a row of kind TOUCH or ROLL.
 
     Both have the gradient of the velocity of the touching material point along the direction a:
     for the height this is so because the lowest point is lowest.
     """
+    rows = s.rows
     i, j = rows.i[k], rows.j[k]
     vectors = rolling_vectors(rows, k, W)
     a, _, _, gap, down = vectors
@@ -73,9 +83,10 @@ def rolling_row(rows, k, W):
     W.value[k] = sliding if rows.kind[k] == ROLL else dot(a, arm)
 
 
-@inner
-def rolling_stiffness(rows, k, W, c):
+@stage(types.void, System, Work, types.int64, types.float64, needed=_has_rolling)
+def rolling_stiffness(s, W, k, c):
     """Add c times the derivative of the gradient of row k to W.Q."""
+    rows = s.rows
     vectors = rolling_vectors(rows, k, W)
     for p in range(12):
         vi, Oi, vj, Oj = unit_twist(p)

@@ -22,6 +22,7 @@ from rom.mbs.kernels.tables import TABLE_WORD
 
 REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
 REAL_MATRIX = types.Array(types.float64, 2, "C")
+REAL_BLOCK = types.Array(types.float64, 2, "A")  # rows and columns of a matrix
 THREE_FACTORS = types.UniTuple(types.float64, 3)
 # of tangents: factors of stiffness and damping, and the matrices they are added to
 TANGENT_TYPES = (types.float64, types.float64, REAL_MATRIX, REAL_MATRIX)
@@ -37,6 +38,28 @@ STAGE_NAMES = (
     "factorise_motion",
     "accelerate",
     "advance",
+    "factorise_blocks",
+    "fill_from_blocks",
+    "solve_blocks",
+    "constraint_range",
+    "least_multipliers",
+    "elastic_damping",
+    "elastic_stiffness",
+    "bent_integrals",
+    "bent_motion",
+    "bent_stiffness",
+    "bent_wrench_stiffness",
+    "coordinate_states",
+    "coupling_row",
+    "coupling_stiffness",
+    "velocity_gaps",
+    "close_gaps",
+    "fit_velocities",
+    "predict_multistep",
+    "follow_increment",
+    "keep_past",
+    "rolling_row",
+    "rolling_stiffness",
 )
 STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked
@@ -50,18 +73,21 @@ class Stage:
     """A kernel with a fixed signature, callable from Python and, once linked, from kernels.
 
     Its first argument is the system. A call in a kernel does nothing, and answers 0, unless some
-    system of this process needed it.
+    system, or step, of this process needed it.
 
     Attributes:
         signature: types of result and arguments.
         kernel: the compiled function.
-        needed: whether a system asks for it.
+        asked: class of the table that needs it or not.
+        needed: whether such a table does.
         slot: its place in `STAGE_ADDRESSES`.
     """
 
-    def __init__(self, function: Callable[..., Any], types_: Any, needed: Callable[[Any], Any]):
+    def __init__(
+        self, function: Callable[..., Any], types_: Any, asked: type, needed: Callable[[Any], Any]
+    ):
         result, *arguments = (getattr(kind, "_numba_type_", kind) for kind in types_)
-        self.signature, self.needed = result(*arguments), needed
+        self.signature, self.asked, self.needed = result(*arguments), asked, needed
         self.kernel = kept(njit(**OPTIONS, no_cfunc_wrapper=True))(function)
         self.slot = STAGE_NAMES.index(function.__name__)
         STAGE_KERNELS[function.__name__] = self
@@ -117,22 +143,31 @@ def call_at(context: Any, builder: Any, signature: Any, address: Any, values: An
     return builder.load(answer)
 
 
-def stage(*types_: Any, needed: Callable[[Any], Any] = _always) -> Callable[[Any], Stage]:
+def stage(
+    *types_: Any, asked: type | None = None, needed: Callable[[Any], Any] = _always
+) -> Callable[[Any], Stage]:
     """Make a function a stage.
 
     Args:
         types_: of the result and of the arguments, classes of tables or types of Numba.
-        needed: system -> whether it asks for this stage; always unless told.
+        asked: class of the tables that may need it; None for systems.
+        needed: table -> whether it needs this stage; always unless told.
     """
-    return lambda function: Stage(function, types_, needed)
+    return lambda function: Stage(function, types_, asked or types_[1], needed)
 
 
-def link(system: Any) -> None:
-    """Compile all stages that a system needs, before kernels call them.
+def needed_by(table: Any) -> set[str]:
+    """Names of the stages that a system or a step needs."""
+    return {n for n, s in STAGE_KERNELS.items() if isinstance(table, s.asked) and s.needed(table)}
+
+
+def link(table: Any) -> None:
+    """Compile all stages that a system or a step needs, before kernels call them.
 
     What another process compiles just now comes last, so that two share the work.
     """
-    needed = [one for one in STAGE_KERNELS.values() if one.needed(system) and not one.linked]
+    asked = needed_by(table)
+    needed = [one for name, one in STAGE_KERNELS.items() if name in asked and not one.linked]
     EXPECTED_FUNCTIONS.update(one.kernel.py_func for one in needed)
     later = []
     for one in needed:

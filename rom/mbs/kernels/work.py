@@ -1,4 +1,4 @@
-"""Memory for what is computed of a system at one instant."""
+"""Memory for what is computed of a system at one instant, and over a time step."""
 
 import numpy as np
 
@@ -9,6 +9,19 @@ from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Table, table
 # velocities and multipliers up to which there is memory for whole matrices beside the blocks, in
 # case that a block of a body or joint is singular for itself
 LARGEST_WHOLE = 2000
+# entries of Step.count
+(
+    STEPS,
+    ITERATIONS,
+    FACTORISATIONS,
+    LAST_ITERATIONS,
+    HAS_FACTOR,
+    STEP_PASSES,
+    STEPS_BEFORE,
+    USES_LAWS,
+    LAWS_ASKED,
+    BOTH_LEVELS,
+) = range(10)
 
 
 @table
@@ -73,6 +86,51 @@ class Work(Table):
     part: Array1  # (m,)
     delta: Array1  # (n,) increment
     dlam: Array1  # (m,) increment of the multipliers
+
+
+@table
+class Step(Table):
+    """State, the trial state of the step under way, and the method.
+
+    Attributes:
+        q, v, a, vd, lam: coordinates, velocities, algorithmic and true accelerations,
+            multipliers at the last accepted instant.
+        q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
+        work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
+        lost: (3,) the powers at the last accepted instant.
+        count: (10,) steps, iterations, factorisations, iterations of the last step, whether a
+            factorisation is at hand, pass of the present step, steps when the present chunk
+            began, whether Python forces are to be asked for, whether they have been, whether
+            constraints hold for positions and velocities both.
+        size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
+            largest gap in a joint before the last increment.
+        method: (5,) h, beta, gamma, alpha_m, alpha_f.
+        bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
+            BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one
+            velocity, and ``psi`` the last increment until the next step begins.
+        past: (2, order - 1, n) for BDF of other orders: earlier positions as seen from the last
+            accepted instant, see `rom.mbs.integrate.bdf`, and velocities.
+        drift: (n,) part of the increment of such a step that closes gaps.
+    """
+
+    q: Array1
+    v: Array1
+    a: Array1
+    vd: Array1
+    lam: Array1
+    q1: Array1
+    v1: Array1
+    vd1: Array1
+    lam1: Array1
+    psi: Array1
+    work: Array1
+    lost: Array1
+    count: Index1
+    size: Array1
+    method: Array1
+    bdf: Array1
+    past: Array3
+    drift: Array1
 
 
 def workspace(system: System, n_signals: int) -> Work:

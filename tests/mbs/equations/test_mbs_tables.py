@@ -12,8 +12,9 @@ from cases.command import environment
 from cases.mbs.mechanisms import random_body
 from rom.components.cosserat import body, straight
 from rom.mbs.equations.packing import pack
+from rom.mbs.integrate import step_memory
 from rom.mbs.kernels.compiled import kernel
-from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES
+from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES, link, needed_by
 from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
 from rom.mbs.mechanism import FAMILIES
 
@@ -91,10 +92,36 @@ def pair():
     return mech, a, b
 
 
+def chain(n):
+    """Pendulums that hang one on the other."""
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    above = mech.ground.marker((0, 0, 0))
+    for k in range(n):
+        bar = mech.add_rigid(
+            f"link {k}",
+            mass=1.0,
+            inertia=(0.1,) * 3,
+            at=(k + 0.5, 0, 0),
+            markers={"top": (-0.5, 0, 0), "end": (0.5, 0, 0)},
+        )
+        mech.revolute(f"hinge {k}", above, bar.marker("top"), axis=(0, 1, 0))
+        above = bar.marker("end")
+    return mech
+
+
+def flexible_body(mech, **kind):
+    soft = random_body(np.random.default_rng(1), **kind)
+    return soft, mech.add_flexible("c", soft)
+
+
 def loaded_body(mech):
-    soft = random_body(np.random.default_rng(1))
-    part = mech.add_flexible("c", soft)
+    soft, part = flexible_body(mech)
     mech.spread_load("weight", part, rom.mass_load(soft, (0, 0, -1.0)))
+
+
+def geared_body(mech, a, b):
+    mech.prismatic("other", mech.ground.marker((0, 0, 0)), b, axis=(1, 0, 0))
+    mech.gear("e", "slide", "other", ratio=2.0)
 
 
 ROD = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0, "inertia": (1e-2,) * 3}
@@ -113,6 +140,20 @@ ELEMENTS = {  # family -> what asks for it
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
+
+STORAGE = {  # whether by blocks -> stages
+    True: {"factorise_blocks", "fill_from_blocks", "solve_blocks"},
+    False: {"constraint_range", "least_multipliers"},
+}
+MULTISTEP = {"predict_multistep", "follow_increment", "keep_past"}
+STABILISED = {"velocity_gaps", "close_gaps", "fit_velocities"}
+METHODS = [  # options of a run, stages that its steps need
+    ({}, set()),
+    ({"method": "bdf"}, set()),
+    ({"method": "bdf", "order": 3}, MULTISTEP | STABILISED),
+    ({"stabilised": True}, STABILISED),
+    ({"dt": None}, set()),
+]
 
 
 def hinge(mech, b):
@@ -140,10 +181,50 @@ def test_every_family_of_the_list_is_tried():
     assert [family.name for family in FAMILIES] == [*ELEMENTS]
 
 
-def test_every_stage_is_asked_for_by_all_mechanisms_or_by_a_method():
+ASKED = {  # stages -> what asks for them
+    "coordinate_states": [ELEMENTS["motors"], ELEMENTS["frictions"], ELEMENTS["stops"]],
+    "coordinate_states coupling_row coupling_stiffness": [geared_body],
+    "rolling_row rolling_stiffness": [
+        lambda m, a, b: m.rolling("e", m.ground.marker((0, 0, 0)), b, normal=(0, 0, 1), radius=0.3),
+    ],
+    "elastic_damping elastic_stiffness": [lambda m, a, b: flexible_body(m)],
+    "elastic_damping elastic_stiffness "
+    "bent_integrals bent_motion bent_stiffness bent_wrench_stiffness": [
+        lambda m, a, b: flexible_body(m, stiffened=True),
+    ],
+}
+
+
+@pytest.mark.parametrize(("stages", "add"), [(k, add) for k, adds in ASKED.items() for add in adds])
+def test_a_mechanism_asks_for_the_stages_of_its_parts(stages, add):
+    mech, a, b = pair()
+    bare = needed_by(pack(mech).system)
+    add(mech, a, b)
+    more = needed_by(pack(mech).system) - bare
+    assert more - set().union(*STORAGE.values()) == set(stages.split())
+
+
+def test_a_mechanism_asks_for_the_stages_of_the_way_its_matrices_are_stored():
+    packed = pack(chain(6))
+    for kind in (packed, packed.whole()):
+        asked = needed_by(kind.system)
+        assert STORAGE[kind.by_blocks] <= asked and not STORAGE[not kind.by_blocks] & asked
+    assert packed.by_blocks
+
+
+@pytest.mark.parametrize(("options", "stages"), METHODS)
+def test_a_run_asks_for_the_stages_of_its_method(options, stages, monkeypatch):
+    steps = []
+    monkeypatch.setattr(step_memory, "link", lambda step: (steps.append(step), link(step)))
+    rom.simulate(chain(1), t_end=0.01, **{"dt": 1e-3} | options)
+    assert steps and all(needed_by(step) == stages for step in steps)
+
+
+def test_every_stage_is_asked_for_by_all_mechanisms_or_by_some_part_or_a_method():
     mech, *_ = pair()
-    always = {n for n, s in STAGE_KERNELS.items() if s.needed(pack(mech).system)}
-    assert set(STAGE_KERNELS) == set(STAGE_NAMES) == always | {"advance"}
+    sometimes = set().union(*map(str.split, ASKED), *STORAGE.values(), MULTISTEP, STABILISED)
+    sometimes |= {"advance"}
+    assert set(STAGE_KERNELS) == set(STAGE_NAMES) == needed_by(pack(mech).system) | sometimes
 
 
 def test_compiled_code_finds_its_stages_whatever_is_imported_first(tmp_path):
