@@ -51,7 +51,7 @@ ERROR_MARGIN = 3.0  # errors of early steps grow on the way to the end
 MIN_WORTHWHILE_GROWTH = 1.3  # of a step that justifies a new factorisation
 MIN_STEP_RATIO = 1e-12  # of the smallest step to the duration
 LEAST_ERROR = 1e-6  # that the next length is chosen by
-NEVER = 1 << 62
+MAX_INTERVAL = 1 << 62  # in steps, of what the method itself is to save: nothing
 
 weights_of_bdf = inner(bdf_weights)
 
@@ -190,7 +190,7 @@ def try_step(s, W, now, trial, rank):
             copy(trial.table[k, i], trial.signal[0, i])
     step.count[STEPS_BEFORE] = step.count[STEPS]
     x = trial.none
-    count[ANSWER] = advance(s, W, step, rank, trial.signal, NEVER, (x, x, x, x, x, x))
+    count[ANSWER] = advance(s, W, step, rank, trial.signal, MAX_INTERVAL, (x, x, x, x, x, x))
     if count[ANSWER] == NEEDS_LAWS:
         return NEEDS_LAWS
     number[ERROR] = math.inf

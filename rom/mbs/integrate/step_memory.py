@@ -99,26 +99,24 @@ def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Arr
 
 
 def across(record: Record, W: Work, state: State, shift: Array) -> Array:
-    """The part of a velocity, or of each column, that changes the gaps of the constraints."""
+    """The part of a velocity that changes the gaps of the constraints."""
     linearize_constraints(record.packed.system, W, state.q, state.v)
     if record.packed.by_blocks:
         return _across_by_blocks(record, W, shift)
     A = W.G @ np.linalg.solve(W.S, W.G.T)
     rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
-    y = np.linalg.lstsq(A, np.where(rolling, 0.0, (W.G @ shift).T).T, rcond=1e-10)[0]
+    y = np.linalg.lstsq(A, np.where(rolling, 0.0, W.G @ shift), rcond=1e-10)[0]
     return np.linalg.solve(W.S, W.G.T @ y)
 
 
 def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
     """The same from the blocks of masses and gradients at hand."""
-    system, columns = record.packed.system, np.ascontiguousarray(np.atleast_2d(shift.T))
-    gap, out = np.zeros(W.value.size), np.zeros_like(columns)
+    system, gap, out = record.packed.system, np.zeros(W.value.size), np.zeros_like(shift)
     if not factorised(system, W, 0.0):
         raise SolverError("the equations of motion are singular where constraints are met.")
-    for column, motion in zip(columns, out, strict=True):
-        gradient_times(system, W, column, False, gap)
-        least_motion(system, W, gap, motion)
-    return out.T.reshape(shift.shape)
+    gradient_times(system, W, shift, False, gap)
+    least_motion(system, W, gap, out)
+    return out
 
 
 def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:

@@ -19,6 +19,7 @@ from cases.mbs.motions import (
     swing,
     wound_drive,
 )
+from rom.bench.models import rigid_chain
 from rom.errors import ModelError, SolverError
 from rom.mbs.integrate import adaptive_step
 from rom.mbs.integrate.simulation import simulate
@@ -45,6 +46,7 @@ def test_a_pendulum_follows_elliptic_functions_to_the_tolerance(method):
         sol = simulate(pendulum(), t_end=t_end, rtol=rtol, method=method)
         found.append(np.abs(sol.q[:, :2] - swung(sol.t)).max())
         steps.append(sol.statistics["steps"])
+        assert_allclose(*np.diff(sol.t)[-2:], rtol=1e-9, err_msg="the last two steps")
     assert (np.array(found) < tolerances).all()
     assert_allclose(np.diff(np.log10(found[1:])), -1.0, atol=0.1)
     assert_allclose(np.diff(np.log10(steps[1:])), 0.5, atol=0.05)
@@ -66,6 +68,11 @@ def test_a_heavy_top_keeps_energy_and_momenta_to_the_tolerance(method):
     assert np.abs(vertical - vertical[0]).max() < rtol * np.abs(turning[0]).max()
     assert_allclose(x[-1], TOP["positions"]["0.5"], atol=2e-6)
     assert sol.statistics["steps"] > 30_000
+
+
+def chain():
+    """Four links, whose equations are eliminated by blocks."""
+    return rigid_chain(4)
 
 
 def calls_of(monkeypatch, build, **options):
@@ -101,6 +108,7 @@ def test_one_call_of_compiled_code_takes_many_steps(method, build, t_end, rtol, 
         (slider_crank, 0.03, 1e-4),
         (wound_drive, 0.03, 1e-4),
         (swing, 0.05, 1e-3),
+        (chain, 0.3, 1e-3),
     ],
 )
 def test_how_many_steps_a_call_takes_changes_no_bit(build, t_end, rtol, options, monkeypatch):
@@ -118,16 +126,17 @@ def test_how_many_steps_a_call_takes_changes_no_bit(build, t_end, rtol, options,
 
 
 class Brake:
-    """A force that breaks in a call of the run, until it is mended."""
+    """A force that breaks in a call of the run, until it is mended; a push sets in at a time."""
 
-    def __init__(self, breaks_at=np.inf):
-        self.calls, self.breaks_at = 0, breaks_at
+    def __init__(self, breaks_at=np.inf, pushes_at=np.inf):
+        self.breaks_at, self.pushes_at, self.times = breaks_at, pushes_at, []
 
     def __call__(self, t, marker):
-        self.calls += 1
-        if self.calls == self.breaks_at:
+        self.times.append(t)
+        if len(self.times) == self.breaks_at:
             raise ZeroDivisionError
-        return -0.3 * marker.velocity, (0, 0, 0)
+        push = 0.5 + 0.5 * np.tanh((t - self.pushes_at) / 1e-4)
+        return -0.3 * marker.velocity + 5.0 * push, (0, 0, 0)
 
 
 def braked(brake, build):
@@ -140,20 +149,22 @@ def braked(brake, build):
 @pytest.mark.parametrize("method", IMPLICIT)
 @pytest.mark.parametrize(("build", "t_end"), [(pendulum, 0.3), (wound_drive, 0.03)])
 def test_a_run_that_breaks_within_a_call_goes_on_to_the_same_bits(build, t_end, method, tmp_path):
-    """In any evaluation: of the method's steps, or of the instants at their ends."""
-    options = {"t_end": t_end, "rtol": 1e-4, "method": method}
-    count = Brake()
+    """In any evaluation: of steps, of the instants at their ends, of steps that are rejected."""
+    options, push = {"t_end": t_end, "rtol": 1e-4, "method": method}, 0.6 * t_end
+    count = Brake(pushes_at=push)
     whole = simulate_quietly(braked(count, build), **options)
-    for share in (0.3, 0.5, 0.501, 0.502, 0.7):
-        folder = tmp_path / str(share)
+    pushed = int(np.argmax(np.array(count.times) > push))
+    early = [int(share * len(count.times)) for share in (0.3, 0.5)]
+    for call in (*early, early[1] + 1, *range(pushed + 2, pushed + 40, 6)):
+        folder = tmp_path / str(call)
         with pytest.raises(SolverError, match="'brake' failed") as caught:
-            broken = braked(Brake(int(share * count.calls)), build)
+            broken = braked(Brake(call, push), build)
             simulate_quietly(broken, keep=rom.Keeping(folder), **options)
         known = caught.value.solution.t.size
         assert 0.1 * whole.t.size < known < whole.t.size
         assert_array_equal(caught.value.solution.q, whole.q[:known])
         keep = rom.Keeping(folder, resume=True)
-        rest = simulate_quietly(braked(Brake(), build), keep=keep, **options)
+        rest = simulate_quietly(braked(Brake(pushes_at=push), build), keep=keep, **options)
         for name in PARTS:
             assert_array_equal(getattr(rest, name), getattr(whole, name), err_msg=name)
 
@@ -224,6 +235,7 @@ def test_dop853_without_an_interval_finds_events():
     sol = simulate(falling(), t_end=1.0, method="dop853")
     assert_allclose(sol.t[-1], np.sqrt(2 / G), atol=1e-10)
     assert sol.status.startswith("Stopped by event 'floor'")
+    assert (np.diff(sol.t) > 0).all()
     sol = simulate(falling(terminal=False), t_end=1.0, method="dop853")
     assert_allclose(sol.events["floor"].t, [np.sqrt(2 / G)], atol=1e-10)
     assert sol.t[-1] == 1.0
@@ -234,7 +246,7 @@ def test_dop853_without_an_interval_goes_on_to_the_same_bits(tmp_path):
     count = Brake()
     whole = simulate(braked(count, pendulum), **options)
     with pytest.raises(SolverError, match="'brake' failed") as caught:
-        broken = braked(Brake(count.calls // 2), pendulum)
+        broken = braked(Brake(len(count.times) // 2), pendulum)
         simulate(broken, keep=rom.Keeping(tmp_path / "a"), **options)
     assert 2 < caught.value.solution.t.size < whole.t.size
     keep = rom.Keeping(tmp_path / "a", resume=True)

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import G, errors, falling, free_crank, heavy_top, pendulum
 from rom import rotation
+from rom.bench.models import rigid_chain
 from rom.errors import SolverError
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.adaptive_step import _Run
@@ -21,6 +22,11 @@ from rom.mbs.integrate.step_memory import across, shift_ahead
 from rom.mbs.kernels.work import workspace
 
 IMPLICIT = ["generalized-alpha", "bdf"]
+
+
+def chain():
+    """Four links, whose equations are eliminated by blocks."""
+    return rigid_chain(4)
 
 
 class End(NamedTuple):
@@ -101,7 +107,8 @@ def test_the_increment_of_a_step_is_known_to_fourth_order():
     assert (ratio > 13).all()
 
 
-def test_another_length_of_steps_prepares_the_method_for_it(monkeypatch):
+@pytest.mark.parametrize(("build", "t_end"), [(pendulum, 0.3), (heavy_top, 0.02), (chain, 0.3)])
+def test_another_length_of_steps_prepares_the_method_for_it(build, t_end, monkeypatch):
     """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
     seen = []
     original = _Run.chunk
@@ -124,7 +131,7 @@ def test_another_length_of_steps_prepares_the_method_for_it(monkeypatch):
         return taken
 
     monkeypatch.setattr(_Run, "chunk", chunk)
-    simulate(pendulum(), t_end=0.3, rtol=1e-3, rho_inf=0.0)
+    simulate(build(), t_end=t_end, rtol=1e-3, rho_inf=0.0)
     assert len(seen) > 2
     assert np.max(seen, axis=0)[0] < 0.3
     assert np.max(seen, axis=0)[1] < 1e-6
