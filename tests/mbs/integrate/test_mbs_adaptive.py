@@ -22,6 +22,7 @@ from cases.mbs.motions import (
 from rom.bench.models import rigid_chain
 from rom.errors import ModelError, SolverError
 from rom.mbs.integrate import adaptive_step
+from rom.mbs.integrate.run import Record
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 
@@ -167,6 +168,25 @@ def test_a_run_that_breaks_within_a_call_goes_on_to_the_same_bits(build, t_end, 
         rest = simulate_quietly(braked(Brake(pushes_at=push), build), keep=keep, **options)
         for name in PARTS:
             assert_array_equal(getattr(rest, name), getattr(whole, name), err_msg=name)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_a_step_that_breaks_gives_back_all_that_it_had_changed(method, monkeypatch):
+    """The factors, too: what is remembered is what a run by single steps remembers there."""
+    options, found = {"t_end": 0.3, "rtol": 1e-4, "method": method}, {}
+    with monkeypatch.context() as patch:
+        patch.setattr(adaptive_step, "FIRST_CHUNK", 1)
+        patch.setattr(adaptive_step, "LARGEST_CHUNK", 1)
+        patch.setattr(Record, "pause", lambda self: found.update({self.t: self.final.memory}))
+        count = Brake(pushes_at=0.18)
+        simulate(braked(count, pendulum), **options)
+    pushed = int(np.argmax(np.array(count.times) > 0.18))
+    for call in range(pushed - 20, pushed + 40, 5):
+        with pytest.raises(SolverError) as caught:
+            simulate(braked(Brake(call, 0.18), pendulum), **options)
+        state = caught.value.solution.final
+        for name, x in found[state.t].arrays.items():
+            assert_array_equal(state.memory.arrays[name], x, err_msg=name)
 
 
 @pytest.mark.parametrize("method", IMPLICIT)
