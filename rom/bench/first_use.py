@@ -79,6 +79,28 @@ def _elements() -> None:
     _move(mech)
 
 
+def _rolling() -> None:
+    from rom.mbs.mechanism import Mechanism
+
+    mech = Mechanism(gravity=(0.0, 0.0, -9.81))
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0.0, 0.0, 0.1))
+    floor, centre = mech.ground.marker(ORIGIN), ball.marker(ORIGIN)
+    mech.rolling("contact", floor, centre, normal=Z_AXIS, radius=0.1)
+    _move(mech)
+
+
+def _stiffened() -> None:
+    """A body with the displacements of second order that rotation stiffens."""
+    from rom.mbs.mechanism import Mechanism
+
+    straight = bar((0.16, 0.02, 0.012), (4, 1, 1))
+    beam = reduce(straight, method=CraigBampton(4), interfaces=KINDS, reference="root",
+                  stiffening=True, certify=False)  # fmt: skip
+    mech = Mechanism()
+    mech.add_flexible("beam", beam, omega=(0.0, 0.0, 10.0))
+    _move(mech)
+
+
 def _rod() -> None:
     """A rod in a mechanism: its law, and the stages of elements with laws."""
     from rom.components.cosserat import body, straight
@@ -170,6 +192,8 @@ CASES: dict[str, Callable[[], object]] = {
     "stabilised": lambda: _move(pendulum(), stabilised=True),
     "dop853": lambda: _move(pendulum(), method="dop853"),
     "elements": _elements,
+    "rolling": _rolling,
+    "stiffening": _stiffened,
     "rod": _rod,
     "wind": _wind,
     "rod alone": _rod_alone,

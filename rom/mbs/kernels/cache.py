@@ -27,7 +27,7 @@ from rom.process.turns import Turns
 IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
 # in sources of kernels, and the folder of what they contain: constants and layouts
 KERNEL_MARK, LAYOUT_FOLDER = b"compiled import", "kernels"
-COMPILE_RATE = 5e-4  # [s] of compiling per byte of a function in Python; 4e-4 to 6e-4 measured
+COMPILE_RATE = 2.5e-4  # [s] of compiling per byte of functions in Python; 2.3e-4 measured
 COMPILE_TURNS, COMPILE_PATIENCE = Turns(), Patience(COMPILE_RATE)
 AHEAD_HINT = "rom doctor --compile compiles all ahead"
 WAIT_SENTENCE = "another process compiles what this one needs: waiting for it"
@@ -161,8 +161,18 @@ def _at_work(function: Any) -> Iterator[None]:
 
 
 def _size(function: Any) -> int:
-    """What the time to compile a function grows with: the length of its code in Python."""
-    return len(function.__code__.co_code)
+    """What the time to compile a function grows with: its code in Python, and what it takes in."""
+    found: set[Any] = set()
+    _collect_inner(function, found)
+    return sum(len(one.__code__.co_code) for one in found)
+
+
+def _collect_inner(function: Any, found: set[Any]) -> None:
+    """The function, and those it calls that are compiled with it each time."""
+    found.add(function)
+    for called in _called(function):
+        if called not in CODE_FILES and called not in found:
+            _collect_inner(called, found)
 
 
 def _size_of_rest() -> int:
@@ -170,15 +180,20 @@ def _size_of_rest() -> int:
     found: set[Any] = set()
     for function in (*EXPECTED_FUNCTIONS, *_under_way):
         _collect_called(function, found)
-    return sum(_size(function) for function in found if not CODE_FILES[function].full())
+    return sum(_size(f) for f in found if f in CODE_FILES and not CODE_FILES[f].full())
 
 
 def _collect_called(function: Any, found: set[Any]) -> None:
     found.add(function)
-    for name in function.__code__.co_names:
-        called = getattr(function.__globals__.get(name), "py_func", None)
-        if called in CODE_FILES and called not in found:
+    for called in _called(function):
+        if called not in found:
             _collect_called(called, found)
+
+
+def _called(function: Any) -> list[Any]:
+    """The compiled functions that a function names, as Python knows them."""
+    named = (function.__globals__.get(name) for name in function.__code__.co_names)
+    return [x.py_func for x in named if hasattr(x, "py_func")]
 
 
 @functools.cache

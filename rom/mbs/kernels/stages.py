@@ -12,6 +12,7 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils, config
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import TypingError
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
@@ -125,8 +126,10 @@ class Stage:
 
 def address_of(kernel: Any, signature: Any) -> int:
     """Address of the compiled form of a kernel, which takes no other types from then on."""
-    kernel.compile(signature)
-    kernel.disable_compile()
+    with global_compiler_lock:  # of two threads the second finds it compiled
+        if signature.args not in kernel.overloads:
+            kernel.compile(signature)
+            kernel.disable_compile()
     compiled = kernel.overloads[signature.args]
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

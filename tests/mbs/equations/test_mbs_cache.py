@@ -97,11 +97,16 @@ def second(x):
 def outer(x):
     return first(x) * second(x)
 
+@kernel
+def later(x):
+    return second(x)
+
 if __name__ == "__main__":
     import logging, sys
     logging.getLogger("rom").setLevel(sys.argv[1])
     import slow
     assert slow.outer(1.0) == 6.0
+    assert slow.later(1.0) == 3.0
 """
 
 
@@ -144,6 +149,8 @@ def test_the_rest_is_what_is_expected_with_all_it_calls_but_for_what_is_kept(mon
     monkeypatch.setattr(cache, "EXPECTED_FUNCTIONS", {calling})
     sizes = [len(function.__code__.co_code) for function in (calling, called)]
     assert cache._size_of_rest() == (sizes[0] if kept else sum(sizes))
+    del files[called]  # taken in wherever it is called, and never kept by itself
+    assert cache._size_of_rest() == sum(sizes)
 
 
 def test_who_can_keep_nothing_is_told_so(tmp_path):
@@ -163,9 +170,12 @@ def test_stages_that_another_process_compiles_are_asked_for_last(monkeypatch, bu
         function = SimpleNamespace(py_func=k)
         files[k] = SimpleNamespace(made_elsewhere=lambda k=k: k in busy)
         kernels[k] = SimpleNamespace(
-            kernel=function, linked=False, needed=bool, link=lambda k=k: linked.append(k)
+            kernel=function, linked=False, asked=str, needed=bool, link=lambda k=k: linked.append(k)
         )
-    kernels[3] = SimpleNamespace(kernel=None, linked=False, needed=lambda system: not system)
+    kernels[3] = SimpleNamespace(
+        kernel=None, linked=False, asked=str, needed=lambda system: not system
+    )
+    kernels[4] = SimpleNamespace(kernel=None, linked=False, asked=int, needed=bool)
     monkeypatch.setattr(stages, "STAGE_KERNELS", kernels)
     monkeypatch.setattr(stages, "CODE_FILES", files)
     monkeypatch.setattr(stages, "EXPECTED_FUNCTIONS", set())
