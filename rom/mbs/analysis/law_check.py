@@ -163,8 +163,12 @@ def _looked(asked: _Asked, motion: Array) -> list[_Finding]:
     bad = ~np.isfinite(answer)
     remembered = answer[6 * n + ENERGY_SIZE : 6 * n + ENERGY_SIZE + m]
     found = [_Finding("numbers that are not finite", _first(bad, asked.fields), bad.sum(), 0.5)]
-    for what, again in (("asked again", law.memory), ("it finds its own memory", remembered)):
-        other = ~np.isclose(asked.answer(motion, again), answer, rtol=1e-12, equal_nan=True)
+    now = np.ones(answer.size, dtype=bool)  # all but what belongs to the way since the last instant
+    now[6 * n + 1], now[6 * n + ENERGY_SIZE + m :] = False, False
+    every = np.ones_like(now)
+    looks = (("asked again", law.memory, every), ("it finds its own memory", remembered, now))
+    for what, again, which in looks:
+        other = ~np.isclose(asked.answer(motion, again), answer, rtol=1e-9, equal_nan=True) & which
         text = f"answers that change when {what}"
         found.append(_Finding(text, _first(other, asked.fields), other.sum(), 0.5))
     if law.compiled[1] is not None:

@@ -16,8 +16,8 @@ function ``tangents(t, parameters, motion, memory, K, C)`` that fills both (6 K,
 are force and moment of each marker, columns its displacement and small rotation, or its velocity
 and angular velocity, all in the world. In C it gets one array, both matrices row by row.
 
-A law that is asked twice at one instant must give the same answer twice, also when it then finds
-the memory that it wrote itself the first time.
+A law that is asked twice at one instant must give the same answer twice; forces, energy and memory
+also when it then finds the memory that it wrote itself the first time.
 """
 
 import inspect

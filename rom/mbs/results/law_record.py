@@ -1,6 +1,6 @@
 """What laws of the user said along a motion, asked again at its instants."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,8 @@ class LawRecord:
         force, moment: (n_t, K, 3) on each of its markers, about it, world [N, N m].
         energy: (n_t,) stored [J]; lost: (n_t,) power turned into heat [W].
         memory: (n_t, m) what it remembers.
-        outputs: {name: (n_t,)} its own outputs.
+        outputs: {name: (n_t,)} its own outputs; they and the losses follow from what it remembered
+            at the saved instant before.
     """
 
     t: Array
@@ -37,9 +38,17 @@ def law_record(solution: Any, name: str) -> LawRecord:
     table = solution.packed.elements[laws.FAMILY]
     e = list(solution.mechanism.families()[laws.FAMILY]).index(name)
     mine = slice(*table.answer_at[e : e + 2])
-    rows = np.array([table.answer[mine].copy() for _ in at_instants(solution)])
+    c, base = solution.packed.system.coordinates.kind.size, solution.base.copy()
+    base[1:, c:] = solution.base[:-1, c:]
     n, m, _ = law.sizes
-    said = [laws.answer_of(row, n, m) for row in rows]
-    force, moment, energy, lost, memory, outputs = (np.array(x) for x in zip(*said, strict=True))
+    force, moment, energy, _, memory, _ = _said(solution, table, mine, (n, m))
+    _, _, _, lost, _, outputs = _said(replace(solution, base=base), table, mine, (n, m))
     own = dict(zip(law.outputs, outputs.T, strict=True))
     return LawRecord(solution.t, force, moment, energy[:, 0], lost[:, 0], memory, own)
+
+
+def _said(solution: Any, table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
+    """The fields of the answers at all instants."""
+    rows = [table.answer[mine].copy() for _ in at_instants(solution)]
+    answers = (laws.answer_of(row, *sizes) for row in rows)
+    return [np.array(field) for field in zip(*answers, strict=True)]

@@ -7,6 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 from numba import njit
+from scipy.integrate import trapezoid
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
@@ -70,7 +71,10 @@ def test_its_record_has_forces_memory_and_outputs():
     assert np.abs(said.force[:, 0, 0]).max() == pytest.approx(YIELD)
     np.testing.assert_allclose(said.force[:, 0], -said.force[:, 1])
     np.testing.assert_allclose(said.energy, said.force[:, 0, 0] ** 2 / 2 / STIFFNESS)
-    assert set(said.outputs) == {"slip"} and said.outputs["slip"].shape == sol.t.shape
+    assert set(said.outputs) == {"slip"}
+    np.testing.assert_allclose(said.outputs["slip"][1:], np.diff(said.memory[:, 0]), atol=1e-9)
+    heat = trapezoid(said.lost, sol.t)
+    assert heat == pytest.approx(sol.energy.damping[-1], rel=1e-2) and heat > 1.0
     with pytest.raises(ConfigError, match=r"no law 'x'; there are \['damper'\]"):
         sol.law("x")
 
