@@ -183,7 +183,7 @@ def compiled_before() -> bool:
 
 
 def leave_uncompiled() -> None:
-    """Run kernels in Python from now on: they compile in half a minute, one swing takes seconds."""
+    """Run kernels in Python from now on: they compile longer than one swing takes, some seconds."""
     import numba
 
     numba.config.DISABLE_JIT = True
