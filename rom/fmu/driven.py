@@ -11,7 +11,7 @@ from rom.fmu.outputs import Outputs
 from rom.io.fmu.variables import Variable
 from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import apply_laws, laws
+from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.work import Work, workspace
@@ -60,7 +60,7 @@ class Driven:
         self.stepped = False
         self.packed: Packed = pack(mechanism)
         self.W: Work = workspace(self.packed.system, len(self.packed.signals))
-        self.laws = laws(mechanism, self.packed)
+        self.laws = self.packed.asked
         self.held = self.inputs.values.copy()
 
     @property

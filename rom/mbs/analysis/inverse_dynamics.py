@@ -10,7 +10,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, reached
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import Laws, apply_laws, laws
+from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate.consistent_start import (
     assembled,
     fitting_velocity,
@@ -63,7 +63,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
         raise failure
     W = workspace(packed.system, len(packed.signals))
     W.base[:] = state.base
-    forces = laws(mechanism, packed)
+    forces = packed.asked
     states: list[State] = []
     powers: list[Array] = []
 

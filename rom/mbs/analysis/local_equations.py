@@ -14,7 +14,7 @@ from rom.mbs.equations.equations import (
     tangents,
 )
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import Laws, apply_laws, laws
+from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
@@ -162,7 +162,7 @@ def instant(mechanism: Any, t: float) -> Instant:
     if not good:
         raise failure
     W.signal[:] = table[0]
-    return Instant(packed, W, float(t), laws(mechanism, packed))
+    return Instant(packed, W, float(t), packed.asked)
 
 
 def consistent(now: Instant, state: Any) -> State:

@@ -1,7 +1,5 @@
 """Force laws written in Python, asked between two calls of compiled code."""
 
-from typing import Any
-
 import numpy as np
 
 from rom.mbs.elements.family import Asked
@@ -10,11 +8,6 @@ from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 
 Laws = tuple[Asked, ...]
-
-
-def laws(_mechanism: Any, packed: Packed) -> Laws:
-    """The laws of a mechanism that stay in Python."""
-    return packed.asked
 
 
 def apply_laws(forces: Laws, W: Work, t: float) -> None:

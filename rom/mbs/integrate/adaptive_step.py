@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import SolverError
-from rom.mbs.equations.python_laws import apply_laws, laws
+from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate import step_control as control
 from rom.mbs.integrate.consistent_start import check_velocity
@@ -59,7 +59,7 @@ class _Run:
     """A run with its step memory; ``T`` is prepared for a next step."""
 
     def __init__(self, record: Record, W: Work, state: State):
-        self.record, self.forces = record, laws(record.mechanism, record.packed)
+        self.record, self.forces = record, record.packed.asked
         settings, signals = record.settings, len(record.packed.signals)
         self.state, duration = state, settings.t_end - settings.t_start
         bare, h = replace(state, memory=None), FIRST_STEP_RATIO * duration

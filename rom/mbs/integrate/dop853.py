@@ -12,7 +12,7 @@ from scipy.integrate import DOP853
 
 from rom.errors import SolverError
 from rom.mbs.equations.equations import evaluate, rates
-from rom.mbs.equations.python_laws import apply_laws, broken_laws, laws
+from rom.mbs.equations.python_laws import apply_laws, broken_laws
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import sampled
@@ -27,7 +27,7 @@ class Equations:
         self.record, self.W, self.rank = record, W, state.rank
         self.n_q, self.n = state.q.size, state.v.size
         self.a, self.lam = np.zeros(self.n), np.zeros(state.lam.size)
-        self.forces = laws(record.mechanism, record.packed)
+        self.forces = record.packed.asked
 
     def __call__(self, t: float, y: Array, *, accepted: bool = False) -> Array:
         """Rates at time t; ``accepted`` for a state of the motion, not a trial.

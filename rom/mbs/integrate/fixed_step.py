@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rom.errors import RomError, SolverError
-from rom.mbs.equations.python_laws import Laws, apply_laws, broken_laws, laws
+from rom.mbs.equations.python_laws import Laws, apply_laws, broken_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.event_end import kept_before_the_end
 from rom.mbs.integrate.events import Noted
@@ -26,7 +26,7 @@ LARGEST_CHUNK = 4096
 
 def run_implicit(record: Record, W: Work, state: State) -> None:
     """Fill the record by generalised-alpha or BDF with steps of one length."""
-    forces, settings = laws(record.mechanism, record.packed), record.settings
+    forces, settings = record.packed.asked, record.settings
     step, state = begin(record, W, state, forces, settings.h)
     alpha.advance.link()
     record.start(state, step.work)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.mbs.equations.equations import evaluate, residual
-from rom.mbs.equations.python_laws import apply_laws, laws
+from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.kernels.work import Work, workspace
 from rom.model import Array
 
@@ -30,7 +30,7 @@ def marker_loads(solution: Any) -> tuple[Array, Array]:
 def at_instants(solution: Any) -> Iterator[Work]:
     """The memory after the equations of motion were evaluated at each instant, one by one."""
     packed, system = solution.packed, solution.packed.system
-    W, forces = workspace(system, len(packed.signals)), laws(solution.mechanism, packed)
+    W, forces = workspace(system, len(packed.signals)), packed.asked
     rows = zip(
         *(solution.t, solution.q, solution.v, solution.a, solution.lam),
         *(solution.signals, solution.base),
