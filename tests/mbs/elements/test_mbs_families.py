@@ -1,5 +1,7 @@
 """A family and a law that are in no list of the package take part in everything."""
 
+import os
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +10,7 @@ from scipy.integrate import trapezoid
 
 import rom
 from cases.mbs.mechanisms import simulate_quietly
+from cases.paths import ROOT
 from rom.mbs.elements.family import Family, integers, rows_of
 from rom.mbs.kernels.algebra import row, sub
 from rom.mbs.kernels.constraints import pair_stiffness, place_relative
@@ -207,3 +210,21 @@ def test_a_run_that_was_saved_goes_on_to_the_same_bits(add, tmp_path):
 def test_a_wrong_tangent_would_cost_newton_passes(add):
     sol = simulate_quietly(bob(add), t_end=0.2, dt=1e-2)
     assert sol.statistics["iterations"] <= 2.5 * sol.statistics["steps"]
+
+
+@pytest.mark.parametrize("name", ["add_family", "add_law", "add_python_law"])
+def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
+    fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
+    monkeypatch.setenv("ROM_PYTHON", sys.executable)
+    script = tmp_path / "bob.py"
+    script.write_text(
+        f"from test_mbs_families import bob, {name}\ndef mechanism():\n    return bob({name})\n"
+    )
+    archive = rom.write_fmu(script, tmp_path / "bob.fmu", outputs=["bob.c"], dt=1e-3,
+                            files=[__file__])  # fmt: skip
+    output = [f"bob.c.position[{k}]" for k in (1, 2, 3)]
+    found = fmpy.simulate_fmu(str(archive), stop_time=0.1, step_size=1e-2, output_interval=1e-2,
+                              fmi_type="CoSimulation", output=output)  # fmt: skip
+    place = np.column_stack([found[name] for name in output])
+    np.testing.assert_allclose(place, exact(found["time"]), atol=6e-5)
