@@ -244,7 +244,7 @@ def measured(name: str) -> dict[str, Any]:
     """Do a case; functions compiled and time of the processor [s], with that of imports."""
     began = process_time()
     CASES[name]()
-    from rom.mbs.kernels.cache import COMPILED_FUNCTIONS
+    from rom.mbs.compiler.cache import COMPILED_FUNCTIONS
 
     count = len(COMPILED_FUNCTIONS)
     COMPILED_FUNCTIONS.clear()

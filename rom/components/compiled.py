@@ -6,8 +6,8 @@ from numba import njit
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
+from rom.mbs.compiler.cache import guard, kept
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE, Elements
-from rom.mbs.kernels.cache import guard, kept
 from rom.mbs.kernels.compiled import INNER_OPTIONS, OPTIONS
 from rom.model import Array, Index
 

@@ -17,7 +17,7 @@ USED = """
 import importlib, pkgutil
 import rom.components, rom.mbs
 from rom.bench.first_use import CASES
-from rom.mbs.kernels.cache import CODE_FILES
+from rom.mbs.compiler.cache import CODE_FILES
 modules = [importlib.import_module(module.name) for package in (rom.mbs, rom.components)
            for module in pkgutil.walk_packages(package.__path__, package.__name__ + ".")]
 for case in CASES.values():

@@ -210,7 +210,7 @@ def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeyp
 
 TOY = """
 import os, pathlib, sys, time
-from rom.mbs.kernels.cache import COMPILED_FUNCTIONS
+from rom.mbs.compiler.cache import COMPILED_FUNCTIONS
 from rom.mbs.kernels.compiled import inner, kernel
 
 @inner
@@ -256,7 +256,7 @@ def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_ke
 
 
 BROKEN = """
-from rom.mbs.kernels.cache import CODE_FILES
+from rom.mbs.compiler.cache import CODE_FILES
 from rom.mbs.kernels.compiled import kernel
 
 @kernel

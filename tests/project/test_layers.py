@@ -169,6 +169,7 @@ ORDER = {
         "ours",
     ),
     "mbs": (
+        "compiler",
         "kernels",
         "parts",
         "elements",
@@ -184,6 +185,8 @@ ORDER = {
         "springs",
         "rotational_springs",
         "loads",
+        "law_calls",
+        "laws_in_python",
         "laws",
         "motors",
         "frictions",

@@ -9,7 +9,8 @@ import numpy as np
 from rom import rotation
 from rom.arguments import typed
 from rom.errors import ConfigError
-from rom.mbs.elements.laws import ENERGY_SIZE, MOTION_SIZE, Law, UserForce, answer_of, motion_of
+from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, motion_of
+from rom.mbs.elements.laws import Law, UserForce
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Mask, Report, Row
 

@@ -1,8 +1,8 @@
 """Elements of force, one family in one file: as users describe them, their arrays and kernels.
 
 `family` says what a family is. There are `springs`, `rotational_springs`, `loads`, `motors`,
-`frictions`, `stops`, `bushings`, `spread_loads`, `nonlinear` bodies, and `laws` of the user;
-`contact` has a folder of its own.
+`frictions`, `stops`, `bushings`, `spread_loads`, `nonlinear` bodies, and `laws` of the user, with
+`law_calls` and `laws_in_python`; `contact` has a folder of its own.
 """
 
 from rom.lazy import front

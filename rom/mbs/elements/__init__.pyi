@@ -4,7 +4,7 @@ from rom.mbs.elements.bushings import Curves as Curves
 from rom.mbs.elements.contact.points import Contact as Contact
 from rom.mbs.elements.family import Family as Family
 from rom.mbs.elements.family import Places as Places
-from rom.mbs.elements.laws import Answer as Answer
+from rom.mbs.elements.law_calls import Answer as Answer
+from rom.mbs.elements.law_calls import Motion as Motion
 from rom.mbs.elements.laws import Law as Law
-from rom.mbs.elements.laws import Motion as Motion
 from rom.mbs.elements.spread_loads import Spread as Spread

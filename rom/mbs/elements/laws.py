@@ -20,13 +20,11 @@ A law that is asked twice at one instant must give the same answer twice; forces
 also when it then finds the memory that it wrote itself the first time.
 """
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
@@ -36,6 +34,8 @@ from numba.extending import intrinsic
 from rom.arguments import finite
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers
+from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, entries
+from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
 from rom.mbs.kernels.algebra import add, cross, scale, unit
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
@@ -51,70 +51,11 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.foreign import ask, numbers, why_not_compiled
 from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
 
-MOTION_SIZE = 18  # numbers of the motion of a marker
-ENERGY_SIZE = 2  # stored energy, lost power
 # steps of the differences of laws [m and rad], [m/s and rad/s], both relative to one plus the value
 DIFFERENCE_STEP = 1e-6
-PAIR_TEXT = "two vectors of three numbers: force and moment"
-# as numba.cfunc takes it
-LAW_TYPES = "void(f8, CPointer(f8), CPointer(f8), CPointer(f8), CPointer(f8))"
-
-
-class Motion(NamedTuple):
-    """How K markers move, in the world.
-
-    Attributes:
-        position: (K, 3) [m].
-        axes: (K, 3, 3) axes of each marker as columns.
-        velocity: (K, 3) [m/s].
-        omega: (K, 3) angular velocity [rad/s].
-    """
-
-    position: Any
-    axes: Any
-    velocity: Any
-    omega: Any
-
-
-class Answer(NamedTuple):
-    """What a law says; zeros where it leaves a field alone, and the old memory.
-
-    Attributes:
-        force: (K, 3) on each marker, world [N].
-        moment: (K, 3) about each marker, world [N m].
-        energy: (1,) stored [J].
-        lost: (1,) power turned into heat [W].
-        memory: (m,) to be remembered when the step is accepted.
-        outputs: (o,) values for the record.
-    """
-
-    force: Any
-    moment: Any
-    energy: Any
-    lost: Any
-    memory: Any
-    outputs: Any
-
-
-@dataclass(frozen=True, slots=True)
-class MarkerMotion:
-    """How a marker moves.
-
-    Attributes:
-        position: (3,) world [m].
-        axes: (3, 3) orientation of the marker, to world.
-        velocity: (3,) world [m/s].
-        omega: (3,) angular velocity, world [rad/s].
-    """
-
-    position: Array
-    axes: Array
-    velocity: Array
-    omega: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,8 +130,8 @@ def law(  # noqa: PLR0913  one keyword per property
     given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
     kept = finite(f"memory of {name}", memory, (np.size(memory),))
     sizes = len(markers), kept.size, len(outputs)
-    entries = _entries(name, (function, tangents), (given.size, *sizes), compiled)
-    element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, entries)
+    called = entries(name, (function, tangents), (given.size, *sizes), compiled)
+    element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)
     self.add(name, element, FAMILY)
 
 
@@ -203,93 +144,14 @@ def user_force(
 ) -> None:
     """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
-    ``a`` and ``b`` are `rom.mbs.elements.laws.MarkerMotion`. The function returns (force, moment)
-    in the world that act on the first marker; the reaction, at the same place in space, acts on the
-    body of the second one, so that momentum is conserved whatever the law.
+    ``a`` and ``b`` are `rom.mbs.elements.laws_in_python.MarkerMotion`. The function returns
+    (force, moment) in the world that act on the first marker; the reaction, at the same place in
+    space, acts on the body of the second one, so that momentum is conserved whatever the law.
     """
     markers = (m1,) if m2 is None else (m1, m2)
     none = np.zeros(0)
     element = UserForce(function, None, markers, none, none, (), False, (None, None))
     self.add(name, element, FAMILY)
-
-
-def motion_of(flat: Any, n: int) -> Motion:
-    """The fields of the motion of n markers in a vector (18 n,)."""
-    return Motion(
-        flat[: 3 * n].reshape(n, 3),
-        flat[3 * n : 12 * n].reshape(n, 3, 3),
-        flat[12 * n : 15 * n].reshape(n, 3),
-        flat[15 * n : 18 * n].reshape(n, 3),
-    )
-
-
-def answer_of(flat: Any, n: int, n_memory: int) -> Answer:
-    """The fields of the answer of a law of n markers in a vector."""
-    at = 6 * n + ENERGY_SIZE
-    return Answer(
-        flat[: 3 * n].reshape(n, 3),
-        flat[3 * n : 6 * n].reshape(n, 3),
-        flat[6 * n : 6 * n + 1],
-        flat[6 * n + 1 : at],
-        flat[at : at + n_memory],
-        flat[at + n_memory :],
-    )
-
-
-def _entries(name: str, laws: Any, sizes: Any, wanted: bool | None) -> tuple[Any, Any]:
-    """Law and tangents as functions of C; None for what is missing or left to Python."""
-    function, slopes = laws
-    entry = _compiled(name, function, sizes, wanted)
-    if slopes is None or entry is None:
-        return entry, None
-    return entry, _compiled(name, slopes, sizes, True, tangents=True)
-
-
-def _compiled(
-    name: str, function: Any, sizes: Any, wanted: bool | None, *, tangents: bool = False
-) -> Any:
-    if hasattr(function, "address"):
-        return function
-    if wanted is False:
-        return None
-    python = getattr(function, "py_func", function)
-    try:
-        if not inspect.isfunction(python):
-            raise TypeError("not a plain function")
-        return entry_of(numba.njit(python), sizes, tangents=tangents)
-    except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
-        if not wanted:
-            return None
-        raise ConfigError(
-            f"law {name!r} cannot be compiled: {why_not_compiled(error)}",
-            hint="Use numbers and arrays of NumPy only, or compiled=False.",
-        ) from error
-
-
-def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool = False) -> Any:
-    """A function of C that calls a compiled law with its arguments in their shapes.
-
-    Args:
-        function: compiled by Numba.
-        sizes: numbers of parameters, markers, remembered numbers, outputs.
-        tangents: whether it is that of the tangents.
-    """
-    p, n, m, o = sizes
-    taken, answered = numba.njit(motion_of), numba.njit(answer_of)
-    n_motion, n_answer, n_rows = MOTION_SIZE * n, 6 * n + ENERGY_SIZE + m + o, 6 * n
-    carray = numba.carray
-
-    def law(t, parameters, motion, memory, out):
-        given, kept = carray(parameters, p), carray(memory, m)
-        moved = taken(carray(motion, n_motion), n)
-        function(t, given, moved, kept, answered(carray(out, n_answer), n, m))
-
-    def slopes(t, parameters, motion, memory, out):
-        given, kept = carray(parameters, p), carray(memory, m)
-        moved, D = taken(carray(motion, n_motion), n), carray(out, (2, n_rows, n_rows))
-        function(t, given, moved, kept, D[0], D[1])
-
-    return numba.cfunc(LAW_TYPES)(slopes if tangents else law)
 
 
 @table
@@ -536,55 +398,10 @@ def law_energy(s, W, laws, _q, _v):
     return total
 
 
-@dataclass(frozen=True, slots=True)
-class AskedLaw:
-    """A law that stays in Python, and its number."""
-
-    name: str
-    law: Law
-    e: int
-    laws: Laws
-    followed: int
-
-    def apply(self, W: Any, t: float) -> None:
-        """Let it answer for the motion at hand."""
-        e, packed, n, m = self.e, self.laws, *self.law.sizes[:2]
-        flat = packed.answer[packed.answer_at[e] : packed.answer_at[e + 1]]
-        flat[:] = 0.0
-        out = answer_of(flat, n, m)
-        if isinstance(self.law, UserForce):
-            return self._push_back(W, t, out)
-        begin = self.followed + packed.memory_at[e]
-        memory = W.base[begin : begin + m].copy()
-        out.memory[:] = memory
-        at = packed.marker[e, :n]
-        motion = Motion(W.P[at], W.E[at], W.V[at, :3], W.V[at, 3:])
-        what = f"law {self.name!r}"
-        ask(what, t, self.law.function, t, self.law.parameters.copy(), motion, memory, out)
-        numbers(what, t, flat, flat.shape, "finite numbers")
-        return None
-
-    def _push_back(self, W: Any, t: float, out: Answer) -> None:
-        """Force and moment on the first marker, and what that does to the second."""
-        at = self.laws.marker[self.e, : len(self.law.markers)]
-        a, *others = (_motion_at(W, m) for m in at)
-        what = f"user force {self.name!r}"
-        answer = ask(what, t, self.law.function, t, a, *others)
-        out.force[0], out.moment[0] = numbers(what, t, answer, (2, 3), PAIR_TEXT)
-        for b in others:
-            out.force[1] = -out.force[0]
-            out.moment[1] = -out.moment[0] - np.cross(a.position - b.position, out.force[0])
-
-
-def _motion_at(W: Any, m: int) -> MarkerMotion:
-    """Motion of marker m at the state of the last evaluation."""
-    return MarkerMotion(W.P[m].copy(), W.E[m].copy(), W.V[m, :3].copy(), W.V[m, 3:].copy())
-
-
 def asked(laws: Mapping[str, Law], packed: Laws, followed: int) -> list[AskedLaw]:
     """The laws that are not compiled."""
     return [
-        AskedLaw(name, law, e, packed, followed)
+        (AskedForce if isinstance(law, UserForce) else AskedLaw)(name, law, e, packed, followed)
         for e, (name, law) in enumerate(laws.items())
         if law.compiled[0] is None
     ]

@@ -3,6 +3,5 @@
 `system` and `plan` are the arrays, in `tables`, `work` what is computed of them; `stages` are
 compiled alone, and so are kernels of elements, by `element_calls`; `algebra` has small matrices,
 `inertia` with its `integrals`, `second_order`, `markers`, `constraints`, `rolling` and
-`coordinates` the mechanics; `compiled` is the compiler, `cache` keeps what it makes;
-`intermediate` compiles what kernels take in.
+`coordinates` the mechanics; `compiled` makes kernels of functions.
 """

@@ -1,9 +1,9 @@
-"""The compiler of the kernels; `rom.mbs.kernels.cache` keeps what it makes."""
+"""The compiler of the kernels; `rom.mbs.compiler.cache` keeps what it makes."""
 
 import numba
 
-from rom.mbs.kernels.cache import kept
-from rom.mbs.kernels.intermediate import IntermediateCompiler
+from rom.mbs.compiler.cache import kept
+from rom.mbs.compiler.intermediate import IntermediateCompiler
 
 # reassociation lets sums be vectorised; NaN and infinity keep their meaning. No kernel makes an
 # array, so none counts references to them: a step took four times as long when all did

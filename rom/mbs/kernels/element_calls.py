@@ -12,7 +12,7 @@ from numba import config, njit, types
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.kernels.cache import kept
+from rom.mbs.compiler.cache import kept
 from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.kernels.stages import REAL_VECTOR, address_of, call_at
 from rom.mbs.kernels.system import System

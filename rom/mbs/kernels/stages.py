@@ -17,7 +17,7 @@ from numba.core.errors import TypingError
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
-from rom.mbs.kernels.cache import CODE_FILES, EXPECTED_FUNCTIONS, kept
+from rom.mbs.compiler.cache import CODE_FILES, EXPECTED_FUNCTIONS, kept
 from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.kernels.tables import TABLE_WORD
 

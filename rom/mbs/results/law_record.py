@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.mbs.elements import laws
+from rom.mbs.elements.law_calls import answer_of
 from rom.mbs.results.interface_loads import at_instants
 from rom.model import Array
 
@@ -50,5 +51,5 @@ def law_record(solution: Any, name: str) -> LawRecord:
 def _said(solution: Any, table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
     """The fields of the answers at all instants."""
     rows = [table.answer[mine].copy() for _ in at_instants(solution)]
-    answers = (laws.answer_of(row, *sizes) for row in rows)
+    answers = (answer_of(row, *sizes) for row in rows)
     return [np.array(field) for field in zip(*answers, strict=True)]

@@ -11,8 +11,9 @@ from numba import njit
 
 from cases.command import environment
 from cases.paths import ROOT
-from rom.mbs.kernels import cache, compiled, stages
-from rom.mbs.kernels.cache import CodeFiles
+from rom.mbs.compiler import cache
+from rom.mbs.compiler.cache import CodeFiles
+from rom.mbs.kernels import compiled, stages
 
 OUTER = """
 from rom.toy.inner import SIZE, inside

@@ -25,8 +25,8 @@ from rom.process.patience import Patience
 from rom.process.turns import Turns
 
 IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
-# in sources of kernels, and the folder of what they contain: constants and layouts
-KERNEL_MARK, LAYOUT_FOLDER = b"compiled import", "kernels"
+# in sources of kernels, and the folders of what they contain and are made by
+KERNEL_MARK, LAYOUT_FOLDERS = b"compiled import", {"kernels", "compiler"}
 COMPILE_RATE = 2.5e-4  # [s] of compiling per byte of functions in Python; 2.3e-4 measured
 COMPILE_TURNS, COMPILE_PATIENCE = Turns(), Patience(COMPILE_RATE)
 AHEAD_HINT = "rom doctor --compile compiles all ahead"
@@ -225,4 +225,4 @@ def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
 
 @functools.cache
 def _has_kernels(path: Path) -> bool:
-    return path.parent.name == LAYOUT_FOLDER or KERNEL_MARK in path.read_bytes()
+    return path.parent.name in LAYOUT_FOLDERS or KERNEL_MARK in path.read_bytes()
