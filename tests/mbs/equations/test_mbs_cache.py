@@ -250,3 +250,30 @@ def test_kernels_copy_arrays_and_count_no_references():
     np.testing.assert_allclose(total, x[1, 0].sum(), rtol=1e-14)
     code = next(iter(spread.inspect_llvm().values()))
     assert code.count("call void @NRT_") == 0
+
+
+def test_functions_that_only_kernels_call_are_part_of_them_with_their_errors():
+    """They have no machine code of their own: Numba keeps none, and links what each one calls."""
+
+    @compiled.inner
+    def root(x):
+        if x < 0.0:
+            raise ValueError("no root of what is below zero")
+        return x**0.5
+
+    @compiled.inner
+    def distance(x, y):
+        return root(x * x + y * y) - root(x)
+
+    @njit(**compiled.OPTIONS | {"cache": False})
+    def both(x, y):
+        return distance(x, y) + root(x)
+
+    assert both(9.0, 12.0) == 15.0
+    with pytest.raises(ValueError, match="no root of what is below zero"):
+        both(-1.0, 1.0)
+    assert not any(
+        cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name)
+        for function in (root, distance)
+        for cres in function.overloads.values()
+    )
