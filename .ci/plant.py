@@ -1,0 +1,140 @@
+"""Plant a wrong sign and a wrong factor in every file of kernels, and see whether a test turns red.
+
+``.venv/bin/python .ci/plant.py [PART OF A PATH ...] [--seed N] [--per-file N]`` copies the package,
+changes one operator or number at a time in compiled functions of the copy, and runs the tests that
+belong to the file until one fails. Survivors are listed at the end with their lines; exit code 1 if
+there are any. Hours for all files, minutes for one.
+"""
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+DECORATORS = ("inner", "kernel", "spliced", "stage", "residuals", "tangents", "energy", "law",
+              "multiplier_columns")  # fmt: skip
+# {part of a path: test files and folders that belong to it, the likeliest first}
+TESTS = {
+    "rom/mbs/elements/contact": ["tests/mbs/elements/test_mbs_contact.py"],
+    "rom/mbs/elements/laws": ["tests/mbs/elements/test_mbs_laws.py"],
+    "rom/mbs/elements/bushings": ["tests/mbs/elements/test_mbs_bushings.py"],
+    "rom/mbs/elements/spread": ["tests/mbs/elements/test_mbs_spread_loads.py"],
+    "rom/mbs/elements/nonlinear": ["tests/components/cosserat"],
+    "rom/mbs/elements/": ["tests/mbs/elements/test_mbs_joint_forces.py", "tests/mbs"],
+    "rom/mbs/kernels/second_order": ["tests/mbs/published/test_mbs_stiffening.py"],
+    "rom/mbs/integrate/step_control": ["tests/mbs/integrate/test_mbs_adaptive.py"],
+    "rom/mbs/integrate/": ["tests/mbs/integrate"],
+    "rom/mbs/": ["tests/mbs/equations", "tests/mbs/joints", "tests/mbs/published", "tests/mbs"],
+}
+
+
+def files() -> list[Path]:
+    """All files with compiled functions."""
+    return sorted(p for p in (ROOT / "rom").rglob("*.py") if any(places(p.read_text())))
+
+
+def places(text: str) -> tuple[list[ast.AST], list[ast.AST]]:
+    """Sums and differences, and products, of compiled functions, indices left out."""
+    signs: list[ast.AST] = []
+    factors: list[ast.AST] = []
+    for function in ast.walk(ast.parse(text)):
+        if not isinstance(function, ast.FunctionDef) or not _compiled(function):
+            continue
+        indices = {id(x) for node in ast.walk(function) if isinstance(node, ast.Subscript)
+                   for x in ast.walk(node.slice)}  # fmt: skip
+        for node in ast.walk(function):
+            if isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Add | ast.Sub):
+                signs += [node] if _real(node.value) else []
+            if not isinstance(node, ast.BinOp) or id(node) in indices:
+                continue
+            if isinstance(node.op, ast.Add | ast.Sub) and _real(node):
+                signs.append(node)
+            elif isinstance(node.op, ast.Mult | ast.Div) and _real(node):
+                factors.append(node)
+    return signs, factors
+
+
+def _compiled(function: ast.FunctionDef) -> bool:
+    named = {x.id for d in function.decorator_list for x in ast.walk(d) if isinstance(x, ast.Name)}
+    return bool(named & set(DECORATORS))
+
+
+def _real(node: ast.AST) -> bool:
+    """Not a count: whole numbers alone count."""
+    numbers = [x.value for x in ast.walk(node) if isinstance(x, ast.Constant)]
+    return not numbers or any(isinstance(x, float) for x in numbers)
+
+
+def planted(text: str, node: Any) -> str:
+    """The text with the sign of the right side turned, or a product doubled."""
+    lines = text.splitlines(keepends=True)
+
+    def at(line: int, column: int) -> int:
+        before = sum(len(x) for x in lines[: line - 1])
+        return before + len(lines[line - 1].encode()[:column].decode())
+
+    begin, end = at(node.lineno, node.col_offset), at(node.end_lineno, node.end_col_offset)
+    mark = {ast.Add: "-", ast.Sub: "+"}.get(type(node.op))
+    if isinstance(node, ast.AugAssign):
+        value = ast.get_source_segment(text, node.value)
+        return f"{text[:begin]}{ast.unparse(node.target)} {mark}= ({value}){text[end:]}"
+    left, right = ast.get_source_segment(text, node.left), ast.get_source_segment(text, node.right)
+    changed = f"(({left}) {mark} ({right}))" if mark else f"(2.0 * ({ast.unparse(node)}))"
+    return text[:begin] + changed + text[end:]
+
+
+def tests_of(path: str) -> list[str]:
+    """The tests that belong to a file."""
+    if path.startswith("rom/components/"):
+        return [f"tests/components/{path.split('/')[2]}"]
+    return next((tests for part, tests in TESTS.items() if path.startswith(part)), ["tests"])
+
+
+def survives(path: str, text: str) -> bool:
+    """Whether the tests of a file stay green with another text in its place."""
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "rom", Path(folder) / "rom")
+        Path(folder, path).write_text(text)
+        for test in tests_of(path):
+            command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", test]
+            environment = os.environ | {"PYTHONPATH": folder}
+            done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True,
+                                  timeout=1800, check=False)  # fmt: skip
+            if done.returncode:
+                return False
+    return True
+
+
+def main() -> int:
+    """Plant, run, and list what nobody noticed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", help="of paths; all files of kernels without any")
+    parser.add_argument("--seed", type=int, default=0, help="of the choice of places")
+    parser.add_argument("--per-file", type=int, default=1, help="signs and factors in each file")
+    given, survivors, total = parser.parse_args(), [], 0
+    for path in files():
+        name, text = str(path.relative_to(ROOT)), path.read_text()
+        if given.parts and not any(part in name for part in given.parts):
+            continue
+        for kind, nodes in zip(("sign", "factor"), places(text), strict=True):
+            chosen = random.Random(f"{given.seed} {name} {kind}")  # the same ones each time
+            for node in chosen.sample(nodes, min(given.per_file, len(nodes))):
+                total += 1
+                alive = survives(name, planted(text, node))
+                line = f"{name}:{node.lineno}: {kind} of {ast.unparse(node)}"
+                sys.stdout.write(f"{'SURVIVES' if alive else 'red     '} {line}\n")
+                sys.stdout.flush()
+                survivors += [line] if alive else []
+    sys.stdout.write(f"{total} planted, {len(survivors)} survive\n")
+    return int(bool(survivors))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
