@@ -103,7 +103,17 @@ def survives(path: str, text: str) -> bool:
         shutil.copytree(ROOT / "rom", Path(folder) / "rom")
         Path(folder, path).write_text(text)
         for test in tests_of(path):
-            command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", test]
+            command = [
+                sys.executable,
+                "-P",
+                "-m",
+                "pytest",
+                "-q",
+                "-x",
+                "-p",
+                "no:cacheprovider",
+                test,
+            ]
             environment = os.environ | {"PYTHONPATH": folder}
             done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True,
                                   timeout=1800, check=False)  # fmt: skip

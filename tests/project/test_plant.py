@@ -1,0 +1,51 @@
+"""The script that plants errors in kernels finds all of them, and plants what it says."""
+
+import ast
+import sys
+
+import pytest
+
+from cases.paths import ROOT
+
+sys.path.insert(0, str(ROOT / ".ci"))
+import plant
+
+SOURCE = """
+@inner
+def f(x, k, out):
+    out[k + 1] += 2.0 * x - x[k - 1] / 3.0
+    return k + 1
+
+def g(x):
+    return x + x
+"""
+
+
+def test_it_finds_signs_and_factors_of_compiled_functions_alone():
+    found = [[ast.unparse(node) for node in nodes] for nodes in plant.places(SOURCE)]
+    assert found == [
+        ["out[k + 1] += 2.0 * x - x[k - 1] / 3.0", "2.0 * x - x[k - 1] / 3.0"],
+        ["2.0 * x", "x[k - 1] / 3.0"],
+    ]
+
+
+def test_it_plants_one_thing():
+    signs, factors = plant.places(SOURCE)
+    changed = [plant.planted(SOURCE, node) for node in (*signs, *factors)]
+    lines = [text.splitlines()[3].strip() for text in changed]
+    assert lines == [
+        "out[k + 1] -= (2.0 * x - x[k - 1] / 3.0)",
+        "out[k + 1] += ((2.0 * x) + (x[k - 1] / 3.0))",
+        "out[k + 1] += (2.0 * (2.0 * x)) - x[k - 1] / 3.0",
+        "out[k + 1] += 2.0 * x - (2.0 * (x[k - 1] / 3.0))",
+    ]
+
+
+@pytest.mark.parametrize("path", plant.files(), ids=lambda path: path.stem)
+def test_what_it_plants_is_python_and_has_tests(path):
+    text = path.read_text()
+    for nodes in plant.places(text):
+        for node in nodes[:1] + nodes[-1:]:
+            assert ast.dump(ast.parse(plant.planted(text, node))) != ast.dump(ast.parse(text))
+    name = str(path.relative_to(ROOT))
+    assert all((ROOT / test).exists() for test in plant.tests_of(name)), name
