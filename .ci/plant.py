@@ -112,6 +112,8 @@ def survives(path: str, text: str) -> bool:
                 "-x",
                 "-p",
                 "no:cacheprovider",
+                "-o",
+                f"pythonpath={folder} tests",
                 test,
             ]
             environment = os.environ | {"PYTHONPATH": folder}
