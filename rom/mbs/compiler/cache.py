@@ -213,14 +213,16 @@ def _collect(source: Path, found: set[Path]) -> None:
 
 @functools.cache
 def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
-    """The text of a source, and the files with kernels or layouts that it imports."""
+    """The text of a source, and the files with kernels, layouts or constants that it imports."""
     text = source.read_bytes()
-    paths = set()
+    paths, built_in = set(), set()
     for module, names in IMPORTS.findall(text):
-        place = PACKAGE.joinpath(*module.decode().split(".")[1:])
-        paths |= {place / f"{name.decode()}.py" for name in re.findall(rb"\w+", names)}
-        paths.add(place.with_suffix(".py"))
-    return text, tuple(sorted(path for path in paths if path.is_file() and _has_kernels(path)))
+        place, words = PACKAGE.joinpath(*module.decode().split(".")[1:]), re.findall(rb"\w+", names)
+        paths |= {place / f"{word.decode()}.py" for word in words} | {place.with_suffix(".py")}
+        if any(word.isupper() for word in words):
+            built_in.add(place.with_suffix(".py"))
+    found = (path for path in paths if path.is_file() and (path in built_in or _has_kernels(path)))
+    return text, tuple(sorted(found))
 
 
 @functools.cache

@@ -30,11 +30,12 @@ if __name__ == "__main__":
 INNER = """
 from rom.mbs.kernels.compiled import inner
 from rom.toy.plain import UNITS
+from rom.toy.words import told
 SIZE = {size}
 
 @inner
 def inside(x):
-    return x + {added}
+    return x + {added} * UNITS
 """
 
 
@@ -52,7 +53,7 @@ def place_for_code(where, tmp_path, toy):
 
 @pytest.mark.parametrize("where", ["beside", "own folder", "of the user", "nowhere"])
 def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
-    """A constant and a function built in from another file; a file without kernels is no source."""
+    """Constants and a function built in from other files; a file that gives none is no source."""
     package = tmp_path / "rom"
     shutil.copytree(ROOT / "rom", package, ignore=shutil.ignore_patterns("__pycache__"))
     toy = package / "toy"
@@ -62,8 +63,9 @@ def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     env |= place_for_code(where, tmp_path, toy)
     kept = "0" if where == "nowhere" else "1"
 
-    def answer(size, added, more="", units=1):
+    def answer(size, added, more="", units=1, told=1):
         (toy / "plain.py").write_text(f"UNITS = {units}")
+        (toy / "words.py").write_text(f"told = {told}")
         (toy / "inner.py").write_text(INNER.format(size=size, added=added))
         (toy / "outer.py").write_text(OUTER.format(more=more))
         done = subprocess.run([sys.executable, "-m", "rom.toy.outer"], env=env, cwd=tmp_path,
@@ -72,7 +74,8 @@ def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
 
     assert answer(2, 1) == ["4.0", "0"]
     assert answer(2, 1) == ["4.0", kept]
-    assert answer(2, 1, units=5) == ["4.0", kept]
+    assert answer(2, 1, told=5) == ["4.0", kept]
+    assert answer(2, 1, units=5) == ["12.0", "0"]
     assert answer(3, 1) == ["6.0", "0"]
     assert answer(3, 2) == ["9.0", "0"]
     assert answer(3, 2, more="# text") == ["9.0", "0"]
