@@ -66,9 +66,16 @@ class Instant:
         apply_laws(self.laws, self.W, self.t)
 
     def residual(self, q: Array, v: Array, a: Array, lam: Array) -> Array:
-        """(n,) equations of motion M a + h - Q + G^T lam."""
+        """(n,) equations of motion M a + h - Q + G^T lam.
+
+        Raises:
+            SolverError: naming the law of a user that gives no finite number.
+        """
         self.evaluate(q, v)
         residual(self.system, self.W, q, v, a, lam)
+        if self.packed.broken_laws:
+            what = f"no forces at t = {self.t:.9g} s{self.packed.broken_laws}."
+            raise SolverError(what, hint="rom.check_law looks for what is wrong with it.")
         return self.W.residual.copy()
 
     def gradient(self, q: Array, v: Array) -> tuple[Array, Array, Array]:

@@ -7,6 +7,7 @@ processes one compiles what the others wait for, and who waits is told so.
 """
 
 import functools
+import gc
 import hashlib
 import os
 import re
@@ -148,13 +149,20 @@ _under_way: list[Any] = []  # functions that are compiled, each for the one befo
 
 @contextmanager
 def _at_work(function: Any) -> Iterator[None]:
-    """Around a compilation, within which others may be; when all have ended, nothing is held."""
+    """Around a compilation, within which others may be; when all have ended, nothing is held.
+
+    Numba makes many small objects and no circles of them: to look for such takes 2 s of 15.
+    """
     with global_compiler_lock:
+        collects = gc.isenabled()
+        gc.disable()
         _under_way.append(function)
         try:
             yield
         finally:
             _under_way.pop()
+            if collects:
+                gc.enable()
             if not _under_way:
                 COMPILE_TURNS.end_all()
                 COMPILE_PATIENCE.end()

@@ -42,6 +42,7 @@ class Packed:
         length: size of the mechanism [m].
         mass: total mass [kg].
         elements: {family: its table}, in the order of the arrays.
+        element_names: {family: names of its elements}.
         asked: laws that stay in Python.
     """
 
@@ -55,6 +56,7 @@ class Packed:
     length: float
     mass: float
     elements: dict[Family, Any]
+    element_names: dict[Family, tuple[str, ...]]
     asked: tuple[Asked, ...]
 
     @property
@@ -67,6 +69,17 @@ class Packed:
         """Constraint rows whose multipliers forces depend on."""
         rows = [family.loaded_rows(table) for family, table in self.elements.items()]
         return np.concatenate([np.zeros(0, dtype=np.int64), *rows])
+
+    @property
+    def broken_laws(self) -> str:
+        """In words, the laws of users that gave no finite number when asked last."""
+        names = [
+            name
+            for family, table in self.elements.items()
+            for name, answer in zip(self.element_names[family], family.answers(table), strict=False)
+            if not np.isfinite(answer).all()
+        ]
+        return f"; the law of {', '.join(map(repr, names))} gives no finite number" if names else ""
 
     @property
     def by_rate(self) -> bool:
@@ -148,6 +161,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         max([_length(parts), *(whole.reach for whole in mechanism.nonlinear.values())]),
         sum(part.mass for part in parts),
         elements,
+        {family: tuple(found) for family, found in families.items()},
         tuple(
             law
             for family, found in families.items()

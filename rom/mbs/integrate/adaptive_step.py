@@ -183,7 +183,8 @@ class _Run:
         if answer != control.TOO_SHORT:
             fits = count[control.STAGE] == control.FITS
             where = f"at t = {t:.9g} s" if fits else "where constraints are met"
-            return SolverError(f"the equations of motion are singular {where}.")
+            broken = record.packed.broken_laws
+            return SolverError(f"the equations of motion are singular {where}{broken}.")
         why = f"its error is {error:.3g} times the tolerance"
         if count[control.ANSWER] != alpha.CONVERGED:
             why = failed_step(record, self.W, self.T, int(count[control.ANSWER]), t).message

@@ -82,7 +82,8 @@ def with_accelerations(packed: Packed, W: Work, state: State) -> State:
     a, lam = np.zeros(state.v.size), np.zeros(state.lam.size)
     y = np.concatenate([state.q, state.v, np.zeros(3)])
     if not rates(packed.system, W, y, state.rank, True, a, lam, np.zeros_like(y)):
-        raise SolverError(f"the equations of motion are singular at t = {state.t:.9g} s.")
+        where = f"at t = {state.t:.9g} s{packed.broken_laws}"
+        raise SolverError(f"the equations of motion are singular {where}.")
     return replace(state, a=a, lam=lam, base=W.base.copy())
 
 

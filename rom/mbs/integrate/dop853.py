@@ -12,7 +12,7 @@ from scipy.integrate import DOP853
 
 from rom.errors import SolverError
 from rom.mbs.equations.equations import evaluate, rates
-from rom.mbs.equations.python_laws import apply_laws, broken_laws
+from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import sampled
@@ -53,8 +53,8 @@ class Equations:
         solved = rates(packed.system, self.W, y, self.rank, accepted, self.a, self.lam, out)
         self.record.compiled += perf_counter() - clock
         if not solved or not np.isfinite(out).all():
-            broken = broken_laws(self.record.mechanism, packed)
-            raise SolverError(f"the equations of motion are singular at t = {t:.9g} s{broken}.")
+            where = f"at t = {t:.9g} s{packed.broken_laws}"
+            raise SolverError(f"the equations of motion are singular {where}.")
         return out
 
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rom.errors import RomError, SolverError
-from rom.mbs.equations.python_laws import Laws, apply_laws, broken_laws
+from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.event_end import kept_before_the_end
 from rom.mbs.integrate.events import Noted
@@ -188,7 +188,7 @@ def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> S
     if W.value.size and np.isfinite(W.value).any():
         k = int(np.nanargmax(np.abs(W.value)))
         culprit = f"; the largest gap is {abs(W.value[k]):.3g} in {record.packed.row_owner[k]!r}"
-    culprit += broken_laws(record.mechanism, record.packed)
+    culprit += record.packed.broken_laws
     return SolverError(
         f"{what} at t = {t:.9g} s (last increment {step.size[0]:.3g} of the size){culprit}.",
         hint=f"Take a smaller step than {step.method[0]:.3g} s; if that does not help, the "

@@ -224,6 +224,20 @@ def test_a_law_that_stops_to_be_a_number_is_named_and_the_motion_kept(compiled, 
     assert told.value.solution.t[-1] >= (0.01 if method == "dop853" else 0.04)
 
 
+STARTS = {
+    "equilibrium": rom.equilibrium,
+    "motion": lambda mech: simulate_quietly(mech, t_end=0.1, dt=1e-3),
+    "chosen steps": lambda mech: simulate_quietly(mech, t_end=0.1, dt=None),
+}
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_a_law_that_never_is_a_number_is_named_at_once(start):
+    mech = hung(lambda m, a, b: m.law("hole", gives_nan, a, b, compiled=True))
+    with pytest.raises(SolverError, match="the law of 'hole' gives no finite number"):
+        STARTS[start](mech)
+
+
 def test_a_motor_that_stops_to_be_a_number_is_named():
     mech = rom.Mechanism()
     part = mech.add_rigid("arm", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
