@@ -62,9 +62,12 @@ class _Border:
     """What a function takes, by place and by name."""
 
     def __init__(self, function: Any):
-        self.name, self.method = function.__name__, "." in function.__qualname__
+        self.name = function.__name__
         known = Names(vars(sys.modules[function.__module__]))
         parameters = signature(function).parameters.values()
+        # a function beside the class can be a method of it too
+        named = [p.name for p in parameters]
+        self.method = "." in function.__qualname__ or named[:1] == ["self"]
         takes = {p.name: taken_by(p.annotation, known) for p in parameters}
         self.more = [takes.pop(p.name) for p in parameters if p.kind is p.VAR_KEYWORD]
         rest = [(p.name, takes[p.name]) for p in parameters if p.kind is p.VAR_POSITIONAL]

@@ -68,36 +68,17 @@ def _slider_crank() -> None:
 
 
 def _elements() -> None:
-    """The kernels of all families of elements, and a law of a user."""
+    """All stages, the kernels of all families of elements, and a law of a user."""
+    from rom.mbs.kernels.stages import STAGE_KERNELS
     from rom.mbs.mechanism import FAMILIES
 
+    for stage in STAGE_KERNELS.values():
+        stage.link()
     for family in FAMILIES:
         for kernel in family.kernels:
             kernel.link()
     mech = pendulum()
     mech.law("law", lambda t, parameters, motion, memory, out: None, mech.ground.marker(ORIGIN))
-    _move(mech)
-
-
-def _rolling() -> None:
-    from rom.mbs.mechanism import Mechanism
-
-    mech = Mechanism(gravity=(0.0, 0.0, -9.81))
-    ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0.0, 0.0, 0.1))
-    floor, centre = mech.ground.marker(ORIGIN), ball.marker(ORIGIN)
-    mech.rolling("contact", floor, centre, normal=Z_AXIS, radius=0.1)
-    _move(mech)
-
-
-def _stiffened() -> None:
-    """A body with the displacements of second order that rotation stiffens."""
-    from rom.mbs.mechanism import Mechanism
-
-    straight = bar((0.16, 0.02, 0.012), (4, 1, 1))
-    beam = reduce(straight, method=CraigBampton(4), interfaces=KINDS, reference="root",
-                  stiffening=True, certify=False)  # fmt: skip
-    mech = Mechanism()
-    mech.add_flexible("beam", beam, omega=(0.0, 0.0, 10.0))
     _move(mech)
 
 
@@ -192,8 +173,6 @@ CASES: dict[str, Callable[[], object]] = {
     "stabilised": lambda: _move(pendulum(), stabilised=True),
     "dop853": lambda: _move(pendulum(), method="dop853"),
     "elements": _elements,
-    "rolling": _rolling,
-    "stiffening": _stiffened,
     "rod": _rod,
     "wind": _wind,
     "rod alone": _rod_alone,

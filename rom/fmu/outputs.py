@@ -101,4 +101,5 @@ class Outputs:
 
 def _coordinate(what: str, k: int) -> Reading:
     """Coordinate or rate that friction k follows."""
-    return lambda W, lam, packed: getattr(W, what)[packed.elements[frictions.FAMILY].at[k]]
+    family = frictions.FRICTIONS_FAMILY
+    return lambda W, lam, packed: getattr(W, what)[packed.elements[family].at[k]]

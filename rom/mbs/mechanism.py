@@ -35,17 +35,17 @@ from rom.plausible import GRAVITY, SPEED, warn_outside
 
 # The list of families: each has its file, and a method or more of `Mechanism`.
 FAMILIES = (
-    springs.FAMILY,
-    rotational_springs.FAMILY,
-    loads.FAMILY,
-    laws.FAMILY,
-    motors.FAMILY,
-    frictions.FAMILY,
-    stops.FAMILY,
-    bushings.FAMILY,
-    points.FAMILY,
-    spread_loads.FAMILY,
-    nonlinear.FAMILY,
+    springs.SPRINGS_FAMILY,
+    rotational_springs.TURNS_FAMILY,
+    loads.LOADS_FAMILY,
+    laws.LAWS_FAMILY,
+    motors.MOTORS_FAMILY,
+    frictions.FRICTIONS_FAMILY,
+    stops.STOPS_FAMILY,
+    bushings.BUSHINGS_FAMILY,
+    points.CONTACTS_FAMILY,
+    spread_loads.SPREAD_LOADS_FAMILY,
+    nonlinear.NONLINEAR_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -160,6 +160,7 @@ class Mechanism:
     springs = Every(springs.Spring)
     turns = Every(rotational_springs.Turn)
     loads = Every(loads.Load)
+    user_forces = Every(laws.UserForce)
     laws = Every(laws.Law)
     motors = Every(motors.Motor)
     frictions = Every(frictions.Friction)

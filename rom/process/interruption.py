@@ -27,6 +27,9 @@ def _raise(number: int, frame: FrameType | None) -> None:
 def terminable() -> Iterator[None]:
     """Raise `Terminated` inside when SIGTERM comes; outside, SIGTERM means what it did before.
 
+    Ctrl-C raises inside too where a library has let it end the process at once, as gmsh does when
+    it is imported.
+
     A `Terminated` that leaves the outermost block ends the process by SIGTERM, as whoever sent it
     expects. Where SIGTERM has a handler already, or in another thread than the main one, nothing
     is changed. May be nested.
@@ -36,6 +39,9 @@ def terminable() -> Iterator[None]:
         yield
         return
     signal.signal(signal.SIGTERM, _raise)
+    abrupt = signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+    if abrupt:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     except Terminated:
@@ -44,6 +50,8 @@ def terminable() -> Iterator[None]:
         raise
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        if abrupt:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @contextmanager

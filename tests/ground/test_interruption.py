@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -39,6 +40,17 @@ def test_a_handler_of_the_user_is_left_alone():
         assert heard == [1]
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def test_ctrl_c_raises_inside_though_a_library_lets_it_end_the_process():
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        with pytest.raises(KeyboardInterrupt), terminable():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_another_thread_changes_nothing():

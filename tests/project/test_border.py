@@ -107,6 +107,8 @@ def test_a_wrong_argument_is_a_mistake_of_the_user_and_named(label, tmp_path, mo
     with suppress(RomError), warnings.catch_warnings():  # compiles what is not yet, untimed
         warnings.simplefilter("ignore")
         function(**legal_call)
+        if label == "simulate":
+            function(**legal_call | {"dt": None})
     found, made, legal = {}, call.make(), COUNTED["legal"]
     for argument in call.arguments:
         for kind, wrong in WRONG.items():

@@ -51,7 +51,9 @@ def whirl(state: Rest) -> Whirl:
     n = len(M)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     values, vectors = eig(A)
-    order = np.argsort(-values.real)
+    # of a pair, whose real parts differ by round-off, the one that turns forwards comes first
+    growth = (values.real / np.abs(values).max()).round(9)
+    order = np.lexsort((-values.imag, -growth))
     return Whirl(values[order], vectors[:n, order])
 
 

@@ -7,20 +7,21 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.errors import ConfigError
 from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, motion_of
 from rom.mbs.elements.laws import Law, UserForce
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Mask, Report, Row
 
-ENTRY = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
+LAW_ENTRY = ctypes.CFUNCTYPE(None, ctypes.c_double, *[ctypes.c_void_p] * 4)
 GUARD_SIZE, GUARD_VALUE = 64, -7.25e77  # numbers on either side of an array, which nobody writes
 DIFFERENCE_STEP = 1e-5
+MOST_SAMPLES = 1000
 TANGENT_RTOL = 1e-6  # of the largest derivative: what central differences leave
 ENERGY_RTOL = 1e-6  # of the powers that add up to nothing
 SPREAD_SHARE, TURN_SPREAD = 0.1, 0.3  # of the probed motions: of the size of the mechanism; [rad]
-AXES = "xyz"
+AXIS_NAMES = "xyz"
 
 
 @typed
@@ -44,7 +45,7 @@ def check_law(
         mechanism: with the law.
         name: of the law.
         t: time [s].
-        samples: number of motions.
+        samples: number of motions, at most 1000.
         rng: source of the motions; None for always the same.
 
     Returns:
@@ -56,7 +57,8 @@ def check_law(
     """
     law = mechanism.laws.get(name)
     if law is None or isinstance(law, UserForce):
-        raise ConfigError(f"no law {name!r}; there are {sorted(mechanism.laws)}.")
+        raise ConfigError(f"name = {name!r}: no law; there are {sorted(mechanism.laws)}.")
+    whole("samples", samples, 1, MOST_SAMPLES)
     rng = np.random.default_rng(0) if rng is None else rng
     asked = _Asked(law, t)
     found = [_looked(asked, motion) for motion in _motions(mechanism, law, samples, rng)]
@@ -88,12 +90,12 @@ class _Asked:
         n, m, o = law.sizes
         self.fields = [
             *(f"{what} on marker {k}, {a}" for what in ("force", "moment")
-              for k in range(n) for a in AXES),
+              for k in range(n) for a in AXIS_NAMES),
             "energy", "lost power", *(f"memory {k}" for k in range(m)), *law.outputs,
         ]  # fmt: skip
         self.motions = [f"{what} {k} {how} {a}" for k in range(n)
                         for what, how in (("way of marker", "along"), ("turn of marker", "about"))
-                        for a in AXES]  # fmt: skip
+                        for a in AXIS_NAMES]  # fmt: skip
         self.size = 6 * n + ENERGY_SIZE + m + o
         self.harm = 0.0  # numbers that were written where none may be
 
@@ -116,7 +118,7 @@ class _Asked:
         before = [x.copy() for x in given]
         if entry is not None:
             inner = [x[GUARD_SIZE:].ctypes.data for x in given]
-            ENTRY(entry.address)(self.t, *inner)
+            LAW_ENTRY(entry.address)(self.t, *inner)
         else:
             self._ask_python(*(x[GUARD_SIZE:-GUARD_SIZE] for x in given))
         for x, y in zip(given[:3], before[:3], strict=True):
@@ -186,16 +188,16 @@ def _first(which: Mask, names: list[str]) -> str:
 
 def _slopes(asked: _Asked, motion: Array) -> list[_Finding]:
     """Tangents of the law against central differences, the worst entry named."""
-    told, found = asked.tangents(motion), []
+    own, found = asked.tangents(motion), []
     for k, what in enumerate(("stiffness", "damping")):
-        n = told.shape[1]
+        n = own.shape[1]
         columns = [_change(asked, motion, p, k) for p in range(n)]
-        miss = np.abs(told[k] - np.array(columns).T)
-        scale = max(np.abs(columns).max(), np.abs(told[k]).max(), 1e-300)
+        miss = np.abs(own[k] - np.array(columns).T)
+        scale = max(np.abs(columns).max(), np.abs(own[k]).max(), 1e-300)
         i, j = np.unravel_index(np.argmax(miss), miss.shape)
         n_force = 3 * (n // 6)
         field = asked.fields[(i // 3 % 2) * n_force + 3 * (i // 6) + i % 3]
-        where = f"{field}, by {asked.motions[j]}: {told[k][i, j]:.6g}, not {columns[j][i]:.6g}"
+        where = f"{field}, by {asked.motions[j]}: {own[k][i, j]:.6g}, not {columns[j][i]:.6g}"
         text = f"error of the {what} / largest"
         found.append(_Finding(text, where, float(miss.max() / scale), TANGENT_RTOL))
     return found
@@ -227,11 +229,11 @@ def _shifted(motion: Array, p: int, h: float, by_velocity: int) -> Array:
 def _balance(asked: _Asked, motion: Array, answer: Array) -> _Finding:
     """Power of the forces, rate of the stored energy and lost power, which add up to nothing."""
     n, m, _ = asked.law.sizes
-    moved, said = motion_of(motion, n), answer_of(answer, n, m)
-    power = float((said.force * moved.velocity).sum() + (said.moment * moved.omega).sum())
+    moved, answered = motion_of(motion, n), answer_of(answer, n, m)
+    power = float((answered.force * moved.velocity).sum() + (answered.moment * moved.omega).sum())
     h = DIFFERENCE_STEP
     energies = [answer_of(asked.answer(_later(motion, s)), n, m).energy[0] for s in (h, -h)]
-    rate, lost = (energies[0] - energies[1]) / (2 * h), float(said.lost[0])
+    rate, lost = (energies[0] - energies[1]) / (2 * h), float(answered.lost[0])
     scale = max(abs(power), abs(rate), abs(lost), 1e-300)
     where = f"power {power:.6g} W, stored {rate:.6g} W, lost {lost:.6g} W"
     return _Finding("power + stored + lost / largest", where, abs(power + rate + lost) / scale,

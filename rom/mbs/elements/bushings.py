@@ -93,7 +93,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
     C = _matrix66(f"damping of {name}", np.zeros(6) if damping is None else damping)
     tables = tuple(_curve(name, *item) for item in (curves or {}).items())
     frames = (A1.T @ world, A2.T @ world)
-    self.add(name, Bushing(m1, m2, frames, world.T @ gap, K, C, tables), FAMILY)
+    self.add(name, Bushing(m1, m2, frames, world.T @ gap, K, C, tables), BUSHINGS_FAMILY)
 
 
 def _matrix66(name: str, value: Any) -> Array:
@@ -384,6 +384,6 @@ def bushing_energy(_s, W, bushings, _q, _v):
     return total
 
 
-FAMILY = Family(
+BUSHINGS_FAMILY = Family(
     "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy
 )  # fmt: skip

@@ -219,5 +219,6 @@ def check_family(name: str, element: Any, family: Family) -> None:
     """
     if not isinstance(element, family.record):
         raise ConfigError(
-            f"{name!r} is {element!r}; the {family.name} are of {family.record.__name__}."
+            f"element = {element!r} of {name!r} is no {family.record.__name__}, of which the "
+            f"{family.name} are."
         )

@@ -83,7 +83,7 @@ def friction(  # noqa: PLR0913  one keyword per property
     fade = positive("stribeck_speed", stribeck_speed) if stribeck_speed is not None else 1.0
     speed = positive("transition_speed", transition_speed)
     numbers = (coulomb, mu * arm, static - 1.0, fade, viscous, speed)
-    self.add(name, Friction(joint, row, tuple(float(x) for x in numbers)), FAMILY)
+    self.add(name, Friction(joint, row, tuple(float(x) for x in numbers)), FRICTIONS_FAMILY)
 
 
 @table
@@ -194,7 +194,7 @@ def add_gradient(s, W, at, c, row):
                 W.UG[row, first + q] += c * W.xg[at, 6 * side + p] * W.H[m, p, q]
 
 
-FAMILY = Family(
+FRICTIONS_FAMILY = Family(
     "frictions", Friction, pack, friction_wrenches, friction_tangents,
     multiplier_columns=load_columns, ends=on_joint, couples=apart,
     loaded_rows=lambda frictions: frictions.load_first[frictions.law[:, 1] != 0.0],

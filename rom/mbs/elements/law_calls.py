@@ -116,12 +116,12 @@ def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool 
     n_motion, n_answer, n_rows = MOTION_SIZE * n, 6 * n + ENERGY_SIZE + m + o, 6 * n
     carray = numba.carray
 
-    def law(t, parameters, motion, memory, out):
+    def law(t: Any, parameters: Any, motion: Any, memory: Any, out: Any) -> None:
         given, kept = carray(parameters, p), carray(memory, m)
         moved = taken(carray(motion, n_motion), n)
         function(t, given, moved, kept, answered(carray(out, n_answer), n, m))
 
-    def slopes(t, parameters, motion, memory, out):
+    def slopes(t: Any, parameters: Any, motion: Any, memory: Any, out: Any) -> None:
         given, kept = carray(parameters, p), carray(memory, m)
         moved, D = taken(carray(motion, n_motion), n), carray(out, (2, n_rows, n_rows))
         function(t, given, moved, kept, D[0], D[1])

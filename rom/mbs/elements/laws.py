@@ -132,7 +132,7 @@ def law(  # noqa: PLR0913  one keyword per property
     sizes = len(markers), kept.size, len(outputs)
     called = entries(name, (function, tangents), (given.size, *sizes), compiled)
     element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)
-    self.add(name, element, FAMILY)
+    self.add(name, element, LAWS_FAMILY)
 
 
 def user_force(
@@ -151,7 +151,7 @@ def user_force(
     markers = (m1,) if m2 is None else (m1, m2)
     none = np.zeros(0)
     element = UserForce(function, None, markers, none, none, (), False, (None, None))
-    self.add(name, element, FAMILY)
+    self.add(name, element, LAWS_FAMILY)
 
 
 @table
@@ -420,7 +420,7 @@ def _answers(laws: Any) -> list[Array]:
     return [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
 
 
-FAMILY = Family(
+LAWS_FAMILY = Family(
     "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
     outside=_outside, couples=_couples, asked=asked, answers=_answers,
 )  # fmt: skip

@@ -47,7 +47,7 @@ def _load(self: Whole, name: str, marker: Marker, vector: Any, frame: str, kind:
         raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
     function = vector if callable(vector) else None
     constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
-    self.add(name, Load(marker, kind + (frame == "body"), constant, function), FAMILY)
+    self.add(name, Load(marker, kind + (frame == "body"), constant, function), LOADS_FAMILY)
 
 
 @table
@@ -111,7 +111,7 @@ def load_tangents(s, W, loads, _lam, ck, _cc):
             pair_stiffness(s, W, m, m, W.Kt)
 
 
-FAMILY = Family(
+LOADS_FAMILY = Family(
     "loads", Load, pack, load_wrenches, load_tangents, ends=lambda load: (load.marker,),
     outside=from_outside, couples=apart, by_rate=lambda loads: False,
 )  # fmt: skip

@@ -64,7 +64,7 @@ def motor(
             numbers, or cannot be compiled although it must.
     """
     row = coordinate_of(self.joints, joint, coordinate, "motor")
-    self.add(name, Motor(joint, row, law, _compiled(name, law, compiled)), FAMILY)
+    self.add(name, Motor(joint, row, law, _compiled(name, law, compiled)), MOTORS_FAMILY)
 
 
 def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
@@ -190,7 +190,7 @@ def motor_tangents(s, W, motors, _lam, ck, cc):
         coordinate_tangent(s, W, at, law, W.Kt, W.S)
 
 
-FAMILY = Family(
+MOTORS_FAMILY = Family(
     "motors", Motor, pack, motor_wrenches, motor_tangents, ends=on_joint, couples=apart,
     asked=asked, answers=lambda motors: motors.answer,
 )  # fmt: skip

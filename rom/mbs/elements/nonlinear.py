@@ -181,7 +181,7 @@ def add_nonlinear(
     for part in parts:
         self.check_new(part.name)
     self.parts.update({part.name: part for part in parts})
-    self.add(name, assembly, FAMILY)
+    self.add(name, assembly, NONLINEAR_FAMILY)
     for a, b in body.coincident:
         self.spherical(f"{name}.{a} and {b}", assembly.marker(a), assembly.marker(b))
     return assembly
@@ -377,7 +377,7 @@ def _outside(whole: Assembly) -> bool:
     return any(group.frames.shape[1] == 1 for group in whole.body.elements)
 
 
-FAMILY = Family(
+NONLINEAR_FAMILY = Family(
     "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
     ends=on_joint, outside=_outside, couples=_couples,
 )  # fmt: skip

@@ -38,7 +38,7 @@ def rotational_spring(
     if joint_with_axis(self.joints, joint, "rotational spring").turn is None:
         raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
     k, c = stiffness_and_damping(name, stiffness, damping)
-    self.add(name, Turn(joint, k, c, number("free_angle", free_angle)), FAMILY)
+    self.add(name, Turn(joint, k, c, number("free_angle", free_angle)), TURNS_FAMILY)
 
 
 @table
@@ -95,7 +95,7 @@ def turn_energy(_s, W, turns, _q, _v):
     return total
 
 
-FAMILY = Family(
+TURNS_FAMILY = Family(
     "turns", Turn, pack, turn_wrenches, turn_tangents, turn_energy, ends=on_joint, couples=apart,
     by_rate=lambda turns: turns.law[:, 1].any(),
 )  # fmt: skip

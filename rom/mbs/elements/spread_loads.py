@@ -79,7 +79,7 @@ def spread_load(
     constant = 0.0 if function else number("amplitude", amplitude)
     arrays = (load.force, load.first, shapes)
     spread = Spread(part.name, *arrays, constant, function, int(frame == "world"))
-    self.add(name, spread, FAMILY)
+    self.add(name, spread, SPREAD_LOADS_FAMILY)
 
 
 @table
@@ -208,7 +208,7 @@ def spread_tangents(s, W, loads, _lam, ck, _cc):
                     block[6 + j, 3 + p] += ca * twist[p]
 
 
-FAMILY = Family(
+SPREAD_LOADS_FAMILY = Family(
     "spread_loads", Spread, pack, spread_residuals, spread_tangents, ends=on_joint,
     outside=from_outside, couples=apart, by_rate=lambda loads: False,
 )  # fmt: skip

@@ -55,7 +55,7 @@ def spring_damper(
     k, c = stiffness_and_damping(name, stiffness, damping)
     if free < 0.0:
         raise ConfigError(f"free_length of {name!r} = {free:g} m: a length is not negative.")
-    self.add(name, Spring(m1, m2, k, c, float(free)), FAMILY)
+    self.add(name, Spring(m1, m2, k, c, float(free)), SPRINGS_FAMILY)
 
 
 def stiffness_and_damping(name: str, stiffness: Any, damping: Any) -> tuple[float, float]:
@@ -141,7 +141,7 @@ def spring_energy(_s, W, springs, _q, _v):
     return total
 
 
-FAMILY = Family(
+SPRINGS_FAMILY = Family(
     "springs", Spring, pack, spring_wrenches, spring_tangents, spring_energy,
     by_rate=lambda springs: springs.law[:, 1].any(),
 )  # fmt: skip

@@ -56,7 +56,7 @@ def stop(
         raise ConfigError(f"stop {name!r} has no limit.", hint="Give lower or upper.")
     if len(limits) == 2 and limits[0][1] > limits[1][1]:
         raise ConfigError(f"stop {name!r}: the lower limit {lower:g} is above the upper {upper:g}.")
-    self.add(name, Stop(joint, row, tuple(limits), law), FAMILY)
+    self.add(name, Stop(joint, row, tuple(limits), law), STOPS_FAMILY)
 
 
 @table
@@ -128,6 +128,6 @@ def stop_energy(_s, W, stops, _q, _v):
     return total
 
 
-FAMILY = Family(
+STOPS_FAMILY = Family(
     "stops", Stop, pack, stop_wrenches, stop_tangents, stop_energy, ends=on_joint, couples=apart
 )  # fmt: skip

@@ -20,8 +20,8 @@ from rom.mbs.kernels.tables import TABLE_WORD, Table
 from rom.mbs.kernels.work import Work
 
 ROW_WORDS = 5  # of a family: its table, then its kernels in the order of their columns
-UNCOMPILED: dict[int, Any] = {}  # tables and kernels by address, where Python runs the kernels
-_S, _W = System._numba_type_, Work._numba_type_
+PYTHON_OBJECTS: dict[int, Any] = {}  # tables and kernels by address, where Python runs the kernels
+SYSTEM_TYPE, WORK_TYPE = System._numba_type_, Work._numba_type_
 
 
 class ElementKernel:
@@ -40,7 +40,7 @@ class ElementKernel:
     def link(self) -> int:
         """Address of the compiled code."""
         if config.DISABLE_JIT:
-            UNCOMPILED[id(self)] = self.kernel
+            PYTHON_OBJECTS[id(self)] = self.kernel
             return id(self)
         if not self._address:
             self._address = address_of(self.kernel, self.signature)
@@ -64,16 +64,16 @@ class Role:
 
     def of(self, table: Any) -> Callable[[Callable[..., Any]], ElementKernel]:
         """Make a function the kernel in this role of the family with this class of table."""
-        signature = self.result(_S, _W, table._numba_type_, *self.types)
+        signature = self.result(SYSTEM_TYPE, WORK_TYPE, table._numba_type_, *self.types)
         return lambda function: ElementKernel(function, signature)
 
     def __call__(self, s: Any, k: int, W: Any, *arguments: Any) -> Any:
         """The call where Python runs the kernels."""
         table, kernel = (int(s.elements[k, c]) for c in (0, self.column))
-        return UNCOMPILED[kernel](s, W, UNCOMPILED[table], *arguments) if kernel else 0.0
+        return PYTHON_OBJECTS[kernel](s, W, PYTHON_OBJECTS[table], *arguments) if kernel else 0.0
 
     def _typed(self) -> Any:
-        return self.result(_S, types.intp, _W, *self.types)
+        return self.result(SYSTEM_TYPE, types.intp, WORK_TYPE, *self.types)
 
     def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
         s, k, W, *arguments = values
@@ -87,7 +87,7 @@ class Role:
 
         table = builder.inttoptr(word(0), TABLE_WORD.as_pointer())
         # all tables are one address to compiled code: that of any class stands for the others
-        called = self.result(_S, _W, _S, *self.types)
+        called = self.result(SYSTEM_TYPE, WORK_TYPE, SYSTEM_TYPE, *self.types)
         values = [s, W, table, *arguments]
         return call_at(context, builder, called, word(self.column), values)
 
@@ -106,5 +106,5 @@ multiplier_columns = Role(4, types.void, REAL_VECTOR, types.int64)
 def row_of(table: Table, kernels: tuple[ElementKernel | None, ...]) -> list[int]:
     """The row of a family; its kernels are compiled."""
     if config.DISABLE_JIT:
-        UNCOMPILED[table._address] = table
+        PYTHON_OBJECTS[table._address] = table
     return [table._address, *(0 if kernel is None else kernel.link() for kernel in kernels)]

@@ -39,11 +39,11 @@ Index1 = Annotated[Index, types.Array(types.int64, 1, "C")]
 Index2 = Annotated[Index, types.Array(types.int64, 2, "C")]
 # of fields that differ between processes or from one instant to the next: they do not tell a
 # mechanism from another
-PASSING = "passing"
-Address1 = Annotated[Index, types.Array(types.int64, 1, "C"), PASSING]
-Address2 = Annotated[Index, types.Array(types.int64, 2, "C"), PASSING]
-Scratch1 = Annotated[Array, types.Array(types.float64, 1, "C"), PASSING]
-Scratch2 = Annotated[Array, types.Array(types.float64, 2, "C"), PASSING]
+PASSING_MARK = "passing"
+Address1 = Annotated[Index, types.Array(types.int64, 1, "C"), PASSING_MARK]
+Address2 = Annotated[Index, types.Array(types.int64, 2, "C"), PASSING_MARK]
+Scratch1 = Annotated[Array, types.Array(types.float64, 1, "C"), PASSING_MARK]
+Scratch2 = Annotated[Array, types.Array(types.float64, 2, "C"), PASSING_MARK]
 TABLE_WORD = ir.IntType(64)
 WORD_SIZE = 8  # of all entries, real and whole numbers both [bytes]
 T = TypeVar("T")
@@ -97,7 +97,9 @@ def table(cls: type[T]) -> type[T]:
     made._numba_type_ = TableType(made)
     made._layout, at = {}, 0
     hints = get_type_hints(made, include_extras=True)
-    made._passing = frozenset(name for name, hint in hints.items() if PASSING in get_args(hint))
+    made._passing = frozenset(
+        name for name, hint in hints.items() if PASSING_MARK in get_args(hint)
+    )
     for name, hint in hints.items():
         if name.startswith("_"):
             continue

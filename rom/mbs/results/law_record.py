@@ -36,8 +36,8 @@ class LawRecord:
 def law_record(solution: Any, name: str) -> LawRecord:
     """Ask a law again at all instants of a motion."""
     law = solution.mechanism.laws[name]
-    table = solution.packed.elements[laws.FAMILY]
-    e = list(solution.mechanism.families()[laws.FAMILY]).index(name)
+    table = solution.packed.elements[laws.LAWS_FAMILY]
+    e = list(solution.mechanism.families()[laws.LAWS_FAMILY]).index(name)
     mine = slice(*table.answer_at[e : e + 2])
     c, base = solution.packed.system.coordinates.kind.size, solution.base.copy()
     base[1:, c:] = solution.base[:-1, c:]

@@ -19,6 +19,7 @@ from cases.solid import STEEL, block, composite
 from cases.wheels import beam_ring, bladed_model, bladed_ring
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
+from rom.mbs.elements import springs
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
@@ -207,6 +208,17 @@ def spring(stiffness):
     return mech
 
 
+def nothing(t, parameters, motion, memory, out):
+    """A law of no force."""
+
+
+def lawful():
+    """A mechanism with a law of its own."""
+    mech = driven()
+    mech.law("law", nothing, mech.parts["mass"].marker("c"), compiled=False)
+    return mech
+
+
 def marked(mech=None):
     """A mechanism and one of its markers."""
     mech = driven() if mech is None else mech
@@ -243,6 +255,7 @@ GIVEN = {  # callable -> legal values of its own
     "bladed_wheel": {"sector": lambda: wheel().parts, "n_waves": lambda: 2},
     "campbell": {"mechanism": lambda: lambda speed: rotor(speed), "speeds": lambda: [1.0, 2.0]},
     "check": {"record": body},
+    "check_law": {"mechanism": lawful, "name": lambda: "law"},
     "craig_bampton": {"K": lambda: model().K, "M": lambda: model().M},
     "cyclic_modes": {"sector": ring, "diameter": lambda: 1},
     "equilibrium_sensitivity": {
@@ -455,6 +468,10 @@ JOIN = {
     "body": lambda mech: body(),
 }  # of the methods of a mechanism
 JOIN_OWN = {
+    ("add", "element"): lambda mech: springs.Spring(
+        *2 * (mech.ground.marker((0, 0, 0)),), 1.0, 0, 0
+    ),
+    ("add", "family"): lambda mech: springs.SPRINGS_FAMILY,
     ("motor", "law"): lambda mech: lambda t, x, v: 0.0,
     ("stop", "lower"): lambda mech: -1.0,
     ("part", "name"): lambda mech: "arm",

@@ -38,7 +38,7 @@ def check_tangents(packed, W, state, motions, tolerance):
     C = difference(lambda x: at(zero, x, zero), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
-    for family in (springs.FAMILY, rotational_springs.FAMILY):
+    for family in (springs.SPRINGS_FAMILY, rotational_springs.TURNS_FAMILY):
         if family in packed.elements:
             packed.elements[family].law[:, 1] = 0.0
     M = difference(lambda x: at(zero, zero, x), v.size)

@@ -70,8 +70,8 @@ def test_forces_are_the_gradient_of_the_energy(seed):
     gradient = difference(energy, v.size)[0]
     residual_at(s, W, q, none, none, lam)
     body = W.residual.copy()
-    packed.elements[bushings.FAMILY].stiffness[:] = 0.0
-    packed.elements[bushings.FAMILY].curve[:] = -1
+    packed.elements[bushings.BUSHINGS_FAMILY].stiffness[:] = 0.0
+    packed.elements[bushings.BUSHINGS_FAMILY].curve[:] = -1
     residual_at(s, W, q, none, none, lam)
     assert_allclose(body - W.residual, gradient, atol=1e-7 * np.abs(gradient).max())
 
@@ -87,7 +87,7 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     C = difference(lambda x: _residual(packed, W, q, v + x, a, lam), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
-    packed.elements[bushings.FAMILY].damping[:] = 0.0
+    packed.elements[bushings.BUSHINGS_FAMILY].damping[:] = 0.0
     check_tangents(packed, W, state, np.eye(zero.size), 1e-6)
 
 

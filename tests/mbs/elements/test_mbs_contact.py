@@ -72,7 +72,7 @@ def test_forces_without_loss_are_the_gradient_of_the_energy(kind):
     )[0]
     residual_at(s, W, q, none, none, lam)
     with_contact = W.residual.copy()
-    packed.elements[points.FAMILY].law[:, 0] = 0.0
+    packed.elements[points.CONTACTS_FAMILY].law[:, 0] = 0.0
     residual_at(s, W, q, none, none, lam)
     assert np.abs(gradient).max() > 0.1
     assert_allclose(with_contact - W.residual, gradient, atol=2e-7 * np.abs(gradient).max())
@@ -108,7 +108,7 @@ def test_what_is_lost_is_what_the_forces_take(kind):
     rate = difference(lambda t: np.array([stored_at(s, W, shifted(packed, q, t * v), v)]), 1)[0, 0]
     residual_at(s, W, q, v, a, lam)
     force, lost = W.residual.copy(), W.power[2]
-    packed.elements[points.FAMILY].law[:, 0] = 0.0
+    packed.elements[points.CONTACTS_FAMILY].law[:, 0] = 0.0
     residual_at(s, W, q, v, a, lam)
     force, lost = W.residual - force, lost - W.power[2]
     assert lost > 0.0

@@ -142,7 +142,7 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     packed, W = prepared(loaded(rng))
     packed.system.markers.twist[:] *= 1e-3
     s, (q, v, a, lam) = packed.system, random_state(rng, packed)
-    packed.elements[motors.FAMILY].answer[:] = 1.7
+    packed.elements[motors.MOTORS_FAMILY].answer[:] = 1.7
     n, m = v.size, lam.size
 
     def at(dq, dv, dlam):
@@ -158,7 +158,7 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     columns_at(s, W, lam)
     assert_allclose(W.UG.T, by_load, atol=1e-6 * np.abs(by_load).max())
     assert np.abs(W.UG - W.G).max() > 0.01
-    v[:], packed.elements[motors.FAMILY].answer[:] = (
+    v[:], packed.elements[motors.MOTORS_FAMILY].answer[:] = (
         0.0,
         0.0,
     )  # the turning of a torque axis holds where the joint is closed

@@ -259,7 +259,7 @@ REFUSED = [
     ),
     (lambda m, a, b: m.law("l", late_nan, a, parameters=[np.inf]), "parameters"),
     (lambda m, a, b: m.law("l", late_nan, rom.mbs.Marker("nobody", (0.0, 0.0, 0.0))), "nobody"),
-    (lambda m, a, b: m.add("l", 3, laws.FAMILY), "'l' is 3; the laws are of Law"),
+    (lambda m, a, b: m.add("l", 3, laws.LAWS_FAMILY), "element = 3 of 'l' is no Law"),
     (lambda m, a, b: m.add("l", 3, 4), "family = 4 must be of type Family"),
 ]
 
@@ -351,7 +351,7 @@ def test_the_check_finds_nothing_in_a_right_law():
     mech = hung(lambda m, a, b: m.law("l", pulling, a, b, tangents=pulling_slopes, energy=True))
     assert rom.check_law(mech, "l").ok
     assert rom.check_law(mech, "l", samples=2, rng=np.random.default_rng(3)).ok
-    with pytest.raises(ConfigError, match="no law 'x'"):
+    with pytest.raises(ConfigError, match="name = 'x': no law"):
         rom.check_law(mech, "x")
 
 

@@ -134,7 +134,7 @@ def _touch(
     ]
     i, j = markers
     e, s = directions
-    self.add(name, Contact(kind, i, j, e, s, radius, checked_law(name, law)), FAMILY)
+    self.add(name, Contact(kind, i, j, e, s, radius, checked_law(name, law)), CONTACTS_FAMILY)
 
 
 @table
@@ -306,6 +306,6 @@ def contact_energy(_s, W, contacts, _q, _v):
     return total
 
 
-FAMILY = Family(
+CONTACTS_FAMILY = Family(
     "contacts", Contact, pack, contact_wrenches, contact_tangents, contact_energy
 )  # fmt: skip

@@ -20,7 +20,7 @@ from rom import rotation
 from rom.arguments import positive, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact, checked_law
-from rom.mbs.elements.contact.points import BORE, CYLINDER, FAMILY, PLANE, SPHERE, Contact
+from rom.mbs.elements.contact.points import BORE, CONTACTS_FAMILY, CYLINDER, PLANE, SPHERE, Contact
 from rom.mbs.parts.bodies import Marker, Part, surface_place
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
@@ -112,4 +112,5 @@ def _cover(
         )
         marker = Marker(part.name, surface_place(int(k)))
         key = f"{name} {k}"
-        self.add(key, Contact(kind, m1, marker, e, np.zeros(3), (0.0, radius), own), FAMILY)
+        contact = Contact(kind, m1, marker, e, np.zeros(3), (0.0, radius), own)
+        self.add(key, contact, CONTACTS_FAMILY)
