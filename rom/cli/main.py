@@ -18,7 +18,7 @@ from rom.errors import (
     ResourceError,
     RomError,
 )
-from rom.process.interruption import terminable
+from rom.process.interruption import Terminated, terminable
 from rom.process.memory import free_bytes
 
 
@@ -55,8 +55,15 @@ def _run(argv: list[str], options: OutputOptions) -> int:
         if options.debug:
             traceback.print_exception(raised)
         error = translated(raised)
-        stop_all(error.exit_code, lambda: print_error(error, options, ranks()[0]))
+        stop_all(error.exit_code, lambda: _print_once(raised, error, options))
         return error.exit_code
+
+
+def _print_once(raised: BaseException, error: RomError, options: OutputOptions) -> None:
+    """Print the error, unless mpirun ends this rank because of one that another has printed."""
+    rank = ranks()[0]
+    if rank == 0 or not isinstance(raised, Terminated):
+        print_error(error, options, rank)
 
 
 def run(argv: list[str], options: OutputOptions) -> int:
