@@ -5,6 +5,7 @@ import os
 import sys
 import traceback
 from contextlib import ExitStack
+from functools import partial
 
 from rom.cli.described import TOML_SUFFIX
 from rom.cli.parser import build_parser, given
@@ -55,7 +56,7 @@ def _run(argv: list[str], options: OutputOptions) -> int:
         if options.debug:
             traceback.print_exception(raised)
         error = translated(raised)
-        stop_all(error.exit_code, lambda: _print_once(raised, error, options))
+        stop_all(error.exit_code, partial(_print_once, raised, error, options))
         return error.exit_code
 
 
