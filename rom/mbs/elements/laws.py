@@ -31,7 +31,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rom.arguments import finite
+from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers
 from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, entries
@@ -125,14 +125,24 @@ def law(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for no marker, or a law that cannot be compiled although it must.
     """
-    if not markers:
-        raise ConfigError(f"law {name!r} acts on no marker.")
+    _check_function("function", function, name)
+    if tangents is not None:
+        _check_function("tangents", tangents, name)
     given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
     kept = finite(f"memory of {name}", memory, (np.size(memory),))
+    if not markers:
+        raise ConfigError(f"law {name!r} acts on no marker.")
     sizes = len(markers), kept.size, len(outputs)
     called = entries(name, (function, tangents), (given.size, *sizes), compiled)
     element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)
     self.add(name, element, LAWS_FAMILY)
+
+
+def _check_function(what: str, function: Any, name: str) -> None:
+    if not callable(function) and not hasattr(function, "address"):
+        raise ConfigError(
+            f"{what} = {shortened(function)} of law {name!r} is no function and has no address."
+        )
 
 
 def user_force(

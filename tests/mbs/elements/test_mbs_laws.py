@@ -253,6 +253,8 @@ def unknown_name(t, parameters, motion, memory, out):
 
 REFUSED = [
     (lambda m, a, b: m.law("l", late_nan), "acts on no marker"),
+    (lambda m, a, b: m.law("l", None, a), "function = None of law 'l' is no function"),
+    (lambda m, a, b: m.law("l", late_nan, a, tangents=3), "tangents = 3 of law 'l' is no function"),
     (
         lambda m, a, b: m.law("l", unknown_name, a, compiled=True),
         "law 'l' cannot be compiled: NameError: .*'nobody' is not defined",
