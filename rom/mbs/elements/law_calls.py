@@ -1,12 +1,10 @@
 """How laws of force are called: what they are given, what they answer, and their entry in C."""
 
-import inspect
 from typing import Any, NamedTuple
 
 import numba
 
-from rom.errors import ConfigError
-from rom.mbs.parts.foreign import why_not_compiled
+from rom.mbs.parts.foreign import compiled
 
 MOTION_SIZE = 18  # numbers of the motion of a marker
 ENERGY_SIZE = 2  # stored energy, lost power
@@ -87,20 +85,12 @@ def _compiled(
 ) -> Any:
     if hasattr(function, "address"):
         return function
-    if wanted is False:
-        return None
-    python = getattr(function, "py_func", function)
-    try:
-        if not inspect.isfunction(python):
-            raise TypeError("not a plain function")
+
+    def make(python: Any) -> Any:
         return entry_of(numba.njit(python), sizes, tangents=tangents)
-    except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
-        if not wanted:
-            return None
-        raise ConfigError(
-            f"law {name!r} cannot be compiled: {why_not_compiled(error)}",
-            hint="Use numbers and arrays of NumPy only, or compiled=False.",
-        ) from error
+
+    hint = "Use numbers and arrays of NumPy only, or compiled=False."
+    return compiled(f"law {name!r}", function, make, wanted, hint)
 
 
 def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool = False) -> Any:

@@ -1,6 +1,5 @@
 """Motors: forces along joint coordinates from a law of control."""
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +10,13 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.tables import Address1, Index1, Scratch1, Table, table
-from rom.mbs.parts.foreign import ask, numbers, why_not_compiled
+from rom.mbs.parts.foreign import ask, numbers
+from rom.mbs.parts.foreign import compiled as compiled_law
 from rom.mbs.parts.joints import Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
@@ -69,20 +68,9 @@ def motor(
 
 def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
     """The law as a C function of three doubles, None when it is left to Python."""
-    if wanted is False:
-        return None
-    python = getattr(law, "py_func", law)
-    try:
-        if not inspect.isfunction(python):
-            raise TypeError("not a plain function")
-        return numba.cfunc("float64(float64, float64, float64)")(python)
-    except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
-        if not wanted:
-            return None
-        raise ConfigError(
-            f"law of motor {name!r} cannot be compiled: {why_not_compiled(error)}",
-            hint="Use numbers and NumPy functions of numbers only, or compiled=False.",
-        ) from error
+    make = numba.cfunc("float64(float64, float64, float64)")
+    hint = "Use numbers and NumPy functions of numbers only, or compiled=False."
+    return compiled_law(f"law of motor {name!r}", law, make, wanted, hint)
 
 
 @table

@@ -305,19 +305,19 @@ def take_frames(s, elements, e, q, v):
             elements.pose[e, 13 * k + 7 + i] = v[vt + i]
 
 
+@inner
+def ask_element(elements, e, wanted):
+    """Let the law of element e answer for its frames, with tangents if they are wanted."""
+    N = elements
+    ask(N.address[e], N.numbers[e], N.pose[e], wanted, N.answer, N.space)
+
+
 @residuals.of(Nonlinear)
 def nonlinear_residuals(s, W, elements, q, v, _lam):
     """Add the forces of all elements to W.residual, and the power they lose to W.power[2]."""
     for e in range(elements.address.size):
         take_frames(s, elements, e, q, v)
-        ask(
-            elements.address[e],
-            elements.numbers[e],
-            elements.pose[e],
-            0,
-            elements.answer,
-            elements.space,
-        )
+        ask_element(elements, e, 0)
         W.power[2] += elements.answer[1]
         for k in range(elements.count[e]):
             t = s.bodies.v_at[elements.body[e, k]]
@@ -330,14 +330,7 @@ def nonlinear_tangents(s, W, elements, _lam, ck, cc):
     """Add stiffness times ck and damping times cc to W.Kt and W.S; `nonlinear_residuals` first."""
     graph = s.graph
     for e in range(elements.address.size):
-        ask(
-            elements.address[e],
-            elements.numbers[e],
-            elements.pose[e],
-            1,
-            elements.answer,
-            elements.space,
-        )
+        ask_element(elements, e, 1)
         n = 6 * elements.count[e]
         for k in range(elements.count[e]):
             for l in range(elements.count[e]):
@@ -356,14 +349,7 @@ def nonlinear_energy(s, _W, elements, q, v):
     total = 0.0
     for e in range(elements.address.size):
         take_frames(s, elements, e, q, v)
-        ask(
-            elements.address[e],
-            elements.numbers[e],
-            elements.pose[e],
-            0,
-            elements.answer,
-            elements.space,
-        )
+        ask_element(elements, e, 0)
         total += elements.answer[0]
     return total
 

@@ -25,8 +25,6 @@ REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
 REAL_MATRIX = types.Array(types.float64, 2, "C")
 REAL_BLOCK = types.Array(types.float64, 2, "A")  # rows and columns of a matrix
 THREE_FACTORS = types.UniTuple(types.float64, 3)
-# of tangents: factors of stiffness and damping, and the matrices they are added to
-TANGENT_TYPES = (types.float64, types.float64, REAL_MATRIX, REAL_MATRIX)
 # Compiled code knows a stage by its place here, whatever is imported first.
 STAGE_NAMES = (
     "evaluate",

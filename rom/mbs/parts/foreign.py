@@ -4,6 +4,7 @@ Whatever leaves such a function, an exception or a value that is none, becomes o
 the function, the time, and the line of the user's code.
 """
 
+import inspect
 import math
 import traceback
 from collections.abc import Callable
@@ -48,6 +49,35 @@ def why_not_compiled(error: Exception) -> str:
     """The line in which Numba says what it cannot compile."""
     lines = (line.strip() for line in str(error).splitlines())
     return next((x for x in lines if x and not x.startswith("Failed in")), type(error).__name__)
+
+
+def compiled(
+    what: str, law: Any, make: Callable[[Any], Any], wanted: bool | None, hint: str
+) -> Any:
+    """What ``make`` compiles a function of the user to; None when it is left to Python.
+
+    Args:
+        what: its name, e.g. ``law of motor 'servo'``.
+        law: a function, or one of Numba.
+        make: compiles a plain function.
+        wanted: True to insist, False to leave it to Python, None for what works.
+        hint: what it may be made of.
+
+    Raises:
+        ConfigError: if it must be compiled and cannot be.
+    """
+    if wanted is False:
+        return None
+    python = getattr(law, "py_func", law)
+    try:
+        if not inspect.isfunction(python):
+            raise TypeError("not a plain function")
+        return make(python)
+    except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
+        if not wanted:
+            return None
+        why = why_not_compiled(error)
+        raise ConfigError(f"{what} cannot be compiled: {why}", hint=hint) from error
 
 
 def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
