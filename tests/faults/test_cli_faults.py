@@ -157,9 +157,17 @@ def refused(capsys, code, arguments, *words):
 @pytest.mark.parametrize("case", USAGE)
 def test_a_wrong_command_line_is_exit_code_2(case, folder, capsys):
     arguments, *words = USAGE[case]
-    start = time.perf_counter()
     assert len(refused(capsys, 2, arguments, *words)) >= 1
-    assert time.perf_counter() - start < 1
+
+
+def test_a_wrong_command_line_is_refused_before_anything_heavy_is_loaded(folder):
+    heavy = {"dolfinx", "gmsh", "matplotlib", "numba", "pyvista", "slepc4py"}
+    code = "import sys\nfrom rom.cli.main import main\n"
+    code += f"codes = {{main(words) for words in {[words for words, *_ in USAGE.values()]}}}\n"
+    code += f"print(codes, sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
+                          text=True, timeout=60, check=False)  # fmt: skip
+    assert done.stdout == "{2} []\n", done.stderr
 
 
 @pytest.mark.parametrize("case", FILES)
