@@ -196,7 +196,7 @@ def interface_pages() -> dict[str, str]:
     """One page per part of the package, with its public names; and the list of these pages."""
     parts: dict[str, list[str]] = {}
     for name in rom.__all__:
-        parts.setdefault(rom.MODULES[name].partition(".")[0], []).append(name)
+        parts.setdefault(rom.MODULES[name].split(".")[1], []).append(name)
     pages = {f"rom_{part}.rst": _names(part, names) for part, names in sorted(parts.items())}
     pages["rom_fe.rst"] = _modules("rom.fe", ["rom.fe"])
     for name, modules in _components().items():
@@ -229,7 +229,7 @@ def _names(part: str, names: list[str]) -> str:
     if part in rom.PACKAGES:
         lines += [_one(getattr(rom, part), name) for name in _further(part)]
     for module in ALSO.get(part, ()):
-        listed = [name for name in names if rom.MODULES[name] == module]
+        listed = [name for name in names if rom.MODULES[name] == f"rom.{module}"]
         skip = f"   :exclude-members: {', '.join(listed)}\n" if listed else ""
         lines.append(f".. automodule:: rom.{module}\n{skip}")
     return "\n".join(lines)
@@ -240,7 +240,7 @@ def _further(part: str) -> list[str]:
     front = getattr(rom, part)
     own: dict[str, str] = getattr(front, "MODULES", {})
     shown = ALSO.get(part, ())
-    further = [n for n in own if n not in rom.MODULES and f"{part}.{own[n]}" not in shown]
+    further = [n for n in own if n not in rom.MODULES and own[n].removeprefix("rom.") not in shown]
     return sorted(name for name in further if callable(getattr(front, name)))
 
 

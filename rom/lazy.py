@@ -16,7 +16,7 @@ class Front(ModuleType):
     """A package that has the names of the stub beside it."""
 
     PACKAGES: tuple[str, ...]  # modules and packages in it that the stub names
-    MODULES: dict[str, str]  # {other name: module below the package that has it}
+    MODULES: dict[str, str]  # {other name: module that has it}
     __all__: list[str]
 
     def __getattr__(self, name: str) -> object:
@@ -24,8 +24,7 @@ class Front(ModuleType):
         if name in self.PACKAGES:
             return importlib.import_module(f"{self.__name__}.{name}")
         if name in self.MODULES:
-            module = importlib.import_module(f"{self.__name__}.{self.MODULES[name]}")
-            return getattr(module, name)
+            return getattr(importlib.import_module(self.MODULES[name]), name)
         raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -45,15 +44,15 @@ def front(package: str) -> None:
     """
     module: Any = sys.modules[package]
     named = _named(package, module.__path__[0])
-    module.PACKAGES = tuple(name for name, place in named.items() if not place)
-    module.MODULES = {name: place for name, place in named.items() if place}
+    module.PACKAGES = tuple(name for name, place in named.items() if place == package)
+    module.MODULES = {name: place for name, place in named.items() if place != package}
     module.__all__ = sorted(module.MODULES)
     module.__class__ = Front
 
 
 def _named(package: str, folder: str) -> dict[str, str]:
-    """{name: module below the package, "" for a module itself}; read without loading ``ast``."""
+    """{name: module that has it, or the package for its modules}, read without loading ``ast``."""
     with open(f"{folder}/__init__.pyi", encoding="utf-8") as stub:
         text = stub.read().replace("(\n", "").replace(",\n)", "")  # lines that are too long
-    lines = (line.split() for line in text.splitlines() if line.startswith(f"from {package}"))
-    return {name: module[len(package) + 1 :] for _, module, _, name, *_ in lines}
+    lines = (line.split() for line in text.splitlines() if line.startswith("from rom"))
+    return {name: module for _, module, _, name, *_ in lines}

@@ -195,6 +195,7 @@ ORDER = {
         "bushings",
         "spread_loads",
         "nonlinear",
+        "rods",
     ),
     "reduction": (
         "bases",

@@ -20,7 +20,10 @@ import numpy.typing as npt
 from rom import rotation
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
-from rom.components.cosserat.elements import (
+from rom.components.cosserat.statics import add_loads, clamped, largest
+from rom.components.cosserat.vibration import lumped_mass
+from rom.errors import ConfigError, SolverError
+from rom.mbs.elements.rods.energy import (
     HALF_BANDWIDTH,
     Rod,
     energy,
@@ -28,10 +31,7 @@ from rom.components.cosserat.elements import (
     turn,
     work,
 )
-from rom.components.cosserat.shape import Shape, reference
-from rom.components.cosserat.statics import add_loads, clamped, largest
-from rom.components.cosserat.vibration import lumped_mass
-from rom.errors import ConfigError, SolverError
+from rom.mbs.elements.rods.shapes import Shape, reference
 from rom.mbs.integrate.generalized_alpha import coefficients
 from rom.model import Array, Mask
 

@@ -5,7 +5,8 @@ import numpy.typing as npt
 
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
-from rom.components.cosserat.elements import (
+from rom.errors import ConfigError, SolverError
+from rom.mbs.elements.rods.energy import (
     HALF_BANDWIDTH,
     Rod,
     add_turning,
@@ -14,8 +15,7 @@ from rom.components.cosserat.elements import (
     turn,
     work,
 )
-from rom.components.cosserat.shape import Shape, reference
-from rom.errors import ConfigError, SolverError
+from rom.mbs.elements.rods.shapes import Shape, reference
 from rom.model import Array, Mask
 
 MAX_ROTATION = 0.2  # rotation of an iteration [rad]: larger steps jump to other equilibria

@@ -10,11 +10,11 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from rom import rotation
 from rom.arguments import whole
-from rom.components.cosserat.elements import Rod
-from rom.components.cosserat.shape import Shape
 from rom.components.cosserat.statics import clamped, linearised
 from rom.deprecated import renamed
 from rom.errors import SolverError
+from rom.mbs.elements.rods.energy import Rod
+from rom.mbs.elements.rods.shapes import Shape
 from rom.model import Array, Modes
 
 

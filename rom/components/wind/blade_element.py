@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import carray
 
-from rom.components.compiled import elements, law
-from rom.components.cosserat import RodBody
-from rom.components.cosserat.elements import rotation_of
 from rom.components.wind.wind_turbine import BLADE_LENGTH, HUB_RADIUS
 from rom.errors import ConfigError
+from rom.mbs.elements.nonlinear import Elements, compiled_law
+from rom.mbs.elements.rods.bodies import RodBody
+from rom.mbs.elements.rods.energy import rotation_of
 from rom.model import Array, Mask
 
 RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 40.45, 44.55, 48.65,
@@ -85,7 +85,7 @@ def strip(numbers, pose, wanted, answer, space):
 @cache
 def compiled_strip() -> Any:
     """The compiled law of a strip."""
-    return law(strip)
+    return compiled_law(strip)
 
 
 def in_wind(
@@ -121,7 +121,7 @@ def in_wind(
     drag = np.where(lifting, DRAG_COEFFICIENT, CIRCLE_DRAG_COEFFICIENT)
     slowed = np.tile((1.0 - induction) * wind, (n, 1))
     numbers = np.column_stack([0.5 * density * area, slowed, lift, drag])
-    blown = elements(compiled_strip(), np.arange(n)[:, None], numbers)
+    blown = Elements.of(compiled_strip(), np.arange(n)[:, None], numbers)
     return replace(blade, elements=(*blade.elements, blown))
 
 

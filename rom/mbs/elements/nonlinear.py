@@ -16,7 +16,7 @@ energy [J]; lost power [W]; (n,) forces of energy and damping that resist the mo
 ``wanted`` is not zero, (n, n) their derivative by displacements in the world and rotations in the
 frame; (n, n) their derivative by the velocities. ``space`` is memory for
 LAW_MEMORY_SIZE numbers. Such a function is made with ``numba.cfunc`` or by any
-compiler.
+compiler; `compiled_law` keeps what it makes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,13 +28,16 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
 from numba import types
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
 from rom import rotation
 from rom.arguments import finite, start_pose, typed
 from rom.errors import ConfigError, ModelError
+from rom.mbs.compiler.cache import guard
 from rom.mbs.elements.family import Family, Places, integers, on_joint
-from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.compiled import OPTIONS, inner
 from rom.mbs.kernels.constraints import block_of
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
@@ -89,6 +92,11 @@ class Elements:
     frames: Index
     numbers: Array
     law: Any = None
+
+    @classmethod
+    def of(cls, law: Any, frames: Index, numbers: Array) -> "Elements":
+        """Elements with a law of `compiled_law`."""
+        return cls(law.address, frames, numbers, law)
 
 
 class NonlinearBody(Protocol):
@@ -146,6 +154,16 @@ class Assembly:
     def reach(self) -> float:
         """Length of the line through all frames [m]."""
         return float(sum(np.linalg.norm(b.at - a.at) for a, b in pairwise(self.parts)))
+
+
+def compiled_law(function: Any) -> Any:
+    """The law that a Python function describes, compiled and kept; it makes arrays of pointers."""
+    options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
+    made = CFunc(function, normalize_signature(LAW_SIGNATURE), {}, options)
+    made.enable_caching()
+    guard(made, function)
+    made.compile()
+    return made
 
 
 def add_nonlinear(

@@ -32,7 +32,7 @@ FENICSX = find_spec("dolfinx") is not None
 # classes that are public without standing in rom: what public functions return and take
 ALSO = {"Solution": Solution, "State": State}
 KEPT = {"RomError", "RomWarning"} | {
-    name for name in rom.__all__ if rom.MODULES[name] == "errors"
+    name for name in rom.__all__ if rom.MODULES[name] == "rom.errors"
 }  # what is raised takes anything
 # of a public class, for `rom.simulate` alone, which fills the folder of a motion by them
 INNER = {"Keeping.begin", "Keeping.due", "Keeping.write"}

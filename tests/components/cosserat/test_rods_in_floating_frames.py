@@ -8,6 +8,7 @@ import rom
 from cases.mbs import floating_rod as floating
 from rom import rotation
 from rom.components import cosserat
+from rom.mbs.elements.rods import energy
 
 LOAD = {"tip": (30.0, -20.0, 10.0), "tip_moment": (10.0, 20.0, -15.0), "weight": (0, 0, -9.81)}
 VELOCITY, OMEGA = (1.0, 2.0, 0.0), (1.0, -2.0, 3.0)
@@ -77,15 +78,15 @@ def test_reference_conditions_hold_nothing(rod, motion):
 def test_forces_of_the_rod_do_not_notice_the_frame(rod, motion):
     """Objectivity: without force and moment as a whole, the same in every frame."""
     now = motion[1][-1]
-    W = cosserat.elements.work(rod)
+    W = energy.work(rod)
     still = np.zeros(W.r.size)
-    cosserat.elements.internal(rod, now.xi, now.theta, still, 0.0, W)
+    energy.internal(rod, now.xi, now.theta, still, 0.0, W)
     seen = np.append(W.r, np.zeros(3)).reshape(-1, 6)
     force = seen[:-1, 3:]
     turned = [rotation.matrix(q) @ m for q, m in zip(now.theta, seen[:, :3], strict=True)]
     assert_allclose(force.sum(axis=0), 0.0, atol=1e-11)
     assert_allclose(np.cross(now.xi, force).sum(axis=0) + np.sum(turned, axis=0), 0.0, atol=1e-11)
-    cosserat.elements.internal(rod, now.shape.x, now.shape.p, still, 0.0, W)
+    energy.internal(rod, now.shape.x, now.shape.p, still, 0.0, W)
     world = np.append(W.r, np.zeros(3)).reshape(-1, 6)
     assert_allclose(world[:-1, 3:], force @ rotation.matrix(now.P).T, atol=1e-11)
     assert_allclose(world[:, :3], seen[:, :3], atol=1e-11)

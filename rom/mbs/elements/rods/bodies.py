@@ -4,7 +4,7 @@ Frame k carries vertex k and the axes of the segment before it, frame 0 those of
 start. The plate at the end has a frame of its own, which shares the mass of the last vertex and
 its place. Gravity and inertia of a vertex and of a segment are those of its frame; a segment
 between two frames and a vertex between two sections are the elements, with the energies of
-`rom.components.cosserat.elements`.
+`rom.mbs.elements.rods.energy`.
 """
 
 from collections.abc import Mapping
@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from rom.components.compiled import elements, inner, law
-from rom.components.cosserat.elements import (
+from rom.errors import ModelError
+from rom.mbs.elements.nonlinear import LAW_MEMORY_SIZE, Elements, Frames, compiled_law
+from rom.mbs.elements.rods.energy import (
     Rod,
     Work,
     curvature_geometry,
@@ -24,9 +25,8 @@ from rom.components.cosserat.elements import (
     stretch_geometry,
     stretched,
 )
-from rom.components.cosserat.shape import Shape, reference
-from rom.errors import ModelError
-from rom.mbs.elements.nonlinear import LAW_MEMORY_SIZE, Elements, Frames
+from rom.mbs.elements.rods.shapes import Shape, reference
+from rom.mbs.kernels.compiled import inner, spliced
 from rom.model import Array
 
 POSE_SIZE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity
@@ -36,7 +36,7 @@ SEGMENT_DOFS, VERTEX_DOFS = (0, 1, 2, 9, 10, 11, 6, 7, 8), (3, 4, 5, 0, 1, 2, 9,
 PLATE_INERTIA_SHARE = 0.25
 
 
-@inner
+@spliced
 def memory(space):
     """Arrays of an element in the memory of the law."""
     R, D = space[0:9].reshape((3, 3)), space[9:36].reshape((3, 9))
@@ -109,7 +109,7 @@ def vertex(numbers, pose, wanted, answer, space):
 @cache
 def laws() -> tuple[Any, Any]:
     """Compiled laws of segments and vertices."""
-    return law(segment), law(vertex)
+    return compiled_law(segment), compiled_law(vertex)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def body(rod: Rod, start: Shape | None = None) -> RodBody:
     stretch = np.column_stack([rod.h, rod.stretch, rod.viscous_stretch, rod.a0])
     bend = np.column_stack([rod.l, rod.bend, rod.viscous_bend, rod.s, rod.S.reshape(n + 1, 9)])
     by_segment, by_vertex = laws()
-    along = elements(by_segment, pairs[:-1], stretch), elements(by_vertex, pairs, bend)
+    along = Elements.of(by_segment, pairs[:-1], stretch), Elements.of(by_vertex, pairs, bend)
     return RodBody(rod, frames, along)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.components.cosserat.elements import Rod, energy, strains, work
 from rom.errors import ModelError
+from rom.mbs.elements.rods.energy import Rod, energy, strains, work
 from rom.model import Array
 
 FLAT_COSINE = np.cos(np.pi / 4 * 0.99)  # neighbours turned further have no side to bend to

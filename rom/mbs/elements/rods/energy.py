@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rom.components.compiled import inner, kernel
+from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array
 
 HALF_BANDWIDTH = 8  # columns on either side of the diagonal
