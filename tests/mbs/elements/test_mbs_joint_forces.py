@@ -132,6 +132,9 @@ def loaded(rng):
     mech.stop("end", "tube", law, coordinate="way", lower=20.0)
     mech.stop("wall", "guide", law, upper=-20.0)
     mech.motor("motor", "tube", lambda t, x, v: 1.7, compiled=False)
+    mech.motor(
+        "drive", "tube", lambda t, x, v: 1.5 - 4.0 * x * x - 0.7 * v * v * v, coordinate="way"
+    )
     return mech
 
 
