@@ -258,6 +258,8 @@ class Nonlinear(Table):
         pose: (e, 13 K) frames at the last residual: position, quaternion, velocities.
         answer: (2 + 6 K + 72 K^2,) what a law says.
         space: (LAW_MEMORY_SIZE,) for the laws to use as they like.
+        owner: (e,) which of the bodies an element is part of.
+        forces: (n,) sum of all force components of each body: not finite where a law failed.
     """
 
     address: Address1
@@ -267,28 +269,30 @@ class Nonlinear(Table):
     pose: Scratch2
     answer: Scratch1
     space: Scratch1
+    owner: Index1
+    forces: Scratch1
 
 
 def pack(bodies: Any, places: Places) -> Nonlinear:
     """The elements of all bodies as arrays."""
     groups = [
-        (group, np.array([places.body[part.name] for part in whole.parts])[group.frames])
-        for whole in bodies.values()
+        (k, group, np.array([places.body[part.name] for part in whole.parts])[group.frames])
+        for k, whole in enumerate(bodies.values())
         for group in whole.body.elements
     ]
-    e = sum(len(rows) for _, rows in groups)
-    K = max((rows.shape[1] for _, rows in groups), default=1)
-    c = max((group.numbers.shape[1] for group, _ in groups), default=1)
+    e = sum(len(rows) for *_, rows in groups)
+    K = max((rows.shape[1] for *_, rows in groups), default=1)
+    c = max((group.numbers.shape[1] for _, group, _ in groups), default=1)
     body, numbers = np.full((e, K), -1, dtype=np.int64), np.zeros((e, c))
-    address, count, at = integers([0] * e), integers([0] * e), 0
-    for group, rows in groups:
+    address, count, owner, at = *(integers([0] * e) for _ in range(3)), 0
+    for k, group, rows in groups:
         mine = slice(at, at + len(rows))
-        address[mine], count[mine] = group.address, rows.shape[1]
+        address[mine], count[mine], owner[mine] = group.address, rows.shape[1], k
         body[mine, : rows.shape[1]] = rows
         numbers[mine, : group.numbers.shape[1]] = group.numbers
         at += len(rows)
     scratch = np.zeros((e, 13 * K)), np.zeros(2 + 6 * K + 72 * K * K), np.zeros(LAW_MEMORY_SIZE)
-    return Nonlinear(address, count, body, numbers, *scratch)
+    return Nonlinear(address, count, body, numbers, *scratch, owner, np.zeros(len(bodies)))
 
 
 @intrinsic
@@ -333,6 +337,8 @@ def ask_element(elements, e, wanted):
 @residuals.of(Nonlinear)
 def nonlinear_residuals(s, W, elements, q, v, _lam):
     """Add the forces of all elements to W.residual, and the power they lose to W.power[2]."""
+    for k in range(elements.forces.size):
+        elements.forces[k] = 0.0
     for e in range(elements.address.size):
         take_frames(s, elements, e, q, v)
         ask_element(elements, e, 0)
@@ -341,6 +347,7 @@ def nonlinear_residuals(s, W, elements, q, v, _lam):
             t = s.bodies.v_at[elements.body[e, k]]
             for i in range(6):
                 W.residual[t + i] += elements.answer[2 + 6 * k + i]
+                elements.forces[elements.owner[e]] += elements.answer[2 + 6 * k + i]
 
 
 @tangents.of(Nonlinear)
@@ -383,5 +390,5 @@ def _outside(whole: Assembly) -> bool:
 
 NONLINEAR_FAMILY = Family(
     "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
-    ends=on_joint, outside=_outside, couples=_couples,
+    ends=on_joint, outside=_outside, couples=_couples, answers=lambda elements: elements.forces,
 )  # fmt: skip

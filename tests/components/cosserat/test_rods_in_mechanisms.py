@@ -308,7 +308,7 @@ def spring(numbers, pose, wanted, answer, _space):
     e = gap / length
     speed = (e * rate).sum()
     out[0], out[1] = 0.5 * k * (length - free) ** 2, c * speed**2
-    tension = k * (length - free) + c * speed
+    tension = k * (length - free) + c * speed if length < numbers[3] else np.nan
     for i in range(3):
         out[2 + i], out[8 + i] = -tension * e[i], tension * e[i]
         for j in range(3):
@@ -320,11 +320,11 @@ def spring(numbers, pose, wanted, answer, _space):
                     out[158 + 12 * (6 * a + i) + 6 * b + j] = sign * c * e[i] * e[j]
 
 
-def two_masses():
+def two_masses(limit=np.inf):
     frames = Frames(np.array([[0.0, 0, 0], [2.0, 0, 0]]), np.tile([1.0, 0, 0, 0], (2, 1)),
                     np.array([1.0, 2.0]), np.full((2, 3), 0.1))  # fmt: skip
     law = cfunc("void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))")(spring)
-    pair = Elements(law.address, np.array([[0, 1]]), np.array([[40.0, 0.3, 1.5]]), law)
+    pair = Elements(law.address, np.array([[0, 1]]), np.array([[40.0, 0.3, 1.5, limit]]), law)
     return SimpleNamespace(frames=frames, elements=(pair,), places={"far": 1}, coincident=())
 
 
@@ -344,6 +344,19 @@ def test_a_law_of_the_user_is_as_good_as_a_force_of_the_core():
     assert_allclose(own.q, core.q, atol=1e-9)
     assert_allclose(own.energy.strain, core.energy.strain, atol=1e-8)
     assert_allclose(own.energy.damping, core.energy.damping, atol=1e-8)
+
+
+def test_a_body_whose_law_fails_is_named_and_the_motion_so_far_is_kept():
+    mech = rom.Mechanism()
+    pair = mech.add_nonlinear("pair", two_masses(limit=2.2))
+    mech.add_nonlinear("other", two_masses(), at=(0.0, 5.0, 0.0))
+    mech.spherical("pivot", mech.ground.marker(ORIGIN), pair.marker(0))
+    mech.force("pull", pair.marker(1), (100.0, 0.0, 0.0))
+    words = r"t = 0\.\d+ s.*; the law of 'pair' gives no finite number"
+    with pytest.raises(rom.SolverError, match=words) as caught:
+        rom.simulate(mech, t_end=2.0, dt=0.005)
+    reached = caught.value.solution.position("pair.1")[:, 0]
+    assert 2.1 < reached[-1] < 2.2 and len(reached) > 5
 
 
 def test_bad_bodies_are_named():
