@@ -16,6 +16,8 @@ from rom.bench import benchmarks, wheel
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ResourceError
 
+pytestmark = pytest.mark.once
+
 SIZE = np.array([0.16, 0.02, 0.012])
 
 

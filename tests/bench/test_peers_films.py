@@ -8,6 +8,8 @@ from rom.bench.peers import films
 from rom.components.journal_bearing import equilibrium
 from rom.components.transmission import rest
 
+pytestmark = pytest.mark.once
+
 
 @pytest.fixture
 def theirs(monkeypatch):

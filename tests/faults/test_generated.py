@@ -12,6 +12,8 @@ from generated.stock import compile_kernels, fill
 
 from cases.long import ROM_LONG
 
+pytestmark = pytest.mark.once
+
 LEAST_CASES = 400
 LEAST_NAMED = 0.98
 CASES = all_cases()

@@ -26,6 +26,8 @@ from cases.long import ROM_LONG
 from cases.solid import block
 from rom.process import child
 
+pytestmark = pytest.mark.once
+
 MODULES = (
     "gmsh numpy pyvista vtk vtkmodules meshio matplotlib json typing subprocess h5py sitecustomize "
     "usercustomize scipy numba yaml re os io abc argparse tempfile dataclasses ctypes runpy "

@@ -15,6 +15,8 @@ from cases.long import ROM_LONG
 from rom.cli.main import main
 from rom.mbs.integrate import keeping
 
+pytestmark = pytest.mark.once
+
 KILLS = 10 if ROM_LONG else 3
 MECHANISM = """
 gravity = [0, 0, -9.81]

@@ -26,6 +26,8 @@ from rom.io.files import write_whole
 from rom.process.turns import Turns
 from rom.report.html import paragraph, write_report
 
+pytestmark = pytest.mark.once
+
 FORK = multiprocessing.get_context("fork")
 WRITES = 40
 PENDULUM = ["simulate", "b.npz", "--hinge", "root", "--t-end", "2e-6", "--dt", "1e-6"]

@@ -10,6 +10,8 @@ from cases.paths import ROOT
 sys.path.insert(0, str(ROOT / ".ci"))
 import plant
 
+pytestmark = pytest.mark.once
+
 SOURCE = """
 @inner
 def f(x, k, out):

@@ -19,6 +19,8 @@ from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, parts_by_face, row_ids
 from rom.fe.mesh.validate import validate
 
+pytestmark = pytest.mark.once
+
 KINDS = sorted(CELL_TYPES)
 
 
