@@ -31,7 +31,6 @@ METHODS = {  # section: method of a mechanism; in the others the kind of the ent
     "stops": "stop",
 }
 ON_JOINTS = ("drives", "motors", "frictions", "stops")
-ONE_POINT = ("revolute", "spherical", "universal", "fixed")
 # of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
 GAP_RTOL = 1e-2
 MARKER_KEYS = ("between", "marker")
@@ -139,7 +138,7 @@ class MechanismFile:
         import numpy as np
 
         joint = made.joints[name]
-        if joint.kind not in ONE_POINT:
+        if not joint.one_point:
             return
         ends = [made.design_point(marker) for marker in joint.markers]
         placed = [part.at for part in made.parts.values()] + ends

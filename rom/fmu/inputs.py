@@ -8,7 +8,7 @@ import numpy as np
 
 from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
-from rom.mbs.connections import Drive
+from rom.mbs.connections.drives import Drive
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import drive_signal
 from rom.model import Array

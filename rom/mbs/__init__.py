@@ -1,7 +1,7 @@
 """Mechanisms of rigid and flexible bodies, and their motion.
 
-`kernels` are compiled by `compiler`, `parts` and `elements` what a mechanism has, `connections` its
-joints, `mechanism` what users write; `equations` packs it, `integrate` moves it, `results` are what
+`kernels` are compiled by `compiler`; a mechanism has `parts`, `connections` and `elements`, in
+`mechanism` is what users write; `equations` packs it, `integrate` moves it, `results` are what
 comes out, `analysis` needs no motion.
 """
 

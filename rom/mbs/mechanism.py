@@ -10,8 +10,9 @@ import numpy.typing as npt
 from rom import rotation
 from rom.arguments import AnyBody, finite, matrix33, positive, start_pose, typed
 from rom.errors import ConfigError
-from rom.mbs import connections
-from rom.mbs.connections import Drive
+from rom.mbs.connections import drives as joint_drives
+from rom.mbs.connections import gears, lower_pairs, rolling, universal
+from rom.mbs.connections import points as joint_points
 from rom.mbs.elements import (
     bushings,
     frictions,
@@ -118,24 +119,24 @@ class Mechanism:
     gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
     parts: dict[str, Part] = field(default_factory=dict, init=False)
     joints: dict[str, Joint] = field(default_factory=dict, init=False)
-    drives: dict[str, Drive] = field(default_factory=dict, init=False)
+    drives: dict[str, joint_drives.Drive] = field(default_factory=dict, init=False)
     elements: dict[str, tuple[Family, Any]] = field(default_factory=dict, init=False)
     events: dict[str, Event] = field(default_factory=dict, init=False)
 
-    revolute = connections.revolute
-    cylindrical = connections.cylindrical
-    prismatic = connections.prismatic
-    spherical = connections.spherical
-    universal = connections.universal
-    fixed = connections.fixed
-    planar = connections.planar
-    screw = connections.screw
-    point_on_line = connections.point_on_line
-    point_on_plane = connections.point_on_plane
-    distance = connections.distance
-    rolling = connections.rolling
-    gear = connections.gear
-    drive = connections.drive
+    revolute = lower_pairs.revolute
+    cylindrical = lower_pairs.cylindrical
+    prismatic = lower_pairs.prismatic
+    spherical = lower_pairs.spherical
+    universal = universal.universal
+    fixed = lower_pairs.fixed
+    planar = lower_pairs.planar
+    screw = lower_pairs.screw
+    point_on_line = joint_points.point_on_line
+    point_on_plane = joint_points.point_on_plane
+    distance = joint_points.distance
+    rolling = rolling.rolling
+    gear = gears.gear
+    drive = joint_drives.drive
 
     spring_damper = springs.spring_damper
     rotational_spring = rotational_springs.rotational_spring

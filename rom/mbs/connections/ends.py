@@ -1,0 +1,85 @@
+"""How a joint connects two bodies: what it must know of both, and what it may not do to them."""
+
+from dataclasses import dataclass
+
+import numpy.typing as npt
+
+from rom import rotation
+from rom.arguments import number, unit_vector
+from rom.errors import ConfigError, ModelError
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.joints import Joint, Triad, triad
+from rom.mbs.parts.whole import Whole
+from rom.model import Array
+
+MOMENT_FREE = ("spherical", "distance")  # joints that bodies without static shapes may have
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """The two markers of a joint where the bodies were added.
+
+    Attributes:
+        name: of the joint.
+        markers: both.
+        frames: (3, 3) axes of both bodies, as columns in the world.
+        gap: (3,) from the first marker to the second, world [m].
+    """
+
+    name: str
+    markers: tuple[Marker, Marker]
+    frames: tuple[Array, Array]
+    gap: Array
+
+    def direction(self, what: str, axis: npt.ArrayLike) -> Array:
+        """(3,) unit vector of an axis that the user gave."""
+        return unit_vector(f"{what} of {self.name}", axis)
+
+    def triad(self, axis: Array) -> Triad:
+        """Axes with ``axis`` last, carried by both bodies."""
+        return triad(axis, self.frames)
+
+    @property
+    def gap_of_first(self) -> Array:
+        """(3,) the gap in the axes of the first body [m]."""
+        return self.frames[0].T @ self.gap
+
+
+def ends_of(whole: Whole, name: str, m1: Marker, m2: Marker) -> Ends:
+    """The ends of a new joint.
+
+    Raises:
+        ConfigError: for a name in use, markers that do not exist, or one body with itself.
+    """
+    whole.check_new(name)
+    whole.check_markers(name, m1, m2)
+    if m1.body == m2.body:
+        raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself.")
+    A1, A2 = (rotation.matrix(whole.part(m.body).p) for m in (m1, m2))
+    return Ends(name, (m1, m2), (A1, A2), whole.design_point(m2) - whole.design_point(m1))
+
+
+def enter(whole: Whole, joint: Joint) -> None:
+    """Let the mechanism have a joint.
+
+    Raises:
+        ModelError: if it transmits moments to free-free modes, which carry none to an interface.
+    """
+    for marker in joint.markers if joint.kind not in MOMENT_FREE else ():
+        body = whole.part(marker.body).flexible
+        if body is not None and not body.has_static_shapes:
+            raise ModelError(
+                f"{joint.kind} joint {joint.name!r} transmits moments, and body "
+                f"{marker.body!r} has free-free modes only: it would be too stiff by tens of "
+                "per cents and without stress at the joint.",
+                hint="Reduce the body with CraigBampton or Rubin, which know the interfaces.",
+            )
+    whole.joints[joint.name] = joint
+
+
+def not_zero(name: str, value: float) -> float:
+    """A finite number that is not zero."""
+    x = number(name, value)
+    if x == 0.0:
+        raise ConfigError(f"{name} = 0: it would lock the joint instead of coupling it.")
+    return x

@@ -1,0 +1,82 @@
+"""Joints whose bodies share a surface: Reuleaux's lower pairs, and the weld."""
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.mbs.connections.ends import Ends, ends_of, enter, not_zero
+from rom.mbs.kernels.system import COUPLING
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, coincidence
+from rom.mbs.parts.whole import Whole
+from rom.model import Array
+
+FULL_TURN = 2 * np.pi
+
+
+def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+    """Hinge about ``axis`` (3,), world at the start; five constraints."""
+    ends = ends_of(self, name, m1, m2)
+    t = ends.triad(ends.direction("axis", axis))
+    rows, angle = (*coincidence(), t.normal(0, 2), t.normal(1, 2)), t.angle()
+    enter(self, Joint(name, "revolute", ends.markers, rows, angle, angle))
+
+
+def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+    """Rotation about and sliding along ``axis`` (3,), world at the start; four constraints."""
+    ends = ends_of(self, name, m1, m2)
+    rows, angle, displacement = _coaxial(ends, ends.direction("axis", axis))
+    enter(self, Joint(name, "cylindrical", ends.markers, rows, angle, angle, displacement))
+
+
+def _coaxial(ends: Ends, axis: Array) -> tuple[tuple[Row, ...], Row, Row]:
+    """Rows of one axis in common, on which the second point lies; angle and way along it."""
+    t = ends.triad(axis)
+    rows = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR), t.normal(0, 2), t.normal(1, 2))
+    return rows, t.angle(), t.along(2, ends.gap_of_first)
+
+
+def screw(
+    self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike, pitch: float
+) -> None:
+    """Cylindrical joint that advances by ``pitch`` [m] per turn; five constraints.
+
+    A positive pitch is a right-hand thread: a right-hand turn about ``axis`` advances along it.
+    """
+    pitch = not_zero("pitch", pitch)
+    ends = ends_of(self, name, m1, m2)
+    rows, angle, displacement = _coaxial(ends, ends.direction("axis", axis))
+    terms = ((displacement, 1.0), (angle, -pitch / FULL_TURN))
+    lead = Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=terms)
+    rows = (*rows, lead)
+    enter(self, Joint(name, "screw", ends.markers, rows, angle, angle, displacement))
+
+
+def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+    """Sliding along ``axis`` (3,), world at the start; five constraints."""
+    ends = ends_of(self, name, m1, m2)
+    t = ends.triad(ends.direction("axis", axis))
+    displacement = t.along(2, ends.gap_of_first)
+    rows = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR),
+            t.normal(0, 2), t.normal(1, 2), t.normal(0, 1))  # fmt: skip
+    enter(self, Joint(name, "prismatic", ends.markers, rows, displacement, None, displacement))
+
+
+def spherical(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
+    """Ball joint; three constraints."""
+    enter(self, Joint(name, "spherical", ends_of(self, name, m1, m2).markers, coincidence()))
+
+
+def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike) -> None:
+    """Sliding in a plane of ``normal`` (3,) through m1, turning about it; three constraints."""
+    ends = ends_of(self, name, m1, m2)
+    t = ends.triad(ends.direction("normal", normal))
+    rows, angle = (t.along(2, NO_VECTOR), t.normal(0, 2), t.normal(1, 2)), t.angle()
+    enter(self, Joint(name, "planar", ends.markers, rows, angle, angle))
+
+
+def fixed(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
+    """Weld; six constraints."""
+    ends = ends_of(self, name, m1, m2)
+    t = ends.triad(np.array([0.0, 0.0, 1.0]))
+    rows = (*coincidence(), t.normal(0, 1), t.normal(1, 2), t.normal(2, 0))
+    enter(self, Joint(name, "fixed", ends.markers, rows))

@@ -1,0 +1,58 @@
+"""Joints that hold one point only: on a line, in a plane, at a distance."""
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import positive
+from rom.errors import ConfigError
+from rom.mbs.connections.ends import ends_of, enter
+from rom.mbs.kernels.system import DISTANCE
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row
+from rom.mbs.parts.whole import Whole
+
+
+def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+    """The point m2 slides on a line along ``axis`` (3,) through m1; two constraints."""
+    ends = ends_of(self, name, m1, m2)
+    t = ends.triad(ends.direction("axis", axis))
+    rows, displacement = (
+        (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR)),
+        t.along(2, ends.gap_of_first),
+    )
+    enter(self, Joint(name, "point on line", ends.markers, rows, displacement, None, displacement))
+
+
+def point_on_plane(
+    self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike
+) -> None:
+    """The point m2 slides in the plane of ``normal`` (3,) through m1; one constraint."""
+    ends = ends_of(self, name, m1, m2)
+    t = ends.triad(ends.direction("normal", normal))
+    enter(self, Joint(name, "point on plane", ends.markers, (t.along(2, NO_VECTOR),)))
+
+
+def distance(
+    self: Whole, name: str, m1: Marker, m2: Marker, *, length: float | None = None
+) -> None:
+    """Massless rod between two points; one constraint.
+
+    Args:
+        name: name of the joint.
+        m1: one end.
+        m2: other end.
+        length: [m]; None for the distance at the start.
+
+    Raises:
+        ConfigError: if the points coincide.
+    """
+    long = None if length is None else positive("length", length)
+    ends = ends_of(self, name, m1, m2)
+    apart = float(np.linalg.norm(ends.gap))
+    if apart == 0.0:
+        raise ConfigError(
+            f"the points of joint {name!r} coincide: a rod of length zero has no direction.",
+            hint="Use a spherical joint.",
+        )
+    row = Row(DISTANCE, NO_VECTOR, NO_VECTOR, NO_VECTOR, apart if long is None else long)
+    enter(self, Joint(name, "distance", ends.markers, (row,)))

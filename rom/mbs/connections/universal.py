@@ -1,0 +1,36 @@
+"""Universal joints: a cross between two shafts."""
+
+import numpy.typing as npt
+
+from rom.errors import ConfigError
+from rom.mbs.connections.ends import ends_of, enter
+from rom.mbs.kernels.system import NORMAL
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, coincidence
+from rom.mbs.parts.whole import Whole
+
+NORMAL_ATOL = 1e-6  # cosine of the angle between the axes of the cross
+
+
+def universal(
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    *,
+    axis1: npt.ArrayLike,
+    axis2: npt.ArrayLike,
+) -> None:
+    """Cardan joint: ``axis1`` on m1 stays perpendicular to ``axis2`` on m2; four constraints.
+
+    Raises:
+        ConfigError: if the axes are not perpendicular at the start.
+    """
+    ends = ends_of(self, name, m1, m2)
+    one, two = ends.direction("axis1", axis1), ends.direction("axis2", axis2)
+    if abs(one @ two) > NORMAL_ATOL:
+        raise ConfigError(
+            f"the axes of joint {name!r} are not perpendicular: cosine {one @ two:.3g}."
+        )
+    cross = Row(NORMAL, ends.frames[0].T @ one, ends.frames[1].T @ two, NO_VECTOR)
+    enter(self, Joint(name, "universal", ends.markers, (*coincidence(), cross)))
