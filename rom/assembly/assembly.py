@@ -87,11 +87,22 @@ class Assembly:
 
     def modes(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Modes:
         """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
-        M, K = self._matrices()
-        N = self._free(fixed)
-        omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
+        omega, V = self._natural(fixed)
         kept = lowest(n)
-        return Modes(omega[kept], per_body(self._widths(), N @ V[:, kept]))
+        return Modes(omega[kept], per_body(self._widths(), V[:, kept]))
+
+    def _natural(self, fixed: tuple[Place, ...]) -> tuple[Array, Array]:
+        """All natural modes, kept for other numbers of them."""
+        key = tuple(map(tuple, fixed))
+        if key not in self._found:
+            (M, K), N = self._matrices(), self._free(fixed)
+            omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
+            self._found[key] = omega, N @ V
+        return self._found[key]
+
+    @cached_property
+    def _found(self) -> dict[Any, tuple[Array, Array]]:
+        return {}
 
     def reduced(
         self, n_interface: int, *, level: str = "system", fixed: tuple[Place, ...] = ()
@@ -147,9 +158,7 @@ class Assembly:
         """Largest gap of the coupled coordinates over their motion, in the lowest elastic modes."""
         if not self.couplings:
             return []
-        M, K = self._matrices()
-        N, n_rigid = self._free(()), self._n_rigid(())
-        V = N @ natural_modes(N.T @ M @ N, N.T @ K @ N, n_rigid)[1][:, n_rigid:][:, :N_COMPARED]
+        V = self._natural(())[1][:, self._n_rigid(()) :][:, :N_COMPARED]
         sides = [np.abs(self._placed(term[:1]) @ V).max() for term in self._coupled]
         gap = np.abs(self._rows(()) @ V).max()
         return [row("gap of coupled interfaces, over their motion", gap / max(sides), GAP_RTOL)]

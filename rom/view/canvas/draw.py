@@ -5,6 +5,7 @@ Started by `rom.view.canvas.offscreen` as ``python -m rom.view.canvas.draw FOLDE
 
 import json
 import sys
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +38,17 @@ def main(folder: Path) -> None:
         for k in moving if frame else ():
             add(plotter, scene, arrays, k, frame)
         plotter.render()
-        fine = plotter.screenshot(return_img=True)[..., :3].astype(np.uint16)
-        blocks = fine.reshape(height, OVERSAMPLING, width, OVERSAMPLING, 3).sum(axis=(1, 3))
-        pictures[frame] = (blocks + OVERSAMPLING**2 // 2) // OVERSAMPLING**2
+        pictures[frame] = averaged(plotter.screenshot(return_img=True)[..., :3])
     np.save(folder / "pictures.npy", pictures)
     plotter.close()
+
+
+def averaged(fine: Any) -> Any:
+    """Means of blocks of pixels; a sum over axes of a reshaped array takes ten times as long."""
+    total = np.full_like(fine[::OVERSAMPLING, ::OVERSAMPLING], OVERSAMPLING**2 // 2, np.uint16)
+    for i, j in product(range(OVERSAMPLING), repeat=2):
+        total += fine[i::OVERSAMPLING, j::OVERSAMPLING]
+    return total // OVERSAMPLING**2
 
 
 def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
