@@ -17,7 +17,7 @@ from rom.mbs.integrate import keeping
 
 pytestmark = pytest.mark.once
 
-KILLS = 10 if ROM_LONG else 3
+KILLS = 10 if ROM_LONG else 2
 MECHANISM = """
 gravity = [0, 0, -9.81]
 ground.place = [0, 0, 0]

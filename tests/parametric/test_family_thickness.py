@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 
 import rom
 from cases.layers import KINDS, LAYERS, ROOT, families, panel
-from cases.long import SHARED_BY
+from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import RANKS
 from cases.solid import STEEL, block
 from rom.body.reference import rigid_elastic
@@ -252,6 +252,7 @@ def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
 @pytest.mark.fenicsx
 @pytest.mark.mpi
 @pytest.mark.slow
+@pytest.mark.skipif(not ROM_LONG, reason="half a minute; families of regions are shared above all")
 def test_layers_are_blind_to_the_number_of_processes(tmp_path):
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     from cases.ranks.environment import ENVIRONMENT
