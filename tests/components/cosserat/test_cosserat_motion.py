@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from rom import rotation
+from rom.components.compiled import kernel
 from rom.components.cosserat import (
     clamped,
     equilibrium,
@@ -20,8 +21,10 @@ from rom.components.cosserat import (
     simulate,
     straight,
 )
+from rom.components.cosserat.motion import add_inertia
 from rom.components.cosserat.vibration import gyroscopic
 from rom.errors import ConfigError, SolverError
+from rom.mbs.elements.rods.energy import HALF_BANDWIDTH, work
 
 ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
 
@@ -226,6 +229,37 @@ def test_forces_of_steady_rotation_have_their_tangent():
     assert_allclose(K @ d, (forces(1e-5 * d) - forces(-1e-5 * d)) / 2e-5, atol=1e-8)
     G = gyroscopic(one, shape, spin).toarray()
     assert_allclose(G, -G.T, atol=1e-14)
+
+
+@kernel
+def inertia_alone(rod, v, a, accelerating, rate, W):
+    """The inertia of a rod, which steps add to its elastic forces."""
+    W.r[:] = 0.0
+    W.A[:] = 0.0
+    add_inertia(rod, v, a, accelerating, rate, W)
+
+
+def test_the_tangent_of_inertia_is_the_derivative_of_its_forces():
+    """By velocities and accelerations; differences of quadratic forces are exact."""
+    rng = np.random.default_rng(6)
+    one = straight(1.0, 3, stretch=3.0, bend=2.0, mass=1.3, inertia=(0.3, 0.5, 0.9))
+    W = work(one)
+    v, a, d = rng.normal(size=(3, W.r.size))
+    rows, columns = np.indices((d.size, d.size))
+    near = np.abs(columns - rows) <= HALF_BANDWIDTH
+
+    def forces(v, a):
+        inertia_alone(one, v, a, 0.0, 0.0, W)
+        return W.r.copy()
+
+    for by_v, by_a in ((1.0, 0.0), (0.0, 1.0)):
+        slope = forces(v + 0.5 * by_v * d, a + 0.5 * by_a * d)
+        slope = slope - forces(v - 0.5 * by_v * d, a - 0.5 * by_a * d)
+        inertia_alone(one, v, a, by_a, by_v, W)
+        A = np.zeros((d.size, d.size))
+        A[near] = W.A[rows[near], (columns - rows)[near] + HALF_BANDWIDTH]
+        assert_allclose(A @ d, slope, atol=1e-12)
+        assert np.abs(slope).max() > 0.1
 
 
 def test_bad_runs_are_refused_and_lost_ones_kept():
