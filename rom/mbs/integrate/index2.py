@@ -105,7 +105,7 @@ def project_velocity(s, W, rank, v):
     largest = 0.0
     for k in range(W.part.size):
         rate = W.signal[s.rows.signal[k], 1] if s.rows.signal[k] >= 0 else 0.0
-        W.dlam[k] += abs(rate)
+        W.dlam[k] = max(W.dlam[k], abs(rate))
         largest = max(largest, W.dlam[k])
     for k in range(W.part.size):
         if abs(W.part[k]) > VELOCITY_GAP_TOL * max(W.dlam[k], SMALL_ROW_RATIO * largest):
