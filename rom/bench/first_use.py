@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.models import KINDS, bar, slider_crank
+from rom.bench.models import KINDS, bar, rigid_chain, slider_crank
 from rom.errors import SolverError
 from rom.process import child
 from rom.reduction.bases.method import CraigBampton
@@ -173,6 +173,7 @@ CASES: dict[str, Callable[[], object]] = {
     "stabilised": lambda: _move(pendulum(), stabilised=True),
     "dop853": lambda: _move(pendulum(), method="dop853"),
     "elements": _elements,
+    "chain": lambda: _move(rigid_chain(12)),
     "rod": _rod,
     "wind": _wind,
     "rod alone": _rod_alone,
