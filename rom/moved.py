@@ -26,6 +26,8 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom.components", "rom.components.updating", "airframe frf_data"),
     ("rom.components", "rom.components.wind",
      "blade_element drivetrain whole_turbine wind_turbine"),
+    ("rom.components.cosserat", "rom.mbs.elements.rods",
+     "elements=energy multibody=bodies shape=shapes"),
     ("rom.components.frf_updating", "rom.components.updating", "methods models"),
     ("rom.config", "rom.report", "reporting=pages run"),
     ("rom.cyclic", "rom.cyclic", "springs=supports"),
