@@ -4,8 +4,15 @@ from typing import Any, NamedTuple
 
 import numba
 
+from rom.mbs.compiler.intermediate import IntermediateCompiler
 from rom.mbs.parts.foreign import compiled
 
+# of functions that an entry takes in; they may make arrays, and are calculated as Python says
+TAKEN_IN = {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": IntermediateCompiler,
+}
 MOTION_SIZE = 18  # numbers of the motion of a marker
 ENERGY_SIZE = 2  # stored energy, lost power
 # as numba.cfunc takes it
@@ -71,6 +78,10 @@ def answer_of(flat: Any, n: int, n_memory: int) -> Answer:
     )
 
 
+# for all entries, so that they are compiled once
+_motion_of, _answer_of = numba.njit(**TAKEN_IN)(motion_of), numba.njit(**TAKEN_IN)(answer_of)
+
+
 def entries(name: str, laws: Any, sizes: Any, wanted: bool | None) -> tuple[Any, Any]:
     """Law and tangents as functions of C; None for what is missing or left to Python."""
     function, slopes = laws
@@ -87,7 +98,7 @@ def _compiled(
         return function
 
     def make(python: Any) -> Any:
-        return entry_of(numba.njit(python), sizes, tangents=tangents)
+        return entry_of(numba.njit(**TAKEN_IN)(python), sizes, tangents=tangents)
 
     hint = "Use numbers and arrays of NumPy only, or compiled=False."
     return compiled(f"law {name!r}", function, make, wanted, hint)
@@ -102,7 +113,7 @@ def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool 
         tangents: whether it is that of the tangents.
     """
     p, n, m, o = sizes
-    taken, answered = numba.njit(motion_of), numba.njit(answer_of)
+    taken, answered = _motion_of, _answer_of
     n_motion, n_answer, n_rows = MOTION_SIZE * n, 6 * n + ENERGY_SIZE + m + o, 6 * n
     carray = numba.carray
 
