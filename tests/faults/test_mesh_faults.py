@@ -31,7 +31,7 @@ from rom.fe.mesh.read import read_mesh
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
 SECONDS = 10.0
-MUTANTS = 60 if ROM_LONG else 20
+MUTANTS = 60 if ROM_LONG else 10
 
 BOX = solid()
 BLOCKS, NAMES = blocks_of(BOX)

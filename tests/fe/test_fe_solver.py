@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 import rom
+from cases.long import ROM_LONG
 from rom.errors import ConfigError, InterfaceError, ModesMissedError, SolverError
 
 pytestmark = pytest.mark.fenicsx
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
+SOLVERS = ["low-rank", "out-of-core", "iterative", *["low-rank:1e-3"] * ROM_LONG]
 BEAM = {"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.045}
 
 
@@ -25,7 +27,7 @@ def reduced(model):
     return rom.reduce(model, method=rom.CraigBampton(8), interfaces=KINDS, certify=False)
 
 
-@pytest.mark.parametrize("solver", ["low-rank", "low-rank:1e-3", "out-of-core", "iterative"])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_gives_the_frequencies_of_the_direct_one(direct, solver):
     model = beam(solver)
     expected, found = (reduced(m).frequencies()[6:] for m in (direct, model))

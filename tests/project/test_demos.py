@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from cases.files.demos import DEMOS, ON_TWO_PROCESSES, check, options_of
+from cases.files.demos import DEMOS, ON_TWO_PROCESSES, TESTED, check, options_of
 from cases.long import ROM_LONG
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
-ALONE = [demo for demo in DEMOS if ROM_LONG or demo.stem not in ON_TWO_PROCESSES]
+ALONE = [demo for demo in DEMOS if ROM_LONG or demo.stem not in ON_TWO_PROCESSES | TESTED]
 
 
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
