@@ -11,7 +11,7 @@ from numba import types
 from rom.mbs.equations.elimination import eliminate, fill_blocks, substitute
 from rom.mbs.kernels.algebra import back_substitute, factorise, range_basis
 from rom.mbs.kernels.compiled import copy, inner, kernel
-from rom.mbs.kernels.markers import own_block
+from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
@@ -49,9 +49,10 @@ def set_scaling(s, W, rank):
     """Scales with which masses and gradients have size one."""
     bodies, graph, d, n = s.bodies, s.graph, W.scaling, W.residual.size
     for b in range(bodies.mass.size):
-        block = own_block(s, b, W.S)
+        x, y = own_corner(s, b)
         for i in range(6 + bodies.r[b]):
-            d[bodies.v_at[b] + i] = 1.0 / math.sqrt(block[i, i]) if block[i, i] > 0.0 else 1.0
+            mass = W.S[x + i, y + i]
+            d[bodies.v_at[b] + i] = 1.0 / math.sqrt(mass) if mass > 0.0 else 1.0
     for k in range(rank):
         total = 0.0
         for j in range(0 if graph.compact else n):
@@ -176,9 +177,9 @@ def gradient_times(s, W, x, absolute, out):
 def mass_diagonal(s, W, out):
     """Set out (n,) to the diagonal of W.S."""
     for b in range(s.bodies.mass.size):
-        block = own_block(s, b, W.S)
-        for i in range(block.shape[0]):
-            out[s.bodies.v_at[b] + i] = block[i, i]
+        x, y = own_corner(s, b)
+        for i in range(6 + s.bodies.r[b]):
+            out[s.bodies.v_at[b] + i] = W.S[x + i, y + i]
 
 
 @kernel
@@ -186,9 +187,9 @@ def weigh(s, W, weight):
     """Set W.S to the diagonal matrix with the inverse squares of the weights (n,)."""
     W.S[:] = 0.0
     for b in range(s.bodies.mass.size):
-        block = own_block(s, b, W.S)
-        for i in range(block.shape[0]):
-            block[i, i] = weight[s.bodies.v_at[b] + i] ** -2
+        x, y = own_corner(s, b)
+        for i in range(6 + s.bodies.r[b]):
+            W.S[x + i, y + i] = weight[s.bodies.v_at[b] + i] ** -2
 
 
 @kernel
@@ -196,9 +197,7 @@ def factorised(s, W, least):
     """Factorise [S G^T; G 0] by blocks; whether no pivot of a joint is below ``least``."""
     P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
     border(W, m)
-    set_scaling(s, W, m)
-    W.by_blocks[0] = 1
-    if not factorise_blocks(s, W):
+    if not factorise_bordered(s, W, m) or W.by_blocks[0] == 0:
         return False
     W.spare[:] = 0.0
     for i in range(m):

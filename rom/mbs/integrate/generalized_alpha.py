@@ -34,7 +34,7 @@ from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
 from rom.mbs.kernels.compiled import copy, inner
 from rom.mbs.kernels.constraints import constraint_gradient
 from rom.mbs.kernels.coordinates import follow_coordinates
-from rom.mbs.kernels.markers import own_block
+from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, stage
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
 from rom.mbs.kernels.work import BOTH_LEVELS as BOTH_LEVELS
@@ -150,9 +150,9 @@ def turn_rows(A, first, last, at, psi):
 def factorise_step(s, W, step, rank):
     """Factorise beta h^2 (M beta' + C gamma' + K), bordered; `tangents` first."""
     for b in range(s.bodies.mass.size):
-        block = own_block(s, b, W.S)
-        for i in range(block.shape[0]):
-            W.weight[s.bodies.v_at[b] + i] = block[i, i] / (mass_factor(step) * step.size[3])
+        x, y = own_corner(s, b)
+        for i in range(6 + s.bodies.r[b]):
+            W.weight[s.bodies.v_at[b] + i] = W.S[x + i, y + i] / (mass_factor(step) * step.size[3])
     if rank < step.lam.size:
         constraint_range(s, W, rank, W.U_lu)
     border(W, rank)

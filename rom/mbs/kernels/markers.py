@@ -123,6 +123,13 @@ def own_block(s, b, S):
 
 
 @inner
+def own_corner(s, b):
+    """Row and column at which this block begins, which compiles faster than the view."""
+    e = s.graph.own[b]
+    return s.graph.x[e], s.graph.y[e]
+
+
+@inner
 def wrench_stiffness(s, W, c, S):
     """Add c times the derivative of -H^T wrench to S, the wrench kept constant in the world.
 

@@ -30,8 +30,10 @@ from rom.mbs.kernels.compiled import inner, spliced
 from rom.model import Array
 
 POSE_SIZE = 13  # numbers of a frame: position, quaternion, velocity, angular velocity
-# where the nine dofs of an element are among the twelve of its two frames
-SEGMENT_DOFS, VERTEX_DOFS = (0, 1, 2, 9, 10, 11, 6, 7, 8), (3, 4, 5, 0, 1, 2, 9, 10, 11)
+# where the nine dofs of an element are among the twelve of its two frames; tuples would be types of
+# their own, for each of which all is compiled
+SEGMENT_DOFS = np.array([0, 1, 2, 9, 10, 11, 6, 7, 8])
+VERTEX_DOFS = np.array([3, 4, 5, 0, 1, 2, 9, 10, 11])
 # inertia that a plate without one takes over from the segment beside it: a trapezoid's share
 PLATE_INERTIA_SHARE = 0.25
 
