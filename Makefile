@@ -8,7 +8,7 @@
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
 # tests that try more where there is time
-LONG = $(shell grep -rl cases.long tests --include='test_*.py')
+LONG = $(shell grep -rlE 'cases.long|mark.long' tests --include='test_*.py')
 # test files side by side, in the order of tests/conftest.py, so that none of the long ones is last
 SIDE_BY_SIDE = -n 2 --dist loadfile --no-loadscope-reorder
 LIGHT = .venv-light/bin/python

@@ -3,7 +3,7 @@
 import os
 import signal
 
-from cases.long import LONGEST_FIRST
+from cases.long import LONGEST_FIRST, ROM_LONG
 from cases.paths import TESTS
 
 # a shell lets what it starts in the background ignore Ctrl-C, and processes pass that on
@@ -17,7 +17,11 @@ os.environ.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
 os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
 
 
-def pytest_collection_modifyitems(items):
-    """Begin with what takes longest; all else stays in its order."""
+def pytest_collection_modifyitems(config, items):
+    """Leave to `make long` what is marked so; begin with what takes longest, all else in order."""
+    left = [] if ROM_LONG else [item for item in items if item.get_closest_marker("long")]
+    if left:
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
     rank = {TESTS / name: k for k, name in enumerate(LONGEST_FIRST)}
     items.sort(key=lambda item: rank.get(item.path, len(rank)))

@@ -153,6 +153,7 @@ def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
 
 
 @pytest.mark.fenicsx
+@pytest.mark.long
 def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
     pytest.importorskip("dolfinx", reason="the sector is meshed")
     coarse = wheel.WHEEL_SIZES | {"lc": 0.02, "lc_blade": 0.02}

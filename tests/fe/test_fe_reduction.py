@@ -60,7 +60,9 @@ def test_every_mode_more_lowers_the_frequencies_towards_the_full_ones(body, full
     assert_allclose(steps[-1], full[fixed], rtol=3e-4)
 
 
-@pytest.mark.parametrize("kind", ["full", "rbe2", "rbe3"])
+@pytest.mark.parametrize(
+    "kind", ["rbe2", *(pytest.param(kind, marks=pytest.mark.long) for kind in ("full", "rbe3"))]
+)
 def test_a_complete_basis_is_the_full_model(tmp_path, kind):
     """A coarse rod without fillets, all fixed-interface modes kept."""
     model = rom.fe.model(ROD, material=STEEL, degree=1, parameters={"lc": 0.016})

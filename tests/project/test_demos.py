@@ -5,16 +5,16 @@ import sys
 
 import pytest
 
-from cases.files.demos import DEMOS, ON_TWO_PROCESSES, TESTED, check, options_of
+from cases.files.demos import DEMOS, LONG_DEMOS, ON_TWO_PROCESSES, check
 from cases.long import ROM_LONG
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
-ALONE = [demo for demo in DEMOS if ROM_LONG or demo.stem not in ON_TWO_PROCESSES | TESTED]
+ALONE = [demo for demo in DEMOS if ROM_LONG or demo.stem not in ON_TWO_PROCESSES | LONG_DEMOS]
 
 
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 @pytest.mark.parametrize("demo", ALONE, ids=lambda path: path.stem)
 def test_demo_ends_in_the_numbers_expected(demo, tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "argv", [str(demo), *options_of(demo, tmp_path)])
+    monkeypatch.setattr(sys, "argv", [str(demo), "--quiet", "--out", str(tmp_path)])
     check(demo, runpy.run_path(str(demo), run_name="__main__")["results"], tmp_path)

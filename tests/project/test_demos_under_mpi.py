@@ -7,7 +7,7 @@ import sys
 import pytest
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
-from cases.files.demos import MESHED, ON_TWO_PROCESSES, check, options_of
+from cases.files.demos import DEMOS, LONG_DEMOS, MESHED, ON_TWO_PROCESSES, check
 from cases.long import ROM_LONG
 from cases.paths import RANKS
 from cases.ranks.environment import ENVIRONMENT
@@ -24,7 +24,7 @@ def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
     out, file = tmp_path / "out", tmp_path / "results.json"
     done = subprocess.run(
         ["mpirun", "-n", "2", "--oversubscribe", sys.executable, str(RANKS / "demo_under_mpi.py"),
-         str(file), str(demo), *options_of(demo, out)],
+         str(file), str(demo), "--quiet", "--out", str(out)],
         env=ENVIRONMENT, capture_output=True, text=True, timeout=1740, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -35,3 +35,5 @@ def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
 def test_what_runs_on_two_processes_has_a_mesh():
     """A name that is none would let a demo run nowhere, or only alone."""
     assert {demo.stem for demo in MESHED} >= ON_TWO_PROCESSES
+    assert {demo.stem for demo in DEMOS} > LONG_DEMOS
+    assert not LONG_DEMOS & ON_TWO_PROCESSES

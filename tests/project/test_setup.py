@@ -115,12 +115,13 @@ def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
     """A file under another name would come last again; `make long` finds files by what they say."""
     assert [name for name in LONGEST_FIRST if not (TESTS / name).is_file()] == []
     importing = {path for path in TESTS.rglob("*.py") if "cases.long" in path.read_text()}
-    apart = {TESTS / "conftest.py", TESTS / "cases" / "files" / "demos.py", Path(__file__)}
+    apart = {TESTS / "conftest.py", Path(__file__)}
     assert importing >= apart
     assert all(path.name.startswith("test_") for path in importing - apart)
     makefile = (ROOT / "Makefile").read_text()
     recipe = makefile.partition("\nlong: setup\n")[2].partition("\n\n")[0]
-    assert "LONG = $(shell grep -rl cases.long tests --include='test_*.py')" in makefile
+    found = "LONG = $(shell grep -rlE 'cases.long|mark.long' tests --include='test_*.py')"
+    assert found in makefile
     assert "ROM_LONG=1 $(PYTHON) -m pytest $(LONG)" in recipe
     assert 'ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once"' in recipe
 

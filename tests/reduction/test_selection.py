@@ -61,6 +61,7 @@ def test_the_selection_works_on_meshes_too():
 
 
 @pytest.mark.fenicsx
+@pytest.mark.long
 def test_the_order_is_chosen_on_meshes_too():
     """Beside an averaging interface, which PETSc has to project."""
     pytest.importorskip("dolfinx", reason="needs finite elements")

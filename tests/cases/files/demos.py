@@ -1,22 +1,23 @@
 """The demos, how each of them runs, what its numbers must be, and what it leaves behind.
 
-In `make test` each runs once, those of `ON_TWO_PROCESSES` under mpirun, but for those of `TESTED`;
+In `make test` each that is not of `LONG_DEMOS` runs once, those of `ON_TWO_PROCESSES` under mpirun;
 in `make long` all run alone, and all with a mesh under mpirun, too.
 """
 
 import pytest
 
-from cases.long import ROM_LONG
 from cases.paths import ROOT
 
 DEMOS = sorted((ROOT / "demos").glob("demo_*.py"))
 MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 # one each that writes files, and is about wheels, rotation and prestress
 ON_TWO_PROCESSES = {"demo_exchange", "demo_mistuning", "demo_rotor", "demo_spin_up"}
-# half a minute each, of what the tests of assemblies, of the blade and of the turbine hold in parts
-TESTED = {"demo_assembly", "demo_compressor_blade", "demo_whole_turbine"}
-# its meshes take a minute; the same limits hold on coarser ones
-COARSER = {"demo_large_mesh": ("--lc", "0.026", "0.02")}
+# more than ten seconds each, of what has tests of its own
+LONG_DEMOS = {
+    "demo_assembly", "demo_bladed_disk", "demo_compressor_blade", "demo_large_mesh",
+    "demo_parameters", "demo_robot_arm", "demo_satellite", "demo_sheet", "demo_transmission",
+    "demo_whole_turbine",
+}  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
     "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
@@ -57,11 +58,6 @@ LEFT_BEHIND = {
     },
     "demo_transmission": {"transmission.png", "transmission_fields.png"},
 }  # fmt: skip
-
-
-def options_of(demo, folder):
-    """Words behind the name of a demo."""
-    return ["--quiet", "--out", str(folder), *(() if ROM_LONG else COARSER.get(demo.stem, ()))]
 
 
 def check(demo, results, folder):

@@ -216,6 +216,7 @@ def test_steps_converge_to_a_reference_of_a_tenth_of_the_step(loaded):
     assert names == set(fine.work)
 
 
+@pytest.mark.long
 def test_the_response_to_the_mesh_is_where_a_motion_settles():
     """To first order; the motion also feels that the stiffness changes while it vibrates."""
     u = unit(torque=300.0, speed=150.0, loss=4e-5)
