@@ -89,7 +89,8 @@ class Assembly:
         """Natural modes: omega (m,) [rad/s], and per body its shapes (6 + r, m)."""
         omega, V = self._natural(fixed)
         kept = lowest(n)
-        return Modes(omega[kept], per_body(self._widths(), V[:, kept]))
+        # copies: what users do to them must not reach what is kept
+        return Modes(omega[kept].copy(), per_body(self._widths(), V[:, kept].copy()))
 
     def _natural(self, fixed: tuple[Place, ...]) -> tuple[Array, Array]:
         """All natural modes, kept for other numbers of them."""

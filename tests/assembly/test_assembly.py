@@ -32,6 +32,18 @@ def test_shapes_of_both_halves_meet_at_the_cut():
     assert_allclose(left.marker("root").hold @ shapes["left"], 0, atol=1e-9 * np.abs(ends[0]).max())
 
 
+def test_modes_asked_for_again_are_the_same_whatever_was_done_to_them():
+    """And those with supports are others: they are kept apart."""
+    assembly = joined("polynomial:2", n_modes=10)
+    omega, shapes = assembly.modes(8)
+    before = omega.copy(), shapes["left"].copy()
+    omega[:] = shapes["left"][:] = 7.0
+    again = assembly.modes(8)
+    assert (again.omega == before[0]).all() and (again.shapes["left"] == before[1]).all()
+    held = assembly.frequencies(8, fixed=(ROOT,))
+    assert (held > 0).all() and (again.omega[:6] == 0).all()
+
+
 def test_errors_are_one_sided_and_fall_with_the_order_of_the_functions():
     exact = whole()
     steps = np.array([joined(f"polynomial:{p}", n_modes=30).frequencies(12, fixed=(ROOT,))
