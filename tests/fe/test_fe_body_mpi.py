@@ -15,11 +15,14 @@ from cases.ranks.environment import ENVIRONMENT
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
 ROD = ROOT / "meshes" / "connecting_rod.geo"
-KINDS = {
-    "average and functions": ["pin_a=rbe3", "pin_b=polynomial:1"],
-    "functions and stiff": ["pin_a=fourier:1,1", "pin_b=rbe2"],
-}
-KINDS = KINDS if ROM_LONG else dict([*KINDS.items()][:1])
+# modes of nearly one frequency are defined to round-off over the distance of their eigenvalues: in
+# none of these rods two are closer than 1e-3, with fourier:1,1 and rbe2 two are 1.3e-4 apart
+KINDS = {"average and functions": ["pin_a=rbe3", "pin_b=polynomial:1"]}
+if ROM_LONG:
+    KINDS |= {
+        "stiff and average": ["pin_a=rbe2", "pin_b=rbe3"],
+        "functions": ["pin_a=polynomial:1", "pin_b=fourier:1,1"],
+    }
 
 
 @pytest.fixture(scope="module", params=KINDS)
