@@ -55,3 +55,11 @@ class IntermediateCompiler(CompilerBase):
         passes.passes = [(last.get(one, one), why) for one, why in passes.passes]
         passes.finalize()
         return [passes]
+
+
+# of functions that only compiled code calls
+INTERMEDIATE_OPTIONS = {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": IntermediateCompiler,
+}

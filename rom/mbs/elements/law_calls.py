@@ -4,15 +4,9 @@ from typing import Any, NamedTuple
 
 import numba
 
-from rom.mbs.compiler.intermediate import IntermediateCompiler
+from rom.mbs.compiler.intermediate import INTERMEDIATE_OPTIONS
 from rom.mbs.parts.foreign import compiled
 
-# of functions that an entry takes in; they may make arrays, and are calculated as Python says
-TAKEN_IN = {
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": IntermediateCompiler,
-}
 MOTION_SIZE = 18  # numbers of the motion of a marker
 ENERGY_SIZE = 2  # stored energy, lost power
 # as numba.cfunc takes it
@@ -78,8 +72,10 @@ def answer_of(flat: Any, n: int, n_memory: int) -> Answer:
     )
 
 
+# functions that an entry takes in may make arrays, and are calculated as Python says
+_taken_in = numba.njit(**INTERMEDIATE_OPTIONS)
 # for all entries, so that they are compiled once
-_motion_of, _answer_of = numba.njit(**TAKEN_IN)(motion_of), numba.njit(**TAKEN_IN)(answer_of)
+_motion_of, _answer_of = map(_taken_in, (motion_of, answer_of))
 
 
 def entries(name: str, laws: Any, sizes: Any, wanted: bool | None) -> tuple[Any, Any]:
@@ -98,7 +94,7 @@ def _compiled(
         return function
 
     def make(python: Any) -> Any:
-        return entry_of(numba.njit(**TAKEN_IN)(python), sizes, tangents=tangents)
+        return entry_of(_taken_in(python), sizes, tangents=tangents)
 
     hint = "Use numbers and arrays of NumPy only, or compiled=False."
     return compiled(f"law {name!r}", function, make, wanted, hint)

@@ -3,7 +3,7 @@
 import numba
 
 from rom.mbs.compiler.cache import kept
-from rom.mbs.compiler.intermediate import IntermediateCompiler
+from rom.mbs.compiler.intermediate import INTERMEDIATE_OPTIONS
 
 # reassociation lets sums be vectorised; NaN and infinity keep their meaning. No kernel makes an
 # array, so none counts references to them: a step took four times as long when all did
@@ -14,12 +14,7 @@ OPTIONS = {
     "fastmath": {"contract", "reassoc"},
 }
 
-INNER_OPTIONS = OPTIONS | {
-    "cache": False,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": IntermediateCompiler,
-}
+INNER_OPTIONS = OPTIONS | {"cache": False} | INTERMEDIATE_OPTIONS
 # callable from Python
 kernel = kept(numba.njit(**OPTIONS), entry=True)
 # callable from other kernels only, which alone are kept
