@@ -12,6 +12,8 @@ LONG = $(shell grep -rlE 'cases.long|mark.long' tests --include='test_*.py')
 # test files side by side, in the order of tests/conftest.py, so that none of the long ones is last
 SIDE_BY_SIDE = -n 2 --dist loadfile --no-loadscope-reorder
 LIGHT = .venv-light/bin/python
+# what Python compiles of sources is kept even where the system would not
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup demo test long docs pictures clean
 setup:
@@ -23,7 +25,7 @@ demo: setup
 test: setup
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
-	$(PYTHON) -m mypy
+	MYPY_NUM_WORKERS=2 $(PYTHON) -m mypy
 	$(PYTHON) -m pytest $(SIDE_BY_SIDE)
 	$(LIGHT) -m pytest -m "not fenicsx and not once" -p no:cacheprovider $(SIDE_BY_SIDE)
 

@@ -82,6 +82,9 @@ for folder in .venv/lib/python3*/site-packages; do
     >"$folder/openblas_core.pth"
 done
 
+# Python's own code of the sources, for each process that starts
+.venv/bin/python -m compileall -q rom
+
 # What is compiled lies beside the sources, under names with the version of Numba; so does the stamp.
 made_of=$({ dpkg-query -W python3-numba; cat .ci/light.txt; echo "${NUMBA_CACHE_DIR:-}"
   find rom -name '*.py' | LC_ALL=C sort | xargs cat; } | sha256sum)

@@ -82,6 +82,7 @@ def test_after_the_set_up_first_motions_compile_nothing():
     assert (done.stdout.split(), done.stderr) == (["0", "1"], "")
 
 
+@pytest.mark.once
 def test_first_uses_are_measured_with_nothing_compiled_and_again():
     """A case of few functions, of which Numba keeps each in a file."""
     name = "three bodies"

@@ -87,6 +87,7 @@ def native(motion):
     return np.hstack([motion.position("slider", "b"), motion.velocity("slider", "b")])
 
 
+@pytest.mark.once
 def test_the_description_is_valid_and_names_no_place_of_this_machine(crank):
     assert fmpy.validation.validate_fmu(str(crank)) == []
     d = fmpy.read_model_description(str(crank))
@@ -317,6 +318,7 @@ def test_a_warning_is_logged_once(crank, tmp_path):
     one.fmu.freeInstance()
 
 
+@pytest.mark.once
 def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
     """Nor the signal for a broken pipe, which Python ignores and other programs do not."""
     one, other = (Instance(hanging, tmp_path / name).begin() for name in ("one", "other"))
@@ -348,6 +350,7 @@ def test_an_fmu_that_cannot_start_says_why(hanging, tmp_path, monkeypatch, pytho
     assert message in log[0]
 
 
+@pytest.mark.once
 def test_a_mechanism_that_cannot_start_says_why(tmp_path):
     """Here its file is gone from the resources."""
     path = written(tmp_path, CRANK, outputs=["slider.b"])
@@ -365,6 +368,7 @@ def written(tmp_path, script, **options):
     return rom.write_fmu(tmp_path / "m.py", tmp_path / "m.fmu", **{"dt": 1e-3, **options})
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("script", "options", "message"),
     [

@@ -344,6 +344,7 @@ def test_a_step_file_that_is_scaled_on_top_of_its_unit_is_doubted(scale, n, tmp_
     assert [("scale=0.001" in text and "0.0001225 m" in text) for text in found] == [True] * n
 
 
+@pytest.mark.once
 def test_strict_turns_a_doubt_into_an_error_of_its_own_code(tmp_path):
     path = tmp_path / "m.toml"
     path.write_text(

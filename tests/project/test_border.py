@@ -98,6 +98,7 @@ def outcome(function, given, wrong, argument):
     return None
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("label", calls())
 def test_a_wrong_argument_is_a_mistake_of_the_user_and_named(label, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

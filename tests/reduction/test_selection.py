@@ -30,6 +30,7 @@ def worst_error(model, exact, n_modes):
     return np.abs(found / exact - 1).max() if found.size == exact.size else 1.0
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("size", "cells"), BODIES)
 @pytest.mark.parametrize(("count", "tol"), [(6, 1e-3), (10, 1e-2), (12, 1e-4)])
 def test_band_and_tolerance_are_met_with_few_modes(size, cells, count, tol):
@@ -99,6 +100,7 @@ def surface_error(model, kinds, exact, method):
     return np.abs(found / exact - 1).max(), body
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("tol", [3e-2, 3e-3])
 @pytest.mark.parametrize(("size", "cells"), BODIES)
 def test_the_order_of_a_surface_is_the_lowest_that_meets_the_tolerance(size, cells, tol):

@@ -62,6 +62,8 @@ FILMS = {
     "flow": lambda: ([np.array([0.0, 1e-6]), [squeezed(0.0), squeezed(0.5)]],
                      {"caption": "What a stranger has to know."}),
 }  # fmt: skip
+# seconds each; "mesh" and "start" are drawn by a child process in `make test`, too
+DRAWN_BY_A_CHILD = {"instants", "mode_shapes", "updating", "wheel_modes"}
 PATH_CAME_FIRST = {"campbell", "convergence", "deformed", "flow", "frequencies", "history",
                    "panels", "plane", "updating", "wheel_modes"}  # fmt: skip
 WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/family.py",
@@ -89,7 +91,9 @@ def test_things_come_first_then_the_path_then_words_by_name(name):
     assert parameters(name)["path"].default is (inspect.Parameter.empty if name in FILMS else None)
 
 
-@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in PICTURES]
+)
 def test_a_picture_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
     (things, words), draw = PICTURES[name](), getattr(view, name)
     seen, file = draw(*things, **words), draw(*things, tmp_path / "a.png", **words)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-OVERSAMPLING = 2  # pictures are drawn larger and averaged: smooth edges on every driver
 EDGE_OFFSET = 2e-3  # of the picture's height, towards the eye; parallel projection does not show it
 CREASE_ANGLE = 35.0  # from which an edge stays sharp in shading [degree]
 
@@ -23,10 +22,8 @@ def main(folder: Path) -> None:
     scene = json.loads((folder / "scene.json").read_text())
     with np.load(folder / "arrays.npz", allow_pickle=False) as file:
         arrays = dict(file)
-    width, height = scene["size"]
-    plotter: Any = pyvista.Plotter(
-        off_screen=True, window_size=[OVERSAMPLING * width, OVERSAMPLING * height]
-    )
+    (width, height), times = scene["size"], scene["oversampling"]
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[times * width, times * height])
     plotter.set_background("white")
     aim(plotter, scene, arrays)
     moving = [k for k in range(len(scene["actors"])) if len(arrays[f"points {k}"]) > 1]
@@ -38,17 +35,17 @@ def main(folder: Path) -> None:
         for k in moving if frame else ():
             add(plotter, scene, arrays, k, frame)
         plotter.render()
-        pictures[frame] = averaged(plotter.screenshot(return_img=True)[..., :3])
+        pictures[frame] = averaged(plotter.screenshot(return_img=True)[..., :3], times)
     np.save(folder / "pictures.npy", pictures)
     plotter.close()
 
 
-def averaged(fine: Any) -> Any:
+def averaged(fine: Any, times: int) -> Any:
     """Means of blocks of pixels; a sum over axes of a reshaped array takes ten times as long."""
-    total = np.full_like(fine[::OVERSAMPLING, ::OVERSAMPLING], OVERSAMPLING**2 // 2, np.uint16)
-    for i, j in product(range(OVERSAMPLING), repeat=2):
-        total += fine[i::OVERSAMPLING, j::OVERSAMPLING]
-    return total // OVERSAMPLING**2
+    total = np.full_like(fine[::times, ::times], times**2 // 2, np.uint16)
+    for i, j in product(range(times), repeat=2):
+        total += fine[i::times, j::times]
+    return total // times**2
 
 
 def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
@@ -84,8 +81,8 @@ def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, fra
         look |= {"scalars": "value", "cmap": scene["colours"], "clim": scene["limits"]}
         look["show_scalar_bar"] = False
     if arrays[f"cells {k}"].shape[1] < 3:
-        look |= {"lighting": False, "line_width": OVERSAMPLING * style["width"]}
-        look |= {"point_size": OVERSAMPLING * style["width"], "render_points_as_spheres": True}
+        look |= {"lighting": False, "line_width": scene["oversampling"] * style["width"]}
+        look |= {"point_size": look["line_width"], "render_points_as_spheres": True}
     else:
         grid = grid.compute_normals(
             feature_angle=CREASE_ANGLE, split_vertices=True, cell_normals=False

@@ -15,11 +15,16 @@ from rom.view.canvas.scene import Actor, Camera
 
 Image = npt.NDArray[np.uint8]
 COLOUR_MAP = "viridis"
+OVERSAMPLING = 2  # smooth edges on every driver
 INSTALL_COMMAND = "pip install 'fenicsx-rom[view]'"
 
 
 def render(
-    actors: Sequence[Actor], camera: Camera, *, limits: tuple[float, float] = (0.0, 1.0)
+    actors: Sequence[Actor],
+    camera: Camera,
+    *,
+    limits: tuple[float, float] = (0.0, 1.0),
+    oversampling: int = OVERSAMPLING,
 ) -> Image:
     """Draw all frames of a scene.
 
@@ -27,6 +32,7 @@ def render(
         actors: what is seen; those with one frame stay while the others move.
         camera: from where.
         limits: values at the ends of the colour map.
+        oversampling: pictures are drawn so many times larger and averaged.
 
     Returns:
         (f, height, width, 3) pixels.
@@ -37,7 +43,7 @@ def render(
     """
     require("pyvista")
     with scratch("view") as folder:
-        write_scene(folder, actors, camera, limits)
+        write_scene(folder, actors, camera, limits, oversampling)
         done = run(python("rom.view.canvas.draw", str(folder)))
         pictures = folder / "pictures.npy"
         if done.code or not pictures.exists():
@@ -58,7 +64,11 @@ def require(package: str) -> None:
 
 
 def write_scene(
-    folder: Path, actors: Sequence[Actor], camera: Camera, limits: tuple[float, float]
+    folder: Path,
+    actors: Sequence[Actor],
+    camera: Camera,
+    limits: tuple[float, float],
+    oversampling: int = OVERSAMPLING,
 ) -> None:
     """Leave a scene where a child process finds it."""
     arrays: dict[str, npt.NDArray[Any]] = {
@@ -72,7 +82,8 @@ def write_scene(
             arrays[f"values {k}"] = actor.values.astype(np.float32)
     np.savez(folder / "arrays.npz", **arrays)
     style = [{"colour": a.colour, "width": a.width, "opacity": a.opacity} for a in actors]
-    scene = {"height": camera.height, "size": camera.size, "limits": limits, "actors": style}
+    scene = {"height": camera.height, "size": camera.size, "oversampling": oversampling}
+    scene |= {"limits": limits, "actors": style}
     (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOUR_MAP}))
 
 

@@ -57,7 +57,9 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     path = page.checked(path, ".gif")
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
     stage = _stage(mechanism, solution, steps, shapes or {}, magnify)
-    images = render(stage.actors, stage.camera(FILM_WIDTH, view, up), limits=stage.limits)
+    camera = stage.camera(FILM_WIDTH, view, up)
+    # many small pictures: as large as they are, the smooth edges that the driver has will do
+    images = render(stage.actors, camera, limits=stage.limits, oversampling=1)
     with page.styled():
         blank = _film_sheet(stage, images.shape[1], magnify)
         clocks = np.stack([_clock(text) for text in clock_texts(solution.t[steps])])

@@ -63,6 +63,7 @@ def solved(body, metal, f, held):
     return u.reshape(-1, 2)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("n", COOK_TABLE)
 def test_cooks_membrane(n):
     found = []
@@ -73,6 +74,7 @@ def test_cooks_membrane(n):
     assert_allclose(found, COOK_TABLE[n], atol=1e-3)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("n", "element", "expected"),
     [(8, "CST", 2.5026), (16, "CST", 3.0770), (8, "F3", 3.2484), (16, "F3", 3.3648),
@@ -338,6 +340,7 @@ def test_explicit_motion_keeps_its_energy():
     assert quarter.work == pytest.approx(kinetic, rel=5e-3)
 
 
+@pytest.mark.once
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("element", "length", "foot", "plastic"),

@@ -331,6 +331,7 @@ def janus():
     return bodies, np.concatenate([-t[:0:-1], t]), x, v
 
 
+@pytest.mark.once
 def test_energy_and_momenta_stay(janus):
     bodies, _, x, v = janus
     E = [bodies.energy(*state) for state in zip(x, v, strict=True)]

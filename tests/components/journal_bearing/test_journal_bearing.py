@@ -74,6 +74,7 @@ RAIMONDI_BOYD = [numbers(line) for line in """
 """.strip().splitlines()]  # fmt: skip
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("row", RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
     slender, e, S, attitude, friction, flow, side, peak = row

@@ -86,6 +86,7 @@ def test_mean_axes_are_the_strains_orthogonal_to_rotation():
     assert_allclose(square.M[:3, 3:], 0.0, atol=1e-12 * square.M.max())
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("Omega", "factor", "period"),
     [(0.1, 0.997509, 1.0011), (0.5, 0.942809, 1.0273), (1.0, 0.816497, 1.0968)],

@@ -230,6 +230,7 @@ def test_the_response_to_the_mesh_is_where_a_motion_settles():
     assert linear.load_factor - 1 == pytest.approx(np.std(run.teeth[last]) / linear.mean, rel=0.3)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("helix", "rel"), [(0.0, 0.15), (HELIX, 0.25)])
 def test_slow_units_have_the_error_of_their_teeth(helix, rel):
     """The error is that of rest; but films resist the tilt of helical gears more when squeezed."""

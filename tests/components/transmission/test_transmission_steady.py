@@ -28,6 +28,7 @@ def found(lossy):
 
 
 @pytest.mark.once
+@pytest.mark.long
 def test_it_is_where_motion_through_time_settles(lossy, found):
     """But for the little that its steps damp."""
     run = simulate(lossy, periods=8, steps=STEPS)

@@ -212,6 +212,7 @@ ABAQUS_FAULTS = {
 }
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("fault", ABAQUS_FAULTS)
 def test_broken_abaqus_deck_is_refused(tmp_path, fault):
     (old, new), error, culprit = ABAQUS_FAULTS[fault]

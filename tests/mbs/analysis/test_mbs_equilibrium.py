@@ -120,6 +120,7 @@ def test_the_torque_that_holds_a_slider_crank():
     assert_allclose(state.q[14], l1 * np.cos(phi) + l2 * np.sqrt(1 - s**2), rtol=1e-10)
 
 
+@pytest.mark.once
 def test_statics_are_where_a_damped_motion_ends():
     """Two links, a spring across, a flexible arm at the end."""
     mech = Mechanism(gravity=(0, 0, -g))

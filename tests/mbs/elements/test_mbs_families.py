@@ -212,6 +212,7 @@ def test_a_wrong_tangent_would_cost_newton_passes(add):
     assert sol.statistics["iterations"] <= 2.5 * sol.statistics["steps"]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("name", ["add_family", "add_law", "add_python_law"])
 def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")

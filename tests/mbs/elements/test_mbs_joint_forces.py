@@ -138,6 +138,7 @@ def loaded(rng):
     return mech
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("seed", range(2))
 def test_tangents_are_derivatives_of_the_forces(seed):
     """By velocities, by coordinates of the mechanism at rest, and by the multipliers."""

@@ -340,6 +340,7 @@ FOUND = {
 }
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("kind", FOUND)
 def test_the_check_names_what_is_wrong(kind):
     law, slopes, text = FOUND[kind]

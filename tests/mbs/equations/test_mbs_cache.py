@@ -15,6 +15,9 @@ from rom.mbs.compiler import cache
 from rom.mbs.compiler.cache import CodeFiles
 from rom.mbs.kernels import compiled, stages
 
+ELSEWHERE = [
+    pytest.param(p, marks=pytest.mark.once) for p in ("own folder", "of the user", "nowhere")
+]
 OUTER = """
 from rom.toy.inner import SIZE, inside
 from rom.mbs.kernels.compiled import kernel
@@ -51,7 +54,7 @@ def place_for_code(where, tmp_path, toy):
     return {"NUMBA_CACHE_DIR": "", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
 
 
-@pytest.mark.parametrize("where", ["beside", "own folder", "of the user", "nowhere"])
+@pytest.mark.parametrize("where", ["beside", *ELSEWHERE])
 def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     """Constants and a function built in from other files; a file that gives none is no source."""
     package = tmp_path / "rom"

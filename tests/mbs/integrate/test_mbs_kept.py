@@ -120,6 +120,7 @@ def same(one, other):
         assert one.statistics[name] == other.statistics[name], name
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("where", ["force", "motor", "drive", "event", "load"])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_function_that_breaks_is_named_and_the_repaired_run_has_the_same_bits(
