@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -130,13 +131,15 @@ def places(found, path):
     return [f"{path.relative_to(ROOT)}:{line} {name}" for name, line in found]
 
 
-TREES = {path: ast.parse(path.read_text()) for path in MODULES}
+@cache
+def trees():
+    return {path: ast.parse(path.read_text()) for path in MODULES}
 
 
 def test_constants_say_quantity_and_kind():
     found = [
         (name, f"{path.relative_to(ROOT)}:{line} {name}")
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         if path.relative_to(ROOT / "rom").as_posix() not in DESCRIPTIONS
         for name, line in one_word_constants(tree)
     ]
@@ -149,7 +152,7 @@ def test_constants_say_quantity_and_kind():
 @pytest.mark.parametrize(("word", "say", "where"), RETIRED, ids=[w for w, _, _ in RETIRED])
 def test_retired_words_do_not_come_back(word, say, where):
     bad = []
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         parts = set(path.relative_to(ROOT / "rom").with_suffix("").parts)
         if not where or parts & set(where.split()):
             bad += places([(n, line) for n, line in names_bound(tree) if n == word], path)

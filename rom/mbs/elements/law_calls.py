@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numba
 
 from rom.mbs.compiler.intermediate import INTERMEDIATE_OPTIONS
-from rom.mbs.parts.foreign import compiled
+from rom.mbs.parts.foreign import compiled_function
 
 MOTION_SIZE = 18  # numbers of the motion of a marker
 ENERGY_SIZE = 2  # stored energy, lost power
@@ -97,7 +97,7 @@ def _compiled(
         return entry_of(_taken_in(python), sizes, tangents=tangents)
 
     hint = "Use numbers and arrays of NumPy only, or compiled=False."
-    return compiled(f"law {name!r}", function, make, wanted, hint)
+    return compiled_function(f"law {name!r}", function, make, wanted, hint)
 
 
 def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool = False) -> Any:

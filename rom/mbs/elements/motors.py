@@ -15,8 +15,7 @@ from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.tables import Address1, Index1, Scratch1, Table, table
-from rom.mbs.parts.foreign import ask, numbers
-from rom.mbs.parts.foreign import compiled as compiled_law
+from rom.mbs.parts.foreign import ask, compiled_function, numbers
 from rom.mbs.parts.joints import Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
@@ -70,7 +69,7 @@ def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
     """The law as a C function of three doubles, None when it is left to Python."""
     make = numba.cfunc("float64(float64, float64, float64)")
     hint = "Use numbers and NumPy functions of numbers only, or compiled=False."
-    return compiled_law(f"law of motor {name!r}", law, make, wanted, hint)
+    return compiled_function(f"law of motor {name!r}", law, make, wanted, hint)
 
 
 @table

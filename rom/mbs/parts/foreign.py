@@ -51,7 +51,7 @@ def why_not_compiled(error: Exception) -> str:
     return next((x for x in lines if x and not x.startswith("Failed in")), type(error).__name__)
 
 
-def compiled(
+def compiled_function(
     what: str, law: Any, make: Callable[[Any], Any], wanted: bool | None, hint: str
 ) -> Any:
     """What ``make`` compiles a function of the user to; None when it is left to Python.

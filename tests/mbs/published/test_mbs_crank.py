@@ -37,7 +37,7 @@ def compare(sol, want, positions, velocities):
 def test_published_solution_of_the_flexible_slider_crank():
     """C2: 13 digits of an independent formulation, with its own inertia integrals."""
     sol = simulate_quietly(
-        simeon_crank(), t_end=0.1, dt=0.1, method="dop853", rtol=1e-12, atol=1e-14
+        simeon_crank(), t_end=0.1, dt=0.1, method="dop853", rtol=1e-11, atol=1e-13
     )
     compare(sol, REFERENCE["published"], 2e-9, 2e-8)
 
