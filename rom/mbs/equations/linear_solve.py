@@ -6,11 +6,12 @@ also where a block is singular for itself.
 
 import math
 
+import numpy as np
 from numba import types
 
 from rom.mbs.equations.elimination import eliminate, fill_blocks, substitute
 from rom.mbs.kernels.algebra import back_substitute, factorise, range_basis
-from rom.mbs.kernels.compiled import copy, inner, kernel
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
@@ -173,46 +174,36 @@ def gradient_times(s, W, x, absolute, out):
                 out[k] += abs(term) if absolute else term
 
 
-@kernel
-def mass_diagonal(s, W, out):
-    """Set out (n,) to the diagonal of W.S."""
-    for b in range(s.bodies.mass.size):
-        x, y = own_corner(s, b)
-        for i in range(6 + s.bodies.r[b]):
-            out[s.bodies.v_at[b] + i] = W.S[x + i, y + i]
+def diagonal(s):
+    """Rows and columns (n,) of W.S where the masses of all velocity coordinates stand."""
+    count = 6 + s.bodies.r
+    body = np.repeat(np.arange(count.size), count)
+    within = np.arange(body.size) - np.repeat(np.cumsum(count) - count, count)
+    own = s.graph.own[body]
+    return s.graph.x[own] + within, s.graph.y[own] + within
 
 
-@kernel
 def weigh(s, W, weight):
     """Set W.S to the diagonal matrix with the inverse squares of the weights (n,)."""
     W.S[:] = 0.0
-    for b in range(s.bodies.mass.size):
-        x, y = own_corner(s, b)
-        for i in range(6 + s.bodies.r[b]):
-            W.S[x + i, y + i] = weight[s.bodies.v_at[b] + i] ** -2
+    W.S[diagonal(s)] = weight**-2
 
 
-@kernel
 def factorised(s, W, least):
     """Factorise [S G^T; G 0] by blocks; whether no pivot of a joint is below ``least``."""
     P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
-    border(W, m)
+    W.UG[:], W.UGT[:] = W.G, W.G
     if not factorise_bordered(s, W, m) or W.by_blocks[0] == 0:
         return False
-    W.spare[:] = 0.0
-    for i in range(m):
-        W.spare[P.position[n + i]] = 1.0
-    for k in range(P.size.size):
-        for i in range(P.size[k]):
-            diagonal = W.factor[P.pivot[k] + i * (P.size[k] + 1)]
-            if W.spare[P.start[k]] == 1.0 and not abs(diagonal) > least:
-                return False
-    return True
+    joints = np.flatnonzero(np.isin(P.start, P.position[n:]))
+    pivots = [P.pivot[k] + np.arange(P.size[k]) * (P.size[k] + 1) for k in joints]
+    return bool(np.all(np.abs(W.factor[np.concatenate([*pivots, joints[:0]])]) > least))
 
 
-@kernel
-def least_motion(s, W, gap, out):
-    """Set out (n,) to the motion x with G x = gap and the least x^T S x, factorised before."""
+def least_motion(s, W, gap):
+    """The motion x (n,) with G x = gap and the least x^T S x, factorised before."""
+    x = np.zeros(W.residual.size)
     W.rhs[:] = 0.0
-    copy(gap, W.part)
-    solve_bordered(s, W, gap.size, out, W.dlam)
+    W.part[:] = gap
+    solve_bordered(s, W, gap.size, x, W.dlam)
+    return x

@@ -8,10 +8,10 @@ import numpy as np
 from rom.errors import ModelError, SolverError, warn
 from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
 from rom.mbs.equations.linear_solve import (
+    diagonal,
     factorised,
     gradient_times,
     least_motion,
-    mass_diagonal,
     weigh,
 )
 from rom.mbs.equations.packing import Packed
@@ -70,7 +70,7 @@ def _independent(packed: Packed, W: Work, q: Array) -> bool:
     """Whether the elimination by blocks meets no joint that could repeat others."""
     linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
     weigh(packed.system, W, _weights(packed, W))
-    return bool(factorised(packed.system, W, RANK_TOLERANCE**1.5))
+    return factorised(packed.system, W, RANK_TOLERANCE**1.5)
 
 
 def with_accelerations(packed: Packed, W: Work, state: State) -> State:
@@ -137,8 +137,7 @@ def _check_gap(packed: Packed, gap: Array) -> None:
 def _weights(packed: Packed, W: Work) -> Array:
     """(n,) inverse square root of what a unit of each velocity coordinate costs."""
     bodies = packed.system.bodies
-    mass = np.zeros(packed.v.size)
-    mass_diagonal(packed.system, W, mass)
+    mass = W.S[diagonal(packed.system)]
     for b, t in enumerate(bodies.v_at):
         mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
         mass[t + 6 : t + 6 + bodies.r[b]] *= ELASTIC_WEIGHT
@@ -148,12 +147,10 @@ def _weights(packed: Packed, W: Work) -> Array:
 def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Integers) -> Array:
     """Solution x of G x = gap in some rows, all by blocks, with the least weighted norm."""
     if packed.by_blocks:
-        x = np.zeros(weight.size)
         weigh(packed.system, W, weight)
         if not factorised(packed.system, W, 0.0):
             raise SolverError("constraints that were independent became dependent.")
-        least_motion(packed.system, W, gap, x)
-        return x
+        return least_motion(packed.system, W, gap)
     scale = packed.row_scale[rows]
     G, gap = W.G[rows] / scale[:, None], gap[rows] / scale
     rows = np.linalg.norm(G * weight, axis=1)

@@ -111,12 +111,11 @@ def across(record: Record, W: Work, state: State, shift: Array) -> Array:
 
 def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
     """The same from the blocks of masses and gradients at hand."""
-    system, gap, out = record.packed.system, np.zeros(W.value.size), np.zeros_like(shift)
+    system, gap = record.packed.system, np.zeros(W.value.size)
     if not factorised(system, W, 0.0):
         raise SolverError("the equations of motion are singular where constraints are met.")
     gradient_times(system, W, shift, False, gap)
-    least_motion(system, W, gap, out)
-    return out
+    return least_motion(system, W, gap)
 
 
 def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
