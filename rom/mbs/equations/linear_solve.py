@@ -6,7 +6,6 @@ also where a block is singular for itself.
 
 import math
 
-import numpy as np
 from numba import types
 
 from rom.mbs.equations.elimination import eliminate, fill_blocks, substitute
@@ -172,38 +171,3 @@ def gradient_times(s, W, x, absolute, out):
             for q in range(6 + s.bodies.r[b] if b >= 0 else 0):
                 term = W.G[k, graph.at[k, p] + q] * x[s.bodies.v_at[b] + q]
                 out[k] += abs(term) if absolute else term
-
-
-def diagonal(s):
-    """Rows and columns (n,) of W.S where the masses of all velocity coordinates stand."""
-    count = 6 + s.bodies.r
-    body = np.repeat(np.arange(count.size), count)
-    within = np.arange(body.size) - np.repeat(np.cumsum(count) - count, count)
-    own = s.graph.own[body]
-    return s.graph.x[own] + within, s.graph.y[own] + within
-
-
-def weigh(s, W, weight):
-    """Set W.S to the diagonal matrix with the inverse squares of the weights (n,)."""
-    W.S[:] = 0.0
-    W.S[diagonal(s)] = weight**-2
-
-
-def factorised(s, W, least):
-    """Factorise [S G^T; G 0] by blocks; whether no pivot of a joint is below ``least``."""
-    P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
-    W.UG[:], W.UGT[:] = W.G, W.G
-    if not factorise_bordered(s, W, m) or W.by_blocks[0] == 0:
-        return False
-    joints = np.flatnonzero(np.isin(P.start, P.position[n:]))
-    pivots = [P.pivot[k] + np.arange(P.size[k]) * (P.size[k] + 1) for k in joints]
-    return bool(np.all(np.abs(W.factor[np.concatenate([*pivots, joints[:0]])]) > least))
-
-
-def least_motion(s, W, gap):
-    """The motion x (n,) with G x = gap and the least x^T S x, factorised before."""
-    x = np.zeros(W.residual.size)
-    W.rhs[:] = 0.0
-    W.part[:] = gap
-    solve_bordered(s, W, gap.size, x, W.dlam)
-    return x

@@ -7,13 +7,7 @@ import numpy as np
 
 from rom.errors import ModelError, SolverError, warn
 from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
-from rom.mbs.equations.linear_solve import (
-    diagonal,
-    factorised,
-    gradient_times,
-    least_motion,
-    weigh,
-)
+from rom.mbs.equations.linear_solve import factorise_bordered, gradient_times, solve_bordered
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
@@ -69,7 +63,7 @@ def _start(packed: Packed, signal: Array, t: float) -> State:
 def _independent(packed: Packed, W: Work, q: Array) -> bool:
     """Whether the elimination by blocks meets no joint that could repeat others."""
     linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
-    weigh(packed.system, W, _weights(packed, W))
+    _weigh(packed.system, W, _weights(packed, W))
     return factorised(packed.system, W, RANK_TOLERANCE**1.5)
 
 
@@ -137,7 +131,7 @@ def _check_gap(packed: Packed, gap: Array) -> None:
 def _weights(packed: Packed, W: Work) -> Array:
     """(n,) inverse square root of what a unit of each velocity coordinate costs."""
     bodies = packed.system.bodies
-    mass = W.S[diagonal(packed.system)]
+    mass: Array = W.S[_diagonal(packed.system)]
     for b, t in enumerate(bodies.v_at):
         mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
         mass[t + 6 : t + 6 + bodies.r[b]] *= ELASTIC_WEIGHT
@@ -147,7 +141,7 @@ def _weights(packed: Packed, W: Work) -> Array:
 def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Integers) -> Array:
     """Solution x of G x = gap in some rows, all by blocks, with the least weighted norm."""
     if packed.by_blocks:
-        weigh(packed.system, W, weight)
+        _weigh(packed.system, W, weight)
         if not factorised(packed.system, W, 0.0):
             raise SolverError("constraints that were independent became dependent.")
         return least_motion(packed.system, W, gap)
@@ -157,6 +151,41 @@ def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Inte
     rows = np.where(rows > 0, rows, 1.0)
     A = G * weight / rows[:, None]
     return weight * np.linalg.lstsq(A, gap / rows, rcond=RANK_TOLERANCE)[0]
+
+
+def _diagonal(s: Any) -> tuple[Integers, Integers]:
+    """Rows and columns (n,) of W.S where the masses of all velocity coordinates stand."""
+    count = 6 + s.bodies.r
+    body = np.repeat(np.arange(count.size), count)
+    within = np.arange(body.size) - np.repeat(np.cumsum(count) - count, count)
+    own = s.graph.own[body]
+    return s.graph.x[own] + within, s.graph.y[own] + within
+
+
+def _weigh(s: Any, W: Work, weight: Array) -> None:
+    """Set W.S to the diagonal matrix with the inverse squares of the weights (n,)."""
+    W.S[:] = 0.0
+    W.S[_diagonal(s)] = weight**-2
+
+
+def factorised(s: Any, W: Work, least: float) -> bool:
+    """Factorise [S G^T; G 0] by blocks; whether no pivot of a joint is below ``least``."""
+    P, n, m = s.graph.plan, W.residual.size, W.G.shape[0]
+    W.UG[:], W.UGT[:] = W.G, W.G
+    if not factorise_bordered(s, W, m) or W.by_blocks[0] == 0:
+        return False
+    joints = np.flatnonzero(np.isin(P.start, P.position[n:]))
+    pivots = [P.pivot[k] + np.arange(P.size[k]) * (P.size[k] + 1) for k in joints]
+    return bool(np.all(np.abs(W.factor[np.concatenate([*pivots, joints[:0]])]) > least))
+
+
+def least_motion(s: Any, W: Work, gap: Array) -> Array:
+    """The motion x (n,) with G x = gap (m,) and the least x^T S x, factorised before."""
+    x = np.zeros(W.residual.size)
+    W.rhs[:] = 0.0
+    W.part[:] = gap
+    solve_bordered(s, W, gap.size, x, W.dlam)
+    return x
 
 
 def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:

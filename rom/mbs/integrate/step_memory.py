@@ -6,11 +6,11 @@ import numpy as np
 
 from rom.errors import SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints, retract
-from rom.mbs.equations.linear_solve import factorised, gradient_times, least_motion
+from rom.mbs.equations.linear_solve import gradient_times
 from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.bdf import multistep_coefficients
-from rom.mbs.integrate.consistent_start import with_accelerations
+from rom.mbs.integrate.consistent_start import factorised, least_motion, with_accelerations
 from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.kernels.stages import link
 from rom.mbs.kernels.system import ROLL
