@@ -13,9 +13,10 @@ import rom
 from cases.mbs.mechanisms import random_body, simeon_rod
 from rom.errors import ModelError, RomWarning
 from rom.mbs.equations import graph
+from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.equations.linear_solve import factorise_bordered, solve_bordered
 from rom.mbs.equations.packing import pack
-from rom.mbs.integrate.consistent_start import initial_state
+from rom.mbs.integrate.consistent_start import factorised, initial_state
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.integrate.step_memory import across
 from rom.mbs.kernels.work import workspace
@@ -186,6 +187,18 @@ def assert_same_motion(one, other, limits):
         expected = getattr(other, name)
         size = np.abs(expected).max()
         assert_allclose(getattr(one, name), expected, atol=limit * size, rtol=0, err_msg=name)
+
+
+def test_the_smallest_pivot_of_a_joint_is_looked_at():
+    """With unit masses no pivot of a body is below one; joints that share a body have smaller."""
+    packed = pack(chain(12, flexible=False))
+    W = workspace(packed.system, 0)
+    linearize_constraints(packed.system, W, packed.q, packed.v)
+    W.S[:] = 0.0
+    for row in packed.system.graph.x[packed.system.graph.own]:
+        W.S[row : row + 6] = np.eye(6)
+    passed = [factorised(packed.system, W, pivot) for pivot in (0.0, 1e-3, 0.999, 1e3)]
+    assert passed == [True, True, False, False]
 
 
 @pytest.mark.parametrize("case", CASES)
