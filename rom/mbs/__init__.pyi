@@ -12,6 +12,7 @@ from rom.mbs.analysis.sensitivity import Sensitivity as Sensitivity
 from rom.mbs.analysis.sensitivity import equilibrium_sensitivity as equilibrium_sensitivity
 from rom.mbs.analysis.sensitivity import frequency_sensitivity as frequency_sensitivity
 from rom.mbs.analysis.sensitivity import motion_sensitivity as motion_sensitivity
+from rom.mbs.analysis.snapshot import snapshot as snapshot
 from rom.mbs.analysis.steady_motion import SteadyMotion as SteadyMotion
 from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
 from rom.mbs.elements.contact.impact import Impact as Impact

@@ -2,5 +2,6 @@
 
 Rest, tangents and modes: `equilibrium`, `linearize`, `campbell`, `response`, `steady_motion`,
 `sensitivity`, `inverse_dynamics`; `local_equations`, `tangent`, `moving_axes` and
-`quadratic_eigen` are what they are made of. `law_check` looks for mistakes in laws of the user.
+`quadratic_eigen` are what they are made of. `snapshot` asks one state what motions are asked,
+`law_check` looks for mistakes in laws of the user.
 """

@@ -1,5 +1,6 @@
 """What a run leaves behind, and the questions it answers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,9 +13,11 @@ from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import WORK
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.interface_loads import marker_loads, of_body
 from rom.mbs.results.interpolation import Point, between
+from rom.mbs.results.joint_motion import JointMotion, joint_motion
 from rom.mbs.results.law_record import LawRecord, law_record
 from rom.mbs.results.recomputed import Tracks, follow
 from rom.mbs.results.state import State
@@ -131,6 +134,7 @@ class Solution:
     def at(self, t: Any) -> "Solution":
         """The motion at other times, with everything that can be asked of a solution.
 
+        Its ``final`` is the state at the last of them, from which a run can go on.
         Cubic Hermite polynomials between the saved instants, see `rom.mbs.results.interpolation`;
         multipliers, works and followed joint coordinates are linear there.
 
@@ -147,6 +151,8 @@ class Solution:
                 f"t = {t[outside][0]:g} s is not within the motion from {self.t[0]:g} s to "
                 f"{self.t[-1]:g} s."
             )
+        if self.t.size == 1:
+            return self
         left = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.t.size - 2)
         rows = zip(left, t, strict=True)
         curves = (
@@ -159,20 +165,29 @@ class Solution:
         span, spacing = (self.t[0], self.t[-1]), 0.01 * (self.t[-1] - self.t[0]) / (self.t.size - 1)
         signals = sample_all(self.packed.signals, t, span, spacing)
         motion = {"q": q, "v": v, "a": a, "lam": lam, "work": work, "base": base}
-        return replace(self, t=t, **motion, signals=signals, _tracks={})
+        ends = {name: row[-1] for name, row in motion.items() if name != "work"}
+        final = State(float(t[-1]), rank=self.final.rank, **ends)
+        return replace(self, t=t, **motion, signals=signals, final=final, _tracks={})
 
     def _point(self, k: int) -> Point:
         return Point(self.t[k], self.q[k], self.v[k], self.a[k])
 
     def position(self, body: str, marker: Any = None) -> Array:
-        """(n_t, 3) position of a marker, or of the body origin [m]."""
+        """(n_t, 3) position of a marker, or of the body origin [m].
+
+        Of a rod, or another body of frames, (n_t, k, 3) for all of its k frames.
+        """
+        if body in self.mechanism.nonlinear:
+            return self._of_frames(body, marker, self.position)
         if marker is None:
             at = self._start_of(body)
             return self.q[:, at : at + 3]
         return self._track(body, marker).position
 
     def velocity(self, body: str, marker: Any = None) -> Array:
-        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]."""
+        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]; of frames as above."""
+        if body in self.mechanism.nonlinear:
+            return self._of_frames(body, marker, self.velocity)
         if marker is None:
             at = self._start_of(body, velocity=True)
             return self.v[:, at : at + 3]
@@ -180,15 +195,22 @@ class Solution:
 
     def axes(self, body: str, marker: Any) -> Array:
         """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included."""
+        if body in self.mechanism.nonlinear:
+            frame = self.mechanism.nonlinear[body].marker(marker).body
+            return np.array([matrix(p) for p in self.orientation(frame)])
         return self._track(body, marker).axes
 
     def orientation(self, body: str) -> Array:
-        """(n_t, 4) quaternion of the body frame."""
+        """(n_t, 4) quaternion of the body frame, (n_t, k, 4) of k frames."""
+        if body in self.mechanism.nonlinear:
+            return self._of_frames(body, None, self.orientation)
         at = self._start_of(body)
         return self.q[:, at + 3 : at + 7]
 
     def omega(self, body: str) -> Array:
-        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]."""
+        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]; of frames as above."""
+        if body in self.mechanism.nonlinear:
+            return self._of_frames(body, None, self.omega)
         at = self._start_of(body, velocity=True)
         return self.v[:, at + 3 : at + 6]
 
@@ -236,6 +258,17 @@ class Solution:
                 f"no joint or drive {name!r}; there are {sorted(set(self.packed.row_owner))}."
             )
         return self._follow(rows=rows).reaction
+
+    def joint(self, name: str) -> JointMotion:
+        """Angle and displacement of a joint over time, with their rates.
+
+        Raises:
+            ConfigError: if there is no such joint, or it leaves no angle about an axis and no
+                displacement along one.
+        """
+        joint = joint_with_axis(self.mechanism.joints, name, "motion of a joint")
+        one, two = (self._follow(self.packed.row(marker)) for marker in joint.markers)
+        return joint_motion(self.t, joint, one, two)
 
     def drive_load(self, name: str) -> Array:
         """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
@@ -301,6 +334,13 @@ class Solution:
         if key not in self._tracks:
             self._tracks[key] = follow(self, marker, np.array(rows, dtype=np.int64))
         return self._tracks[key]
+
+    def _of_frames(self, body: str, marker: Any, ask: Callable[[str], Array]) -> Array:
+        """An answer for one frame of a body of frames, or for all of them, (n_t, k, ...)."""
+        whole = self.mechanism.nonlinear[body]
+        if marker is not None:
+            return ask(whole.marker(marker).body)
+        return np.stack([ask(part.name) for part in whole.parts], axis=1)
 
     def _start_of(self, body: str, *, velocity: bool = False) -> int:
         if body not in self.packed.names:

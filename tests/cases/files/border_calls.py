@@ -310,6 +310,7 @@ GIVEN = {  # callable -> legal values of its own
         "r": lambda: 1,
     },
     "simulate": {"t_end": lambda: 1e-3, "dt": lambda: 1e-3},
+    "snapshot": {"state": lambda: rom.equilibrium(driven())},
     "spin_up": WHEEL | {"speed": lambda: 10.0, "n_states": lambda: 2},
     "substructured_sector": WHEEL,
     "supported_sector": {
