@@ -1,9 +1,10 @@
-"""Histories of a motion as a table (CSV) or as a tree of arrays (HDF5), units in their names."""
+"""Histories of a motion: a table (CSV, pandas), a tree of arrays (HDF5), a data set (xarray)."""
 
 import csv
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,11 @@ from rom.io.files import check_writable, write_whole
 from rom.model import Array
 
 AXIS_LETTERS = ("x", "y", "z")
+QUATERNION_PARTS = ("p0", "p1", "p2", "p3")
+DIMENSION_NAMES = {
+    AXIS_LETTERS: "axis",
+    QUATERNION_PARTS: "quaternion",
+}  # of data sets, by their coordinates
 ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "total")
 
 
@@ -40,7 +46,8 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
     """Write the motion of every body and marker, the reactions and the energies.
 
     Positions and velocities are of the world, angular velocities of the body frame; a reaction
-    acts on the second body of its joint, its moment about the second marker.
+    acts on the second body of its joint, its moment about the second marker. Joints that leave an
+    angle or a displacement have these, too.
 
     Args:
         solution: a `rom.mbs.results.solution.Solution` with n_t instants.
@@ -55,16 +62,66 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
     ending = Path(path).suffix.lower()
     if ending not in WRITERS:
         raise ConfigError(f"{path} has the ending {ending!r}; known: {', '.join(sorted(WRITERS))}.")
-    whole("every", every, 1)
     path = check_writable(path)
-    rows = slice(None, None, every)
-    found = tuple(
-        Channel(c.path, c.unit, c.columns, c.values[rows].reshape(len(solution.t[rows]), -1))
-        for c in channels(solution)
-    )
-    content = WRITERS[ending](solution, solution.t[rows], found)
+    content = WRITERS[ending](solution, *_every(solution, every))
     write_whole(path, lambda file: file.write(content))
     return path
+
+
+def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:
+    """Times and channels of every so many instants."""
+    whole("every", every, 1)
+    rows = slice(None, None, every)
+    t = solution.t[rows]
+    return t, tuple(
+        Channel(c.path, c.unit, c.columns, c.values[rows].reshape(len(t), -1))
+        for c in channels(solution)
+    )
+
+
+def data_frame(solution: Any, *, every: int = 1) -> Any:
+    """The table as a pandas DataFrame, indexed by time; columns are named as in the file.
+
+    Raises:
+        ConfigError: for a wrong ``every``.
+        ResourceError: if pandas is missing.
+    """
+    pandas = _library("pandas")
+    t, found = _every(solution, every)
+    values = np.hstack([c.values for c in found])
+    return pandas.DataFrame(values, pandas.Index(t, name="t [s]"), _head(found))
+
+
+def data_set(solution: Any, *, every: int = 1) -> Any:
+    """The quantities as an xarray Dataset over "t", each with its unit as an attribute.
+
+    Raises:
+        ConfigError: for a wrong ``every``.
+        ResourceError: if xarray is missing.
+    """
+    xarray = _library("xarray")
+    t, found = _every(solution, every)
+    variables = {}
+    for c in found:
+        name = " ".join(c.path[1:])
+        if c.columns == ("",):
+            variables[name] = xarray.DataArray(c.values[:, 0], dims="t", attrs={"units": c.unit})
+            continue
+        across = DIMENSION_NAMES.get(c.columns, f"{name} coordinate")
+        coordinates = {across: list(c.columns)}
+        variables[name] = xarray.DataArray(
+            c.values, coordinates, ("t", across), attrs={"units": c.unit}
+        )
+    return xarray.Dataset(variables, {"t": ("t", t, {"units": "s"})}, {"status": solution.status})
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        raise ResourceError(
+            f"{name} is not installed.", hint="pip install 'fenicsx-rom[data]'."
+        ) from error
 
 
 def channels(solution: Any) -> Iterator[Channel]:
@@ -75,16 +132,30 @@ def channels(solution: Any) -> Iterator[Channel]:
         loads = solution.reaction(joint)
         yield Channel(("joints", joint, "force"), "N", AXIS_LETTERS, loads[:, :3])
         yield Channel(("joints", joint, "moment"), "N m", AXIS_LETTERS, loads[:, 3:])
+        yield from _of_joint(solution, joint)
     for name in ENERGIES:
         values = getattr(solution.energy, name)
         yield Channel(("energy", name), "J", ("",), values)
+
+
+def _of_joint(solution: Any, name: str) -> Iterator[Channel]:
+    joint = solution.mechanism.joints.get(name)
+    if joint is None or joint.coordinate is None:
+        return
+    motion, place = solution.joint(name), ("joints", name)
+    if joint.turn is not None:
+        yield Channel((*place, "angle"), "rad", ("",), motion.angle)
+        yield Channel((*place, "angle rate"), "rad/s", ("",), motion.angle_rate)
+    if joint.displacement is not None:
+        yield Channel((*place, "displacement"), "m", ("",), motion.displacement)
+        yield Channel((*place, "displacement rate"), "m/s", ("",), motion.displacement_rate)
 
 
 def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
     place = ("bodies", name)
     yield Channel((*place, "position"), "m", AXIS_LETTERS, solution.position(name))
     quaternion = solution.orientation(name)
-    yield Channel((*place, "orientation"), "1", ("p0", "p1", "p2", "p3"), quaternion)
+    yield Channel((*place, "orientation"), "1", QUATERNION_PARTS, quaternion)
     yield Channel((*place, "velocity"), "m/s", AXIS_LETTERS, solution.velocity(name))
     yield Channel((*place, "omega"), "rad/s", AXIS_LETTERS, solution.omega(name))
     if part.r:
@@ -100,10 +171,16 @@ def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:
 
 def _table(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
     """Comma separated, one line of names with units in brackets, then numbers of 17 digits."""
-    head = ["t [s]"]
-    for c in found:
-        head += [f"{' '.join(c.path[1:])} {x}".strip() + f" [{c.unit}]" for x in c.columns]
-    return table(head, np.column_stack([t, *(c.values for c in found)]), "%.17g")
+    return table(
+        ["t [s]", *_head(found)], np.column_stack([t, *(c.values for c in found)]), "%.17g"
+    )
+
+
+def _head(found: tuple[Channel, ...]) -> list[str]:
+    """Names of all columns, units in brackets."""
+    return [
+        f"{' '.join(c.path[1:])} {x}".strip() + f" [{c.unit}]" for c in found for x in c.columns
+    ]
 
 
 def table(head: list[str], values: Array, number: str) -> bytes:

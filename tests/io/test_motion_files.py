@@ -3,6 +3,7 @@
 import csv
 import json
 import struct
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
+from cases.mbs.mechanisms import random_body
 from cases.solid import block
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ResourceError
 from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.rotation import matrix
 
@@ -60,6 +62,57 @@ def test_the_table_has_units_in_its_head_and_every_quantity(motion, tmp_path):
     q = named("rod elastic", "m sqrt(kg)", [f"q{k + 1}" for k in range(8)])
     assert_array_equal(q, motion.elastic("rod"))
     assert_array_equal(values[:, head.index("strain [J]")], motion.energy.strain)
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    """A flexible body in a cylindrical joint, and a ball."""
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(0, 0, 1.0))
+    mech.cylindrical("pin", mech.ground.marker(mech.design_point(body.marker("a"))),
+                     body.marker("a"), axis=(0, 0, 1))  # fmt: skip
+    mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), velocity=(1, 0, 0))
+    return rom.simulate(mech, t_end=0.02, dt=1e-3)
+
+
+def test_a_data_frame_is_the_table_of_the_file(mixed, tmp_path):
+    pytest.importorskip("pandas", reason="pandas is not installed")
+    frame = mixed.to_pandas(every=2)
+    lines = list(csv.reader(rom.write_history(mixed, tmp_path / "a.csv", every=2).open()))
+    assert [frame.index.name, *frame.columns] == lines[0]
+    numbers = np.array(lines[1:], dtype=float)
+    assert_allclose(frame.index, numbers[:, 0], rtol=0)
+    assert_allclose(frame.to_numpy(), numbers[:, 1:], rtol=0)
+    assert_allclose(frame["ball position x [m]"], mixed.t[::2], atol=1e-12)
+    assert_allclose(frame["pin displacement rate [m/s]"], -9.81 * mixed.t[::2], atol=1e-2)
+
+
+def test_a_data_set_has_units_and_names(mixed):
+    pytest.importorskip("xarray", reason="xarray is not installed")
+    data = mixed.to_xarray()
+    assert data.t.attrs["units"] == "s"
+    assert data["ball velocity"].dims == ("t", "axis")
+    assert data["ball velocity"].attrs["units"] == "m/s"
+    assert_allclose(data["ball velocity"].sel(axis="x"), 1.0, rtol=1e-12)
+    assert_allclose(data["one elastic"], mixed.elastic("one"), rtol=0)
+    assert_allclose(data["pin angle"], mixed.joint("pin").angle, rtol=0)
+    assert data["ball orientation"].sizes["quaternion"] == 4
+    assert_allclose(data["kinetic"].sel(t=0.01, method="nearest"), mixed.energy.kinetic[10], rtol=0)
+    assert data.attrs["status"] == mixed.status
+
+
+@pytest.mark.parametrize("name", ["pandas", "xarray"])
+def test_what_is_missing_is_named_with_the_cure(name, mixed, monkeypatch):
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ResourceError, match=f"{name} is not installed") as caught:
+        getattr(mixed, f"to_{name}")()
+    assert "pip install 'fenicsx-rom[data]'" in caught.value.hint
+
+
+def test_a_wrong_share_of_instants_is_named(mixed):
+    pytest.importorskip("pandas", reason="pandas is not installed")
+    with pytest.raises(ConfigError, match="every = 0"):
+        mixed.to_pandas(every=0)
 
 
 def test_the_tree_is_read_by_h5py(motion, tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 
 from rom.arguments import one_of, typed, vector
 from rom.errors import ConfigError
+from rom.io.history import data_frame, data_set
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import WORK
 from rom.mbs.mechanism import Mechanism
@@ -328,6 +329,22 @@ class Solution:
         """(n_t, 3) linear momentum and (n_t, 3) angular momentum about the world origin."""
         tracks = self._follow()
         return tracks.momentum[:, :3], tracks.momentum[:, 3:]
+
+    def to_pandas(self, *, every: int = 1) -> Any:
+        """The motion as a table: a DataFrame of `rom.io.history.data_frame`.
+
+        Args:
+            every: take every so many instants.
+
+        Raises:
+            ConfigError: for a wrong ``every``.
+            ResourceError: if pandas is missing.
+        """
+        return data_frame(self, every=every)
+
+    def to_xarray(self, *, every: int = 1) -> Any:
+        """The motion as named arrays: a Dataset of `rom.io.history.data_set`; as above."""
+        return data_set(self, every=every)
 
     def _follow(self, marker: int = 0, rows: Any = ()) -> Tracks:
         key = (marker, tuple(rows))
