@@ -13,7 +13,7 @@ from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
 from rom.names import check_text
-from rom.notebook import html_table
+from rom.notebook import html_table, listed
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -45,6 +45,10 @@ class Interface:
 
     def __post_init__(self) -> None:
         check_text(self.name, "an interface", InterfaceError)
+
+    def __repr__(self) -> str:
+        origin = ", ".join(f"{x:.5g}" for x in self.origin)
+        return f"Interface({self.name!r}: {self.nodes.size} nodes, origin ({origin}) m)"
 
     @property
     def dofs(self) -> Index:
@@ -147,6 +151,19 @@ class FEModel:
     stresses: Any = None
     regions: Mapping[str, "Region"] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return (
+            f"FEModel({self.n_dofs} dofs, regions {listed(self.regions)}, interfaces "
+            f"{listed(self.interfaces)})"
+        )
+
+    def _repr_html_(self) -> str:
+        carried = [("attachments", len(self.attachments))] if self.attachments else []
+        regions = [("regions", listed(self.regions))] if self.regions else []
+        faces = [(f"interface {i.name}", repr(i)) for i in self.interfaces.values()]
+        rows = [("nodes", len(self.points)), *regions, *carried, *faces]
+        return html_table(f"Finite element model of {self.n_dofs} dofs", ("", ""), rows)
+
     @property
     def n_dofs(self) -> int:
         """Number of displacement dofs of the whole model."""
@@ -197,6 +214,10 @@ class Basis:
     Psi: Array
     omega: Array
     labels: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        n, r = self.Psi.shape
+        return f"Basis({r} columns of {n} rows, {self.omega.size} of them modes)"
 
     def project(self, A: Any) -> Array:
         """(r, r) symmetric projection Psi^T A Psi; on one process."""

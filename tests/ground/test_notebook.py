@@ -73,6 +73,27 @@ def test_a_body(bar):
     assert repr(bar).startswith("FlexibleBody('<b>bar': 62.8 kg, ") and len(repr(bar)) < 200
 
 
+def test_a_model_prints_in_one_line():
+    model = block(cells=(4, 1, 1))
+    assert repr(model) == "FEModel(60 dofs, regions none, interfaces root, tip)"
+    root = model.interfaces["root"]
+    assert repr(root).startswith("Interface('root': 4 nodes, origin (0, ")
+    rows = dict(Cells(model._repr_html_()).rows)
+    assert rows["nodes"] == "20" and rows["interface root"] == repr(root)
+    basis = rom.Basis(np.ones((60, 9)), np.ones(3), ("mode",) * 9)
+    assert repr(basis) == "Basis(9 columns of 60 rows, 3 of them modes)"
+
+
+def test_bodies_and_joints_of_a_mechanism_print_in_one_line(bar, motion):
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    rod = mech.add_flexible("rod", bar)
+    words = f"flexible, {bar.n_modes} elastic coordinates, {bar.mass:.5g} kg, markers root, tip"
+    assert repr(rod) == f"Part('rod': {words})"
+    assert repr(motion.mechanism.part("<bob>")) == "Part('<bob>': rigid, 2.5 kg, markers o)"
+    pivot = motion.mechanism.joints["pivot"]
+    assert repr(pivot) == "Joint('pivot': spherical, ground.(1.0, 0.0, 0.0) to <bob>.o)"
+
+
 def test_a_report_begins_with_what_fails():
     report = Report("gate", (Row("good", 1.0, "<= 2", True), Row("bad", 3.0, "<= 2", False)))
     assert [row[0] for row in Cells(report._repr_html_()).rows] == ["quantity", "bad", "good"]

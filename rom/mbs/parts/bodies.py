@@ -8,6 +8,7 @@ import numpy as np
 from rom.arguments import finite, typed
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
+from rom.notebook import listed
 from rom.plausible import GYRATION, SIZE, warn_outside
 
 GROUND = "ground"
@@ -60,6 +61,10 @@ class Part:
     flexible: Any = None
     q: Array = field(default_factory=lambda: np.zeros(0))
     qd: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __repr__(self) -> str:
+        kind = f"flexible, {self.r} elastic coordinates" if self.flexible is not None else "rigid"
+        return f"Part({self.name!r}: {kind}, {self.mass:.5g} kg, markers {listed(self.names)})"
 
     @property
     def r(self) -> int:

@@ -51,6 +51,10 @@ class Joint:
     turn: Row | None = None
     displacement: Row | None = None
 
+    def __repr__(self) -> str:
+        ends = " to ".join(f"{m.body}.{m.place}" for m in self.markers)
+        return f"Joint({self.name!r}: {self.kind}, {ends})"
+
     @property
     def one_point(self) -> bool:
         """Whether both markers are at one point."""
