@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 from docutils import nodes
-from docutils.utils.math import latex2mathml
+from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
 CODE = re.compile(r"(``.+?``|`[^`]+`)", re.S)
@@ -37,16 +37,30 @@ def _skip(app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: An
     return True if str(thing.__doc__).startswith("Alias for field") else None
 
 
+def mathml(formula: str, *, block: bool = False) -> str:
+    """A formula as MathML; lines of a block are aligned where it says ``&``.
+
+    Raises:
+        ValueError: for a command that is not known, which would stand there as text.
+    """
+    if block and r"\\" in formula and r"\begin" not in formula:
+        formula = rf"\begin{{align*}}{formula}\end{{align*}}"
+    made = convert(formula, display="block" if block else "inline")
+    if "\\" in made:
+        raise ValueError(f"unknown command in the formula {formula}")
+    for side in ("left", "right"):  # browsers take alignment from styles alone
+        style = f'style="text-align: {side}; padding: 0.5ex 0"'
+        made = made.replace(f'columnalign="{side}"', style)
+    return made
+
+
 def _inline(translator: Any, node: nodes.math) -> None:
-    translator.body.append(latex2mathml.tex2mathml(node.astext()))
+    translator.body.append(mathml(node.astext()))
     raise nodes.SkipNode
 
 
 def _block(translator: Any, node: nodes.math_block) -> None:
-    text = node.astext()
-    if r"\\" in text and r"\begin" not in text:
-        text = rf"\begin{{aligned}}{text}\end{{aligned}}"
-    translator.body.append(f'<div class="math">{latex2mathml.tex2mathml(text, True)}</div>')
+    translator.body.append(f'<div class="math">{mathml(node.astext(), block=True)}</div>')
     raise nodes.SkipNode
 
 

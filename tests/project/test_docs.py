@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -93,6 +94,51 @@ def test_the_answers_page_has_every_key_of_every_schema(pages):
 def test_the_files_page_shows_the_samples(pages):
     page = pages.files_page()
     assert 'E = "210 GPa"' in page and 'rate = "300 rad/s"' in page and "| `rho_inf` |" in page
+
+
+def read_back(node):
+    """A formula in MathML as text, with brackets where elements are."""
+    parts = [read_back(child) for child in node]
+    match node.tag.split("}")[-1], parts:
+        case "mfrac", [above, below]:
+            return f"[{above}/{below}]"
+        case "msub", [base, index]:
+            return f"{base}_{{{index}}}"
+        case "munder", [base, index]:
+            return f"{base}_{{{index}}}"
+        case "msubsup", [base, index, power]:
+            return f"{base}_{{{index}}}^{{{power}}}"
+        case "mover", [base, mark]:
+            return f"<{base}{mark}>"
+        case "msqrt", _:
+            return f"root[{''.join(parts)}]"
+        case "mtable", _:
+            return f"[{'; '.join(parts)}]"
+        case "mtr", _:
+            return ", ".join(parts)
+    return (node.text or "").strip() + "".join(parts)
+
+
+@pytest.mark.parametrize(
+    ("formula", "meaning"),
+    [
+        (r"\tfrac12\sum_k m_k", "[1/2]∑_{k}m_{k}"),
+        (r"\ddot q_k", "<q¨>_{k}"),
+        (r"\dot\omega + \bar s", "<ω˙>+<s¯>"),
+        (r"x_{k+1}^2", "x_{k+1}^{2}"),
+        (r"\frac{\partial L}{\partial \dot q}", "[∂L/∂<q˙>]"),
+        (r"\omega = \sqrt{k / m}", "ω=root[k/m]"),
+        (r"\begin{pmatrix} a & b \\ c & d \end{pmatrix}", "([a, b; c, d])"),
+        (r"M a &= f \\ G a &= 0", "[Ma, =f; Ga, =0]"),
+    ],
+)
+def test_formulas_mean_what_is_written(formula, meaning, pages):
+    import site_text
+
+    made = site_text.mathml(formula, block=True)
+    assert read_back(ET.fromstring(made)) == meaning
+    with pytest.raises(ValueError, match="unknown command"):
+        site_text.mathml(formula + r"\nonsense")
 
 
 @pytest.mark.fenicsx
