@@ -11,6 +11,7 @@ may become a file name; so it is one line of text that can be seen and cannot le
 
 import unicodedata
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 from rom.errors import ConfigError, RomError
@@ -19,6 +20,7 @@ ORIGIN_MARK = "written by rom"  # stands in every file of a format that has comm
 MAX_CHARACTERS = 120
 MAX_FILE_NAME_BYTES = 255  # of Linux, macOS and Windows; endings and temporary names included
 MAX_NAMED = 20  # names in one message
+MAX_OFFERED = 8  # of them, where there are more
 TEMPORARY_BYTES = 20  # that a file being written adds to its name
 FOLDER_SEPARATORS = "/\\"
 INVISIBLE_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # categories of Unicode
@@ -107,3 +109,12 @@ def named(names: Iterable[object]) -> str:
     words = [repr(name) for name in names]
     more = f" and {len(words) - MAX_NAMED} more" if len(words) > MAX_NAMED else ""
     return ", ".join(words[:MAX_NAMED]) + more
+
+
+def offered(names: Iterable[object], wanted: object = "") -> str:
+    """What there is instead of an unknown name: all names, or the most alike of many."""
+    every = sorted(map(str, names))
+    if len(every) <= MAX_NAMED:
+        return str(every)
+    near = get_close_matches(str(wanted), every, MAX_OFFERED, cutoff=0.0)
+    return f"{near} and {len(every) - len(near)} more"

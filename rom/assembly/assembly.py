@@ -26,6 +26,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.errors import ConfigError
 from rom.model import Array, Modes, Report, Row
+from rom.names import offered
 from rom.rows import frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
@@ -236,7 +237,7 @@ class Assembly:
     def _marker(self, place: Place) -> Marker:
         body, interface = place
         if body not in self.bodies:
-            raise ConfigError(f"no body {body!r}; the assembly has {sorted(self.bodies)}.")
+            raise ConfigError(f"no body {body!r}; the assembly has {offered(self.bodies, body)}.")
         return self.bodies[body].marker(interface)
 
     def _free(self, fixed: tuple[Place, ...]) -> Array:

@@ -30,6 +30,7 @@ from rom.arguments import one_of, typed
 from rom.assembly.certificate import N_COMPARED, rows_of_parts
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Report, Row
+from rom.names import offered
 from rom.reduction.bases.free_interface import free_modes, residual_flexibility
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, frequency_rows, row
@@ -238,11 +239,11 @@ class DualAssembly:
     def _rows(self, place: Place) -> Index:
         body, interface = place
         if body not in self.bodies:
-            raise ConfigError(f"no body {body!r}; the assembly has {sorted(self.bodies)}.")
+            raise ConfigError(f"no body {body!r}; the assembly has {offered(self.bodies, body)}.")
         if interface not in self.bodies[body].parts:
             raise InterfaceError(
                 f"body {body!r} has no interface {interface!r}; it has "
-                f"{sorted(self.bodies[body].parts)}."
+                f"{offered(self.bodies[body].parts, interface)}."
             )
         return self.bodies[body].parts[interface]
 

@@ -9,7 +9,7 @@ from rom.arguments import typed
 from rom.body.recovery import StressRecovery
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
-from rom.names import check_text, named
+from rom.names import check_text, named, offered
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ class BodyData:
         if unknown := [name for name in names if name not in self.markers]:
             raise InterfaceError(
                 f"body {self.name!r} has no interface {named(unknown)}; it has "
-                f"{sorted(self.markers)}."
+                f"{offered(self.markers)}."
             )
 
 

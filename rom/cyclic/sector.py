@@ -26,7 +26,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
-from rom.names import named
+from rom.names import named, offered
 
 Complex = npt.NDArray[np.complex128]
 NO_DOFS = np.zeros(0, dtype=np.int64)
@@ -126,7 +126,7 @@ class CyclicSector:
         """
         if unknown := [name for name in (low, high, *fixed) if name not in model.interfaces]:
             raise InterfaceError(
-                f"the sector has no interface {named(unknown)}; it has {sorted(model.interfaces)}."
+                f"the sector has no interface {named(unknown)}; it has {offered(model.interfaces)}."
             )
         e, at = unit_axis(axis), finite("at", at, (3,))
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
@@ -284,7 +284,7 @@ def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
     """
     if name not in model.regions:
         raise ConfigError(
-            f"the sector has no region {name!r}; it has {sorted(model.regions)}.",
+            f"the sector has no region {name!r}; it has {offered(model.regions, name)}.",
             hint="Name the volume of the blade in the geometry.",
         )
     share = model.regions[name]

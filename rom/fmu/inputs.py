@@ -12,6 +12,7 @@ from rom.mbs.connections.drives import Drive
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import drive_signal
 from rom.model import Array
+from rom.names import offered
 
 INFINITE_SPAN = (-np.inf, np.inf)
 DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
@@ -72,7 +73,7 @@ class Inputs:
         for name in names:
             if name not in kinds:
                 raise ConfigError(
-                    f"no input {name!r}; the loads, motors and drives are {sorted(kinds)}."
+                    f"no input {name!r}; the loads, motors and drives are {offered(kinds, name)}."
                 )
             if list(names).count(name) > 1:
                 raise ConfigError(f"the input {name!r} is named twice.")

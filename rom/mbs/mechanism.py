@@ -30,7 +30,7 @@ from rom.mbs.elements.family import Family, check_family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint
 from rom.model import Array
-from rom.names import check_name, check_text
+from rom.names import check_name, check_text, offered
 from rom.notebook import html_table, listed
 from rom.plausible import GRAVITY, SPEED, warn_outside
 
@@ -322,7 +322,7 @@ class Mechanism:
         if name == GROUND:
             return self.ground
         if name not in self.parts:
-            raise ConfigError(f"no body {name!r}; the mechanism has {sorted(self.parts)}.")
+            raise ConfigError(f"no body {name!r}; the mechanism has {offered(self.parts, name)}.")
         return self.parts[name]
 
     def _enter(self, part: Part) -> Part:
@@ -342,7 +342,9 @@ class Mechanism:
             *(GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events),
         ]
         if name in taken:
-            raise ConfigError(f"the name {name!r} is used twice; in use are {sorted(taken)}.")
+            raise ConfigError(
+                f"the name {name!r} is used twice; in use are {offered(taken, name)}."
+            )
 
     def check_markers(self, name: str, *markers: Marker) -> None:
         """Refuse markers of bodies that are not in this mechanism, or of places they have not.

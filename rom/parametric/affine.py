@@ -12,6 +12,7 @@ from rom.eigen.attachments import added_mass, carried_displacements
 from rom.eigen.verbs import Operators
 from rom.errors import ParameterError
 from rom.model import Array, FEModel, Region
+from rom.names import offered
 from rom.parametric.family import Share
 from rom.parametric.layers import Stretch
 from rom.parametric.parameters import Density, Parameter, Point, factors
@@ -66,7 +67,7 @@ class AffineModel:
         for name in names:
             if name not in model.regions:
                 raise ParameterError(
-                    f"there is no region {name!r}; the model has {sorted(model.regions)}.",
+                    f"there is no region {name!r}; the model has {offered(model.regions, name)}.",
                     hint="Regions are the named physical volumes of the geometry.",
                 )
         self.regions = {name: model.regions[name] for name in names}

@@ -25,7 +25,7 @@ from rom.eigen.scipy import SciPyOperators, negative_count
 from rom.eigen.verbs import dofs_of, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Index
-from rom.names import named
+from rom.names import named, offered
 from rom.prestress.heat import Heat
 
 RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain
@@ -131,7 +131,7 @@ def held_dofs(model: FEModel, fixed: tuple[str, ...]) -> Index:
     if unknown := [name for name in fixed if name not in model.interfaces]:
         raise InterfaceError(
             f"there is no interface {named(unknown)} to hold; the model has "
-            f"{sorted(model.interfaces)}."
+            f"{offered(model.interfaces)}."
         )
     return np.unique(np.concatenate([model.interfaces[name].dofs for name in fixed]))
 

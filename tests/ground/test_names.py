@@ -19,7 +19,7 @@ from rom.config.keys import Named, Quantity
 from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
 from rom.io.archive import Kind, read_archive, write_archive
 from rom.io.native import FIELDS, SCHEMA_NAME, VERSION, body_arrays, body_manifest
-from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside, named
+from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside, named, offered
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 UNSEEN = ["a\0b", "a\nb", "a\rb", "a\x1b[2Jb", "\u202egnp.x", "a\u200bb", "a\u2028b", "\ud800",
@@ -280,3 +280,20 @@ def test_members_that_the_manifest_promises_are_named_when_they_are_gone(body, t
     with pytest.raises(FileFormatError, match="'D', 'K'"):
         read_archive(other, Kind({SCHEMA_NAME: VERSION}, "body file", FIELDS))
     assert np.isfinite(rom.load(path).mass)
+
+
+def test_few_names_are_all_offered_and_of_many_the_most_alike():
+    assert offered({"b", "a"}, "c") == "['a', 'b']" and offered((), "c") == "[]"
+    many = [f"rod.{k}" for k in range(150)] + ["wrist pin", "crank pin"]
+    text = offered(many, "wrist_pin")
+    assert text.startswith("['wrist pin', 'crank pin'") and text.endswith("] and 144 more")
+
+
+def test_a_body_that_is_none_of_hundreds_is_answered_in_one_line():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    for k in range(150):
+        mech.add_rigid(f"stone {k}", mass=1.0, inertia=(1, 1, 1), at=(k, 0, 0))
+    with pytest.raises(ConfigError, match=r"no body 'stone_77'; the mechanism has \['stone 77',"):
+        mech.part("stone_77")
+    with pytest.raises(ConfigError, match=r"used twice; in use are \['stone 3',.* and 14\d more"):
+        mech.add_rigid("stone 3", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))

@@ -28,6 +28,7 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
+from rom.names import offered
 
 if TYPE_CHECKING:
     from rom.cyclic.blades.records import SubstructuredSector
@@ -66,7 +67,7 @@ def reduced_blade(
     if blade is None:
         if root not in model.interfaces:
             raise InterfaceError(
-                f"the blade has no interface {root!r}; it has {sorted(model.interfaces)}."
+                f"the blade has no interface {root!r}; it has {offered(model.interfaces, root)}."
             )
         K, M = all_rows(model, model.K), all_rows(model, model.M)
         inner, nodes = np.arange(model.n_dofs), model.interfaces[root].nodes

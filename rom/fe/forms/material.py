@@ -11,7 +11,7 @@ from dolfinx import fem
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
 from rom.model import Index, Material, Orthotropic
-from rom.names import named
+from rom.names import named, offered
 from rom.plausible import FOAM_SPEED
 
 Solid = Material | Orthotropic
@@ -34,7 +34,9 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
             f"material = {material!r} is neither Material, Orthotropic nor a dictionary of them."
         )
     if unknown := [name for name in material if name not in regions]:
-        raise MaterialError(f"there is no region {named(unknown)}; the mesh has {sorted(regions)}.")
+        raise MaterialError(
+            f"there is no region {named(unknown)}; the mesh has {offered(regions)}."
+        )
     for name, value in material.items():
         if not isinstance(value, Solid):
             raise MaterialError(f"the material of region {name!r} is {value!r}.")

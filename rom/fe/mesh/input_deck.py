@@ -20,7 +20,7 @@ from rom.fe.mesh.sources.abaqus import SIDES
 from rom.fe.mesh.sources.deck import DECK_EDGES
 from rom.fe.mesh.topology import row_ids
 from rom.model import Index, Orthotropic
-from rom.names import ORIGIN_MARK, named
+from rom.names import ORIGIN_MARK, named, offered
 
 STEPS = {
     "frequencies": "*FREQUENCY\n{n}",
@@ -63,7 +63,7 @@ def input_deck(
     one_of("step", step, STEPS)
     if missing := sorted(set(fixed) - set(mesh.facets)):
         raise InterfaceError(
-            f"{named(missing)} cannot be held; the interfaces are {sorted(mesh.facets)}."
+            f"{named(missing)} cannot be held; the interfaces are {offered(mesh.facets)}."
         )
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)

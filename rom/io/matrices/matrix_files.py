@@ -14,6 +14,7 @@ from rom.io.matrices.dmig import Dofs, read_dmig, whole
 from rom.io.matrices.market import BANNER_TEXT, read_market
 from rom.io.matrices.op4 import read_op4
 from rom.io.matrices.user_element import read_user_element
+from rom.names import offered
 
 HEAD_BYTES = 10_000  # among which a user element is announced
 
@@ -58,7 +59,7 @@ def read_matrix(source: Any) -> NamedMatrix:
         )
     key = next(iter(found)) if name is None else name.upper()
     if key not in found:
-        raise ConfigError(f"{path} has no matrix {name!r}; it holds {sorted(found)}.")
+        raise ConfigError(f"{path} has no matrix {name!r}; it holds {offered(found, name)}.")
     A, dofs = found[key]
     if A.shape[0] != A.shape[1]:
         raise FileFormatError(f"the matrix {key} is {A.shape[0]} x {A.shape[1]}.", where=str(path))

@@ -11,7 +11,7 @@ from rom.errors import ConfigError, FileFormatError, InterfaceError, UnsafeFileE
 from rom.io.files import check_readable
 from rom.io.matrices.dmig import read_grids, whole
 from rom.model import Array, Index
-from rom.names import named
+from rom.names import named, offered
 
 CARDS = (".bdf", ".dat")
 WITH_FILES, MOST_INCLUDED = ("*INCLUDE", "*NODE", "*NSET"), 20
@@ -94,7 +94,7 @@ def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]
     known = {name: name.upper() for name in names}
     missing = [name for name, key in known.items() if key not in sets.members]
     if missing:
-        raise InterfaceError(f"{path} has no set {named(missing)}; it has {sorted(sets.members)}.")
+        raise InterfaceError(f"{path} has no set {named(missing)}; it has {offered(sets.members)}.")
     return {name: sets.of(key, str(path)) for name, key in known.items()}
 
 

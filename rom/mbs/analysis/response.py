@@ -14,6 +14,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.names import offered
 
 # reciprocal condition number of the dynamic stiffness from which a response counts as infinite
 RECIPROCAL_CONDITION_TOL = 1e-13
@@ -103,7 +104,9 @@ def transmissibility(
     f = _checked(frequencies)
     around = linearize(mechanism, state)
     if drive not in mechanism.drives:
-        raise ConfigError(f"no drive {drive!r}; the mechanism has {sorted(mechanism.drives)}.")
+        raise ConfigError(
+            f"no drive {drive!r}; the mechanism has {offered(mechanism.drives, drive)}."
+        )
     if around.state.v.any():
         raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
     now = instant(mechanism, around.state.t)

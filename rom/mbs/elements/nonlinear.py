@@ -53,6 +53,7 @@ from rom.mbs.kernels.tables import (
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
+from rom.names import offered
 
 # of a law, as numba.cfunc takes it
 LAW_SIGNATURE = "void(CPointer(f8), CPointer(f8), i8, CPointer(f8), CPointer(f8))"
@@ -144,7 +145,7 @@ class Assembly:
         if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
             raise ConfigError(
                 f"body {self.name!r} has no marker {place!r}; it has "
-                f"{sorted(self.body.places)} and frames 0 to {len(self.parts) - 1}."
+                f"{offered(self.body.places, place)} and frames 0 to {len(self.parts) - 1}."
             )
         if not -len(self.parts) <= frame < len(self.parts):
             raise ConfigError(f"body {self.name!r} has {len(self.parts)} frames, no {frame}.")

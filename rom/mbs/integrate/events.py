@@ -16,6 +16,7 @@ from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.foreign import ask, numbers
 from rom.mbs.results.solution import Occurrences
 from rom.model import Array
+from rom.names import offered
 
 START_ATOL = 1e-10  # time after the start [s] within which a zero is the start, not an event
 ROOT_RTOL = 1e-14  # of the step
@@ -78,7 +79,7 @@ class Instant:
     def _start(self, body: str, starts: Any) -> int:
         names = self._packed.names
         if body not in names:
-            raise ConfigError(f"no body {body!r}; the mechanism has {sorted(names)}.")
+            raise ConfigError(f"no body {body!r}; the mechanism has {offered(names, body)}.")
         return int(starts[names.index(body)])
 
     def _row(self, body: str, place: Any) -> int:

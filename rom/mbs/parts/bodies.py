@@ -8,6 +8,7 @@ import numpy as np
 from rom.arguments import finite, typed
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
+from rom.names import offered
 from rom.notebook import listed
 from rom.plausible import GYRATION, SIZE, warn_outside
 
@@ -86,7 +87,8 @@ class Part:
         if isinstance(place, str):
             if place not in self.names:
                 raise ConfigError(
-                    f"body {self.name!r} has no marker {place!r}; it has {sorted(self.names)}."
+                    f"body {self.name!r} has no marker {place!r}; it has "
+                    f"{offered(self.names, place)}."
                 )
             return Marker(self.name, place)
         if self.flexible is not None:

@@ -9,6 +9,7 @@ from rom.errors import ConfigError
 from rom.mbs.kernels.system import ALONG, ANGLE, NORMAL, POINT
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array
+from rom.names import offered
 
 NO_VECTOR = np.zeros(3)
 
@@ -102,7 +103,7 @@ def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint
         ConfigError: if it is unknown, or has none.
     """
     if joint not in joints:
-        raise ConfigError(f"{what}: no joint {joint!r}; there are {sorted(joints)}.")
+        raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
     if joints[joint].coordinate is None:
         raise ConfigError(
             f"{what}: joint {joint!r} is {joints[joint].kind}, which leaves no angle about an axis "

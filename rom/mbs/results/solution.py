@@ -23,6 +23,7 @@ from rom.mbs.results.law_record import LawRecord, law_record
 from rom.mbs.results.recomputed import Tracks, follow
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.names import offered
 from rom.notebook import html_table, listed
 from rom.rotation import matrix
 
@@ -256,7 +257,8 @@ class Solution:
         rows = self.packed.rows_of(name)
         if not rows.size:
             raise ConfigError(
-                f"no joint or drive {name!r}; there are {sorted(set(self.packed.row_owner))}."
+                f"no joint or drive {name!r}; there are "
+                f"{offered(set(self.packed.row_owner), name)}."
             )
         return self._follow(rows=rows).reaction
 
@@ -274,7 +276,9 @@ class Solution:
     def drive_load(self, name: str) -> Array:
         """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
         if name not in self.mechanism.drives:
-            raise ConfigError(f"no drive {name!r}; there are {sorted(self.mechanism.drives)}.")
+            raise ConfigError(
+                f"no drive {name!r}; there are {offered(self.mechanism.drives, name)}."
+            )
         return -self.lam[:, self.packed.rows_of(name)[0]]
 
     def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
@@ -305,7 +309,7 @@ class Solution:
             ConfigError: for a name that no law has.
         """
         if name not in self.mechanism.laws:
-            raise ConfigError(f"no law {name!r}; there are {sorted(self.mechanism.laws)}.")
+            raise ConfigError(f"no law {name!r}; there are {offered(self.mechanism.laws, name)}.")
         return law_record(self, name)
 
     @cached_property
@@ -361,7 +365,9 @@ class Solution:
 
     def _start_of(self, body: str, *, velocity: bool = False) -> int:
         if body not in self.packed.names:
-            raise ConfigError(f"no body {body!r}; the mechanism has {sorted(self.packed.names)}.")
+            raise ConfigError(
+                f"no body {body!r}; the mechanism has {offered(self.packed.names, body)}."
+            )
         bodies = self.packed.system.bodies
         starts = bodies.v_at if velocity else bodies.q_at
         return int(starts[self.packed.names.index(body)])

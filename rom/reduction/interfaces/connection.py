@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from rom.eigen.verbs import Operators, given_rigid_motions, rigid_motions
 from rom.errors import InterfaceError
 from rom.model import FEModel, Index, Interface
-from rom.names import named
+from rom.names import named, offered
 from rom.reduction.interfaces.kinds import tie
 from rom.reduction.interfaces.records import Connection, Tie
 
@@ -52,7 +52,7 @@ def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
     names = list(names)
     if unknown := [name for name in names if name not in model.interfaces]:
         raise InterfaceError(
-            f"there is no interface {named(unknown)}; the model has {sorted(model.interfaces)}.",
+            f"there is no interface {named(unknown)}; the model has {offered(model.interfaces)}.",
             hint="Interfaces are the named physical surfaces of the geometry.",
         )
     return [model.interfaces[name] for name in names]

@@ -11,7 +11,7 @@ from rom import rotation
 from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.errors import ConfigError
 from rom.model import Array
-from rom.names import named
+from rom.names import named, offered
 from rom.view.canvas import page
 from rom.view.canvas.gif import write_gif
 from rom.view.canvas.offscreen import Image, render
@@ -123,7 +123,7 @@ def _stage(
     unknown = set(shapes) - set(mechanism.parts)
     if unknown:
         raise ConfigError(
-            f"shapes: no body {named(sorted(unknown))}; there are {sorted(mechanism.parts)}."
+            f"shapes: no body {named(sorted(unknown))}; there are {offered(mechanism.parts)}."
         )
     actors: list[Actor] = []
     flexible: dict[str, int] = {}
