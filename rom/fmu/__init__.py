@@ -11,7 +11,8 @@ and talks with it over a socket. Errors in that process come back as fmi2Error w
 
 The archive holds the Python file that builds the mechanism and the files it reads, the library,
 compiled at export by gcc for POSIX systems, and the C source of the library. The interpreter is the
-one that the environment variable ROM_PYTHON names, else python3.
+one that the environment variable ROM_PYTHON names, else the one that wrote the archive, where it is
+there, else python3.
 
 A body alone, in small motions, needs none of this: `rom.io.fmu.body` writes its linear equations
 as C code.

@@ -1,6 +1,7 @@
 """Write the FMU of a mechanism."""
 
 import json
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from rom.io.fmu.description import Model, model_description
 from rom.io.fmu.variables import Variable
 from rom.process.child import Limits, python, run, scratch
 
+PYTHON_FILE = "python"  # names the interpreter; read by process.c
 MODEL_FOLDER = "model"  # of the Python file, below the resources
 BUILD_TIME_LIMIT = 600  # [s] for the mechanism, its compilation included
 
@@ -36,7 +38,8 @@ def write_fmu(
     The mechanism is built by a Python file, for its functions of time cannot be written down
     otherwise: a function ``mechanism()`` returns a `rom.Mechanism`. What it reads it must find in
     its own folder, as in ``rom.load(Path(__file__).with_name("rod.rom.npz"))``; it is tried in an
-    empty folder before it is packed. The FMU runs where rom is installed, on POSIX systems.
+    empty folder before it is packed. The FMU runs where rom is installed, on POSIX systems, by the
+    Python that wrote it; elsewhere by the one that the variable ROM_PYTHON names, or python3.
 
     Inputs replace functions of time and are held over a communication step: three components of a
     force or torque [N, N m]; the amplitude of a spread load; the force or torque of a motor; for a
@@ -69,6 +72,7 @@ def write_fmu(
     settings: dict[str, Any] = {"script": f"{MODEL_FOLDER}/{script.name}"}
     settings |= {"inputs": list(inputs), "outputs": list(outputs)}
     settings |= {"dt": float(dt), "rho_inf": float(rho_inf)}
+    resources[PYTHON_FILE] = sys.executable.encode()
     resources[SETTINGS_FILE] = json.dumps(settings, indent=1).encode()
     describe = partial(_description, path.stem, _variables(resources, script), float(dt))
     return write_archive(path, Content(path.stem, "process.c", describe, resources))

@@ -54,7 +54,7 @@ def mechanism():
 def python_with_rom(monkeypatch):
     """The process of an FMU finds this rom, and the mechanisms of the tests."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
-    monkeypatch.setenv("ROM_PYTHON", sys.executable)
+    monkeypatch.delenv("ROM_PYTHON", raising=False)
 
 
 @pytest.fixture(scope="module")
@@ -348,6 +348,21 @@ def test_an_fmu_that_cannot_start_says_why(hanging, tmp_path, monkeypatch, pytho
     with pytest.raises(Exception, match="instantiate"):
         Instance(hanging, tmp_path, guid=guid, log=log)
     assert message in log[0]
+
+
+def test_where_its_writer_is_gone_the_usual_python_runs_it(hanging, tmp_path, monkeypatch):
+    """Here one that has no rom, and says that it was asked."""
+    folder = fmpy.extract(str(hanging), str(tmp_path / "a folder"))
+    assert (Path(folder) / "resources" / "python").read_text() == sys.executable
+    (Path(folder) / "resources" / "python").write_text("/nowhere/python")
+    (tmp_path / "python3").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "python3").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setattr(fmpy, "extract", lambda *a: folder)
+    log = []
+    with pytest.raises(Exception, match="instantiate"):
+        Instance(hanging, tmp_path, log=log)
+    assert "python3 ended at once" in log[0]
 
 
 @pytest.mark.once

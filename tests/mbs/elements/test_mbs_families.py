@@ -1,7 +1,6 @@
 """A family and a law that are in no list of the package take part in everything."""
 
 import os
-import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -217,7 +216,6 @@ def test_a_wrong_tangent_would_cost_newton_passes(add):
 def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
-    monkeypatch.setenv("ROM_PYTHON", sys.executable)
     script = tmp_path / "bob.py"
     script.write_text(
         f"from test_mbs_families import bob, {name}\ndef mechanism():\n    return bob({name})\n"

@@ -109,9 +109,29 @@ static int begin(Model *m, const char *python, const char *resources)
     return failure;
 }
 
+/* The interpreter that wrote the FMU, where it can be run; as the first line of a resource. */
+static const char *writer(const char *resources, char *path)
+{
+    FILE *file;
+    snprintf(path, MESSAGE, "%s/python", resources);
+    file = fopen(path, "r");
+    if (!file)
+        return NULL;
+    if (!fgets(path, MESSAGE, file))
+        path[0] = 0;
+    fclose(file);
+    path[strcspn(path, "\n")] = 0;
+    return access(path, X_OK) ? NULL : path;
+}
+
 Model *model_open(const char *resources, char *message)
 {
-    const char *given = getenv("ROM_PYTHON"), *python = given && *given ? given : "python3";
+    char path[MESSAGE];
+    const char *python = getenv("ROM_PYTHON");
+    if (!python || !*python)
+        python = writer(resources, path);
+    if (!python)
+        python = "python3";
     Model *m = malloc(sizeof *m);
     int failure = m ? begin(m, python, resources) : ENOMEM;
     if (failure) {
