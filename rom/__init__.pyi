@@ -30,6 +30,7 @@ from rom.body.spread import surface_load as surface_load
 from rom.checks.gates import check as check
 from rom.config.component import read_component as read_component
 from rom.config.mechanism import read_mechanism as read_mechanism
+from rom.config.mechanism_fmu import write_mechanism_fmu as write_mechanism_fmu
 from rom.cyclic.blades.blade import reduced_blade as reduced_blade
 from rom.cyclic.blades.bladed_wheel import BladedWheel as BladedWheel
 from rom.cyclic.blades.disk import bladed_wheel as bladed_wheel

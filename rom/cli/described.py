@@ -71,15 +71,19 @@ def component(args: argparse.Namespace, *extra: str) -> "Component":
     return read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
 
 
-def mechanism(args: argparse.Namespace) -> "MechanismFile":
+def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
     """The mechanism of the file, with what the command line changes.
+
+    Args:
+        args: the options.
+        extra: options the verb looks after itself.
 
     Raises:
         ConfigError: for an option that has no key, and as `rom.read_mechanism`.
     """
     from rom.config.mechanism import read_mechanism
 
-    return read_mechanism(args.file, changes(args.given, MOTION_KEYS, ()), **meshing(args))
+    return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
 
 
 def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: Any) -> Changes:

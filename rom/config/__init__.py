@@ -2,5 +2,5 @@
 
 `document` knows the lines of a file, `keys` what a table of keys says of it; `component` and
 `mechanism` read by those of `component_keys` and `mechanism_keys`, with `methods` and `laws` by
-name; `page` is their documentation.
+name, `mechanism_fmu` packs a mechanism with its bodies; `page` is their documentation.
 """

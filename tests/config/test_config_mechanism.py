@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -290,3 +291,61 @@ def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
     assert_allclose(sol.mechanism.parts["crank"].at, crank.centre, atol=1e-12)
     pins = sol.position("rod", "pin_b") - sol.position("rod", "pin_a")
     assert_allclose(np.linalg.norm(pins, axis=1), 0.2, atol=1e-4)  # bores are polygons
+
+
+FMU_CASES = {
+    "as it is": {},
+    "another frame": {("bodies", "rod", "reference"): ["tip"]},
+    "a rigid rod, pushed": {
+        ("bodies", "rod", "rigid"): True, ("bodies", "rod", "velocity"): ["1 mm/s", 0, 0],
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FMU_CASES)
+def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
+    """Bodies travel inside, the folder may go; nothing but rom need be found."""
+    fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.delenv("ROM_PYTHON", raising=False)
+    file = read_mechanism("crank.toml", FMU_CASES[case])
+    names = ["slider.pin", "main bearing"] if case != "as it is" else None
+    rom.write_mechanism_fmu(file, "crank.fmu", outputs=names)
+    sol = file.simulate()
+    (folder / "rod.rom.npz").unlink()
+    (folder / "crank.toml").unlink()
+    place = [f"slider.pin.position[{k}]" for k in (1, 2, 3)]
+    found = fmpy.simulate_fmu("crank.fmu", stop_time=0.01, step_size=1e-4, output_interval=1e-4,
+                              fmi_type="CoSimulation",
+                              output=[*place, "'main bearing'.angle"])  # fmt: skip
+    moved = np.column_stack([found[name] for name in place])
+    assert_allclose(moved, sol.position("slider", "pin"), atol=1e-9)
+    assert_allclose(found["'main bearing'.angle"], sol.joint("main bearing").angle, atol=1e-8)
+
+
+def test_the_command_line_writes_fmus_of_mechanisms(folder, capsys):
+    assert main(["export", "pendulum.toml", "p.fmu", "--dt", "1e-3", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["format"] == "fmu"
+    with zipfile.ZipFile("p.fmu") as archive:
+        settings = json.loads(archive.read("resources/fmu.json"))
+    assert settings["dt"] == 1e-3 and settings["outputs"] == ["bob.top", "pivot"]
+    assert settings["rho_inf"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["crank.toml", "c.fmu", "--inputs", "gass"], "no input 'gass'"),
+        (["crank.toml", "c.fmu", "--outputs", "slider.pine"], "no output 'slider.pine'"),
+        (["crank.toml", "c.vtu"], "c.vtu does not end in .fmu"),
+        (["crank.toml", "c.fmu", "--held", "root"], "--held does not go with a .toml file"),
+        (["rod.rom.npz", "c.fmu", "--inputs", "gas"], "--inputs goes with the .toml file of a"),
+        (["still.toml", "c.fmu"], "gives no dt, which an FMU needs"),
+    ],
+)
+def test_what_cannot_become_an_fmu_is_named(words, message, folder, capsys):
+    still = PENDULUM.replace('dt = "0.5 ms"', 'method = "dop853"').replace("rho_inf = 1", "")
+    (folder / "still.toml").write_text(still)
+    assert main(["export", *words]) in (2, 4)
+    assert message in capsys.readouterr().err
+    assert not (folder / "c.fmu").exists() and not (folder / "c.vtu").exists()

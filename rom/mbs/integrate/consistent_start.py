@@ -198,16 +198,22 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
         return v.copy()
     linearize_constraints(packed.system, W, q, v)
     weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
-    now, every = np.zeros_like(wanted), np.arange(wanted.size)
+    now, every, given = np.zeros_like(wanted), np.arange(wanted.size), v
     for _ in range(2):  # the second pass removes the round-off of the first
         gradient_times(packed.system, W, v, False, now)
         v = v + _least_change(packed, W, wanted - now, weight, every)
-    check_velocity(packed, W, v)
+    check_velocity(packed, W, v, given)
     return v
 
 
-def check_velocity(packed: Packed, W: Work, v: Array) -> None:
+def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None) -> None:
     """Refuse velocities that do not satisfy joints and drives as linearised last.
+
+    Args:
+        packed: the mechanism.
+        W: its memory.
+        v: (n,) the velocities.
+        given: (n,) those they were fitted from: where all come to rest, v is their round-off.
 
     Raises:
         ModelError: naming a joint or drive that contradicts others.
@@ -218,6 +224,9 @@ def check_velocity(packed: Packed, W: Work, v: Array) -> None:
     gradient_times(packed.system, W, v, True, size)
     miss, size = np.abs(now - wanted), size + np.abs(wanted)
     size = np.maximum(size, 1e-3 * size.max())  # rows at rest hold nothing but round-off
+    if given is not None:
+        gradient_times(packed.system, W, given, True, now)
+        size = np.maximum(size, 1e-3 * now.max())
     k = int(np.argmax(miss / np.maximum(size, 1e-300)))
     if miss[k] > 1e-8 * size[k]:
         raise ModelError(

@@ -92,17 +92,18 @@ def project_velocity(s, W, rank, v):
 
     `factorise_motion` first. False if there is none.
     """
+    largest = 0.0  # of rates, and of the first gaps: where all stand still, v is their round-off
     for turn in range(3):  # the second removes the round-off of the first, the third looks
         gradient_times(s, W, v, False, W.part)
         for k in range(W.part.size):
             rate = W.signal[s.rows.signal[k], 1] if s.rows.signal[k] >= 0 else 0.0
             W.part[k] = rate - W.part[k]
+            largest = max(largest, abs(W.part[k]) if turn == 0 else 0.0)
         if turn < 2:
             least_motion_across(s, W, rank, W.delta)
             for i in range(v.size):
                 v[i] += W.delta[i]
     gradient_times(s, W, v, True, W.dlam)
-    largest = 0.0
     for k in range(W.part.size):
         rate = W.signal[s.rows.signal[k], 1] if s.rows.signal[k] >= 0 else 0.0
         W.dlam[k] = max(W.dlam[k], abs(rate))

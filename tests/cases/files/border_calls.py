@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +16,7 @@ from scipy.io import mmwrite
 
 import rom
 import rom.view
+from cases.files.toml_files import PENDULUM
 from cases.mbs.mechanisms import rotor
 from cases.solid import STEEL, block, composite
 from cases.wheels import beam_ring, bladed_model, bladed_ring
@@ -52,6 +55,14 @@ class Call:
     make: Callable[[], tuple[Callable[..., Any], dict[str, Any]]]
     arguments: tuple[str, ...]
     skipped: frozenset[tuple[str, str]]
+
+
+@cache
+def mechanism_file():
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "pendulum.toml"
+        path.write_text(PENDULUM)
+        return rom.read_mechanism(path)
 
 
 @cache
@@ -326,6 +337,10 @@ GIVEN = {  # callable -> legal values of its own
     "write_animation": {"path": lambda: "out.glb", "frames": lambda: 2},
     "write_body_fmu": {"path": lambda: "nowhere/out.fmu"},
     "write_fmu": {"path": lambda: "out.fmu", "script": lambda: "none.py", "dt": lambda: 1e-3},
+    "write_mechanism_fmu": {
+        "file": mechanism_file,
+        "path": lambda: "out.fmu",
+    },
     "write_history": {"path": lambda: "out.csv"},
     "write_report": {"path": lambda: "out.html", "sections": lambda: {"numbers": ["text"]}},
     "write_stress": {"path": lambda: "out.vtu", "q": lambda: np.zeros(body().n_modes)},

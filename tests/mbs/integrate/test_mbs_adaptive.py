@@ -276,3 +276,32 @@ def test_dop853_without_an_interval_goes_on_to_the_same_bits(tmp_path):
     state = caught.value.solution.final
     more = simulate(braked(Brake(), pendulum), state=state, **options)
     assert_array_equal(more.q[-1], whole.q[-1])
+
+
+def linkage_that_stops():
+    """A slider-crank whose drive turns it by 0.05 rad and holds it; bodies are given a push."""
+    mech, z = Mechanism(gravity=(0, -9.81, 0)), (0, 0, 1)
+    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.05, 0, 0),
+                           markers={"p": (-0.05, 0, 0), "q": (0.05, 0, 0)},
+                           velocity=(1e-3, 0, 0))  # fmt: skip
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(0.25, 0.05, 0),
+                         markers={"p": (-0.15, -0.05, 0), "q": (0.15, -0.05, 0)})  # fmt: skip
+    slider = mech.add_rigid("slider", mass=1.0, inertia=(1e-3,) * 3, at=(0.4, 0, 0),
+                            markers={"p": (0, 0, 0)})  # fmt: skip
+    mech.revolute("main", mech.ground.marker((0, 0, 0)), crank.marker("p"), axis=z)
+    mech.revolute("pin", crank.marker("q"), rod.marker("p"), axis=z)
+    mech.revolute("wrist", rod.marker("q"), slider.marker("p"), axis=z)
+    mech.prismatic("guide", mech.ground.marker((0.4, 0, 0)), slider.marker("p"), axis=(1, 0, 0))
+    mech.drive("motor", "main", lambda t: 0.05 * (1 - np.where(t < 0.1, (1 - 10 * t) ** 4, 0.0)))
+    return mech
+
+
+@pytest.mark.filterwarnings("ignore:.*constraints repeat others")
+@pytest.mark.parametrize("options", [{}, {"stabilised": True}, {"method": "bdf"}])
+def test_what_comes_to_rest_contradicts_nothing(options):
+    """Where all stand still, velocities are round-off, and so are their gaps."""
+    sol = simulate(linkage_that_stops(), t_end=0.3, **options)
+    assert sol.t[-1] == 0.3
+    assert np.abs(sol.v[0]).max() > 1.0
+    assert np.abs(sol.v[sol.t > 0.11]).max() < 1e-9
+    assert sol.joint("main").angle[-1] == pytest.approx(0.05, abs=1e-9)

@@ -1,0 +1,129 @@
+"""The FMU of a mechanism file: its bodies are reduced now, and travel in the archive."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.config.mechanism import MechanismFile
+from rom.errors import ConfigError
+from rom.fmu.export import write_fmu
+from rom.io.files import check_readable
+from rom.io.native import save
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Part
+from rom.names import file_name
+from rom.process.child import scratch
+
+SCRIPT_TEXT = '''"""Builds the mechanism of {file}, whose bodies lie beside it."""
+
+from pathlib import Path
+
+import rom
+
+FOLDER = Path(__file__).parent
+BODIES = {bodies!r}
+
+
+def mechanism():
+    return rom.read_mechanism(FOLDER / {file!r}, BODIES).mechanism()
+'''
+
+
+@typed
+def write_mechanism_fmu(
+    file: MechanismFile,
+    path: str | Path,
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
+    dt: float | None = None,
+) -> Path:
+    """Write the mechanism of a file as an FMU for co-simulation, see `rom.write_fmu`.
+
+    Component files in it are meshed and reduced once, here: the FMU needs neither FEniCSx nor
+    geometries.
+
+    Args:
+        file: as of `rom.read_mechanism`.
+        path: file ending in ``.fmu``.
+        inputs: names of loads, motors or drives that follow inputs.
+        outputs: "body.marker", names of joints or drives; None for all of them.
+        dt: longest time step [s]; None for that of the file.
+
+    Raises:
+        ConfigError: as `rom.write_fmu`, or if neither gives a step.
+        FileFormatError: if the file is gone.
+        ModelError: if the mechanism cannot be built.
+        ResourceError: as `rom.write_fmu`.
+    """
+    simulation = file.values["simulation"]
+    step = simulation.get("dt") if dt is None else dt
+    if step is None:
+        raise ConfigError(
+            f"{file.document.path} gives no dt, which an FMU needs.",
+            hint="Add dt to [simulation], or --dt on the command line.",
+        )
+    made = file.mechanism()
+    with scratch("fmu") as folder:
+        text = folder / file.document.path.name
+        text.write_bytes(check_readable(file.document.path).read_bytes())
+        bodies, files = _bodies(file, made, folder)
+        script = folder / "mechanism.py"
+        script.write_text(SCRIPT_TEXT.format(file=text.name, bodies=bodies))
+        return write_fmu(
+            script,
+            path,
+            inputs=list(inputs),
+            outputs=everything(made) if outputs is None else list(outputs),
+            dt=step,
+            rho_inf=simulation.get("rho_inf", 0.9),
+            files=[text, *files],
+        )
+
+
+def everything(made: Mechanism) -> list[str]:
+    """All outputs there can be: markers with names, joints with a coordinate, drives."""
+    markers = [f"{name}.{marker}" for name, part in made.parts.items() for marker in part.names]
+    joints = [name for name, joint in made.joints.items() if joint.coordinate is not None]
+    return [*markers, *joints, *made.drives]
+
+
+def _bodies(
+    file: MechanismFile, made: Mechanism, folder: Path
+) -> tuple[dict[tuple[str, ...], Any], list[Path]]:
+    """What replaces the bodies from other files, and the files that it names."""
+    changes: dict[tuple[str, ...], Any] = {}
+    files: list[Path] = []
+    for name, values in file.document.data["bodies"].items():
+        if "file" not in values:
+            continue
+        part = made.parts[name]
+        if part.flexible is None:
+            changes["bodies", name] = _numbers(part)
+            continue
+        place = folder / f"{len(files)} {file_name(name)}.rom.npz"
+        files.append(save(part.flexible, place))
+        changes["bodies", name, "file"] = place.name
+        if "reference" in values:
+            changes["bodies", name, "reference"] = None
+    return changes, files
+
+
+def _numbers(part: Part) -> dict[str, Any]:
+    """A rigid body by its numbers, in SI."""
+    vectors = {
+        "inertia": np.trace(part.second) * np.eye(3) - part.second,
+        "at": part.at,
+        "orientation": part.p,
+        "velocity": part.velocity,
+        "omega": part.omega,
+    }
+    points = {name: np.asarray(x).tolist() for name, x in part.points.items()}
+    return {
+        "mass": float(part.mass),
+        "markers": points,
+        **{name: value.tolist() for name, value in vectors.items()},
+    }
