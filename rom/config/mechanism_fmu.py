@@ -107,8 +107,6 @@ def _bodies(
         place = folder / f"{len(files)} {file_name(name)}.rom.npz"
         files.append(save(part.flexible, place))
         changes["bodies", name, "file"] = place.name
-        if "reference" in values:
-            changes["bodies", name, "reference"] = None
     return changes, files
 
 

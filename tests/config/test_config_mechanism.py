@@ -296,8 +296,12 @@ def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
 FMU_CASES = {
     "as it is": {},
     "another frame": {("bodies", "rod", "reference"): ["tip"]},
-    "a rigid rod, pushed": {
+    "a rigid rod, pushed, and another that flies": {
         ("bodies", "rod", "rigid"): True, ("bodies", "rod", "velocity"): ["1 mm/s", 0, 0],
+        ("bodies", "free"): {
+            "file": "rod.rom.npz", "rigid": True, "at": [1.0, 2.0, 3.0], "velocity": [3.0, 0, 1.0],
+            "orientation": {"axis": [1, 2, 3], "angle": "40 deg"}, "omega": [1.0, 20.0, -5.0],
+        },
     },
 }  # fmt: skip
 
@@ -309,17 +313,21 @@ def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.delenv("ROM_PYTHON", raising=False)
     file = read_mechanism("crank.toml", FMU_CASES[case])
-    names = ["slider.pin", "main bearing"] if case != "as it is" else None
+    free = ["free.tip"] if ("bodies", "free") in FMU_CASES[case] else []
+    names = ["slider.pin", "main bearing", *free] if case != "as it is" else None
     rom.write_mechanism_fmu(file, "crank.fmu", outputs=names)
     sol = file.simulate()
     (folder / "rod.rom.npz").unlink()
     (folder / "crank.toml").unlink()
-    place = [f"slider.pin.position[{k}]" for k in (1, 2, 3)]
+    place, tip = ([f"{x}.position[{k}]" for k in (1, 2, 3)] for x in ("slider.pin", "free.tip"))
+    output = [*place, *(tip if free else []), "'main bearing'.angle"]
     found = fmpy.simulate_fmu("crank.fmu", stop_time=0.01, step_size=1e-4, output_interval=1e-4,
-                              fmi_type="CoSimulation",
-                              output=[*place, "'main bearing'.angle"])  # fmt: skip
+                              fmi_type="CoSimulation", output=output)  # fmt: skip
     moved = np.column_stack([found[name] for name in place])
     assert_allclose(moved, sol.position("slider", "pin"), atol=1e-9)
+    if free:
+        flown = np.column_stack([found[name] for name in tip])
+        assert_allclose(flown, sol.position("free", "tip"), atol=1e-9)
     assert_allclose(found["'main bearing'.angle"], sol.joint("main bearing").angle, atol=1e-8)
 
 

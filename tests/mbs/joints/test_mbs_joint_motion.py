@@ -1,5 +1,7 @@
 """Angles and displacements that a motion gives for its joints."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,7 +9,10 @@ from numpy.testing import assert_allclose
 from cases.mbs.mechanisms import random_body
 from rom.errors import ConfigError
 from rom.mbs.integrate.simulation import simulate
+from rom.mbs.kernels.system import ALONG
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.joints import NO_VECTOR, Row
+from rom.mbs.results.joint_motion import displacements
 
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
 
@@ -85,6 +90,24 @@ def test_a_run_goes_on_from_a_time_between(flexible):
     assert on.joint("thread").angle[-1] % (2 * np.pi) == pytest.approx(
         flexible.joint("thread").angle[-1] % (2 * np.pi), abs=1e-4
     )
+
+
+def test_a_displacement_along_a_turning_axis_changes_with_the_axis():
+    """Of points that are no longer on the axis: of a gap (t, 1, 0) seen along (cos t, sin t, 0)."""
+    t = np.linspace(0.0, 2.0, 2001)
+    nothing, ones = np.zeros_like(t), np.ones_like(t)
+    c, s = np.cos(t), np.sin(t)
+    turned = np.stack([np.stack([c, -s, nothing], 1), np.stack([s, c, nothing], 1),
+                       np.tile([0.0, 0, 1], (t.size, 1))], axis=1)  # fmt: skip
+    still = np.zeros((t.size, 3))
+    one = SimpleNamespace(position=still, axes=turned,
+                          twist=np.column_stack([still, nothing, nothing, ones]))  # fmt: skip
+    two = SimpleNamespace(position=np.column_stack([t, ones, nothing]), axes=turned,
+                          twist=np.column_stack([ones, nothing, nothing, still]))  # fmt: skip
+    row = Row(ALONG, np.array([1.0, 0, 0]), NO_VECTOR, NO_VECTOR, offset=0.5)
+    value, rate = displacements(row, one, two)
+    assert_allclose(value, t * c + s - 0.5, atol=1e-12)
+    assert_allclose(rate, c - t * s + c, atol=1e-12)
 
 
 def test_joints_without_a_coordinate_are_named():
