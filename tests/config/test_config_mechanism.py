@@ -306,6 +306,7 @@ FMU_CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("case", FMU_CASES)
 def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
     """Bodies travel inside, the folder may go; nothing but rom need be found."""
@@ -340,6 +341,7 @@ def test_the_command_line_writes_fmus_of_mechanisms(folder, capsys):
     assert settings["rho_inf"] == 1.0
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(
     ("words", "message"),
     [

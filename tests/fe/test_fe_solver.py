@@ -86,6 +86,7 @@ def test_an_unknown_solver_is_named(text):
         beam(text)
 
 
+@pytest.mark.long
 def test_the_certificate_estimates_what_it_cannot_afford(direct):
     bodies = [
         rom.reduce(m, method=rom.CraigBampton(18), interfaces=KINDS)

@@ -75,7 +75,7 @@ def test_the_mesh_is_fit_for_use_and_always_the_same():
     assert 10e3 < 3 * len(read_mesh(GEOMETRY, parameters=COARSE, order=2).points) < 20e3
 
 
-@pytest.mark.parametrize("crown", [0.0, 0.03])
+@pytest.mark.parametrize("crown", [pytest.param(0.0, marks=pytest.mark.long), 0.03])
 @pytest.mark.parametrize("change", [{}, {"beta": 60.0, "l_root": 0.040, "R": 0.001}])
 def test_flanks_are_planes_or_cylinders_where_the_dovetail_has_them(crown, change):
     p = {"beta": 50.0, "l_root": 0.044, "R": 0.0015} | change

@@ -212,7 +212,9 @@ def test_a_wrong_tangent_would_cost_newton_passes(add):
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("name", ["add_family", "add_law", "add_python_law"])
+@pytest.mark.parametrize(
+    "name", ["add_family", pytest.param("add_law", marks=pytest.mark.long), "add_python_law"]
+)
 def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))
