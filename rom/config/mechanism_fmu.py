@@ -10,6 +10,7 @@ from rom.arguments import typed
 from rom.config.mechanism import MechanismFile
 from rom.errors import ConfigError
 from rom.fmu.export import write_fmu
+from rom.fmu.outputs import output_names
 from rom.io.files import check_readable
 from rom.io.native import save
 from rom.mbs.mechanism import Mechanism
@@ -77,18 +78,11 @@ def write_mechanism_fmu(
             script,
             path,
             inputs=list(inputs),
-            outputs=everything(made) if outputs is None else list(outputs),
+            outputs=output_names(made) if outputs is None else list(outputs),
             dt=step,
             rho_inf=simulation.get("rho_inf", 0.9),
             files=[text, *files],
         )
-
-
-def everything(made: Mechanism) -> list[str]:
-    """All outputs there can be: markers with names, joints with a coordinate, drives."""
-    markers = [f"{name}.{marker}" for name, part in made.parts.items() for marker in part.names]
-    joints = [name for name, joint in made.joints.items() if joint.coordinate is not None]
-    return [*markers, *joints, *made.drives]
 
 
 def _bodies(

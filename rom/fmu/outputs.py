@@ -25,6 +25,15 @@ MARKER_OUTPUTS = (
 )
 
 
+def output_names(mechanism: Mechanism) -> list[str]:
+    """All outputs there can be: markers with names, joints with a coordinate, drives."""
+    markers = [
+        f"{name}.{marker}" for name, part in mechanism.parts.items() for marker in part.names
+    ]
+    joints = [name for name, joint in mechanism.joints.items() if joint.coordinate is not None]
+    return [*markers, *joints, *mechanism.drives]
+
+
 class Outputs:
     """What an FMU tells of its mechanism.
 
@@ -56,7 +65,7 @@ class Outputs:
             elif name in mechanism.drives:
                 self._drive(mechanism, name)
             else:
-                known = sorted([*places, *joints, *mechanism.drives])
+                known = sorted(output_names(mechanism))
                 raise ConfigError(f"no output {name!r}; there are {known}.")
 
     def values(self, W: Work, lam: Array, packed: Packed) -> Array:
