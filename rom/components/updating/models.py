@@ -13,6 +13,7 @@ from rom.reduction.bases.fixed_interface import craig_bampton
 
 Complex = NDArray[np.complex128]
 RIGID_RTOL = 1e-4  # round-off of a rigid motion's eigenvalue, of the lowest elastic one
+DEAD_RATIO = 1e-8  # of the largest response: below it, round-off of those who compute responses
 RANK_RTOL = 1e-7  # singular value of dependent columns of a basis, of the largest one
 
 
@@ -104,10 +105,10 @@ class Measurement:
 
     Attributes:
         omega: (n_f,) circular frequencies [rad/s].
-        H: (n_f, n_s, n_e) displacement at each sensor per unit force at each exciter [m/N];
-            a sensor that symmetry keeps at rest has only noise to say and is left out.
+        H: (n_f, n_s, n_e) displacement at each sensor per unit force at each exciter [m/N].
         inputs: (n_e,) which sensors have an exciter.
-        weights: (n_f, n_s, n_e), (n_f, 1, 1) or one number: how far to trust each value.
+        weights: (n_f, n_s, n_e), (n_f, 1, 1) or one number: how far to trust each value; zero for
+            a sensor that symmetry keeps at rest, which has only round-off or noise to say.
 
     Raises:
         ConfigError: if these do not fit each other, or a channel is dead.
@@ -129,6 +130,19 @@ class Measurement:
         w = np.shape(self.weights)
         if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
             raise ConfigError(f"weights {w} fit neither a number nor responses {self.H.shape}.")
+        self._check_levels()
+
+    def _check_levels(self) -> None:
+        """Refuse channels that only round-off moves: the logarithm of that is anything."""
+        level = np.abs(self.H).max(axis=0)
+        trusted = np.broadcast_to(self.weights, self.H.shape).any(axis=0)
+        for sensor, exciter in np.argwhere((level < DEAD_RATIO * level.max()) & trusted):
+            raise ConfigError(
+                f"under exciter {exciter} sensor {sensor} moves by "
+                f"{level[sensor, exciter] / level.max():.1e} of the largest response: a dead channel, "
+                "kept at rest by symmetry or a support.",
+                hint="Give it the weight 0 there, or leave it out.",
+            )
 
     def check(self, model: "Model", zeta: ArrayLike = ()) -> None:
         """See that a model and damping ratios can answer to it.

@@ -29,6 +29,7 @@ from rom.io.fields.universal import assemble, read_universal
 TRUE = np.array([0.30, -0.25, 0.0, 0.20, 0.0, -0.35, 0.0, 0.25, -0.20])
 ZETA = np.array([1.2, 0.8, 1.5, 1.0, 2.0]) / 100
 START, GUESS = np.zeros(9), np.full(5, 0.01)
+ROUND_OFF = 1e-8  # of parameters found; some 1e-9, more or less by the arithmetic of the processor
 OMEGA = 2 * np.pi * np.linspace(2, 180, 180)
 INPUTS = (2, 7)  # nodes 9 and 24
 STIFF, HEAVY = slice(0, 6), slice(6, 9)
@@ -251,7 +252,7 @@ def test_eight_sensors_need_some_linear_solutions():
     found = response_function_method(BEAM, measured(weights=1 / np.abs(EXACT)), START, C, steps=5)
     error = np.abs(found.history - TRUE).max(axis=1)
     assert error[0] == pytest.approx(0.15, abs=1e-6)
-    assert error[1] < 0.01 and error[2] < 1e-4 and error[-1] < 1e-9
+    assert error[1] < 0.01 and error[2] < 1e-4 and error[-1] < ROUND_OFF
 
 
 def test_unmeasured_dofs_as_the_model_says_converge_slower_to_the_same():
@@ -380,13 +381,17 @@ def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
     seen = np.array([bed.sensor(*place) for place in places])
     model = ParametricModel(K, M, dK, 0 * dK, seen, n_rigid=6)
     true, zeta = np.array([0.30, -0.10]), np.full(8, 0.01)
-    modes = [modal(model.at(p), []).Phi[:, :40] for p in ((0.0, 0.0), (0.4, -0.3), (-0.3, 0.3))]
-    small = model.in_basis(np.linalg.svd(np.hstack(modes), full_matrices=False)[0][:, :60])
+    modes = [modal(model.at(p), []).Phi[:, :60] for p in ((0.0, 0.0), (0.4, -0.3), (-0.3, 0.3))]
+    small = model.in_basis(np.linalg.svd(np.hstack(modes), full_matrices=False)[0][:, :90])
     omega, inputs = 2 * np.pi * np.linspace(4, 62, 150), (0, 3)
-    exact = responses(model, true, zeta, omega, inputs)
-    test = Measurement(omega, data.noisy(exact, 0.02, np.random.default_rng(5)), inputs)
-    found = update_by_output(small, test, np.zeros(2), zeta)
-    assert_allclose(found.p, true, atol=0.01)
+    exact, start = responses(model, true, zeta, omega, inputs), (np.zeros(2), zeta)
+    measured = data.noisy(exact, 0.02, np.random.default_rng(5))
+    with pytest.raises(ConfigError, match="under exciter 1 sensor 4 moves by .* a dead channel"):
+        Measurement(omega, measured, inputs)
+    weights = np.ones(exact.shape)
+    weights[:, 4, 1] = 0.0  # tail up and down, fuselage pushed sideways: at rest by symmetry
+    found = update_by_output(small, Measurement(omega, measured, inputs, weights), *start)
+    assert_allclose(found.p, true, atol=1e-3)
     assert np.all(np.abs(found.p - true) < 4 * found.deviation[:2])
 
 
