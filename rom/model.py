@@ -273,6 +273,39 @@ class Modes:
         return html_table(f"Modes: {self._said}", ("mode", *names), rows)
 
 
+# What a row that fails costs the user, and the cure, by words of its quantity
+MORE_MODES = "Leave n_modes (-m) out, and as many are kept as are needed; or give a larger one."
+SMALLER_STEPS = "Take smaller steps, dt or rtol."
+FAILURE_COSTS = {
+    "worst error of": f"Motions at these frequencies are off by as much. {MORE_MODES}",
+    "estimated error of": f"Motions at these frequencies are off by about as much. {MORE_MODES}",
+    "lowest MAC": f"A mode has another shape: stress and answers in it are wrong. {MORE_MODES}",
+    "reduced never below full": "No reduction can do that: stiffness and mass are of different "
+    "models, or a mode of the full model was missed.",
+    "error over its estimate": "The estimates of this body are too small; go by the errors.",
+    "static flexibility": "Slow loads on the interfaces bend the body wrongly by as much. Use a "
+    "method with constraint modes, such as CraigBampton.",
+    "mass, centre, inertia": "It falls and turns otherwise than the part: shapes are missing.",
+    "rigid motions inside the basis": "It resists moving as a whole: shapes are missing.",
+    "energy of rigid motions": "The model resists moving as a whole: it is held somewhere, or its "
+    "stiffness misses digits. Give a model that floats.",
+    "stiffness against rigid motion": "The model resists moving as a whole: it is held somewhere, "
+    "or its stiffness misses digits. Give a model that floats.",
+    "scaled mass": "Two shapes are nearly the same and digits are lost. Keep fewer modes, or "
+    "fewer coordinates per interface.",
+    "largest deformation": "Linear elasticity about a floating frame ends here. Split the body "
+    "into several, or take a rod that bends far.",
+    "softens it to nothing": "Centrifugal force would stiffen it, which this body does not know. "
+    "Reduce it with stiffening=True.",
+    "energy balance": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
+    "drift of energy": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
+    "change of ": f"Momentum changes though nothing pushes from outside. {SMALLER_STEPS}",
+    "gap in a joint": f"Joints come apart. {SMALLER_STEPS}",
+    "slip of what rolls": f"What rolls slips. {SMALLER_STEPS}",
+    "Newton corrections": f"Steps are hard to solve: something is stiff. {SMALLER_STEPS}",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """One line of a report: a quantity, its value, its limit, and whether it holds."""
@@ -306,6 +339,13 @@ class Report:
         """The rows that do not hold."""
         return tuple(row for row in self.rows if not row.ok)
 
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What the rows that fail cost the user, and what helps."""
+        costs = (text for row in self.failures for words, text in FAILURE_COSTS.items()
+                 if words in row.quantity)  # fmt: skip
+        return tuple(dict.fromkeys(costs))
+
     def __str__(self) -> str:
         width = max((len(row.quantity) for row in self.rows), default=0)
         lines = [
@@ -313,7 +353,8 @@ class Report:
             + ("ok" if row.ok else "FAILED")
             for row in self.rows
         ]
-        return "\n".join([f"{self.title}: {self._verdict}", *lines])
+        advice = [f"  -> {text}" for text in self.advice]
+        return "\n".join([f"{self.title}: {self._verdict}", *lines, *advice])
 
     def __repr__(self) -> str:
         return f"Report({self.title!r}: {self._verdict})"

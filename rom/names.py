@@ -19,6 +19,7 @@ from rom.errors import ConfigError, RomError
 ORIGIN_MARK = "written by rom"  # stands in every file of a format that has comments
 MAX_CHARACTERS = 120
 MAX_FILE_NAME_BYTES = 255  # of Linux, macOS and Windows; endings and temporary names included
+MAX_DIGITS = 18  # of whole numbers in texts
 MAX_NAMED = 20  # names in one message
 MAX_OFFERED = 8  # of them, where there are more
 TEMPORARY_BYTES = 20  # that a file being written adds to its name
@@ -55,6 +56,11 @@ def check_text(name: object, what: str, error: type[RomError] = ConfigError) -> 
             hint=NAME_ALPHABET,
         )
     return name
+
+
+def is_whole(text: str) -> bool:
+    """Whether a text from outside is a whole number of at most 18 digits: it fits eight bytes."""
+    return len(text) <= MAX_DIGITS and text.isascii() and text.isdecimal()
 
 
 def check_name(name: object, what: str, error: type[RomError] = ConfigError) -> str:

@@ -7,6 +7,7 @@ from rom.model import Row
 FREQUENCY_RTOL = 1e-3  # what a structural dynamicist accepts without asking
 BELOW_FULL_RTOL = 1e-8  # round-off by which a reduced frequency may lie below the full one
 MIN_MAC = 0.99
+N_COMPARED = 6  # lowest elastic modes that certificates compare
 
 
 def row(quantity: str, value: float, limit: float, *, above: bool = False) -> Row:

@@ -35,6 +35,7 @@ from rom.reduction.interfaces.kinds import by_name
 from rom.reduction.interfaces.order import with_orders
 
 log = logging.getLogger("rom")
+ENOUGH_MODES = CraigBampton()  # as many as the certificate needs
 CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
 
@@ -133,7 +134,7 @@ def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
 def reduce(
     model: FEModel,
     *,
-    method: Method | Characteristic,
+    method: Method | Characteristic = ...,
     interfaces: dict[str, Any] | None = None,
     reference: Any = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
@@ -154,7 +155,7 @@ def reduce(
 def reduce(  # noqa: PLR0913  one keyword per choice
     model: FEModel | CyclicSector,
     *,
-    method: Method | Characteristic,
+    method: Method | Characteristic = ENOUGH_MODES,
     interfaces: dict[str, Any] | None = None,
     reference: Any = "mean-axis",
     damping: Rayleigh | ModalDamping | None = None,
@@ -169,7 +170,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         model: the full model, free-free; or one sector of a wheel, which gives a reduced sector
             with ``interfaces={"cyclic": Polynomial(4)}`` on its cyclic faces, see `reduce_sector`.
         method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
-            `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`.
+            `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`. If missing,
+            ``CraigBampton()``, which keeps as many modes as the certificate needs.
         interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial`,
             `FourierLegendre` or `Snapshots`; ``Polynomial()`` has its order chosen from the band
             and the tolerance of the method.
@@ -203,6 +205,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         connection = connect(ops, model, method.kinds(connection, interfaces))
         method = method.method
         say("full interfaces follow %d coordinates", connection.boundary.size)
+    method = judged_in(method, tuple(connection.parts.values()))
     with _on_interfaces(interfaces):
         basis = method.basis(connection.ops, connection.boundary, connection.labels)
     Psi = connection.ops.expand(basis.Psi)
@@ -234,6 +237,15 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
+
+
+def judged_in(method: Any, supports: tuple[Index, ...]) -> Any:
+    """The method; if it chooses the number of its modes, so that they serve all supports."""
+    inner = getattr(method, "method", None)
+    if inner is not None:
+        return replace(method, method=judged_in(inner, supports))
+    chooses = isinstance(method, CraigBampton) and method.chooses
+    return replace(method, supports=supports) if chooses else method
 
 
 def _reduced_sector(

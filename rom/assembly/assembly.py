@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import lowest, one_of, typed
-from rom.assembly.certificate import N_COMPARED, rows_of_parts
+from rom.assembly.certificate import rows_of_parts
 from rom.assembly.condensed import (
     CondensedAssembly,
     Partition,
@@ -27,7 +27,7 @@ from rom.body.records import Marker
 from rom.errors import ConfigError
 from rom.model import Array, Modes, Report, Row
 from rom.names import offered
-from rom.rows import frequency_rows, row
+from rom.rows import N_COMPARED, frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces

@@ -6,7 +6,6 @@ from typing import Any
 
 from rom.model import Row
 
-N_COMPARED = 6  # elastic modes that certificates look at
 MISSING_ROWS = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
 
 

@@ -27,13 +27,13 @@ import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import one_of, typed
-from rom.assembly.certificate import N_COMPARED, rows_of_parts
+from rom.assembly.certificate import rows_of_parts
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Report, Row
 from rom.names import offered
 from rom.reduction.bases.free_interface import free_modes, residual_flexibility
 from rom.reduction.interfaces.records import Connection
-from rom.rows import FREQUENCY_RTOL, frequency_rows, row
+from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
 KINDS = ("macneal", "rubin", "dual")
 SAME_PLACE = 1e-6  # distance of two interfaces, of their distance from the origin, that still meet

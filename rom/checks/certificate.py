@@ -11,9 +11,8 @@ from rom.body.reference import rigid_mass
 from rom.eigen.verbs import Held, Operators, given_rigid_motions, mac, residual_errors
 from rom.model import Array, Basis, Report, Row
 from rom.reduction.interfaces.records import Connection
-from rom.rows import FREQUENCY_RTOL, frequency_rows, row
+from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
-N_COMPARED = 6  # elastic modes compared in each support
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
 # rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
 ASYMMETRY_RTOL = 1e-6

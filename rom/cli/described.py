@@ -48,6 +48,7 @@ MOTION_KEYS: dict[str, tuple[str, ...]] = {
 REPLACED_KEYS = {  # an option takes the place of what contradicts it
     "modes": (("reduction", "f_max"), ("reduction", "tol")),
     "f_max": (("reduction", "modes"),),
+    "tol": (("reduction", "modes"),),
 }
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.options import assignment, require, unique
 from rom.errors import ConfigError
-from rom.names import named
+from rom.names import is_whole, named
 
 if TYPE_CHECKING:
     from rom.model import FEModel
@@ -127,7 +127,7 @@ def labels(text: str) -> list[int]:
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         last = last if dash else first
-        if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last)):
+        if not (is_whole(first) and is_whole(last) and int(first) <= int(last)):
             raise ConfigError(f"--set: {part!r} is no label and no range of labels as in 11-14.")
         if int(last) - int(first) > MOST_NODES:
             raise ConfigError(f"--set: {part} has more than {MOST_NODES} nodes.")

@@ -4,8 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from rom.cli.options import count, number, positive
-from rom.config.methods import CRAIG_BAMPTON, METHODS
-from rom.errors import ConfigError
+from rom.config.methods import CRAIG_BAMPTON, METHODS, SETTINGS, chosen
 
 if TYPE_CHECKING:
     from rom.reduction.bases.method import Method
@@ -32,7 +31,8 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         "-m",
         "--modes",
         type=count,
-        help="modes kept (default 20); blocks per frequency for moment-matching (default 2)",
+        help="modes kept; if missing, as many as the certificate needs for craig-bampton, 20 for "
+        "others; blocks per frequency for moment-matching (default 2)",
     )
     kept.add_argument(
         "--f-max", type=positive, help="craig-bampton: keep all modes up to this frequency [Hz]"
@@ -40,8 +40,8 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tol",
         type=positive,
-        help="with --f-max: the fewest modes with this relative error of all frequencies in the "
-        "band, e.g. 1e-3",
+        help="craig-bampton: the fewest modes with this relative error of all frequencies up to "
+        "--f-max, or else of the lowest six in every support (default 5e-4)",
     )
     parser.add_argument(
         "--at", metavar="HZ,…", type=frequencies, help="moment-matching: where (default 0) [Hz]"
@@ -65,34 +65,5 @@ def method(args: argparse.Namespace) -> "Method | Characteristic":
     Raises:
         ConfigError: if they contradict each other.
     """
-    from rom.reduction.bases.loads import WithLoads
-    from rom.reduction.interfaces.characteristic import Characteristic
-
-    chosen = _plain(args)
-    if args.gravity_shapes:
-        chosen = WithLoads(chosen)
-    if args.characteristic is None:
-        return chosen
-    if not any(kind == "full" for _, kind in args.interface):
-        raise ConfigError("--characteristic needs a full interface, as in -i tip=full.")
-    return Characteristic(chosen, args.characteristic)
-
-
-def _plain(args: argparse.Namespace) -> "Method":
-    import rom
-
-    _, name, default = METHODS[args.method]
-    if args.f_max and args.method != CRAIG_BAMPTON:
-        raise ConfigError(f"--f-max belongs to {CRAIG_BAMPTON}; give {args.method} a number -m.")
-    if args.tol is not None and not args.f_max:
-        raise ConfigError("--tol needs the band --f-max.")
-    if args.at is not None and args.method != "moment-matching":
-        raise ConfigError(f"--at belongs to moment-matching, not to {args.method}.")
-    if default is None and args.modes is not None:
-        raise ConfigError(f"{args.method} keeps no modes: leave -m out.")
-    if args.f_max:
-        return rom.CraigBampton(f_max=args.f_max, tol=args.tol)
-    number_kept = () if default is None else (default if args.modes is None else args.modes,)
-    if args.method == "moment-matching":
-        return rom.MomentMatching(args.at or (0.0,), *number_kept)
-    return getattr(rom, name)(*number_kept)
+    settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
+    return chosen(settings, full=any(kind == "full" for _, kind in args.interface))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.errors import ConfigError
+from rom.names import is_whole
 
 if TYPE_CHECKING:
     from rom.model import Material
@@ -46,7 +47,7 @@ def limit(text: str) -> float:
 
 def count(text: str) -> int:
     """A whole number, zero or more."""
-    if not text.isdecimal():
+    if not is_whole(text):
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
     return int(text)
 

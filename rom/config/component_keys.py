@@ -110,10 +110,11 @@ TABLE = Table("A component.", (
     )), "attachments"), "Rigid bodies and point masses it carries."),
     Key("reduction", Table("How it is reduced.", (
         Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
-        Key("modes", Whole(), "How many; 20 if missing. For moment-matching blocks, 2."),
+        Key("modes", Whole(), "How many; if missing, as many as the certificate needs, of methods "
+            "other than craig-bampton 20, of moment-matching blocks 2."),
         Key("f_max", Quantity("Hz", positive=True), "Craig-Bampton: all modes up to here instead."),
         Key("tol", Quantity("1", positive=True),
-            "With f_max: the fewest modes with this relative error in the band."),
+            "The fewest modes with this relative error up to f_max, or of the lowest six."),
         Key("at", Quantity("Hz", ((None,),)), "Moment-matching: where to be exact; 0 if missing."),
         Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
         Key("gravity_shapes", Flag(), "Keep the answers to gravity along each axis.", False),

@@ -1,5 +1,6 @@
 """Reduction methods by name."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rom.errors import ConfigError
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
 
 CRAIG_BAMPTON = "craig-bampton"
 METHODS = {  # name: module, class, and how many modes when nobody says; None for none
-    CRAIG_BAMPTON: ("method", "CraigBampton", 20),
+    CRAIG_BAMPTON: ("method", "CraigBampton", "enough"),
     "enhanced": ("enhanced", "EnhancedCraigBampton", 20),
     "guyan": ("method", "Guyan", None),
     "rubin": ("free_interface", "Rubin", 20),
@@ -20,12 +21,15 @@ METHODS = {  # name: module, class, and how many modes when nobody says; None fo
     "balanced": ("balanced", "BalancedTruncation", 20),
 }
 
+OWN_SETTINGS = {"f_max": CRAIG_BAMPTON, "tol": CRAIG_BAMPTON, "at": "moment-matching"}
+SETTINGS = ("method", "modes", *OWN_SETTINGS, "characteristic", "gravity_shapes")
+
 
 def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic":
     """The method of a table [reduction].
 
     Args:
-        settings: values by the keys method, modes, f_max, tol, at, characteristic, gravity_shapes.
+        settings: values by the keys of `SETTINGS`; those that nobody chose are missing.
         full: whether any interface keeps all its dofs.
 
     Raises:
@@ -45,24 +49,19 @@ def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic"
 
 
 def _plain(settings: dict[str, Any]) -> "Method":
-    from importlib import import_module
-
     name = settings["method"]
     module, kind, default = METHODS[name]
     modes, f_max = settings.get("modes"), settings.get("f_max")
-    for key, owner in (("f_max", CRAIG_BAMPTON), ("at", "moment-matching")):
+    for key, owner in OWN_SETTINGS.items():
         if key in settings and name != owner:
             raise ConfigError(f"{key} belongs to {owner}, not to {name}.")
-    if "tol" in settings and f_max is None:
-        raise ConfigError("tol needs the band f_max.")
-    if modes is not None and (f_max is not None or default is None):
-        raise ConfigError(f"{name} {'keeps no modes' if default is None else 'has f_max'}: "
-                          "leave modes out.")  # fmt: skip
+    if modes is not None and {"f_max", "tol"} & set(settings):
+        raise ConfigError(f"{name} has {'tol' if f_max is None else 'f_max'}: leave modes out.")
+    if modes is not None and default is None:
+        raise ConfigError(f"{name} keeps no modes: leave modes out.")
     make: Any = getattr(import_module(f"rom.reduction.bases.{module}"), kind)
-    if f_max is not None:
-        made = make(f_max=f_max, tol=settings.get("tol"))
-    elif name == "moment-matching":
-        made = make(tuple(settings.get("at", (0.0,))), modes or default)
-    else:
-        made = make() if default is None else make(default if modes is None else modes)
-    return made
+    if name == CRAIG_BAMPTON:
+        return make(modes, f_max, settings.get("tol"))
+    if name == "moment-matching":
+        return make(tuple(settings.get("at", (0.0,))), modes or default)
+    return make() if default is None else make(default if modes is None else modes)

@@ -8,9 +8,8 @@ import numpy as np
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.sector import CyclicSector
 from rom.model import Array, Report, Row
-from rom.rows import FREQUENCY_RTOL, frequency_rows
+from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 
-N_COMPARED = 6  # elastic frequencies compared for each number of nodal diameters
 N_FAMILIES = 2  # modes per number of nodal diameters, whose union is compared with a wheel
 STIFFER_BLADES = 0.05  # of all blades: the wheel stays cyclic, so that its truth is one sector
 

@@ -47,7 +47,8 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
 
     Positions and velocities are of the world, angular velocities of the body frame; a reaction
     acts on the second body of its joint, its moment about the second marker. Joints that leave an
-    angle or a displacement have these, too.
+    angle or a displacement have these, too. Force elements have their force along the coordinate
+    of their joint, others force and moment on their last marker.
 
     Args:
         solution: a `rom.mbs.results.solution.Solution` with n_t instants.
@@ -125,7 +126,7 @@ def _library(name: str) -> Any:
 
 
 def channels(solution: Any) -> Iterator[Channel]:
-    """All quantities of a motion, body by body, then joints, then energies."""
+    """All quantities of a motion: bodies, joints, force elements, energies."""
     for name, part in solution.mechanism.parts.items():
         yield from _of_body(solution, name, part)
     for joint in sorted(set(solution.packed.row_owner)):
@@ -133,6 +134,8 @@ def channels(solution: Any) -> Iterator[Channel]:
         yield Channel(("joints", joint, "force"), "N", AXIS_LETTERS, loads[:, :3])
         yield Channel(("joints", joint, "moment"), "N m", AXIS_LETTERS, loads[:, 3:])
         yield from _of_joint(solution, joint)
+    for element in solution.elements:
+        yield from _of_element(element, solution.element(element))
     for name in ENERGIES:
         values = getattr(solution.energy, name)
         yield Channel(("energy", name), "J", ("",), values)
@@ -149,6 +152,15 @@ def _of_joint(solution: Any, name: str) -> Iterator[Channel]:
     if joint.displacement is not None:
         yield Channel((*place, "displacement"), "m", ("",), motion.displacement)
         yield Channel((*place, "displacement rate"), "m/s", ("",), motion.displacement_rate)
+
+
+def _of_element(name: str, found: Any) -> Iterator[Channel]:
+    """Along the coordinate of its joint, or on its last marker."""
+    if found.on_joint:
+        yield Channel(("elements", name, "along"), found.along_unit, ("",), found.along)
+        return
+    yield Channel(("elements", name, "force"), "N", AXIS_LETTERS, found.force[:, -1])
+    yield Channel(("elements", name, "moment"), "N m", AXIS_LETTERS, found.moment[:, -1])
 
 
 def _of_body(solution: Any, name: str, part: Any) -> Iterator[Channel]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import elastic_part
-from rom.checks.certificate import N_COMPARED, compared, reduced_shapes, rigid_rows
+from rom.checks.certificate import compared, reduced_shapes, rigid_rows
 from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
 from rom.parametric.affine import AffineModel
@@ -15,7 +15,7 @@ from rom.parametric.family import BodyFamily
 from rom.parametric.parameters import scattered
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.records import Connection
-from rom.rows import frequency_rows, row
+from rom.rows import N_COMPARED, frequency_rows, row
 
 HELD_OUT = 3  # points of the certificate
 

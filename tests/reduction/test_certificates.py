@@ -8,7 +8,7 @@ import pytest
 import rom
 from cases.files import border_calls as made
 from cases.paths import ROOT
-from rom.cyclic.certificate import N_COMPARED
+from rom.rows import N_COMPARED
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),

@@ -160,4 +160,13 @@ def _text(body: "FlexibleBody", output: Path) -> str:
         f"{output}: body {body.name}, {body.mass:.6g} kg, {full} dofs reduced to "
         f"6 + {body.n_modes}, frame {body.reference}"
     )
-    return head if body.certificate is None else f"{head}\n\n{body.certificate}"
+    if body.certificate is None:
+        return head
+    return f"{head}\n{_lowest(body)}\n\n{body.certificate}"
+
+
+def _lowest(body: "FlexibleBody") -> str:
+    """The lowest elastic frequency in each support that was compared."""
+    found = body.provenance["comparison"].items()
+    lowest = ", ".join(f"{support} {table['reduced'][0]:.5g} Hz" for support, table in found)
+    return f"lowest elastic frequency: {lowest}; it depends on how the body is held"

@@ -51,7 +51,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--material", choices=sorted(MATERIALS), default="steel", help="default steel"
     )
-    parser.add_argument("-m", "--modes", type=count, default=20, help="modes kept (default 20)")
+    parser.add_argument(
+        "-m", "--modes", type=count, help="modes kept (default: as many as are needed)"
+    )
     parser.add_argument(
         "--gravity", type=vector, help="[m/s^2], default 9.81 along the axis most across the part"
     )

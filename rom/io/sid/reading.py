@@ -12,7 +12,7 @@ from rom.errors import FileFormatError, UnsafeFileError
 from rom.io.files import check_readable
 from rom.io.sid.format import BLOCKS, GENERAL, NODE_BLOCKS, SYMMETRIC, UNIT, shape_of
 from rom.model import Array
-from rom.names import ORIGIN_MARK
+from rom.names import ORIGIN_MARK, is_whole
 
 MAX_BYTES = 2**28  # of a file that is still read
 MOST_MODES = 1000  # blocks grow with their square
@@ -185,7 +185,7 @@ def _enter(
 def _fill(file: RawFile, block: RawBlock, key: str, index: str, value: float, line: int) -> None:
     numbers = index.split(",")
     wanted = {"m0": 2, "m1": 3, "mn": 3}
-    if len(numbers) != wanted.get(key) or not all(n.strip().isdecimal() for n in numbers):
+    if len(numbers) != wanted.get(key) or not all(is_whole(n.strip()) for n in numbers):
         file.refuse(f"{key}({index}) is no entry of a block", line)
     if key == "mn":
         block.dropped += 1

@@ -8,7 +8,7 @@ by ``mechanism.add``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -117,6 +117,11 @@ class Places:
     coordinates: list[tuple[tuple[Marker, Marker], Row]] = field(default_factory=list)
     time: int = -1
     remembered: list[Array] = field(default_factory=list)
+
+    def copy(self) -> "Places":
+        """The same places, to which more can be added without changing these."""
+        kept = ("owners", "signals", "coordinates", "remembered")
+        return replace(self, **{name: list(getattr(self, name)) for name in kept})
 
     def coordinate(self, joint: str, row: Row) -> int:
         """Number of a coordinate of a joint."""

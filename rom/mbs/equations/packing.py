@@ -44,6 +44,7 @@ class Packed:
         elements: {family: its table}, in the order of the arrays.
         element_names: {family: names of its elements}.
         asked: laws that stay in Python.
+        places: where the arrays have what elements speak of.
     """
 
     system: System
@@ -58,6 +59,7 @@ class Packed:
     elements: dict[Family, Any]
     element_names: dict[Family, tuple[str, ...]]
     asked: tuple[Asked, ...]
+    places: Places
 
     @property
     def followed(self) -> int:
@@ -167,6 +169,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
             for family, found in families.items()
             for law in family.asked(found, elements[family], followed)
         ),
+        places,
     )
 
 

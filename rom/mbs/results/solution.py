@@ -16,6 +16,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
+from rom.mbs.results.element_record import ElementRecord, element_record, markers_of
 from rom.mbs.results.interface_loads import marker_loads, of_body
 from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.joint_motion import JointMotion, joint_motion
@@ -311,6 +312,20 @@ class Solution:
         if name not in self.mechanism.laws:
             raise ConfigError(f"no law {name!r}; there are {offered(self.mechanism.laws, name)}.")
         return law_record(self, name)
+
+    def element(self, name: str) -> ElementRecord:
+        """Forces, energy and losses of one spring, motor, contact or other force element.
+
+        Raises:
+            ConfigError: if there is no such element, or it acts on no markers.
+        """
+        return element_record(self, name)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """Names of the force elements that act on markers, which `element` answers for."""
+        found = self.mechanism.elements.items()
+        return tuple(name for name, x in found if markers_of(self.mechanism, *x))
 
     @cached_property
     def _marker_loads(self) -> tuple[Array, Array]:

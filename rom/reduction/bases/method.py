@@ -1,6 +1,6 @@
 """Reduction methods as small records: what `rom.reduce` is asked to do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -10,9 +10,11 @@ from rom.eigen.verbs import Held, Operators, whole_clusters
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.fixed_interface import constraint_modes
-from rom.reduction.bases.selection import enough_modes
+from rom.reduction.bases.selection import Wanted, enough_modes
+from rom.rows import FREQUENCY_RTOL
 
-FIRST_BATCH = 16  # modes computed first when a frequency limit is given
+FIRST_BATCH = 16  # modes computed first where their number is looked for
+ENOUGH_RTOL = 0.5 * FREQUENCY_RTOL  # the estimate is none below half the limit of certificates
 
 
 class Method(Protocol):
@@ -41,11 +43,17 @@ class Guyan:
 class CraigBampton:
     """Constraint modes of the interface coordinates and fixed-interface normal modes.
 
+    Without a number or a band, the fewest modes are kept with which the six lowest elastic
+    frequencies of the body, free and held by each of its interfaces, are accurate: those that its
+    certificate compares.
+
     Attributes:
         n_modes: number of fixed-interface modes; a repeated frequency is kept whole.
         f_max: alternatively, keep all fixed-interface modes up to this frequency [Hz].
-        tol: with f_max, keep instead the fewest modes whose estimated error of every natural
-            frequency of the free body up to f_max is at most this, e.g. 1e-3.
+        tol: keep instead the fewest modes whose estimated error of every natural frequency of
+            the free body up to f_max is at most this, e.g. 1e-3; without f_max, of the lowest
+            six in every support, 5e-4 if not given.
+        supports: columns of the interfaces that are held for this, which `rom.reduce` fills in.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
@@ -54,18 +62,24 @@ class CraigBampton:
     n_modes: int | None = None
     f_max: float | None = None
     tol: float | None = None
+    supports: tuple[Index, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if (self.n_modes is None) == (self.f_max is None):
-            raise ConfigError("CraigBampton needs either n_modes or f_max.")
+        if self.n_modes is not None and self.f_max is not None:
+            raise ConfigError("CraigBampton takes n_modes or f_max, not both.")
         if self.n_modes is not None:
             whole("n_modes", self.n_modes)
         if self.f_max is not None and not (np.isfinite(self.f_max) and self.f_max > 0):
             raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
-        if self.tol is not None and (self.f_max is None or not 0 < self.tol < 1):
+        if self.tol is not None and (self.n_modes is not None or not 0 < self.tol < 1):
             raise ConfigError(
-                f"tol = {self.tol!r} is a relative error between 0 and 1, and needs f_max."
+                f"tol = {self.tol!r} is a relative error between 0 and 1, in place of n_modes."
             )
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the number of modes follows from estimated errors."""
+        return self.n_modes is None and (self.f_max is None or self.tol is not None)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis in interface coordinates; boundary columns first.
@@ -82,13 +96,17 @@ class CraigBampton:
             )
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
-        if self.tol is None or self.f_max is None:
-            omega, Phi = self._normal_modes(ops, held)
+        if self.chooses:
+            omega, Phi = enough_modes(ops, held, Psi_b, self._wanted(), FIRST_BATCH)
         else:
-            band = 2 * np.pi * self.f_max
-            omega, Phi = enough_modes(ops, held, Psi_b, band, self.tol, FIRST_BATCH)
+            omega, Phi = self._normal_modes(ops, held)
         normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
         return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal))
+
+    def _wanted(self) -> Wanted:
+        if self.f_max is not None and self.tol is not None:
+            return Wanted(self.tol, 2 * np.pi * self.f_max)
+        return Wanted(ENOUGH_RTOL if self.tol is None else self.tol, supports=self.supports)
 
     def _normal_modes(self, ops: Operators, held: Held) -> tuple[Array, Array]:
         if self.n_modes is not None:

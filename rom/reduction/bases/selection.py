@@ -1,34 +1,51 @@
-"""How many modes: the fewest whose estimated errors stay below a tolerance in a band."""
+"""How many modes: the fewest whose estimated errors stay below a tolerance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
 
 from rom.eigen.verbs import Held, Operators
-from rom.model import Array
+from rom.model import Array, Index
 from rom.reduction.bases.enhanced import projected, residual_shapes
+from rom.rows import N_COMPARED
 
 # reduced frequencies up to so many times the band may approximate those inside it
 BAND_FACTOR = 2.0
 SAFETY_FACTOR = 1.1  # the estimate is asymptotic: among crowded modes it is a little too small
-GROWTH_FACTOR = 1.6  # of the number of modes until the band is accurate
+GROWTH_FACTOR = 1.6  # of the number of modes until the frequencies are accurate
+NOTHING_HELD = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """The natural frequencies that are to be accurate.
+
+    Attributes:
+        tol: relative error of a frequency that is accepted.
+        omega_max: upper end of the band [rad/s]; None for the lowest `N_COMPARED` elastic ones.
+        supports: interface columns held, for each support beside the free body.
+    """
+
+    tol: float
+    omega_max: float | None = None
+    supports: Sequence[Index] = ()
 
 
 def enough_modes(
-    ops: Operators, held: Held, Psi_b: Array, omega_max: float, tol: float, first: int
+    ops: Operators, held: Held, Psi_b: Array, wanted: Wanted, first: int
 ) -> tuple[Array, Array]:
-    """The fewest fixed-interface modes with which all frequencies up to omega_max are accurate.
+    """The fewest fixed-interface modes with which all frequencies wanted are accurate.
 
-    Accuracy is the a-posteriori estimate of `estimated_errors` for the body without support; half
-    the relative error of an eigenvalue is that of a frequency.
+    Accuracy is the a-posteriori estimate of `estimated_errors`; half the relative error of an
+    eigenvalue is that of a frequency.
 
     Args:
         ops: operators in interface coordinates.
         held: their stiffness with the interfaces held.
         Psi_b: (n_local, n_b) constraint modes.
-        omega_max: upper end of the band [rad/s].
-        tol: relative error of a frequency that is accepted.
+        wanted: which frequencies, and how accurate.
         first: number of modes computed first.
 
     Returns:
@@ -37,42 +54,58 @@ def enough_modes(
     m = min(max(first, 1), held.n_free)
     while True:
         omega, Phi = ops.modes(held, m)
-        error = truncation_errors(ops, held, Psi_b, omega, Phi, omega_max)
-        if error(m) <= tol or m == held.n_free:
+        error = truncation_errors(ops, held, Psi_b, (omega, Phi), wanted)
+        if error(m) <= wanted.tol or m == held.n_free:
             break
         m = min(int(np.ceil(GROWTH_FACTOR * m)), held.n_free)
     low, high = 0, m  # error(high) is accepted, or there are no more modes
     while low < high:
         middle = (low + high) // 2
-        low, high = (low, middle) if error(middle) <= tol else (middle + 1, high)
+        low, high = (low, middle) if error(middle) <= wanted.tol else (middle + 1, high)
     return omega[:high], Phi[:, :high]
 
 
 def truncation_errors(
-    ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi: Array, omega_max: float
+    ops: Operators, held: Held, Psi_b: Array, modes: tuple[Array, Array], wanted: Wanted
 ) -> Callable[[int], float]:
-    """The largest estimated frequency error in the band as a function of the modes kept.
+    """The largest estimated error of a frequency wanted as a function of the modes kept.
 
     All candidates are judged from one set of products: what leaves the basis joins the residual.
     """
+    omega, Phi = modes
     n_b, m = Psi_b.shape[1], omega.size
     Y = residual_shapes(ops, held, Psi_b, omega, Phi)
     K, M = projected(ops, np.hstack([Psi_b, Phi, Y]))
     moved = M[n_b : n_b + m, :n_b] / (omega**2)[:, None]  # Phi^T M Psi_b / omega^2
 
     def error(k: int) -> float:
-        lam, V = reduced_modes(K[: n_b + k, : n_b + k], M[: n_b + k, : n_b + k])
-        near = (lam > 1e-9 * lam[-1]) & (lam <= (BAND_FACTOR * omega_max) ** 2)
+        return max(in_support(k, drop) for drop in (NOTHING_HELD, *wanted.supports))
+
+    def in_support(k: int, drop: Index) -> float:
+        keep = np.setdiff1d(np.arange(n_b + k), drop)
+        lam, V = reduced_modes(K[np.ix_(keep, keep)], M[np.ix_(keep, keep)])
+        near = _candidates(lam, wanted.omega_max)
+        if wanted.omega_max is None and near.size < N_COMPARED and k < m:
+            return np.inf
         lam, V = lam[near], V[:, near]
         t, d = np.zeros((2, K.shape[0], lam.size))
-        t[: n_b + k] = V
-        d[n_b + k : n_b + m] = moved[k:] @ V[:n_b]
-        d[n_b + m :] = V[:n_b]
+        t[keep] = V
+        d[n_b + k : n_b + m] = moved[k:] @ t[:n_b]
+        d[n_b + m :] = t[:n_b]
         eta = np.abs(_eigenvalue_errors(K, M, t, d * lam, lam))
-        inside = lam <= (1 + 2 * eta) * omega_max**2  # the exact one may be, if eta is too small
-        return 0.5 * SAFETY_FACTOR * float(eta[inside].max(initial=0.0))
+        if wanted.omega_max is not None:  # the exact one may be inside, if eta is too small
+            eta = eta[lam <= (1 + 2 * eta) * wanted.omega_max**2]
+        return 0.5 * SAFETY_FACTOR * float(eta.max(initial=0.0))
 
     return error
+
+
+def _candidates(lam: Array, omega_max: float | None) -> Index:
+    """Elastic modes that may approximate the frequencies wanted."""
+    elastic = np.flatnonzero(lam > 1e-9 * lam[-1])
+    if omega_max is None:
+        return elastic[:N_COMPARED]
+    return elastic[lam[elastic] <= (BAND_FACTOR * omega_max) ** 2]
 
 
 def reduced_modes(K: Array, M: Array) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from scipy.sparse import identity, kron
 from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, ResourceError
 from rom.model import Array, Interface
+from rom.names import is_whole
 from rom.reduction.interfaces.characteristic import CharacteristicFunctions
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
 from rom.reduction.interfaces.records import Tie
@@ -135,6 +136,6 @@ def parsed(name: str, kind: Any) -> Any:
         word, _, numbers = kind.partition(":")
         family = {"polynomial": (Polynomial, 1), "fourier": (FourierLegendre, 2)}.get(word)
         values = numbers.split(",")
-        if family and len(values) == family[1] and all(v.strip().isdecimal() for v in values):
+        if family and len(values) == family[1] and all(is_whole(v.strip()) for v in values):
             return family[0](*map(int, values))
     raise ConfigError(f"interface {name!r} has the kind {kind!r}; known kinds: {KNOWN_KINDS}.")

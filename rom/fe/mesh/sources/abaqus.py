@@ -25,6 +25,7 @@ from rom.fe.mesh.sources.deck import (
     to_gmsh,
 )
 from rom.model import Array, Index
+from rom.names import is_whole
 
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
 SKIN_TYPES = ("S3", "S4", "S6", "S8", "STRI3", "STRI65", "M3D3", "M3D4", "M3D6", "M3D8", "SFM3D")
@@ -141,7 +142,7 @@ def _members(options: dict[str, str], rows: list[list[str]]) -> list[int | str]:
 
 
 def _number(word: str) -> int | str:
-    return int(word) if word.isdigit() else word.strip('"')
+    return int(word) if is_whole(word) else word.strip('"')
 
 
 def _numbers(sets: dict[str, list[int | str]], name: int | str, depth: int = 20) -> list[int]:
@@ -193,7 +194,7 @@ BLOCK_READERS = {
 
 def _solid(name: str) -> str:
     digits = "".join(c for c in name.removeprefix("C3D") if c.isdigit())
-    if not name.startswith("C3D") or int(digits or 0) not in SOLIDS:
+    if not name.startswith("C3D") or not is_whole(digits) or int(digits) not in SOLIDS:
         raise MeshError(
             f"elements of type {name} are not supported.",
             hint="Supported are C3D4, C3D10, C3D8, C3D20 and their variants.",

@@ -12,7 +12,7 @@ from rom.model import Index
 
 # gmsh element types
 SOLIDS = {4: "tet4", 5: "hex8", 11: "tet10", 12: "hex27", 17: "hex20"}
-NAMES = re.compile(rb'^\s*([0-3])\s+(\d+)\s+"([^"\r\n]*)"\s*$', re.MULTILINE)
+NAMES = re.compile(rb'^\s*([0-3])\s+(\d{1,18})\s+"([^"\r\n]*)"\s*$', re.MULTILINE)
 DIMENSIONS = ("point", "curve", "surface", "volume")
 Blocks = dict[int, tuple[Index, Index]]  # numbers and nodes of the elements of each volume
 Groups = dict[tuple[int, int], str]  # names by dimension and tag
@@ -46,7 +46,7 @@ def check_declared(gmsh: Any, declared: Path) -> None:
 def version(path: Path) -> int:
     """Main version of a ``.msh`` file; 0 when it does not tell."""
     with path.open("rb") as stream:
-        found = re.search(rb"\$MeshFormat\s+(\d+)", stream.read(2**20))
+        found = re.search(rb"\$MeshFormat\s+(\d{1,9})", stream.read(2**20))
     return int(found[1]) if found else 0
 
 

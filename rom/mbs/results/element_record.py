@@ -1,0 +1,185 @@
+"""What a single force element does along a motion, evaluated again at its instants."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places
+from rom.mbs.elements.laws import LAWS_FAMILY
+from rom.mbs.equations.equations import element_energy, evaluate
+from rom.mbs.equations.python_laws import apply_laws
+from rom.mbs.kernels.compiled import copy, inner, kernel
+from rom.mbs.kernels.element_calls import residuals
+from rom.mbs.kernels.system import ALONG
+from rom.mbs.kernels.work import workspace
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.joints import Row
+from rom.mbs.parts.signals import sample_all
+from rom.mbs.results.interface_loads import at_instants
+from rom.mbs.results.law_record import law_record
+from rom.model import Array, Index
+from rom.names import offered
+
+
+@dataclass(frozen=True)
+class ElementRecord:
+    """One spring, motor, contact, load or other force element over time.
+
+    Attributes:
+        t: (n_t,) times [s].
+        markers: the K markers it acts on; of an element on a joint, those of the joint.
+        force, moment: (n_t, K, 3) on each of them, about it, world [N, N m].
+        along: (n_t,) of an element on a joint, the torque [N m] or force [N] along its coordinate;
+            of one between two markers, the force with which it pulls them together [N]; None for
+            others.
+        along_unit: "N m" along an angle, else "N".
+        on_joint: whether it acts along the coordinate of a joint.
+        energy: (n_t,) stored [J].
+        lost: (n_t,) power turned into heat [W].
+    """
+
+    t: Array
+    markers: tuple[Marker, ...]
+    force: Array
+    moment: Array
+    along: Array | None
+    along_unit: str
+    on_joint: bool
+    energy: Array
+    lost: Array
+
+
+def element_record(solution: Any, name: str) -> ElementRecord:
+    """Evaluate one element along a motion.
+
+    Raises:
+        ConfigError: if there is no such element, or it acts on no markers.
+    """
+    mechanism = solution.mechanism
+    if name not in mechanism.elements:
+        raise ConfigError(f"no element {name!r}; there are {offered(mechanism.elements, name)}.")
+    family, element = mechanism.elements[name]
+    markers = markers_of(mechanism, family, element)
+    if not markers:
+        raise ConfigError(
+            f"{name!r} of the {family.name} acts on whole bodies, not on markers.",
+            hint="interface_loads has what acts on the interfaces of a body.",
+        )
+    rows = np.array([solution.packed.row(marker) for marker in markers])
+    if family is not LAWS_FAMILY:
+        return _alone(solution, name, markers, rows)
+    law = law_record(solution, name)
+    along = pull(np.array([W.P[rows] for W in at_instants(solution)]), law.force)
+    forces = law.force, law.moment, along, "N", False
+    return ElementRecord(solution.t, markers, *forces, law.energy, law.lost)
+
+
+def markers_of(mechanism: Any, family: Family, element: Any) -> tuple[Marker, ...]:
+    """The markers an element acts on, its own or those of its joint."""
+    joint = mechanism.joints.get(getattr(element, "joint", None))
+    return tuple(family.ends(element)) or (() if joint is None else tuple(joint.markers))
+
+
+def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -> ElementRecord:
+    """The element as the only one of its mechanism, in the motion of the whole."""
+    packed, places = solution.packed, solution.packed.places.copy()
+    family, element = solution.mechanism.elements[name]
+    table = family.pack({name: element}, places)
+    asked = tuple(family.asked({name: element}, table, len(places.coordinates)))
+    system = packed.system.replace(elements=np.array([family.row(table)], dtype=np.int64))
+    W = workspace(system, len(places.signals))
+    signals = np.concatenate([solution.signals, _sampled(solution, places)], axis=1)
+    row = coordinate_row(solution.mechanism, element)
+    c = -1 if row is None else places.coordinate(element.joint, row)
+    n = solution.t.size
+    found = ElementTracks(*(np.zeros(x) for x in ((n, rows.size, 6), (n, rows.size, 3), (n, 3))))
+    motion = (solution.q, solution.v, solution.lam, solution.base, signals)
+    for k in range(n) if asked else ():
+        answered = tuple(x[k : k + 1] for x in motion)
+        W.signal[:], W.base[:] = signals[k], solution.base[k]
+        evaluate(system, W, solution.q[k], solution.v[k])
+        apply_laws(asked, W, float(solution.t[k]))
+        track_element(system, W, answered, rows, c, ElementTracks(*(x[k : k + 1] for x in found)))
+    if not asked:
+        track_element(system, W, motion, rows, c, found)
+    force, moment = found.wrench[..., :3], found.wrench[..., 3:]
+    energy, lost, along = found.scalars.T
+    if row is None:
+        forces = force, moment, pull(found.position, force), "N", False
+    else:
+        forces = force, moment, along, "N" if row.kind == ALONG else "N m", True
+    return ElementRecord(solution.t, markers, *forces, energy, lost)
+
+
+class ElementTracks(NamedTuple):
+    """One row per instant.
+
+    Attributes:
+        wrench: (n_t, K, 6) on the markers of the element.
+        position: (n_t, K, 3) of them.
+        scalars: (n_t, 3) stored energy, power lost, force along the joint coordinate.
+    """
+
+    wrench: Array
+    position: Array
+    scalars: Array
+
+
+@kernel
+def track_element(s, W, motion, rows, c, out):
+    """Fill the tracks of a system of one element, which acts along coordinate c if there is one."""
+    Q, V, L, base, signals = motion
+    for k in range(Q.shape[0]):
+        copy(signals[k], W.signal)
+        copy(base[k], W.base)
+        evaluate(s, W, Q[k], V[k])
+        W.wrench[:] = 0.0
+        W.power[:] = 0.0
+        W.driven[0] = 0.0
+        for e in range(s.elements.shape[0]):
+            residuals(s, e, W, Q[k], V[k], L[k])
+        out.scalars[k, 0] = element_energy(s, W, Q[k], V[k])
+        out.scalars[k, 1] = W.power[2]
+        for m in range(rows.size):
+            copy(W.wrench[rows[m]], out.wrench[k, m])
+            copy(W.P[rows[m]], out.position[k, m])
+        if c >= 0:
+            out.scalars[k, 2] = along_coordinate(out.wrench[k], W.xg[c])
+
+
+@inner
+def along_coordinate(wrench, gradient):
+    """The generalised force of wrenches (2, 6), which are its multiples of the gradient (12,)."""
+    force, size = 0.0, 0.0
+    for side in range(2):
+        for p in range(6):
+            force += wrench[side, p] * gradient[6 * side + p]
+            size += gradient[6 * side + p] ** 2
+    return force / size
+
+
+def _sampled(solution: Any, places: Places) -> Array:
+    """(n_t, s, 3) the functions of time that were asked for once more."""
+    t, new = solution.t, tuple(places.signals[len(solution.packed.signals) :])
+    span = (float(t.min()), float(t.max()))
+    spacing = 0.01 * (span[1] - span[0]) / max(t.size - 1, 1)
+    return sample_all(new, t, span, spacing)
+
+
+def coordinate_row(mechanism: Any, element: Any) -> Row | None:
+    """The joint coordinate an element acts along, if it is one on a joint."""
+    joint = mechanism.joints.get(getattr(element, "joint", None))
+    return None if joint is None else getattr(element, "row", joint.turn)
+
+
+def pull(position: Array, force: Array) -> Array | None:
+    """(n_t,) part of the forces (n_t, 2, 3) that pulls two markers together; None for others."""
+    if position.shape[1] != 2:
+        return None
+    gap = position[:, 1] - position[:, 0]
+    length = np.linalg.norm(gap, axis=1)
+    e = gap / np.where(length > 0, length, 1.0)[:, None]
+    found: Array = 0.5 * ((force[:, 0] - force[:, 1]) * e).sum(axis=1)
+    return found

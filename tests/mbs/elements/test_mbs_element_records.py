@@ -1,0 +1,141 @@
+"""Forces of single elements along a motion: by their own laws, and all of them by what moves."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from rom.components import cosserat
+from rom.errors import ConfigError
+from rom.mbs.elements.contact.impact import Impact
+
+STIFFNESS, DAMPING, LOAD, LEVEL, MU = 100.0, 3.0, 1.0, 0.5, 0.1
+X_AXIS, Z_AXIS = (1, 0, 0), (0, 0, 1)
+
+
+def slipping(t, parameters, motion, memory, out):
+    """A spring of 40 N/m that slips at 3 N."""
+    pull = 40.0 * (motion.position[1, 0] - motion.position[0, 0] - 1.0 - memory[0])
+    if abs(pull) > 3.0:
+        out.memory[0] = memory[0] + np.sign(pull) * (abs(pull) - 3.0) / 40.0
+        pull = np.sign(pull) * 3.0
+    out.force[0, 0], out.force[1, 0] = pull, -pull
+    out.energy[0] = pull**2 / 80.0
+
+
+def slide():
+    """A block on a guide along x between springs, under loads of all kinds."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    block = mech.add_rigid("block", mass=2.0, inertia=(1, 1, 1), at=(0, 0, 0), velocity=X_AXIS,
+                           markers={"hook": (0, 0, 0)})  # fmt: skip
+    wall, hook = mech.ground.marker((-1, 0, 0)), block.marker("hook")
+    mech.prismatic("guide", wall, hook, axis=X_AXIS)
+    mech.spring_damper("spring", wall, hook, stiffness=STIFFNESS, damping=DAMPING)
+    mech.spring_damper("other", mech.ground.marker((2, 0, 0)), hook, stiffness=50.0)
+    mech.motor("motor", "guide", lambda t, x, rate: -5 * np.sin(3 * t) - rate)
+    mech.motor("asked", "guide", lambda t, x, rate: -float(str(x)), compiled=False)
+    mech.force("load", hook, lambda t: np.array([np.cos(5 * t), LOAD, 0]))
+    mech.friction("friction", "guide", transition_speed=1e-2, coulomb=LEVEL, mu=MU)
+    mech.stop("stop", "guide", Impact(stiffness=1e4, exponent=1.0), upper=0.02)
+    mech.law("slipping", slipping, wall, hook, memory=[0.0], energy=True)
+    mech.user_force("pushed", lambda t, a: (np.array([0, 0, 2.0]), np.zeros(3)), hook)
+    return mech
+
+
+@pytest.fixture(scope="module")
+def slid():
+    return rom.simulate(slide(), t_end=0.5, dt=5e-4)
+
+
+def test_each_element_by_its_own_law(slid):
+    x, v = slid.position("block")[:, 0], slid.velocity("block")[:, 0]
+    spring = slid.element("spring")
+    assert_allclose(spring.along, STIFFNESS * x + DAMPING * v, atol=1e-12)
+    assert_allclose(spring.force[:, 1, 0], -spring.along, atol=1e-12)
+    assert_allclose(spring.energy, STIFFNESS * x**2 / 2, atol=1e-12)
+    assert_allclose(spring.lost, DAMPING * v**2, atol=1e-12)
+    assert_allclose(slid.element("other").along, -50.0 * x, atol=1e-12)  # it grows shorter
+    assert_allclose(slid.element("motor").along, -5 * np.sin(3 * slid.t) - v, atol=1e-12)
+    assert_allclose(slid.element("asked").along, -x, atol=1e-12)
+    assert_allclose(slid.element("load").force[:, 0, 0], np.cos(5 * slid.t), rtol=1e-14)
+    assert slid.element("load").along is None
+    pressed = np.hypot(LOAD, 2.0)  # across the guide
+    fast = np.abs(v) > 1.0 / 10
+    level = LEVEL + MU * pressed
+    friction = slid.element("friction")
+    assert fast.sum() > 100
+    assert_allclose(friction.along[fast], -level * np.sign(v[fast]), rtol=1e-3)
+    assert_allclose(friction.lost, -friction.along * v, atol=1e-12)
+    beyond = np.maximum(x - 0.02, 0.0)
+    stop = slid.element("stop")
+    assert stop.along.min() < -10.0
+    assert_allclose(stop.along, -1e4 * beyond, atol=1e-9)
+    assert_allclose(stop.energy, 1e4 * beyond**2 / 2, atol=1e-9)
+    assert (stop.on_joint, stop.along_unit) == (True, "N")
+
+
+def test_what_a_law_remembers_is_in_its_forces(slid):
+    found, own = slid.element("slipping"), slid.law("slipping")
+    assert_allclose(found.along, own.force[:, 0, 0], atol=1e-12)
+    assert np.abs(np.diff(own.memory[:, 0])).max() > 0
+
+
+def test_together_they_are_what_acts_on_the_block(slid):
+    """With what the guide transmits; and that is mass times acceleration."""
+    total = slid.reaction("guide")[:, :3].copy()
+    for name in slid.elements:
+        found = slid.element(name)
+        total += sum(
+            found.force[:, k] for k, marker in enumerate(found.markers) if marker.body == "block"
+        )
+    assert_allclose(total, slid.interface_loads("block")["hook"][:, :3], atol=1e-9)
+    assert set(slid.elements) == set(slide().elements)
+
+
+def test_energies_and_losses_add_up(slid):
+    energy = sum(slid.element(name).energy for name in slid.elements)
+    assert_allclose(energy, slid.energy.strain, atol=1e-9)
+    lost = sum(slid.element(name).lost for name in slid.elements)
+    spent = np.concatenate([[0], np.cumsum(0.5 * np.diff(slid.t) * (lost[1:] + lost[:-1]))])
+    assert_allclose(spent, slid.energy.damping, atol=2e-3 * slid.energy.damping[-1])
+
+
+def test_torques_about_joints_and_between_bodies():
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0.4, 0, 0),
+                         markers={"eye": (-0.4, 0, 0)})  # fmt: skip
+    eye, foot = bob.marker("eye"), mech.ground.marker((0, 0, 0))
+    mech.revolute("hinge", foot, eye, axis=Z_AXIS)
+    mech.rotational_spring("turn", "hinge", stiffness=7.0, damping=0.2, free_angle=0.1)
+    mech.bushing("bushing", foot, eye, stiffness=(1e3,) * 3 + (2.0,) * 3, damping=(0,) * 6)
+    sol = rom.simulate(mech, t_end=0.3, dt=1e-3)
+    joint, turn = sol.joint("hinge"), sol.element("turn")
+    torque = -7.0 * (joint.angle - 0.1) - 0.2 * joint.angle_rate
+    assert_allclose(turn.along, torque, atol=1e-10)
+    assert_allclose(turn.moment[:, 1, 2], torque, atol=1e-10)
+    assert_allclose(turn.moment[:, 0, 2], -torque, atol=1e-10)
+    assert turn.along_unit == "N m"
+    assert_allclose(sol.element("bushing").moment[:, 1, 2], -2.0 * joint.angle, rtol=1e-2, atol=0.02)
+    table = sol.to_pandas() if rom_has_pandas() else None
+    if table is not None:
+        assert_allclose(table["turn along [N m]"], torque, atol=1e-10)
+
+
+def rom_has_pandas():
+    from importlib.util import find_spec
+
+    return find_spec("pandas") is not None
+
+
+def test_what_has_no_markers_is_refused():
+    section = {"stretch": 1e6, "bend": 50.0, "mass": 0.1, "inertia": (1e-4, 1e-4, 2e-4)}
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    rod = mech.add_nonlinear("rod", cosserat.body(cosserat.straight(1.0, 4, **section)))
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech.force("push", rod.marker("end"), (0.05, 0, 0))
+    sol = rom.simulate(mech, t_end=2e-3, dt=1e-3)
+    assert sol.elements == ("push",)
+    with pytest.raises(ConfigError, match=r"'rod' .* acts on whole bodies, not on markers"):
+        sol.element("rod")
+    with pytest.raises(ConfigError, match=r"no element 'pull'; there are \['push', 'rod'\]"):
+        sol.element("pull")
