@@ -205,9 +205,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         connection = connect(ops, model, method.kinds(connection, interfaces))
         method = method.method
         say("full interfaces follow %d coordinates", connection.boundary.size)
-    method = judged_in(method, tuple(connection.parts.values()))
+    chosen = judged_in(method, tuple(connection.parts.values()))
     with _on_interfaces(interfaces):
-        basis = method.basis(connection.ops, connection.boundary, connection.labels)
+        basis = chosen.basis(connection.ops, connection.boundary, connection.labels)
     Psi = connection.ops.expand(basis.Psi)
     elastic = elastic_part(ops, Psi)
 

@@ -433,7 +433,7 @@ def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, option
     [
         ("--method", "guyan", "-m", 3),
         ("--method", "rubin", "--f-max", 10),
-        ("--tol", 1e-3),
+        ("--tol", 1e-3, "-m", 4),
         ("--at", 5),
         ("--characteristic", 8),
     ],

@@ -44,6 +44,50 @@ def test_band_and_tolerance_are_met_with_few_modes(size, cells, count, tol):
     assert worst_error(model, exact, int(n / 1.5) - 1) > tol
 
 
+ALL_KINDS = [KINDS, {"root": "rbe3", "tip": "rbe2"}, {"root": "rbe2"}, {"root": "full"},
+             {"root": "rbe2", "tip": "polynomial:2"}]  # fmt: skip
+
+
+def errors_in_all_supports(model, kinds, method):
+    """Of the lowest six elastic frequencies, {support: (6,)}; missing ones are wrong by one."""
+    body = rom.reduce(model, method=method, interfaces=kinds, certify=False)
+    found = {}
+    for fixed in ((), *((name,) for name in kinds)):
+        rigid = 0 if fixed else 6
+        exact = rom.modes(model, rigid + 6, fixed=fixed, interfaces=kinds).frequencies[rigid:]
+        reduced = np.full(6, 2 * exact)
+        few = body.frequencies(fixed=fixed)[rigid:][:6]
+        reduced[: few.size] = few
+        found[fixed] = np.abs(reduced / exact - 1)
+    return found, body.n_modes
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("kinds", ALL_KINDS, ids=str)
+@pytest.mark.parametrize(("size", "cells"), BODIES[::3])
+def test_without_a_number_the_frequencies_of_every_support_are_accurate(size, cells, kinds):
+    """To half the limit of certificates; half of the modes would not do."""
+    model = block(size=size, cells=cells)
+    errors, n = errors_in_all_supports(model, kinds, rom.CraigBampton())
+    assert max(e.max() for e in errors.values()) <= 5e-4
+    one = rom.reduce(model, method=rom.CraigBampton(1), interfaces=kinds, certify=False)
+    half = (n - one.n_modes) // 2
+    fewer, _ = errors_in_all_supports(model, kinds, rom.CraigBampton(half))
+    assert max(e.max() for e in fewer.values()) > 5e-4
+
+
+def test_the_default_passes_its_certificate():
+    """Also with gravity shapes around it, and with another tolerance."""
+    model = block(size=(1.0, 0.3, 0.05), cells=(10, 4, 2))
+    body = rom.reduce(model, interfaces=KINDS)
+    assert body.certificate.ok, body.certificate
+    loaded = rom.reduce(model, method=rom.WithLoads(rom.CraigBampton()), interfaces=KINDS)
+    assert loaded.certificate.ok and loaded.n_modes > body.n_modes
+    finer = rom.reduce(model, method=rom.CraigBampton(tol=1e-5), interfaces=KINDS, certify=False)
+    assert finer.n_modes > body.n_modes
+    assert not rom.reduce(model, method=rom.CraigBampton(1), interfaces=KINDS).certificate.ok
+
+
 @pytest.mark.fenicsx
 def test_the_selection_works_on_meshes_too():
     """PETSc operators, rbe3 and orthogonal functions as interfaces."""
@@ -82,8 +126,9 @@ def test_the_order_is_chosen_on_meshes_too():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"tol": 1e-3}, "either n_modes or f_max"),
-        ({"n_modes": 3, "tol": 1e-3}, "needs f_max"),
+        ({"n_modes": 3, "f_max": 1e3}, "n_modes or f_max, not both"),
+        ({"n_modes": 3, "tol": 1e-3}, "in place of n_modes"),
+        ({"tol": 1.0}, "tol = 1.0"),
         ({"f_max": 1e3, "tol": 0.0}, "tol = 0.0"),
         ({"f_max": 1e3, "tol": 1.0}, "tol = 1.0"),
         ({"f_max": 1e3, "tol": float("nan")}, "tol = nan"),

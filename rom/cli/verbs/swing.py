@@ -18,7 +18,7 @@ from rom.cli.answer import Answer, failures, report_data
 from rom.cli.options import add_geometry, count, positive, reading, vector
 from rom.cli.output import add_force, checked, claim
 from rom.errors import ConfigError
-from rom.names import inside
+from rom.names import inside, is_whole
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -103,7 +103,7 @@ def _files(args: argparse.Namespace) -> dict[str, Path]:
 
 def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
     """Name of the interface, and the face to pick for it if it has none."""
-    if text.isdecimal():
+    if is_whole(text):
         return "hinge", {"hinge": int(text)}
     if "," not in text:
         return text, {}

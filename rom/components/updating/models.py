@@ -139,8 +139,8 @@ class Measurement:
         for sensor, exciter in np.argwhere((level < DEAD_RATIO * level.max()) & trusted):
             raise ConfigError(
                 f"under exciter {exciter} sensor {sensor} moves by "
-                f"{level[sensor, exciter] / level.max():.1e} of the largest response: a dead channel, "
-                "kept at rest by symmetry or a support.",
+                f"{level[sensor, exciter] / level.max():.1e} of the largest response: a dead "
+                "channel, kept at rest by symmetry or a support.",
                 hint="Give it the weight 0 there, or leave it out.",
             )
 

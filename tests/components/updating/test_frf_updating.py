@@ -386,7 +386,7 @@ def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
     omega, inputs = 2 * np.pi * np.linspace(4, 62, 150), (0, 3)
     exact, start = responses(model, true, zeta, omega, inputs), (np.zeros(2), zeta)
     measured = data.noisy(exact, 0.02, np.random.default_rng(5))
-    with pytest.raises(ConfigError, match="under exciter 1 sensor 4 moves by .* a dead channel"):
+    with pytest.raises(ConfigError, match=r"under exciter 1 sensor 4 moves by .* a dead channel"):
         Measurement(omega, measured, inputs)
     weights = np.ones(exact.shape)
     weights[:, 4, 1] = 0.0  # tail up and down, fuselage pushed sideways: at rest by symmetry

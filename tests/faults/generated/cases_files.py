@@ -163,7 +163,7 @@ COMPONENT = {  # the same of part.toml
     "an unknown frame": ('reference = "root"', 'reference = "rot"', "rot"),
     "an unknown method": ("modes = 4", 'method = "craig"', "craig"),
     "two ways to choose modes": ("modes = 4", "modes = 4\nf_max = 100.0", "f_max"),
-    "a tolerance alone": ("modes = 4", "tol = 0.1", "tol"),
+    "a tolerance and a number": ("modes = 4", "modes = 4\ntol = 0.1", "tol"),
     "two dampings": ("ratio = 0.01", "ratio = 0.01\nalpha = 1", ("ratio", "damping")),
     "a negative ratio": ("ratio = 0.01", "ratio = -0.01", "ratio"),
     "a ratio with a unit": ("ratio = 0.01", 'ratio = "1 Hz"', "ratio"),
