@@ -35,7 +35,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "units": {"errors"},
     "rotation": {"errors"},
     "eigen": {"model", "errors"},
-    "reduction": {"model", "eigen", "errors"},
+    "reduction": {"model", "rows", "eigen", "errors"},
     "cyclic": {"model", "rows", "eigen", "rotation", "reduction", "errors"},
     "body": {"model", "eigen", "rotation", "notebook", "units", "errors"},
     "assembly": {"model", "rows", "eigen", "body", "reduction", "errors"},
