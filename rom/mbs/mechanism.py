@@ -111,6 +111,9 @@ class Mechanism:
     Args:
         gravity: (3,) acceleration of gravity [m/s^2].
 
+    Raises:
+        ConfigError: if gravity is not three finite numbers.
+
     Warns:
         RomWarning: for numbers legal but strange: gravity beyond that of all planets, an inertia
             far too large for the markers, stiffness or damping below zero.
@@ -206,7 +209,7 @@ class Mechanism:
             mass: mass [kg].
             inertia: (3,) or (3, 3) about the mass centre, body frame [kg m^2].
             at: (3,) mass centre at the start, world [m].
-            orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+            orientation: (3, 3) matrix or (4,) quaternion [1], body to world; None for parallel.
             markers: {name: (3,) point from the mass centre, body frame [m]}.
             velocity: (3,) of the mass centre, world [m/s].
             omega: (3,) angular velocity, body frame [rad/s].
@@ -242,11 +245,12 @@ class Mechanism:
             body: a ``FlexibleBody`` with r elastic coordinates; one of other units is converted
                 to SI, in which a mechanism is.
             at: (3,) origin of its frame at the start, world [m].
-            orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+            orientation: (3, 3) matrix or (4,) quaternion [1], body to world; None for parallel.
             velocity: (3,) of the origin, world [m/s].
             omega: (3,) angular velocity of the frame, body frame [rad/s].
-            q: (r,) elastic coordinates at the start; None for undeformed.
-            qd: (r,) their rates.
+            q: (r,) elastic coordinates at the start, in the units of the body's shapes; None for
+                undeformed.
+            qd: (r,) their rates, in the units of q per second.
 
         Raises:
             ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
@@ -302,6 +306,9 @@ class Mechanism:
                 step are not seen.
             direction: 1 counts rising values only, -1 falling ones, 0 both.
             terminal: end the run there.
+
+        Raises:
+            ConfigError: for a name in use or another direction.
         """
         self.check_new(name)
         if direction not in (-1, 0, 1):
@@ -309,7 +316,11 @@ class Mechanism:
         self.events[name] = Event(function, int(direction), bool(terminal))
 
     def design_point(self, marker: Marker) -> Array:
-        """(3,) position of a marker where its body was added, undeformed [m]."""
+        """(3,) position of a marker where its body was added, undeformed [m].
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         part = self.part(marker.body)
         return part.at + rotation.matrix(part.p) @ part.point(marker)
 

@@ -26,8 +26,9 @@ class Campbell:
     Attributes:
         speeds: (s,) [rad/s].
         eigenvalues: (s, m) [rad/s]; a column follows one mode.
-        mac: (s - 1, m) likeness of its shapes at neighbouring speeds, 1 for the same shape; below
-            a half the speeds are too far apart to be sure of it, or two modes share a frequency.
+        mac: (s - 1, m) likeness of its shapes at neighbouring speeds, 1 for the same shape [1];
+            below a half the speeds are too far apart to be sure of it, or two modes share a
+            frequency.
     """
 
     speeds: Array
@@ -41,7 +42,7 @@ class Campbell:
 
     @property
     def damping_ratios(self) -> Array:
-        """(s, m) share of critical damping; negative where a motion grows."""
+        """(s, m) share of critical damping [1]; negative where a motion grows."""
         size = np.abs(self.eigenvalues)
         return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
 
@@ -80,7 +81,7 @@ def campbell(
             turns freely, for then nothing holds it at speed zero.
         n: number of modes to keep, lowest at the first speed first; None for all. Motions that
             are free at all speeds are left out.
-        axis: (3,) axis of the rotation of a mechanism as a whole, world.
+        axis: (3,) axis of the rotation of a mechanism as a whole, world [1].
         about: (3,) a point on it [m].
         frame: axes for small motions, see `linearize`: "world" for rotors in bearings.
 

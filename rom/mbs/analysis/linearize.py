@@ -41,13 +41,15 @@ class Linearization:
     Attributes:
         state: where.
         M, C, K: (f, f) mass, damping with gyroscopic terms, stiffness with geometric and
-            centrifugal terms, for the coordinates y of the free motions; M is the unit matrix.
+            centrifugal terms, for the coordinates y of the free motions; M is the unit matrix [1],
+            so that C is [1/s] and K [1/s^2].
         basis: (n, f) variation of all coordinates, counted as in `State.v`, per y.
-        test: (n, f) virtual motions that project forces; the basis unless there is friction.
-        round_off: share of the highest frequency below which others count as zero.
-        scale: (n,) small motion of each coordinate, as many rad as sizes of the mechanism.
+        test: (n, f) virtual motions that project forces, in units of the basis; the basis unless
+            there is friction.
+        round_off: share of the highest frequency below which others count as zero [1].
+        scale: (n,) small motion of each coordinate [m, rad], as many rad as sizes of the mechanism.
         packed: the arrays of the mechanism.
-        H: (k, 6, 6 + R) twist of all markers per velocity of their body.
+        H: (k, 6, 6 + R) twist of all markers per velocity of their body [1, m, 1/m].
     """
 
     state: State
@@ -81,7 +83,7 @@ class Linearization:
 
     @property
     def damping_ratios(self) -> Array:
-        """(f,) share of critical damping, negative where a motion grows; 0 for free motions."""
+        """(f,) share of critical damping [1], negative where a motion grows; 0 for free motions."""
         size = np.abs(self.eigenvalues)
         return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
 
@@ -96,7 +98,7 @@ class Linearization:
 
     @property
     def vectors(self) -> Array:
-        """(f, f) modes in the coordinates y."""
+        """(f, f) modes in the coordinates y, in units of these."""
         return self._modes[1]
 
     @property
@@ -106,11 +108,21 @@ class Linearization:
         return bool(every.real.max(initial=0.0) <= self.round_off * np.abs(every).max(initial=0.0))
 
     def motion(self, marker: Marker) -> Array:
-        """(6, f) small translation and rotation of a marker, in the world, per coordinate y."""
+        """(6, f) small translation [m] and rotation [rad] of a marker in the world, per coordinate.
+
+        The coordinates are y, those of the free motions.
+
+        Raises:
+            ConfigError: if the marker is not one of the mechanism.
+        """
         return self.jacobian(marker) @ self.basis
 
     def jacobian(self, marker: Marker) -> Array:
-        """(6, n) small translation and rotation of a marker, in the world, per coordinate."""
+        """(6, n) small translation [m] and rotation [rad] of a marker in the world, per coordinate.
+
+        Raises:
+            ConfigError: if the marker is not one of the mechanism.
+        """
         packed = self.packed
         if marker not in packed.markers:
             raise ConfigError(

@@ -33,7 +33,7 @@ class Sensitivity:
         names: the k parameters.
         value: (...) the result.
         derivative: (..., k) its derivatives, unit of the result per unit of the parameter.
-        error: (k,) estimated error of the derivatives relative to their size; zeros where they
+        error: (k,) estimated error of the derivatives relative to their size [1]; zeros where they
             follow from equations at the solution.
     """
 
@@ -84,7 +84,7 @@ def equilibrium_sensitivity(
     Args:
         build: function of the parameters by name that returns the mechanism, always with the same
             bodies and joints.
-        parameters: {name: value}.
+        parameters: {name: value}, each in its own unit.
         output: function of a mechanism and a state; returns a number or an array.
         options: of `equilibrium`.
 
@@ -116,7 +116,7 @@ def frequency_sensitivity(
 
     Args:
         build: as in `equilibrium_sensitivity`.
-        parameters: {name: value}.
+        parameters: {name: value}, each in its own unit.
         options: of `equilibrium`.
 
     Returns:
@@ -153,7 +153,7 @@ def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, floa
     Args:
         result: function of the parameters by name that returns a number or an array, for example
             ``lambda length: rom.simulate(pendulum(length), ...).position("bob")[-1]``.
-        parameters: {name: value}.
+        parameters: {name: value}, each in its own unit.
 
     Raises:
         ConfigError: for wrong parameters, or results of different shape.

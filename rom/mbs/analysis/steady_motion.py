@@ -37,7 +37,7 @@ class SteadyMotion:
         state: the motion.
         eigenvalues: (k,) s [rad/s] of the equations of first order, ascending in size; k counts the
             free positions and the free velocities. Zeros belong to neighbouring steady motions.
-        rate: speed of the mechanism in radians, or in its sizes, per second.
+        rate: speed of the mechanism in radians, or in its sizes, per second [1/s].
     """
 
     state: State

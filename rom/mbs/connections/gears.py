@@ -29,7 +29,7 @@ def gear(
             ``joint2``.
         joint1: driving joint.
         joint2: driven joint.
-        ratio: d(coordinate 2) / d(coordinate 1).
+        ratio: d(coordinate 2) / d(coordinate 1) [1, m/rad or rad/m].
         coordinate1: "angle" or "displacement"; None for the only or the first one.
         coordinate2: likewise of ``joint2``.
 

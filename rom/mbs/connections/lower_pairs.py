@@ -14,7 +14,18 @@ FULL_TURN = 2 * np.pi
 
 
 def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-    """Hinge about ``axis`` (3,), world at the start; five constraints."""
+    """Hinge about an axis; five constraints.
+
+    Args:
+        name: name of the joint.
+        m1: one side.
+        m2: other side; the joint angle is its rotation against the first.
+        axis: (3,) direction, world at the start [1].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("axis", axis))
     rows, angle = (*coincidence(), t.normal(0, 2), t.normal(1, 2)), t.angle()
@@ -22,7 +33,18 @@ def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayL
 
 
 def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-    """Rotation about and sliding along ``axis`` (3,), world at the start; four constraints."""
+    """Rotation about and sliding along an axis; four constraints.
+
+    Args:
+        name: name of the joint.
+        m1: one side.
+        m2: other side.
+        axis: (3,) direction, world at the start [1].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     rows, angle, displacement = _coaxial(ends, ends.direction("axis", axis))
     enter(self, Joint(name, "cylindrical", ends.markers, rows, angle, angle, displacement))
@@ -38,9 +60,21 @@ def _coaxial(ends: Ends, axis: Array) -> tuple[tuple[Row, ...], Row, Row]:
 def screw(
     self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike, pitch: float
 ) -> None:
-    """Cylindrical joint that advances by ``pitch`` [m] per turn; five constraints.
+    """Cylindrical joint that advances as it turns; five constraints.
 
-    A positive pitch is a right-hand thread: a right-hand turn about ``axis`` advances along it.
+    A positive pitch is a right-hand thread: a right-hand turn about the axis advances along it.
+
+    Args:
+        name: name of the joint.
+        m1: one side.
+        m2: other side.
+        axis: (3,) direction, world at the start [1].
+        pitch: advance per turn [m].
+
+    Raises:
+        ConfigError: for a pitch of zero, a name in use, an unknown marker, one body twice, or no
+            direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     pitch = not_zero("pitch", pitch)
     ends = ends_of(self, name, m1, m2)
@@ -52,7 +86,18 @@ def screw(
 
 
 def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-    """Sliding along ``axis`` (3,), world at the start; five constraints."""
+    """Sliding along an axis; five constraints.
+
+    Args:
+        name: name of the joint.
+        m1: one side.
+        m2: other side.
+        axis: (3,) direction, world at the start [1].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("axis", axis))
     displacement = t.along(2, ends.gap_of_first)
@@ -62,12 +107,27 @@ def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.Array
 
 
 def spherical(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
-    """Ball joint; three constraints."""
+    """Ball joint; three constraints.
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, or one body twice.
+    """
     enter(self, Joint(name, "spherical", ends_of(self, name, m1, m2).markers, coincidence()))
 
 
 def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike) -> None:
-    """Sliding in a plane of ``normal`` (3,) through m1, turning about it; three constraints."""
+    """Sliding in a plane through m1, turning about its normal; three constraints.
+
+    Args:
+        name: name of the joint.
+        m1: point of the plane.
+        m2: what slides.
+        normal: (3,) of the plane, world at the start [1].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("normal", normal))
     rows, angle = (t.along(2, NO_VECTOR), t.normal(0, 2), t.normal(1, 2)), t.angle()
@@ -75,7 +135,12 @@ def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayL
 
 
 def fixed(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
-    """Weld; six constraints."""
+    """Weld; six constraints.
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, or one body twice.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(np.array([0.0, 0.0, 1.0]))
     rows = (*coincidence(), t.normal(0, 1), t.normal(1, 2), t.normal(2, 0))

@@ -13,7 +13,18 @@ from rom.mbs.parts.whole import Whole
 
 
 def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
-    """The point m2 slides on a line along ``axis`` (3,) through m1; two constraints."""
+    """The point m2 slides on a line through m1; two constraints.
+
+    Args:
+        name: name of the joint.
+        m1: point of the line, which its body carries.
+        m2: what slides.
+        axis: (3,) direction of the line, world at the start [1].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("axis", axis))
     rows, displacement = (
@@ -26,7 +37,18 @@ def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.A
 def point_on_plane(
     self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike
 ) -> None:
-    """The point m2 slides in the plane of ``normal`` (3,) through m1; one constraint."""
+    """The point m2 slides in a plane through m1; one constraint.
+
+    Args:
+        name: name of the joint.
+        m1: point of the plane, which its body carries.
+        m2: what slides.
+        normal: (3,) of the plane, world at the start [1].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("normal", normal))
     enter(self, Joint(name, "point on plane", ends.markers, (t.along(2, NO_VECTOR),)))

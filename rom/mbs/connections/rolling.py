@@ -32,12 +32,13 @@ def rolling(
         name: name of the joint.
         m1: point of the plane.
         m2: centre of the ball or wheel.
-        normal: (3,) of the plane towards the centre, world at the start.
+        normal: (3,) of the plane towards the centre, world at the start [1].
         radius: [m].
-        axis: (3,) axis of a wheel, world at the start; None for a ball.
+        axis: (3,) axis of a wheel, world at the start [1]; None for a ball.
 
     Raises:
         ConfigError: if the wheel lies flat on the plane.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     radius = positive("radius", radius)
     ends = ends_of(self, name, m1, m2)

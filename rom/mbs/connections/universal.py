@@ -21,10 +21,19 @@ def universal(
     axis1: npt.ArrayLike,
     axis2: npt.ArrayLike,
 ) -> None:
-    """Cardan joint: ``axis1`` on m1 stays perpendicular to ``axis2`` on m2; four constraints.
+    """Cardan joint: one axis on m1 stays perpendicular to another on m2; four constraints.
+
+    Args:
+        name: name of the joint.
+        m1: one side.
+        m2: other side.
+        axis1: (3,) direction fixed to the first body, world at the start [1].
+        axis2: (3,) direction fixed to the second body, world at the start [1].
 
     Raises:
-        ConfigError: if the axes are not perpendicular at the start.
+        ConfigError: if the axes are not perpendicular at the start; for a name in use, an unknown
+            marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
     ends = ends_of(self, name, m1, m2)
     one, two = ends.direction("axis1", axis1), ends.direction("axis2", axis2)

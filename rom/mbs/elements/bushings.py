@@ -76,8 +76,9 @@ def bushing(  # noqa: PLR0913  one keyword per property
         m2: other marker; turned by less than half a turn against the first.
         stiffness: (6,) or symmetric (6, 6) [N/m, N/rad; N m/m, N m/rad], translations first,
             then rotations (vector of the rotation).
-        damping: likewise, times the rates; None for none.
-        axes: (3, 3) or quaternion, axes of the bushing to world at the start; None: world.
+        damping: (6,) or symmetric (6, 6) likewise, times the rates [N s/m, N s/rad; N m s/m, N m
+            s/rad]; None for none.
+        axes: (3, 3) matrix or (4,) quaternion [1], bushing to world at the start; None: world.
         curves: {"x": (displacements, forces), ..., "rz": (angles, moments)} added to the
             stiffness: monotone cubic between ascending points, straight beyond them.
 

@@ -58,7 +58,12 @@ def always(_: Table) -> bool:
 
 
 def pairs(table: Any, body: Index) -> Iterable[Sequence[int]]:
-    """Bodies of the markers i and j of each element."""
+    """(e, 2) bodies of the markers i and j of each of e elements.
+
+    Args:
+        table: the elements.
+        body: (m,) body of every marker.
+    """
     return np.column_stack([body[table.i], body[table.j]])
 
 
@@ -68,7 +73,7 @@ def apart(_table: Any, _body: Index) -> Iterable[Sequence[int]]:
 
 
 def no_rows(_: Table) -> Index:
-    """The forces do not depend on what joints transmit."""
+    """(0,) constraint rows: the forces do not depend on what joints transmit."""
     return NO_ROWS
 
 
@@ -105,7 +110,7 @@ class Places:
         signals: functions of time so far.
         coordinates: markers and row of each joint coordinate that something acts on.
         time: number of the one that tells the time, -1 for none.
-        remembered: numbers that laws remember, at the start.
+        remembered: (m,) numbers that each law remembers, at the start, in their own units.
     """
 
     body: Mapping[str, int]
@@ -150,7 +155,7 @@ class Places:
         return self.time
 
     def memory(self, start: Array) -> int:
-        """First of some numbers that are kept from one instant to the next, by their start."""
+        """First of (m,) numbers that are kept from one instant to the next, in their own units."""
         self.remembered.append(start)
         return sum(x.size for x in self.remembered[:-1])
 

@@ -53,10 +53,10 @@ def friction(  # noqa: PLR0913  one keyword per property
         transition_speed: speed over which the sign changes [m/s or rad/s]; implicit steps that
             change the speed by much more do not converge.
         coulomb: level that is always there [N or N m].
-        mu: coefficient of friction.
+        mu: coefficient of friction [1].
         radius: at which friction acts on an angle, that of the pin [m]; none for a
             displacement.
-        static: level at rest over that of fast motion, at least 1.
+        static: level at rest over that of fast motion, at least 1 [1].
         stribeck_speed: speed over which this fades [m/s or rad/s].
         viscous: [N s/m or N m s/rad].
         coordinate: "angle" or "displacement"; None for the only or the first one.

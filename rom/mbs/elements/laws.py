@@ -65,7 +65,8 @@ class Law:
     Attributes:
         function, tangents: of the user; tangents None for differences.
         markers: it acts on.
-        parameters, memory: numbers it is given, and that it remembers at the start.
+        parameters, memory: (p,), (m,) numbers it is given, and that it remembers at the start, in
+            its own units.
         outputs: names of its own outputs.
         stores: whether it accounts for its energy and its losses.
         compiled: entries in C with attribute ``address``, None where Python is asked.
@@ -113,8 +114,9 @@ def law(  # noqa: PLR0913  one keyword per property
         function: ``law(t, parameters, motion, memory, out)``; a function of Python, compiled by
             Numba when it can be, one of Numba, or anything with an ``address`` in C.
         markers: at least one, of any bodies or the ground.
-        parameters: (p,) numbers handed to the law.
-        memory: (m,) numbers that the law remembers from step to step, at the start.
+        parameters: (p,) numbers handed to the law, in its own units.
+        memory: (m,) numbers that the law remembers from step to step, at the start, in its own
+            units.
         outputs: names of its own outputs; ``solution.law(name)`` has them.
         energy: whether it tells stored energy and lost power. If not, all its work is that of an
             applied force, and equilibria let it grow with the loads.

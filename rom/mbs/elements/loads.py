@@ -33,12 +33,20 @@ class Load:
 
 
 def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
-    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker."""
+    """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker.
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker or frame, or a wrong vector.
+    """
     _load(self, name, marker, vector, frame, FORCE_WORLD)
 
 
 def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
-    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker."""
+    """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker.
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker or frame, or a wrong vector.
+    """
     _load(self, name, marker, vector, frame, TORQUE_WORLD)
 
 

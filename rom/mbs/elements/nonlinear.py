@@ -67,7 +67,7 @@ class Frames:
 
     Attributes:
         x: (n, 3) origins [m].
-        p: (n, 4) unit quaternions, frame to body.
+        p: (n, 4) unit quaternions, frame to body [1].
         mass: (n,) [kg].
         inertia: (n, 3) principal moments about the origin, axes of the frame [kg m^2].
     """
@@ -85,7 +85,7 @@ class Elements:
     Attributes:
         address: of the law in memory.
         frames: (e, k) frames that each element connects.
-        numbers: (e, c) what the law knows of each element.
+        numbers: (e, c) what the law knows of each element, in its own units.
         law: kept so that the compiled code lives as long as the elements.
     """
 
@@ -96,7 +96,13 @@ class Elements:
 
     @classmethod
     def of(cls, law: Any, frames: Index, numbers: Array) -> "Elements":
-        """Elements with a law of `compiled_law`."""
+        """Elements with a law of `compiled_law`.
+
+        Args:
+            law: the law.
+            frames: (e, k) frames that each element connects.
+            numbers: (e, c) what the law knows of each element, in its own units.
+        """
         return cls(law.address, frames, numbers, law)
 
 
@@ -183,7 +189,7 @@ def add_nonlinear(
         name: name of the body; its frames become bodies ``name.0``, ``name.1``, ...
         body: see `NonlinearBody`.
         at: (3,) origin of the body at the start, world [m].
-        orientation: (3, 3) matrix or (4,) quaternion, body to world; None for parallel.
+        orientation: (3, 3) matrix or (4,) quaternion [1], body to world; None for parallel.
         velocity: (3,) of that origin, world [m/s].
         omega: (3,) angular velocity of the body as a whole, axes of the body [rad/s].
 

@@ -34,7 +34,18 @@ def rotational_spring(
     damping: float = 0.0,
     free_angle: float = 0.0,
 ) -> None:
-    """Spring [N m/rad] and damper [N m s/rad] about the axis of a revolute joint."""
+    """Spring and damper about the axis of a joint that turns.
+
+    Args:
+        name: name of the spring.
+        joint: joint with an angle.
+        stiffness: [N m/rad].
+        damping: [N m s/rad].
+        free_angle: angle without moment [rad].
+
+    Raises:
+        ConfigError: for a name in use, or a joint that is unknown or does not turn.
+    """
     if joint_with_axis(self.joints, joint, "rotational spring").turn is None:
         raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
     k, c = stiffness_and_damping(name, stiffness, damping)

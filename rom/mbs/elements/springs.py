@@ -49,6 +49,9 @@ def spring_damper(
         stiffness: [N/m].
         damping: [N s/m].
         free_length: length without force [m]; None for the length at the start.
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, or a length below zero.
     """
     gap = self.design_point(m2) - self.design_point(m1)
     free = np.linalg.norm(gap) if free_length is None else number("free_length", free_length)

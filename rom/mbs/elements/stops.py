@@ -42,7 +42,7 @@ def stop(
         joint: joint with a coordinate.
         law: `rom.mbs.Impact`, its friction without effect.
         lower: smallest coordinate without force [rad or m]; None for no limit.
-        upper: largest one.
+        upper: largest one [rad or m].
         coordinate: "angle" or "displacement"; None for the only or the first one.
 
     Raises:

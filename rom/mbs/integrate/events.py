@@ -39,40 +39,64 @@ class Instant:
         self._fresh = False
 
     def set(self, t: float, q: Array, v: Array) -> "Instant":
-        """Look at another time."""
+        """Look at another time t [s], with q (n_q,) and v (n,) in units of `State`."""
         self.t, self.q, self.v, self._fresh = t, q, v, False
         return self
 
     def position(self, body: str, marker: Any = None) -> Array:
-        """(3,) position of a marker, or of the body origin [m]."""
+        """(3,) position of a marker, or of the body origin [m].
+
+        Raises:
+            ConfigError: if the body or the marker is unknown.
+        """
         if marker is not None:
             return self._evaluated(body).P[self._row(body, marker)].copy()
         at = self._start(body, self._packed.system.bodies.q_at)
         return self.q[at : at + 3].copy()
 
     def velocity(self, body: str, marker: Any = None) -> Array:
-        """(3,) velocity of a marker, or of the body origin, world [m/s]."""
+        """(3,) velocity of a marker, or of the body origin, world [m/s].
+
+        Raises:
+            ConfigError: if the body or the marker is unknown.
+        """
         if marker is not None:
             return self._evaluated(body).V[self._row(body, marker), :3].copy()
         at = self._start(body, self._packed.system.bodies.v_at)
         return self.v[at : at + 3].copy()
 
     def axes(self, body: str, marker: Any) -> Array:
-        """(3, 3) orientation of a marker, to world."""
+        """(3, 3) orientation of a marker, to world [1].
+
+        Raises:
+            ConfigError: if the body or the marker is unknown.
+        """
         return self._evaluated(body).E[self._row(body, marker)].copy()
 
     def orientation(self, body: str) -> Array:
-        """(4,) quaternion of the body frame."""
+        """(4,) quaternion of the body frame [1].
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         at = self._start(body, self._packed.system.bodies.q_at) + 3
         return self.q[at : at + 4].copy()
 
     def omega(self, body: str) -> Array:
-        """(3,) angular velocity of the body frame, body frame [rad/s]."""
+        """(3,) angular velocity of the body frame, body frame [rad/s].
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         at = self._start(body, self._packed.system.bodies.v_at) + 3
         return self.v[at : at + 3].copy()
 
     def elastic(self, body: str) -> Array:
-        """(r,) elastic coordinates."""
+        """(r,) elastic coordinates, in units of the body's shapes.
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         at = self._start(body, self._packed.system.bodies.q_at) + 7
         return self.q[at : at + self._mechanism.part(body).r].copy()
 

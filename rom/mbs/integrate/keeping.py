@@ -155,7 +155,7 @@ class Keeping:
         return self.folder / f"part-{k:06d}.npz"
 
     def due(self, now: float) -> bool:
-        """Whether it is time to write."""
+        """Whether it is time to write; ``now`` by the clock of the writer [s]."""
         return now >= self._next
 
     def write(self, blocks: Sequence[Block], state: State, noted: Noted | None) -> None:
@@ -169,6 +169,7 @@ class Keeping:
         Raises:
             ConfigError: if the folder cannot be made.
             ResourceError: if the disk is full.
+            QualityGateError: if a number of the motion is not finite.
         """
         begun, count = perf_counter(), len(blocks)
         if state.memory is None:

@@ -61,14 +61,14 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             second order or as ``order`` says, damps all that the step does not resolve), or
             "dop853" (explicit, eighth order, variable step: references for smooth, not too stiff
             motion).
-        rho_inf: spectral radius of generalised-alpha at infinite frequency: 1 keeps energy, but
+        rho_inf: spectral radius of generalised-alpha at infinite frequency [1]: 1 keeps energy, but
             reactions then collect round-off over many steps; 0 removes what the time step does
             not resolve in one step.
-        tolerance: of the Newton iteration, relative to what the accelerations move in one step.
-        rtol: relative tolerance of variable steps. dop853 keeps it in every step (1e-12);
+        tolerance: of the Newton iteration [1], relative to what the accelerations move in one step.
+        rtol: relative tolerance of variable steps [1]. dop853 keeps it in every step (1e-12);
             implicit methods let the errors of all steps add up to it (1e-4), lengths relative to
             the size of the mechanism, velocities to the largest so far, weighted by mass.
-        atol: absolute tolerance of dop853.
+        atol: absolute tolerance of dop853, of positions and velocities [m, rad, m/s, rad/s].
         progress: report on stderr.
         save_every: keep every so many steps.
         t_start: start time [s]; None for 0, or for the time of ``state``.
@@ -101,6 +101,12 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     Warns:
         RomWarning: if a body left the range of small elastic deformation, or turned faster than
             it can without geometric stiffness.
+
+    Source:
+        Bruels, Cardona and Arnold, Lie group generalized-alpha time integration of constrained
+        flexible multibody systems, Mech. Mach. Theory 48 (2012) 121, see
+        docs/theory/floating_frame.md; Hairer and Wanner, Solving Ordinary Differential
+        Equations II, for BDF.
     """
     one_of("method", method, METHODS)
     if t_start is None:

@@ -27,7 +27,7 @@ def surface_place(k: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """A point on a body: a name, or three coordinates in the body frame."""
+    """A point on a body: a name, or three coordinates in the body frame [m]."""
 
     body: str
     place: str | tuple[float, float, float]
@@ -43,11 +43,11 @@ class Part:
         mass: [kg].
         first: (3,) first moment about the origin of the frame [kg m].
         second: (3, 3) integral of rho X X^T [kg m^2].
-        at, p: (3,), (4,) origin and quaternion of the frame at the start.
-        velocity, omega: (3,), (3,) of the frame at the start; world, body frame.
-        points: named points of a rigid body, body frame [m].
+        at, p: (3,), (4,) origin [m] and quaternion [1] of the frame at the start.
+        velocity, omega: (3,), (3,) of the frame at the start; world, body frame [m/s, rad/s].
+        points: {name: (3,) point of a rigid body, body frame [m]}.
         flexible: the ``FlexibleBody``, None for a rigid body.
-        q, qd: (r,) elastic coordinates and rates at the start.
+        q, qd: (r,) elastic coordinates and rates at the start, in the units of the body's shapes.
     """
 
     name: str
@@ -99,7 +99,11 @@ class Part:
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 
     def point(self, marker: Marker) -> Array:
-        """(3,) undeformed position of a marker in the body frame [m]."""
+        """(3,) undeformed position of a marker in the body frame [m].
+
+        Raises:
+            ConfigError: if the body has no such marker.
+        """
         row = self._surface_row(marker.place)
         if row is not None:
             return np.asarray(self.flexible.surface.points[row], dtype=float)
@@ -111,7 +115,7 @@ class Part:
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
 
     def shapes(self, marker: Marker) -> tuple[Array, Array]:
-        """(3, r) displacement and (3, r) rotation of a marker per elastic coordinate."""
+        """(3, r) displacement [m] and (3, r) rotation [rad] of a marker per elastic coordinate."""
         if self.flexible is None:
             return np.zeros((3, 0)), np.zeros((3, 0))
         row = self._surface_row(marker.place)

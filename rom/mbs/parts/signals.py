@@ -42,7 +42,13 @@ class Signal:
     looked: dict[Span, Examined] = field(default_factory=dict, compare=False, repr=False)
 
     def end(self, span: Span, time: float, spacing: float) -> tuple[float, RomError] | None:
-        """When a drive stops to be a motion, as far as looked up to a time, and the error."""
+        """When a drive stops to be a motion [s], and the error; None if it does not.
+
+        Args:
+            span: no time before the first or after the second one is asked for.
+            time: up to which to look [s].
+            spacing: of the times that are looked at [s].
+        """
         if self.width == 3:
             return None
         if span not in self.looked:
@@ -54,12 +60,15 @@ class Signal:
         return lambda t: self._values(function, t)[:, 0]
 
     def sample(self, t: Array, span: Span, spacing: float) -> Array:
-        """(n, 3) value, rate, acceleration at the times t; or the vectors of a load.
+        """Value, rate and acceleration of a drive, or the vectors of a load.
 
         Args:
-            t: (n,) times.
+            t: (n,) times [s].
             span: no time before the first or after the second one is asked for.
             spacing: of the finite differences for missing derivatives [s].
+
+        Returns:
+            (n, 3): value [m or rad] and its rates per second, or force [N] or moment [N m].
         """
         t = np.clip(t, *span)
         if self.width == 3:

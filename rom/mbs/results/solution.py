@@ -35,7 +35,7 @@ class Occurrences:
 
     Attributes:
         t: (k,) times [s].
-        q, v: (k, n_q), (k, n) coordinates and velocities then.
+        q, v: (k, n_q), (k, n) coordinates and velocities then, in units of `State`.
     """
 
     t: Array
@@ -45,15 +45,15 @@ class Occurrences:
 
 @dataclass(frozen=True)
 class Energy:
-    """Energies and works over time, each (n_t,) [J]; works count from the start.
+    """Energies and works over time; works count from the start.
 
     Attributes:
-        kinetic: of all bodies.
-        strain: elastic energy of bodies and elements.
-        potential: of gravity.
-        drives: work done by drives and motors.
-        forces: work done by forces, torques and user forces.
-        damping: work lost in dampers, friction and impacts.
+        kinetic: (n_t,) of all bodies [J].
+        strain: (n_t,) elastic energy of bodies and elements [J].
+        potential: (n_t,) of gravity [J].
+        drives: (n_t,) work done by drives and motors [J].
+        forces: (n_t,) work done by forces, torques and user forces [J].
+        damping: (n_t,) work lost in dampers, friction and impacts [J].
     """
 
     kinetic: Array
@@ -65,12 +65,12 @@ class Energy:
 
     @property
     def total(self) -> Array:
-        """Mechanical energy: kinetic, strain and potential."""
+        """(n_t,) mechanical energy: kinetic, strain and potential [J]."""
         return self.kinetic + self.strain + self.potential
 
     @property
     def balance(self) -> Array:
-        """Mechanical energy gained minus work put in; zero for an exact motion."""
+        """(n_t,) mechanical energy gained minus work put in [J]; zero for an exact motion."""
         supplied = self.drives + self.forces - self.damping
         return self.total - self.total[0] - supplied
 
@@ -86,11 +86,11 @@ class Solution:
         t: (n_t,) times [s].
         q, v, a: (n_t, n_q), (n_t, n), (n_t, n) coordinates, velocities, accelerations, see
             `rom.mbs.results.state.State`.
-        lam: (n_t, m) constraint multipliers.
+        lam: (n_t, m) constraint multipliers [N, N m].
         work: (n_t, 3) work of drives, of forces, lost in dampers [J].
         base: (n_t, c) joint coordinates that forces or couplings act on, angles counted over
             whole turns [m, or rad].
-        signals: (n_t, s, 3) prescribed functions of time.
+        signals: (n_t, s, 3) prescribed functions of time, in their own units.
         statistics: steps, iterations, times.
         status: one sentence on how the run ended.
         final: the last state, from which a run can go on.
@@ -179,6 +179,9 @@ class Solution:
         """(n_t, 3) position of a marker, or of the body origin [m].
 
         Of a rod, or another body of frames, (n_t, k, 3) for all of its k frames.
+
+        Raises:
+            ConfigError: if the body is unknown, or the marker was not one of the run.
         """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, marker, self.position)
@@ -188,7 +191,11 @@ class Solution:
         return self._track(body, marker).position
 
     def velocity(self, body: str, marker: Any = None) -> Array:
-        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]; of frames as above."""
+        """(n_t, 3) velocity of a marker, or of the body origin, world [m/s]; of frames as above.
+
+        Raises:
+            ConfigError: if the body is unknown, or the marker was not one of the run.
+        """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, marker, self.velocity)
         if marker is None:
@@ -197,28 +204,44 @@ class Solution:
         return self._track(body, marker).twist[:, :3]
 
     def axes(self, body: str, marker: Any) -> Array:
-        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included."""
+        """(n_t, 3, 3) orientation of a marker, to world, elastic rotation included [1].
+
+        Raises:
+            ConfigError: if the body is unknown, or the marker was not one of the run.
+        """
         if body in self.mechanism.nonlinear:
             frame = self.mechanism.nonlinear[body].marker(marker).body
             return np.array([matrix(p) for p in self.orientation(frame)])
         return self._track(body, marker).axes
 
     def orientation(self, body: str) -> Array:
-        """(n_t, 4) quaternion of the body frame, (n_t, k, 4) of k frames."""
+        """(n_t, 4) quaternion of the body frame [1], (n_t, k, 4) of k frames.
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, None, self.orientation)
         at = self._start_of(body)
         return self.q[:, at + 3 : at + 7]
 
     def omega(self, body: str) -> Array:
-        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]; of frames as above."""
+        """(n_t, 3) angular velocity of the body frame, body frame [rad/s]; of frames as above.
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, None, self.omega)
         at = self._start_of(body, velocity=True)
         return self.v[:, at + 3 : at + 6]
 
     def elastic(self, body: str) -> Array:
-        """(n_t, r) elastic coordinates."""
+        """(n_t, r) elastic coordinates, in units of the body's shapes.
+
+        Raises:
+            ConfigError: if the body is unknown.
+        """
         at = self._start_of(body)
         return self.q[:, at + 7 : at + 7 + self.mechanism.part(body).r]
 
@@ -254,6 +277,9 @@ class Solution:
         """(n_t, 6) force [N] and moment [N m] of a joint or drive on its second body, world.
 
         The moment is about the second marker. A drive is counted apart from its joint.
+
+        Raises:
+            ConfigError: if there is no such joint or drive.
         """
         rows = self.packed.rows_of(name)
         if not rows.size:
@@ -275,7 +301,11 @@ class Solution:
         return joint_motion(self.t, joint, one, two)
 
     def drive_load(self, name: str) -> Array:
-        """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate."""
+        """(n_t,) torque [N m] or force [N] that a drive supplies along its joint coordinate.
+
+        Raises:
+            ConfigError: if there is no such drive.
+        """
         if name not in self.mechanism.drives:
             raise ConfigError(
                 f"no drive {name!r}; there are {offered(self.mechanism.drives, name)}."

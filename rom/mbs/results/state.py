@@ -32,15 +32,16 @@ class State:
 
     Attributes:
         t: time [s].
-        q: (n_q,) per body: origin (3), quaternion (4), elastic coordinates (r).
-        v: (n,) per body: velocity of the origin, world (3), angular velocity, body frame (3),
-            elastic rates (r).
-        a: (n,) rates of v.
-        lam: (m,) multipliers of the constraints.
+        q: (n_q,) per body: origin (3) [m], quaternion (4) [1], elastic coordinates (r).
+        v: (n,) per body: velocity of the origin, world (3) [m/s], angular velocity, body frame (3)
+            [rad/s], elastic rates (r).
+        a: (n,) rates of v [m/s^2, rad/s^2].
+        lam: (m,) multipliers of the constraints [N, N m].
         rank: number of independent constraints.
-        algorithmic: (n,) acceleration-like variable of generalised-alpha, None at a fresh start.
-        base: (c,) joint coordinates that forces or couplings act on, angles counted over whole
-            turns; None: as measured.
+        algorithmic: (n,) acceleration-like variable of generalised-alpha [m/s^2, rad/s^2], None at
+            a fresh start.
+        base: (c,) joint coordinates that forces or couplings act on [m, rad], angles counted over
+            whole turns; None: as measured.
         memory: of the method that arrived here; None at a fresh start.
     """
 

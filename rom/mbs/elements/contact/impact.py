@@ -21,11 +21,11 @@ class Impact:
 
     Args:
         stiffness: [N/m^exponent], or [N m/rad^exponent] on an angle.
-        exponent: 1 for linear, 3/2 for Hertz.
+        exponent: 1 for linear, 3/2 for Hertz [1].
         damping: factor of the closing speed [s/m]; or give the next two.
-        restitution: speed after over speed before, above 0 and at most 1.
+        restitution: speed after over speed before, above 0 and at most 1 [1].
         impact_speed: at which that holds [m/s].
-        mu: coefficient of friction at the touching point.
+        mu: coefficient of friction at the touching point [1].
         transition_speed: sliding speed over which friction changes its sign [m/s]; implicit steps
             that change the sliding speed by much more do not converge.
 
@@ -103,9 +103,9 @@ def hertz_stiffness(E1: float, nu1: float, E2: float, nu2: float, radius: float)
 
     Args:
         E1: Young's modulus of one [Pa].
-        nu1: its Poisson's ratio.
+        nu1: its Poisson's ratio [1].
         E2: Young's modulus of the other [Pa].
-        nu2: its Poisson's ratio.
+        nu2: its Poisson's ratio [1].
         radius: 1 / (1 / R1 + 1 / R2); of the sphere alone against a plane [m].
 
     Raises:

@@ -56,7 +56,20 @@ def sphere_on_plane(
     normal: npt.ArrayLike,
     radius: float,
 ) -> None:
-    """Sphere about m2 against the plane through m1; ``normal`` (3,), world at the start."""
+    """Sphere about m2 against the plane through m1.
+
+    Args:
+        name: name of the contact.
+        m1: point of the plane.
+        m2: centre of the sphere.
+        law: force of the penetration.
+        normal: (3,) of the plane towards the sphere, world at the start [1].
+        radius: of the sphere [m].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
+            `rom.mbs.Impact`, or no direction.
+    """
     _touch(self, name, PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
 
 
@@ -73,8 +86,18 @@ def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
 ) -> None:
     """Rim of a thin disc about m2 against the plane through m1; two make a cylinder.
 
-    ``normal`` of the plane and ``axis`` of the disc (3,) in the world at the start; the disc
-    must not lie flat.
+    Args:
+        name: name of the contact.
+        m1: point of the plane.
+        m2: centre of the disc, which must not lie flat.
+        law: force of the penetration.
+        normal: (3,) of the plane towards the disc, world at the start [1].
+        axis: (3,) of the disc, world at the start [1].
+        radius: of the disc [m].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
+            `rom.mbs.Impact`, or no direction.
     """
     _touch(self, name, DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
 
@@ -89,7 +112,12 @@ def sphere_on_sphere(
     radius1: float,
     radius2: float,
 ) -> None:
-    """Spheres of radius1 about m1 and radius2 about m2 [m]."""
+    """Spheres of radius1 about m1 and radius2 about m2 [m].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
+            `rom.mbs.Impact`, or a radius not above zero.
+    """
     radii = positive("radius2", radius2), positive("radius1", radius1)
     _touch(self, name, SPHERE, (m1, m2), law, (None, None), radii)
 
@@ -106,10 +134,23 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     radius2: float,
     inside: bool = False,
 ) -> None:
-    """Sphere of radius2 about m2 against an endless cylinder of radius1 about m1, or its bore.
+    """Sphere about m2 against an endless cylinder about m1, or its bore.
 
-    ``axis`` (3,) of the cylinder, world at the start; a disc across a bore with its radius is
-    a pin with clearance.
+    A disc across a bore with its radius is a pin with clearance.
+
+    Args:
+        name: name of the contact.
+        m1: point of the axis of the cylinder.
+        m2: centre of the sphere.
+        law: force of the penetration.
+        axis: (3,) of the cylinder, world at the start [1].
+        radius1: of the cylinder [m].
+        radius2: of the sphere [m].
+        inside: the sphere is in the bore.
+
+    Raises:
+        ConfigError: for a sphere that does not fit into the bore, a name in use, an unknown marker,
+            one body twice, a law that is no `rom.mbs.Impact`, or no direction.
     """
     radii = positive("radius2", radius2), positive("radius1", radius1)
     if inside and radii[0] >= radii[1]:

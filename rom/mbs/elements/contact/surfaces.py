@@ -45,7 +45,7 @@ def surface_on_plane(
         m1: point of the plane.
         part: what `add_flexible` returned, with a surface.
         law: per area.
-        normal: (3,) towards the body, world at the start.
+        normal: (3,) towards the body, world at the start [1].
         where: part of the surface, as in `rom.surface_load`.
 
     Raises:
@@ -65,7 +65,20 @@ def surface_on_sphere(
     radius: float,
     where: Where = None,
 ) -> None:
-    """Surface of a flexible body against a sphere of ``radius`` [m] about m1."""
+    """Surface of a flexible body against a sphere about m1.
+
+    Args:
+        name: name of the contact.
+        m1: centre of the sphere.
+        part: what `add_flexible` returned, with a surface.
+        law: per area.
+        radius: of the sphere [m].
+        where: part of the surface, as in `rom.surface_load`.
+
+    Raises:
+        ConfigError: for a wrong argument.
+        ModelError: if the body carries no surface.
+    """
     _cover(self, name, SPHERE, m1, part, (law, None, positive("radius", radius), where))
 
 
@@ -81,7 +94,22 @@ def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     inside: bool = False,
     where: Where = None,
 ) -> None:
-    """Surface of a flexible body against an endless cylinder about m1, or inside its bore."""
+    """Surface of a flexible body against an endless cylinder about m1, or inside its bore.
+
+    Args:
+        name: name of the contact.
+        m1: point of the axis.
+        part: what `add_flexible` returned, with a surface.
+        law: per area.
+        axis: (3,) of the cylinder, world at the start [1].
+        radius: of the cylinder [m].
+        inside: the body is in the bore.
+        where: part of the surface, as in `rom.surface_load`.
+
+    Raises:
+        ConfigError: for a wrong argument.
+        ModelError: if the body carries no surface.
+    """
     kind = BORE if inside else CYLINDER
     _cover(self, name, kind, m1, part, (law, axis, positive("radius", radius), where))
 

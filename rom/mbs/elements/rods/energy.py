@@ -34,16 +34,17 @@ class Rod(NamedTuple):
     Attributes:
         h: (N,) lengths of the segments [m].
         stretch: (N, 3) shear rigidities and axial rigidity GA1, GA2, EA [N].
-        a0: (N, 3) reference of the vector of stretch and shear.
+        a0: (N, 3) reference of the vector of stretch and shear [1].
         l: (N + 1,) lengths that bend at the vertices, half a segment at an end [m].
         bend: (N + 1, 3) bending rigidities and torsional rigidity EI1, EI2, GJ [N m^2].
-        s: (N + 1, 4) square root of the reference rotation between neighbours.
-        S: (N + 1, 3, 3) the same as matrices.
+        s: (N + 1, 4) square root of the reference rotation between neighbours, quaternions [1].
+        S: (N + 1, 3, 3) the same as matrices [1].
         mass: (N + 1,) at the vertices [kg].
         inertia: (N + 2, 3) of plate, segments, plate, about their own axes [kg m^2].
-        viscous_stretch, viscous_bend: like stretch, bend, per rate of strain [N s], [N m^2 s].
+        viscous_stretch, viscous_bend: (N, 3), (N + 1, 3) like stretch, bend, per rate of strain [N
+            s], [N m^2 s].
         x: (N + 1, 3) reference positions [m].
-        p: (N + 2, 4) reference quaternions of plate, segments, plate.
+        p: (N + 2, 4) reference quaternions of plate, segments, plate [1].
     """
 
     h: Array

@@ -22,14 +22,14 @@ class Shape:
 
     Attributes:
         x: (N + 1, 3) positions of the vertices [m].
-        p: (N + 2, 4) quaternions of plate, segments, plate; section axes to world, third along.
+        p: (N + 2, 4) quaternions [1] of plate, segments, plate; section axes to world, third along.
     """
 
     x: Array
     p: Array
 
     def frame(self, k: int) -> Array:
-        """(3, 3) section axes as columns: plate 0, segments 1 to N, plate N + 1 or -1."""
+        """(3, 3) section axes as columns [1]: plate 0, segments 1 to N, plate N + 1 or -1."""
         return rotation.matrix(self.p[k])
 
 
@@ -48,16 +48,16 @@ def rod(  # noqa: PLR0913  one keyword per property of the rod
 
     Args:
         x: (N + 1, 3) vertices [m].
-        p: (N + 2, 4) unit quaternions of the plate at the start, the N segments and the plate at
-            the end: section axes to world, the third along the rod. The rotation between a plate
+        p: (N + 2, 4) unit quaternions [1] of the plate at the start, the N segments and the plate
+            at the end: section axes to world, the third along the rod. The rotation between a plate
             and the segment beside it is that over half a segment.
         stretch: (N, 3) or (3,) rigidities GA1, GA2, EA of the segments [N].
         bend: (N + 1, 3) or (3,) rigidities EI1, EI2, GJ at the vertices [N m^2].
         mass: (N,) or scalar, per length [kg/m].
         inertia: (N, 3) or (3,), per length about the section axes [kg m].
         viscosity: (6,) or scalar, ratio of viscous to elastic rigidities, stretch before bend [s].
-        bends: (N,) whether a segment shares in the bending; one that does not is a rigid link as
-            far as its stretch rigidity is high.
+        bends: (N,) whether a segment shares in the bending [1]; one that does not is a rigid link
+            as far as its stretch rigidity is high.
 
     Returns:
         Rod; its masses are lumped, half of each segment at either vertex.
@@ -120,8 +120,12 @@ def straight(
         length: of the rod [m].
         n: number of segments.
         start: (3,) first vertex [m].
-        frame: (3, 3) section axes as columns, the third along the rod; without it the world axes.
+        frame: (3, 3) section axes as columns [1], the third along the rod; without it the world
+            axes.
         section: rigidities, mass and more as for `rod`.
+
+    Raises:
+        ModelError: as `rod`.
     """
     A = np.eye(3) if frame is None else np.asarray(frame, dtype=float)
     x = np.asarray(start, dtype=float) + np.outer(np.linspace(0, length, n + 1), A[:, 2])
@@ -134,8 +138,11 @@ def along(place: Callable[[float], tuple[npt.ArrayLike, npt.ArrayLike]], station
 
     Args:
         place: position (3,) [m] and section axes (3, 3), columns, third tangent, at a station.
-        stations: (N + 1,) where the vertices are, in the parameter of the curve.
+        stations: (N + 1,) where the vertices are, in the units of the parameter of the curve.
         section: rigidities, mass and more as for `rod`.
+
+    Raises:
+        ModelError: as `rod`.
     """
     s = np.asarray(stations, dtype=float)
     middles = np.concatenate(([s[0]], (s[1:] + s[:-1]) / 2, [s[-1]]))
