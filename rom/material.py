@@ -22,7 +22,7 @@ class Material:
 
     Attributes:
         E: Young's modulus [Pa].
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
         rho: density [kg/m^3].
 
     Raises:
@@ -51,6 +51,12 @@ class Material:
     @classmethod
     def from_units(cls, units: str, *, E: float, nu: float, rho: float) -> "Material":
         """The solid with numbers in another unit system, e.g. "mm-t-s": MPa and t/mm^3.
+
+        Args:
+            units: name of the unit system.
+            E: Young's modulus, in units of the system.
+            nu: Poisson's ratio [1].
+            rho: density, in units of the system.
 
         Raises:
             ConfigError: if the unit system is unknown.
@@ -89,13 +95,14 @@ class Orthotropic:
 
     Attributes:
         E: (3,) Young's moduli E1, E2, E3 [Pa].
-        nu: (3,) Poisson's ratios nu12, nu13, nu23; nu_ij = -eps_j / eps_i under stress along i.
+        nu: (3,) Poisson's ratios nu12, nu13, nu23 [1]; nu_ij = -eps_j / eps_i under stress along i.
         G: (3,) shear moduli G12, G13, G23 [Pa].
         rho: density [kg/m^3].
-        axes: (3, 3) rows are the principal axes in the frame of the geometry.
+        axes: (3, 3) rows are the principal axes in the frame of the geometry [1].
 
     Raises:
         MaterialError: if the stiffness is not positive definite or the axes are not orthonormal.
+        ConfigError: if the axes are no (3, 3) finite numbers.
 
     Warns:
         RomWarning: if sound would travel in it as in no solid: wrong units.
@@ -131,6 +138,14 @@ class Orthotropic:
         cls, units: str, *, E: Any, nu: Any, G: Any, rho: float, axes: Any = None
     ) -> "Orthotropic":
         """The solid with numbers in another unit system, e.g. "mm-t-s": MPa and t/mm^3.
+
+        Args:
+            units: name of the unit system.
+            E: (3,) Young's moduli, in units of the system.
+            nu: (3,) Poisson's ratios [1], as for numbers in SI.
+            G: (3,) shear moduli, in units of the system.
+            rho: density, in units of the system.
+            axes: (3, 3) rows are the principal axes [1]; None for those of the geometry.
 
         Raises:
             ConfigError: if the unit system is unknown.

@@ -205,8 +205,8 @@ class Basis:
     """Columns that span the deformations kept.
 
     Attributes:
-        Psi: (n, r) displacement shapes, interface columns first; under mpirun the rows of this
-            rank.
+        Psi: (n, r) displacement shapes [m] per unit of each coordinate, interface columns first;
+            under mpirun the rows of this rank.
         omega: (m,) circular frequencies [rad/s] of the last m columns, ascending.
         labels: (r,) what each column is, e.g. "constraint 12" or "fixed-interface 3".
     """
@@ -220,7 +220,11 @@ class Basis:
         return f"Basis({r} columns of {n} rows, {self.omega.size} of them modes)"
 
     def project(self, A: Any) -> Array:
-        """(r, r) symmetric projection Psi^T A Psi; on one process."""
+        """(r, r) symmetric projection Psi^T A Psi in units of A and the shapes; on one process.
+
+        Raises:
+            ConfigError: if A is no (n, n) matrix.
+        """
         n = len(self.Psi)
         B = self.Psi.T @ (matrix("A", A, (n, n)) @ self.Psi)
         return 0.5 * (B + B.T)

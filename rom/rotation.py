@@ -15,19 +15,19 @@ Array = npt.NDArray[np.float64]
 
 
 def skew(a: npt.ArrayLike) -> Array:
-    """(3, 3) matrix of the cross product a x b = S b."""
+    """(3, 3) matrix S of the cross product a x b = S b, in the units of a (3,)."""
     x, y, z = np.asarray(a, dtype=float)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def axial(S: npt.ArrayLike) -> Array:
-    """(3,) vector of the skew part of a (3, 3) matrix; the inverse of `skew`."""
+    """(3,) vector of the skew part of a (3, 3) matrix, in the units of it; inverse of `skew`."""
     S = np.asarray(S, dtype=float)
     return 0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
 
 
 def matrix(p: npt.ArrayLike) -> Array:
-    """(3, 3) rotation matrix of a unit quaternion, body to world."""
+    """(3, 3) rotation matrix [1] of a unit quaternion (4,), body to world."""
     e0, e1, e2, e3 = np.asarray(p, dtype=float)
     return np.array(
         [
@@ -39,7 +39,7 @@ def matrix(p: npt.ArrayLike) -> Array:
 
 
 def quaternion(A: npt.ArrayLike) -> Array:
-    """(4,) unit quaternion of a rotation matrix, scalar part not negative.
+    """(4,) unit quaternion [1] of a rotation matrix (3, 3), scalar part not negative.
 
     The largest of the four components is found first, so that no division by a small number occurs.
 
@@ -65,7 +65,15 @@ def quaternion(A: npt.ArrayLike) -> Array:
 
 
 def multiply(p: npt.ArrayLike, q: npt.ArrayLike) -> Array:
-    """(4,) product p o q; matrix(p o q) = matrix(p) matrix(q)."""
+    """(4,) product p o q; matrix(p o q) = matrix(p) matrix(q).
+
+    Args:
+        p: (4,) quaternion [1].
+        q: (4,) quaternion [1].
+
+    Returns:
+        (4,) quaternion [1].
+    """
     p, q = np.asarray(p, dtype=float), np.asarray(q, dtype=float)
     scalar = p[0] * q[0] - p[1:] @ q[1:]
     return np.concatenate(([scalar], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])))

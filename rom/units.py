@@ -76,7 +76,7 @@ class Unit:
     """A unit: so many of the SI unit of its dimension.
 
     Attributes:
-        factor: an exact fraction, or a float where pi is in it.
+        factor: how many SI units it is [1]; an exact fraction, or a float where pi is in it.
         dimension: (5,) exponents of `BASES`.
     """
 
@@ -157,6 +157,9 @@ def in_si(text: str, wanted: str) -> float:
     Args:
         text: number and unit.
         wanted: a unit of the dimension it must have, e.g. ``"Pa"``; ``"1"`` for a plain number.
+
+    Returns:
+        The number, in units of SI.
 
     Raises:
         ConfigError: if it is no quantity, or one of another dimension.

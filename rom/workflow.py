@@ -189,6 +189,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     Raises:
         InterfaceError, ConfigError: for a wrong interface, kind, method or reference.
         ModesMissedError: if the inertia count says that a mode was skipped.
+        ModelError: if the basis misses a rigid motion or has columns that depend on each other.
+        SolverError: if no order of ``Polynomial()`` is accurate enough.
     """
     if isinstance(model, CyclicSector):
         of_bodies = (reference != "mean-axis", damping is not None, stress, stiffening)
@@ -290,6 +292,10 @@ def substructure(
 
     Raises:
         InterfaceError, ConfigError: for a wrong interface, kind or number of modes.
+
+    Source:
+        Rixen, A dual Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math.
+        168 (2004) 383; see docs/theory/other_bases.md.
     """
     connection = connect(operators(model), model, by_name(interfaces))
     origins = {name: model.interfaces[name].origin for name in connection.parts}

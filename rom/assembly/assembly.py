@@ -75,7 +75,7 @@ class Assembly:
         return tuple(term[0][1].shape[0] for term in self._coupled)
 
     def frequencies(self, n: int | None = None, *, fixed: tuple[Place, ...] = ()) -> Array:
-        """Natural frequencies of the assembly [Hz].
+        """(k,) natural frequencies of the assembly [Hz].
 
         Args:
             n: how many, lowest first; None for all.

@@ -54,9 +54,10 @@ class CondensedAssembly:
         n_interface: number of interface functions kept.
         interface_omega: (n_interface,) circular frequencies of the interface functions [rad/s],
             fixed-interface modes left out.
-        basis: (n, m) motions kept, in the coordinates of all bodies, interface functions first.
-        M: (m, m) mass.
-        K: (m, m) stiffness.
+        basis: (n, m) motions kept, in units of the coordinates of all bodies, interface functions
+            first.
+        M: (m, m) mass, in units of that of the bodies.
+        K: (m, m) stiffness, in units of that of the bodies.
         widths: {body: number of its coordinates}.
         n_rigid: rigid motions that the supports leave free.
         certificate: frequencies against the assembly with all its interface coordinates.
@@ -73,7 +74,7 @@ class CondensedAssembly:
     certificate: Report
 
     def frequencies(self, n: int | None = None) -> Array:
-        """Natural frequencies [Hz], lowest first; None for all."""
+        """(k,) natural frequencies [Hz], lowest first; None for all."""
         return self.modes(n).frequencies
 
     def modes(self, n: int | None = None) -> Modes:

@@ -48,13 +48,13 @@ class FreeSubstructure:
     """A free body as its interfaces see it.
 
     Attributes:
-        parts: {interface: rows in the arrays below}.
+        parts: {interface: (k,) rows in the arrays below}.
         origins: {interface: (3,) where it is [m]}.
-        rigid: (n_b, 6) interface coordinates of M-orthonormal rigid motions.
+        rigid: (n_b, 6) interface coordinates of M-orthonormal rigid motions [kg^-1/2].
         omega: (m,) elastic free-free frequencies [rad/s].
-        shapes: (n_b, m) interface coordinates of the mass-normalised modes.
+        shapes: (n_b, m) interface coordinates of the mass-normalised modes [kg^-1/2].
         flexibility: (n_b, n_b) residual flexibility G [m/N].
-        mass: (n_b, n_b) kinetic energy of the residual shapes, G^T M G.
+        mass: (n_b, n_b) kinetic energy of the residual shapes, G^T M G [kg m^2/N^2].
         certificate: frequencies with one interface held against the full model, or None.
     """
 
@@ -73,9 +73,18 @@ def free_substructure(
 ) -> FreeSubstructure:
     """What a coupling by forces needs of a body in interface coordinates; see the class.
 
+    Args:
+        connection: the body in the coordinates of its interfaces.
+        origins: {interface: (3,) where it is [m]}.
+        n_modes: number of elastic free-free modes.
+
     Raises:
         ConfigError: for more modes than there are dofs.
         InterfaceError: if the interfaces leave a rigid motion free.
+
+    Source:
+        Rixen, A dual Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math. 168
+        (2004) 383; see docs/theory/other_bases.md.
     """
     ops, b = connection.ops, connection.boundary
     R, omega, Phi = free_modes(ops, n_modes)
@@ -145,7 +154,7 @@ class DualAssembly:
     def frequencies(
         self, n: int | None = None, *, kind: str = "dual", fixed: tuple[Place, ...] = ()
     ) -> Array:
-        """Natural frequencies of the whole [Hz], lowest first.
+        """(k,) natural frequencies of the whole [Hz], lowest first.
 
         Args:
             n: how many; None for all.
@@ -163,13 +172,36 @@ class DualAssembly:
         return omega[:n] / (2 * np.pi)
 
     def eigenvalues(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> Array:
-        """All eigenvalues [rad^2/s^2], ascending, with those below zero of a dual assembly."""
+        """(k,) all eigenvalues [rad^2/s^2], ascending, with those below zero of a dual assembly.
+
+        Args:
+            kind: "macneal", "rubin" or "dual".
+            fixed: (body, interface) pairs that are held.
+
+        Raises:
+            ConfigError: if the kind is unknown.
+            InterfaceError: if an interface is unknown, or forces on interfaces are redundant.
+        """
         K, M = self.matrices(kind=kind, fixed=fixed)
         scale = 1 / np.sqrt(np.diag(M))
         return eigh(scale[:, None] * K * scale, scale[:, None] * M * scale, eigvals_only=True)
 
     def matrices(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> tuple[Array, Array]:
-        """Stiffness and mass of the whole in modal coordinates, and forces for "dual"."""
+        """Stiffness and mass of the whole in modal coordinates, and forces for "dual".
+
+        Args:
+            kind: "macneal", "rubin" or "dual".
+            fixed: (body, interface) pairs that are held.
+
+        Returns:
+            (k, k) stiffness [rad^2/s^2] and (k, k) mass [1], for coordinates whose modes have mass
+            one; rows and columns of "dual" that belong to forces are in flexibility [m/N] and its
+            mass.
+
+        Raises:
+            ConfigError: if the kind is unknown.
+            InterfaceError: if an interface is unknown, or forces on interfaces are redundant.
+        """
         one_of("kind", kind, KINDS)
         Lam, Psi, Gamma, H = self._coupled(fixed)
         hard = self._hard(Lam, Psi, Gamma)

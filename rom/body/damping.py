@@ -53,7 +53,7 @@ class ModalDamping:
     """D = diag(2 zeta omega) in the elastic coordinates of the body.
 
     Attributes:
-        ratio: damping ratio zeta, one number or one per elastic coordinate; 0.02 is two per
+        ratio: damping ratio zeta [1], a scalar or (r,) one per elastic coordinate; 0.02 is two per
             cent. Nothing vibrates from one on: a ratio beyond is refused as a mistake for per
             cent, and one itself, by which residual shapes are stilled, is taken at its word.
 
@@ -71,7 +71,11 @@ class ModalDamping:
             check_damping_ratio(value)
 
     def matrix(self, body: FlexibleBody) -> Array:
-        """(r, r) damping [N s/m]."""
+        """(r, r) damping [N s/m].
+
+        Raises:
+            ConfigError: if there is not one ratio per elastic coordinate of the body.
+        """
         zeta = np.asarray(self.ratio, dtype=float)
         if zeta.ndim > 1 or (zeta.ndim == 1 and zeta.size != body.n_modes):
             raise ConfigError(

@@ -124,7 +124,7 @@ class FlexibleBody(BodyData):
         return point_areas(self, where)
 
     def frequencies(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Array:
-        """Natural frequencies of the reduced body with some interfaces held [Hz].
+        """(k,) natural frequencies of the reduced body with some interfaces held [Hz].
 
         Args:
             n: how many, lowest first; None for all.
@@ -143,6 +143,7 @@ class FlexibleBody(BodyData):
         Raises:
             InterfaceError: if an interface is unknown.
             ModelError: if an interface of a basis of free-free modes alone is held.
+            ConfigError: if n is no number of modes that the body has.
         """
         self.check_support(fixed)
         M, K = self.full_matrices()
@@ -182,13 +183,13 @@ class FlexibleBody(BodyData):
         fixed: tuple[str, ...],
         at: npt.ArrayLike = (0.0, 0.0, 0.0),
     ) -> Array:
-        """Natural frequencies in a frame that rotates steadily with the supports [Hz].
+        """(k,) natural frequencies in a frame that rotates steadily with the supports [Hz].
 
         Centrifugal stiffening (``K_geo``), spin softening and Coriolis forces included.
 
         Args:
             speed: angular speed [rad/s].
-            axis: (3,) direction of the axis of rotation, axes of the geometry.
+            axis: (3,) direction of the axis of rotation, axes of the geometry [1].
             fixed: names of the interfaces that rotate with the frame; the first holds the body.
             at: (3,) a point of the axis [m].
 
@@ -211,7 +212,12 @@ class FlexibleBody(BodyData):
         return SecondOrder.of(self)
 
     def full_matrices(self) -> tuple[Array, Array]:
-        """(6 + r, 6 + r) mass and stiffness of small motions, rigid coordinates first."""
+        """Mass and stiffness of small motions.
+
+        Returns:
+            (6 + r, 6 + r), (6 + r, 6 + r), in units of the body; the six rigid coordinates come
+            first.
+        """
         M = np.block([[rigid_mass(self), rigid_elastic(self)], [rigid_elastic(self).T, self.M]])
         K = np.zeros_like(M)
         K[6:, 6:] = self.K

@@ -35,11 +35,12 @@ class Marker:
     Attributes:
         name: name of the interface.
         point: (3,) undeformed position in the body frame [m].
-        translation: (3, r) displacement per unit of each elastic coordinate.
+        translation: (3, r) displacement [m] per unit of each elastic coordinate.
         rotation: (3, r) small rotation vector per unit of each elastic coordinate [rad].
         kind: "rbe2", "rbe3", "full", or the functions it follows, e.g. "polynomial:3".
         hold: (n_c, 6 + r) interface coordinates as a function of rigid motion (translation, then
-            rotation about the body origin) and elastic coordinates; zero when it is held.
+            rotation about the body origin) and elastic coordinates, in units of these; zero when it
+            is held.
         patch: the surface of a deformable interface; None when its motion is rigid or averaged.
     """
 

@@ -22,7 +22,20 @@ def rotating_frequencies(
     fixed: tuple[str, ...],
     at: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
-    """Frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`."""
+    """(k,) frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`.
+
+    Args:
+        body: the body, in SI.
+        speed: angular speed [rad/s].
+        axis: (3,) direction of the axis of rotation [1].
+        fixed: names of the interfaces that rotate with the frame; the first holds the body.
+        at: (3,) a point of the axis [m].
+
+    Raises:
+        ConfigError: if no interface is held, or the axis has no direction.
+        InterfaceError: if an interface is unknown.
+        ModelError: if an interface of a basis of free-free modes alone is held.
+    """
     w, arm = speed * unit_vector("axis", axis), finite("at", at, (3,))
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")

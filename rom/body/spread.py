@@ -20,7 +20,7 @@ class SpreadLoad:
     Attributes:
         force: (3,) sum of f [N].
         first: (3, 3) entry [a, b] is the sum of X_a f_b [N m].
-        shapes: (r, 3, 3) entry [k, a, b] is the sum of phi_k,a f_b.
+        shapes: (r, 3, 3) entry [k, a, b] is the sum of phi_k,a f_b [N m] per unit of q_k.
     """
 
     force: Array

@@ -34,7 +34,12 @@ def check(record: Any) -> Report:
 
 
 def check_model(model: FEModel) -> Report:
-    """Rigid-body residuals, symmetry and mass of a full model; collective under mpirun."""
+    """Rigid-body residuals, symmetry and mass of a full model; collective under mpirun.
+
+    Raises:
+        ConfigError: if stiffness and mass are not square matrices of one size.
+        ModelError: if its operators were made without geometry.
+    """
     ops: Any = model.operators or SciPyOperators(model.K, model.M, rigid_motions(model.points))
     R = given_rigid_motions(ops)
     KR, MR = ops.apply_K(R), ops.apply_M(R)

@@ -35,10 +35,13 @@ class Mass(Protocol):
     """What a scalar product with the mass needs of `Operators`."""
 
     def apply_M(self, X: Array) -> Array:
-        """M X, (n_local, k)."""
+        """M X, (n_local, k), in units of M times those of X (n_local, k)."""
 
     def gram(self, X: Array, Y: Array) -> Array:
-        """X^T Y summed over the ranks."""
+        """(k, l) X^T Y summed over the ranks, in units of their product.
+
+        Any two arrays (n_local, k) and (n_local, l) with equally distributed rows.
+        """
 
 
 class Operators(Protocol):
@@ -50,8 +53,8 @@ class Operators(Protocol):
         n_local: number of this process's rows.
         last: True on the process that owns the end of the rows, and stays so after `transform`.
         affordable: True when modes of the whole model cost a few factorisations, not hours.
-        rigid: (n_local, 6) rigid motions (three translations, three rotations about the origin of
-            coordinates), or None when there is no geometry.
+        rigid: (n_local, 6) rigid motions [1, m] (three translations, three rotations about the
+            origin of coordinates), or None when there is no geometry.
     """
 
     n: int
@@ -62,13 +65,16 @@ class Operators(Protocol):
     rigid: Array | None
 
     def apply_K(self, X: Array) -> Array:
-        """K X, (n_local, k)."""
+        """K X, (n_local, k), in units of K times those of X (n_local, k)."""
 
     def apply_M(self, X: Array) -> Array:
-        """M X, (n_local, k)."""
+        """M X, (n_local, k), in units of M times those of X (n_local, k)."""
 
     def gram(self, X: Array, Y: Array) -> Array:
-        """X^T Y summed over the ranks; any two arrays with equally distributed rows."""
+        """(k, l) X^T Y summed over the ranks, in units of their product.
+
+        Any two arrays (n_local, k) and (n_local, l) with equally distributed rows.
+        """
 
     def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Held:
         """Eliminate the held dofs (global numbers, equal on all ranks) and factor the rest.
@@ -89,12 +95,21 @@ class Operators(Protocol):
         *,
         finished: bool = False,
     ) -> tuple[Array, Array]:
-        """Lowest m modes with the given dofs held: (omega (m,), Phi (n_local, m)).
+        """Lowest m modes with the given dofs held.
 
         Accepts what `hold` returned, to use its factor again; with ``finished`` nobody else will,
-        and its memory may be used for counting. Mass-normalised, ascending, largest
-        entry positive. The shift sigma is chosen from the model when not given. With nothing held
-        the six rigid motions come first with omega exactly zero.
+        and its memory may be used for counting. With nothing held the six rigid motions come first
+        with omega exactly zero.
+
+        Args:
+            held: (k,) dof numbers, or what `hold` returned.
+            m: number of modes.
+            sigma: shift [rad^2/s^2]; chosen from the model when not given.
+            finished: nobody else will use the factor.
+
+        Returns:
+            omega (m,) [rad/s], ascending, and Phi (n_local, m), mass-normalised, largest entry
+            positive [kg^-1/2].
 
         Raises:
             ModesMissedError: if the inertia count says a mode was skipped.
@@ -107,23 +122,46 @@ class Operators(Protocol):
             T: sparse (n_local, n_a) rows of this process, global columns. Columns of kept dofs
                 stay on the rank that owns them, in their order; further columns come last, on the
                 last rank.
-            rigid: (n_local_a, 6) the rigid motions in a; its length is the size of this rank.
+            rigid: (n_local_a, 6) the rigid motions in a, in units of a; its length is the size of
+                this rank.
         """
 
     def expand(self, A: Array) -> Array:
-        """T A: from the coordinates of `transform` back to (rows of the parent, k)."""
+        """T A, in units of the parent: from the coordinates of `transform` back to it.
+
+        Args:
+            A: (n_local, k) in the coordinates of `transform`, in units of these.
+
+        Returns:
+            (n_parent, k) rows of this rank.
+        """
 
     def restrict(self, F: Array) -> Array:
-        """T^T F: loads (rows of the parent, k) in the coordinates of `transform`."""
+        """T^T F: loads in the coordinates of `transform`.
+
+        Args:
+            F: (n_parent, k) loads on the rows of the parent, in units of any kind.
+
+        Returns:
+            (n_local, k), in units of F times those of T.
+        """
 
     def rows(self, X: Array, dofs: npt.ArrayLike) -> Array:
-        """X[dofs] for global dof numbers, (n_dofs, k) equal on all ranks."""
+        """X[dofs] (k, l) for global dof numbers (k,), equal on all ranks.
+
+        Args:
+            X: (n_local, l) rows of this rank, in units of any kind.
+            dofs: (k,) global dof numbers.
+
+        Returns:
+            (k, l), in units of X.
+        """
 
     def plus_mass(self, dM: Any) -> "Operators":
         """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
 
     def product(self, A: Any, X: Array) -> Array:
-        """A X for a matrix with the layout of K, (n_local, k)."""
+        """A X for a matrix with the layout of K, (n_local, k), in units of A times those of X."""
 
     def varied(
         self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
@@ -133,12 +171,19 @@ class Operators(Protocol):
         Args:
             stiffness: (k, [(k_i, K_i), ...]), matrices with the layout of K.
             mass: (m, [(m_i, M_i), ...]).
-            rigid: (n_local, 6) its rigid motions; None if they are the same.
+            rigid: (n_local, 6) its rigid motions [1, m]; None if they are the same.
         """
 
 
 def canonical_signs(Phi: Array) -> Array:
-    """Turn each column so that its largest entry is positive; the first of equals decides."""
+    """Turn each column so that its largest entry is positive; the first of equals decides.
+
+    Args:
+        Phi: (n, m) columns, in units of any kind; changed in place.
+
+    Returns:
+        The same array (n, m), in units of the one given.
+    """
     for phi in Phi.T:
         size = np.abs(phi)
         if phi[np.argmax(size >= (1 - 1e-6) * size.max(initial=0.0))] < 0:
@@ -150,11 +195,11 @@ def count_shift(lam: Array, m: int) -> tuple[int, float]:
     """Where to count: the widest relative gap behind the m-th of some more eigenvalues.
 
     Args:
-        lam: (k,) ascending eigenvalues, k > m, not all zero.
+        lam: (k,) ascending eigenvalues [rad^2/s^2], k > m, not all zero.
         m: number of modes wanted.
 
     Returns:
-        The number of eigenvalues below the gap and a shift inside it.
+        The number of eigenvalues below the gap and a shift inside it [rad^2/s^2].
     """
     upper, lower = lam[m:], lam[m - 1 : -1]
     j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), np.abs(lam[-1]) * 1e-12)))
@@ -167,7 +212,7 @@ def whole_clusters(lam: Array, m: int) -> int:
     One of two equal modes would prefer a direction that the structure does not have.
 
     Args:
-        lam: (k,) ascending eigenvalues.
+        lam: (k,) ascending eigenvalues [rad^2/s^2].
         m: number of modes wanted, 1 <= m <= k.
     """
     while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER_RTOL * lam[m]:
@@ -176,7 +221,15 @@ def whole_clusters(lam: Array, m: int) -> int:
 
 
 def orthonormal(ops: Mass, X: Array) -> Array:
-    """M-orthonormal columns with the span of X, in the order given."""
+    """M-orthonormal columns with the span of X, in the order given.
+
+    Args:
+        ops: its mass is the weight.
+        X: (n_local, k) columns, in units of any kind: their lengths do not matter.
+
+    Returns:
+        (n_local, l) columns of mass one [kg^-1/2], l <= k.
+    """
     return without_dependent(ops, X)[0]
 
 
@@ -186,7 +239,15 @@ def without_dependent(ops: Mass, X: Array) -> tuple[Array, list[int]]:
 
 
 def orthonormal_in(S: Any, V: Array) -> Array:
-    """S-orthonormal columns with the span of V, in the order given; sums over one process."""
+    """S-orthonormal columns with the span of V, in the order given; sums over one process.
+
+    Args:
+        S: (n, n) symmetric positive weight.
+        V: (n, k) columns, in units of any kind: their lengths do not matter.
+
+    Returns:
+        (n, l) columns with V^T S V = 1, in units of S to the power -1/2; l <= k.
+    """
     return independent(V, lambda A, B: A.T @ (S @ B))[0]
 
 
@@ -226,7 +287,7 @@ def _length(x: Array, product: Product) -> float:
 
 
 def given_rigid_motions(ops: Operators) -> Array:
-    """The (n_local, 6) rigid motions of a body.
+    """The (n_local, 6) rigid motions of a body: translations [1] and rotations [m].
 
     Raises:
         ModelError: if its operators were made without geometry.
@@ -245,7 +306,7 @@ def dofs_of(nodes: Index) -> Index:
 
 
 def rigid_motions(points: Array) -> Array:
-    """(3k, 6) displacements of k points: unit translations, unit rotations about the origin.
+    """(3k, 6) displacements of k points: unit translations [1], rotations about the origin [m].
 
     Args:
         points: (k, 3) coordinates [m].
@@ -260,7 +321,7 @@ def rigid_motions(points: Array) -> Array:
 
 
 def mean_motion(interface: Interface) -> Array:
-    """(6, 3k) translation and rotation of a surface, least squares over its area.
+    """(6, 3k) translation [1] and rotation [1/m] of a surface, least squares over its area.
 
     C = (R^T S R)^-1 R^T S with R the rigid motions about the origin of the interface and S the
     surface mass: the rigid motion c = C u leaves the smallest integral of |u - R c|^2.
@@ -284,12 +345,12 @@ def mean_motion(interface: Interface) -> Array:
 
 
 def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
-    """Modal assurance criterion with the mass as weight, (k, l) in [0, 1].
+    """Modal assurance criterion with the mass as weight, (k, l) between 0 and 1 [1].
 
     Args:
         ops: operators of the model the shapes belong to.
-        Phi: (n_local, k) shapes.
-        Psi: (n_local, l) shapes.
+        Phi: (n_local, k) shapes, in units of any length, for each is normalised.
+        Psi: (n_local, l) shapes, likewise in units of any length.
     """
     cross = ops.gram(Phi, ops.apply_M(Psi))
     return cross**2 / np.outer(_squares(ops, Phi), _squares(ops, Psi))
@@ -298,14 +359,14 @@ def mac(ops: Operators, Phi: Array, Psi: Array) -> Array:
 def residual_errors(
     ops: Operators, inverse: Held, X: Array, *, seen_in: Operators | None = None
 ) -> Array:
-    """(k,) frequency errors r^T K^-1 r / (2 x^T K x) of modes of a basis, r = K x - lambda M x.
+    """(k,) relative frequency errors [1] of modes of a basis, r^T K^-1 r / (2 x^T K x).
 
-    Asymptotically exact, not a bound.
+    With the residual r = K x - lambda M x; asymptotically exact, not a bound.
 
     Args:
         ops: operators of the model the shapes belong to.
         inverse: stiffness, factored, of the dofs on which the basis leaves a residual.
-        X: (n_local, k) shapes.
+        X: (n_local, k) shapes [m].
         seen_in: other coordinates of the same model, in which equilibrium is asked for and those
             of ``inverse``.
     """
