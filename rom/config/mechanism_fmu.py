@@ -59,6 +59,7 @@ def write_mechanism_fmu(
         FileFormatError: if the file is gone.
         ModelError: if the mechanism cannot be built.
         ResourceError: as `rom.write_fmu`.
+        UnsafeFileError: if the file is larger than such a file can be.
     """
     simulation = file.values["simulation"]
     step = simulation.get("dt") if dt is None else dt

@@ -55,7 +55,7 @@ def write_fmu(
         inputs: names of loads, spread loads, motors or drives.
         outputs: "body.marker", names of joints or drives.
         dt: longest time step [s]; a communication step is divided into equal ones.
-        rho_inf: spectral radius of generalised-alpha at infinite frequency.
+        rho_inf: spectral radius of generalised-alpha at infinite frequency [1].
         files: what the Python file reads or imports; put beside it.
 
     Raises:

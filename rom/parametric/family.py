@@ -94,13 +94,13 @@ class BodyFamily:
         extrapolate: bool = False,
         **values: float,
     ) -> Array:
-        """Natural frequencies [Hz] at some values, without the rest of the body.
+        """(k,) natural frequencies [Hz] at some values, without the rest of the body.
 
         Args:
             n: how many, lowest first; None for all.
             fixed: names of the interfaces held; with none the six zeros of rigid motion come first.
             extrapolate: see `at`.
-            values: see `at`.
+            values: see `at` [1].
 
         Raises:
             ParameterError, InterfaceError: see `at` and `FlexibleBody.frequencies`.

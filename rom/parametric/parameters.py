@@ -27,8 +27,8 @@ class Parameter:
 
     Attributes:
         region: name of the region; None for the whole body, masses carried by interfaces excluded.
-        low: smallest factor.
-        high: largest factor.
+        low: smallest factor [1].
+        high: largest factor [1].
 
     Raises:
         ParameterError: unless 0 < low <= high.
@@ -61,7 +61,11 @@ class Parameter:
 
     @typed
     def inside(self, share: float) -> float:
-        """The factor at a share (0 to 1) of the range, in equal ratios."""
+        """The factor [1] at a share [1] of the range, 0 to 1, in equal ratios.
+
+        Raises:
+            ParameterError: for another share.
+        """
         if not 0.0 <= share <= 1.0:
             raise ParameterError(f"share = {share:g} is not within 0 and 1.", where=str(self))
         return float(self.low * (self.high / self.low) ** share)
@@ -72,6 +76,9 @@ class YoungsModulus(Parameter):
 
     Attributes:
         region, low, high: see `Parameter`.
+
+    Raises:
+        ParameterError: as `Parameter`.
     """
 
     __slots__ = ()
@@ -82,6 +89,9 @@ class Density(Parameter):
 
     Attributes:
         region, low, high: see `Parameter`.
+
+    Raises:
+        ParameterError: as `Parameter`.
     """
 
     __slots__ = ()
@@ -96,6 +106,9 @@ class Thickness(Parameter):
     Attributes:
         region, low, high: see `Parameter`.
         axis: "x", "y" or "z", along which the layer is thin; no other region may lie beside it.
+
+    Raises:
+        ParameterError: as `Parameter`, or for another axis.
     """
 
     axis: str = "z"

@@ -69,8 +69,8 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         damping: structural damping, made anew at every point.
         name: name of the bodies.
         stress: make the stress on the outer surface recoverable.
-        tol: relative error of the first frequencies that is accepted; where the method alone has
-            nearly as much at the centre, more points are no cure.
+        tol: relative error of the first frequencies that is accepted [1]; where the method alone
+            has nearly as much at the centre, more points are no cure.
         certify: compare with full models at points that were not sampled.
 
     Returns:
@@ -80,6 +80,12 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         ParameterError: for a wrong parameter or an unknown region.
         InterfaceError, ConfigError: for a wrong interface, kind, method, reference or tolerance.
         ModesMissedError: if the inertia count says that a mode was skipped.
+        ModelError: if the basis misses a rigid motion or has columns that depend on each other.
+
+    Source:
+        Bases at several points joined into one: Benner, Gugercin and Willcox, A survey of
+        projection-based model reduction methods for parametric dynamical systems, SIAM Review
+        57 (2015) 483.
     """
     check_name(name, "a body")
     clock = perf_counter()

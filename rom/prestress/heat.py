@@ -46,7 +46,7 @@ class Heat:
             )
 
     def on(self, model: FEModel) -> tuple[dict[str, float], dict[str, float], Array]:
-        """Expansion and temperature of each region, and what nodes (n / 3,) add to the latter.
+        """Expansion [1/K] and temperature [K] of each region; what nodes (n / 3,) add to this [K].
 
         Raises:
             ConfigError: if a region is unknown, numbers are not finite or do not fit the nodes.
@@ -65,7 +65,7 @@ class Heat:
         return alpha, dict.fromkeys(names, 0.0), values
 
     def described(self, share: float) -> str:
-        """A share of the temperature, for messages."""
+        """A share [1] of the temperature, for messages."""
         given = self.temperature
         if not isinstance(given, Mapping) and not callable(given) and np.ndim(given) == 0:
             return f"a temperature change of {share * float(given):.5g} K"  # type: ignore[arg-type]

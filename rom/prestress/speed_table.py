@@ -48,7 +48,7 @@ class SpeedTable(ABC):
         return float(self.speeds[-1])
 
     def weights(self, speed: float) -> Array:
-        """(k,) of the tabulated states at a speed.
+        """(k,) weights [1] of the tabulated states at a speed [rad/s].
 
         Raises:
             ConfigError: if the speed is above the highest.
@@ -69,7 +69,11 @@ class SpeedTable(ABC):
         return cyclic_modes(self.at(speed), diameter, n, speed=speed)
 
     def waves(self, n: int, *, speed: float, diameter: int = 0) -> TravellingModes:
-        """Complex modes about the steady state; see `rom.travelling_modes`."""
+        """Complex modes about the steady state; see `rom.travelling_modes`.
+
+        Raises:
+            ConfigError: as `rom.travelling_modes`, or if the speed is above the highest.
+        """
         return travelling_modes(self.at(speed), diameter, n, speed=speed)
 
 
@@ -79,8 +83,10 @@ class ReducedSpinUp(SpeedTable):
     """Few coordinates that follow the steady state, `SpinUp.reduced`.
 
     Attributes:
+        speeds: (k,) tabulated angular speeds [rad/s], ascending from zero.
+        omega: lowest circular frequency at rest, which sets the scale [rad/s].
         sectors: the reduced sector at each tabulated speed, in coordinates that correspond.
-        error: relative error of the lowest frequencies half-way between the two speeds in the
+        error: relative error [1] of the lowest frequencies half-way between the two speeds in the
             middle, against the full model in its own steady state there.
     """
 
@@ -101,7 +107,11 @@ class ReducedSpinUp(SpeedTable):
         return Report("certificate of the spin-up", (*rows, between))
 
     def at(self, speed: float) -> ReducedSector:
-        """The reduced sector at a speed [rad/s], interpolated."""
+        """The reduced sector at a speed [rad/s], interpolated.
+
+        Raises:
+            ConfigError: if the speed is above the highest.
+        """
         weights = self.weights(speed)
         mean = {
             name: sum(
@@ -153,7 +163,12 @@ class SpinUp(SpeedTable):
         return self.steady.T @ a
 
     def at(self, speed: float) -> CyclicSector:
-        """The sector in its own steady state at a speed [rad/s], for vibrations at this speed."""
+        """The sector in its own steady state at a speed [rad/s], for vibrations at this speed.
+
+        Raises:
+            ConfigError: if the speed is above the highest.
+            ModelError: if no stable state is found there.
+        """
         K_t = self.steady.solid.tangent(self.displacement(speed))
         return replace(self.sector, K=csr_matrix(self.sector.K + K_t - self.steady.K_cold))
 

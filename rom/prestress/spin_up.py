@@ -45,6 +45,10 @@ def spin_up(
         ModelError: if the solid passes an instability on its way; the message says where, and
             ``error.solution`` holds the states below.
         ParallelError: on several processes.
+
+    Source:
+        St. Venant-Kirchhoff solid with forces that follow, Newton's method along the speed:
+        Wriggers, Nonlinear Finite Element Methods (2008); see docs/theory/rotating_solids.md.
     """
     positive("speed", speed)
     whole("n_states", n_states, 2, reason="rest and the top")
@@ -89,7 +93,7 @@ def held_solid(
     Args:
         model: the solid, on one process.
         fixed: names of the interfaces that are held.
-        axis: (3,) direction of the axis of rotation.
+        axis: (3,) direction of the axis of rotation [1].
         at: (3,) a point of it [m].
 
     Raises:

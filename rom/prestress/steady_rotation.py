@@ -49,11 +49,11 @@ class SteadyRotation:
 
     @property
     def at_rest(self) -> Array:
-        """(f,) independent dofs without displacement."""
+        """(f,) independent dofs without displacement [m]."""
         return np.zeros(self.T.shape[1])
 
     def independent(self, u: Array) -> Array:
-        """(f,) independent dofs of a displacement (n,) that is equal in all sectors."""
+        """(f,) independent dofs of a displacement (n,) that is equal in all sectors [m]."""
         return u[self.kept]
 
     def load(self, square: float) -> None:
@@ -61,18 +61,18 @@ class SteadyRotation:
         self.square = square
 
     def residual(self, a: Array) -> Array:
-        """(f,) forces out of balance."""
+        """(f,) forces out of balance [N] at the displacement a (f,) [m]."""
         u = self.T @ a
         found: Array = self.solid.force(u) - self.square * (self.pull + self.softening @ u)
         return self.T.T @ found
 
     def tangent(self, a: Array) -> csr_matrix:
-        """(f, f) their derivative."""
+        """(f, f) their derivative [N/m] at the displacement a (f,) [m]."""
         K = self.solid.tangent(self.T @ a) - self.square * self.softening
         return csr_matrix(self.T.T @ K @ self.T)
 
     def newton(self, a: Array) -> Array | None:
-        """The equilibrium near some displacement; None if it is not found or not stable."""
+        """(f,) the equilibrium near a displacement [m]; None if it is not found or not stable."""
         for _ in range(MAX_ITERATIONS):
             lu = _factor(self.tangent(a)[self.free][:, self.free])
             if lu is None:
@@ -93,13 +93,13 @@ class SteadyRotation:
         """The equilibrium at the end of a stretch of load, or the last that is stable.
 
         Args:
-            a: (f,) equilibrium at the start.
-            start: first value of the load.
-            end: last value.
+            a: (f,) equilibrium at the start [m].
+            start: first value of the load [1 or (rad/s)^2].
+            end: last value [1 or (rad/s)^2].
             load: sets the load.
 
         Returns:
-            The equilibrium and its load, which falls short of the end where the path does.
+            The equilibrium (f,) [m] and its load, which falls short of the end where the path does.
         """
         now, step, slope = start, end - start, np.zeros_like(a)
         while now != end:

@@ -48,6 +48,11 @@ def heated(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> FEMode
         InterfaceError: if an interface is unknown, or the supports leave a rigid motion.
         ModelError: if the solid buckles below this temperature; the message says where.
         ParallelError: on several processes.
+
+    Source:
+        Initial stress by temperature and its geometric stiffness: Cook, Malkus, Plesha and
+        Witt, Concepts and Applications of Finite Element Analysis (2002), chapters on thermal
+        and stress stiffening; see docs/theory/rotating_solids.md.
     """
     solid, K, K_geo, held = _stressed(model, heat, fixed)
     _refuse_buckled([_loose(held, K, K_geo)], heat)
@@ -80,6 +85,9 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
     Raises:
         ConfigError: if the model has no finite elements, or a region is unknown.
         ModelError: if the wheel buckles below this temperature; the message says where.
+
+    Source:
+        See docs/theory/rotating_solids.md for heat and rotation of wheels.
     """
     solid = finite_solid(model, heat)
     _, K_geo = _thermal(solid, sector.harmonic(0), axial_pins(sector), sector.M)
@@ -89,7 +97,7 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
 
 @typed
 def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> float:
-    """Factor on the temperature at which the solid buckles; infinite if it never does.
+    """Factor [1] on the temperature at which the solid buckles; infinite if it never does.
 
     The smallest positive tau with a singular K + tau K_geo; cooling has another one.
 
@@ -100,6 +108,10 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ())
 
     Raises:
         ConfigError, InterfaceError: see `heated`.
+
+    Source:
+        Linear buckling K + tau K_geo: Cook, Malkus, Plesha and Witt, Concepts and Applications
+        of Finite Element Analysis (2002).
     """
     _, K, K_geo, held = _stressed(model, heat, fixed)
     return critical_factor(*_loose(held, K, K_geo))

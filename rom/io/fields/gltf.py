@@ -33,10 +33,10 @@ class MovingMesh:
         points: (n, 3) undeformed, body frame [m].
         triangles: (t, 3) corners, seen from outside counter-clockwise.
         origin: (f, 3) origin of its frame [m].
-        orientation: (f, 4) quaternion of its frame, scalar first.
-        shapes: (3 n, r) displacement per unit of each elastic coordinate.
-        q: (f, r) elastic coordinates.
-        colour: (3,) red, green, blue from 0 to 1.
+        orientation: (f, 4) quaternion of its frame, scalar first [1].
+        shapes: (3 n, r) displacement per unit of each elastic coordinate [m].
+        q: (f, r) elastic coordinates, in units of the shapes.
+        colour: (3,) red, green, blue from 0 to 1 [1].
     """
 
     name: str
@@ -95,11 +95,12 @@ def write_glb(
         bodies: what is seen.
         times: (f,) when each instant is shown, ascending from zero [s].
         path: file to write.
-        up: (3,) upright direction of the world, which the format calls y.
+        up: (3,) upright direction of the world [1], which the format calls y.
         title: name of the scene.
 
     Raises:
         ConfigError: if the place is not writable.
+        ResourceError: if the disk is full.
     """
     generator = {"version": "2.0", "generator": "fenicsx-rom"}
     document = _Document({"asset": generator, "scene": 0})

@@ -27,7 +27,7 @@ def write_vtkhdf(
         triangles: (t, 3) corners, the same at all instants.
         times: (f,) [s].
         path: file ending in ``.vtkhdf``.
-        fields: {name: (f, n) or (f, n, c) values at the points}.
+        fields: {name: (f, n) or (f, n, c) values at the points, in their own units}.
 
     Raises:
         ConfigError: if the place is not writable.

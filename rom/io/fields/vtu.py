@@ -29,6 +29,7 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
 
     Raises:
         ConfigError: if the body has no surface, or the place is not writable.
+        ResourceError: if the disk is full.
     """
     if body.surface is None:
         raise ConfigError(f"body {body.name!r} has no surface to draw.")
@@ -45,13 +46,15 @@ def write_stress(
 
     Args:
         body: a body reduced with ``stress=True``.
-        q: (r,) elastic coordinates.
+        q: (r,) elastic coordinates, in units of the body's shapes.
         path: file ending in ``.vtu``.
-        accelerations: see `rom.body.recovery.StressRecovery.accelerations`; None for statics.
+        accelerations: (6 + r,) see `rom.body.recovery.StressRecovery.accelerations`; None for
+            statics.
 
     Raises:
         ConfigError: if the stress of the body cannot be recovered, q has another length, or the
             place is not writable.
+        ResourceError: if the disk is full.
     """
     if body.stress is None or body.surface is None:
         raise ConfigError(
@@ -79,6 +82,7 @@ def write_stress_history(
 
     Raises:
         ConfigError: if the stress of the body cannot be recovered, or the place is not writable.
+        ResourceError: if the disk is full.
     """
     whole("every", every, 1)
     path = Path(path)

@@ -47,7 +47,7 @@ def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
 
 
 def read_grids(path: str | Path) -> tuple[Index, Array]:
-    """Labels (k,) and positions (k, 3) of the GRID cards, which must be in the basic system.
+    """Labels (k,) and positions (k, 3) of GRID cards in the basic system, in units of the file.
 
     Raises:
         FileFormatError: naming the line, for a card that is damaged or in another system.
@@ -74,10 +74,12 @@ def write_dmig(
         matrices: {name of at most 8 characters: (n, n)}.
         dofs: (n, 2) label and component of each row; component 0 for a scalar point.
         path: file to write.
-        nodes: {label: (3,) position}, written as GRID cards, with the scalar points as SPOINT.
+        nodes: {label: (3,) position, in units of the matrices}, written as GRID cards, with the
+            scalar points as SPOINT.
 
     Raises:
         ConfigError: if the place is not writable.
+        ResourceError: if the disk is full.
     """
     lines = [f"$ {ORIGIN_MARK}", *_points(dofs, nodes)] if nodes else []
     for name, A in matrices.items():

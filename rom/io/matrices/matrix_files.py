@@ -76,6 +76,7 @@ def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
 
     Raises:
         ConfigError: if the place is not writable.
+        ResourceError: if the disk is full.
     """
     found = coo_matrix(np.tril(A) if isinstance(A, np.ndarray) else A)
     lines = [

@@ -19,7 +19,7 @@ MOST_NESTED, MOST_NODES = 200, 100_000_000  # sets in sets, nodes in a set
 
 
 def read_nodes(nodes: Any) -> tuple[Index, Array]:
-    """Ascending labels (k,) and positions (k, 3).
+    """Ascending labels (k,) and positions (k, 3), in units of the file.
 
     Args:
         nodes: both; or a file: ``.inp``, ``.bdf``, ``.dat`` or ``.csv``.
@@ -59,7 +59,7 @@ def _node_file(path: Path) -> tuple[Index, Array]:
 
 
 def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]:
-    """Labels of the nodes of sets, ``*NSET`` or ``*NODE, NSET=``, of an input deck.
+    """{name: (k,) labels} of the nodes of sets, ``*NSET`` or ``*NODE, NSET=``, of an input deck.
 
     Args:
         path: the deck, ``.inp``.

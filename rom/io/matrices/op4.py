@@ -88,6 +88,7 @@ def write_op4(matrices: dict[str, Any], path: str | Path) -> Path:
 
     Raises:
         ConfigError: if the place is not writable.
+        ResourceError: if the disk is full.
     """
     text = "".join(_written(name, csc_matrix(A)) for name, A in matrices.items())
     write_whole(path, lambda file: file.write(text.encode("ascii")))

@@ -41,12 +41,12 @@ def read_model(
         K: stiffness of the body without supports: file, or (file, name), see
             `rom.io.matrices.matrix_files.read_matrix`.
         M: mass, likewise; the same along x, y and z, as that of solid elements.
-        nodes: (k,) labels and (k, 3) positions; or a file: ``.inp`` with ``*NODE``, ``.bdf`` or
-            ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``. Rows of matrices
-            without labels are those of the nodes in ascending order, 3 or 6 for each; where all
-            rows have labels, nodes without a row are left out.
-        interfaces: {name: labels of its nodes}, or names of ``*NSET`` in the ``.inp`` of the nodes;
-            all nodes of an interface weigh the same.
+        nodes: (k,) labels and (k, 3) positions, in units of the files; or a file: ``.inp`` with
+            ``*NODE``, ``.bdf`` or ``.dat`` with GRID cards, ``.csv`` with lines ``label, x, y, z``.
+            Rows of matrices without labels are those of the nodes in ascending order, 3 or 6 for
+            each; where all rows have labels, nodes without a row are left out.
+        interfaces: {name: (m,) labels of its nodes}, or names of ``*NSET`` in the
+            ``.inp`` of the nodes; all nodes of an interface weigh the same.
         units: unit system of the files; the model is in SI.
 
     Raises:

@@ -77,10 +77,12 @@ def write_user_element(
         matrices: {type, e.g. "STIFFNESS": (n, n)}.
         dofs: (n, 2) label and component of each row, node by node; component 0 becomes 1.
         path: file to write.
-        nodes: {label: (3,) position}; nodes without one, as those of modes, lie at the origin.
+        nodes: {label: (3,) position, in units of the matrices}; nodes without one, as those of
+            modes, lie at the origin.
 
     Raises:
         ConfigError: if the place is not writable.
+        ResourceError: if the disk is full.
     """
     text = "\n".join(_document(matrices, np.asarray(dofs), nodes)) + "\n"
     write_whole(path, lambda file: file.write(text.encode("ascii")))

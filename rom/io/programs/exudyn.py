@@ -120,6 +120,7 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
 
     Raises:
         ConfigError: if the place is not writable.
+        ResourceError: if the disk is full.
 
     Warns:
         RomWarning: if the shapes move the mass centre, which gravity in Exudyn does not see.

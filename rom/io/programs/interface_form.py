@@ -19,7 +19,8 @@ class InterfaceForm:
     """Craig-Bampton form: interface motions first, then modes with all interfaces held.
 
     Attributes:
-        K, M, D: (n, n) stiffness, mass, damping of small motions, rigid ones included.
+        K, M, D: (n, n) stiffness, mass, damping of small motions, in units of the body, rigid ones
+            included.
         dofs: (n, 2) label and component: interfaces are 1, 2, … in their order, with components 1
             to 3 translations [m] and 4 to 6 rotations [rad]; modes are 1001, … with component 0.
         points: {label: (3,) position of the interface [m]}.

@@ -41,6 +41,7 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
     Raises:
         ConfigError: if there is no shape or no interface, names become equal without their
             blanks, or the place is not writable.
+        ResourceError: if the disk is full.
     """
     if not body.n_modes or not body.markers:
         raise ConfigError(

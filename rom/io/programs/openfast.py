@@ -50,6 +50,7 @@ def write_openfast(
         ConfigError: if not exactly one interface is free, the version is unknown, or the place is
             not writable.
         ModelError: if the shapes do not let the interfaces move one by one.
+        ResourceError: if the disk is full.
     """
     if version not in VERSIONS:
         raise ConfigError(f"version {version!r} of OpenFAST is unknown; known: {VERSIONS}.")

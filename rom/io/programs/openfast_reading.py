@@ -30,9 +30,10 @@ class Superelement:
     """What a file holds; n is 6 and the number of modes.
 
     Attributes:
-        M, K, D: (n, n) mass, stiffness, damping.
-        weight: (n,) constant weight; zero in files up to version 4, which have it in the loads.
-        K_W: (n, n) the weight is ``weight - K_W q``; zero in files up to version 4.
+        M, K, D: (n, n) mass [kg], stiffness [N/m], damping [N s/m], moments and rotations likewise.
+        weight: (n,) constant weight [N, N m]; zero in files up to version 4, which have it in the
+            loads.
+        K_W: (n, n) [N/m, N m/rad]: the weight is ``weight - K_W q``; zero in files up to version 4.
         t: (k,) times [s], evenly spaced; none in files of version 5.
         loads: (k, n) forces and moments on the interface [N], [N m], and on the modes.
         elevation: (k,) of the waves [m]; zero where the file has none.

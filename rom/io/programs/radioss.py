@@ -35,6 +35,7 @@ def write_radioss(
         ConfigError: if the body keeps modes, has too few interfaces or all on a line, a label is
             missing or not a number of a node, or the place is not writable.
         ModelError: if the shapes of the body do not let its interfaces move one by one.
+        ResourceError: if the disk is full.
     """
     form = interface_form(body)
     if form.omega.size:

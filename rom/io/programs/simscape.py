@@ -30,6 +30,7 @@ def write_simscape(body: FlexibleBody, path: str | Path) -> Path:
     Raises:
         ConfigError: if an interface is not rigid or averaged, or the place is not writable.
         ModelError: if the shapes of the body do not let its interfaces move one by one.
+        ResourceError: if the disk is full.
     """
     form = interface_form(body)
     variables = {

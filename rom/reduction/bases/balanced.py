@@ -28,7 +28,10 @@ class BalancedTruncation:
     Attributes:
         n_modes: number of combinations kept.
         pool: number of fixed-interface modes to choose from; None for three times as many.
-        damping_ratio: modal damping of the pool, for the choice only.
+        damping_ratio: modal damping of the pool [1], for the choice only.
+
+    Raises:
+        ConfigError: for numbers of modes or a damping that cannot be.
 
     Source:
         Chahlaoui, Lemonnier, Vandendorpe and Van Dooren, Second-order balanced truncation, Linear
@@ -49,12 +52,13 @@ class BalancedTruncation:
             raise ConfigError(f"damping_ratio = {self.damping_ratio!r} is not between 0 and 1.")
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis; interface columns first.
+        """The basis for the interface dofs (n_b,); their columns first.
 
         Raises:
             ConfigError: without an interface, or for a pool beyond the dofs.
             ResourceError: for a pool too large for dense equations.
             InterfaceError: if the interfaces leave a rigid motion free.
+            ModelError: if the pool with its damping is not stable.
         """
         if boundary.size == 0:
             raise ConfigError("the method holds the interfaces of the body, and none is given.")
@@ -103,11 +107,11 @@ def second_order_balanced_truncation(
     """Reduce a small second-order system to its r most controllable and observable positions.
 
     Args:
-        K: (n, n) stiffness of a stable system.
-        M: (n, n) mass.
-        D: (n, n) damping.
-        B: (n, p) input.
-        C: (q, n) position output.
+        K: (n, n) stiffness of a stable system [N/m].
+        M: (n, n) mass [kg].
+        D: (n, n) damping [N s/m].
+        B: (n, p) force per unit of each input [N].
+        C: (q, n) output per position [1/m].
         r: number of coordinates kept.
 
     Raises:

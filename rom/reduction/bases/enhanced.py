@@ -26,6 +26,9 @@ class EnhancedCraigBampton:
     Attributes:
         n_modes: number of fixed-interface modes.
 
+    Raises:
+        ConfigError: if n_modes is no number of modes.
+
     Source:
         Kim and Lee, An enhanced Craig-Bampton method, Int. J. Numer. Meth. Eng. 103 (2015) 79.
     """
@@ -36,7 +39,7 @@ class EnhancedCraigBampton:
         whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis; interface columns first.
+        """The basis for the interface dofs (n_b,); their columns first.
 
         Raises:
             ConfigError: without an interface, or for too many modes.

@@ -27,6 +27,9 @@ class Rubin:
     Attributes:
         n_modes: number of elastic free-free modes.
 
+    Raises:
+        ConfigError: if n_modes is no number of modes.
+
     Source:
         Rubin, Improved component-mode representation for structural dynamic analysis, AIAA J. 13
         (1975) 995; Craig and Chang, NASA CR-145123 (1977); inertia relief after MacNeal, Comput.
@@ -39,7 +42,7 @@ class Rubin:
         whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis; interface columns first, then rigid motions and free-free modes.
+        """The basis: columns of the interface dofs (n_b,), then rigid motions and free-free modes.
 
         Raises:
             ConfigError: without an interface, or for more modes than there are dofs.
@@ -64,6 +67,9 @@ class Herting:
     Attributes:
         n_modes: number of elastic free-free modes.
 
+    Raises:
+        ConfigError: if n_modes is no number of modes.
+
     Source:
         Herting, A general purpose, multi-stage, component modal synthesis method, Finite Elem.
         Anal. Des. 1 (1985) 153.
@@ -75,7 +81,7 @@ class Herting:
         whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis; interface columns first.
+        """The basis for the interface dofs (n_b,); their columns first.
 
         Raises:
             ConfigError: without an interface, or for more modes than there are dofs.
@@ -104,6 +110,9 @@ class FreeFree:
     Attributes:
         n_modes: number of elastic free-free modes.
 
+    Raises:
+        ConfigError: if n_modes is no number of modes.
+
     Source:
         O'Shea, Jayakumar, Mechergui, Shabana and Wang, J. Comput. Nonlinear Dynam. 13 (2018)
         041007, on reference conditions and the choice of modes.
@@ -115,7 +124,7 @@ class FreeFree:
         whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis: rigid motions, then free-free modes; no interface column.
+        """The basis: rigid motions, then free-free modes; no column for the interface dofs (n_b,).
 
         Raises:
             ConfigError: for more modes than there are dofs.

@@ -28,6 +28,9 @@ class MomentMatching:
         frequencies: (k,) where to be exact [Hz]; 0 is allowed and costs no other factor.
         order: blocks of vectors per frequency, 1 or more.
 
+    Raises:
+        ConfigError: for frequencies below zero or given twice, or an order below one.
+
     Source:
         Grimme, Krylov projection methods for model reduction, thesis, Urbana-Champaign (1997);
         for second-order systems Bai and Su, SIAM J. Sci. Comput. 26 (2005) 1692.
@@ -47,7 +50,7 @@ class MomentMatching:
             )
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis; interface columns first, then combinations that are modes of the inner part.
+        """The basis: columns of the interface dofs (n_b,), then modes of the inner part.
 
         Raises:
             ConfigError: without an interface.

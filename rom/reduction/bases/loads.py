@@ -35,7 +35,7 @@ class WithLoads:
     loads: Any = "gravity"
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis; interface columns, answers to the loads, then the columns of the method.
+        """The basis: columns of the interface dofs (n_b,), answers to loads, columns of the method.
 
         Raises:
             ConfigError: if the loads do not fit the body, or it has no geometry to weigh.

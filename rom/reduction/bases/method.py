@@ -21,7 +21,7 @@ class Method(Protocol):
     """What `rom.reduce` needs of a method."""
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis in interface coordinates; boundary columns first."""
+        """The basis in interface coordinates; columns of the boundary (n_b,) first."""
 
 
 @typed
@@ -34,7 +34,12 @@ class Guyan:
     """
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis in interface coordinates."""
+        """The basis in interface coordinates, those of the boundary (n_b,).
+
+        Raises:
+            ConfigError: without any interface.
+            InterfaceError: if the interfaces leave a rigid motion free.
+        """
         return CraigBampton(n_modes=0).basis(ops, boundary, labels)
 
 
@@ -50,10 +55,13 @@ class CraigBampton:
     Attributes:
         n_modes: number of fixed-interface modes; a repeated frequency is kept whole.
         f_max: alternatively, keep all fixed-interface modes up to this frequency [Hz].
-        tol: keep instead the fewest modes whose estimated error of every natural frequency of
+        tol: keep instead the fewest modes whose estimated error [1] of every natural frequency of
             the free body up to f_max is at most this, e.g. 1e-3; without f_max, of the lowest
             six in every support, 5e-4 if not given.
         supports: columns of the interfaces that are held for this, which `rom.reduce` fills in.
+
+    Raises:
+        ConfigError: if both n_modes and f_max are given, or for numbers out of range.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
@@ -82,7 +90,7 @@ class CraigBampton:
         return self.n_modes is None and (self.f_max is None or self.tol is not None)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis in interface coordinates; boundary columns first.
+        """The basis in interface coordinates; columns of the boundary (n_b,) first.
 
         Raises:
             ConfigError: without any interface.

@@ -42,6 +42,9 @@ class Characteristic:
         method: what reduces the body then, for example ``CraigBampton(20)``.
         n: number of functions of every full interface, six rigid motions among them.
 
+    Raises:
+        ConfigError: for fewer functions than rigid motions.
+
     Source:
         Castanier, Tan and Pierre, Characteristic constraint modes for component mode synthesis,
         AIAA J. 39 (2001) 1182.
@@ -63,6 +66,7 @@ class Characteristic:
         Raises:
             ConfigError: without a full interface, or if n exceeds the dofs of one.
             InterfaceError: if the interfaces leave a rigid motion free.
+            ModelError: if the model does not know its rigid motions.
         """
         names = [name for name, tie in connection.ties.items() if tie.label == "full"]
         if not names:

@@ -37,6 +37,9 @@ class Polynomial:
         order: total degree p >= 1; with p = 1 the surface moves rigidly or strains uniformly.
             Without a number the lowest one is chosen that meets the band and the tolerance of
             ``CraigBampton(f_max=…, tol=…)``.
+
+    Raises:
+        ConfigError: for an order below one.
     """
 
     order: int | None = None
@@ -46,7 +49,7 @@ class Polynomial:
             whole("order", self.order, 1, reason="a constant alone is a ball joint, not a surface")
 
     def functions(self, interface: Interface) -> Array:
-        """(k, n) functions at the nodes, from low to high degree; some may depend on others.
+        """(k, n) functions [1] at the nodes, from low to high degree; some may depend on others.
 
         Raises:
             ConfigError: if the order is still open, or far beyond what the nodes can tell apart.
@@ -78,6 +81,9 @@ class FourierLegendre:
     Attributes:
         harmonics: highest harmonic n >= 1 in cos(n theta) and sin(n theta).
         order: highest degree along the axis, >= 0.
+
+    Raises:
+        ConfigError: for a harmonic below one or an order below zero.
     """
 
     harmonics: int
@@ -88,10 +94,11 @@ class FourierLegendre:
         whole("order", self.order, 0, reason="a degree is not negative")
 
     def functions(self, interface: Interface) -> Array:
-        """(k, n) functions at the nodes; the linear ones first, so that rigid motions are exact.
+        """(k, n) functions [1] at the nodes; linear ones first, so that rigid motions are exact.
 
         Raises:
             ConfigError: if there are far more of them than the nodes can tell apart.
+            InterfaceError: if the surface is not one around an axis.
         """
         asked = f"{self.harmonics} harmonics and order {self.order}"
         _refuse_many((2 * self.harmonics + 1) * (self.order + 1), interface, asked)

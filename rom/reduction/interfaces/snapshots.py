@@ -25,8 +25,11 @@ class Snapshots:
     Attributes:
         values: (3k, s) displacements of the dofs of the surface [m], ``3*i + axis`` for its i-th
             node.
-        energy: share of the squared displacement beyond rigid motion that is kept.
+        energy: share [1] of the squared displacement beyond rigid motion that is kept.
         n: alternatively, number of functions, the six rigid motions among them.
+
+    Raises:
+        ConfigError: for values of another shape, or unless one of energy and n is given.
 
     Source:
         Sirovich, Turbulence and the dynamics of coherent structures, Q. Appl. Math. 45 (1987) 561.
