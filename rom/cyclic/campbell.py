@@ -25,9 +25,10 @@ class WheelCampbell:
         speeds: (s,) [rad/s].
         diameter: number of nodal diameters.
         omega: (s, n) circular frequencies seen from the wheel [rad/s]; a column may cross others.
-        direction: (n,) +1 for waves that run ahead with the rotation, -1 against it, 0 standing.
-        mac: (s, n) likeness, 0 to 1, of each shape to that at the speed before; where it is near
-            one half two waves change their shapes, and the speeds are too far apart.
+        direction: (n,) [1] +1 for waves that run ahead with the rotation, -1 against it, 0
+            standing.
+        mac: (s, n) likeness [1], 0 to 1, of each shape to that at the speed before; where it is
+            near one half two waves change their shapes, and the speeds are too far apart.
     """
 
     speeds: Array
@@ -71,6 +72,10 @@ def wheel_campbell(
     Raises:
         ConfigError: if a speed is negative, or the wheel has not so many waves.
         ModelError, ModesMissedError: see `rom.travelling_modes`.
+
+    Source:
+        Campbell, The protection of steam-turbine disk wheels from axial vibration, Trans. ASME
+        46 (1924) 31; see docs/theory/rotating_solids.md.
     """
     Omega = np.atleast_1d(np.asarray(speeds, dtype=float))
     if Omega.ndim != 1 or not Omega.size or not np.isfinite(Omega).all() or Omega.min() < 0.0:

@@ -28,8 +28,8 @@ class GyroscopicModes:
 
     Attributes:
         w: (2n,) circular frequencies [rad/s], ascending, of both signs.
-        velocities: (n, 2n) q' of each, where |q'|^2 + |omega q|^2 = 1.
-        shapes: (n, 2n) q of each.
+        velocities: (n, 2n) q' of each [1], where |q'|^2 + |omega q|^2 = 1.
+        shapes: (n, 2n) q of each [s].
     """
 
     w: Array
@@ -37,18 +37,23 @@ class GyroscopicModes:
     shapes: Complex
 
     def waves(self) -> tuple[Array, Complex]:
-        """Positive w (n,), ascending, and shapes (n, n) of length 1, which turn with exp(i w t)."""
+        """The motions that turn with exp(i w t), w > 0.
+
+        Returns:
+            w (n,) [rad/s], ascending, and shapes (n, n) of length 1 [1].
+        """
         n = len(self.shapes)
         q = self.shapes[:, n:]
         return self.w[n:], q / np.linalg.norm(q, axis=0)
 
     def response(self, p: Complex, sweep: Array, damping: float) -> Complex:
-        """(w, n) answers q to p exp(i omega t), each motion with its share of critical damping.
+        """(w, n) answers q [kg^1/2 m] to p exp(i omega t), each motion with its share of damping.
 
         Args:
-            p: (n,) modal forces.
+            p: (n,) forces on mass-normalised modes [N kg^-1/2].
             sweep: (w,) circular frequencies omega [rad/s].
-            damping: a motion decays at this share zeta of its w, as exp(i w sqrt(1 - zeta^2) t).
+            damping: a motion decays at this share zeta [1] of its w, as exp(i w sqrt(1 - zeta^2)
+                t).
         """
         slower = np.sqrt(1.0 - damping**2)
         met = self.velocities.conj().T @ p
@@ -62,6 +67,10 @@ def gyroscopic_modes(omega: Array, g: Array) -> GyroscopicModes:
     Args:
         omega: (n,) circular frequencies without g, positive [rad/s].
         g: (n, n) skew-symmetric [rad/s].
+
+    Source:
+        Meirovitch, A new method of solution of the eigenvalue problem for gyroscopic systems,
+        AIAA J. 12 (1974) 1337.
     """
     n, D = omega.size, np.diag(omega)
     w, W = eigh(-1j * np.block([[-g, -D], [D, np.zeros((n, n))]]))

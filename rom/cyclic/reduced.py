@@ -25,7 +25,7 @@ class ReducedSector(CyclicSector):
     """A sector in a few coordinates: those of its two faces, then fixed-interface modes.
 
     Attributes:
-        Psi: (n_full, r) displacement shapes of the full sector.
+        Psi: (n_full, r) displacement shapes of the full sector [1; kg^-1/2].
         full: the full sector.
         omega: (m,) circular frequencies of the fixed-interface modes [rad/s].
     """
@@ -45,7 +45,7 @@ class ReducedSector(CyclicSector):
         return sector_certificate(self, self.full)
 
     def expand(self, shapes: Complex) -> Complex:
-        """(n_full, m) displacements of the full sector."""
+        """(n_full, m) displacements of the full sector, in units of the shapes (r, m) given."""
         return self.Psi @ shapes
 
     def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:

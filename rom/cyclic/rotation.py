@@ -41,6 +41,10 @@ def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
 
     Raises:
         ConfigError: if the model has no finite elements, or carries attachments.
+
+    Source:
+        Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010); see
+        docs/theory/rotating_solids.md.
     """
     if model.stresses is None:
         raise ConfigError(
@@ -62,7 +66,10 @@ def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
 
     Args:
         M: (n, n) mass of a solid, the same for all directions [kg].
-        axis: (3,) unit vector.
+        axis: (3,) unit vector [1].
+
+    Source:
+        See docs/theory/rotating_solids.md for G and the softening.
     """
     nodes = identity(M.shape[0] // 3)
     turn, across = skew(axis), np.eye(3) - np.outer(axis, axis)
@@ -71,7 +78,14 @@ def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
 
 
 def centrifugal_displacement(sector: CyclicSector) -> Array:
-    """(n,) displacement of the sector in a wheel that turns at 1 rad/s [m]."""
+    """(n,) displacement of the sector in a wheel that turns at 1 rad/s [m].
+
+    Raises:
+        ConfigError: if the matrices of the sector do not fit each other.
+
+    Source:
+        See docs/theory/rotating_solids.md for the linear solid in steady rotation.
+    """
     T = sector.harmonic(0)
     load = sector.M @ arms(sector, sector.points).ravel()
     ops = SciPyOperators(T.T @ sector.K @ T, T.T @ sector.M @ T)
@@ -107,6 +121,9 @@ def divergence_speed(sector: CyclicSector, diameter: int) -> float:
 
     Raises:
         ModelError: if nothing holds the wheel even at rest.
+
+    Source:
+        See docs/theory/rotating_solids.md for the matrices of rotation.
     """
     T = sector.harmonic(sector.checked(diameter))
     H = T.conj().T

@@ -47,10 +47,10 @@ class CyclicSector:
         step: +1 if the slave meets the master of the next sector, -1 of the one before.
         held: (h,) dofs that do not move.
         points: (n / 3, 3) nodes [m], or None where dofs are not displacements of nodes.
-        motions: (n, 6) motions without stiffness: translations, then rotations about ``at``; None
-            when they are not known, or held.
+        motions: (n, 6) motions without stiffness [1, m]: translations, then rotations about ``at``;
+            None when they are not known, or held.
         face: the leading face with its nodes and area, or None.
-        axis: (3,) unit vector of the axis of rotation.
+        axis: (3,) unit vector of the axis of rotation [1].
         at: (3,) a point of it [m].
         matching: True when each node of a face has a partner on the other.
         coriolis: (n, n) skew-symmetric Coriolis matrix per rad/s [kg], or None.
@@ -58,6 +58,10 @@ class CyclicSector:
             centrifugal stress less spin softening; None for a wheel at rest.
         regions: {region: (n, n) stiffness of its elements alone}.
         sprung: True when K has springs to the ground, see `supported_sector`.
+
+    Raises:
+        ConfigError: for fewer than two sectors, or a coupling that does not fit the faces.
+        InterfaceError: if a dof is on both faces.
     """
 
     n_sectors: int
@@ -113,7 +117,7 @@ class CyclicSector:
             model: one sector, with its two cyclic faces as interfaces.
             low: name of one cyclic face.
             high: name of the other.
-            axis: (3,) direction of the axis of rotation.
+            axis: (3,) direction of the axis of rotation [1].
             at: (3,) a point of it [m].
             fixed: names of interfaces that are held.
             regions: names of regions whose stiffness is kept apart, for blades that differ.
@@ -182,7 +186,11 @@ class CyclicSector:
         return self.n_sectors * self.free.size
 
     def standing(self, diameter: int) -> bool:
-        """True for the harmonics whose waves cannot travel: 0 and N / 2."""
+        """True for the harmonics whose waves cannot travel: 0 and N / 2.
+
+        Raises:
+            ConfigError: if the wheel cannot have so many diameters.
+        """
         return 2 * self.checked(diameter) % self.n_sectors == 0
 
     def checked(self, diameter: int) -> int:
@@ -214,7 +222,7 @@ class CyclicSector:
         return csr_matrix(own + np.exp(1j * diameter * self.step * self.angle) * following)
 
     def rigid(self, diameter: int) -> Complex:
-        """(n, k) rigid motions of the wheel that are waves with these nodal diameters.
+        """(n, k) rigid motions of the wheel that are waves with these nodal diameters [1, m].
 
         Motion along and about the axis belongs to 0, motion across it to 1.
         """
@@ -258,12 +266,12 @@ class CyclicSector:
         Mass-normalised shapes of a sector become mass-normalised shapes of the wheel.
 
         Args:
-            shapes: (n, m) complex, of sector 0.
+            shapes: (n, m) complex displacements of sector 0, in units of any kind.
             diameter: number of nodal diameters.
             phase: turns the wave [rad]; a quarter of 2 pi gives its partner.
 
         Returns:
-            (N, n, m).
+            (N, n, m), in units of the shapes.
         """
         j = np.arange(self.n_sectors)
         wave = np.exp(1j * (diameter * self.angle * j - phase))

@@ -29,6 +29,10 @@ def supported_sector(
     Raises:
         ConfigError: if the stiffness is not positive in any direction, or negative in one.
         InterfaceError: if the sector has no such nodes.
+
+    Source:
+        Isotropic bearings seen from the rotor: Friswell, Penny, Garvey and Lees, Dynamics of
+        Rotating Machines (2010); see docs/theory/rotating_solids.md.
     """
     if not (np.isfinite([across, along]).all() and min(across, along) >= 0 < across + along):
         raise ConfigError(

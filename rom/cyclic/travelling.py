@@ -36,7 +36,7 @@ class TravellingModes(Modes):
         sector: the sector.
         diameter: number n of nodal diameters.
         speed: angular speed Omega [rad/s].
-        direction: (m,) +1 for waves that run ahead with the rotation, -1 against it, 0 where a
+        direction: (m,) [1] +1 for waves that run ahead with the rotation, -1 against it, 0 where a
             wave stands: n = 0 and N / 2.
     """
 
@@ -47,12 +47,12 @@ class TravellingModes(Modes):
 
     @property
     def forward(self) -> Array:
-        """Frequencies of the waves that run ahead, seen from the wheel [Hz]."""
+        """(k,) frequencies of the waves that run ahead, seen from the wheel [Hz]."""
         return self.frequencies[self.direction > 0]
 
     @property
     def backward(self) -> Array:
-        """Frequencies of the waves that run back, seen from the wheel [Hz]."""
+        """(k,) frequencies of the waves that run back, seen from the wheel [Hz]."""
         return self.frequencies[self.direction < 0]
 
     @property
@@ -81,6 +81,10 @@ def travelling_modes(
         ConfigError: if the wheel cannot have the diameters, or has no matrices of rotation.
         ModelError: if a motion grows: the speed is above that of an instability.
         ModesMissedError: if the inertia count of a supported wheel says that a wave was skipped.
+
+    Source:
+        Bryan, On the beats in the vibrations of a revolving cylinder or bell, Proc. Cambridge
+        Phil. Soc. 7 (1890) 101; see docs/theory/rotating_solids.md.
     """
     K = spinning(sector, speed)
     T = sector.harmonic(sector.checked(diameter))

@@ -63,6 +63,10 @@ def reduced_blade(
     Raises:
         ConfigError: if the region is unknown, or the blade cannot have so many modes.
         InterfaceError: if the root is unknown, or not that of the sector.
+
+    Source:
+        Craig and Bampton, AIAA J. 6 (1968) 1313, with polynomials on the root as in Carassale
+        and Maurici (2018); see docs/theory/cyclic_symmetry.md.
     """
     if blade is None:
         if root not in model.interfaces:

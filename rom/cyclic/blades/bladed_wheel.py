@@ -45,11 +45,12 @@ class BladedWheel:
 
     Attributes:
         sector: the sector of the tuned wheel.
-        K: (d, d) stiffness of the disk in c coordinates of the roots, then mass-normalised waves
-            with all roots held.
-        M: (d, d) its mass.
-        roots: (N, r, c) how the roots of the blades move by these coordinates.
-        rigid: (c, k) rigid motions of a free wheel; k = 0 if it is held.
+        K: (d, d) stiffness [N/m; 1/s^2] of the disk in c coordinates of the roots, then
+            mass-normalised waves with all roots held.
+        M: (d, d) its mass [kg; 1].
+        roots: (N, r, c) how the roots of the blades move by these coordinates, in units of them.
+        rigid: (c, k) rigid motions of a free wheel, in units of the coordinates; k = 0 if it is
+            held.
         coriolis: (d, d) Coriolis matrix of the disk per rad/s [kg], or None.
         centrifugal: (d, d) change of K per (rad/s)^2 [kg]; None at rest.
     """
@@ -77,6 +78,9 @@ class BladedWheel:
             blades: N of them, in the order of the sectors.
             speed: angular speed that stiffens and softens [rad/s].
 
+        Returns:
+            (n, n), (n, n) stiffness [N/m; 1/s^2] and mass [kg; 1].
+
         Raises:
             ConfigError: if there is not one blade for each sector, one has another root, or the
                 matrices of rotation are missing.
@@ -88,7 +92,7 @@ class BladedWheel:
         return (K + speed**2 * self._joined("centrifugal", blades) if speed else K), M
 
     def coriolis_matrix(self, blades: Sequence[ReducedBlade]) -> Array:
-        """Skew-symmetric Coriolis matrix per rad/s, in the coordinates of `matrices`.
+        """(n, n) skew-symmetric Coriolis matrix per rad/s [kg], in the coordinates of `matrices`.
 
         Raises:
             ConfigError: see `matrices`.
@@ -124,7 +128,18 @@ class BladedWheel:
         return A
 
     def of_blades(self, blades: Sequence[ReducedBlade], Phi: Array) -> list[Array]:
-        """(r + m, k) per blade: root and cantilever coordinates in k motions Phi (n, k)."""
+        """Root and cantilever coordinates of every blade in k motions of the wheel.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            Phi: (n, k) motions, in units of the coordinates.
+
+        Returns:
+            (r + m, k) per blade, in units of Phi.
+
+        Raises:
+            ConfigError: if Phi or the blades do not fit the wheel.
+        """
         self._check(blades)
         Phi = matrix("Phi", Phi, (len(self.K) + sum(blade.n_modes for blade in blades), None))
         c = self.roots.shape[2]
@@ -197,7 +212,12 @@ class BladedWheel:
         return Phi, gyroscopic_modes(omega, 0.5 * (g - g.T))
 
     def energies(self, blades: Sequence[ReducedBlade], n: int) -> Array:
-        """(n, N) share of the strain energy of the blades that each of them has, lowest modes."""
+        """(n, N) share of the strain energy of the blades that each of them has [1], lowest modes.
+
+        Raises:
+            ConfigError: if there is not one blade for each sector, or one has another root.
+            ModelError: if a motion has no stiffness.
+        """
         _, Phi = self.modes(blades)
         each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q)
                          for blade, q in zip(blades, self.of_blades(blades, Phi[:, :n]),
@@ -227,7 +247,7 @@ class BladedWheel:
                 different models.
             engine_order: number E of disturbances around the circumference.
             omega: (w,) circular frequencies [rad/s].
-            damping: share of critical damping of each mode.
+            damping: share of critical damping of each mode [1].
             at: (p,) dofs of the model of a blade, or (p, n) rows, whose displacements are wanted;
                 or a list of N of them.
             speed: angular speed [rad/s], with Coriolis forces.
@@ -237,6 +257,7 @@ class BladedWheel:
 
         Raises:
             ConfigError: for damping not between 0 and 1, or a force or place off the blades.
+            ModelError: if a motion has no stiffness.
         """
         if not 0.0 < damping < 1.0:
             raise ConfigError(
@@ -266,7 +287,7 @@ class BladedWheel:
     def amplification(
         self, blades: Sequence[ReducedBlade], force: Any, *, at: Any, **sweep: Any
     ) -> float:
-        """Largest amplitude of any blade, as a multiple of that of the tuned wheel.
+        """Largest amplitude of any blade, as a multiple of that of the tuned wheel [1].
 
         Args:
             blades: see `response`.
@@ -274,6 +295,9 @@ class BladedWheel:
             at: the amplitude is the norm of these displacements; of a list, as with the force.
             sweep: engine_order, omega, damping and speed of `response`; the tuned peak is found in
                 the same sweep.
+
+        Raises:
+            ConfigError: as `response`, or if the force does not move the tuned wheel there.
         """
         found = self.response(blades, force, at=at, **sweep)
         alike = [self.sector.blade] * self.sector.n_sectors

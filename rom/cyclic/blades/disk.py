@@ -30,6 +30,10 @@ def bladed_wheel(
 
     Raises:
         ConfigError: if the disk has not so many.
+
+    Source:
+        Castanier, Tan and Pierre, Characteristic constraint modes for component mode synthesis,
+        AIAA J. 39 (2001) 1182; see docs/theory/cyclic_symmetry.md.
     """
     j = np.arange(sector.n_sectors)
     given = {name: A for name, A in _disk(sector).items() if A is not None}

@@ -48,7 +48,8 @@ class MistunedWheel:
         sector: the sector.
         harmonics: (r,) number n of each wave, -N / 2 < n <= N / 2.
         omega: (r,) circular frequencies of the tuned wheel [rad/s].
-        shapes: (n, r) complex shapes of sector 0; sector j moves by exp(i n j alpha) times that.
+        shapes: (n, r) complex, mass-normalised shapes of sector 0 [kg^-1/2]; sector j moves by
+            exp(i n j alpha) times that.
         blade: (r, r) Hermitian, N Phi^H K_blade Phi of one blade [1/s^2].
         blade_stiffness: (n, n) K_blade in the dofs of the sector [N/m].
         speed: angular speed of the tuned modes [rad/s].
@@ -74,7 +75,7 @@ class MistunedWheel:
         """(..., r, r) Hermitian stiffness in mass-normalised waves [1/s^2].
 
         Args:
-            deviations: (..., N) relative deviations of the stiffness of the blades.
+            deviations: (..., N) relative deviations of the stiffness of the blades [1].
 
         Raises:
             ConfigError: if there is not one number above -1 for each blade.
@@ -93,11 +94,12 @@ class MistunedWheel:
         """Frequencies [rad/s] (..., n) and modes in waves (..., r, n) of mistuned wheels.
 
         Args:
-            deviations: (..., N) relative deviations of the stiffness of the blades.
+            deviations: (..., N) relative deviations of the stiffness of the blades [1].
             n: number of modes, lowest first; None for all r.
 
         Raises:
             ModelError: if a deviation leaves a motion without stiffness.
+            ConfigError: if there is not one number above -1 for each blade.
         """
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
@@ -121,19 +123,20 @@ class MistunedWheel:
         mode of the mistuned wheel has the same share of critical damping.
 
         Args:
-            deviations: (N,) relative deviations of the stiffness of the blades.
+            deviations: (N,) relative deviations of the stiffness of the blades [1].
             force: (n,) force on the dofs of a sector, in its own axes [N]; complex if phases
                 differ.
             engine_order: number E of disturbances around the circumference.
             omega: (w,) circular frequencies [rad/s].
-            damping: share of critical damping of each mode.
-            at: (p,) dofs of a sector, or (p, n) rows, whose displacements are wanted.
+            damping: share of critical damping of each mode [1].
+            at: (p,) dof numbers of a sector, or (p, n) rows [1], whose displacements are wanted.
 
         Returns:
             (w, N, p) complex displacements [m].
 
         Raises:
             ConfigError: for wrong deviations, or damping that is not positive.
+            ModelError: if a deviation leaves a motion without stiffness.
         """
         drive = self._drive(force, engine_order)
         rows = self._rows(at)
@@ -157,12 +160,16 @@ class MistunedWheel:
             deviations: (s, N) one row per wheel; see `response` for the others.
             force: (n,) see `response`.
             engine_order: see `response`.
-            omega: (w,) sweep over the resonances; the tuned peak is found in the same sweep.
+            omega: (w,) sweep over the resonances [rad/s]; the tuned peak is found in the same
+                sweep.
             damping: see `response`.
-            at: the amplitude of a blade is the norm of the displacements of these dofs.
+            at: see `response`; the amplitude of a blade is the norm of these displacements.
 
         Returns:
-            (s,) amplification factors.
+            (s,) amplification factors [1].
+
+        Raises:
+            ConfigError: as `response`, or if the force does not move the tuned wheel there.
         """
         many = np.atleast_2d(np.asarray(deviations, dtype=float))
         N, sweep = self.sector.n_sectors, vector("omega", omega)
@@ -229,6 +236,10 @@ def mistuned_wheel(
     Raises:
         ConfigError: if the region is unknown.
         ModelError, ModesMissedError: see `cyclic_modes`.
+
+    Source:
+        Lim, Bladh, Castanier and Pierre, Compact, generalized component mode mistuning
+        representation for modeling bladed disk vibration, AIAA J. 45 (2007) 2285.
     """
     if isinstance(blade, str) and blade not in sector.regions:
         raise ConfigError(
@@ -270,5 +281,10 @@ def _tuned(
 
 
 def whitehead(n_sectors: int) -> float:
-    """Largest amplification one family of blade modes can reach, (1 + sqrt(N)) / 2."""
+    """Largest amplification one family of blade modes can reach, (1 + sqrt(N)) / 2 [1].
+
+    Source:
+        Whitehead, The maximum factor by which forced vibration of blades can increase due to
+        mistuning, J. Eng. Gas Turbines Power 120 (1998) 115.
+    """
     return 0.5 * (1 + np.sqrt(n_sectors))

@@ -20,11 +20,12 @@ class ReducedBlade:
     Attributes:
         K: (r + m, r + m) stiffness [N/m; 1/s^2].
         M: (r + m, r + m) mass [kg; 1].
-        Psi: (n, r + m) displacement shapes on the dofs of the model the blade comes from.
+        Psi: (n, r + m) displacement shapes on the dofs of the model the blade comes from [1;
+            kg^-1/2].
         n_root: number r of root coordinates.
         coriolis: (r + m, r + m) skew-symmetric Coriolis matrix per rad/s [kg], or None.
         centrifugal: (r + m, r + m) change of K per (rad/s)^2: geometric stiffness of centrifugal
-            stress less spin softening; None for a blade at rest.
+            stress less spin softening [kg]; None for a blade at rest.
     """
 
     K: Array
@@ -53,10 +54,10 @@ class ReducedBlade:
         Centrifugal stress follows from equilibrium: it grows with the density, not the stiffness.
 
         Args:
-            stiffness: relative deviation of the stiffness of the blade.
-            density: relative deviation of its density.
-            cantilever: (k,) relative deviations of its first k cantilever frequencies, beyond what
-                the two others do; shapes and root keep theirs.
+            stiffness: relative deviation of the stiffness of the blade [1].
+            density: relative deviation of its density [1].
+            cantilever: (k,) relative deviations of its first k cantilever frequencies [1], beyond
+                what the two others do; shapes and root keep theirs.
 
         Raises:
             ConfigError: for a deviation not above -1, or of a mode the blade does not have.
@@ -92,7 +93,7 @@ class SubstructuredSector(ReducedSector):
         root: (r,) which coordinates are those of the root.
         cantilever: (m,) which are cantilever modes.
         root_points: (k, 3) nodes of the root [m].
-        root_functions: (k, r / 3) functions on it, alike for the three directions.
+        root_functions: (k, r / 3) functions on it [1], alike for the three directions.
         root_moved: (k, 3) displacement of the root in a wheel at 1 rad/s [m]; None at rest.
     """
 
