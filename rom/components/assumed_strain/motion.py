@@ -1,4 +1,9 @@
-"""Forces, stiffness and mass of a sheet; equilibrium and explicit motion."""
+"""Forces, stiffness and mass of a sheet; equilibrium and explicit motion.
+
+Source:
+    Flores, A two-dimensional linear assumed strain triangular element for finite deformation
+    analysis, J. Appl. Mech. 73 (2006) 970.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +25,7 @@ class Metal:
 
     Attributes:
         E: Young's modulus [Pa].
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
         rho: density [kg/m^3].
         yield_stress: first yield stress [Pa].
         hardening: slope of the yield stress over plastic strain [Pa].
@@ -59,7 +64,17 @@ class Metal:
 
 
 def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -> csr_matrix:
-    """(2n, 2n) tangent stiffness [N/m] at positions x (n, 2), where they began the linear one."""
+    """(2n, 2n) tangent stiffness [N/m], where the positions began the linear one.
+
+    Args:
+        body: the sheet.
+        metal: its material.
+        x: (n, 2) positions [m].
+        history: (t, p, 5) as of `forces` [1]; None: virgin.
+
+    Raises:
+        ConfigError: if the positions do not fit the sheet.
+    """
     K, x = np.zeros((len(body.patch), 12, 12)), _nodal("positions", x, body)
     kernels.tangents(x, *_parts(body, metal, history), K)
     dofs = (2 * body.patch[:, :, None] + np.arange(2)).reshape(-1, 12)
@@ -71,9 +86,19 @@ def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -
 def forces(
     body: Sheet, metal: Metal, x: Array, history: Array | None = None
 ) -> tuple[Array, Array]:
-    """Internal forces (n, 2) [N] at positions x (n, 2), and the history after it (t, p, 5).
+    """Internal forces at a position.
 
-    The history holds plastic strain 11, 22, 12, 33 and the accumulated one; None: virgin.
+    Args:
+        body: the sheet.
+        metal: its material.
+        x: (n, 2) positions [m].
+        history: (t, p, 5) plastic strain 11, 22, 12, 33 and the accumulated one [1]; None: virgin.
+
+    Returns:
+        Forces (n, 2) [N] and the history after it.
+
+    Raises:
+        ConfigError: if the positions do not fit the sheet.
     """
     f, parts = np.zeros(body.points.shape), _parts(body, metal, history)
     new = np.empty_like(parts[-1])
@@ -93,14 +118,17 @@ def mass(body: Sheet, metal: Metal) -> csr_matrix:
 def equilibrium(
     body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
 ) -> tuple[Array, Array | None, int]:
-    """Positions (n, 2), history and the most Newton iterations under dead loads in equal steps.
+    """Rest under dead loads, which grow in equal steps.
 
     Args:
         body: the sheet.
         metal: its material.
         load: (n, 2) dead forces [N].
-        held: dof numbers that do not move.
+        held: (k,) dof numbers that do not move.
         steps: load steps.
+
+    Returns:
+        Positions (n, 2) [m], history as of `forces`, and the most Newton iterations of a step.
 
     Raises:
         ConfigError: if loads or held dofs do not fit, or without a step.
@@ -143,7 +171,7 @@ class Flight:
     Attributes:
         t: (k,) times [s].
         x: (k, n, 2) positions [m].
-        plastic: (k, t, p) accumulated plastic strain.
+        plastic: (k, t, p) accumulated plastic strain [1].
         work: energy that went from the motion into the solid [J].
         steps: number of time steps; -1 of a motion that was lost.
     """
@@ -158,7 +186,15 @@ class Flight:
 def fly(
     body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *, pictures: int = 41
 ) -> Flight:
-    """Explicit motion from rest lengths with velocities v (n, 2) [m/s]; held dofs do not move.
+    """Explicit motion from rest lengths.
+
+    Args:
+        body: the sheet.
+        metal: its material.
+        v: (n, 2) velocities at the start [m/s].
+        held: (k,) dof numbers that do not move.
+        t_end: duration [s].
+        pictures: number of instants that are kept.
 
     Raises:
         ConfigError: if velocities, held dofs, duration or pictures do not fit.

@@ -23,6 +23,7 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
 
     Raises:
         ConfigError: with axial symmetry, or for a share that does not exist.
+        MeshError: if a triangle is turned over.
 
     Source:
         Edge-based smoothed elements: Liu, Nguyen-Thoi and Lam, J. Sound Vib. 320 (2009) 1100.

@@ -20,6 +20,10 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
     Raises:
         ConfigError: for another state than plane stress.
         InterfaceError: if the nodes of an interface contain no triangle.
+
+    Source:
+        Bending by a quadratic fitted to the patch of a triangle: Nay and Utku, An alternative
+        for the finite element method, Variational Methods in Engineering (1972).
     """
     if body.state != "plane stress":
         raise ConfigError(f"a sheet in space is in plane stress, not {body.state}.")

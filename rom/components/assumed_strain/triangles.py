@@ -1,4 +1,9 @@
-"""Meshes of triangles, and the gradients at the middles of their sides."""
+"""Meshes of triangles, and the gradients at the middles of their sides.
+
+Source:
+    Flores, A two-dimensional linear assumed strain triangular element for finite deformation
+    analysis, J. Appl. Mech. 73 (2006) 970.
+"""
 
 from dataclasses import dataclass
 
@@ -58,7 +63,7 @@ def sheet(
 
     Args:
         points: (n, 2) coordinates [m].
-        triangles: (t, 3) corners, counter-clockwise.
+        triangles: (t, 3) corners, numbers of points, counter-clockwise.
         element: "F3" for elastic and modal work, "F1" for plastic flow without locking, "CST".
         state: "plane stress", "plane strain" or "axisymmetric" (first axis is the radius).
         thickness: of a plane solid [m].
@@ -157,10 +162,18 @@ def _side_gradients(X: Array, patch: Index, constant: Array, k: int) -> Array:
 def rectangle(
     n: tuple[int, int], corners: npt.ArrayLike, diagonal: str = "/"
 ) -> tuple[Array, Index]:
-    """Points (m, 2) and triangles (t, 3) of a quadrilateral with corners (4, 2), counter-clockwise.
+    """Points and triangles of a quadrilateral.
 
     Rows of points follow each other from the first side to the third; quadrilaterals are split by
     "/", by the other diagonal, or by both with "x".
+
+    Args:
+        n: divisions along the first and the second side.
+        corners: (4, 2) counter-clockwise [m].
+        diagonal: how to split.
+
+    Returns:
+        Points (m, 2) [m] and triangles (t, 3).
 
     Raises:
         ConfigError: for fewer than one division, or another way to split.

@@ -41,11 +41,12 @@ def _newton(y, mass, degree):
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """Point masses that attract each other, V = -sum m_i m_j r_ij^degree.
+    """Point masses that attract each other, V = -sum m_i m_j r_ij^degree; no unit but ratios: [1].
 
     Attributes:
-        mass: (n,) masses.
-        degree: -1 for Newton's law; -2 makes a world without size, which conserves D where E = 0.
+        mass: (n,) masses [1].
+        degree: of V [1]: -1 for Newton's law; -2 makes a world without size, which conserves D
+            where E = 0.
 
     Raises:
         ConfigError: if a mass is not positive or the degree not negative.
@@ -62,7 +63,7 @@ class Bodies:
             raise ConfigError(f"degree = {self.degree:g}: the bodies attract with degree < 0.")
 
     def potential(self, x: Array) -> float:
-        """Potential energy of the configuration (n, 3).
+        """Potential energy of the configuration (n, 3) [1].
 
         Raises:
             ConfigError, ModelError: for other bodies than these; for two in the same place.
@@ -70,42 +71,77 @@ class Bodies:
         return _pairs(self._apart(x), self.mass, self.degree, np.zeros_like(x, dtype=float))
 
     def acceleration(self, x: Array) -> Array:
-        """(n, 3) accelerations in the configuration (n, 3)."""
+        """(n, 3) accelerations in the configuration (n, 3) [1].
+
+        Raises:
+            ConfigError, ModelError: for other bodies than these; for two in the same place.
+        """
         a = np.zeros_like(x, dtype=float)
         _pairs(self._apart(x), self.mass, self.degree, a)
         return a
 
     def kinetic(self, v: Array) -> float:
-        """Kinetic energy."""
+        """Kinetic energy of velocities (n, 3) [1]."""
         return 0.5 * float(self.mass @ np.square(v).sum(axis=1))
 
     def energy(self, x: Array, v: Array) -> float:
-        """Total energy."""
+        """Total energy [1] of a configuration (n, 3) [1] with velocities (n, 3) [1].
+
+        Raises:
+            ConfigError, ModelError: as `potential`.
+        """
         return self.kinetic(v) + self.potential(x)
 
     def centred(self, x: Array) -> Array:
-        """Positions (or velocities) relative to those of the mass centre."""
+        """(n, 3) positions or velocities (n, 3) relative to those of the mass centre [1].
+
+        Raises:
+            ConfigError: for other bodies than these.
+        """
         x = self._placed(x)
         return x - self.mass @ x / self.mass.sum()
 
     def size(self, x: Array) -> float:
-        """I = sum m r^2 about the mass centre."""
+        """I = sum m r^2 about the mass centre of a configuration (n, 3) [1].
+
+        Raises:
+            ConfigError: for other bodies than these.
+        """
         return float(self.mass @ np.square(self.centred(x)).sum(axis=1))
 
     def growth(self, x: Array, v: Array) -> float:
-        """D = sum m r . v about the mass centre, half the rate of I.
+        """D = sum m r . v about the mass centre, half the rate of I; x (n, 3) [1], v (n, 3) [1].
 
         With degree -1, dD/dt = 2 E - V: at energy zero D only grows, and I has one smallest value.
+
+        Raises:
+            ConfigError: for other bodies than these.
         """
         return float(self.mass @ (self.centred(x) * v).sum(axis=1))
 
     def complexity(self, x: Array) -> float:
-        """C_S = sqrt(sum m_i m_j r_ij^2) sum m_i m_j / r_ij / M^3: how clustered a shape is."""
+        """How clustered a shape (n, 3) is, sqrt(sum m_i m_j r_ij^2) sum m_i m_j / r_ij / M^3 [1].
+
+        Raises:
+            ConfigError, ModelError: as `potential`.
+        """
         near, M = -Bodies(self.mass).potential(x), self.mass.sum()
         return float(np.sqrt(self.size(x) * M) * near / M**3)
 
     def at_rest_as_a_whole(self, x: Array, v: Array) -> tuple[Array, Array]:
-        """(x, v) about the mass centre with P = L = 0, velocities scaled so that E = 0."""
+        """Configuration and velocities of a system that rests as a whole, P = L = 0, with E = 0.
+
+        Args:
+            x: (n, 3) configuration [1].
+            v: (n, 3) velocities [1], which are scaled.
+
+        Returns:
+            x and v (n, 3), (n, 3) about the mass centre [1].
+
+        Raises:
+            ConfigError: for other bodies than these.
+            ModelError: if the velocities are a rigid motion, or two bodies are in the same place.
+        """
         x = self.centred(x)
         matched = match(self.mass, x, v)
         if matched.energy <= 1e-20 * self.kinetic(v):
@@ -113,9 +149,18 @@ class Bodies:
         return x, matched.rest * np.sqrt(-self.potential(x) / matched.energy)
 
     def move(self, x: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """Positions and velocities (k, n, 3) at the times t (k,), starting at t[0].
+        """The motion of the bodies.
+
+        Args:
+            x: (n, 3) configuration at t[0] [1].
+            v: (n, 3) velocities there [1].
+            t: (k,) times [1].
+
+        Returns:
+            Positions and velocities (k, n, 3), (k, n, 3) [1].
 
         Raises:
+            ConfigError, ModelError: as `potential`.
             SolverError: if two bodies come too close.
         """
         y = np.concatenate([self._apart(x).ravel(), self._placed(v).ravel()])

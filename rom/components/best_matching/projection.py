@@ -1,4 +1,8 @@
-"""The best rigid motion of a velocity field, and of two pictures of the same particles."""
+"""The best rigid motion of a velocity field, and of two pictures of the same particles.
+
+Source:
+    Barbour and Bertotti, Proc. R. Soc. A 382 (1982) 295.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +34,11 @@ class Matched:
 
 
 def generators(x: Array, *, scale: bool = False) -> Array:
-    """(3n, 6) rigid motions of the configuration x (n, 3), (3n, 7) with uniform growth last."""
+    """(3n, 6) rigid motions [1, m] of x (n, 3) [m]; (3n, 7) with uniform growth last.
+
+    Raises:
+        ConfigError: if x is no configuration.
+    """
     R = rigid_motions(configuration(x))
     return np.hstack([R, np.reshape(x, (-1, 1))]) if scale else R
 
@@ -40,11 +48,12 @@ def rigid_part(mass: Any, R: Array, V: Array) -> Array:
 
     Args:
         mass: (n,) masses of particles, or the (3n, 3n) mass matrix of finite elements [kg].
-        R: (3n, k) generators.
-        V: (3n,) or (3n, m) velocities or shapes.
+        R: (3n, k) generators [1, m].
+        V: (3n,) or (3n, m) velocities [m/s] or shapes [m].
 
     Returns:
-        (k,) or (k, m); the smallest where nothing moves, as when a line turns about itself.
+        (k,) or (k, m) [m/s, rad/s], for shapes [m, rad]; the smallest where nothing moves, as when
+        a line turns about itself.
 
     Raises:
         ConfigError: if the sizes do not fit.
@@ -67,6 +76,9 @@ def match(mass: Any, x: Array, v: Array, *, scale: bool = False) -> Matched:
         x: (n, 3) positions [m].
         v: (n, 3) velocities [m/s].
         scale: take uniform growth out as well.
+
+    Raises:
+        ConfigError: if the sizes do not fit, or a mass is not positive.
     """
     R, v = generators(x, scale=scale), configuration(v)
     motion = rigid_part(mass, R, v.ravel())
@@ -135,7 +147,7 @@ def stacked(mass: Any, X: Array, *, plane: bool = False) -> Array:
         plane: turn about z only.
 
     Returns:
-        (k, n, 3): the shortest motion through these shapes, whatever frames they were taken in.
+        (k, n, 3): the shortest motion through these shapes [m], whatever frames they were taken in.
 
     Raises:
         ConfigError: without a picture.
@@ -157,8 +169,11 @@ def emergent_rate(mass: Any, x: Array, dx: Array, kinetic: float) -> float:
     Args:
         mass: (n,) masses [kg].
         x: (n, 3) configuration [m].
-        dx: (n, 3) its derivative by the parameter.
+        dx: (n, 3) its derivative by the parameter [m].
         kinetic: E - V(x) [J].
+
+    Returns:
+        Time per unit of the parameter [s].
 
     Raises:
         ModelError: if nothing is left to move with.

@@ -18,6 +18,9 @@ class ShapeSphere:
 
     With Jacobi vectors z_1, z_2, weighted by the roots of their masses, as complex numbers, a shape
     is n = (2 Re z_1* z_2, 2 Im z_1* z_2, |z_1|^2 - |z_2|^2) / I; mirror images have opposite n_2.
+
+    Raises:
+        ConfigError: for another number of bodies or another law.
     """
 
     bodies: Bodies
@@ -27,13 +30,21 @@ class ShapeSphere:
             raise ConfigError("the shape sphere is that of three bodies of degree -1.")
 
     def shape(self, x: Array) -> Array:
-        """(3,) point on the unit sphere of the configuration (3, 3)."""
+        """(3,) point on the unit sphere of the configuration (3, 3) [1]."""
         z1, z2 = self._jacobi(x)
         w, a, b = 2 * z1.conjugate() * z2, abs(z1) ** 2, abs(z2) ** 2
         return np.array([w.real, w.imag, a - b]) / (a + b)
 
     def momentum(self, x: Array, v: Array) -> Array:
-        """(3,) momentum of the shape, I / 4 times its velocity; tangent to the sphere."""
+        """(3,) momentum of the shape, I / 4 times its velocity; tangent to the sphere.
+
+        Args:
+            x: (3, 3) configuration [1].
+            v: (3, 3) velocities [1].
+
+        Returns:
+            (3,) momentum [1].
+        """
         (z1, z2), (w1, w2) = self._jacobi(x), self._jacobi(v)
         cross = 2 * (w1.conjugate() * z2 + z1.conjugate() * w2)
         change = 2 * (z1.conjugate() * w1 - z2.conjugate() * w2).real
@@ -41,20 +52,34 @@ class ShapeSphere:
         return (moved - n * (n @ moved)) / 4
 
     def attraction(self, n: Array) -> float:
-        """-V sqrt(I) of the shape n (3,), which knows no size."""
+        """-V sqrt(I) of the shape n (3,), which knows no size [1]."""
         weight, slope, level = self._distances()
         return float(weight @ (slope @ n + level) ** -0.5)
 
     def size(self, n: Array, p: Array, D: float) -> float:
-        """sqrt(I) of a motion with energy zero, from shape, momentum of the shape and D alone."""
+        """sqrt(I) of a motion with energy zero [1].
+
+        Args:
+            n: (3,) shape [1].
+            p: (3,) momentum of the shape [1].
+            D: half the rate of I [1].
+        """
         return (D**2 + 4 * float(np.square(p).sum())) / (2 * self.attraction(n))
 
     def move(self, n: Array, p: Array, D: Array) -> tuple[Array, Array]:
-        """Shapes and their momenta (k, 3) at the values of D (k,), starting at D[0].
+        """Shapes and their momenta over D, which grows with time and takes its place.
 
-        E = L = P = 0. D grows with time and takes its place; no size enters::
+        E = L = P = 0, and no size enters::
 
             H = ln(D^2 + 4 p^2) - ln(-V sqrt(I)),   n' = dH/dp,   p' = -dH/dn, on the sphere
+
+        Args:
+            n: (3,) shape at D[0] [1].
+            p: (3,) momentum there [1].
+            D: (k,) values [1].
+
+        Returns:
+            Shapes and momenta (k, 3), (k, 3) [1].
 
         Raises:
             SolverError: if two bodies come too close.

@@ -28,10 +28,10 @@ class HelicalSpring:
     Attributes:
         wire: diameter of the wire [m].
         diameter: of the helix, centre line to centre line [m].
-        coils: number of active coils.
+        coils: number of active coils [1].
         length: free length [m].
-        E, nu: Young's modulus [Pa] and Poisson's ratio of the wire.
-        total_coils: coils that lie on each other when the spring is solid; None for the active
+        E, nu: Young's modulus [Pa] and Poisson's ratio [1] of the wire.
+        total_coils: coils that lie on each other when the spring is solid [1]; None for the active
             ones.
 
     Raises:
@@ -111,7 +111,7 @@ class HelicalSpring:
         return length - (self.diameter + self.wire) / 2 * abs(angle) - self.solid_length
 
     def rigidities(self) -> dict[str, tuple[float, float, float]]:
-        """Keywords ``stretch`` and ``bend`` of a rod."""
+        """Keywords ``stretch`` [N] and ``bend`` [N m^2] of a rod."""
         return {
             "stretch": (self.shear, self.shear, self.axial),
             "bend": (self.bending, self.bending, self.torsion),
@@ -133,10 +133,10 @@ class HelicalSpring:
         """Sideways stiffness between parallel plates under compression, after Haringx.
 
         Args:
-            compression: (...) share of the free length, 0 to below 1.
+            compression: (k,) share of the free length, 0 to below 1 [1]; or a scalar.
 
         Returns:
-            (...) stiffness [N/m]; negative beyond buckling.
+            (k,) or scalar stiffness [N/m]; negative beyond buckling.
         """
         share = np.asarray(compression, dtype=float)
         now = 1 - share
@@ -148,11 +148,11 @@ class HelicalSpring:
         return np.where(share > 0, k, 1 / (l**3 / (12 * B) + l / S))
 
     def critical_compression(self, end: float = 0.5) -> float:
-        """Share of the free length at which the spring buckles; infinite if it never does.
+        """Share of the free length at which the spring buckles [1]; infinite if it never does.
 
         Args:
-            end: effective length, 1/2 between fixed plates, 1 if one plate is free to move
-                sideways, 2 if it is also free to turn.
+            end: effective length over length [1], 1/2 between fixed plates, 1 if one plate is free
+                to move sideways, 2 if it is also free to turn.
         """
         first = self.E / (2 * (self.E - self.G))
         second = 2 * np.pi**2 * (self.E - self.G) / (2 * self.G + self.E)
@@ -160,7 +160,12 @@ class HelicalSpring:
         return float(first * (1 - np.sqrt(1 - second / slender))) if second < slender else np.inf
 
     def wire_stress(self, force: float, moment: float = 0.0) -> tuple[float, float]:
-        """Shear stress from an axial force, after Bergstraesser, and bending stress [Pa]."""
+        """Shear stress, after Bergstraesser, and bending stress of the wire [Pa].
+
+        Args:
+            force: along the axis [N].
+            moment: across it [N m].
+        """
         C = self.diameter / self.wire
         shear = (4 * C + 2) / (4 * C - 3) * 8 * force * self.diameter / (np.pi * self.wire**3)
         return shear, 32 * moment / (np.pi * self.wire**3)
@@ -196,7 +201,7 @@ def wire_rod(spring: HelicalSpring, per_coil: int = 40) -> Rod:
 
 
 def plate_compliance(rod: Rod, centre: npt.ArrayLike) -> Array:
-    """(6, 6) motion of a plate at the end of a rod per load at its centre, start clamped.
+    """(6, 6) motion of a plate at a rod's end per load at its centre [m/N, rad/N; m/N/m, rad/N/m].
 
     Args:
         rod: the rod, about its reference.

@@ -2,6 +2,10 @@
 
 Each piece deforms linearly in a frame that moves with its root, as reduced bodies do; poses of the
 frames are exact. With one piece this is linear theory; with many the rod itself comes back.
+
+Source:
+    The rod is that of Lang, Linn and Arnold, Multibody Syst. Dyn. 25 (2011) 285, see
+    docs/theory/rods.md; its pieces are ours.
 """
 
 from itertools import pairwise

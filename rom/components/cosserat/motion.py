@@ -173,8 +173,9 @@ class Motion:
         rod: the rod.
         t: (k,) instants [s].
         x: (k, N + 1, 3) positions [m].
-        p: (k, N + 2, 4) quaternions of plate, segments, plate.
-        v: (k, 6 N + 9) velocities: plate, x_0, segment, x_1, ...; angular ones in section axes.
+        p: (k, N + 2, 4) quaternions of plate, segments, plate [1].
+        v: (k, 6 N + 9) velocities: plate, x_0, segment, x_1, ... [m/s, rad/s]; angular ones in
+            section axes.
         root: (k, 6) what holds the start: force in world axes [N], moment in section axes [N m],
             without the inertia of the held vertex itself.
         iterations, products: of all steps together.
@@ -226,9 +227,9 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
             axes and angular velocity (3,) in section axes of the plate at the start; without it
             that plate stays where it is. The rod starts with the angular velocity of its root.
         start: shape at time zero; without it the one without stress.
-        free: (6 N + 9,) which dofs may move, rotations in section axes; without it the plate at the
-            start is held.
-        rho_inf: damping of the highest frequencies in a step, 1 for none.
+        free: (6 N + 9,) which dofs may move [1], rotations in section axes; without it the plate at
+            the start is held.
+        rho_inf: damping of the highest frequencies in a step, 1 for none [1].
         save_every: steps between instants that are kept.
 
     Raises:

@@ -1,4 +1,9 @@
-"""Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation."""
+"""Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation.
+
+Source:
+    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
+    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -137,7 +142,7 @@ def loads(
         weight: (3,) acceleration of gravity [m/s^2].
 
     Returns:
-        (N + 1, 3) forces on vertices, (N + 2, 3) moments on plate, segments, plate.
+        (N + 1, 3) forces on vertices [N], (N + 2, 3) moments on plate, segments, plate [N m].
     """
     f, m = np.zeros_like(rod.x), np.zeros((rod.h.size + 2, 3))
     f += np.asarray(force, dtype=float) + np.outer(rod.mass, np.broadcast_to(weight, 3))
@@ -163,7 +168,7 @@ def equilibrium(
     Args:
         rod: the rod.
         load: forces and moments, see `loads`.
-        free: (6 N + 9,) which dofs may move; without it the plate at the start is clamped.
+        free: (6 N + 9,) which dofs may move [1]; without it the plate at the start is clamped.
         start: a shape near the solution, from which no continuation is needed.
         steps: parts in which the load grows, and the square of the speed.
         spin: (3,) angular velocity of the axes about their origin [rad/s], in which the rod rests
@@ -211,10 +216,19 @@ def linearised(
     load: tuple[Array, Array] | None = None,
     spin: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array]:
-    """Forces out of balance (n,) and their tangent (n, n), unknowns in the order of `clamped`.
+    """Forces out of balance and their tangent, unknowns in the order of `clamped`.
 
     Both count positions in world axes and rotations in section axes; the tangent is the exact
     derivative, symmetric where moments are in balance.
+
+    Args:
+        rod: the rod.
+        shape: where it is.
+        load: dead loads, see `loads`.
+        spin: (3,) angular velocity of the axes about their origin [rad/s].
+
+    Returns:
+        (n,) forces and moments [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
     """
     W = work(rod)
     n = W.r.size

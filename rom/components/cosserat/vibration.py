@@ -1,4 +1,9 @@
-"""Small vibrations of a rod about a shape at rest or in steady rotation."""
+"""Small vibrations of a rod about a shape at rest or in steady rotation.
+
+Source:
+    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
+    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+"""
 
 from dataclasses import dataclass
 
@@ -28,7 +33,7 @@ class Vibrations(Modes):
     """
 
     def translations(self) -> Array:
-        """(N + 1, 3, m) displacements of the vertices in world axes."""
+        """(N + 1, 3, m) displacements of the vertices in world axes, in units of the shapes."""
         padded = np.concatenate([self.shapes, np.zeros_like(self.shapes[:3])])
         return padded.reshape(-1, 6, padded.shape[1])[:-1, 3:]
 
@@ -71,8 +76,8 @@ def modes(
         rod: the rod.
         shape: an equilibrium, see `statics.equilibrium`.
         n: number of modes.
-        load: the dead loads of that equilibrium.
-        free: (6 N + 9,) which dofs may move; without it the plate at the start is held.
+        load: the dead loads of that equilibrium, see `loads`.
+        free: (6 N + 9,) which dofs may move [1]; without it the plate at the start is held.
         spin: (3,) angular velocity of the axes in which the shape rests [rad/s].
 
     Raises:

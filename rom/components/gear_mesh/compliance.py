@@ -1,7 +1,8 @@
 """Compliance of gear teeth: closed forms for bending, foundation and contact.
 
-Weber and Banaschek, VDI-Bericht 1953 (plane strain, nu = 0.3 in the numbers); Sainsot, Velex and
-Duverger, J. Mech. Des. 126 (2004), for the body; ISO 6336-1 for the whole.
+Source:
+    Weber and Banaschek, VDI-Bericht 1953 (plane strain, nu = 0.3 in the numbers); Sainsot, Velex
+    and Duverger, J. Mech. Des. 126 (2004), for the body; ISO 6336-1 for the whole.
 """
 
 from typing import Literal
@@ -48,11 +49,11 @@ def tooth_compliance(
         gear: 0 for the pinion, 1 for the gear.
         radius: where the tooth is loaded [m].
         body: foundation of Weber, or of Sainsot with a body clamped at its bore.
-        bore: diameter of the bore over that of the reference circle.
+        bore: diameter of the bore over that of the reference circle [1].
 
     Returns:
-        bending with shear and compression, foundation, depth [m] from the flank to the axis of the
-        tooth along the normal.
+        bending with shear and compression [1], foundation [1], depth [m] from the flank to the axis
+        of the tooth along the normal.
 
     Raises:
         ModelError: if the tooth has no such radius.
@@ -82,7 +83,7 @@ def tooth_compliance(
 def contact_compliance(
     radii: npt.ArrayLike, depths: npt.ArrayLike, force: float, E: float
 ) -> float:
-    """E times the approach of two teeth per force and width; line contact after Weber.
+    """E times the approach of two teeth per force and width [1]; line contact after Weber.
 
     Args:
         radii: (2,) of curvature [m].
@@ -106,6 +107,9 @@ def pair_stiffness(
         force: per width [N/m].
         E: Young's modulus [Pa].
         body: see `tooth_compliance`.
+
+    Raises:
+        ModelError: if the pair does not touch there.
     """
     rho = np.array([s, pair.tangents - s])
     parts = [tooth_compliance(pair, g, float(np.hypot(pair.rb[g], rho[g])), body) for g in (0, 1)]
@@ -116,7 +120,11 @@ def pair_stiffness(
 def stiffness_table(
     pair: GearPair, *, force: float, n: int = 41, E: float = 206e9, body: Body = "weber"
 ) -> Array:
-    """(n,) stiffness of one pair from first to last contact [N/m^2]; see `pair_stiffness`."""
+    """(n,) stiffness of one pair from first to last contact [N/m^2]; see `pair_stiffness`.
+
+    Raises:
+        ModelError: as `pair_stiffness`.
+    """
     A, B = pair.path
     inside = np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n)
     return np.array([pair_stiffness(pair, s, force=force, E=E, body=body) for s in inside])

@@ -3,6 +3,10 @@
 Motions q = (u1, phi1, u2, phi2) of both wheels count from the datum: wheels centred, shafts
 parallel, working flanks just touching. In helical gears contact lines run as
 s = r_b1 theta + k p_b + z tan(beta_b), whose normal is cos(beta_b) n_t - sin(beta_b) e_z.
+
+Source:
+    Velex and Maatar, A mathematical model for analyzing the influence of shape deviations and
+    mounting errors on gear dynamic behaviour, J. Sound Vib. 191 (1996) 629.
 """
 
 from dataclasses import dataclass, field
@@ -23,7 +27,7 @@ class Correction:
     Attributes:
         relief: (2,) depth at the tips of pinion and gear [m].
         extent: (2,) length of the relief along the path of contact [m].
-        power: 1 for linear, 2 for parabolic relief.
+        power: 1 for linear, 2 for parabolic relief [1].
         crowning: at both ends of the face [m].
         slope: of the lead, gap at z = +width/2 less gap at -width/2 [m].
         pitch: errors of the teeth of pinion and gear [m]; positive leaves a gap.
@@ -62,7 +66,8 @@ class MeshForce:
 
     Attributes:
         force: (12,) on (u1, phi1, u2, phi2) [N, N m].
-        stiffness, damping: (12, 12) minus its derivatives.
+        stiffness, damping: (12, 12) minus its derivatives [N/m, N/rad; N s/m, N s/rad; N m/rad, N m
+            s/rad].
         energy: stored [J].
         lost: power of the damping [W].
         slices: where the flanks are near.
@@ -89,6 +94,9 @@ class Mesh:
         correction: of the flanks.
         damping: force per rate over force per deflection of a slice [s].
         cells: slices across the face.
+
+    Raises:
+        ModelError: for a stiffness, a damping or a number of slices that no mesh has.
     """
 
     pair: GearPair
@@ -130,7 +138,12 @@ class Mesh:
         return float(gap.min() / np.cos(self.pair.base_helix))
 
     def pair_stiffness(self, s: Array, path: tuple[float, float]) -> Array:
-        """(n,) stiffness per length of contact line of pairs in contact at s [N/m^2]."""
+        """(n,) stiffness per length of contact line [N/m^2].
+
+        Args:
+            s: (n,) places of the contact on its path [m].
+            path: first and last place of it [m].
+        """
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if k.size == 1:
             return np.full(s.shape, k[0])
@@ -144,7 +157,7 @@ class Mesh:
         Args:
             q: (12,) motions of the wheels from the datum [m, rad].
             theta: angle the pinion has turned [rad].
-            rate: (12,) of the motions; without it nothing is damped.
+            rate: (12,) of the motions [m/s, rad/s]; without it nothing is damped.
 
         Raises:
             ModelError: if the wheels came so close that they have no common tangent.

@@ -30,11 +30,14 @@ class GearPair:
         width: common face width [m].
         helix: angle at the reference circle [rad]; positive for a right-handed pinion.
         pressure_angle: normal [rad].
-        shift: profile shifts in modules.
+        shift: profile shifts in modules [1].
         centre_distance: [m]; None leaves no backlash.
         thinning: transverse backlash from thinner teeth, along the line of action [m].
         addendum, dedendum, fillet: height of the teeth above and below the reference circle, and
-            radius at their roots, in modules.
+            radius at their roots, in modules [1].
+
+    Raises:
+        ModelError: if no such gears mesh.
     """
 
     teeth: tuple[int, int]
@@ -190,14 +193,18 @@ def path_of_contact(pair: GearPair, alpha: float) -> tuple[float, float]:
 
 
 def line_length(pair: GearPair, tau: npt.ArrayLike, terms: int = 4000) -> Array:
-    """Total length of the contact lines over width / cos(base helix), as a Fourier series.
-
-    Maatar and Velex, J. Mech. Des. 118 (1996).
+    """Total length of the contact lines over width / cos(base helix) [1], as a Fourier series.
 
     Args:
         pair: the gears.
-        tau: (n,) time in mesh periods since a pair began to touch on the first end of the face.
+        tau: (n,) time in mesh periods since a pair began to touch on the first end of the face [1].
         terms: of the series.
+
+    Returns:
+        (n,) lengths [1].
+
+    Source:
+        Maatar and Velex, J. Mech. Des. 118 (1996).
     """
     a, b, t = pair.contact_ratio, pair.overlap, np.asarray(tau, dtype=float)
     k = np.arange(1, terms + 1)

@@ -28,8 +28,9 @@ class ToothModel:
         pair, gear: which.
         points: (n, 2) nodes; the axis of the tooth is y, from the centre of the wheel [m].
         cells: (c, 9) nodes, along the thickness first.
-        axis, flank: nodes on the axis of the tooth and on the flank of positive x, root to tip.
-        free: coordinates that are not clamped.
+        axis, flank: (k,), (m,) nodes on the axis of the tooth and on the flank of positive x, root
+            to tip.
+        free: (f,) coordinates that are not clamped.
         factor: of the stiffness for E = 1, with a method ``solve``.
     """
 
@@ -43,7 +44,7 @@ class ToothModel:
     factor: Any
 
     def compliance(self, radius: float) -> float:
-        """E times the deflection of the axis along the line of action per force and width.
+        """E times the deflection of the axis along the line of action per force and width [1].
 
         Args:
             radius: of the load on the involute [m].
@@ -78,9 +79,9 @@ def tooth_model(
     Args:
         pair: spur gears.
         gear: 0 for the pinion, 1 for the gear.
-        bore: diameter of the bore over that of the reference circle.
+        bore: diameter of the bore over that of the reference circle [1].
         fine: elements across half of the thickness of the tooth.
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
 
     Raises:
         ModelError: if the bore leaves no body.
@@ -109,6 +110,9 @@ def element_table(
         bore: see `tooth_model`.
         n: number of values.
         E: Young's modulus [Pa].
+
+    Raises:
+        ModelError: if the bore leaves no body.
     """
     models = [tooth_model(pair, gear, bore=bore) for gear in (0, 1)]
     (A, B), table = pair.path, []

@@ -39,8 +39,11 @@ class Tendon:
 
     Attributes:
         holes: in the order in which the cable passes them.
-        friction: coefficient where the cable turns at a hole.
+        friction: coefficient where the cable turns at a hole [1].
         conduit: angle by which a conduit between actuator and first hole turns [rad].
+
+    Raises:
+        ModelError: for fewer than two holes, or numbers below zero.
     """
 
     holes: tuple[Hole, ...]
@@ -70,24 +73,34 @@ class Tendon:
         return np.concatenate(([0.0], np.arctan2(sine, (d[:-1] * d[1:]).sum(axis=1)), [0.0]))
 
     def tensions(self, shape: Shape, way: float = 1.0) -> Array:
-        """(k - 1,) tension of the pieces over that at the first hole.
+        """(k - 1,) tension of the pieces over that at the first hole [1].
 
         Args:
             shape: of the rod.
-            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction.
+            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
         """
         return np.exp(-way * self.friction * np.cumsum(self.turns(shape)[:-1]))
 
     def actuator(self, tension: float, way: float = 1.0) -> float:
-        """Force at the other end of the conduit, for a tension at the first hole [N]."""
+        """Force at the other end of the conduit [N].
+
+        Args:
+            tension: at the first hole [N].
+            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
+        """
         return tension * float(np.exp(way * self.friction * self.conduit))
 
     def forces(self, rod: Rod, shape: Shape, way: float = 1.0) -> tuple[Array, Array]:
         """What a tension of 1 N at the first hole adds to forces out of balance and tangent.
 
+        Args:
+            rod: the rod.
+            shape: of it.
+            way: 1 when the cable is pulled in, -1 when it is let out, 0 without friction [1].
+
         Returns:
-            (n,) gradient and (n, n) tangent, in the order of `cosserat.linearised`; the tangent
-            leaves out that friction changes with the shape.
+            (n,) gradient [1, m] and (n, n) tangent [1/m, 1, m] per newton, in the order of
+            `cosserat.linearised`; the tangent leaves out that friction changes with the shape.
         """
         n = 6 * rod.h.size + 9
         r, K = np.zeros(n), np.zeros((n, n))

@@ -47,9 +47,9 @@ class Finger:
         springs: from the palm outward.
         phalanges: length of the link beyond each spring [m]; the last may be zero, a bare plate.
         offset: of the cable from the centre line, towards the palm [m].
-        friction: of the cable where it turns.
+        friction: of the cable where it turns [1].
         stiffener: factor of the rigidities of joints against bending and shear out of the plane of
-            flexion, and against torsion.
+            flexion, and against torsion [1].
         n: segments of a spring.
 
     Raises:
@@ -123,7 +123,7 @@ class Finger:
         return np.array(left)
 
     def stops(self, shape: Shape) -> tuple[Array, Array]:
-        """Forces out of balance (n,) and tangent (n, n) of coils that touch."""
+        """Forces out of balance (n,) [N, N m] and tangent (n, n) [N/m] of coils that touch."""
         n = 6 * self.rod.h.size + 9
         r, K = np.zeros(n), np.zeros((n, n))
         gaps = self.clearances(shape)
@@ -221,7 +221,7 @@ def close(
         pull: length drawn out [m] instead.
         load: (3,) dead force on the tip [N].
         start: posture to start from, straight if not given.
-        way: 1 when the cable is drawn in, -1 when it is let out: the sign of friction.
+        way: 1 when the cable is drawn in, -1 when it is let out: the sign of friction [1].
         extra: function of a shape that gives more forces out of balance (n,) and their tangent
             (n, n), such as those of contacts.
 
@@ -300,7 +300,15 @@ def _moved(shape: Shape, rows: Array) -> Shape:
 
 
 def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
-    """Five fingers of three joints each; phalanges scale with the length of the finger."""
+    """Five fingers of three joints each; phalanges scale with the length of the finger.
+
+    Args:
+        friction: of the cables where they turn [1].
+        n: segments of a spring.
+
+    Raises:
+        ModelError: for numbers that no finger has.
+    """
     springs = sum(s.length for s in (HAND_SPRING,) * 3)
     shares = np.array(INDEX_LENGTHS) / sum(INDEX_LENGTHS)
     return {

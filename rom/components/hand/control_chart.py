@@ -30,8 +30,8 @@ class Chart:
     """Borders and times of the chart.
 
     Attributes:
-        threshold: effort below which nothing moves.
-        full: effort beyond the threshold that draws the cable all the way.
+        threshold: effort below which nothing moves [1].
+        full: effort beyond the threshold that draws the cable all the way [1].
         margin: beyond a border before a group is left [rad].
         dwell: how long it must be left [s].
         together: effort and time [s] of both muscles that switch between closing and opening.
@@ -50,13 +50,18 @@ class Chart:
     pull: float = 14e-3
 
     def group(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Index:
-        """Which group points of the square belong to, `NO_GROUP` for none; no memory."""
+        """(...,) group that points of the square belong to, `NO_GROUP` for none; no memory.
+
+        Args:
+            x: (...,) flexor, 0 to 1 [1].
+            y: (...,) extensor, 0 to 1 [1].
+        """
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         sector = np.minimum((np.arctan2(y, x) / (np.pi / 2) * len(GROUPS)).astype(int), 4)
         return np.where(np.maximum(x, y) < self.threshold, NO_GROUP, sector)
 
     def command(self, effort: npt.ArrayLike) -> Array:
-        """Pull for an effort [m]."""
+        """(...,) pull [m] for an effort (...,), 0 to 1."""
         share = (np.asarray(effort, dtype=float) - self.threshold) / self.full
         return self.pull * np.clip(share, 0.0, 1.0)
 
@@ -64,8 +69,8 @@ class Chart:
         """Commands over time.
 
         Args:
-            x: (n,) flexor, 0 to 1.
-            y: (n,) extensor, 0 to 1.
+            x: (n,) flexor, 0 to 1 [1].
+            y: (n,) extensor, 0 to 1 [1].
             dt: between samples [s].
 
         Raises:
@@ -129,19 +134,39 @@ class Commands:
 
 
 def muscle(activation: npt.ArrayLike, dt: float, rng: np.random.Generator) -> Array:
-    """A raw signal of a muscle (n,): noise as strong as its activation (n,), 0 to 1."""
+    """A raw signal of a muscle, noise as strong as its activation.
+
+    Args:
+        activation: (n,) 0 to 1 [1].
+        dt: between samples [s].
+        rng: source of random numbers.
+
+    Returns:
+        (n,) signal [1].
+    """
     activation = np.asarray(activation, dtype=float)
     return activation * rng.normal(size=activation.shape)
 
 
 def envelope(raw: npt.ArrayLike, dt: float, *, tau: float = 0.15) -> Array:
-    """Effort (n,) from a raw signal (n,), 1 for white noise of unit strength.
+    """Effort from a raw signal, 1 for white noise of unit strength.
 
-    A band from 20 to 450 Hz, rectified, smoothed over tau [s]; normalised by the mean of what
-    passes the band.
+    A band from 20 to 450 Hz, rectified, smoothed; normalised by the mean of what passes the band.
+
+    Args:
+        raw: (n,) signal, in units of its strength.
+        dt: between samples [s].
+        tau: time constant of the smoothing [s].
+
+    Returns:
+        (n,) effort, 0 to 1 [1].
 
     Raises:
         ConfigError: if samples are too far apart for the band.
+
+    Source:
+        Rectified and smoothed as in De Luca, The use of surface electromyography in biomechanics,
+        J. Appl. Biomech. 13 (1997) 135.
     """
     if not 0 < dt < 1 / 950:
         raise ConfigError(f"samples {dt:g} s apart miss 450 Hz.", hint="Sample at 1 kHz.")

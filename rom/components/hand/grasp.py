@@ -31,7 +31,11 @@ class Bar:
     stiffness: float = 3e3
 
     def places(self, finger: Finger) -> tuple[Array, Array, Array]:
-        """Watched places: vertex (k,), share (k,) of the way to the next one, and (k, 2) halves."""
+        """Watched places of the finger.
+
+        Returns:
+            (k,) vertex, (k,) share of the way to the next one [1], and (k, 2) shares of both [1].
+        """
         n = finger.rod.h.size
         links = [top for (_, _, top, _) in finger.joints if top < n]
         vertex = np.concatenate(
@@ -84,6 +88,10 @@ def grasp(finger: Finger, bar: Bar, tensions: npt.ArrayLike) -> list[Posture]:
 
     Raises:
         ConfigError: if the bar is in the way of the straight finger.
+        SolverError: if no posture was found; ``error.solution`` is the last good one.
+
+    Source:
+        Contact by a penalty: Wriggers, Computational Contact Mechanics (2006).
     """
     posture = rest(finger)
     gap = bar.gaps(finger, posture.shape)[0].min()

@@ -61,7 +61,7 @@ def solid_finger(
         bodies: a ``FlexibleBody`` per phalanx, from the palm outward.
         springs: as many.
         ends: markers of a phalanx towards the palm and towards the tip.
-        orientation: (3, 3) axes of the bodies to those of the finger; None for the same.
+        orientation: (3, 3) axes of the bodies to those of the finger [1]; None for the same.
         n: segments of a spring.
         density: of the wire [kg/m^3].
         gravity: (3,) [m/s^2].
@@ -101,7 +101,7 @@ def tip_compliance(mechanism: Mechanism, marker: Any, state: Any = None) -> Arra
 
 
 def link_compliance(solid: Any, ends: tuple[str, str] = ENDS) -> Array:
-    """(6, 6) motion of one marker of a reduced body per load on it, the other held; body axes.
+    """(6, 6) motion of one marker per load on it, the other held, body axes [m/N, rad/N, rad/N/m].
 
     Args:
         solid: a ``FlexibleBody``.
@@ -132,11 +132,12 @@ def parts_of_compliance(
         bodies: a ``FlexibleBody`` per phalanx, from the palm outward.
         springs: as many.
         ends: markers of a phalanx towards the palm and towards the tip.
-        orientation: (3, 3) axes of the bodies to those of the finger; None for the same.
+        orientation: (3, 3) axes of the bodies to those of the finger [1]; None for the same.
         n: segments of a spring.
 
     Returns:
-        (6, 6) of the springs and (6, 6) of the phalanges, world axes, as of `tip_compliance`.
+        (6, 6) of the springs and (6, 6) of the phalanges, world axes, as of `tip_compliance` [m/N,
+        rad/N m].
 
     Raises:
         ModelError: if bodies and springs do not match.

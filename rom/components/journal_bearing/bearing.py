@@ -29,7 +29,7 @@ class Groove:
         angle: of its middle from X in the direction of rotation [rad].
         width: how far it extends around the bush [rad]; at least one column of cells.
         pressure: of the oil in it [Pa].
-        share: of the width of the bearing, about its middle.
+        share: of the width of the bearing, about its middle [1].
     """
 
     angle: float
@@ -50,10 +50,13 @@ class JournalBearing:
         clearance: radius of the bush less radius of the journal [m]; of a lobe, if preloaded.
         grooves: inlets of oil.
         cavitation: what happens where oil would have to pull.
-        preload: of a two-lobed bore; its halves are moved together by so many clearances.
+        preload: of a two-lobed bore; its halves are moved together by so many clearances [1].
         lobes: angle of the line along which they are moved [rad].
         cells: around the bearing, along its width.
         aligned: the journal never tilts, and the cells cover half the width.
+
+    Raises:
+        ModelError: for numbers that no bearing has, or grooves that its cavitation needs and lacks.
     """
 
     diameter: float
@@ -98,7 +101,11 @@ class JournalBearing:
         return np.array([c, c, c / self.length, c / self.length])
 
     def thinnest(self, motion: npt.ArrayLike) -> float:
-        """Smallest film of the cells [m] when the journal is there."""
+        """Smallest film of the cells [m] when the journal is there.
+
+        Args:
+            motion: (2,) or (4,) ex, ey, phi_x, phi_y of the journal in the bush [m, rad].
+        """
         m = four(motion) / self.scale
         edges = np.array([-0.5, 0.5]) if not self.aligned else np.zeros(1)
         return self.clearance * float(np.min(thickness(self.grid, m, edges)))

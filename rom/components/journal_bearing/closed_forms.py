@@ -1,7 +1,11 @@
 """Short and long bearings: closed forms.
 
-Short: Ocvirk's film, pressure on half the circumference; coefficients in the form of Friswell,
-Penny, Garvey and Lees, Dynamics of Rotating Machines (2010). Long: Sommerfeld's film.
+Short: Ocvirk's film, pressure on half the circumference. Long: Sommerfeld's film.
+
+Source:
+    Ocvirk, Short-bearing approximation for full journal bearings, NACA TN 2808 (1952); Sommerfeld,
+    Z. Math. Phys. 50 (1904) 97; coefficients in the form of Friswell, Penny, Garvey and Lees,
+    Dynamics of Rotating Machines (2010).
 """
 
 import numpy as np
@@ -14,7 +18,7 @@ GAUSS_X, GAUSS_W = np.polynomial.legendre.leggauss(64)
 
 
 def short_sommerfeld(eccentricity: npt.ArrayLike) -> Array:
-    """S (L/D)^2 of a short bearing with viscosity N L D / W (R/c)^2 = S.
+    """(...,) S (L/D)^2 of a short bearing [1] with viscosity N L D / W (R/c)^2 = S.
 
     Raises:
         ModelError: if an eccentricity is not between 0 and 1.
@@ -24,13 +28,17 @@ def short_sommerfeld(eccentricity: npt.ArrayLike) -> Array:
 
 
 def short_attitude(eccentricity: npt.ArrayLike) -> Array:
-    """Angle from the load to the line of centres [rad]."""
+    """(...,) angle from the load to the line of centres [rad] at eccentricities (...,).
+
+    Raises:
+        ModelError: if an eccentricity is not between 0 and 1.
+    """
     e = _inside(eccentricity)
     return np.arctan2(np.pi * np.sqrt(1 - e**2), 4 * e)
 
 
 def short_eccentricity(sommerfeld: float) -> float:
-    """Eccentricity at which `short_sommerfeld` has that value.
+    """Eccentricity, in clearances, at which `short_sommerfeld` has that value; both [1].
 
     Raises:
         ModelError: if it is not positive.
@@ -47,8 +55,14 @@ def short_eccentricity(sommerfeld: float) -> float:
 def short_coefficients(eccentricity: float) -> tuple[Array, Array]:
     """Stiffness times c/W and damping times c speed/W of a short bearing.
 
+    Args:
+        eccentricity: between 0 and 1, in clearances [1].
+
     Returns:
-        (2, 2), (2, 2); x along the load, y from it by 90 degrees in the direction of rotation.
+        (2, 2), (2, 2) [1]; x along the load, y from it by 90 degrees in the direction of rotation.
+
+    Raises:
+        ModelError: if the eccentricity is not between 0 and 1.
     """
     e = float(_inside(eccentricity))
     r, p = np.sqrt(1 - e**2), np.pi**2
@@ -69,8 +83,8 @@ def short_force(position: npt.ArrayLike, rate: npt.ArrayLike) -> Array:
     Pressure fills the half of the circumference where the film closes.
 
     Args:
-        position: (2,) of the journal in clearances.
-        rate: (2,) per radian of rotation.
+        position: (2,) of the journal in clearances [1].
+        rate: (2,) in clearances per radian of rotation [1].
 
     Returns:
         (2,) in units of viscosity speed R L^3/c^2.
@@ -85,11 +99,14 @@ def short_force(position: npt.ArrayLike, rate: npt.ArrayLike) -> Array:
 
 
 def long_pressure(theta: npt.ArrayLike, eccentricity: float) -> Array:
-    """Pressure of a long film over viscosity speed (R/c)^2, zero at its largest gap.
+    """(n,) pressure of a long film over viscosity speed (R/c)^2 [1], zero at its largest gap.
 
     Args:
         theta: (n,) from the largest gap in the direction of rotation [rad].
-        eccentricity: between 0 and 1.
+        eccentricity: between 0 and 1, in clearances [1].
+
+    Raises:
+        ModelError: if the eccentricity is not between 0 and 1.
     """
     e, t = float(_inside(eccentricity)), np.asarray(theta, dtype=float)
     return 6 * e * np.sin(t) * (2 + e * np.cos(t)) / ((2 + e**2) * (1 + e * np.cos(t)) ** 2)
@@ -98,7 +115,14 @@ def long_pressure(theta: npt.ArrayLike, eccentricity: float) -> Array:
 def long_force(eccentricity: float) -> Array:
     """(2,) half of Sommerfeld's film: force against the eccentricity and across it.
 
-    Per length, in units of viscosity speed R (R/c)^2.
+    Args:
+        eccentricity: between 0 and 1, in clearances [1].
+
+    Returns:
+        (2,) per length, in units of viscosity speed R (R/c)^2.
+
+    Raises:
+        ModelError: if the eccentricity is not between 0 and 1.
     """
     e = float(_inside(eccentricity))
     radial = 12 * e**2 / ((2 + e**2) * (1 - e**2))

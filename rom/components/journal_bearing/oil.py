@@ -1,4 +1,9 @@
-"""Viscosity of oil over temperature, and the temperature the film makes for itself."""
+"""Viscosity of oil over temperature, and the temperature the film makes for itself.
+
+Source:
+    Walther's equation as in ASTM D341; grades of ISO 3448; the effective temperature as in
+    Raimondi and Boyd, ASLE Trans. 1 (1958) 159.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -23,6 +28,9 @@ class Oil:
         nu_40, nu_100: kinematic viscosity at 40 and 100 degrees Celsius [mm^2/s].
         density: [kg/m^3].
         heat: specific heat [J/(kg K)].
+
+    Raises:
+        ModelError: for numbers that no oil has.
     """
 
     nu_40: float
@@ -38,14 +46,14 @@ class Oil:
             )
 
     def law(self) -> tuple[float, float]:
-        """A and B of log10 log10 (nu + 0.7) = A - B log10 T."""
+        """A and B of log10 log10 (nu + 0.7) = A - B log10 T, nu in mm^2/s and T in kelvin [1]."""
         cold, hot = (np.log10(np.log10(nu + 0.7)) for nu in (self.nu_40, self.nu_100))
         T = np.log10([CELSIUS_ZERO + 40, CELSIUS_ZERO + 100])
         B = (cold - hot) / (T[1] - T[0])
         return float(cold + B * T[0]), float(B)
 
     def viscosity(self, celsius: npt.ArrayLike) -> Array:
-        """Dynamic viscosity [Pa s] at a temperature [degrees Celsius]."""
+        """(...,) dynamic viscosity [Pa s] at temperatures (...,) [degrees Celsius]."""
         A, B = self.law()
         nu = 10 ** (10 ** (A - B * np.log10(np.asarray(celsius, dtype=float) + CELSIUS_ZERO))) - 0.7
         return 1e-6 * self.density * nu
@@ -101,12 +109,13 @@ def warm_equilibrium(
         oil: in it.
         speed: [rad/s].
         inlet: temperature of the oil that comes in [degrees Celsius].
-        carried: share of the heat that leaves with the oil.
-        felt: share of the rise that the effective viscosity feels; 0.5 is the mean of inlet and
+        carried: share of the heat that leaves with the oil [1].
+        felt: share of the rise that the effective viscosity feels [1]; 0.5 is the mean of inlet and
             outlet, as Raimondi and Boyd take it.
 
     Raises:
         SolverError: if no film carries the load, or the temperature does not settle.
+        ModelError: without a load.
     """
     T, start = inlet, None
     for _ in range(60):
@@ -139,7 +148,7 @@ def warm_bearing(
         bush: how much warmer it is [K].
         shaft: how much warmer it is [K].
         expansion: coefficients of bush and shaft [1/K].
-        free: share of its expansion that the fit lets the bush have.
+        free: share of its expansion that the fit lets the bush have [1].
 
     Raises:
         ModelError: if no clearance is left.

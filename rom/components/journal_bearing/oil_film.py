@@ -1,4 +1,9 @@
-"""The film between journal and bush in SI units: its pressure, and what it does."""
+"""The film between journal and bush in SI units: its pressure, and what it does.
+
+Source:
+    Reynolds, Phil. Trans. R. Soc. 177 (1886) 157; cavitation by complementarity as in
+    Giacopini, Fowell, Dini and Strozzi, J. Tribol. 132 (2010) 041702.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,7 +35,7 @@ def film(
         rate: (2,) or (4,) its velocity [m/s, rad/s].
         speed: of rotation [rad/s], positive.
         viscosity: dynamic, of the oil [Pa s].
-        warm: `Film.active` of a film nearby, which saves iterations.
+        warm: (nt, nz) `Film.active` of a film nearby, which saves iterations.
 
     Raises:
         ModelError: if the journal touches the bush, or tilts in an aligned bearing.
@@ -74,9 +79,9 @@ class Film:
         motion, rate: (4,) of the journal [m, rad; per second].
         speed, viscosity: [rad/s], [Pa s].
         P: (nt, nz) pressure in units of viscosity speed (R/c)^2.
-        fill: (nt, nz) share of the gap that is oil.
+        fill: (nt, nz) share of the gap that is oil [1].
         active: (nt, nz) 1 where the film carries pressure.
-        F, dF: (4,), (4, 8) dimensionless forces and their derivatives.
+        F, dF: (4,), (4, 8) dimensionless forces and their derivatives [1].
         iterations: changes of the cavitated region, and one more.
     """
 
@@ -117,7 +122,7 @@ class Film:
 
     @property
     def damping(self) -> Array:
-        """(4, 4) minus the derivative of the force by the rate of the motion."""
+        """(4, 4) minus the derivative of the force by the rate of motion [N s/m, N s, N m s]."""
         d = self.bearing.scale * self.speed
         return -self.unit * self.bearing.clearance * self.dF[:, 4:] / np.outer(d / self.speed, d)
 
@@ -129,12 +134,12 @@ class Film:
 
     @property
     def eccentricity(self) -> float:
-        """Distance of the centres in clearances."""
+        """Distance of the centres in clearances [1]."""
         return float(np.hypot(*self.motion[:2])) / self.bearing.clearance
 
     @property
     def sommerfeld(self) -> float:
-        """Viscosity times revolutions times L D / W (R/c)^2."""
+        """Viscosity times revolutions times L D / W (R/c)^2 [1]."""
         return float(self.unit / (np.pi * np.hypot(*self.force[:2])))
 
     @cached_property
@@ -152,7 +157,11 @@ class Film:
         )
 
     def friction(self, streamers: bool = True) -> float:
-        """Friction over load times R/c; `streamers` of oil are sheared where it cavitates, too."""
+        """Friction over load times R/c [1].
+
+        Args:
+            streamers: of oil that are sheared where it cavitates, too.
+        """
         H, dH = self._films()
         shear = np.sum((1.0 if streamers else self.fill) / H) * 2 * np.pi / len(H)
         return float(self._width * (shear - 0.5 * np.sum(self.P * dH)) / np.hypot(*self.F[:2]))

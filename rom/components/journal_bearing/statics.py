@@ -1,4 +1,8 @@
-"""Where a loaded journal comes to rest, and how long it stays there: stability of whirl."""
+"""Where a loaded journal comes to rest, and how long it stays there: stability of whirl.
+
+Source:
+    Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010).
+"""
 
 from dataclasses import dataclass
 
@@ -88,7 +92,8 @@ class Stability:
 
     Attributes:
         stiffness: that the whirl feels [N/m].
-        whirl_ratio: frequency of the whirl at the threshold over the speed; 0 if it never whirls.
+        whirl_ratio: frequency of the whirl at the threshold over the speed [1]; 0 if it never
+            whirls.
         critical_mass: per bearing, from which on the rotor whirls [kg]; inf if it never does.
     """
 
@@ -120,9 +125,12 @@ def stability(stiffness: npt.ArrayLike, damping: npt.ArrayLike, speed: float) ->
 
 
 def threshold_speed(film: Film) -> float:
-    """Speed times sqrt(c/g) at which a rigid rotor with the load of this film starts to whirl.
+    """Speed times sqrt(c/g) at which a rigid rotor with the load of this film begins to whirl [1].
 
     The position of the journal, and with it the coefficients, are kept. inf if it never whirls.
+
+    Raises:
+        ModelError: if the film feeds the whirl.
     """
     found = stability(film.stiffness[:2, :2], film.damping[:2, :2], film.speed)
     weight = float(np.hypot(*film.force[:2]))
@@ -133,7 +141,7 @@ def coefficients(film: Film) -> tuple[Array, Array]:
     """Stiffness times c/W and damping times c speed/W, x along the load, y by 90 degrees from it.
 
     Returns:
-        (2, 2), (2, 2).
+        (2, 2), (2, 2) [1].
     """
     W = -film.force[:2]
     size = np.hypot(*W)

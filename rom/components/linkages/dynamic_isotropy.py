@@ -30,12 +30,12 @@ DETERMINANT_RTOL = 1e-12  # of the squared trace: round-off by which a determina
 
 
 def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
-    """(...) index 2 sqrt(det A) / tr A, one where isotropic; independent of the scale of A.
+    """(...,) index 2 sqrt(det A) / tr A [1], one where isotropic; independent of the scale of A.
 
     Args:
-        A: (..., 2, 2) generalised inertia.
-        lengths: (2,) by which the coordinates are multiplied first: (1, 1) for two angles, (L, 1)
-            with a characteristic length L for an angle beside a displacement.
+        A: (..., 2, 2) generalised inertia [kg m^2].
+        lengths: (2,) by which the coordinates are multiplied first [1 or m]: (1, 1) for two angles,
+            (L, 1) with a characteristic length L for an angle beside a displacement.
 
     Raises:
         ConfigError, ModelError: for lengths that are not positive; for an inertia that is not.
@@ -61,7 +61,7 @@ def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
 
 
 def angle_grid(n: int) -> tuple[Array, Array]:
-    """(n, n), (n, n) angles of both motors over one turn, the first along the rows."""
+    """(n, n), (n, n) angles of both motors over one turn [rad], the first along the rows."""
     angles = 2 * np.pi * np.arange(n) / n
     q1, q2 = np.meshgrid(angles, angles, indexing="ij")
     return q1, q2
@@ -72,7 +72,7 @@ class Isotropic:
     """Isotropic configurations.
 
     Attributes:
-        q: (k, 2) angles in [0, 2 pi), ascending.
+        q: (k, 2) angles from 0 to below 2 pi [rad], ascending.
         inertia: (k,) the inertia both motors feel [kg m^2].
         winding: (k,) 1 or -1 for an isolated point, 0 for a point of a curve of isotropy.
     """
@@ -166,8 +166,8 @@ def closed_loci(index: Array, level: float) -> list[Array]:
     """Curves of one value of a field on the torus, each closed, across the seam as well.
 
     Args:
-        index: (n, n) values on `angle_grid`.
-        level: the value.
+        index: (n, n) values on `angle_grid`, in units of the field.
+        level: the value, in units of the field.
 
     Returns:
         (k, 2) angles of each curve [rad], continuous; the last point is the first one, moved by

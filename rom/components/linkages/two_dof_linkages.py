@@ -35,8 +35,8 @@ class Link:
     Attributes:
         length: distance of the pins [m].
         M: (3 + r, 3 + r) mass for velocity of the first pin along and across the axis, angular
-            velocity of that pin, rates of r elastic coordinates.
-        tip: (2, r) displacement of the second pin along and across per elastic coordinate.
+            velocity of that pin, rates of r elastic coordinates [kg, kg m, kg m^2].
+        tip: (2, r) displacement of the second pin along and across per elastic coordinate [m].
     """
 
     length: float
@@ -70,7 +70,11 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
 
 
 def rod(mass: float, length: float) -> Link:
-    """A uniform slender rod of that mass [kg] and length [m]."""
+    """A uniform slender rod of that mass [kg] and length [m].
+
+    Raises:
+        ModelError: for a mass or a length that is not positive.
+    """
     return rigid_link(mass, length, (length / 2, 0.0), mass * length**2 / 12)
 
 
@@ -133,8 +137,8 @@ class TwoLink:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad].
 
         Args:
-            q1: (...) angle of the first link.
-            q2: (...) angle of the second one, of the same shape.
+            q1: (...,) angle of the first link [rad].
+            q2: (...,) angle of the second one, of the same shape [rad].
             elastic: "held", what slow motors feel; "free", what a sudden torque meets: the
                 elastic coordinates take the rates that make the kinetic energy least.
         """
@@ -181,8 +185,8 @@ class FiveBar:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad] of the cranks.
 
         Args:
-            q1: (...) angle of the left crank against the base.
-            q2: (...) angle of the right one, of the same shape.
+            q1: (...,) angle of the left crank against the base [rad].
+            q2: (...,) angle of the right one, of the same shape [rad].
             elastic: "held" or "free", see `TwoLink.inertia`.
 
         Raises:
@@ -193,7 +197,14 @@ class FiveBar:
         return _in_chunks(moved._of_all_rates, q1, q2)
 
     def posture(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
-        """(..., 5, 2) left pivot, left elbow, tip, right elbow, right pivot [m].
+        """Where the joints are at angles of the cranks.
+
+        Args:
+            q1: (...,) angle of the left crank against the base [rad].
+            q2: (...,) angle of the right one, of the same shape [rad].
+
+        Returns:
+            (..., 5, 2) left pivot, left elbow, tip, right elbow, right pivot [m].
 
         Raises:
             ModelError: if the couplers cannot reach each other at some angles.
@@ -323,7 +334,7 @@ def mechanism_inertia(
     angles: npt.ArrayLike = (0.0, 0.0),
     elastic: Elastic = "held",
 ) -> Array:
-    """(2, 2) generalised inertia of any mechanism that two drives move, from its constraints.
+    """(2, 2) generalised inertia of a mechanism that two drives move [kg m^2], from constraints.
 
     With the mass matrix M of all bodies, motions N that the joints allow and their drive rates E,
     it is the inverse of E N (N^T M N)^-1 N^T E^T; elastic coordinates held are left out of N.
@@ -331,7 +342,8 @@ def mechanism_inertia(
     Args:
         mechanism: bodies and joints; everything else that moves it is left out.
         drives: names of the two drives.
-        angles: (2,) their joint coordinates; mixed units, metres for a prismatic joint.
+        angles: (2,) their joint coordinates [rad or m]; with a displacement the inertia is mixed
+            too.
         elastic: "held" or "free", see `TwoLink.inertia`.
 
     Raises:

@@ -4,6 +4,11 @@ If any forces in the joints balance the weight, press and stay within friction, 
 (the lower bound theorem; with friction it is exact for joints that dilate as they slip).
 `arch` and `wall` lay the stones, `stands` looks for such forces by linear programming,
 `minimum_thickness` is the closed form for circular arches of infinitely many voussoirs.
+
+Source:
+    Heyman, The stone skeleton, Int. J. Solids Struct. 2 (1966) 249; by linear programming:
+    Livesley, Limit analysis of structures formed from rigid blocks, Int. J. Numer. Meth. Eng.
+    12 (1978) 1853.
 """
 
 from dataclasses import dataclass
@@ -24,10 +29,10 @@ class Rock:
 
     Attributes:
         E: Young's modulus [Pa].
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
         rho: density [kg/m^3].
-        friction: tangent of the angle of friction.
-        contact: stiffness of a contact over E times the thickness.
+        friction: tangent of the angle of friction [1].
+        contact: stiffness of a contact over E times the thickness [1].
     """
 
     E: float = 10e9
@@ -37,11 +42,23 @@ class Rock:
     contact: float = 20.0
 
     def stone(self, outline: Array, solid: Array | None = None) -> Stone:
-        """A stone of unit depth."""
+        """A stone of unit depth.
+
+        Args:
+            outline: (k, 2) corners, counterclockwise [m].
+            solid: (m, 2) polygon the mass comes from [m], if finer than the outline.
+
+        Raises:
+            MaterialError, ModelError: as `stone`.
+        """
         return stone(outline, E=self.E, nu=self.nu, rho=self.rho, solid=solid)
 
     def masonry(self, stones: list[Stone], held: tuple[int, ...]) -> Masonry:
-        """Stones in contact."""
+        """Stones in contact.
+
+        Raises:
+            ConfigError: as `Masonry`.
+        """
         return Masonry(tuple(stones), held, self.contact * self.E, self.friction)
 
 
@@ -187,9 +204,9 @@ class Limit:
     """The thinnest arch.
 
     Attributes:
-        ratio: thickness over radius of the centre line.
+        ratio: thickness over radius of the centre line [1].
         hinge: angle of the intrados hinges from the crown [rad].
-        thrust: horizontal thrust over weight per length and radius.
+        thrust: horizontal thrust over weight per length and radius [1].
     """
 
     ratio: float

@@ -5,7 +5,7 @@ deformation analysis, or the modes of a reduced body. `simulate` moves an assemb
 `rom.components.masonry.limits` lays arches and walls, and asks statics what they could carry.
 
 Source:
-    After Shi's discontinuous deformation analysis and its use for masonry by Bagi.
+    After Shi's discontinuous deformation analysis (1988) and its use for masonry by Bagi.
 """
 
 from dataclasses import dataclass
@@ -44,9 +44,10 @@ class Stone:
     Attributes:
         outline: (k, 2) corners at the start, counterclockwise [m].
         centre: (2,) mass centre at the start [m].
-        M: (3 + r, 3 + r) mass of translation, rotation about the centre, elastic coordinates.
+        M: (3 + r, 3 + r) mass of translation, rotation about the centre, elastic coordinates [kg,
+            kg m^2].
         K: (r, r) stiffness [N/m].
-        shapes: (k, 2, r) displacement of the corners per elastic coordinate.
+        shapes: (k, 2, r) displacement of the corners per elastic coordinate [m].
     """
 
     outline: Array
@@ -71,11 +72,11 @@ def stone(
     Args:
         outline: (k, 2) corners, counterclockwise [m].
         E: Young's modulus [Pa].
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
         rho: density [kg/m^3].
         thickness: out of the plane [m].
         state: "plane stress" or "plane strain".
-        solid: (m, 2) polygon the mass comes from, if finer than the outline.
+        solid: (m, 2) polygon the mass comes from [m], if finer than the outline.
 
     Raises:
         ConfigError, MaterialError: for an unknown state; if no stone has these numbers.
@@ -160,7 +161,7 @@ class Masonry:
         held: numbers of those that do not move.
         stiffness: of a contact across the edge [N/m]; 10 to 100 times the modulus of the stone
             times its thickness.
-        friction: tangent of the angle of friction.
+        friction: tangent of the angle of friction [1].
         gravity: (2,) [m/s^2].
         reach: distance within which corners watch edges [m]; None for 5 % of the shortest edge.
 
@@ -197,7 +198,7 @@ class Masonry:
         )
 
     def start(self) -> Array:
-        """(B, 3 + R) coordinates at the start: mass centre, angle zero, no deformation."""
+        """(B, 3 + R) coordinates at the start [m, rad]: mass centre, angle zero, no deformation."""
         q = np.zeros((len(self.stones), 3 + self.R))
         q[:, :2] = [s.centre for s in self.stones]
         return q
@@ -250,7 +251,7 @@ class Motion:
     Attributes:
         masonry: the stones.
         t: (n,) times [s].
-        q, v: (n, B, 3 + R) coordinates and rates: mass centre, angle, elastic.
+        q, v: (n, B, 3 + R) coordinates and rates: mass centre [m], angle [rad], elastic.
         energy: (n,) kinetic, elastic, potential, and of the contacts [J].
         contacts: those at the end.
         cuts: how often a step was cut.
@@ -321,11 +322,11 @@ def simulate(
         masonry: the stones.
         t_end: duration [s].
         dt: step [s]; cut where contacts change too much.
-        keep: share of the velocity kept after each step: 1 for dynamics, 0 for statics, 0.95 to
+        keep: share of the velocity kept after each step [1]: 1 for dynamics, 0 for statics, 0.95 to
             0.98 to come to rest.
         save_every: steps between two saved ones.
-        q: (B, 3 + R) coordinates at the start; None for where the outlines are.
-        v: (B, 3 + R) rates at the start; None for rest.
+        q: (B, 3 + R) coordinates at the start [m, rad]; None for where the outlines are.
+        v: (B, 3 + R) rates at the start [m/s, rad/s]; None for rest.
 
     Raises:
         ConfigError: if times or shapes do not fit.

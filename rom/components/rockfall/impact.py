@@ -1,4 +1,8 @@
-"""A boulder, a plug and the modes of a slab: the motion of an impact and what decides over it."""
+"""A boulder, a plug and the modes of a slab: the motion of an impact and what decides over it.
+
+Source:
+    After Schellenberg, On the design of rockfall protection galleries, ETH Zurich (2009).
+"""
 
 from dataclasses import astuple, dataclass, replace
 from typing import Any
@@ -24,7 +28,7 @@ class Slab:
     Attributes:
         phi: (r,) deflection under the plug per modal coordinate [kg^-1/2].
         omega: (r,) frequencies [rad/s].
-        damping: share of critical damping of all modes.
+        damping: share of critical damping of all modes [1].
         capacity: force at which a slab of one mode yields [N].
 
     Raises:
@@ -66,7 +70,7 @@ class Slab:
             supports: interfaces held.
             down: (3,) direction of the blow, body frame.
             n: modes kept, lowest first; None for all.
-            damping: share of critical damping.
+            damping: share of critical damping [1].
         """
         omega, V = body.modes(n, fixed=supports)
         m = body.marker(patch)
@@ -223,10 +227,10 @@ def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str
     Args:
         g: the gallery.
         answer: function of a `Gallery` that gives a number, e.g. a peak of `strike`.
-        factors: (f,) for example 0.8 and 1.25.
+        factors: (f,) for example 0.8 and 1.25 [1].
 
     Returns:
-        {parameter: (f,) relative changes of the answer}.
+        {parameter: (f,) relative changes of the answer [1]}.
     """
     first = answer(g)
     return {

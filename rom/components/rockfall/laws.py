@@ -23,10 +23,10 @@ class Cushion:
 
     Attributes:
         stiffness: k [N/m^n].
-        exponent: n; 3/2 for a sphere after Hertz, 1 for a spring.
-        recovery: share of the penetration that comes back, in (0, 1]; 1 is elastic.
+        exponent: n [1]; 3/2 for a sphere after Hertz, 1 for a spring.
+        recovery: share of the penetration that comes back [1], above 0; 1 is elastic.
         limit: penetration at which the compacted cushion is rigid [m].
-        hardening: m of the compaction, 0 for none.
+        hardening: m of the compaction [1], 0 for none.
 
     Raises:
         ConfigError: for a number out of its range.
@@ -100,7 +100,7 @@ class Shear:
         capacity: force at which it cracks [N].
         reinforced: stiffness left to the reinforcement then [N/m].
         ultimate: deformation at which that fails, too: the slab is punched [m].
-        damping: share of critical damping of the plug on the uncracked concrete alone.
+        damping: share of critical damping of the plug on the uncracked concrete alone [1].
 
     Raises:
         ConfigError: for a number out of its range.

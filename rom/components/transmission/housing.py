@@ -23,7 +23,7 @@ class Housing:
     """Matrices of a housing that is held somewhere, and how its bushes move.
 
     Attributes:
-        M, K: (n, n) mass and stiffness.
+        M, K: (n, n) mass and stiffness, in units of the coordinates of the body.
         bushes: of pinion and gear, {node of the shaft: (6, n)} motion of the bush u_x, u_y, u_z,
             phi_x, phi_y, phi_z per coordinate, in the axes of the unit.
     """
@@ -54,7 +54,7 @@ class Housing:
             pinion: {node of the shaft: interface of its bush}.
             gear: the same of the gear.
             fixed: interfaces that do not move.
-            axes: (3, 3) rows: X, Y and Z of the unit in the axes of the body.
+            axes: (3, 3) rows: X, Y and Z of the unit in the axes of the body [1].
 
         Raises:
             InterfaceError: if the body has no such interface.

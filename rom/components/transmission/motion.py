@@ -2,6 +2,9 @@
 
 Newmark's average acceleration; in every step Newton's method over films, their cavitated regions
 and the set of teeth in contact together. It keeps the balance of work exactly, step by step.
+
+Source:
+    Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85 (1959) 67.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +29,7 @@ class Whirl:
 
     Attributes:
         values: (2n,) eigenvalues, least damped first [1/s].
-        shapes: (n, 2n) their displacements, columns.
+        shapes: (n, 2n) their displacements, columns, in units of the coordinates.
     """
 
     values: Array
@@ -39,7 +42,12 @@ class Whirl:
 
 
 def linearised(state: Rest) -> tuple[Array, Array, Array]:
-    """(n, n) mass, damping with gyroscopic forces, and stiffness about an equilibrium."""
+    """Matrices of small motions about an equilibrium.
+
+    Returns:
+        (n, n) mass [kg], damping with gyroscopic forces [N s/m], stiffness [N/m]; of rotations
+        alike.
+    """
     M, K, G = state.unit.matrices
     C = state.unit.loss * K + G + state.forces.damping
     return M, C, K + state.forces.stiffness
@@ -66,7 +74,7 @@ def threshold(unit: Transmission, low: float, high: float, *, within: float = 0.
         unit: the transmission; its own speed does not matter.
         low: speed without whirl [rad/s].
         high: speed with whirl [rad/s].
-        within: share of the speed that the answer may be off.
+        within: share of the speed that the answer may be off [1].
 
     Raises:
         ModelError: if both speeds whirl, or neither.
@@ -116,7 +124,7 @@ class Run:
 
     @property
     def balance(self) -> float:
-        """Work that is missing at the end over the work of the drive."""
+        """Work that is missing at the end over the work of the drive [1]."""
         given = sum(w[-1] for name, w in self.work.items() if name != "kinetic")
         return float(abs(given - self.work["kinetic"][-1]) / abs(self.work["drive"][-1]))
 
@@ -126,7 +134,7 @@ def simulate(state: Rest, *, periods: float, steps: int = 100, whirling: bool = 
 
     Args:
         state: where it starts, without vibration.
-        periods: how many mesh periods.
+        periods: how many mesh periods [1].
         steps: per mesh period.
         whirling: go on although the equilibrium is not stable.
 

@@ -2,7 +2,10 @@
 
 Films and teeth are linear about an equilibrium. What drives them is the transmission error under
 load: how far the pinion has to turn for the teeth to carry the same torque in every position, times
-the mean stiffness (Velex and Ajmi, J. Sound Vib. 290, 2006), and moments that wander with the load.
+the mean stiffness, and moments that wander with the load.
+
+Source:
+    Velex and Ajmi, J. Sound Vib. 290 (2006).
 """
 
 from dataclasses import dataclass
@@ -40,7 +43,7 @@ class Response:
 
     @property
     def load_factor(self) -> float:
-        """1 and the root mean square of the changing force over its mean."""
+        """1 and the root mean square of the changing force over its mean [1]."""
         return 1 + float(np.sqrt(np.sum(self.force**2) / 2)) / self.mean
 
 

@@ -36,7 +36,15 @@ class Disc:
     def of_ring(
         cls, node: int, *, outer: float, inner: float, width: float, rho: float = 7850.0
     ) -> "Disc":
-        """A ring of that outer and inner diameter and width [m]."""
+        """A ring on a shaft.
+
+        Args:
+            node: where it sits.
+            outer: diameter [m].
+            inner: diameter [m].
+            width: along the shaft [m].
+            rho: density [kg/m^3].
+        """
         m = rho * np.pi / 4 * (outer**2 - inner**2) * width
         squares = outer**2 + inner**2
         return cls(node, m, m * (squares / 16 + width**2 / 12), m * squares / 8)
@@ -52,6 +60,9 @@ class Shaft:
         discs: on the shaft.
         material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3].
         bore: (n - 1,) diameters of a hole along the axis [m], or one number.
+
+    Raises:
+        ModelError: for pieces that no shaft has, or a disc beyond it.
     """
 
     z: npt.ArrayLike
@@ -86,18 +97,18 @@ class Shaft:
         return np.tile([True] * 3 + [False] * 3, self.nodes)
 
     def rows(self, node: int) -> Array:
-        """(6, n) motion of a node per coordinate."""
+        """(6, n) motion of a node per coordinate [1]."""
         return np.eye(self.n)[6 * node : 6 * node + 6]
 
     def rigid(self) -> Array:
-        """(n, 6) coordinates of rigid motions: along the axes, and about them at z = 0."""
+        """(n, 6) coordinates of rigid motions: along the axes, and about them at z = 0 [1, m]."""
         found = np.tile(np.eye(6), (self.nodes, 1))
         z = np.asarray(self.z, dtype=float)
         found[0::6, 4], found[1::6, 3] = z, -z
         return found
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """(n, n) mass, stiffness, and gyroscopic matrix per speed of rotation."""
+        """(n, n) mass [kg], stiffness [N/m], gyroscopic matrix per speed of rotation [kg m^2]."""
         z = np.asarray(self.z, dtype=float)
         d, hole = (
             np.broadcast_to(np.asarray(x, dtype=float), z.size - 1)

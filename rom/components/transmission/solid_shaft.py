@@ -39,6 +39,9 @@ class SolidShaft:
         body: with its journals and the seat of the wheel as interfaces; mean motions count.
         seats: names of the interfaces, in the order of the nodes.
         discs: on the seats.
+
+    Raises:
+        ModelError: if a disc sits beyond the seats.
     """
 
     body: FlexibleBody
@@ -73,7 +76,7 @@ class SolidShaft:
         return np.ones(self.n, dtype=bool)
 
     def rows(self, node: int) -> Array:
-        """(6, n) mean motion of a seat per coordinate."""
+        """(6, n) mean motion of a seat [m, rad] per coordinate."""
         (X, Z, T), B = self._shapes, motion_of(self.body, self.seats[node])
         b = X.shape[1]
         found = np.zeros((6, self.n))
@@ -85,7 +88,7 @@ class SolidShaft:
         return found
 
     def rigid(self) -> Array:
-        """(n, 6) coordinates of rigid motions: along the axes, and about them at z = 0."""
+        """(n, 6) rigid motions along the axes, about them at z = 0, in units of the coordinates."""
         X, Z, T = self._shapes
         b, z = X.shape[1], 2 * X.shape[1]
         found = np.zeros((self.n, 6))
@@ -95,7 +98,7 @@ class SolidShaft:
         return found
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """(n, n) mass, stiffness, and gyroscopic matrix per speed of rotation."""
+        """(n, n) mass, stiffness, and gyroscopic matrix per speed, in units of the coordinates."""
         (X, Z, T), (M, K) = self._shapes, self.body.full_matrices()
         b, n = X.shape[1], self.n
         whole_M, whole_K, G = (np.zeros((n, n)) for _ in range(3))

@@ -1,8 +1,11 @@
 """Motion that repeats with every tooth: films and teeth as they are, found by shooting.
 
 The state after one mesh period is a function of the state before it. Newton's method makes both
-equal; the derivatives come with the time steps. Their eigenvalues, Floquet's multipliers, say
-whether the motion is stable (Nayfeh and Balachandran, Applied Nonlinear Dynamics, 1995).
+equal; the derivatives come with the time steps. Their eigenvalues, the multipliers of Floquet, say
+whether the motion is stable.
+
+Source:
+    Nayfeh and Balachandran, Applied Nonlinear Dynamics (1995).
 """
 
 from collections.abc import Iterable
@@ -31,13 +34,13 @@ class Steady:
         unit: what moves.
         theta: angle that the drive has turned at the start [rad].
         t: (n_t,) [s]; first and last are a period apart.
-        q, v: (n_t, n) coordinates and rates.
+        q, v: (n_t, n) coordinates and rates [m, rad; per second].
         teeth: (n_t,) normal force between the teeth [N].
         error: (n_t,) of transmission, along the line of action [m].
         heat: (n_t,) power that becomes heat in the films [W].
-        multipliers: (2n,) of Floquet, largest first.
+        multipliers: (2n,) of Floquet [1], largest first.
         passes: through the period until it closed.
-        gap: what is left of it, over the largest coordinate.
+        gap: what is left of it, over the largest coordinate [1].
     """
 
     unit: Transmission
@@ -64,12 +67,12 @@ class Steady:
 
     @property
     def load_factor(self) -> float:
-        """Largest over mean force between the teeth."""
+        """Largest over mean force between the teeth [1]."""
         return float(self.teeth.max() / self.teeth[1:].mean())
 
     @property
     def apart(self) -> float:
-        """Share of the time in which no teeth touch."""
+        """Share of the time in which no teeth touch [1]."""
         return float(np.mean(self.teeth[1:] == 0))
 
     @property

@@ -5,6 +5,10 @@ In axes that do not spin, bending in both planes obeys::
     M q'' + (C + Omega G) q' + K q = 0
 
 with bearings in C and K. Gyroscopic forces part forward from backward whirl.
+
+Source:
+    Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010); see
+    docs/theory/rotating_solids.md.
 """
 
 from collections.abc import Mapping
@@ -29,7 +33,7 @@ class Support:
 
     Attributes:
         stiffness: across the shaft [N/m], a number or a (2, 2) matrix.
-        damping: [N s/m], likewise.
+        damping: [N s/m], a scalar or a (2, 2) matrix likewise.
     """
 
     stiffness: npt.ArrayLike
@@ -43,7 +47,7 @@ class ShaftWhirl:
     Attributes:
         values: (m,) eigenvalues with a positive imaginary part [rad/s].
         shapes: (n, m) complex coordinates of the shaft, as in `Shaft.matrices`.
-        direction: (m,) +1 forward, with the rotation, -1 backward, 0 along a line.
+        direction: (m,) [1] +1 forward, with the rotation, -1 backward, 0 along a line.
     """
 
     values: npt.NDArray[np.complex128]
@@ -62,7 +66,7 @@ class ShaftWhirl:
 
     @property
     def damping_ratios(self) -> Array:
-        """(m,) share of critical damping; negative where whirl grows."""
+        """(m,) share of critical damping [1]; negative where whirl grows."""
         return -self.values.real / np.abs(self.values)
 
 

@@ -3,6 +3,10 @@
 Datum: journals centred, shafts parallel, working flanks just touching. The pinion turns about +Z
 and is driven through a torsion spring that turns at constant speed; the gear turns about -Z, and a
 load torque brakes its end.
+
+Source:
+    After Fargere and Velex, who put gears and journal bearings into one model, J. Vib. Acoust.
+    135 (2013) 061014.
 """
 
 from collections.abc import Mapping
@@ -54,7 +58,7 @@ class Forces:
 
     Attributes:
         force: (n,) of films and teeth [N, N m].
-        stiffness, damping: (n, n) minus its derivatives.
+        stiffness, damping: (n, n) minus its derivatives [N/m, N s/m].
         films: of all bearings, pinion first.
         mesh: of the teeth.
     """
@@ -80,6 +84,9 @@ class Transmission:
         loss: damping over stiffness of the shafts [s].
         gravity: along X and Y [m/s^2]; a housing is measured from where it sags to.
         housing: that holds the bushes; rigid if None.
+
+    Raises:
+        ModelError: for a speed, a torque or a viscosity that no unit runs with.
     """
 
     pinion: Rotor
@@ -136,7 +143,7 @@ class Transmission:
         return M, K + self.motor * np.outer(self.drive, self.drive), G
 
     def rows(self, k: int, node: int) -> Array:
-        """(6, n) motion of a node of the pinion, 0, or of the gear, 1, per coordinate."""
+        """(6, n) motion of a node of the pinion, 0, or of the gear, 1, per coordinate [1]."""
         found = np.zeros((6, self.parts[2].stop))
         found[:, self.parts[k]] = (self.pinion, self.gear)[k].shaft.rows(node)
         return found
@@ -208,7 +215,7 @@ class Transmission:
 
         Args:
             q: (n,) coordinates [m, rad].
-            v: (n,) their rates.
+            v: (n,) their rates [m/s, rad/s].
             theta: angle that the drive has turned [rad].
             warm: films of a position nearby.
 
@@ -233,7 +240,12 @@ class Transmission:
         return Forces(F + teeth.force @ W, K, C, films, teeth)
 
     def allowed(self, q: Array, step: Array) -> float:
-        """Share of a step that keeps films: no journal moves far, or loses half of its film."""
+        """Share [1] of a step that keeps films: no journal moves far, or loses half of its film.
+
+        Args:
+            q: (n,) coordinates [m, rad].
+            step: (n,) their change [m, rad].
+        """
         share = 1.0
         for inside, bearing, _ in self.journals:
             at, d = inside[:4] @ q, inside[:4] @ step
@@ -257,7 +269,7 @@ class Rest:
         q: (n,) coordinates [m, rad].
         theta: angle of the pinion [rad].
         forces: of films and teeth.
-        residual: largest force that is not balanced, over the largest force.
+        residual: largest force that is not balanced, over the largest force [1].
     """
 
     unit: Transmission
@@ -291,8 +303,8 @@ def rest(
     Args:
         unit: the transmission.
         theta: angle of the pinion [rad].
-        start: (n,) coordinates of an equilibrium nearby; then the load is not raised.
-        loads: shares of the load on the way.
+        start: (n,) coordinates of an equilibrium nearby [m, rad]; then the load is not raised.
+        loads: shares of the load on the way [1].
 
     Raises:
         SolverError: if films or teeth cannot carry the load; ``error.solution`` is the equilibrium

@@ -3,6 +3,10 @@
 Fuselage, wing, drums at the wing tips, fin and tailplane of aluminium. Neutral axes do not meet;
 the parts are joined rigidly, or by joints that give way to moments: bolted plates do, and what they
 give is hardly known before a test.
+
+Source:
+    Dimensions of the test bed of Balmes and Wright, GARTEUR group on ground vibration testing,
+    IMAC XV (1997).
 """
 
 from dataclasses import dataclass
@@ -82,10 +86,11 @@ class Airframe:
     Attributes:
         points: (n, 3) nodes [m].
         beams: (m, 2) nodes of each element.
-        K: {(part, kind): (r, r)} stiffness by part and kind of deformation; of the kind "joint" is
-            what holds the part, if it gives way.
-        M: {part: (r, r)} mass by part.
-        T: (6 n, r) displacements and rotations of all nodes from the independent coordinates.
+        K: {(part, kind): (r, r)} stiffness [N/m, N m/rad] by part and kind of deformation; of the
+            kind "joint" is what holds the part, if it gives way.
+        M: {part: (r, r)} mass by part [kg, kg m^2].
+        T: (6 n, r) displacements and rotations of all nodes [m, rad] from the independent
+            coordinates.
     """
 
     points: Array
@@ -108,7 +113,15 @@ class Airframe:
         return int(far.argmin())
 
     def sensor(self, point: npt.ArrayLike, axis: int) -> Array:
-        """(r,) the row that gives the displacement of a node along an axis 0, 1, 2."""
+        """(r,) the row [1] that gives the displacement of a node along an axis 0, 1, 2.
+
+        Args:
+            point: (3,) where the node is [m].
+            axis: number of the axis.
+
+        Raises:
+            ConfigError: if there is no node.
+        """
         return self.T[6 * self.node(point) + axis]
 
 

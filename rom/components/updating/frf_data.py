@@ -1,4 +1,11 @@
-"""Frequency responses as a test gives them: noise, estimators, weights, comparison."""
+"""Frequency responses as a test gives them: noise, estimators, weights, comparison.
+
+Source:
+    Bendat and Piersol, Random Data (2010), for estimators and their errors; Heylen and Lammens,
+    FRAC: a consistent way of comparing frequency response functions (1996); Pascual, Golinval and
+    Razeto, A frequency domain correlation technique for model correlation and updating, IMAC XV
+    (1997).
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +18,15 @@ COHERENCE_ATOL = 1e-6  # distance of the coherence from 0 and 1, which no measur
 
 
 def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
-    """H with complex Gaussian errors of a relative standard deviation, any shape.
+    """H with complex Gaussian errors.
+
+    Args:
+        H: (...,) responses of any shape, in units of any kind.
+        level: relative standard deviation [1].
+        rng: source of random numbers.
+
+    Returns:
+        (...,) responses, in units of those given.
 
     Raises:
         ConfigError: for a negative level.
@@ -32,6 +47,9 @@ def estimators(x: Complex, f: Complex) -> tuple[Complex, Complex, Complex, Array
         x: (n_a, ...) spectra of the response [m], one for each average.
         f: (n_a, ...) spectra of the force [N], the same shape.
 
+    Returns:
+        H1, H2, Hv (...,) [m/N] and the coherence (...,) [1].
+
     Raises:
         ConfigError: for fewer than two averages: coherence would be one whatever the noise.
     """
@@ -44,7 +62,7 @@ def estimators(x: Complex, f: Complex) -> tuple[Complex, Complex, Complex, Array
 
 
 def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
-    """Relative standard deviation of |H1| under noise on the response.
+    """(...,) relative standard deviation of |H1| under noise on the response [1].
 
     Raises:
         ConfigError: without averages.
@@ -59,19 +77,23 @@ def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
 
 
 def weights(coherence: npt.ArrayLike, n_averages: int) -> Array:
-    """1 / random error, one in the mean square; the shape of the coherence."""
+    """(...,) 1 / random error, one in the mean square [1]; the shape of the coherence.
+
+    Raises:
+        ConfigError: without averages.
+    """
     w = 1.0 / random_error(np.clip(coherence, COHERENCE_ATOL, 1 - COHERENCE_ATOL), n_averages)
     return w / np.sqrt((w**2).mean())
 
 
 def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width: float) -> Array:
-    """(n_f, 1, 1) weights that fall to zero at poles whose damping is hardly known.
+    """(n_f, 1, 1) weights [1] that fall to zero at poles whose damping is hardly known.
 
     Args:
         omega: (n_f,) circular frequencies [rad/s].
         poles: (m,) natural frequencies [rad/s].
-        zeta: (m,) their damping ratios, roughly.
-        width: number of half bandwidths zeta omega from where on lines count fully.
+        zeta: (m,) their damping ratios, roughly [1].
+        width: number of half bandwidths zeta omega from where on lines count fully [1].
 
     Raises:
         ConfigError: if poles and ratios differ in number, or a bandwidth is not positive.
@@ -84,7 +106,11 @@ def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width:
 
 
 def frac(H: Complex, G: Complex) -> Array:
-    """(n_s, n_e) frequency response assurance over the lines of H, G (n_f, n_s, n_e), in [0, 1].
+    """(n_s, n_e) frequency response assurance over all lines, from 0 to 1 [1].
+
+    Args:
+        H: (n_f, n_s, n_e) responses [m/N].
+        G: (n_f, n_s, n_e) responses to compare with [m/N].
 
     Raises:
         ConfigError: if the shapes differ.
@@ -96,11 +122,21 @@ def frac(H: Complex, G: Complex) -> Array:
 
 
 def fdac(H: Complex, G: Complex) -> Array:
-    """(n_f, n_g) frequency domain assurance: each line of H against each line of G, in [0, 1]."""
+    """(n_f, n_g) frequency domain assurance, from 0 to 1 [1].
+
+    Args:
+        H: (n_f, n_s, n_e) responses [m/N].
+        G: (n_g, n_s, n_e) responses, each line of which is compared with each of H [m/N].
+    """
     A, B = (X.reshape(len(X), -1) / np.linalg.norm(X, axis=(1, 2))[:, None] for X in (H, G))
     return np.abs(A.conj() @ B.T) ** 2
 
 
 def deviation(H: Complex, test: Complex) -> Array:
-    """(n_f,) norm(H - test) / norm(test) of each line."""
+    """(n_f,) norm(H - test) / norm(test) of each line [1].
+
+    Args:
+        H: (n_f, n_s, n_e) responses of the model [m/N].
+        test: (n_f, n_s, n_e) measured ones [m/N].
+    """
     return np.linalg.norm(H - test, axis=(1, 2)) / np.linalg.norm(test, axis=(1, 2))

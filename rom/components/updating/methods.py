@@ -1,4 +1,10 @@
-"""Least squares over responses and over equations, and the response function method."""
+"""Least squares over responses and over equations, and the response function method.
+
+Source:
+    After Berriet, Fillod and Bouhaddi; the response function method is that of Lin and Ewins,
+    Analytical model improvement using frequency response functions, Mech. Syst. Signal Process.
+    8 (1994) 437.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -32,11 +38,11 @@ class Update:
     """What updating found.
 
     Attributes:
-        p: (n_p,) relative changes of stiffness and mass.
-        zeta: (m,) damping ratios of the lowest elastic modes.
-        deviation: (n_p + m,) standard deviations of p and ln zeta that the residual implies.
-        history: (k, n_p) p after each step.
-        residual: root mean square of the weighted residual.
+        p: (n_p,) relative changes of stiffness and mass [1].
+        zeta: (m,) damping ratios of the lowest elastic modes [1].
+        deviation: (n_p + m,) standard deviations of p and ln zeta that the residual implies [1].
+        history: (k, n_p) p after each step [1].
+        residual: root mean square of the weighted residual [1].
     """
 
     p: Array
@@ -49,12 +55,21 @@ class Update:
 def responses(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> Complex:
-    """Receptances (n_f, n_s, n_e) [m/N] at the sensors, for forces at the sensors ``inputs``.
+    """Receptances at the sensors.
 
-    Parameters p (n_p,), damping ratios zeta (m,) of the lowest elastic modes, omega (n_f,) [rad/s].
+    Args:
+        model: with its sensors.
+        p: (n_p,) relative changes of stiffness and mass [1].
+        zeta: (m,) damping ratios of the lowest elastic modes [1].
+        omega: (n_f,) circular frequencies [rad/s].
+        inputs: sensors at which forces act.
+
+    Returns:
+        (n_f, n_s, n_e) [m/N].
 
     Raises:
         ConfigError: for an input that is no sensor, or a frequency that is not finite.
+        ModelError: for mass or stiffness not positive.
     """
     here = model.at(p)
     if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
@@ -118,7 +133,21 @@ def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) 
 def sensitivity(
     model: Model, p: ArrayLike, zeta: ArrayLike, omega: Array, inputs: tuple[int, ...]
 ) -> tuple[Complex, Complex]:
-    """Receptances (n_f, n_s, n_e), and their derivatives by p and ln zeta, (..., n_p + m)."""
+    """Receptances, and their derivatives by p and ln zeta.
+
+    Args:
+        model: with its sensors.
+        p: (n_p,) relative changes of stiffness and mass [1].
+        zeta: (m,) damping ratios of the lowest elastic modes [1].
+        omega: (n_f,) circular frequencies [rad/s].
+        inputs: sensors at which forces act.
+
+    Returns:
+        (n_f, n_s, n_e) and (n_f, n_s, n_e, n_p + m) [m/N].
+
+    Raises:
+        ConfigError, ModelError: as `responses`.
+    """
     here = model.at(p)
     modes = modal(here, zeta)
     seen, g = here.sensors @ modes.Phi, modes.g(omega)
@@ -128,9 +157,19 @@ def sensitivity(
 
 
 def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
-    """Least squares of ln(H / H_test) over p and ln zeta, from a start (n_p,), (m,).
+    """Least squares of ln(H / H_test) over p and ln zeta.
 
     Each value counts by its relative error, so that antiresonances weigh as much as resonances.
+
+    Args:
+        model: with its sensors.
+        test: what was measured.
+        p: (n_p,) relative changes to start from [1].
+        zeta: (m,) damping ratios to start from [1].
+
+    Raises:
+        ConfigError: if the test does not fit the model.
+        ModelError: for mass or stiffness not positive.
     """
     test.check(model, zeta)
     n_p, path = np.size(p), []
@@ -161,6 +200,10 @@ def update_by_input(
     U spans the strongest ``rank`` directions of all test and model responses together; both sets
     are condensed with it. The rank, at most the number of sensors, must reach the number of modes
     in the band. Otherwise as `update_by_output`.
+
+    Raises:
+        ConfigError: if the test does not fit the model, or has not so many sensors.
+        ModelError: for mass or stiffness not positive.
     """
     test.check(model, zeta)
     if not 1 <= rank <= test.H.shape[1]:
@@ -192,14 +235,21 @@ def response_function_method(
     """Solve H - H_test = H dZ(p) H_test, linear in p.
 
     Exact in one step when every dof is measured without noise. Else unmeasured rows of H_test
-    follow the measured ones as the model at the last p says. Of several steps none changes a
-    parameter by more than 0.2. The damping C (n, n) [N s/m] is known, sensors are dofs.
+    follow the measured ones as the model at the last p says. Sensors are dofs.
+
+    Args:
+        model: with its sensors.
+        test: what was measured.
+        p: (n_p,) relative changes to start from [1].
+        C: (n, n) damping, which is known [N s/m].
+        steps: number of them; of several none changes a parameter by more than 0.2.
 
     Raises:
         ConfigError: if damping or sensors do not fit the model, or without a step.
 
     Source:
-        The identity is that of the response function method of Lin and Ewins.
+        Lin and Ewins, Analytical model improvement using frequency response functions, Mech. Syst.
+        Signal Process. 8 (1994) 437.
     """
     test.check(model)
     if np.shape(C) != model.K.shape or steps < 1:
@@ -228,7 +278,13 @@ def response_function_method(
 
 
 def common_basis(test: Complex, model: Complex, rank: int) -> Array:
-    """(n_s, rank) orthonormal directions of test and model responses, each of norm one."""
+    """(n_s, rank) orthonormal directions of test and model responses, each of norm one [1].
+
+    Args:
+        test: (n_f, n_s, n_e) measured responses [m/N].
+        model: (n_f, n_s, n_e) those of the model [m/N].
+        rank: number of directions.
+    """
     Y = np.concatenate([np.moveaxis(H, 1, 0).reshape(H.shape[1], -1) for H in (test, model)], 1)
     Y = Y / np.linalg.norm(Y, axis=0)
     return np.linalg.svd(np.hstack([Y.real, Y.imag]), full_matrices=False)[0][:, :rank]

@@ -1,4 +1,9 @@
-"""Models with parameters, their modes, and what is measured of them."""
+"""Models with parameters, their modes, and what is measured of them.
+
+Source:
+    Condensation to the sensors: Guyan, Reduction of stiffness and mass matrices, AIAA J. 3
+    (1965) 380.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,10 +29,13 @@ class ParametricModel:
     Attributes:
         K: (n, n) stiffness at p = 0 [N/m].
         M: (n, n) mass at p = 0 [kg].
-        dK: (n_p, n, n) what each parameter adds to K; zeros where it does not.
-        dM: (n_p, n, n) what each parameter adds to M.
-        sensors: (n_s, n) rows that give the measured displacements.
+        dK: (n_p, n, n) what each parameter adds to K [N/m]; zeros where it does not.
+        dM: (n_p, n, n) what each parameter adds to M [kg].
+        sensors: (n_s, n) rows that give the measured displacements [1].
         n_rigid: number of rigid motions, 0 for a supported and 6 for a free structure.
+
+    Raises:
+        ConfigError: if the matrices do not fit each other.
     """
 
     K: Array
@@ -47,7 +55,11 @@ class ParametricModel:
                 raise ConfigError(f"{name} is {found} where {shape} belongs to {n} dofs.")
 
     def at(self, p: ArrayLike) -> "ParametricModel":
-        """The model with its origin at p (n_p,)."""
+        """The model with its origin at p (n_p,) [1].
+
+        Raises:
+            ConfigError: if p has another length.
+        """
         p = np.asarray(p, dtype=float)
         if p.shape != (len(self.dK),):
             raise ConfigError(f"p has the shape {p.shape}; the model has {len(self.dK)} of them.")
@@ -55,7 +67,11 @@ class ParametricModel:
         return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
 
     def in_basis(self, T: Array) -> "ParametricModel":
-        """The model reduced to u = T a, T (n, r) the same for all p: fast, still parametric."""
+        """The model reduced to u = T a, T (n, r) the same for all p [1]: fast, still parametric.
+
+        Raises:
+            ConfigError: if the matrices do not fit each other.
+        """
         K, M, dK, dM = (T.T @ A @ T for A in (self.K, self.M, self.dK, self.dM))
         return ParametricModel(K, M, dK, dM, self.sensors @ T, self.n_rigid)
 
@@ -75,7 +91,7 @@ class AtSensors:
     full: ParametricModel
 
     def at(self, p: ArrayLike) -> ParametricModel:
-        """The condensed model with its origin at p and the derivatives there.
+        """The condensed model with its origin at p (n_p,) [1] and the derivatives there.
 
         Raises:
             ConfigError, ModelError: if sensors are no dofs, or do not hold the structure.
@@ -145,7 +161,7 @@ class Measurement:
             )
 
     def check(self, model: "Model", zeta: ArrayLike = ()) -> None:
-        """See that a model and damping ratios can answer to it.
+        """See that a model and damping ratios (m,) [1] can answer to it.
 
         Raises:
             ConfigError: if the sensors differ in number, or a ratio is not positive.
@@ -165,7 +181,7 @@ class Modal:
 
     Attributes:
         lam: (n,) eigenvalues [rad^2/s^2].
-        Phi: (n, n) modes, mass-normalised.
+        Phi: (n, n) modes, mass-normalised [kg^-1/2].
         d: (n,) damping 2 zeta omega [rad/s] of each mode.
     """
 
@@ -174,13 +190,13 @@ class Modal:
     d: Array
 
     def g(self, omega: Array) -> Complex:
-        """(n_f, n) receptance of each mode."""
+        """(n_f, n) receptance of each mode [s^2] at omega (n_f,) [rad/s]."""
         w = omega[:, None]
         return 1.0 / (self.lam - w**2 + 1j * w * self.d)
 
 
 def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
-    """Modes of a model at its origin; zeta (m,) for the lowest elastic ones, the others undamped.
+    """Modes of a model at its origin; zeta (m,) [1] of the lowest elastic ones, others undamped.
 
     Raises:
         ConfigError, ModelError: for more ratios than modes; for mass or stiffness not positive.
@@ -211,16 +227,26 @@ def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
 
 
 def damping_matrix(model: ParametricModel, zeta: ArrayLike) -> Array:
-    """(n, n) C = sum 2 zeta omega (M phi)(M phi)^T at the origin of the model [N s/m]."""
+    """(n, n) C = sum 2 zeta omega (M phi)(M phi)^T at the origin of the model [N s/m].
+
+    Raises:
+        ConfigError, ModelError: as `modal`.
+    """
     modes = modal(model, zeta)
     return (model.M @ modes.Phi * modes.d) @ (model.M @ modes.Phi).T
 
 
 def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -> Array:
-    """(n, r) basis for a range of p: Craig-Bampton at samples (k, n_p), held at the sensors.
+    """(n, r) basis [1] for a range of p: Craig-Bampton at samples, held at the sensors.
+
+    Args:
+        model: with its sensors.
+        n_modes: number of modes at each sample.
+        samples: (k, n_p) relative changes [1].
 
     Raises:
         ConfigError: without a mode, or if sensors are no dofs.
+    # --- wind
     """
     if n_modes < 1:
         raise ConfigError(f"n_modes = {n_modes}: a basis needs one or more between the sensors.")

@@ -103,7 +103,7 @@ def in_wind(
     Args:
         blade: from ``cosserat.body(blade(...))``.
         wind: (3,) velocity of the wind far away, world [m/s].
-        induction: share by which the rotor slows the wind down, 0 to below 1.
+        induction: share by which the rotor slows the wind down, 0 to below 1 [1].
         density: of the air [kg/m^3].
 
     Raises:

@@ -3,6 +3,10 @@
 Without gravity the three blades move alike, so one of them with a third of everything else is the
 whole rotor. All of it is one rod: the generator is the plate at its start, the shaft twists, the
 hub is a corner and a link that do not bend.
+
+Source:
+    Jonkman, Butterfield, Musial, Scott, Definition of a 5-MW reference wind turbine for
+    offshore system development, NREL/TP-500-38060, 2009.
 """
 
 from dataclasses import dataclass
@@ -42,7 +46,7 @@ class Rotor:
     free: npt.NDArray[np.bool_]
 
     def torque(self, total: float) -> tuple[Array, Array]:
-        """Loads of a torque of the whole rotor on the generator [N m]."""
+        """Loads (N + 1, 3), (N + 2, 3) of a torque of the whole rotor on the generator [N m]."""
         moment = np.zeros((len(self.rod.p), 3))
         moment[0, 0] = total / N_BLADES
         return np.zeros_like(self.rod.x), moment
@@ -70,6 +74,9 @@ def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
     Args:
         n: segments of the blade.
         blade_rod: another blade, upright, whose root is on the hub.
+
+    Raises:
+        ModelError: as `cosserat.rod`.
     """
     one = blade(n) if blade_rod is None else blade_rod
     n = one.h.size

@@ -57,7 +57,7 @@ class Turbine:
         mechanism: all of it; `slow`, the joint of gear wheel and nacelle, turns about the shaft.
         blades: three rods.
         tower: a rod, None for a stiff one.
-        axis: (3,) of the shaft, downwind.
+        axis: (3,) of the shaft, downwind [1].
         hub: (3,) its centre [m].
     """
 
@@ -120,6 +120,7 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
 
     Raises:
         ConfigError: for less than one segment of a blade.
+        ModelError: if a rod is none, see `cosserat.rod`.
     """
     if segments < 1 or tower_segments < 0:
         raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",

@@ -41,7 +41,7 @@ STEEL = {"E": 210e9, "G": 80.8e9, "rho": 8500.0}  # with paint, bolts and flange
 
 
 def stations() -> dict[str, Array]:
-    """{name: (49,)} properties of the blade along its length; SI units, twist in degrees."""
+    """{name: (49,)} properties of the blade along its length, in units of SI; twist [deg]."""
     return dict(zip(COLUMNS, np.loadtxt(STATIONS, delimiter=",").T, strict=True))
 
 
@@ -52,7 +52,7 @@ def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: flo
         n: number of segments, of equal length.
         azimuth: turned about the rotor axis from upright [rad].
         damped: with viscosity in proportion to the rigidities.
-        shear: factor of the shear rigidity; a thousand makes an Euler-Bernoulli beam.
+        shear: factor of the shear rigidity [1]; a thousand makes an Euler-Bernoulli beam.
     """
     table = stations()
     eta = np.linspace(0, 1, n + 1)
@@ -146,7 +146,7 @@ class RunUp:
 
     @property
     def t(self) -> Array:
-        """Instants [s]."""
+        """(k,) instants [s]."""
         return self.motion.t
 
 
@@ -170,6 +170,10 @@ def run_up(
         rise: when it is reached [s], see `ramp`.
         gravity: acceleration of gravity, down [m/s^2]; the blade starts at rest under its weight.
         options: more for `cosserat.simulate`.
+
+    Raises:
+        ConfigError: for a step or an end that is not positive.
+        SolverError: if a step has no solution.
     """
     speed, angle = ramp(final, rise)
     home = rod.x[0].copy(), rod.p[0].copy()
