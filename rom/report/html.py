@@ -112,6 +112,7 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
 
     Raises:
         ConfigError: if the ending is another one or the folder cannot be written.
+        ResourceError: if the disk is full.
     """
     path = Path(path)
     if path.suffix.lower() != ".html":

@@ -176,7 +176,7 @@ def campbell(
     Args:
         diagram: what `rom.campbell` returned.
         path: picture to write, .png; None to get the `Picture` itself.
-        orders: multiples of the speed to draw.
+        orders: multiples of the speed to draw [1].
         names: one per mode, in the order of the columns; without names modes are numbered.
         title: heading.
         caption: what a stranger has to know.

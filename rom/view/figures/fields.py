@@ -30,13 +30,16 @@ class Drawing:
     Attributes:
         title: what it shows.
         x, y: labels of the axes with their units.
-        extent: (left, right, bottom, top) of the drawing; None for what it holds.
-        shade: (n, m) values over the extent, first index along x; or None.
+        extent: (left, right, bottom, top) of the drawing, in units of the axes; None for what it
+            holds.
+        shade: (n, m) values in units of the label over the extent, first index along x; or None.
         label: what the colours of the shade or the polygons mean.
-        polygons: (k, 2) outlines, filled.
-        values: (number of polygons,) what their colours mean, or None for the colour of stone.
-        curves: {label: list of (k, 2) curves}; labels that start with "_" stay out of the legend.
-        points: {label: (k, 2) points}.
+        polygons: (k, 2) outlines in units of the axes, filled.
+        values: (number of polygons,) what their colours mean, in units of the label, or None for
+            the colour of stone.
+        curves: {label: list of (k, 2) curves in units of the axes}; labels that start with "_" stay
+            out of the legend.
+        points: {label: (k, 2) points in units of the axes}.
         equal: the same scale along x and y.
     """
 

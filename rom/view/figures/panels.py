@@ -30,7 +30,8 @@ class Panel:
         curves: {name: (x (n,), y (n,))} drawn as lines; thin, without legend, if the name starts
             with "_".
         points: {name: (x (n,), y (n,))} drawn as small circles over them.
-        bars: {name: (low, high)} horizontal bars from low to high, from top to bottom.
+        bars: {name: (low, high)} horizontal bars from low to high in units of the axis, from top to
+            bottom.
         equal: the same scale along both axes.
         log: logarithmic scales along both axes.
     """

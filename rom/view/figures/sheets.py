@@ -30,8 +30,8 @@ class Shape:
         title: what is seen.
         points: (n, 2) positions [m].
         triangles: (t, 3) corners.
-        before: (n, 2) positions at the start, whose edge is drawn dashed.
-        values: (t,) what the colours show, or None for one colour.
+        before: (n, 2) positions at the start [m], whose edge is drawn dashed.
+        values: (t,) what the colours show, in units of the label, or None for one colour.
         label: what the values are.
         width: of its picture [pixel].
     """
@@ -64,7 +64,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         curves: {name: (x (n,), y (n,))}, x on a logarithmic axis.
         shapes: bodies, from left to right.
         path: picture to write, .png; None to get the `Picture` itself.
-        limit: name and value of a horizontal line.
+        limit: name and value of a horizontal line, in units of y.
         xlabel: of the curves.
         ylabel: of the curves.
         title: heading.
@@ -120,7 +120,7 @@ def flow(
         times: (k,) of the shapes [s].
         shapes: (k) states of the body, with values.
         path: film to write, .gif.
-        seconds: how long the film lasts.
+        seconds: how long the film lasts [s].
         caption: what a stranger has to know.
 
     Raises:

@@ -37,7 +37,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
     Args:
         f: (n,) frequencies [Hz].
         curves: {name: (n,) complex receptance [m/N]}: test, model before, model after.
-        changes: {parameter: (true, found, standard deviation)} as fractions.
+        changes: {parameter: (true, found, standard deviation)} as fractions [1].
         path: picture to write, .png; None to get the `Picture` itself.
         structure: points (n, 3) [m], beams (m, 2), sensor and exciter positions (k, 3), (l, 3).
         label: what the response is, with its unit.

@@ -41,9 +41,9 @@ def write_animation(
         shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body; without one
             it is drawn as bars between its markers.
         frames: number of instants, evenly over the saved ones.
-        seconds: how long the ``.glb`` lasts; None for the true time.
-        magnify: deformations are drawn so many times larger than they are.
-        up: (3,) upright direction; None for against gravity, or z without gravity.
+        seconds: how long the ``.glb`` lasts [s]; None for the true time.
+        magnify: deformations are drawn so many times larger than they are [1].
+        up: (3,) upright direction [1]; None for against gravity, or z without gravity.
 
     Raises:
         ConfigError: for an unknown body or ending, a length of time or a number of frames that

@@ -46,10 +46,10 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
         shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body; without one
             it is drawn as bars between its markers.
         frames: number of pictures, evenly over the time of the solution.
-        seconds: how long the film lasts.
-        magnify: deformations are drawn so many times larger than they are.
-        view: (3,) direction from the things to the eye; None: mainly along the shortest extent.
-        up: (3,) upright direction; None: across the longest extent.
+        seconds: how long the film lasts [s].
+        magnify: deformations are drawn so many times larger than they are [1].
+        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
+        up: (3,) upright direction [1]; None: across the longest extent.
 
     Raises:
         ConfigError: for an unknown body, or if pictures cannot be made here.
@@ -85,6 +85,9 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`.
 
     The path ends in .png; without one the `Picture` itself is given back.
+
+    Raises:
+        ConfigError: for an unknown body, or if pictures cannot be made here.
     """
     path = page.wanted(path)
     wanted = np.asarray(times, dtype=float).ravel()

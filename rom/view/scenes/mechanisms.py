@@ -33,8 +33,8 @@ def start(
         mechanism: a `Mechanism`.
         path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
-        view: (3,) direction from the things to the eye; None: mainly along the shortest extent.
-        up: (3,) upright direction; None: across the longest extent.
+        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
+        up: (3,) upright direction [1]; None: across the longest extent.
 
     Raises:
         ConfigError: if pictures cannot be made here.

@@ -34,8 +34,8 @@ def mode_shapes(
         path: picture to write, .png; None to get the `Picture` itself.
         n: number of modes.
         fixed: names of the interfaces held; the body is free when there are none.
-        view: (3,) direction from the body to the eye; None: mainly along its shortest extent.
-        up: (3,) upright direction; None: across its longest extent.
+        view: (3,) direction from the body to the eye [1]; None: mainly along its shortest extent.
+        up: (3,) upright direction [1]; None: across its longest extent.
 
     Raises:
         ConfigError: if the body has no surface, or pictures cannot be made here.

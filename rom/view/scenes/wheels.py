@@ -35,13 +35,14 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
 
     Args:
         model: one sector, with its surface.
-        shapes: {name: (N, 3 k) displacements of the k nodes of each sector, axes of the wheel}.
+        shapes: {name: (N, 3 k) displacements of the k nodes of each sector, axes of the wheel, in
+            units of any length}.
         path: picture to write, .png; None to get the `Picture` itself.
         title: heading.
         caption: what a stranger has to know.
         hidden: interfaces inside the wheel, not drawn.
-        axis: (3,) axis of the wheel, through the origin of coordinates.
-        view: (3,) direction from the wheel to the eye.
+        axis: (3,) axis of the wheel, through the origin of coordinates [1].
+        view: (3,) direction from the wheel to the eye [1].
 
     Raises:
         ConfigError: if there is nothing to draw, or pictures cannot be made here.
