@@ -246,7 +246,6 @@ def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -
 
     Raises:
         ConfigError: without a mode, or if sensors are no dofs.
-    # --- wind
     """
     if n_modes < 1:
         raise ConfigError(f"n_modes = {n_modes}: a basis needs one or more between the sensors.")
