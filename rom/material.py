@@ -30,6 +30,11 @@ class Material:
 
     Warns:
         RomWarning: if sound would travel in it as in no solid: wrong units.
+
+    Example:
+        >>> steel = rom.Material.from_units("mm-t-s", E=210e3, nu=0.3, rho=7.85e-9)
+        >>> round(steel.rho, 6)
+        7850.0
     """
 
     E: float

@@ -108,6 +108,12 @@ class FlexibleBody(BodyData):
         Raises:
             InterfaceError: if an interface is unknown.
             ModelError: if the condition leaves the frame undetermined.
+
+        Example:
+            >>> body = rom.load("beam.rom.npz")
+            >>> held = body.with_reference("root")
+            >>> bool(np.allclose(body.frequencies()[6:], held.frequencies()[6:]))
+            True
         """
         return seen_from(self, reference)
 
@@ -132,6 +138,12 @@ class FlexibleBody(BodyData):
 
         Raises:
             InterfaceError: if an interface is unknown.
+
+        Example:
+            >>> body = rom.load("beam.rom.npz")
+            >>> free, held = body.frequencies(), body.frequencies(fixed=("root",))
+            >>> int((free == 0.0).sum()), int((held == 0.0).sum())  # rigid motions
+            (6, 0)
         """
         return self.modes(n, fixed=fixed)[0] / (2 * np.pi * unit_system(self.units).time)
 

@@ -141,6 +141,10 @@ class BodyData:
 
         Raises:
             InterfaceError: listing the names that exist.
+
+        Example:
+            >>> float(rom.load("beam.rom.npz").marker("tip").point[0])  # the beam is 1 m long
+            1.0
         """
         self._refuse_unknown((name,))
         return self.markers[name]

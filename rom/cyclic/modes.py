@@ -66,6 +66,14 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
 
     Source:
         Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).
+
+    Example:
+        >>> K, M = csr_matrix([[2.0, -1.0], [-1.0, 2.0]]), csr_matrix(np.eye(2) / 2)
+        >>> one = csr_matrix([[1.0]])  # a ring of masses m = 1, to the ground k = 2, between c = 1
+        >>> slave, master = np.array([1]), np.array([0])
+        >>> ring = rom.CyclicSector(12, K, M, slave=slave, master=master, coupling=one)
+        >>> (rom.cyclic_modes(ring, 6, 1).omega ** 2).round(6)  # (k + 4 c sin^2(pi n / N)) / m
+        array([6.])
     """
     n = whole("n", n, 1, sector.free.size)
     T = sector.harmonic(sector.checked(diameter))

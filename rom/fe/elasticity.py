@@ -72,6 +72,12 @@ def model(
         ResourceError: if meshing exceeds its limit of time or memory.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
+
+    Example:
+        >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+        >>> beam = rom.fe.model("meshes/beam.geo", material=steel)  # 1 m x 50 mm x 30 mm
+        >>> beam.interface_names
+        ('root', 'tip')
     """
     from rom.fe.mesh.read import read_mesh, to_dolfinx
 

@@ -96,6 +96,12 @@ def export(
     Raises:
         ConfigError: if the format or the ending is not known, another one is given interfaces to
             hold, or the place is not writable.
+
+    Example:
+        >>> body = rom.load("beam.rom.npz")
+        >>> file = rom.export(body, "beam.SID_FEM")
+        >>> rom.read_sid("beam.SID_FEM").n_modes == body.n_modes
+        True
     """
     kind = format_of(path, to)
     if held and kind not in HOLDING_FORMATS:

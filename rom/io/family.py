@@ -35,6 +35,12 @@ def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
         ConfigError: if the folder is missing or not writable.
         QualityGateError: if an array holds a number that is not finite.
         ResourceError: if the disk is full.
+
+    Example:
+        >>> body = rom.load("beam.rom.npz")
+        >>> file = rom.save(body, "copy.rom.npz")
+        >>> rom.load("copy.rom.npz").n_modes == body.n_modes
+        True
     """
     if isinstance(body, FlexibleBody):
         return native.save(body, path)
@@ -77,6 +83,10 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
         FileFormatError: if the file is missing, cut, changed, or no body file.
         UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
         QualityGateError: if the numbers are not those of a body.
+
+    Example:
+        >>> round(rom.load("beam.rom.npz").mass, 6)  # steel, 1 m x 50 mm x 30 mm
+        11.775
     """
     path = Path(path)
     known = Kind(

@@ -117,6 +117,12 @@ class Mechanism:
     Warns:
         RomWarning: for numbers legal but strange: gravity beyond that of all planets, an inertia
             far too large for the markers, stiffness or damping below zero.
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+        >>> bob = mech.add_rigid("bob", mass=2.0, inertia=(1e-3,) * 3, at=(0.5, 0, 0))
+        >>> list(mech.parts)
+        ['bob']
     """
 
     gravity: npt.ArrayLike = (0.0, 0.0, -9.81)
@@ -217,6 +223,14 @@ class Mechanism:
         Raises:
             ConfigError: for a name in use, a wrong shape or a number that is not finite.
             ModelError: if mass or inertia are not those of a real body.
+
+        Example:
+            >>> mech = rom.Mechanism()
+            >>> ends = {"a": (-0.1, 0, 0), "b": (0.1, 0, 0)}  # from the mass centre
+            >>> solid = {"mass": 1.0, "inertia": (1e-5, 3e-3, 3e-3)}
+            >>> rod = mech.add_rigid("rod", **solid, at=(1, 0, 0), markers=ends)
+            >>> mech.design_point(rod.marker("b"))
+            array([1.1, 0. , 0. ])
         """
         pose = start_pose(at, orientation, velocity, omega)
         points = {
@@ -255,6 +269,12 @@ class Mechanism:
         Raises:
             ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
             ModelError: if the mass matrix of the body is singular: rigid motions left in it.
+
+        Example:
+            >>> mech = rom.Mechanism()
+            >>> beam = mech.add_flexible("beam", rom.load("beam.rom.npz"))
+            >>> round(beam.mass, 6)
+            11.775
         """
         body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
         r = body.K.shape[0]

@@ -65,6 +65,14 @@ def equilibrium(
     Source:
         Newton's method on the tangent space of the constraints, with the absolute values of the
         negative curvatures: Nocedal and Wright, Numerical Optimization, chapter 3.4.
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+        >>> at = {"at": (0.5, 0, 0), "markers": {"end": (-0.5, 0, 0)}}
+        >>> bob = mech.add_rigid("bob", mass=2, inertia=(1e-3,) * 3, **at)
+        >>> mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("end"), axis=(0, 1, 0))
+        >>> round(float(rom.equilibrium(mech).q[2]), 6)  # it hangs
+        -0.5
     """
     whole("steps", steps, 1, MOST_STEPS)
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)

@@ -174,6 +174,15 @@ def linearize(
     Source:
         Variation of the equations of motion on R^3 x SO(3) x R^r, as in Bruels and Cardona,
         Mech. Mach. Theory 48 (2012) 121, projected on the tangent space of the constraints.
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+        >>> at = {"at": (0, 0, 0), "markers": {"top": (0, 0, 1)}}
+        >>> bob = mech.add_rigid("bob", mass=1, inertia=(1e-9,) * 3, **at)
+        >>> mech.revolute("pivot", mech.ground.marker((0, 0, 1)), bob.marker("top"), axis=(1, 0, 0))
+        >>> found = rom.linearize(mech, rom.equilibrium(mech)).frequencies
+        >>> round(float(found[0] / (np.sqrt(9.81) / (2 * np.pi))), 6)  # that of a pendulum
+        1.0
     """
     time = (0.0 if state is None else state.t) if t is None else t
     now = instant(mechanism, time)

@@ -25,6 +25,14 @@ def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayL
     Raises:
         ConfigError: for a name in use, an unknown marker, one body twice, or no direction.
         ModelError: if a body has free-free modes only, which carry no moment to an interface.
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+        >>> ends = {"pin": (-0.5, 0, 0)}
+        >>> bob = mech.add_rigid("bob", mass=2.0, inertia=(1e-3,) * 3, at=(0.5, 0, 0), markers=ends)
+        >>> mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=(0, 1, 0))
+        >>> len(mech.joints["hinge"].rows)
+        5
     """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("axis", axis))
@@ -140,6 +148,13 @@ def fixed(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
     Raises:
         ConfigError: for a name in use, an unknown marker, or one body twice.
         ModelError: if a body has free-free modes only, which carry no moment to an interface.
+
+    Example:
+        >>> mech = rom.Mechanism()
+        >>> beam = mech.add_flexible("beam", rom.load("beam.rom.npz"))
+        >>> mech.fixed("wall", mech.ground.marker((0, 0.025, 0.015)), beam.marker("root"))
+        >>> len(mech.joints["wall"].rows)
+        6
     """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(np.array([0.0, 0.0, 1.0]))

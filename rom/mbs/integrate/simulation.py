@@ -107,6 +107,13 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         flexible multibody systems, Mech. Mach. Theory 48 (2012) 121, see
         docs/theory/floating_frame.md; Hairer and Wanner, Solving Ordinary Differential
         Equations II, for BDF.
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+        >>> ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, 0))
+        >>> sol = rom.simulate(mech, t_end=1.0, dt=1e-2)
+        >>> round(float(sol.position("ball")[-1, 2]), 6)  # - g t^2 / 2
+        -4.905
     """
     one_of("method", method, METHODS)
     if t_start is None:

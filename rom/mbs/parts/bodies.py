@@ -83,6 +83,12 @@ class Part:
         Raises:
             ConfigError: if the name is unknown, or for a free point on a flexible body, where
                 only the interfaces have known deformations.
+
+        Example:
+            >>> mech = rom.Mechanism()
+            >>> beam = mech.add_flexible("beam", rom.load("beam.rom.npz"), at=(2, 0, 0))
+            >>> float(mech.design_point(beam.marker("tip"))[0])  # 1 m long, from x = 2
+            3.0
         """
         if isinstance(place, str):
             if place not in self.names:

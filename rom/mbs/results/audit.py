@@ -36,6 +36,12 @@ def audit(solution: Solution) -> Report:
 
     Returns:
         Report with a row per check.
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+        >>> ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, 0))
+        >>> rom.audit(rom.simulate(mech, t_end=1.0, dt=1e-2)).ok
+        True
     """
     rows = [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
     return Report(f"audit of {solution.t[-1] - solution.t[0]:g} s of motion", tuple(rows))

@@ -182,6 +182,13 @@ class Solution:
 
         Raises:
             ConfigError: if the body is unknown, or the marker was not one of the run.
+
+        Example:
+            >>> mech = rom.Mechanism(gravity=(0, 0, 0))
+            >>> solid = {"mass": 1.0, "inertia": (1e-3,) * 3}
+            >>> ball = mech.add_rigid("ball", **solid, at=(0, 0, 0), velocity=(3, 0, 0))
+            >>> rom.simulate(mech, t_end=2.0, dt=0.1).position("ball")[-1].round(6)
+            array([6., 0., 0.])
         """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, marker, self.position)
@@ -280,6 +287,15 @@ class Solution:
 
         Raises:
             ConfigError: if there is no such joint or drive.
+
+        Example:
+            >>> mech = rom.Mechanism(gravity=(0, 0, -9.81))
+            >>> at = {"at": (0, 0, -1), "markers": {"top": (0, 0, 1)}}
+            >>> lamp = mech.add_rigid("lamp", mass=2, inertia=(1e-3,) * 3, **at)
+            >>> mech.spherical("hook", mech.ground.marker((0, 0, 0)), lamp.marker("top"))
+            >>> sol = rom.simulate(mech, t_end=0.1, dt=1e-2)
+            >>> round(float(sol.reaction("hook")[-1, 2]), 6)  # its weight
+            19.62
         """
         rows = self.packed.rows_of(name)
         if not rows.size:

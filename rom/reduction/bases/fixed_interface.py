@@ -38,6 +38,12 @@ def craig_bampton(K: Any, M: Any, boundary: npt.ArrayLike, n_modes: int) -> Basi
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
+
+    Example:
+        >>> K = np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])  # three masses
+        >>> basis = rom.craig_bampton(K, np.eye(3), [0, 2], n_modes=1)
+        >>> basis.Psi[1].round(6), basis.omega.round(6)  # half of either end, and sqrt(2)
+        (array([0.5, 0.5, 1. ]), array([1.414214]))
     """
     return fixed_interface(SciPyOperators(K, M), boundary, n_modes)
 

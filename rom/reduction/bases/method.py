@@ -65,6 +65,10 @@ class CraigBampton:
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
+
+    Example:
+        >>> rom.CraigBampton(f_max=3e3, tol=1e-3)  # as few modes as that takes
+        CraigBampton(n_modes=None, f_max=3000.0, tol=0.001)
     """
 
     n_modes: int | None = None

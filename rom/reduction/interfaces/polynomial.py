@@ -40,6 +40,13 @@ class Polynomial:
 
     Raises:
         ConfigError: for an order below one.
+
+    Example:
+        >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+        >>> beam = rom.fe.model("meshes/beam.geo", material=steel)
+        >>> kinds = {"root": "rbe2", "tip": rom.Polynomial(order=1)}  # 3 functions, 3 directions
+        >>> rom.reduce(beam, method=rom.Guyan(), interfaces=kinds, certify=False).n_modes
+        9
     """
 
     order: int | None = None

@@ -34,6 +34,11 @@ class Panel:
             bottom.
         equal: the same scale along both axes.
         log: logarithmic scales along both axes.
+
+    Example:
+        >>> line = rom.view.Panel("A line", "x [m]", "y [m]", curves={"y = 2 x": ([0, 1], [0, 2])})
+        >>> line.curves["y = 2 x"][1]
+        [0, 2]
     """
 
     title: str
