@@ -4,6 +4,7 @@ They are written below ``generated/`` beside this file whenever the site is buil
 them can be out of date.
 """
 
+import ast
 import importlib
 import inspect
 import re
@@ -13,6 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from site_tasks import TASKS
+from site_text import plain
 from sphinx.application import Sphinx
 
 import rom
@@ -37,6 +40,8 @@ ALSO = {  # what public functions give back or raise
         "mbs.parts.signals",
     ),
 }
+FURTHER_PARTS = ("eigen",)  # packages without a name that `rom` has itself
+WHOLE_MODULES = ("rom.rotation", "rom.units")
 CURES = {  # what to do about it, where no single message can tell
     "ConfigError": "Compare with `rom VERB --help` or the arguments of the function.",
     "ParameterError": "Keep to the range the family was reduced for, or reduce it for a wider one.",
@@ -193,17 +198,66 @@ def _parts(schema: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, A
 
 
 def interface_pages() -> dict[str, str]:
-    """One page per part of the package, with its public names; and the list of these pages."""
-    parts: dict[str, list[str]] = {}
+    """One page per part of the package, with its public names; and all names by task."""
+    parts: dict[str, list[str]] = {part: [] for part in FURTHER_PARTS}
     for name in rom.__all__:
         parts.setdefault(rom.MODULES[name].split(".")[1], []).append(name)
     pages = {f"rom_{part}.rst": _names(part, names) for part, names in sorted(parts.items())}
-    pages["rom_fe.rst"] = _modules("rom.fe", ["rom.fe"])
+    functions = (f".. autofunction:: rom.fe.{name}\n" for name in rom.fe.__all__)
+    pages["rom_fe.rst"] = "\n".join([_head("rom.fe"), *functions])
+    for name in WHOLE_MODULES:
+        pages[f"{name.replace('.', '_')}.rst"] = _modules(name, [name])
     for name, modules in _components().items():
         pages[f"{name.replace('.', '_')}.rst"] = _modules(name, modules)
     listed = "\n".join(f"   {name.removesuffix('.rst')}" for name in pages)
-    head = "Interface\n=========\n\nEvery public name, from its docstring.\n\n"
-    return pages | {"interface.rst": f"{head}.. toctree::\n   :maxdepth: 1\n\n{listed}\n"}
+    sections = [_task(*item) for item in TASKS.items()]
+    return pages | {
+        "interface.rst": "\n".join([
+            "Interface\n=========\n",
+            "Every public name by what it is for; behind the name stands its docstring.\n",
+            *sections,
+            f"By package\n----------\n\n.. toctree::\n   :maxdepth: 1\n\n{listed}\n",
+        ])
+    }  # fmt: skip
+
+
+def _task(heading: str, about: tuple[str, str]) -> str:
+    """A section with the names of a task and the first lines of their docstrings."""
+    sentence, names = about
+    rows = [f"- {_link(f'rom.{name}')}: {plain(_first_line(f'rom.{name}'))}"
+            for name in names.split()]  # fmt: skip
+    return "\n".join([heading, "-" * len(heading), "", sentence, "", *rows, ""])
+
+
+def _link(name: str) -> str:
+    if name.startswith("rom.components."):
+        return f":doc:`{name} <{name.replace('.', '_')}>`"
+    return f":py:obj:`{name} <{_target(name)}>`"
+
+
+def _target(name: str) -> str:
+    """Under which name the site describes it."""
+    package, _, short = name.rpartition(".")
+    front: dict[str, str] = getattr(importlib.import_module(package), "MODULES", {})
+    part = package.rpartition(".")[2]
+    if name.startswith("rom.fe."):
+        return f"rom.fe.{short}"
+    if package == "rom":
+        return name if short not in vars(errors) else f"rom.errors.{short}"
+    shown = front.get(short, package).removeprefix("rom.")
+    return f"rom.{shown}.{short}" if shown in ALSO.get(part, ()) else name
+
+
+def _first_line(name: str) -> str:
+    """Of rom.fe as it is written, for finite elements may be missing where pages are made."""
+    package, _, short = name.rpartition(".")
+    if package == "rom.fe":
+        tree = ast.parse((ROOT / "rom" / "fe" / "elasticity.py").read_text())
+        (node,) = (n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == short)
+        text = ast.get_docstring(node)
+    else:
+        text = inspect.getdoc(getattr(importlib.import_module(package), short))
+    return " ".join((text or "").partition("\n\n")[0].split())
 
 
 def _components() -> dict[str, list[str]]:
@@ -240,7 +294,10 @@ def _further(part: str) -> list[str]:
     front = getattr(rom, part)
     own: dict[str, str] = getattr(front, "MODULES", {})
     shown = ALSO.get(part, ())
-    further = [n for n in own if n not in rom.MODULES and own[n].removeprefix("rom.") not in shown]
+    further = [
+        name for name, place in own.items()
+        if place != rom.MODULES.get(name) and place.removeprefix("rom.") not in shown
+    ]  # fmt: skip
     return sorted(name for name in further if callable(getattr(front, name)))
 
 

@@ -8,6 +8,7 @@ from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
 CODE = re.compile(r"(``.+?``|`[^`]+`)", re.S)
+EXAMPLE = re.compile(r"^ *>>> (?:.+\n?)+", re.M)  # up to the next blank line
 MARKUP = re.compile(r"([*|])|(?<=\w)(_)(?!\w)")
 
 
@@ -20,6 +21,9 @@ def plain(text: str) -> str:
     Returns:
         The same in reStructuredText.
     """
+    if examples := EXAMPLE.findall(text):
+        around = [plain(part) for part in EXAMPLE.split(text)]
+        return around[0] + "".join(a + b for a, b in zip(examples, around[1:], strict=True))
     parts = CODE.split(text)
     parts[::2] = [MARKUP.sub(r"\\\g<0>", part) for part in parts[::2]]
     parts[1::2] = [f"``{part.strip('`')}``" for part in parts[1::2]]

@@ -75,6 +75,44 @@ def test_every_public_name_has_its_place(pages):
         assert f":: rom.{name}\n" in text
 
 
+def public_names():
+    """What `rom` and the packages that it names have for users, as a page of the site calls it."""
+    found = dict(rom.MODULES)
+    for package in rom.PACKAGES:
+        front = importlib.import_module(f"rom.{package}")
+        if package in ("rotation", "units"):
+            own = {n: f"rom.{package}" for n, x in vars(front).items()
+                   if n[0] != "_" and getattr(x, "__module__", "") == front.__name__}  # fmt: skip
+        elif package == "fe":
+            own = dict.fromkeys(front.__all__, "rom.fe")
+        elif package == "components":
+            own = dict.fromkeys(front.PACKAGES, "rom.components")
+        else:
+            own = {name: place for name, place in getattr(front, "MODULES", {}).items()
+                   if callable(getattr(front, name))}  # fmt: skip
+        found |= {f"{package}.{name}": place for name, place in own.items()
+                  if rom.MODULES.get(name) != place}  # fmt: skip
+    return set(found)
+
+
+def test_every_public_name_stands_exactly_once_among_the_tasks(pages):
+    named = [name for _, names in pages.TASKS.values() for name in names.split()]
+    assert set(named) == public_names() and len(named) == len(set(named))
+    page = pages.interface_pages()["interface.rst"]
+    assert "- :py:obj:`rom.reduce <rom.reduce>`: A flexible body that stands" in page
+    assert ":py:obj:`rom.mbs.Solution <rom.mbs.results.solution.Solution>`: Motion of" in page
+    assert page.count(":py:obj:`") + page.count(":doc:`") == len(named)
+    for heading in pages.TASKS:
+        assert f"\n{heading}\n{'-' * len(heading)}\n" in page
+
+
+def test_examples_stay_as_they_are_typed(pages):
+    text = "A * b.\n\nExample:\n    >>> x = 2 * a_ | b\n    4\n\nAnd c_ * d."
+    assert pages.plain(text) == (
+        "A \\* b.\n\nExample:\n    >>> x = 2 * a_ | b\n    4\n\nAnd c\\_ \\* d."
+    )
+
+
 def test_every_verb_is_shown_with_its_help(pages):
     page = pages.command_page()
     for module in VERBS:

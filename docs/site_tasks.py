@@ -1,0 +1,103 @@
+"""The public names by what they are for: the one table behind the page of the interface."""
+
+# heading: a sentence about it, and the names, in the order in which they are met
+TASKS: dict[str, tuple[str, str]] = {
+    "From geometry to matrices": (
+        "A mesh and its materials become stiffness and mass.",
+        """Material Orthotropic Layered fe.model fe.assemble read_component Region Interface
+        Attachment SurfaceMesh FEModel mass_properties modes Modes""",
+    ),
+    "Reduce": (
+        "A method and kinds of interfaces make a small body of a large model.",
+        """reduce CraigBampton Guyan Rubin Herting FreeFree EnhancedCraigBampton
+        BalancedTruncation MomentMatching WithLoads reduction.Method Polynomial FourierLegendre
+        Characteristic Snapshots Rayleigh ModalDamping FlexibleBody Basis craig_bampton
+        second_order_balanced_truncation body.Marker body.Surface body.InertiaIntegrals""",
+    ),
+    "Parameters": (
+        "One reduction for a range of moduli, densities and thicknesses.",
+        """reduce_parametric parametric.Parameter YoungsModulus Density Thickness BodyFamily""",
+    ),
+    "Check": (
+        "What tells how far to trust a model, a body, a motion or a law.",
+        """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",
+    ),
+    "Assemble": (
+        "Bodies put together before any motion.",
+        """Assembly assembly.CondensedAssembly substructure FreeSubstructure
+        assembly.free_substructure DualAssembly""",
+    ),
+    "Wheels": (
+        "Equal sectors, at rest and in rotation, with blades that are alike or not.",
+        """CyclicSector cyclic_modes CyclicModes reduce_sector cyclic.ReducedSector
+        supported_sector rotating_sector travelling_modes TravellingModes wheel_campbell
+        WheelCampbell mistuned_wheel MistunedWheel cyclic.whitehead substructured_sector
+        cyclic.SubstructuredSector reduced_blade ReducedBlade bladed_wheel BladedWheel
+        cyclic.gyroscopic_modes cyclic.GyroscopicModes cyclic.divergence_speed
+        cyclic.centrifugal_displacement cyclic.rotation_matrices""",
+    ),
+    "Rotation and heat": (
+        "States about which a solid vibrates: turning fast, or heated.",
+        """held_solid spin_up SpinUp ReducedSpinUp prestress.SteadyRotation Heat heated
+        heated_sector thermal_buckling body.rotating_frequencies""",
+    ),
+    "Move": (
+        "Bodies, joints and forces become a mechanism, and the mechanism moves.",
+        """read_mechanism Mechanism mbs.Part mbs.Marker mbs.Impact mbs.hertz_stiffness surface_load
+        mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State mbs.Instant
+        mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
+    ),
+    "Results": (
+        "What a mechanism answers without moving, and what a motion holds.",
+        """mbs.Solution mbs.Energy mbs.Occurrences snapshot equilibrium inverse_dynamics linearize
+        mbs.Linearization campbell mbs.Campbell frequency_response transmissibility
+        mbs.FrequencyResponse steady_motion SteadyMotion equilibrium_sensitivity
+        frequency_sensitivity motion_sensitivity mbs.Sensitivity body.von_mises""",
+    ),
+    "Pictures": (
+        "Drawings, films and pages.",
+        """view.mesh view.mode_shapes view.start view.animate view.instants view.wheel_modes
+        view.frequencies view.convergence view.campbell view.history view.Panel view.panels
+        view.Drawing view.plane view.Shape view.deformed view.flow view.updating view.box
+        view.cylinder view.sleeves write_animation write_report""",
+    ),
+    "Files": (
+        "Bodies and motions written and read, for this toolkit and for others.",
+        """save load export io.read_body write_history write_stress write_stress_history
+        io.write_vtu io.write_vtkhdf io.write_glb io.MovingMesh write_fmu write_mechanism_fmu
+        write_body_fmu read_sid io.write_sid io.sid_body io.standard_input io.StandardInput
+        io.write_mbdyn io.write_exudyn io.write_openfast io.read_openfast io.Superelement
+        io.write_simscape io.write_radioss io.interface_form io.InterfaceForm io.read_universal""",
+    ),
+    "Matrices of other programs": (
+        "Stiffness and mass from files, to be reduced here, and back.",
+        """read_model io.read_matrix io.read_market io.read_op4 io.write_op4 io.read_dmig
+        io.write_dmig io.read_stored_matrix io.write_abaqus_matrix io.read_user_element
+        io.write_user_element io.read_nodes io.read_node_sets io.read_grids""",
+    ),
+    "Components": (
+        "What stands on top, each a package of its own.",
+        """components.cosserat components.assumed_strain components.masonry components.rockfall
+        components.hand components.linkages components.wind components.gear_mesh
+        components.journal_bearing components.transmission components.updating
+        components.best_matching""",
+    ),
+    "Rotations and units": (
+        "Quaternions, and quantities as text.",
+        """rotation.skew rotation.axial rotation.matrix rotation.quaternion rotation.multiply
+        rotation.exp rotation.log units.in_si units.unit units.Unit units.unit_system
+        units.UnitSystem units.fits units.dimension_name""",
+    ),
+    "Verbs on matrices": (
+        "What a reduction asks of a model, for methods and formats of your own.",
+        """eigen.Operators eigen.Held eigen.Mass eigen.Weighted eigen.rigid_motions
+        eigen.given_rigid_motions eigen.mean_motion eigen.dofs_of eigen.orthonormal
+        eigen.orthonormal_in eigen.canonical_signs eigen.count_shift eigen.whole_clusters""",
+    ),
+    "Errors": (
+        "What is raised on purpose.",
+        """RomError ConfigError FileFormatError UnsafeFileError MeshError TagError MaterialError
+        InterfaceError ParameterError ModelError SolverError ModesMissedError QualityGateError
+        ResourceError ParallelError InterruptedRun RomWarning""",
+    ),
+}
