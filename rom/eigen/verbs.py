@@ -133,7 +133,7 @@ class Operators(Protocol):
             A: (n_local, k) in the coordinates of `transform`, in units of these.
 
         Returns:
-            (n_parent, k) rows of this rank.
+            (n_parent, k) rows of this rank, in units of the parent.
         """
 
     def restrict(self, F: Array) -> Array:

@@ -50,7 +50,7 @@ def model(
             `rom.fe.mesh.read.read_mesh`.
         material: `Material`, `Orthotropic`, or {region name: material}.
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
-        parameters: values of the geometry's parameters.
+        parameters: {name: value} of the geometry's parameters, in the units of the geometry.
         attachments: point masses and rigid bodies carried by interfaces.
         solver: how equations are solved. "direct": a MUMPS factor, the fastest when it fits;
             "low-rank" or "low-rank:1e-8": the same with compressed blocks; "out-of-core": the

@@ -21,7 +21,15 @@ import re
 import pytest
 
 import rom
-from cases.files.docstrings import INSIDE, called_by, of_function, public, raised, raises_in
+from cases.files.docstrings import (
+    INSIDE,
+    called_by,
+    of_function,
+    pages_and_demos,
+    public,
+    raised,
+    raises_in,
+)
 from cases.paths import ROOT
 from rom.errors import ConfigError
 
@@ -154,8 +162,7 @@ def test_docstrings_say(what):
 
 def test_lists_of_exceptions_are_up_to_date():
     assert set(PLAIN) <= set(public()), "names in PLAIN that are gone"
-    text = "\n".join(p.read_text() for p in [*(ROOT / "demos").glob("*.py"), ROOT / "README.md",
-                                             *(ROOT / "docs").glob("**/*.md")])  # fmt: skip
+    text = pages_and_demos()
     for package in INSIDE - {"rom.bench"}:  # of which a page tells
         assert (ROOT / package.replace(".", "/") / "__init__.pyi").exists()
         assert not re.search(rf"from {package} import", text), f"users import from {package}"

@@ -11,7 +11,7 @@ import pytest
 from scipy.sparse import csr_matrix
 
 import rom
-from cases.files.docstrings import Callable, definitions, public
+from cases.files.docstrings import Callable, definitions, pages_and_demos, public
 from cases.paths import ROOT
 from cases.solid import block
 
@@ -27,7 +27,7 @@ USED_METHODS = {  # which the same count cannot tell from others of the same nam
     "rom.model.FEModel": ("mass",),
 }
 USED_FUNCTIONS = {
-    "rom.fe.elasticity.model", "rom.io.export.export", "rom.io.family.save",
+    "rom.fe.model", "rom.io.export.export", "rom.io.family.save",
     "rom.reduction.bases.fixed_interface.craig_bampton", "rom.view.figures.panels.Panel",
     "rom.workflow.mass_properties",
 }  # fmt: skip
@@ -45,7 +45,7 @@ def examples():
             found[name] = text
     path = ROOT / "rom" / "fe" / "elasticity.py"  # which cannot be imported everywhere
     text = ast.get_docstring(definitions(path)["model"])
-    return found | {"rom.fe.elasticity.model": Callable("", None, text).sections["Example"]}
+    return found | {"rom.fe.model": Callable("", None, text).sections["Example"]}
 
 
 EXAMPLES = examples()
@@ -102,9 +102,7 @@ def run(name, beam, folder, monkeypatch):
 
 
 def test_what_is_used_most_has_an_example():
-    text = "\n".join(p.read_text() for p in [*(ROOT / "demos").glob("*.py"), ROOT / "README.md",
-                                             *(ROOT / "docs").rglob("*.md")])  # fmt: skip
-    calls = re.findall(r"\brom\.([A-Za-z]\w+)\(", text)
+    calls = re.findall(r"\brom\.([A-Za-z]\w+)\(", pages_and_demos())
     used = {f"{rom.MODULES[name]}.{name}" for name in rom.__all__ if calls.count(name) >= MANY}
     used |= {f"{owner}.{name}" for owner, names in USED_METHODS.items() for name in names}
     used = {name.replace("rom.material.", "rom.model.") for name in used | USED_FUNCTIONS}

@@ -2,7 +2,7 @@
 
 import ast
 import builtins
-import importlib
+import importlib.util
 import inspect
 import re
 import textwrap
@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+import rom
 from cases.paths import ROOT
 from rom import errors
 
@@ -86,6 +87,8 @@ def public():
                 module = importlib.import_module(line.module)
                 found |= {f"{line.module}.{a.name}": getattr(module, a.name, None)
                           for a in line.names}  # fmt: skip
+    if importlib.util.find_spec("dolfinx"):
+        found |= {f"rom.fe.{name}": getattr(rom.fe, name) for name in rom.fe.__all__}
     for name in MODULES:
         inside = vars(importlib.import_module(name)).items()
         found |= {f"{name}.{k}": x for k, x in inside
@@ -250,3 +253,13 @@ def own_method(body, name):
     for part in body.__qualname__.split(".")[:-1]:
         owner = getattr(owner, part, None)
     return getattr(owner, name, None)
+
+
+# --- what users read ---
+
+
+def pages_and_demos():
+    """All text of README, pages and demos; not the pages that are made of these."""
+    written = [path for path in (ROOT / "docs").rglob("*.md") if "generated" not in path.parts]
+    paths = [ROOT / "README.md", *written, *(ROOT / "demos").glob("*.py")]
+    return "\n".join(path.read_text() for path in paths)
