@@ -9,8 +9,9 @@ cd "$(dirname "$0")/.."
 packages="python3-dolfinx python3-petsc4py python3-slepc4py python3-gmsh python3-meshio
   python3-scipy python3-numba python3-h5py python3-venv python3-dev libopenblas0-pthread
   gcc g++ pkg-config libgl1 libegl1 libxrender1"
-# programs that tests compare with, a few MB; where they cannot be had, those tests are skipped
-optional="calculix-ccx"
+# a program that tests compare with, and a browser that opens reports; where they cannot be had,
+# those tests are skipped
+optional="calculix-ccx chromium"
 
 fail() {
   echo "setup: $1" >&2

@@ -252,7 +252,7 @@ report.write_report(
                 f"{1e6 * np.abs(stretch).max():.1f} um and loads the crank pin with up to "
                 f"{force.max():.0f} N ({force_rigid.max():.0f} N with a rigid rod)."
             ),
-            report.picture(out / "slider_crank.gif", "One turn at full speed."),
+            report.motion(last, out / "slider_crank.gif", **scene),
         ],
         "Geometry and mesh": [
             report.picture(out / "rod_mesh.png", "The rod."),
@@ -279,7 +279,7 @@ report.write_report(
             ),
         ],
         "Frequencies, full against reduced": [
-            report.picture(out / "rod_modes.png", "Mode shapes of the reduced rod."),
+            report.modes(rod, out / "rod_modes.png"),
             report.picture(out / "rod_frequencies.png", "Errors of the reduced frequencies."),
             report.table(
                 ("support", "mode", "full [Hz]", "reduced [Hz]", "error", "MAC"),

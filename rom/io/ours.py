@@ -36,7 +36,7 @@ FILE_SIGNS = {  # kind of file: how each that rom writes begins
     "h5": rb"\x89HDF\r\n.*rom-history",
     "glb": rb'glTF.{0,40}"asset": ?\{[^}]*"generator": ?"fenicsx-rom"',
     "vtkhdf": rb"\x89HDF\r\n.*" + MARK_BYTES,
-    "json": rb'\{\s*"schema": "rom-run"',
+    "json": rb'\{\s*"schema": ?"rom-(run|scene)"',
 }
 SAME_KIND = {
     "sid-pysid": "sid",

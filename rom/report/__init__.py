@@ -1,7 +1,8 @@
 """Reports in one HTML file that needs nothing else.
 
 `html` writes them, `pages` fills them for bodies, for files and for motions, `run` moves what a
-mechanism file describes and keeps it in a folder.
+mechanism file describes and keeps it in a folder. `viewer` makes the figures that turn, from what
+`scene` takes of a body or a motion, `coarse` makes small and `scene_file` keeps with a run.
 """
 
 from rom.lazy import front

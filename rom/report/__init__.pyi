@@ -7,3 +7,5 @@ from rom.report.html import picture as picture
 from rom.report.html import source as source
 from rom.report.html import table as table
 from rom.report.html import write_report as write_report
+from rom.report.viewer import modes as modes
+from rom.report.viewer import motion as motion

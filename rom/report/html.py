@@ -1,7 +1,9 @@
 """A report in one HTML file that needs nothing else: text, tables, checks and pictures inside."""
 
 import base64
+import hashlib
 import html
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,19 +17,12 @@ from rom.io.files import write_whole
 from rom.model import Report
 from rom.names import ORIGIN_MARK
 
-PAGE_STYLE = """
-body { font: 16px/1.5 "DejaVu Sans", "Segoe UI", Arial, sans-serif; color: #20242a;
-       max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.7rem; } h2 { font-size: 1.2rem; margin-top: 2.5rem; }
-table { border-collapse: collapse; margin: 0.8rem 0; font-size: 0.9rem; }
-th, td { padding: 0.25rem 0.8rem; border-bottom: 1px solid #dfe3e8; text-align: right; }
-th:first-child, td:first-child { text-align: left; }
-thead th { border-bottom: 2px solid #5c636e; }
-td.ok { color: #2c7a4b; } td.failed { color: #b3261e; font-weight: bold; }
-pre { background: #f4f6f8; padding: 0.6rem 0.9rem; font-size: 0.85rem; overflow-x: auto; }
-figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
-figcaption, caption { font-size: 0.9rem; color: #4a515b; text-align: left; caption-side: bottom; }
-"""
+SOURCE_FOLDER = Path(__file__).parent
+PAGE_STYLE = (SOURCE_FOLDER / "page.css").read_text(encoding="utf-8")
+SCRIPTS = ("vendor/three.min.js", "viewer.js")  # of figures that turn
+ARRAY_ELEMENT = re.compile(
+    r"<script type='application/octet-stream' id='(array-[0-9a-f]+)'>[^<]*</script>"
+)
 KINDS = {".png": "image/png", ".gif": "image/gif"}
 MAX_PICTURE_BYTES = 20_000_000  # more makes a report that browsers cannot open
 
@@ -81,6 +76,12 @@ def picture(path: str | Path, caption: str) -> str:
     Raises:
         ConfigError: if it is missing, of another kind, or too large.
     """
+    words = html.escape(caption, quote=True)
+    return f"<figure>{image(path, caption)}<figcaption>{words}</figcaption></figure>"
+
+
+def image(path: str | Path, words: str) -> str:
+    """A picture without a caption; words for those who do not see it. Raises as `picture`."""
     path = Path(path)
     if path.suffix.lower() not in KINDS or not path.is_file():
         raise ConfigError(f"{path} is no picture of the kinds {', '.join(KINDS)}.")
@@ -90,11 +91,8 @@ def picture(path: str | Path, caption: str) -> str:
             f"{path} has {len(data)} bytes; pictures up to {MAX_PICTURE_BYTES} are embedded."
         )
     code = base64.b64encode(data).decode("ascii")
-    words = html.escape(caption, quote=True)
-    return (
-        f"<figure><img alt='{words}' src='data:{KINDS[path.suffix.lower()]};base64,{code}'>"
-        f"<figcaption>{words}</figcaption></figure>"
-    )
+    kind = KINDS[path.suffix.lower()]
+    return f"<img alt='{html.escape(words, quote=True)}' src='data:{kind};base64,{code}'>"
 
 
 @path_came_first(2, 0, 1)
@@ -120,15 +118,48 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
     body = "".join(
         f"<h2>{html.escape(heading)}</h2>{''.join(blocks)}" for heading, blocks in sections.items()
     )
+    scripts = _scripts() if "<figure class='scene" in body else []
     name = html.escape(title)
     text = (
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
+        f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">'
         f"<meta name='generator' content='{ORIGIN_MARK}'>"
         f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
-        f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{body}</body></html>\n"
+        f"<style>{PAGE_STYLE}</style></head><body><h1>{name}</h1>{_once_each(body)}"
+        f"{''.join(f'<script>{script}</script>' for script in scripts)}</body></html>\n"
     )
     write_whole(path, lambda file: file.write(text.encode("utf-8")))
     return path
+
+
+def _scripts() -> list[str]:
+    """What draws the figures that turn."""
+    return [(SOURCE_FOLDER / name).read_text(encoding="utf-8") for name in SCRIPTS]
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """What the browser lets the page do: these scripts, this style, pictures inside, no network."""
+
+    def only(texts: Sequence[str]) -> str:
+        digests = [hashlib.sha256(text.encode("utf-8")).digest() for text in texts]
+        return " ".join(f"'sha256-{base64.b64encode(d).decode('ascii')}'" for d in digests)
+
+    return (
+        f"default-src 'none'; script-src {only(scripts) or repr('none')}; "
+        f"style-src {only([PAGE_STYLE])}; img-src data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _once_each(body: str) -> str:
+    """The page with each array that several figures use in the first of them only."""
+    seen: set[str] = set()
+
+    def first(found: re.Match[str]) -> str:
+        kept = "" if found[1] in seen else found[0]
+        seen.add(found[1])
+        return kept
+
+    return ARRAY_ELEMENT.sub(first, body)
 
 
 def _cell(value: Any) -> str:

@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.config.document import read_document
-from rom.errors import FileFormatError, RomError
+from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Report, Row
 from rom.process.child import scratch
 from rom.report import html
-from rom.report.run import RECORD_FILE, versions
+from rom.report.run import N_INSTANTS, RECORD_FILE, SCENE_FILE, Run, run, versions
+from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
+from rom.report.scene_file import read_scene
+from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -23,11 +26,18 @@ SHOWN_KEYS = (
     "path", "sha256", "parameters", "scale", "material", "degree", "solver", "K", "M", "units",
 )  # fmt: skip
 BODY_COLUMNS = ("body", "mass [kg]", "elastic coordinates", "markers")
+NO_STILL = "The run made no picture: picture = true of its [output] asks for one."
 ENERGIES = ("kinetic", "strain", "potential", "total")
 
 
 def describe(
-    source: Path, *, command: str = "", version: str = "", **meshing: Any
+    source: Path,
+    *,
+    command: str = "",
+    version: str = "",
+    move: bool = False,
+    progress: bool = False,
+    **meshing: Any,
 ) -> tuple[str, Sections]:
     """Title and sections of a report, for `rom.report.html.write_report`.
 
@@ -35,19 +45,26 @@ def describe(
         source: a body file, a component or mechanism file, or the folder of a run.
         command: what was typed, for the record.
         version: of rom, for the record.
+        move: move the mechanism of a file, and show its motion.
+        progress: report on the motion on stderr.
         meshing: ``trust``, ``time_limit``, ``memory_limit`` of `rom.read_component`.
 
     Raises:
         RomError: if the source is none of these; what cannot be drawn is said in the report.
     """
     made = {"rom": version} | versions()
+    described = source.suffix.lower() == ".toml" and not source.is_dir()
+    if described and "bodies" in read_document(source).data:
+        from rom.config.mechanism import read_mechanism
+
+        file = read_mechanism(source, **meshing)
+        moved = run(file, progress=progress) if move else None
+        return of_mechanism(file, how(command, made), moved)
+    if move:
+        raise ConfigError(f"{source} is no mechanism file, which alone can be moved.")
     if source.is_dir():
         return of_run(source)
-    if source.suffix.lower() == ".toml":
-        if "bodies" in read_document(source).data:
-            from rom.config.mechanism import read_mechanism
-
-            return of_mechanism(read_mechanism(source, **meshing), how(command, made))
+    if described:
         from rom.config.component import read_component
 
         component = read_component(source, **meshing)
@@ -72,7 +89,7 @@ def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
     from rom.checks.gates import check
 
     sections: Sections = {
-        "What it is": [html.paragraph(_sentence(body)), *_mode_picture(body)],
+        "What it is": [html.paragraph(_sentence(body)), *_mode_figure(body)],
         "Mass properties": [_mass_table(body)],
         "Frequencies": _frequency_blocks(body),
         "Interfaces": [_interface_table(body)],
@@ -141,13 +158,27 @@ def _interface_table(body: "FlexibleBody") -> str:
     return html.table(header, rows, "Where joints and forces act, in the axes of the geometry.")
 
 
-def _mode_picture(body: "FlexibleBody") -> list[str]:
+def _mode_figure(body: "FlexibleBody", size: int = SHAPE_BYTES) -> list[str]:
+    """Modes that swing and turn; and the picture of some of them, for those who see no such."""
+
     def draw(path: Path) -> None:
         from rom.view.scenes.mode_shapes import mode_shapes
 
         mode_shapes(body, path)
 
-    return drawn(draw, "Its lowest elastic modes.")
+    return turning(
+        lambda: modes_scene(body, size=size),
+        drawn(draw, "Its lowest elastic modes."),
+        modes_words(body.name),
+    )
+
+
+def turning(make: Callable[[], dict[str, Any]], still: list[str], caption: str) -> list[str]:
+    """A figure that turns; or the still picture alone, where there is no scene."""
+    try:
+        return [figure(make(), still, caption)]
+    except RomError as error:
+        return [*still, html.paragraph(f"Nothing to turn around here: {error.message}")]
 
 
 def _provenance(body: "FlexibleBody") -> list[str]:
@@ -164,9 +195,11 @@ def _provenance(body: "FlexibleBody") -> list[str]:
     return [html.table(("", "made from"), rows, "What the body file says of its origin.")]
 
 
-def of_mechanism(file: "MechanismFile", made: list[str]) -> tuple[str, Sections]:
-    """A mechanism as it starts; nothing is moved."""
-    mechanism = file.mechanism()
+def of_mechanism(
+    file: "MechanismFile", made: list[str], moved: Run | None = None
+) -> tuple[str, Sections]:
+    """A mechanism as it starts, and how it moves if it has been moved."""
+    mechanism = file.mechanism() if moved is None else moved.solution.mechanism
     bodies = [
         (name, "flexible" if part.r else "rigid", float(part.mass), part.r, ", ".join(part.names))
         for name, part in mechanism.parts.items()
@@ -178,27 +211,62 @@ def of_mechanism(file: "MechanismFile", made: list[str]) -> tuple[str, Sections]
         f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
     )
 
+    look = {key: file.values["output"][key] for key in ("view", "up")
+            if key in file.values["output"]}  # fmt: skip
+
     def draw(path: Path) -> None:
         from rom.view.scenes.mechanisms import start
 
-        how = {key: file.values["output"][key] for key in ("view", "up")
-               if key in file.values["output"]}  # fmt: skip
-        start(mechanism, path, title=f"Mechanism {file.name}", **how)
+        start(mechanism, path, title=f"Mechanism {file.name}", **look)
 
     sections: Sections = {
-        "What it is": [html.paragraph(words), *drawn(draw, "As its bodies are placed.")],
+        "What it is": [
+            html.paragraph(words),
+            *turning(
+                lambda: start_scene(mechanism, title=f"Mechanism {file.name}", **look),
+                drawn(draw, "As its bodies are placed."),
+                START_WORDS,
+            ),
+        ],
         "Bodies": [html.table(header, bodies, "Bodies, and the names joints may use.")],
         "Joints and forces": [_connection_table(file)],
     }
+    if moved is not None:
+        sections["Motion"] = _motion(moved, look)
     flexible = {n: p.flexible for n, p in mechanism.parts.items() if p.flexible is not None}
     for name, body in flexible.items():
         sections[f"Body {name}"] = [
-            html.paragraph(_sentence(body)), *_frequency_blocks(body), _interface_table(body)
+            html.paragraph(_sentence(body)), *_mode_figure(body, SHAPE_BYTES // len(flexible)),
+            *_frequency_blocks(body), _interface_table(body),
         ]  # fmt: skip
     written = file.document.path.read_text(encoding="utf-8")
     return f"Mechanism {file.name}", sections | {
         "How it was made": [*made, html.source(written)]
     }  # fmt: skip
+
+
+def _motion(moved: Run, look: dict[str, Any]) -> list[str]:
+    """The motion that was computed for the report, and whether it is to be believed."""
+    solution, how = moved.solution, look | {"magnify": moved.file.values["output"]["magnify"]}
+
+    def draw(path: Path) -> None:
+        import numpy as np
+
+        from rom.view.scenes.film import instants
+
+        times = np.linspace(solution.t[0], solution.t[-1], N_INSTANTS)
+        instants(solution.mechanism, solution, path, times=times, **how)
+
+    title = f"Motion of {moved.file.name}"
+    return [
+        html.paragraph(solution.status),
+        *turning(
+            lambda: motion_scene(solution, title=title, **how),
+            drawn(draw, "Four instants."),
+            MOTION_WORDS,
+        ),
+        html.checks(moved.audit, "Is the computed motion believable?"),
+    ]
 
 
 def _connection_table(file: "MechanismFile") -> str:
@@ -223,17 +291,22 @@ def of_run(folder: Path) -> tuple[str, Sections]:
     ]
     audit = Report(record["audit"]["title"], tuple(Row(*row) for row in record["audit"]["rows"]))
     words = f"{record['name']} was moved for {record['t_end']:g} s in {record['steps']} steps. "
-    pictures = [
-        html.picture(folder / name, caption)
+    pictures = {
+        name: html.picture(folder / name, caption)
         for name, caption in (
             ("motion.gif", "The motion."),
             ("instants.png", "Four instants."),
             ("curves.png", "Histories, as asked for."),
         )
         if name in record["files"] and (folder / name).is_file()
-    ]
+    }
+    if SCENE_FILE in record["files"] and (folder / SCENE_FILE).is_file():
+        name = next((name for name in ("motion.gif", "instants.png") if name in pictures), "")
+        still = [pictures.pop(name)] if name else [html.paragraph(NO_STILL)]
+        moving = figure(read_scene(folder / SCENE_FILE), still, MOTION_WORDS)
+        pictures = {SCENE_FILE: moving} | pictures
     return f"Motion of {record['name']}", {
-        "What it is": [html.paragraph(words + record["status"]), *pictures],
+        "What it is": [html.paragraph(words + record["status"]), *pictures.values()],
         "Bodies and joints": [
             html.table(BODY_COLUMNS, bodies, "Bodies."),
             html.table(("joint", "kind"), list(record["joints"].items()), "Joints."),

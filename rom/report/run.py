@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rom.mbs.results.solution import Solution
     from rom.model import Report
 
-RECORD_FILE = "run.json"
+RECORD_FILE, SCENE_FILE = "run.json", "scene.json"
 N_INSTANTS = 4  # in the picture
 
 
@@ -85,7 +85,7 @@ class Run:
     file: MechanismFile
     solution: "Solution"
     audit: "Report"
-    command: str
+    command: str = ""
     version: str = ""
 
     def paths(self, folder: Path) -> list[Path]:
@@ -100,6 +100,7 @@ class Run:
         paths = self.paths(folder)
         self.write_motion(paths)
         self._draw(paths)
+        self._scene(paths[-2])
 
     def write_motion(self, paths: list[Path]) -> None:
         """Write the table of the motion, then the record, the last of the paths."""
@@ -137,6 +138,14 @@ class Run:
         if "curves.png" in names:
             self._curves(names["curves.png"])
 
+    def _scene(self, path: Path) -> None:
+        from rom.report.scene import motion_scene
+        from rom.report.scene_file import write_scene
+
+        out, title = self.file.values["output"], f"Motion of {self.file.name}"
+        look = {key: out[key] for key in ("view", "up") if key in out}
+        write_scene(motion_scene(self.solution, title=title, magnify=out["magnify"], **look), path)
+
     def _curves(self, path: Path) -> None:
         from rom.view.figures.curves import history
 
@@ -161,7 +170,7 @@ def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
     names += ["instants.png"] if out["picture"] else []
     names += ["curves.png"] if out["plot"] else []
     names += [f"motion.{out['film']}"] if "film" in out else []
-    return [folder / name for name in [*names, RECORD_FILE]]
+    return [folder / name for name in [*names, SCENE_FILE, RECORD_FILE]]
 
 
 def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:

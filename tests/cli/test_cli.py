@@ -148,7 +148,7 @@ def test_simulate_writes_a_film_and_a_history_when_asked(file, tmp_path, capsys)
         capsys, "simulate", file, "--hinge", "root", "--t-end", 0.004, "--dt", 4e-4, "-q",
         "--film", "glb", "--history", "csv", "-o", tmp_path,
     )  # fmt: skip
-    names = ("body.glb", "body.history.csv", "run.json")
+    names = ("body.glb", "body.history.csv", "scene.json", "run.json")
     assert found["also"] == [str(tmp_path / name) for name in names]
     assert (tmp_path / "body.glb").read_bytes()[:4] == b"glTF"
     assert "hinge force x [N]" in (tmp_path / "body.history.csv").read_text().splitlines()[0]

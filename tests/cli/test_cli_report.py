@@ -1,6 +1,7 @@
 """rom report: one HTML file that says what something is, without network."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from cases.files.toml_files import laid_out
 from cases.solid import block
 from rom.cli.main import main
 
+ADDRESS, XML_NAME = re.compile(r"[a-z]*://[^\s\"'<]*"), "http://www.w3.org/1999/xhtml"
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
@@ -34,7 +36,7 @@ def reported(*words):
     assert main(["report", *words, "-o", "r.html", "-q"]) == 0
     reader = read(Path("r.html"))
     assert all(link.startswith("data:image/") for link in reader.links)
-    assert "://" not in Path("r.html").read_text()
+    assert set(ADDRESS.findall(Path("r.html").read_text())) <= {XML_NAME}
     return reader
 
 
@@ -71,6 +73,16 @@ def test_inertia_is_that_about_the_mass_centre(folder, monkeypatch):
     assert f"{m * (0.1**2 + 0.08**2) / 12:.5g}" in text
     assert f"{m * (1 + 0.08**2) / 12:.5g}" in text and f"{m * (1 + 0.1**2) / 12:.5g}" in text
     assert "No picture here: pictures need" in text
+
+
+def test_a_mechanism_is_moved_where_that_is_asked_for(folder, monkeypatch, capsys):
+    without_pictures(monkeypatch)
+    text = reported("pendulum.toml", "--move").text
+    for words in ("Mechanism pendulum", "Reached t = 0.5 s.", "energy balance / energy"):
+        assert words in text, words
+    assert main(["report", "rod.rom.npz", "--move", "-o", "s.html"]) == 2
+    assert "rod.rom.npz is no mechanism file" in capsys.readouterr().err
+    assert not (folder / "s.html").exists()
 
 
 def test_a_mechanism_is_described_as_it_starts(folder, monkeypatch):

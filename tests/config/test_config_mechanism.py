@@ -90,7 +90,7 @@ def test_simulate_leaves_a_folder_that_says_how_it_came_about(folder, capsys):
     assert main([*words, "--json", "-q"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["output"] == "out/motion.csv" and found["steps"] == 200
-    assert found["also"] == ["out/run.json"]
+    assert found["also"] == ["out/scene.json", "out/run.json"]
     head, *rows = (folder / "out" / "motion.csv").read_text().splitlines()
     assert head.startswith("t [s],bob position x [m],bob position y [m]") and len(rows) == 201
     fall = float(rows[-1].split(",")[2])  # y = -g m L^2 / I t^2 / 2 as long as it is level
@@ -107,7 +107,7 @@ def test_a_film_and_another_form_of_the_table_when_the_file_asks(folder):
     (folder / "c.toml").write_text(text)
     assert main(["simulate", "c.toml", "--t-end", "2e-3", "-q", "-o", "out"]) in (0, 5)
     assert {path.name for path in (folder / "out").iterdir()} == {
-        "motion.h5", "motion.glb", "run.json",
+        "motion.h5", "motion.glb", "scene.json", "run.json",
     }  # fmt: skip
     assert (folder / "out" / "motion.glb").read_bytes()[:4] == b"glTF"
 

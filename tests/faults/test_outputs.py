@@ -32,6 +32,7 @@ WRITERS = {  # case: (what to type, the file it writes)
     "film for ParaView": ([*PENDULUM, "--film", "vtkhdf", "-o", "out"], "out/good.vtkhdf"),
     "film": ([*PENDULUM, "--film", "glb", "-o", "out"], "out/good.glb"),
     "record": ([*PENDULUM, "-o", "out"], "out/run.json"),
+    "scene": ([*PENDULUM, "-o", "out"], "out/scene.json"),
     "report": (["report", "good.npz", "-o", "x.html"], "x.html"),
 }
 BEFORE_COMPUTING = {  # case: (what to type, the file it would write); nothing of it is there

@@ -119,7 +119,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bits(number, whole, folder, ca
         assert whole["motion.csv"].startswith(motion[: motion.rindex(b"\n", 0, -1)])
     assert main([*RUN, *more, "-q"]) == 0, capsys.readouterr().err
     assert files(folder / "out") == whole
-    assert sorted(os.listdir("out")) == ["motion.csv", "run.json"]
+    assert sorted(os.listdir("out")) == ["motion.csv", "run.json", "scene.json"]
     if more:
         assert main([*RUN, "--resume"]) == 2
         assert "came to its end" in capsys.readouterr().err
@@ -184,4 +184,8 @@ def test_a_film_that_is_interrupted_takes_nothing_away(folder, monkeypatch, caps
     assert files(folder / "out") == before
     assert sorted(os.listdir("out/motion.parts")) == ["part-000001.npz", "state.npz"]
     assert main([*short, "--resume"]) == 0
-    assert files(folder / "out") | {"run.json": None} == before | {"run.json": None}
+    found = files(folder / "out")
+    assert found.keys() - before.keys() == {"scene.json"}
+    assert {name: found[name] for name in before if name != "run.json"} == {
+        name: content for name, content in before.items() if name != "run.json"
+    }

@@ -206,7 +206,7 @@ def test_two_runs_into_one_folder_leave_the_files_of_one(body, tmp_path, monkeyp
     steps = json.loads(Path("out/run.json").read_text())["steps"]
     table = np.loadtxt("out/b.csv", delimiter=",", skiprows=1)
     assert len(table) == steps + 1 and steps in (30, 40)
-    assert sorted(os.listdir("out")) == ["b.csv", "run.json"]
+    assert sorted(os.listdir("out")) == ["b.csv", "run.json", "scene.json"]
     capsys.readouterr()
 
 
@@ -361,4 +361,4 @@ def test_two_ranks_are_one_writer(body, tmp_path):
     done = command(*PENDULUM, "-o", "out", n=2, cwd=tmp_path)
     assert done.returncode == 2 and done.stderr.count("error: ") == 1, done.stderr
     assert (tmp_path / "out" / "b.csv").read_text() == "my notes\n"
-    assert sorted(os.listdir(tmp_path / "out")) == ["b.csv", "run.json"]
+    assert sorted(os.listdir(tmp_path / "out")) == ["b.csv", "run.json", "scene.json"]

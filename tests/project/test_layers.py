@@ -50,7 +50,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "view": {"model", "mbs", "rotation", "io", "errors"},
     "fmu": {"model", "mbs", "rotation", "body", "io", "errors"},
     "config": LIGHT | {"checks", "fe", "fmu", "workflow"},
-    "report": {"model", "body", "checks", "config", "mbs", "view", "io", "errors"},
+    "report": {"model", "rotation", "body", "checks", "config", "mbs", "view", "io", "errors"},
     "material": {"errors", "units"},
     "rows": {"model"},
 }

@@ -1,6 +1,7 @@
 """Write a report of a body, a component, a mechanism or a finished run: one HTML file.
 
-Pictures are inside; the file opens without network. Where no picture can be drawn it says why.
+Modes and motions turn, swing and play in the browser, without network; still pictures are inside
+for print and for browsers without WebGL. Where no picture can be drawn it says why.
 """
 
 import argparse
@@ -16,6 +17,7 @@ EXAMPLES = """\
   rom report rod.rom.npz -o rod.html
   rom report meshes/connecting_rod.toml -o rod.html   # meshes and reduces it first
   rom report demos/slider_crank.toml -o crank.html    # as it starts
+  rom report demos/slider_crank.toml --move -o crank.html   # and as it moves
   rom report out -o motion.html                       # what rom simulate left
 """
 
@@ -24,6 +26,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="body file, .toml file, or folder of a run")
     parser.add_argument("-o", "--output", type=Path, required=True, help="report, .html")
+    parser.add_argument(
+        "--move", action="store_true", help="move the mechanism of a file, and show the motion"
+    )
     add_force(parser)
     add_meshing(parser)
 
@@ -39,7 +44,14 @@ def run(args: argparse.Namespace) -> Answer:
         raise ConfigError(f"{args.output}: a report is written as .html.")
     checked(args, args.output)
     command = f"rom {' '.join(map(quote, args.argv))}"
-    title, sections = describe(args.file, command=command, version=__version__, **meshing(args))
+    title, sections = describe(
+        args.file,
+        command=command,
+        version=__version__,
+        move=args.move,
+        progress=not args.quiet,
+        **meshing(args),
+    )
     data = {
         "file": str(args.file),
         "output": str(args.output),

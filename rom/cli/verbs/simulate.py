@@ -161,7 +161,7 @@ def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> An
 def _pendulum(args: argparse.Namespace) -> Answer:
     from rom import __version__
     from rom.io.native import load
-    from rom.report.run import RECORD_FILE, Record, file_digest
+    from rom.report.run import RECORD_FILE, SCENE_FILE, Record, file_digest
 
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
     require(needed | {OUTPUT_FLAG: args.output})
@@ -175,7 +175,8 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     path = inside(folder, body.name, ".csv")
     films = [path.with_suffix(f".{args.film}")] if args.film else []
     tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
-    paths = [checked(args, each) for each in (path, *films, *tables, folder / RECORD_FILE)]
+    last = (folder / SCENE_FILE, folder / RECORD_FILE)
+    paths = [checked(args, each) for each in (path, *films, *tables, *last)]
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
@@ -193,6 +194,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         _write_motion(path, tables, body, solution)
         record.write(paths, solution, audit)
         _write_films(films, solution)
+        _write_scene(paths[-2], body, solution)
         _finish(keep)
 
     return _answer(solution, audit, paths, write)
@@ -227,6 +229,13 @@ def _write_films(films: list[Path], solution: Any) -> None:
 
     for film in films:
         write_animation(solution, film)
+
+
+def _write_scene(path: Path, body: "FlexibleBody", solution: Any) -> None:
+    from rom.report.scene import motion_scene
+    from rom.report.scene_file import write_scene
+
+    write_scene(motion_scene(solution, title=f"Motion of {body.name}"), path)
 
 
 def _write(path: Path, body: "FlexibleBody", solution: Any) -> None:

@@ -1,6 +1,6 @@
 // What `viewer.js` uses of three.js; bundled into three.min.js as README.md tells.
 export {
-  AmbientLight, BufferAttribute, BufferGeometry, Color, DataTexture, DirectionalLight, DoubleSide,
+  AmbientLight, BufferAttribute, BufferGeometry, DataTexture, DirectionalLight, DoubleSide,
   Group, LinearFilter, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial,
   OrthographicCamera, Quaternion, Scene, SRGBColorSpace, Vector3, WebGLRenderer,
 } from "three";

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.io import mmwrite
 
 import rom
+import rom.report
 import rom.view
 from cases.files.toml_files import PENDULUM
 from cases.mbs.mechanisms import rotor
@@ -33,7 +34,12 @@ KINDS = {"root": "rbe2", "tip": "rbe2"}
 TOGETHER = ((("a", "tip"), ("b", "root")),)
 FENICSX = find_spec("dolfinx") is not None
 # classes that are public without standing in rom: what public functions return and take
-ALSO = {"Solution": Solution, "State": State}
+ALSO = {
+    "Solution": Solution,
+    "State": State,
+    "modes_figure": rom.report.modes,
+    "motion_figure": rom.report.motion,
+}
 KEPT = {"RomError", "RomWarning"} | {
     name for name in rom.__all__ if rom.MODULES[name] == "rom.errors"
 }  # what is raised takes anything

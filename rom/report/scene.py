@@ -1,0 +1,361 @@
+"""What a page draws in space: bodies, their shapes, and modes or a motion, small enough to send.
+
+A scene is a dictionary for JSON, numbers in base 64. Flexible bodies keep their elastic
+coordinates: the page computes the place of a point from x = r + A (X + S q), as the integrator.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import finite, positive
+from rom.body.records import Surface
+from rom.body.recovery import von_mises
+from rom.errors import ConfigError
+from rom.model import Array, Index
+from rom.names import named, offered
+from rom.report.coarse import array, coarsened, corners, quantised_column, quantised_points
+from rom.rotation import matrix
+from rom.view.canvas.scene import aimed, sharp_edges
+from rom.view.canvas.solids import Mesh
+from rom.view.scenes.film import METAL_COLOURS, bars, placed, shades_of
+from rom.view.scenes.mechanisms import COLOURS
+from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
+
+if TYPE_CHECKING:
+    from rom.body.flexible import FlexibleBody
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.results.solution import Solution
+
+SCHEMA_NAME, SCHEMA_VERSION = "rom-scene", [1, 0]
+SHAPE_BYTES = 1_300_000  # of all shapes and stresses of a scene
+MOTION_BYTES = 1_000_000  # of all poses and elastic coordinates of a scene
+MIN_POINTS, MAX_POINTS = 500, 20_000  # of one surface
+N_FRAMES = 600  # of a motion
+N_MODES = 6  # shown of a body that was compared with no mesh
+N_COORDINATES = 40  # elastic coordinates that are shown one by one
+SMALLEST_SHARE = 1e-4  # of a displacement or stress: coordinates that add less are left out
+FRAMES_AT_ONCE = 50  # while limits of colours are looked for
+ELASTIC_COLOURS = ("#2f7f9f", "#d1495b", "#edae49", "#66a182")
+NO_TURN = np.array([[1.0, 0.0, 0.0, 0.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """A body in a scene, at f instants.
+
+    Attributes:
+        name: its name.
+        colour: where it has no field, "#rrggbb".
+        points: (s, 3) undeformed, body frame [m].
+        triangles: (t, 3) corners.
+        position: (f, 3) origin of its frame [m].
+        orientation: (f, 4) quaternion of its frame.
+        shapes: (3 s, r) displacement per unit of each elastic coordinate; r = 0 for a rigid body.
+        stress: (6 s, r) stress on the points per unit of each [Pa], or None.
+        q: (f, r) elastic coordinates.
+    """
+
+    name: str
+    colour: str
+    points: Array
+    triangles: Index
+    position: Array
+    orientation: Array
+    shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    stress: Array | None = None
+    q: Array = field(default_factory=lambda: np.zeros((1, 0)))
+
+    def corners(self) -> Array:
+        """(8 f, 3) of the box around the undeformed points, in the world."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        box = np.array([np.where(np.array(k) > 0, high, low) for k in np.ndindex(2, 2, 2)])
+        turned = np.array([matrix(p) for p in self.orientation])
+        return placed(box[None], (self.position, turned)).reshape(-1, 3)
+
+
+def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> dict[str, Any]:
+    """The modes of a body in each support of its comparison, and its elastic coordinates.
+
+    Args:
+        body: a flexible body.
+        size: bytes its shapes may take; a finer surface is made coarser.
+
+    Raises:
+        ConfigError: if the body has no surface.
+    """
+    body = body.in_units("SI")
+    surface, stress, found = _surface(body), _stress(body), list(_modes(body))
+    if surface is None:
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+    Q = np.array([mode["q"] for mode in found]).reshape(len(found), -1)
+    far = [float(np.abs(displacement(body, _motion(mode))).max()) for mode in found]
+    kept = np.union1d(
+        _felt(surface.shape, stress, Q, np.array(far)), np.arange(body.n_modes)[:N_COORDINATES]
+    ).astype(int)
+    for mode, unit in zip(found, far, strict=True):
+        mode["rigid"] = [float(f"{x / unit:.7g}") for x in mode["rigid"]]
+        mode["q"] = [float(f"{x / unit:.7g}") for x in mode["q"][kept]]
+    thing = Thing(
+        body.name, ELASTIC_COLOURS[0], surface.points, surface.triangles, np.zeros((1, 3)),
+        NO_TURN, surface.shape[:, kept], None if stress is None else stress[:, kept],
+        np.zeros((1, len(kept))),
+    )  # fmt: skip
+    coordinates = [
+        {"group": "Elastic coordinates", "label": f"q{k + 1}: {f:.5g} Hz", "coordinate": k}
+        for k, f in enumerate(body.omega[:N_COORDINATES] / (2 * np.pi))
+    ]
+    title = f"Mode shapes of {body.name}"
+    scene = _scene(title, [thing], size, {"magnify": AMPLITUDE_RATIO})
+    return scene | {"modes": found + coordinates}
+
+
+def motion_scene(
+    solution: "Solution",
+    *,
+    title: str = "Motion",
+    shapes: dict[str, Mesh] | None = None,
+    magnify: float = 1.0,
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+) -> dict[str, Any]:
+    """A motion; arguments as of `rom.view.animate`, but for ``up``: None is against gravity.
+
+    Raises:
+        ConfigError: for an unknown body, or directions that are none.
+    """
+    mechanism = solution.mechanism
+    given = _meshes(shapes or {}, mechanism)
+    positive("magnify", magnify)
+    steps = _steps(solution)
+    things = [
+        _of_part(
+            part, colour, given.get(name),
+            (solution.position(name)[steps], solution.orientation(name)[steps]),
+            solution.elastic(name)[steps] if part.r else None,
+        )
+        for (name, part), colour in zip(mechanism.parts.items(), _colours(mechanism), strict=True)
+    ]  # fmt: skip
+    limits = [_limits(thing) for thing in things]
+    largest = {
+        key: max((limit[key] for limit in limits), default=0.0)
+        for key in ("displacement", "stress")
+    }
+    look = {"view": view, "up": up, "gravity": mechanism.gravity, "magnify": magnify}
+    scene = _scene(title, things, SHAPE_BYTES, look)
+    t = solution.t[steps]
+    return scene | {"times": array(t - t[0], "float32"), "start": float(t[0]), "limits": largest}
+
+
+def start_scene(
+    mechanism: "Mechanism",
+    *,
+    title: str = "Mechanism at its start",
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+) -> dict[str, Any]:
+    """A mechanism as its bodies are placed; arguments as of `rom.view.mechanism`."""
+    things = [
+        _of_part(part, COLOURS[k % len(COLOURS)], None, (part.at[None], part.p[None]), None)
+        for k, part in enumerate(mechanism.parts.values())
+    ]
+    look = {"view": view, "up": up, "gravity": mechanism.gravity}
+    return _scene(title, things, SHAPE_BYTES, look)
+
+
+def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
+    """The shapes of bodies, if the mechanism has these and the triangles have their corners."""
+    if unknown := set(shapes) - set(mechanism.parts):
+        raise ConfigError(
+            f"shapes: no body {named(sorted(unknown))}; there are {offered(mechanism.parts)}."
+        )
+    found = {}
+    for name, (points, triangles) in shapes.items():
+        X, corner = np.asarray(points, dtype=float), np.asarray(triangles)
+        fit = X.ndim == corner.ndim == 2 and X.shape[1] == corner.shape[1] == 3 and corner.size
+        if not fit or not np.isfinite(X).all() or corner.dtype.kind not in "iu":
+            raise ConfigError(f"the shape of {name!r} is no (n, 3) points and (t, 3) corners.")
+        if corner.min() < 0 or corner.max() >= len(X):
+            raise ConfigError(f"the shape of {name!r} has corners beyond its {len(X)} points.")
+        found[name] = X, corner.astype(np.int64)
+    return found
+
+
+def _surface(body: Any) -> Surface | None:
+    """The surface of a body, if it is flexible and has one to draw."""
+    surface: Surface | None = getattr(body, "surface", None)
+    return surface if surface is not None and len(surface.triangles) else None
+
+
+def _stress(body: "FlexibleBody") -> Array | None:
+    """(6 s, r) stress on the points of the surface, where the body has it."""
+    surface = _surface(body)
+    if body.stress is None or surface is None or body.stress.points.shape != surface.points.shape:
+        return None
+    return body.stress.operator
+
+
+def _modes(body: "FlexibleBody") -> Iterator[dict[str, Any]]:
+    """The modes whose frequencies a report lists, support by support."""
+    compared = body.provenance.get("comparison", {})
+    supports = {"free": ()} | {f"{name} held": (name,) for name in body.markers}
+    for support, fixed in supports.items():
+        n = len(compared.get(support, {}).get("full", ()))
+        if not (n or (not fixed and not compared)):
+            continue
+        omega, V = body.modes(fixed=fixed)
+        for i, k in enumerate(np.flatnonzero(omega > 0)[: n or N_MODES]):
+            label = f"mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
+            yield {
+                "group": support.capitalize() if not fixed else support,
+                "label": label, "rigid": V[:6, k], "q": V[6:, k],
+            }  # fmt: skip
+
+
+def _motion(mode: dict[str, Any]) -> Array:
+    return np.concatenate([mode["rigid"], mode["q"]])
+
+
+def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
+    """Numbers of the elastic coordinates that are seen in any of the states Q (m, r).
+
+    Args:
+        shapes: (3 s, r).
+        stress: (6 s, r) or None.
+        Q: (m, r) elastic coordinates.
+        far: (m,) largest displacement in each state.
+    """
+    seen = np.abs(Q) * np.abs(shapes).max(axis=0) > SMALLEST_SHARE * far[:, None]
+    if stress is not None:
+        parts = np.abs(Q) * np.abs(stress).max(axis=0)
+        seen |= parts > SMALLEST_SHARE * parts.max(axis=1, initial=0.0)[:, None]
+    return np.flatnonzero(seen.any(axis=0))
+
+
+def _steps(solution: "Solution") -> Index:
+    """Numbers of the instants that are kept, evenly over the saved ones."""
+    per_frame = 4 * sum(7 + part.r for part in solution.mechanism.parts.values())
+    n = int(np.clip(MOTION_BYTES // max(per_frame, 1), 2, N_FRAMES))
+    return np.unique(np.linspace(0, len(solution.t) - 1, n).round().astype(np.int64))
+
+
+def _colours(mechanism: "Mechanism") -> list[str]:
+    shades, elastic, found = shades_of(mechanism), 0, []
+    for name, part in mechanism.parts.items():
+        flexible = _surface(part.flexible) is not None
+        colour = ELASTIC_COLOURS[elastic % len(ELASTIC_COLOURS)]
+        found.append(colour if flexible else METAL_COLOURS[shades[name]])
+        elastic += flexible
+    return found
+
+
+def _of_part(
+    part: Any, colour: str, shape: Mesh | None, pose: tuple[Array, Array], q: Array | None
+) -> Thing:
+    """A body of a mechanism, by its surface, the shape it was given, or as bars."""
+    surface = _surface(part.flexible)
+    if surface is None:
+        points, triangles = bars(part) if shape is None else shape
+        return Thing(part.name, colour, points, triangles, *pose)
+    mesh = surface.points, surface.triangles
+    if q is None or not part.r:
+        return Thing(part.name, colour, *mesh, *pose)
+    stress = _stress(part.flexible)
+    far = np.array([max(_chunked(lambda u: np.abs(u).max(), surface.shape, q))])
+    kept = _felt(surface.shape, stress, np.abs(q).max(axis=0)[None], far)
+    chosen = None if stress is None else stress[:, kept]
+    return Thing(part.name, colour, *mesh, *pose, surface.shape[:, kept], chosen, q[:, kept])
+
+
+def _chunked(of: Callable[[Array], float], columns: Array, q: Array) -> Iterator[float]:
+    """A number of the field (f, n) of columns (n, r), some instants at a time."""
+    for k in range(0, len(q), FRAMES_AT_ONCE):
+        yield float(of(q[k : k + FRAMES_AT_ONCE] @ columns.T))
+
+
+def _limits(thing: Thing) -> dict[str, float]:
+    """Largest displacement relative to the frame [m] and equivalent stress [Pa] of a motion."""
+    out = {"displacement": 0.0, "stress": 0.0}
+    if thing.shapes.size:
+        out["displacement"] = max(
+            _chunked(
+                lambda u: np.linalg.norm(u.reshape(-1, 3), axis=1).max(), thing.shapes, thing.q
+            )
+        )
+    if thing.stress is not None and thing.stress.size:
+        out["stress"] = max(
+            _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
+        )
+    return out
+
+
+def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> dict[str, Any]:
+    seen = np.concatenate([thing.corners() for thing in things])
+    view, centre = _view(seen, look.get("view"), look.get("up"), look.get("gravity"))
+    bending = max(sum(thing.shapes.size > 0 for thing in things), 1)
+    return {
+        "schema": SCHEMA_NAME,
+        "version": SCHEMA_VERSION,
+        "title": title,
+        "view": view,
+        "size": float(np.ptp(seen, axis=0).max()),
+        "magnify": look.get("magnify", 1.0),
+        "bodies": [_encoded(thing, centre, size // bending) for thing in things],
+        "modes": [],
+    }
+
+
+def _view(seen: Array, view: Any, up: Any, gravity: Any) -> tuple[dict[str, Any], Array]:
+    """The eye, and the middle of what it sees; upright is an axis, unless something says more."""
+    view, up = (
+        value if value is None else finite(name, value, (3,))
+        for name, value in (("view", view), ("up", up))
+    )
+    if up is None and gravity is not None and np.any(gravity):
+        up = -np.asarray(gravity, dtype=float)
+        toward = aimed(seen, 1000, view=view).toward
+        if np.linalg.norm(np.cross(toward, up)) < 0.05 * np.linalg.norm(up):  # seen from above
+            up = None
+    camera = aimed(seen, 1000, view=view, up=up, heights=(0.02, 50.0))
+    upright = np.eye(3)[np.argmax(np.abs(camera.up))] * np.sign(
+        camera.up[np.argmax(np.abs(camera.up))]
+    )
+    if up is not None:
+        upright = np.asarray(up, dtype=float) / np.linalg.norm(up)
+    radius = float(np.linalg.norm(seen - camera.focus, axis=1).max()) or 1.0
+    found = {
+        "toward": camera.toward.tolist(), "up": upright.tolist(), "radius": radius,
+        "tall": camera.height, "wide": camera.height * camera.size[0] / camera.size[1],
+    }  # fmt: skip
+    return found, camera.focus
+
+
+def _encoded(thing: Thing, centre: Array, size: int) -> dict[str, Any]:
+    """A body as numbers for the page, its surface as coarse as its share of the bytes asks."""
+    r = thing.shapes.shape[1]
+    per_point = 2 * 3 * r * (1 if thing.stress is None else 3)
+    n_max = int(np.clip(size // max(per_point, 1), MIN_POINTS, MAX_POINTS))
+    kept, triangles = coarsened(thing.points, thing.triangles, n_max)
+    X = thing.points[kept]
+
+    def columns(A: Array | None, width: int) -> list[dict[str, Any]]:
+        if A is None or not A.size:
+            return []
+        rows = (width * kept[:, None] + np.arange(width)).ravel()
+        return [quantised_column(column) for column in A[rows].T]
+
+    return {
+        "name": thing.name,
+        "colour": thing.colour,
+        "points": quantised_points(X),
+        "triangles": corners(triangles, len(X)),
+        "edges": corners(sharp_edges(X, triangles), len(X)),
+        "shapes": columns(thing.shapes, 3),
+        "stresses": columns(thing.stress, 6),
+        "position": array(thing.position - centre, "float32"),
+        "orientation": array(thing.orientation, "float32"),
+        "q": array(thing.q if r else np.zeros(0), "float32"),
+    }

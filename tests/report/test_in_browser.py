@@ -1,0 +1,304 @@
+"""Reports in a real browser: what a stranger sees who opens one, turns it and lets it move."""
+
+import base64
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.files.browser import PROGRAM, REASON, WITH_WEBGL, WITHOUT_WEBGL, browser
+from cases.solid import block
+from rom import report
+from rom.body.recovery import StressRecovery
+from rom.view import box
+
+pytestmark = [pytest.mark.once, pytest.mark.skipif(PROGRAM is None, reason=REASON)]
+
+NAME = "</script><b>bar"
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+M8AAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
+)
+MODES, MOTION, TURN = "#modes", "#motion", "#turn"
+LENGTH, QUARTER = 1.0, 0.1  # of the bar [m]; time of a quarter of a turn [s]
+MAGNIFY = 2000.0  # of the cantilever, which sags by a few hundredths of a millimetre
+SMALL = (640, 560)  # window [pixel]: the processor draws
+
+
+def bar_that_bends():
+    """A body whose stress is made up: xx is 1 GPa per metre of displacement along y."""
+    made = rom.reduce(block(cells=(8, 2, 2)), method=rom.CraigBampton(6), reference="root",
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
+    operator = np.zeros((6 * len(made.surface.points), made.n_modes))
+    operator[0::6] = 1e9 * made.surface.shape[1::3]
+    return replace(made, name=NAME, stress=StressRecovery(made.surface.points, operator))
+
+
+def cantilever(body):
+    """Let go under its weight, from straight."""
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    bar = mech.add_flexible("<b>bar", body)
+    mech.fixed("wall", mech.ground.marker((0, 0, 0)), bar.marker("root"))
+    return rom.simulate(mech, t_end=0.02, dt=1e-4)
+
+
+def quarter_turn():
+    """A box at +x that turns about z to +y."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    arm = mech.add_rigid("arm", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0),
+                         markers={"hub": (0, 0, 0)})  # fmt: skip
+    mech.revolute("hub", mech.ground.marker((0, 0, 0)), arm.marker("hub"), axis=(0, 0, 1))
+    s = 2 * np.pi / QUARTER  # starts and ends without a jolt
+    mech.drive("motor", "hub", lambda t: (s * t - np.sin(s * t)) / 4)
+    return rom.simulate(mech, t_end=QUARTER, dt=1e-3)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "still.png").write_bytes(PIXEL)
+    body, side = bar_that_bends(), {"view": (0, 0, 1), "up": (0, 1, 0)}
+    bent = cantilever(body)
+    shapes = {"arm": box((0.2, 0.1, 0.1), (1.0, 0.0, 0.0))}
+    blocks = [
+        report.modes(body, folder / "still.png"),
+        report.motion(bent, folder / "still.png", magnify=MAGNIFY, **side),
+        report.motion(quarter_turn(), shapes=shapes, **side),
+    ]
+    blocks = [
+        f"<div id='{name[1:]}'>{figure}</div>"
+        for figure, name in zip(blocks, (MODES, MOTION, TURN), strict=True)
+    ]
+    path = report.write_report({NAME: blocks}, folder / "report.html", title=NAME)
+    return path, bent
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser(*WITH_WEBGL) as found:
+        yield found
+
+
+@pytest.fixture
+def shown(chromium, page):
+    chromium.open(page[0], SMALL)
+    return chromium
+
+
+def look(shown, figure):
+    """(h, w) where a figure shows a body: opaque, and neither axes nor scale; and its colours."""
+    shown.run(f"document.querySelector('{figure}').scrollIntoView()")
+    shown.settle()
+    pixels = shown.pixels(f"{figure} canvas")
+    seen = pixels[..., 3] > 200
+    seen[-85:, :100] = False
+    seen[-50:, seen.shape[1] // 2 :] = False
+    return seen, pixels
+
+
+def middle(seen):
+    """(2,) of what is seen, to the right and up from the lower left corner [pixel]."""
+    y, x = np.nonzero(seen)
+    return np.array([x.mean(), seen.shape[0] - y.mean()])
+
+
+def lowest(bent):
+    """When the tip of the cantilever is lowest, as a share of the time."""
+    return bent.t[np.argmin(bent.position("<b>bar", "tip")[:, 1])] / bent.t[-1]
+
+
+def differ(a, b):
+    return int((np.abs(a - b).max(axis=-1) > 8).sum())
+
+
+def test_it_opens_without_a_complaint_and_without_network(shown):
+    for figure in (MODES, MOTION, TURN):
+        assert look(shown, figure)[0].sum() > 500, figure
+    assert not shown.complaints
+    assert {url.partition(":")[0] for url in shown.requests} <= {"file", "data"}
+    assert shown.run("document.querySelectorAll('figure.live').length") == 3
+    for hidden in (".still", ".message"):
+        assert shown.run(f"getComputedStyle(document.querySelector('{hidden}')).display") == "none"
+
+
+def test_the_policy_keeps_other_scripts_and_the_network_out(shown):
+    """A script that came in by a gap would not run, and could tell nobody."""
+    shown.run("""(() => { const one = document.createElement('script'); one.textContent = 'got = 1';
+        document.body.append(one);
+        const picture = new Image(); picture.src = 'http://127.0.0.1:9/x.png'; })()""")
+    shown.settle()
+    assert shown.run("typeof got") == "undefined"
+    assert shown.run("fetch('http://127.0.0.1:9/').then(() => 1, () => 0)") == 0
+    assert len([c for c in shown.complaints if "Content Security Policy" in str(c)]) >= 3
+
+
+def test_names_are_text(shown):
+    assert shown.run("document.querySelector('h1').textContent") == NAME
+    assert shown.run("document.querySelectorAll('b').length") == 0
+    assert NAME in shown.run(f"document.querySelector('{MODES} figcaption').textContent")
+    shown.set(f"{MOTION} .colour", "")
+    assert shown.run(f"document.querySelector('{MOTION} .legend').textContent") == "<b>bar"
+
+
+def test_play_moves_and_pause_stops(shown):
+    for figure in (MODES, MOTION):
+        _, before = look(shown, figure)
+        shown.click(f"{figure} .play")
+        shown.settle(4)
+        _, during = look(shown, figure)
+        assert differ(before, during) > 200
+        shown.click(f"{figure} .play")
+        _, after = look(shown, figure)
+        shown.settle()
+        assert differ(after, look(shown, figure)[1]) == 0
+    assert "Play" in shown.run(f"document.querySelector('{MOTION} .play').textContent")
+    assert not shown.complaints
+
+
+def test_modes_supports_and_coordinates_are_offered(shown):
+    groups = shown.run(
+        f"[...document.querySelectorAll('{MODES} optgroup')].map((one) => one.label)"
+    )
+    assert groups == ["Free", "root held", "tip held", "Elastic coordinates"]
+    seen = [look(shown, MODES)[1]]
+    for number in ("1", "7"):
+        shown.set(f"{MODES} .mode", number)
+        seen.append(look(shown, MODES)[1])
+    assert min(differ(seen[0], seen[1]), differ(seen[1], seen[2])) > 500
+
+
+def test_without_amplitude_a_mode_is_the_body_at_rest(shown):
+    shown.set(f"{MODES} .amplitude", "0")
+    rest, _ = look(shown, MODES)
+    shown.set(f"{MODES} .mode", "2")
+    assert (look(shown, MODES)[0] != rest).sum() < 20
+    shown.set(f"{MODES} .amplitude", "0.1")
+    assert (look(shown, MODES)[0] != rest).sum() > 500
+
+
+def test_a_cantilever_bends_as_far_as_the_solution_says(shown, page):
+    """Sign, magnification and scale: the tip at the time of the slider, against its marker."""
+    bent = page[1]
+    share = lowest(bent)
+    straight, _ = look(shown, MOTION)
+    shown.set(f"{MOTION} .time", str(share))
+    seen, _ = look(shown, MOTION)
+    columns = np.flatnonzero(straight.any(axis=0))
+    pixels = LENGTH / (columns[-1] - columns[0])  # [m]
+    end = columns[-1] - 5
+
+    def height(found):
+        return found.shape[0] - np.flatnonzero(found[:, end]).mean()
+
+    sag = bent.position("<b>bar", "tip")[:, 1]
+    wanted = MAGNIFY * (sag - sag[0]).min()
+    assert wanted < -0.05
+    assert_allclose((height(seen) - height(straight)) * pixels, wanted, rtol=0.06)
+    shown.set(f"{MOTION} .amplitude", "0")
+    assert (look(shown, MOTION)[0] != straight).sum() < 500
+
+
+def test_a_body_turns_the_way_of_the_solution(shown):
+    """From +x over the diagonal to +y, as far from the hub all the time."""
+    places = []
+    for share in ("0", "0.5", "1"):
+        shown.set(f"{TURN} .time", share)
+        places.append(middle(look(shown, TURN)[0]))
+    first, half, last = places
+    radius = (first - last)[0]
+    hub = np.array([last[0], first[1]])
+    assert radius > 100
+    assert_allclose(last - hub, [0, radius], atol=0.03 * radius)
+    assert_allclose(half - hub, radius * np.sqrt([0.5, 0.5]), atol=0.03 * radius)
+
+
+def test_colours_follow_the_deformation_and_the_legend_has_units(shown, page):
+    """The made-up stress is 1 GPa per metre along y: the tip of the cantilever has the most."""
+    shown.set(f"{MOTION} .time", str(lowest(page[1])))
+    for kind, unit in (("displacement", "µm]"), ("stress", "kPa]")):
+        shown.set(f"{MOTION} .colour", kind)
+        seen, pixels = look(shown, MOTION)
+        columns = np.flatnonzero(seen.any(axis=0))
+        root, tip = (pixels[:, k][seen[:, k]].mean(axis=0) for k in (columns[8], columns[-8]))
+        assert root[2] > root[1] and tip[1] > 1.5 * tip[2], kind  # violet to yellow
+        words = shown.run(f"document.querySelector('{MOTION} .legend').textContent")
+        assert unit in words, words
+    bent = page[1]
+    surface = bent.mechanism.parts["<b>bar"].flexible.surface
+    far = np.abs((bent.elastic("<b>bar") @ surface.shape.T)[:, 1::3]).max()
+    assert words.endswith(f"{1e6 * far:.3g}")
+    shown.set(f"{MOTION} .colour", "")
+    seen, pixels = look(shown, MOTION)
+    assert np.ptp(pixels[seen][:, 0]) < 150 and (pixels[seen].mean(axis=0)[0] < 100)
+
+
+def test_it_turns_and_zooms_by_mouse_and_keys_and_comes_back(shown):
+    _, before = look(shown, MODES)
+    x, y = shown.middle(f"{MODES} canvas")
+    shown.mouse((x, y), (x + 120, y + 40))
+    shown.settle()
+    _, turned = look(shown, MODES)
+    assert differ(before, turned) > 500
+    shown.click(f"{MODES} .reset")
+    assert differ(before, look(shown, MODES)[1]) < 50
+    shown.run(f"document.querySelector('{MODES} canvas').focus()")
+    area = look(shown, MODES)[0].sum()
+    shown.key("+")
+    assert look(shown, MODES)[0].sum() > 1.1 * area
+    shown.key("ArrowLeft")
+    _, left = look(shown, MODES)
+    assert differ(before, left) > 500
+    shown.key("0")
+    assert differ(before, look(shown, MODES)[1]) < 50
+    shown.key(".")
+    assert shown.run(f"document.querySelector('{MODES} .mode').value") == "1"
+    shown.key(" ")
+    assert "Pause" in shown.run(f"document.querySelector('{MODES} .play').textContent")
+
+
+def test_the_scale_is_true(shown):
+    """The bar is a metre long; the rule on the right says what its pixels are."""
+    seen, pixels = look(shown, MOTION)
+    columns = np.flatnonzero(seen.any(axis=0))
+    rule = np.flatnonzero(pixels[-20, :, 3] > 100)
+    rule = rule[rule > pixels.shape[1] / 2]
+    assert_allclose((rule[-1] - rule[0]) / (columns[-1] - columns[0]), 0.2, rtol=0.02)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_it_fits_a_phone_in_the_light_and_in_the_dark(chromium, page, dark):
+    chromium.open(page[0], size=(400, 800), dark=dark)
+    assert chromium.run("document.documentElement.scrollWidth") <= 400
+    assert look(chromium, MODES)[0].sum() > 1000
+    ink, paper = (
+        chromium.run(f"getComputedStyle(document.body).{what}.match(/[0-9]+/g).map(Number)")
+        for what in ("color", "backgroundColor")
+    )
+    assert (np.mean(ink) > np.mean(paper)) == dark and abs(np.mean(ink) - np.mean(paper)) > 150
+    assert not chromium.complaints
+
+
+def test_print_has_the_still_picture(shown):
+    shown.ask("Emulation.setEmulatedMedia", media="print")
+
+    def display(selector):
+        return shown.run(f"getComputedStyle(document.querySelector('{selector}')).display")
+
+    assert display(f"{MODES} .still") != "none"
+    assert display(f"{MODES} .stage") == display(f"{MODES} .controls") == "none"
+    assert display(f"{TURN} .stage") != "none"  # it has no other picture
+    shown.ask("Emulation.setEmulatedMedia", media="")
+
+
+def test_without_webgl_the_still_picture_stays_and_says_why(page):
+    with browser(*WITHOUT_WEBGL) as found:
+        found.open(page[0], SMALL)
+        assert not found.complaints
+        assert found.run("document.querySelectorAll('figure.live').length") == 0
+        words = found.run(f"document.querySelector('{MODES} .message').innerText")
+        assert "still picture" in words and "WebGL" in words
+        width = found.run(f"document.querySelector('{MODES} .still img').naturalWidth")
+        assert width == struct.unpack(">I", PIXEL[16:20])[0]
+        assert found.run("document.querySelectorAll('button').length") == 0
