@@ -28,11 +28,12 @@ SMALL = (640, 560)  # window [pixel]: the processor draws
 
 
 def bar_that_bends():
-    """A body whose stress is made up: xx is 1 GPa per metre of displacement along y."""
+    """A body whose stress is made up: per metre, 1 GPa of xx along y, and of xy along z."""
     made = rom.reduce(block(cells=(8, 2, 2)), method=rom.CraigBampton(6), reference="root",
                       interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
     operator = np.zeros((6 * len(made.surface.points), made.n_modes))
     operator[0::6] = 1e9 * made.surface.shape[1::3]
+    operator[5::6] = 1e9 * made.surface.shape[2::3]
     return replace(made, name=NAME, stress=StressRecovery(made.surface.points, operator))
 
 
@@ -167,6 +168,25 @@ def test_modes_supports_and_coordinates_are_offered(shown):
         shown.set(f"{MODES} .mode", number)
         seen.append(look(shown, MODES)[1])
     assert min(differ(seen[0], seen[1]), differ(seen[1], seen[2])) > 500
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_the_stress_of_a_mode_is_that_at_the_displacement_said(shown, page, k):
+    """Von Mises of xx and xy alone is sqrt(xx^2 + 3 xy^2)."""
+    body = page[1].mechanism.parts["<b>bar"].flexible
+    omega, V = body.modes()
+    motion = V[:, np.flatnonzero(omega > 0)[k]]
+    elastic = (body.surface.shape @ motion[6:]).reshape(-1, 3)
+    moved = elastic + motion[:3] + np.cross(motion[3:6], body.surface.points)
+    largest = np.linalg.norm(moved, axis=1).max()
+    stress = 1e9 * np.sqrt(elastic[:, 1] ** 2 + 3 * elastic[:, 2] ** 2).max() * 0.01 / largest
+    shown.set(f"{MODES} .mode", str(k))
+    shown.set(f"{MODES} .colour", "stress")
+    legend = f"document.querySelector('{MODES} .legend"
+    words = shown.run(f"{legend} .meaning').textContent")
+    assert words == "von Mises stress where the largest displacement is 10 mm [MPa]"
+    end = shown.run(f"{legend} .ends').lastChild.textContent")
+    assert float(end) == pytest.approx(1e-6 * stress, rel=6e-3)
 
 
 def test_without_amplitude_a_mode_is_the_body_at_rest(shown):
