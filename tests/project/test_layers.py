@@ -190,6 +190,7 @@ ORDER = {
         "law_calls",
         "laws_in_python",
         "laws",
+        "formulas",
         "motors",
         "frictions",
         "contact",

@@ -20,6 +20,7 @@ DIFFERENCE_STEP = 1e-5
 MOST_SAMPLES = 1000
 TANGENT_RTOL = 1e-6  # of the largest derivative: what central differences leave
 ENERGY_RTOL = 1e-6  # of the powers that add up to nothing
+ENERGY_DIGITS = 16 * np.finfo(float).eps  # of an energy: what a difference of two may be
 SPREAD_SHARE, TURN_SPREAD = 0.1, 0.3  # of the probed motions: of the size of the mechanism; [rad]
 AXIS_NAMES = "xyz"
 
@@ -234,7 +235,8 @@ def _balance(asked: _Asked, motion: Array, answer: Array) -> _Finding:
     h = DIFFERENCE_STEP
     energies = [answer_of(asked.answer(_later(motion, s)), n, m).energy[0] for s in (h, -h)]
     rate, lost = (energies[0] - energies[1]) / (2 * h), float(answered.lost[0])
-    scale = max(abs(power), abs(rate), abs(lost), 1e-300)
+    unseen = ENERGY_DIGITS * max(map(abs, energies)) / h / ENERGY_RTOL
+    scale = max(abs(power), abs(rate), abs(lost), unseen, 1e-300)
     where = f"power {power:.6g} W, stored {rate:.6g} W, lost {lost:.6g} W"
     return _Finding("power + stored + lost / largest", where, abs(power + rate + lost) / scale,
                     ENERGY_RTOL)  # fmt: skip

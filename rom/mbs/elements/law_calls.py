@@ -3,8 +3,12 @@
 from typing import Any, NamedTuple
 
 import numba
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 
+from rom.mbs.compiler.cache import guard
 from rom.mbs.compiler.intermediate import INTERMEDIATE_OPTIONS
+from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.parts.foreign import compiled_function
 
 MOTION_SIZE = 18  # numbers of the motion of a marker
@@ -124,3 +128,18 @@ def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool 
         function(t, given, moved, kept, D[0], D[1])
 
     return numba.cfunc(LAW_TYPES)(slopes if tangents else law)
+
+
+def compiled_entry(function: Any, types: str) -> Any:
+    """A function of C, compiled and kept; it makes arrays of pointers.
+
+    Args:
+        function: in Python, of a module.
+        types: of its arguments, as ``numba.cfunc`` takes them.
+    """
+    options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
+    made = CFunc(function, normalize_signature(types), {}, options)
+    made.enable_caching()
+    guard(made, function)
+    made.compile()
+    return made

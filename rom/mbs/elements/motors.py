@@ -11,13 +11,15 @@ from numba import types
 from numba.extending import intrinsic
 
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
+from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
-from rom.mbs.kernels.tables import Address1, Index1, Scratch1, Table, table
+from rom.mbs.kernels.tables import Address1, Array1, Index1, Scratch1, Table, table
 from rom.mbs.parts.foreign import ask, compiled_function, numbers
 from rom.mbs.parts.joints import Row, coordinate_of
 from rom.mbs.parts.whole import Whole
+from rom.model import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,13 @@ class Motor:
     def address(self) -> int:
         """Of the compiled law; 0 when it is left to Python."""
         return self.compiled.address if self.compiled is not None else 0
+
+    @property
+    def program(self) -> Array:
+        """(n,) length and program of a formula; none of other laws."""
+        if not isinstance(self.law, Formula):
+            return np.zeros(0)
+        return np.concatenate([[1.0 + self.law.program.size], self.law.program])
 
 
 def motor(
@@ -53,7 +62,8 @@ def motor(
     Args:
         name: name of the motor.
         joint: joint with a coordinate.
-        law: function of time [s], coordinate [rad or m] and its rate, or one of Numba.
+        law: function of time [s], coordinate [rad or m] and its rate, or one of Numba, or a
+            `rom.mbs.elements.formulas.programs.Formula`.
         coordinate: "angle" or "displacement"; None for the only or the first one.
         compiled: True to insist, False to leave it to Python, None for what works.
 
@@ -67,6 +77,8 @@ def motor(
 
 def _compiled(name: str, law: Any, wanted: bool | None) -> Any:
     """The law as a C function of three doubles, None when it is left to Python."""
+    if isinstance(law, Formula):
+        return law
     make = numba.cfunc("float64(float64, float64, float64)")
     hint = "Use numbers and NumPy functions of numbers only, or compiled=False."
     return compiled_function(f"law of motor {name!r}", law, make, wanted, hint)
@@ -79,23 +91,33 @@ class Motors(Table):
     Attributes:
         at: (k,) joint coordinates.
         address: (k,) of compiled laws, 0 for Python.
+        program_at: (k + 1,) where the programs of formulas begin; equal numbers for other laws.
+        programs: (p,) of all formulas.
         clock: (1,) function that tells the time.
+        formula: (3,) what the formula at hand gives: force, and its derivatives.
         answer: (k,) forces at the last residual; those of laws in Python before it.
     """
 
     at: Index1
     address: Address1
+    program_at: Index1
+    programs: Array1
     clock: Index1
+    formula: Scratch1
     answer: Scratch1
 
 
 def pack(motors: Any, places: Places) -> Motors:
     """The motors as arrays."""
     found = motors.values()
+    programs = [motor.program for motor in found]
     return Motors(
         integers(places.coordinate(m.joint, m.row) for m in found),
         integers(m.address for m in found),
+        np.cumsum([0, *(program.size for program in programs)]),
+        np.concatenate(programs),
         integers([places.clock()]),
+        np.zeros(3),
         np.zeros(len(found)),
     )
 
@@ -138,17 +160,51 @@ def call(_context, address, time, x, rate):
     return signature, build
 
 
+@intrinsic
+def call_formula(context, address, t, x, rate, program, answer):
+    """Let the compiled code at an address run a program."""
+    arrays = program, answer
+    signature = types.void(address, t, x, rate, program, answer)
+
+    def build(context, builder, signature, arguments):
+        def data(k):
+            return context.make_array(signature.args[k])(context, builder, arguments[k]).data
+
+        double, pointer = ir.DoubleType(), ir.DoubleType().as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [double] * 3 + [pointer] * 2)
+        code = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(code, [*arguments[1:4], data(4), data(5)])
+        return context.get_dummy_value()
+
+    return (signature, build) if all(isinstance(a, types.Array) for a in arrays) else None
+
+
+@inner
+def ask_formula(motors, W, k, x, rate):
+    """Whether motor k has a formula; if so, set motors.formula."""
+    first = motors.program_at[k]
+    if first == motors.program_at[k + 1]:
+        return False
+    program, t = motors.programs[first:], W.signal[motors.clock[0], 0]
+    call_formula(motors.address[k], t, x, rate, program, motors.formula)
+    return True
+
+
 @inner
 def motor_force(motors, W, k, x, rate):
     """Force of motor k at a coordinate and its rate; a Python law was asked before."""
     if motors.address[k] == 0:
         return motors.answer[k]
+    if ask_formula(motors, W, k, x, rate):
+        return motors.formula[0]
     return call(motors.address[k], W.signal[motors.clock[0], 0], x, rate)
 
 
 @inner
 def motor_slopes(motors, W, k, x, rate):
-    """Derivatives of a motor law by coordinate and rate, from central differences."""
+    """Derivatives of a motor law by coordinate and rate; of a formula, or central differences."""
+    if ask_formula(motors, W, k, x, rate):
+        return motors.formula[1], motors.formula[2]
     dx, dv = 1e-6 * (1.0 + abs(x)), 1e-6 * (1.0 + abs(rate))
     by_x = motor_force(motors, W, k, x + dx, rate) - motor_force(motors, W, k, x - dx, rate)
     by_rate = motor_force(motors, W, k, x, rate + dv) - motor_force(motors, W, k, x, rate - dv)

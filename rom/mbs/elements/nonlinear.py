@@ -28,16 +28,14 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
 from numba import types
-from numba.core.ccallback import CFunc
-from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
 from rom import rotation
 from rom.arguments import finite, start_pose, typed
 from rom.errors import ConfigError, ModelError
-from rom.mbs.compiler.cache import guard
 from rom.mbs.elements.family import Family, Places, integers, on_joint
-from rom.mbs.kernels.compiled import OPTIONS, inner
+from rom.mbs.elements.law_calls import compiled_entry
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
@@ -165,12 +163,7 @@ class Assembly:
 
 def compiled_law(function: Any) -> Any:
     """The law that a Python function describes, compiled and kept; it makes arrays of pointers."""
-    options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
-    made = CFunc(function, normalize_signature(LAW_SIGNATURE), {}, options)
-    made.enable_caching()
-    guard(made, function)
-    made.compile()
-    return made
+    return compiled_entry(function, LAW_SIGNATURE)
 
 
 def add_nonlinear(
