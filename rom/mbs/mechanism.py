@@ -1,6 +1,6 @@
 """The mechanism as the user describes it: bodies, joints, drives and forces, by name."""
 
-from collections.abc import Callable, Iterator, MutableMapping
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -28,7 +28,7 @@ from rom.mbs.elements import (
 from rom.mbs.elements.contact import points, surfaces
 from rom.mbs.elements.family import Family, check_family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
-from rom.mbs.parts.joints import Joint
+from rom.mbs.parts.joints import Joint, Row, coordinate_of
 from rom.model import Array
 from rom.names import check_name, check_text, offered
 from rom.notebook import html_table, listed
@@ -93,11 +93,21 @@ class Every(Generic[Element]):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A function of the motion whose zeros are looked for."""
+    """A function of the motion whose zeros are looked for.
+
+    Attributes:
+        function: of the time and an instant of the motion.
+        direction: 1 for rising values, -1 for falling ones, 0 for both.
+        terminal: whether it ends the run.
+        markers: the function asks for, beside those with names.
+        coordinates: joints and rows of the coordinates it asks for.
+    """
 
     function: Callable[..., Any]
     direction: int
     terminal: bool
+    markers: tuple[Marker, ...] = ()
+    coordinates: tuple[tuple[str, Row], ...] = ()
 
 
 @typed
@@ -316,6 +326,7 @@ class Mechanism:
         *,
         direction: int = 0,
         terminal: bool = False,
+        follow: Sequence[Marker | str | tuple[str, str]] = (),
     ) -> None:
         """Look for the times at which ``function(t, instant)`` passes through zero.
 
@@ -326,14 +337,24 @@ class Mechanism:
                 step are not seen.
             direction: 1 counts rising values only, -1 falling ones, 0 both.
             terminal: end the run there.
+            follow: what the function asks the instant for beyond markers with names and markers in
+                use: markers, joints, or pairs of a joint and its "angle" or "displacement".
 
         Raises:
-            ConfigError: for a name in use or another direction.
+            ConfigError: for a name in use, another direction, or a marker, joint or coordinate that
+                is not there.
         """
         self.check_new(name)
         if direction not in (-1, 0, 1):
             raise ConfigError(f"direction of event {name!r} is {direction!r}; it is -1, 0 or 1.")
-        self.events[name] = Event(function, int(direction), bool(terminal))
+        markers = tuple(one for one in follow if isinstance(one, Marker))
+        self.check_markers(name, *markers)
+        named = [(one, None) if isinstance(one, str) else one for one in follow]
+        rows = tuple(
+            (joint, coordinate_of(self.joints, joint, which, f"event {name!r}"))
+            for joint, which in (one for one in named if not isinstance(one, Marker))
+        )
+        self.events[name] = Event(function, int(direction), bool(terminal), markers, rows)
 
     def design_point(self, marker: Marker) -> Array:
         """(3,) position of a marker where its body was added, undeformed [m].

@@ -67,6 +67,11 @@ class Packed:
         return int(self.system.coordinates.kind.size + self.system.memory.size)
 
     @property
+    def coordinate_rows(self) -> tuple[Row, ...]:
+        """What each followed joint coordinate measures."""
+        return tuple(row for _, row in self.places.coordinates)
+
+    @property
     def loaded_rows(self) -> Index:
         """Constraint rows whose multipliers forces depend on."""
         rows = [family.loaded_rows(table) for family, table in self.elements.items()]
@@ -140,6 +145,9 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     _doubt_place(mechanism, _length(parts))
     families = mechanism.families()
     elements = {family: family.pack(found, places) for family, found in families.items()}
+    for event in mechanism.events.values():
+        for joint, row in event.coordinates:
+            places.coordinate(joint, row)
     followed = len(places.coordinates)
     markers = _markers(mechanism, handles, R)
     system = System(
@@ -183,6 +191,7 @@ def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
     found = [Marker(part.name, name) for part in parts for name in part.names]
     found += [m for joint in mechanism.joints.values() for m in joint.markers]
     found += [m for family, x in mechanism.elements.values() for m in family.ends(x)]
+    found += [m for event in mechanism.events.values() for m in event.markers]
     return list(dict.fromkeys([*found, Marker(GROUND, (0.0, 0.0, 0.0))]))
 
 

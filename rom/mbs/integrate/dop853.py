@@ -144,6 +144,7 @@ def _first_event(record: Record, equations: Equations, solver: DOP853) -> float 
         y = _unit(record, dense(t).copy())
         return y[:n_q], y[n_q : n_q + n]
 
+    record.watch.instant.W.base[:] = equations.W.base
     record.watch.step(solver.t_old, solver.t, motion)
     return record.watch.stop[1] if record.watch.stop else None
 

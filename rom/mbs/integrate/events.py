@@ -12,9 +12,11 @@ from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Event, Mechanism
-from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.foreign import ask, numbers
+from rom.mbs.parts.joints import coordinate_of
 from rom.mbs.results.solution import Occurrences
+from rom.mbs.results.state import State
 from rom.model import Array
 from rom.names import offered
 
@@ -100,6 +102,23 @@ class Instant:
         at = self._start(body, self._packed.system.bodies.q_at) + 7
         return self.q[at : at + self._mechanism.part(body).r].copy()
 
+    def joint(self, name: str, coordinate: str | None = None) -> tuple[float, float]:
+        """A joint coordinate, whole turns counted, and its rate [rad or m, per second].
+
+        Args:
+            name: of a joint that the event follows, see `rom.Mechanism.event`.
+            coordinate: "angle" or "displacement"; None for the only or the first one.
+        """
+        row = coordinate_of(self._mechanism.joints, name, coordinate, "an event")
+        for k, known in enumerate(self._packed.coordinate_rows):
+            if known is row:
+                self._evaluate()
+                return float(self.W.x[k]), float(self.W.xd[k])
+        raise ConfigError(
+            f"the coordinate of joint {name!r} is not followed.",
+            hint=f"Add the event with follow=[{name!r}].",
+        )
+
     def _start(self, body: str, starts: Any) -> int:
         names = self._packed.names
         if body not in names:
@@ -111,16 +130,20 @@ class Instant:
         if marker not in self._packed.markers:
             raise ConfigError(
                 f"the point {marker.place} of body {body!r} is not a marker of the mechanism.",
-                hint="Name it when the body is added.",
+                hint="Name it when the body is added, or add the event with follow=[marker].",
             )
         return self._packed.row(marker)
 
     def _evaluated(self, body: str) -> Any:
-        self._start(body, self._packed.system.bodies.q_at)
+        if body != GROUND:
+            self._start(body, self._packed.system.bodies.q_at)
+        self._evaluate()
+        return self.W
+
+    def _evaluate(self) -> None:
         if not self._fresh:
             evaluate(self._packed.system, self.W, self.q, self.v)
             self._fresh = True
-        return self.W
 
 
 class Noted(NamedTuple):
@@ -152,8 +175,10 @@ class Watch:
         self.found: dict[str, list[tuple[float, Array, Array]]] = {n: [] for n in self.events}
         self.stop: tuple[str, float] | None = None
 
-    def begin(self, q: Array, v: Array) -> None:
+    def begin(self, state: State) -> None:
         """Note the signs at the start."""
+        self.instant.W.base[:] = state.base
+        q, v = state.q, state.v
         self.signs = {n: np.sign(self.value(n, self.start, q, v)) for n in self.events}
 
     def value(self, name: str, t: float, q: Array, v: Array) -> float:

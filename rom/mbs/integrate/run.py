@@ -277,7 +277,7 @@ class Record:
         if not self.blocks:
             self.keep_state(state, work)
         if self.watch and self.noted is None:
-            self.watch.begin(state.q, state.v)
+            self.watch.begin(state)
         elif self.watch and self.noted:
             self.watch.recall(self.noted)
         self.reach(state)
