@@ -152,6 +152,7 @@ VERBS: dict[str, Schema] = {
         also=each(text("file"), "other files written"),
         steps=whole("time steps kept"),
         status=text("how the run ended"),
+        events=by_name(each(number("[s]"), "times [s]"), "when each event happened, by name"),
         audit=REPORT,
     ),
     "view": record(

@@ -299,9 +299,15 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Variants:
-    """Tables told apart by their key ``kind``."""
+    """Tables told apart by their key ``kind``.
+
+    Attributes:
+        tables: by kind.
+        telling: {key: kind it stands for where none is written}.
+    """
 
     tables: Mapping[str, Table]
+    telling: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def summary(self) -> str:
@@ -312,9 +318,11 @@ class Variants:
         """Values by key, ``kind`` among them."""
         if not isinstance(value, Mapping):
             raise place.error(f"{place.name} = {as_text(value)}: needed is a table [{place.name}].")
-        if "kind" not in value:
+        written = [kind for key, kind in self.telling.items() if key in value]
+        if "kind" not in value and not written:
             raise place.error(f"kind is missing in [{place.name}].", nearest("", self.tables))
-        kind = Text(tuple(self.tables)).read(value["kind"], place.at("kind"))
+        named = value.get("kind", written[0] if written else "")
+        kind = Text(tuple(self.tables)).read(named, place.at("kind"))
         remaining = {key: item for key, item in value.items() if key != "kind"}
         return {"kind": kind} | self.tables[kind].read(remaining, place)
 

@@ -1,11 +1,13 @@
-"""Functions of time in a file: constant, steady, run-up, ramp, harmonic, table."""
+"""Functions of time in a file: constant, steady, run-up, ramp, harmonic, table, formula, Python."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from rom.config.expressions import formula_kind
 from rom.config.keys import Either, Key, Kind, Place, Quantity, Table, Variants, raise_mistakes
+from rom.config.python_files import PYTHON_KEYS, function_of
 from rom.errors import ConfigError
 
 Function = Callable[[Any], Any]
@@ -13,15 +15,18 @@ Function = Callable[[Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A function of time with its first and second derivative; each takes numbers and arrays."""
+    """A function of time with its first and second derivative; each takes numbers and arrays.
+
+    Those of a function in Python are not known.
+    """
 
     value: Function
-    rate: Function
-    acceleration: Function
+    rate: Function | None
+    acceleration: Function | None
 
 
-def law_kind(unit: str) -> Kind:
-    """How a law is written whose values have this SI unit."""
+def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
+    """How a law is written whose values have this SI unit; formulas may have other variables."""
     value, rate = Quantity(unit), Quantity("1/s" if unit == "1" else f"{unit}/s")
     still = 0.0
     tables = {
@@ -54,8 +59,15 @@ def law_kind(unit: str) -> Kind:
             Key("t", Quantity("s", ((None,),)), "Times, ascending.", ...),
             Key("values", Quantity(unit, ((None,),)), "Values.", ...),
         )),
+        "expression": formula_kind(
+            unit, variables, "A formula; its rate and acceleration are exact."
+        ),
+        "python": Table(
+            f"A function of ({', '.join(variables)}) in a Python file, which runs only with "
+            "`--trust` or `trust=True`.", PYTHON_KEYS,
+        ),
     }  # fmt: skip
-    return Either(value, Variants(tables))
+    return Either(value, Variants(tables, {"expression": "expression", "function": "python"}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,16 +112,18 @@ class ByCoordinate:
         return pending
 
 
-def law_of(values: Any, place: Place, *, t_end: float | None = None) -> Law:
+def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool = False) -> Law:
     """The functions of a law.
 
     Args:
         values: what `law_kind` has read: a number, or a table with its kind.
         place: its place in the file.
         t_end: until when it is asked for [s].
+        trust: run a function of a Python file.
 
     Raises:
         ConfigError: for a table of points that is none, or that ends too early.
+        UnsafeFileError: for a Python file that is not trusted.
     """
     import numpy as np
 
@@ -121,6 +135,13 @@ def law_of(values: Any, place: Place, *, t_end: float | None = None) -> Law:
         return _polynomial(values["value"], 0.0)
     if kind == "steady":
         return _polynomial(values["start"], values["rate"])
+    if kind == "expression":
+        from rom.mbs.elements.formulas.programs import formula
+
+        found = formula(values["expression"])
+        return Law(found, found.rate, found.acceleration)
+    if kind == "python":
+        return Law(function_of(values, place, trust=trust), None, None)
     if kind == "table":
         from scipy.interpolate import CubicSpline
 

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from rom.arguments import typed
 from rom.config.component import Located, change, read_component
+from rom.config.connections import Entry, check_name
 from rom.config.document import Document, read_document
 from rom.config.keys import Place, nearest, raise_mistakes, read_table
-from rom.config.laws import Pending, law_of
-from rom.config.mechanism_keys import IMPACT, SECTIONS, TABLE
+from rom.config.laws import Pending
+from rom.config.mechanism_keys import SECTIONS, TABLE
+from rom.config.python_files import check_trust, python_entries
+from rom.config.rods import rod_of
 from rom.errors import ConfigError, warn
 
 if TYPE_CHECKING:
@@ -19,21 +22,9 @@ if TYPE_CHECKING:
     from rom.mbs.results.solution import Solution
 
 GROUND = "ground"
-METHODS = {  # section: method of a mechanism; in the others the kind of the entry
-    "drives": "drive",
-    "motors": "motor",
-    "springs": "spring_damper",
-    "rotational_springs": "rotational_spring",
-    "bushings": "bushing",
-    "forces": "force",
-    "torques": "torque",
-    "frictions": "friction",
-    "stops": "stop",
-}
-ON_JOINTS = ("drives", "motors", "frictions", "stops")
 # of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
 GAP_RTOL = 1e-2
-MARKER_KEYS = ("between", "marker")
+MARKER_KEYS = ("between", "marker", "markers")
 JOINT_KEYS = ("joint", "joint1", "joint2")
 MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
 
@@ -65,10 +56,15 @@ class MechanismFile:
         """
         from rom.mbs.mechanism import Mechanism
 
+        for path, file in python_entries(self.document):
+            check_trust(file, Place(self.document, path), trust=self.meshing.get("trust", False))
         made = Mechanism(gravity=self.values["gravity"])
         for name, values in self.values["bodies"].items():
             with self.at("bodies", name):
                 _add_body(made, name, dict(values), self.meshing)
+        for name, values in self.values["rods"].items():
+            with self.at("rods", name):
+                _add_rod(made, name, dict(values), Place(self.document, ("rods", name)))
         self._refuse_unknown_markers(made)
         for section, name, values in self._connections():
             with self.at(section, name):
@@ -113,25 +109,21 @@ class MechanismFile:
 
     def _connect(self, made: "Mechanism", section: str, name: str, values: dict[str, Any]) -> None:
         """Call the method of the mechanism with what the entry says."""
-        method = METHODS.get(section) or values.pop("kind")
         place = Place(self.document, (section, name))
-        first: list[Any] = []
+        ends: list[Any] = []
         for key in MARKER_KEYS:
-            first += [self._marker(made, marker) for marker in _markers(values.pop(key, []))]
+            ends += [self._marker(made, marker) for marker in _markers(values.pop(key, []))]
         for key in (key for key in JOINT_KEYS if key in values):
             joint = values.pop(key)
             if joint not in made.joints:
                 hint = nearest(joint, made.joints)
                 raise place.at(key).error(f"there is no joint {joint!r}.", hint)
-            first.append(joint)
-        turns = _turns(made, first[0], values.get("coordinate")) if section in ON_JOINTS else True
+            ends.append(joint)
         for key, value in values.items():
             if isinstance(value, Pending):
-                values[key] = value.of(turns=turns)
-        adapt = SECTION_ADAPTERS.get(section)
-        if adapt is not None:
-            first, values = adapt(first, values, place, self.values["simulation"]["t_end"])
-        getattr(made, method)(name, *first, **values)
+                values[key] = value.of(turns=_turns(made, ends[0], values.get("coordinate")))
+        end, trust = self.values["simulation"]["t_end"], self.meshing.get("trust", False)
+        Entry(made, section, name, ends, values, place, end, trust).connect()
 
     def _warn_if_apart(self, made: "Mechanism", name: str) -> None:
         """Two points that are to be one should be near each other at the start."""
@@ -155,6 +147,8 @@ class MechanismFile:
         if body == GROUND:
             points = self.values["ground"]
             return made.ground.marker(points[where] if isinstance(where, str) else where)
+        if body in made.nonlinear:
+            return made.nonlinear[body].marker(int(where) if where.isdecimal() else where)
         return made.parts[body].marker(where)
 
     def _refuse_unknown_markers(self, made: "Mechanism") -> None:
@@ -169,14 +163,28 @@ class MechanismFile:
 
     def _note_unknown(self, made: "Mechanism", marker: tuple[str, Any], place: Place) -> None:
         body, where = marker
-        bodies = [GROUND, *made.parts]
-        points = self.values["ground"] if body == GROUND else {}
-        known = made.parts[body].names if body in made.parts else points
-        if body not in bodies:
-            place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, bodies)))
-        elif isinstance(where, str) and where not in known:
+        names: dict[str, Any] = {GROUND: self.values["ground"]}
+        names |= {key: made.parts[key].names for key in self.values["bodies"]}
+        names |= {key: _places(made, key) for key in self.values["rods"]}
+        if body not in names:
+            place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, names)))
+            return
+        if isinstance(where, str) and where not in names[body]:
             what = "the ground has no point" if body == GROUND else f"body {body!r} has no marker"
+            known = (
+                list(made.nonlinear[body].body.places) if body in made.nonlinear else names[body]
+            )
             place.mistakes.append(place.error(f"{what} {where!r}.", nearest(where, known)))
+        elif not isinstance(where, str) and body in self.values["rods"]:
+            frames = f'"{body}.start", "{body}.end" or "{body}.3" for its frame 3'
+            what = f"rod {body!r} has no points of its own."
+            place.mistakes.append(place.error(what, f"Write {frames}."))
+
+
+def _places(made: "Mechanism", rod: str) -> list[str]:
+    """Markers of a rod: its ends, and all frames by number."""
+    whole = made.nonlinear[rod]
+    return [*whole.body.places, *map(str, range(len(whole.parts)))]
 
 
 def _markers(found: Any) -> list[Any]:
@@ -195,8 +203,7 @@ def _turns(made: "Mechanism", joint: str, coordinate: str | None) -> bool:
 def _add_body(
     made: "Mechanism", name: str, values: dict[str, Any], meshing: dict[str, Any]
 ) -> None:
-    if "." in name or name == GROUND:
-        raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
+    check_name(name, GROUND)
     if "orientation" in values:
         values["orientation"] = _orientation(values["orientation"])
     if "file" not in values:
@@ -205,12 +212,25 @@ def _add_body(
     file, rigid = values.pop("file"), values.pop("rigid")
     reference = values.pop("reference", None)
     if rigid:
+        if "q" in values or "qd" in values:
+            raise ConfigError("a rigid body has no elastic coordinates: leave q and qd out.")
         _add_rigid_from(made, name, _mass_of(file, meshing), values)
         return
     body = _body_of(file, meshing)
     if reference is not None:
         body = body.with_reference(reference[0] if len(reference) == 1 else reference)
     made.add_flexible(name, body, **values)
+
+
+def _add_rod(made: "Mechanism", name: str, values: dict[str, Any], place: Place) -> None:
+    from rom.mbs.elements.rods.bodies import body
+
+    check_name(name, GROUND)
+    keys = ("at", "orientation", "velocity", "omega")
+    pose = {key: values[key] for key in keys if key in values}
+    if "orientation" in pose:
+        pose["orientation"] = _orientation(pose["orientation"])
+    made.add_nonlinear(name, body(rod_of(values, place)), **pose)
 
 
 def _orientation(value: Any) -> Any:
@@ -272,55 +292,6 @@ def _mass_of(file: Path, meshing: dict[str, Any]) -> MassProperties:
     return body.mass, c, inertia, {key: marker.point for key, marker in body.markers.items()}
 
 
-def _drive(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
-    law = law_of(values["law"], place.at("law"), t_end=t_end)
-    return [*first, law.value], {"rate": law.rate, "acceleration": law.acceleration}
-
-
-def _motor(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
-    remaining = {key: value for key, value in values.items() if key != "law"}
-    if not isinstance(values["law"], Mapping):
-        constant = values["law"]
-        return [*first, lambda t, x, rate: constant], remaining
-    value = law_of(values["law"], place.at("law"), t_end=t_end).value
-    return [*first, lambda t, x, rate: float(value(t))], remaining | {"compiled": False}
-
-
-def _load(first: list[Any], values: dict[str, Any], place: Place, t_end: float) -> Any:
-    import numpy as np
-
-    vector = np.array(values["vector"])
-    remaining = {"frame": values["frame"]}
-    if "factor" not in values:
-        return [*first, vector], remaining
-    factor = law_of(values["factor"], place.at("factor"), t_end=t_end).value
-    return [*first, lambda t: float(factor(t)) * vector], remaining
-
-
-def _bushing(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:
-    for key in ("stiffness", "damping"):
-        values[key] = [*values[key], *values.pop(f"turning_{key}")]
-    return first, values
-
-
-def _impact(first: list[Any], values: dict[str, Any], _place: Place, _t_end: float) -> Any:
-    from rom.mbs.elements.contact.impact import Impact
-
-    numbers = {key.name: values.pop(key.name) for key in IMPACT if key.name in values}
-    return [*first, Impact(**numbers)], values
-
-
-SECTION_ADAPTERS = {
-    "drives": _drive,
-    "motors": _motor,
-    "forces": _load,
-    "torques": _load,
-    "bushings": _bushing,
-    "stops": _impact,
-    "contacts": _impact,
-}
-
-
 @typed
 def read_mechanism(
     path: str | Path,
@@ -335,7 +306,7 @@ def read_mechanism(
     Args:
         path: ``.toml``; its keys are listed on the page about files.
         changes: {("simulation", "t_end"): "1 s", ...} in place of what the file says; None removes.
-        trust: run geometries written in Python.
+        trust: run geometries and functions written in Python.
         time_limit: of meshing a body [s]; see `rom.fe.model`.
         memory_limit: of meshing a body [bytes].
 
@@ -348,6 +319,10 @@ def read_mechanism(
         raise ConfigError(
             "this is a component; a mechanism is needed.", where=str(path),
             hint="A mechanism has [bodies], one of which may have this file.",
+        )  # fmt: skip
+    if not {"bodies", "rods"} & set(document.data):
+        raise ConfigError(
+            "bodies is missing: nothing moves.", where=str(path), hint="Add [bodies.NAME].",
         )  # fmt: skip
     for key, value in (changes or {}).items():
         change(document.data, key, value)

@@ -8,6 +8,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.config.mechanism import MechanismFile
+from rom.config.python_files import python_entries
 from rom.errors import ConfigError
 from rom.fmu.export import write_fmu
 from rom.fmu.outputs import output_names
@@ -18,18 +19,18 @@ from rom.mbs.parts.bodies import Part
 from rom.names import file_name
 from rom.process.child import scratch
 
-SCRIPT_TEXT = '''"""Builds the mechanism of {file}, whose bodies lie beside it."""
+SCRIPT_TEXT = '''"""Builds the mechanism of {file}, whose bodies and Python files lie beside it."""
 
 from pathlib import Path
 
 import rom
 
 FOLDER = Path(__file__).parent
-BODIES = {bodies!r}
+CHANGES = {changes!r}
 
 
 def mechanism():
-    return rom.read_mechanism(FOLDER / {file!r}, BODIES).mechanism()
+    return rom.read_mechanism(FOLDER / {file!r}, CHANGES, trust={trust!r}).mechanism()
 '''
 
 
@@ -45,7 +46,8 @@ def write_mechanism_fmu(
     """Write the mechanism of a file as an FMU for co-simulation, see `rom.write_fmu`.
 
     Component files in it are meshed and reduced once, here: the FMU needs neither FEniCSx nor
-    geometries.
+    geometries. Python files with functions of it travel, too; what they import is looked for where
+    the FMU runs.
 
     Args:
         file: as of `rom.read_mechanism`.
@@ -55,7 +57,8 @@ def write_mechanism_fmu(
         dt: longest time step [s]; None for that of the file.
 
     Raises:
-        ConfigError: as `rom.write_fmu`, or if neither gives a step.
+        ConfigError: as `rom.write_fmu`, or if neither gives a step, or for an event that would end
+            the motion.
         FileFormatError: if the file is gone.
         ModelError: if the mechanism cannot be built.
         ResourceError: as `rom.write_fmu`.
@@ -68,13 +71,16 @@ def write_mechanism_fmu(
             f"{file.document.path} gives no dt, which an FMU needs.",
             hint="Add dt to [simulation], or --dt on the command line.",
         )
+    _refuse_ends(file)
     made = file.mechanism()
     with scratch("fmu") as folder:
         text = folder / file.document.path.name
         text.write_bytes(check_readable(file.document.path).read_bytes())
-        bodies, files = _bodies(file, made, folder)
+        changes, files = _bodies(file, made, folder)
+        programs, copies = _programs(file, folder)
         script = folder / "mechanism.py"
-        script.write_text(SCRIPT_TEXT.format(file=text.name, bodies=bodies))
+        given = {"changes": changes | programs, "trust": bool(programs)}
+        script.write_text(SCRIPT_TEXT.format(file=text.name, **given))
         return write_fmu(
             script,
             path,
@@ -82,8 +88,31 @@ def write_mechanism_fmu(
             outputs=output_names(made) if outputs is None else list(outputs),
             dt=step,
             rho_inf=simulation.get("rho_inf", 0.9),
-            files=[text, *files],
+            files=[text, *files, *copies],
         )
+
+
+def _refuse_ends(file: MechanismFile) -> None:
+    """An FMU goes on as long as it is asked to; other events change nothing of a motion."""
+    for name, values in file.values["events"].items():
+        if values["terminal"]:
+            raise ConfigError(
+                f"event {name!r} ends the motion, which an FMU cannot do.",
+                where=file.document.where(("events", name)),
+                hint="Write terminal = false, and let whoever moves the FMU end it.",
+            )
+
+
+def _programs(file: MechanismFile, folder: Path) -> tuple[dict[tuple[str, ...], str], list[Path]]:
+    """What replaces Python files, and copies of them."""
+    copies: dict[Path, Path] = {}
+    changes: dict[tuple[str, ...], str] = {}
+    for key, path in python_entries(file.document):
+        if path not in copies:
+            copies[path] = folder / f"functions {len(copies)} {path.name}"
+            copies[path].write_bytes(check_readable(path).read_bytes())
+        changes[key] = copies[path].name
+    return changes, list(copies.values())
 
 
 def _bodies(
@@ -92,7 +121,7 @@ def _bodies(
     """What replaces the bodies from other files, and the files that it names."""
     changes: dict[tuple[str, ...], Any] = {}
     files: list[Path] = []
-    for name, values in file.document.data["bodies"].items():
+    for name, values in file.document.data.get("bodies", {}).items():
         if "file" not in values:
             continue
         part = made.parts[name]

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
     FilePath,
@@ -21,6 +22,8 @@ from rom.config.keys import (
     as_text,
 )
 from rom.config.laws import ByCoordinate, law_kind
+from rom.config.python_files import PYTHON_KEYS
+from rom.config.rods import ROD_KEYS
 
 POINT, DIRECTION = Quantity("m", ((3,),)), Quantity("1", ((3,),))
 
@@ -60,6 +63,19 @@ class Two:
         return [MarkerName().read(item, place) for item in value]
 
 
+@dataclass(frozen=True, slots=True)
+class Several:
+    """Markers of any bodies."""
+
+    summary: str = 'list of markers, each "body.marker" or { body = [x, y, z] }'
+
+    def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
+        """At least one of them."""
+        if not isinstance(value, list) or not value:
+            raise place.error(f"{place.name} = {as_text(value)}: a list of markers is needed.")
+        return [MarkerName().read(item, place) for item in value]
+
+
 POSE = (
     Key("orientation", Either(Quantity("1", ((4,), (3, 3))), Table("A rotation.", (
         Key("axis", DIRECTION, "Axis.", ...),
@@ -79,6 +95,15 @@ FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
     Key("file", FilePath(), "A body file `.rom.npz`, or a component file `.toml`.", ...),
     Key("rigid", Flag(), "Take mass, inertia and interfaces of it only.", False),
     Key("reference", Words(), "Another floating frame, see the component file."),
+    Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
+    *POSE,
+    Key("q", Quantity("1", ((None,),)), "Elastic coordinates at the start; zero if missing."),
+    Key("qd", Quantity("1", ((None,),)), "Their rates at the start; zero if missing."),
+))  # fmt: skip
+ROD = Table(
+    "A geometrically exact rod. Markers are its ends, `rod.start` and `rod.end`, and its frames by "
+    "number, `rod.0`, `rod.1`, ...", (
+    *ROD_KEYS,
     Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
     *POSE,
 ))  # fmt: skip
@@ -151,6 +176,14 @@ IMPACT = (
     Key("transition_speed", Quantity("m/s", positive=True), "Over which friction turns.", 1e-3),
 )  # fmt: skip
 RADIUS = Quantity("m", positive=True)
+FLEXIBLE = Key("body", Text(), "Flexible body that carries a surface.", ...)
+WHERE = Key("where", Text(), "Deformable interface that is the part of it; all of it if missing.")
+COVER = (
+    Key("marker", MarkerName(), "Where the other surface is.", ...), FLEXIBLE, WHERE,
+    Key("stiffness", Quantity("1", positive=True),
+        "Pressure per depth^exponent, a plain number in SI.", ...),
+    *IMPACT[1:],
+)  # fmt: skip
 CONTACTS = {
     "sphere_on_plane": Table("A sphere about the second marker, a plane through the first.", (
         BETWEEN, NORMAL, Key("radius", RADIUS, "Of the sphere.", ...), *IMPACT,
@@ -167,10 +200,82 @@ CONTACTS = {
         Key("radius2", RADIUS, "Of the sphere.", ...),
         Key("inside", Flag(), "Whether it is in the bore.", False), *IMPACT,
     )),
+    "surface_on_plane": Table("The surface of a body on a plane through the marker.", (
+        *COVER, Key("normal", DIRECTION, "Towards the body, world at the start.", ...),
+    )),
+    "surface_on_sphere": Table("The surface of a body on a sphere about the marker.", (
+        *COVER, Key("radius", RADIUS, "Of the sphere.", ...),
+    )),
+    "surface_on_cylinder": Table("The surface of a body on a cylinder about the marker.", (
+        *COVER, AXIS, Key("radius", RADIUS, "Of the cylinder.", ...),
+        Key("inside", Flag(), "Whether it is in the bore.", False),
+    )),
 }  # fmt: skip
 MARKER = Key("marker", MarkerName(), "Where it acts.", ...)
 FRAME = Key("frame", Text(("world", "body")), "Axes of the vector.", "world")
 FACTOR = Key("factor", law_kind("1"), "A law that multiplies the vector; constant if missing.")
+MOTION = ("t", "x", "v")
+SPREAD_LOADS = {
+    "pressure": Table("A pressure on the surface of a body, pushing inwards.", (
+        FLEXIBLE, Key("pressure", Quantity("Pa"), "Pressure.", ...), WHERE,
+    )),
+    "traction": Table("A force per area on the surface of a body.", (
+        FLEXIBLE, Key("traction", Quantity("Pa", ((3,),)), "Force per area.", ...), WHERE,
+    )),
+    "acceleration": Table("A force per mass on all of a body.", (
+        Key("body", Text(), "Flexible body.", ...),
+        Key("acceleration", Quantity("m/s^2", ((3,),)), "Force per mass.", ...),
+    )),
+}  # fmt: skip
+SPREAD_KEYS = (
+    FACTOR,
+    Key("frame", Text(("body", "world")), "Axes in which it keeps its direction.", "body"),
+)
+MANY = Key("markers", Several(), "On which it acts.", ...)
+LAWS = {
+    "line": formula_kind("N", MOTION, "A force along the line between two markers, positive when "
+                         "it pushes them apart: x is its length, v its rate.", BETWEEN),
+    "points": Table("The same by points; it goes on straight beyond them.", (
+        BETWEEN,
+        Key("x", Quantity("m", ((None,),)), "Lengths, ascending.", ...),
+        Key("values", Quantity("N", ((None,),)), "Forces there.", ...),
+        Key("interpolation", Text(("monotone", "cubic")), "Nowhere beyond neighbours, or of "
+            "continuous curvature.", "monotone"),
+    )),
+    "python": Table("A law in Python between any markers, as `mechanism.law` takes it.", (
+        MANY, *PYTHON_KEYS,
+        Key("memory", Quantity("1", ((None,),)), "Numbers it remembers, at the start.", []),
+        Key("outputs", Words(), "Names of its own outputs.", ()),
+        Key("energy", Flag(), "Whether it tells stored energy and lost power.", False),
+    )),
+    "user_force": Table("A force and moment in Python, as `mechanism.user_force` takes it.", (
+        MANY, *PYTHON_KEYS,
+    )),
+}  # fmt: skip
+PASSES = (
+    *(key for key in formula_keys("1", MOTION) if key.name == "constants"),
+    Key("expression", Text(), "Formula of t, the measured x and its rate v whose zeros are looked "
+        "for, in place of a value."),
+)  # fmt: skip
+WHEN = (
+    Key("direction", Text(("rising", "falling", "both")), "Which way it passes.", "both"),
+    Key("terminal", Flag(), "Whether the run ends there.", False),
+)  # fmt: skip
+EVENTS = {
+    "coordinate": FormulaTable("A joint coordinate passes a value.", (
+        JOINT, WHICH, Key("value", WAY, "Value."), *PASSES, *WHEN,
+    ), MOTION),
+    "position": FormulaTable("A marker passes a plane.", (
+        MARKER, Key("axis", DIRECTION, "Along which its position is measured, in the world.", ...),
+        Key("value", Quantity("m"), "Position."), *PASSES, *WHEN,
+    ), MOTION),
+    "distance": FormulaTable("Two markers are so far apart.", (
+        BETWEEN, Key("value", Quantity("m"), "Distance."), *PASSES, *WHEN,
+    ), MOTION),
+    "python": Table("A function of (t, instant) in Python, as `mechanism.event` takes it.", (
+        Key("markers", Several(), "It asks for, beyond those with names."), *PYTHON_KEYS, *WHEN,
+    )),
+}  # fmt: skip
 SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how
     "joints": ("joints", Variants(JOINTS)),
     "drives": ("prescribed joint coordinates", Table("A joint coordinate prescribed in time.", (
@@ -179,7 +284,8 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
     ))),
     "motors": ("forces along joint coordinates", Table("A torque or force along a coordinate.", (
         JOINT, WHICH,
-        Key("law", ByCoordinate(law_kind("N m"), law_kind("N")), "Force over time.", ...),
+        Key("law", ByCoordinate(law_kind("N m", MOTION), law_kind("N", MOTION)),
+            "Force over time; formulas and Python also by coordinate x and rate v.", ...),
     ))),
     "springs": ("springs and dampers between markers", Table("A spring and damper.", (
         BETWEEN,
@@ -221,6 +327,14 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         JOINT, WHICH, Key("lower", WAY, "Lower limit."), Key("upper", WAY, "Upper limit."), *IMPACT,
     ))),
     "contacts": ("contacts", Variants(CONTACTS)),
+    "spread_loads": ("loads spread over bodies", Variants({
+        kind: Table(table.about, (*table.keys, *SPREAD_KEYS))
+        for kind, table in SPREAD_LOADS.items()
+    }, {kind: kind for kind in SPREAD_LOADS})),
+    "laws": ("laws of force", Variants(LAWS, {
+        "expression": "line", "values": "points", "function": "python",
+    })),
+    "events": ("events", Variants(EVENTS, {"function": "python"})),
 }  # fmt: skip
 SIMULATION = Table("How it is moved.", (
     Key("t_end", Quantity("s", positive=True), "End.", ...),
@@ -246,7 +360,8 @@ OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
 TABLE = Table("A mechanism.", (
     Key("name", Text(), "Its name; that of the file if missing."),
     Key("gravity", Quantity("m/s^2", ((3,),)), "Acceleration of gravity.", [0.0, 0.0, -9.81]),
-    Key("bodies", Named(Body(), "bodies"), "What moves.", ...),
+    Key("bodies", Named(Body(), "bodies"), "What moves, beside rods.", {}),
+    Key("rods", Named(ROD, "rods"), "Slender bodies of any deflection.", {}),
     Key("ground", Named(POINT, "points"), "Named points of the ground.", {}),
     *(Key(name, Named(kind, what), what.capitalize() + ".", {})
       for name, (what, kind) in SECTIONS.items()),

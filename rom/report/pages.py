@@ -275,9 +275,11 @@ def _connection_table(file: "MechanismFile") -> str:
     rows = []
     for section in SECTIONS:
         for name, values in file.values[section].items():
-            ends = values.get("between") or [values[k] for k in ("marker",) if k in values]
+            ends = values.get("between") or values.get("markers") or []
+            ends = [*ends, *(values[k] for k in ("marker",) if k in values)]
             where = [f"{body}.{m}" if isinstance(m, str) else f"{body} {m}" for body, m in ends]
-            where += [values[key] for key in ("joint", "joint1", "joint2") if key in values]
+            named = ("joint", "joint1", "joint2", "body")
+            where += [values[key] for key in named if key in values]
             rows.append((name, values.get("kind", section.rstrip("s")), " and ".join(where)))
     return html.table(("name", "kind", "at"), rows, "Joints, drives and forces.")
 
@@ -288,6 +290,10 @@ def of_run(folder: Path) -> tuple[str, Sections]:
     bodies = [
         (name, b["mass"], b["elastic coordinates"], ", ".join(b["markers"]))
         for name, b in record["bodies"].items()
+    ]
+    events = [
+        (name, ", ".join(f"{t:.6g}" for t in times) or "never")
+        for name, times in record.get("events", {}).items()
     ]
     audit = Report(record["audit"]["title"], tuple(Row(*row) for row in record["audit"]["rows"]))
     words = f"{record['name']} was moved for {record['t_end']:g} s in {record['steps']} steps. "
@@ -311,6 +317,8 @@ def of_run(folder: Path) -> tuple[str, Sections]:
             html.table(BODY_COLUMNS, bodies, "Bodies."),
             html.table(("joint", "kind"), list(record["joints"].items()), "Joints."),
         ],
+        **({"Events": [html.table(("event", "times [s]"), events, "When events happened.")]}
+           if events else {}),
         "Checks": [html.checks(audit, "Is the computed motion believable?")],
         "Energy": _energy(folder, record),
         "How it was made": [

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.config.keys import Place, nearest
 from rom.config.mechanism import MechanismFile
+from rom.config.python_files import python_entries
 
 if TYPE_CHECKING:
     from rom.mbs.integrate.keeping import Keeping
@@ -63,6 +64,7 @@ class Record:
                 for name, p in parts
             },
             "joints": {name: joint.kind for name, joint in joints},
+            "events": happened(solution),
             "audit": {
                 "title": audit.title,
                 "rows": [[r.quantity, float(r.value), r.limit, bool(r.ok)] for r in audit.rows],
@@ -173,6 +175,11 @@ def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
     return [folder / name for name in [*names, SCENE_FILE, RECORD_FILE]]
 
 
+def happened(solution: "Solution") -> dict[str, list[float]]:
+    """When each event happened [s], by name."""
+    return {name: [float(t) for t in found.t] for name, found in solution.events.items()}
+
+
 def columns(solution: "Solution") -> dict[str, tuple[str, Any]]:
     """Unit and values (n_t,) of every column of the table of a motion, by name."""
     from rom.io.history import channels
@@ -227,6 +234,8 @@ def made_from(file: MechanismFile) -> dict[str, str]:
     for name, values in file.values["bodies"].items():
         if "file" in values:
             found[f"file of body {name!r}"] = file_digest(values["file"])
+    for key, path in python_entries(file.document):
+        found[f"Python file of {' '.join(key[:-1])}"] = file_digest(path)
     return found
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rom.model import Report
 
 PARTS_FOLDER = "motion.parts"  # where the motion is kept while the run lasts
+MOST_TIMES = 10  # of an event that are told; all of them are in the record
 SUMMARY = "move a mechanism, or let a body swing as a pendulum"
 EXAMPLES = """\
   rom simulate demos/slider_crank.toml -o out/
@@ -147,15 +148,29 @@ def _rescuing(
 
 
 def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
+    from rom.report.run import happened
+
     data = {
         "output": str(paths[0]),
         "also": [str(also) for also in paths[1:]],
         "steps": len(solution.t) - 1,
         "status": solution.status,
+        "events": happened(solution),
         "audit": report_data(audit),
     }
-    text = f"{paths[0]}: {data['steps']} steps. {solution.status}\n\n{audit}"
+    events = "".join(_occurred(*one) for one in happened(solution).items())
+    text = f"{paths[0]}: {data['steps']} steps. {solution.status}\n{events}\n{audit}"
     return Answer(data, text, write, failures(audit))
+
+
+def _occurred(name: str, times: list[float]) -> str:
+    """A line about an event: how often it happened, and when."""
+    if not times:
+        return f"Event {name!r} did not happen.\n"
+    first = ", ".join(f"{t:.9g}" for t in times[:MOST_TIMES])
+    more = ", ..." if len(times) > MOST_TIMES else ""
+    often = "once" if len(times) == 1 else f"{len(times)} times"
+    return f"Event {name!r} happened {often}, at {first}{more} s.\n"
 
 
 def _pendulum(args: argparse.Namespace) -> Answer:

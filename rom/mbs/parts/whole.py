@@ -23,6 +23,10 @@ class Whole(Protocol):
     def spherical(self) -> Callable[[str, Marker, Marker], None]:
         """Make a ball joint."""
 
+    @property
+    def law(self) -> Callable[..., None]:
+        """Add a law of force, see `rom.mbs.elements.laws.law`."""
+
     def add(self, name: str, element: Any, family: Any) -> None:
         """Enter an element."""
 

@@ -3,8 +3,8 @@
 A positive force pushes the markers apart. Without the time in it, F(x, 0) stores energy,
 U(x) = -integral of F(s, 0) from the length at the start to x, and what v adds is lost power,
 -(F(x, v) - F(x, 0)) v; so all of it balances. The integral is that of a formula given for it, or
-comes from Lobatto points on intervals halved until it is exact to round-off. With the time in it, the
-work is that of an applied force.
+comes from Lobatto points on intervals halved until it is exact to round-off. With the time in it,
+the work is that of an applied force.
 """
 
 import math
@@ -31,7 +31,7 @@ POINTS = np.concatenate([[-1.0], np.sort(_LEGENDRE.deriv().roots()), [1.0]])
 WEIGHTS = 1.0 / (28.0 * _LEGENDRE(POINTS) ** 2)
 INTEGRAL_RTOL = 1e-14  # of the largest force times the length of an interval
 SMALLEST_SHARE = 2.0**-46  # of the way: smaller intervals hold a jump, and are left as they are
-MOST_INTERVALS = 4000  # a force that needs more has a pole on the way
+MOST_INTERVALS = 1000  # a force that needs more has a pole on the way
 HEAD_SIZE = 4  # numbers before the programs: length of all, stores or not, start, second program
 REST = (0.0, 0.0, 0.0)
 INTERPOLATIONS = ("monotone", "cubic")

@@ -15,7 +15,6 @@ from rom.mbs.elements.formulas.codes import (
     ATAN,
     ATAN2,
     COS,
-    COSH,
     DIV,
     EXP,
     LOG,
@@ -215,7 +214,7 @@ def of_two(code, a, b):
 
 
 @inner
-def run(program, t, x, v, stack):  # noqa: PLR0913
+def run(program, t, x, v, stack):
     """Value and derivatives of a program.
 
     Args:

@@ -1,0 +1,252 @@
+"""How the entries of a mechanism file become calls of the methods of a mechanism."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from rom.config.conditions import condition_of
+from rom.config.keys import Place, nearest
+from rom.config.laws import Law, law_of
+from rom.config.mechanism_keys import IMPACT
+from rom.config.python_files import function_of, plain_function_of
+from rom.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rom.mbs.elements.contact.impact import Impact
+    from rom.mbs.mechanism import Mechanism
+    from rom.mbs.parts.bodies import Part
+
+METHODS = {  # section: method of a mechanism; in the others the kind of the entry
+    "springs": "spring_damper",
+    "rotational_springs": "rotational_spring",
+    "bushings": "bushing",
+    "frictions": "friction",
+}
+DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """An entry with its markers and joints found.
+
+    Attributes:
+        made: the mechanism.
+        section, name: of the entry.
+        ends: markers, or joints.
+        values: its other values, in SI.
+        place: in the file.
+        t_end: until when functions of time are asked for [s].
+        trust: run functions of Python files.
+    """
+
+    made: "Mechanism"
+    section: str
+    name: str
+    ends: list[Any]
+    values: dict[str, Any]
+    place: Place
+    t_end: float
+    trust: bool
+
+    def connect(self) -> None:
+        """Call the method of the mechanism.
+
+        Raises:
+            RomError: for what the mechanism refuses.
+        """
+        connect = CALLS.get(self.section, _plainly)
+        connect(self)
+
+    def law(self, key: str) -> Law:
+        """The law under a key."""
+        return law_of(self.values[key], self.place.at(key), t_end=self.t_end, trust=self.trust)
+
+    def take_impact(self) -> "Impact":
+        """The law of penetration, whose numbers leave the values."""
+        from rom.mbs.elements.contact.impact import Impact
+
+        numbers = {k.name: self.values.pop(k.name) for k in IMPACT if k.name in self.values}
+        return Impact(**numbers)
+
+    def take_body(self) -> "Part":
+        """The flexible body under "body", which leaves the values.
+
+        Raises:
+            ConfigError: if there is none of that name.
+        """
+        name, parts = self.values.pop("body"), self.made.parts
+        flexible = [key for key, part in parts.items() if part.flexible is not None]
+        if name not in flexible:
+            raise self.place.at("body").error(
+                f"there is no flexible body {name!r}.",
+                nearest(name, flexible) if flexible else "All bodies of the file are rigid.",
+            )
+        return parts[name]
+
+
+def _plainly(entry: Entry) -> None:
+    method = METHODS.get(entry.section) or entry.values.pop("kind")
+    getattr(entry.made, method)(entry.name, *entry.ends, **entry.values)
+
+
+def _drive(entry: Entry) -> None:
+    law = entry.law("law")
+    functions = {"rate": law.rate, "acceleration": law.acceleration}
+    (joint,) = entry.ends
+    entry.made.drive(entry.name, joint, law.value, **functions)
+
+
+def _motor(entry: Entry) -> None:
+    law, (joint,) = entry.values["law"], entry.ends
+    coordinate = entry.values.get("coordinate")
+    if not isinstance(law, Mapping):
+        entry.made.motor(entry.name, joint, lambda t, x, rate: law, coordinate=coordinate)
+        return
+    value: Any = entry.law("law").value
+    if law["kind"] in ("expression", "python"):  # they take coordinate and rate
+        entry.made.motor(entry.name, joint, value, coordinate=coordinate)
+        return
+
+    def by_time(t: float, _x: float, _rate: float) -> float:
+        return float(value(t))
+
+    entry.made.motor(entry.name, joint, by_time, coordinate=coordinate, compiled=False)
+
+
+def _load(entry: Entry) -> None:
+    import numpy as np
+
+    vector: Any = np.array(entry.values["vector"])
+    if "factor" in entry.values:
+        factor, constant = entry.law("factor").value, vector
+
+        def vector(t: float) -> Any:
+            return float(factor(t)) * constant
+
+    method = entry.section.removesuffix("s")
+    getattr(entry.made, method)(entry.name, *entry.ends, vector, frame=entry.values["frame"])
+
+
+def _spread(entry: Entry) -> None:
+    from rom.body.spread import mass_load, surface_load
+
+    part, values = entry.take_body(), entry.values
+    kind = values["kind"]
+    if kind == "acceleration":
+        load = mass_load(part.flexible, values[kind])
+    else:
+        load = surface_load(part.flexible, where=values.get("where"), **{kind: values[kind]})
+    factor: Any = 1.0
+    if "factor" in values:
+        law = entry.law("factor").value
+
+        def factor(t: float) -> float:
+            return float(law(t))
+
+    entry.made.spread_load(entry.name, part, load, factor, frame=values["frame"])
+
+
+def _bushing(entry: Entry) -> None:
+    for key in ("stiffness", "damping"):
+        entry.values[key] = [*entry.values[key], *entry.values.pop(f"turning_{key}")]
+    _plainly(entry)
+
+
+def _stop(entry: Entry) -> None:
+    (joint,) = entry.ends
+    entry.made.stop(entry.name, joint, entry.take_impact(), **entry.values)
+
+
+def _contact(entry: Entry) -> None:
+    kind, impact = entry.values.pop("kind"), entry.take_impact()
+    body = [entry.take_body()] if "body" in entry.values else []
+    getattr(entry.made, kind)(entry.name, *entry.ends, *body, impact, **entry.values)
+
+
+def _law(entry: Entry) -> None:
+    kind = entry.values.pop("kind")
+    LAWS[kind](entry)
+
+
+def _line(entry: Entry) -> None:
+    from rom.mbs.elements.formulas.lines import line_law
+    from rom.mbs.elements.formulas.programs import formula
+
+    one, two = entry.ends
+    line_law(entry.made, entry.name, one, two, formula(entry.values["expression"]))
+
+
+def _points(entry: Entry) -> None:
+    from rom.mbs.elements.formulas.lines import line_law, through_points
+
+    x, values = entry.values["x"], entry.values["values"]
+    if len(x) != len(values) or len(x) < 2:
+        raise entry.place.error(
+            f"{entry.place.name} has {len(x)} lengths and {len(values)} values."
+        )
+    if any(b <= a for a, b in pairwise(x)):
+        raise entry.place.at("x").error(f"the lengths of {entry.place.name} do not ascend.")
+    one, two = entry.ends
+    force, potential = through_points(x, values, entry.values["interpolation"])
+    line_law(entry.made, entry.name, one, two, force, potential)
+
+
+def _python_law(entry: Entry) -> None:
+    function = plain_function_of(entry.values, entry.place, trust=entry.trust)
+    keys = ("parameters", "memory", "outputs", "energy")
+    given = {key: entry.values[key] for key in keys}
+    entry.made.law(entry.name, function, *entry.ends, **given)
+
+
+def _user_force(entry: Entry) -> None:
+    function = function_of(entry.values, entry.place, trust=entry.trust)
+    if len(entry.ends) > 2:
+        raise entry.place.at("markers").error(
+            f"{len(entry.ends)} markers: a force acts on one, or between two.",
+            'More of them may have kind = "python".',
+        )
+    entry.made.user_force(entry.name, function, *entry.ends)
+
+
+def _event(entry: Entry) -> None:
+    how = {
+        "direction": DIRECTIONS[entry.values.pop("direction")],
+        "terminal": entry.values.pop("terminal"),
+    }
+    if entry.values["kind"] == "python":
+        function = function_of(entry.values, entry.place, trust=entry.trust)
+        entry.made.event(entry.name, function, **how, follow=entry.ends)
+        return
+    condition = condition_of(entry.ends, entry.values, entry.place)
+    entry.made.event(entry.name, condition, **how, follow=condition.follow)
+
+
+CALLS: dict[str, Callable[[Entry], None]] = {
+    "drives": _drive,
+    "motors": _motor,
+    "forces": _load,
+    "torques": _load,
+    "spread_loads": _spread,
+    "bushings": _bushing,
+    "stops": _stop,
+    "contacts": _contact,
+    "laws": _law,
+    "events": _event,
+}
+LAWS: dict[str, Callable[[Entry], None]] = {
+    "line": _line,
+    "points": _points,
+    "python": _python_law,
+    "user_force": _user_force,
+}
+
+
+def check_name(name: str, ground: str) -> None:
+    """Refuse names of bodies and rods that markers could not name.
+
+    Raises:
+        ConfigError: for one with a dot, or that of the ground.
+    """
+    if "." in name or name == ground:
+        raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
