@@ -1,0 +1,177 @@
+"""Whatever a mechanism can do in Python, its file can say: an entry for every method that adds."""
+
+import inspect
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rom
+from cases.solid import block
+from rom.config.mechanism import read_mechanism
+from rom.mbs.mechanism import Mechanism
+
+OF_OTHERS = {"add", "check_markers"}  # elements of any family, by what others make in Python
+
+
+def adding_methods():
+    """Methods whose first argument is the name of what they add."""
+    found = set()
+    for name, method in vars(Mechanism).items():
+        if inspect.isfunction(method) and not name.startswith("_"):
+            arguments = list(inspect.signature(method).parameters)
+            if arguments[1:2] == ["name"] and len(arguments) > 2:
+                found.add(name)
+    return found - OF_OTHERS
+
+
+BASE = """
+[ground]
+o = [0, 0, 0]
+[bodies.a]
+mass = 1
+inertia = [1, 1, 1]
+at = [0, 0, 0]
+markers = { p = [0, 0, 0], q = [0, 0, 1] }
+[bodies.soft]
+file = "soft.rom.npz"
+at = [3, 0, 0]
+[joints.turn]
+kind = "revolute"
+between = ["ground.o", "a.p"]
+axis = [0, 0, 1]
+[joints.other]
+kind = "cylindrical"
+between = ["ground.o", "soft.root"]
+axis = [0, 0, 1]
+[simulation]
+t_end = 1
+"""
+ENDS = 'between = ["ground.o", "a.q"]\n'
+IMPACT = "stiffness = 1e6\n"
+
+
+def joint(kind, more=""):
+    return f'[joints.new]\nkind = "{kind}"\n{ENDS}{more}\n'
+
+
+AXIS, NORMAL, RADIUS = "axis = [0, 0, 1]\n", "normal = [0, 0, 1]\n", "radius = 0.1\n"
+COVER = 'body = "soft"\nmarker = "ground.o"\n' + IMPACT
+ENTRIES = {  # method: an entry that calls it
+    "add_rigid": "[bodies.new]\nmass = 1\ninertia = [1, 1, 1]\nat = [0, 0, 0]\n",
+    "add_flexible": '[bodies.new]\nfile = "soft.rom.npz"\nq = [0, 0, 0, 0, 0, 0, 1e-6]\n'
+    "qd = [0, 0, 0, 0, 0, 0, 2e-6]\n",
+    "add_nonlinear": '[rods.new]\npoints = [[0, 0, 0], [1, 0, 0]]\nelements = 3\n'
+    'section = { kind = "circle", diameter = "1 cm" }\n'
+    'material = { E = "210 GPa", nu = 0.3, rho = 7850 }\n',
+    **{kind: joint(kind, AXIS) for kind in
+       ("revolute", "cylindrical", "prismatic", "point_on_line")},
+    "spherical": joint("spherical"),
+    "fixed": joint("fixed"),
+    "distance": joint("distance"),
+    "universal": joint("universal", "axis1 = [1, 0, 0]\naxis2 = [0, 1, 0]"),
+    "planar": joint("planar", NORMAL),
+    "point_on_plane": joint("point_on_plane", NORMAL),
+    "screw": joint("screw", AXIS + 'pitch = "1 mm"'),
+    "rolling": joint("rolling", NORMAL + "radius = 1"),
+    "gear": '[joints.new]\nkind = "gear"\njoint1 = "turn"\njoint2 = "other"\nratio = 2\n',
+    "drive": '[drives.new]\njoint = "turn"\nlaw = { expression = "sin(t)" }\n',
+    "motor": '[motors.new]\njoint = "turn"\nlaw = { expression = "-x - v" }\n',
+    "spring_damper": f"[springs.new]\n{ENDS}stiffness = 1\n",
+    "rotational_spring": '[rotational_springs.new]\njoint = "turn"\nstiffness = 1\n',
+    "bushing": f"[bushings.new]\n{ENDS}stiffness = [1, 1, 1]\n",
+    "force": '[forces.new]\nmarker = "a.q"\nvector = [1, 0, 0]\n',
+    "torque": '[torques.new]\nmarker = "a.q"\nvector = [1, 0, 0]\n',
+    "friction": '[frictions.new]\njoint = "turn"\ntransition_speed = 1\ncoulomb = 1\n',
+    "stop": f'[stops.new]\njoint = "turn"\nupper = 1\n{IMPACT}',
+    "law": f'[laws.new]\n{ENDS}expression = "-100*(x - 1) - v"\n',
+    "user_force": '[laws.new]\nkind = "user_force"\nmarkers = ["a.q"]\nfile = "f.py"\n'
+    'function = "none"\n',
+    "sphere_on_plane": f'[contacts.new]\nkind = "sphere_on_plane"\n{ENDS}{NORMAL}{RADIUS}{IMPACT}',
+    "disc_on_plane": f'[contacts.new]\nkind = "disc_on_plane"\n{ENDS}{NORMAL}{RADIUS}{IMPACT}'
+    "axis = [1, 0, 0]\n",
+    "sphere_on_sphere": f'[contacts.new]\nkind = "sphere_on_sphere"\n{ENDS}{IMPACT}'
+    "radius1 = 0.1\nradius2 = 0.1\n",
+    "sphere_on_cylinder": f'[contacts.new]\nkind = "sphere_on_cylinder"\n{ENDS}{AXIS}{IMPACT}'
+    "radius1 = 0.1\nradius2 = 0.1\n",
+    "surface_on_plane": f'[contacts.new]\nkind = "surface_on_plane"\n{COVER}{NORMAL}',
+    "surface_on_sphere": f'[contacts.new]\nkind = "surface_on_sphere"\n{COVER}{RADIUS}',
+    "surface_on_cylinder": f'[contacts.new]\nkind = "surface_on_cylinder"\n{COVER}{AXIS}{RADIUS}'
+    "inside = true\n",
+    "spread_load": '[spread_loads.new]\nbody = "soft"\ntraction = [0, "1 kPa", 0]\n'
+    'factor = { expression = "2*t" }\nframe = "world"\n',
+    "event": '[events.new]\nkind = "coordinate"\njoint = "turn"\nvalue = "1 rev"\n',
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def soft(tmp_path_factory):
+    body = rom.reduce(block(cells=(3, 1, 1)), method=rom.CraigBampton(1),
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
+                      certify=False)  # fmt: skip
+    return rom.save(body, tmp_path_factory.mktemp("soft") / "soft.rom.npz")
+
+
+def test_every_method_that_adds_something_has_an_entry():
+    assert adding_methods() == set(ENTRIES)
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")  # its joints are anywhere
+@pytest.mark.parametrize("method", ENTRIES)
+def test_an_entry_calls_the_method(method, soft, tmp_path, monkeypatch):
+    (tmp_path / "soft.rom.npz").symlink_to(soft)
+    (tmp_path / "f.py").write_text("def none(t, a):\n    return (0, 0, 0), (0, 0, 0)\n")
+    (tmp_path / "m.toml").write_text(BASE + ENTRIES[method])
+    calls, plain = [], getattr(Mechanism, method)
+
+    def noted(self, name, *arguments, **named):
+        calls.append(name)
+        return plain(self, name, *arguments, **named)
+
+    monkeypatch.setattr(Mechanism, method, noted)
+    made = read_mechanism(tmp_path / "m.toml", trust=True).mechanism()
+    assert "new" in calls
+    assert any(name.startswith("new") for name in (*made.parts, *made.joints, *made.drives,
+                                                    *made.elements, *made.events))  # fmt: skip
+
+
+def made_of(soft, tmp_path, more):
+    if not (tmp_path / "soft.rom.npz").exists():
+        (tmp_path / "soft.rom.npz").symlink_to(soft)
+    (tmp_path / "m.toml").write_text(
+        BASE[: BASE.index("[joints")] + more + "[simulation]\nt_end=1\n"
+    )
+    return read_mechanism(tmp_path / "m.toml").mechanism()
+
+
+def test_elastic_coordinates_surfaces_and_spread_loads_are_those_of_python(soft, tmp_path):
+    more = ENTRIES["add_flexible"] + ENTRIES["spread_load"].replace("new", "spread")
+    more += ENTRIES["surface_on_plane"].replace("new", "k") + "exponent = 1\n"
+    made = made_of(soft, tmp_path, more)
+    body, mech = rom.load(soft), rom.Mechanism()
+    mech.add_rigid("a", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
+                   markers={"p": (0, 0, 0), "q": (0, 0, 1)})  # fmt: skip
+    part = mech.add_flexible("soft", body, at=(3, 0, 0))
+    q = np.zeros(7)
+    q[6] = 1e-6
+    mech.add_flexible("new", body, q=q, qd=2 * q)
+    law = rom.mbs.Impact(stiffness=1e6, exponent=1.0)
+    mech.surface_on_plane("k", mech.ground.marker((0, 0, 0)), part, law, normal=(0, 0, 1))
+    load = rom.surface_load(body, traction=(0, 1e3, 0))
+    mech.spread_load("spread", part, load, lambda t: 2 * t, frame="world")
+    assert_array_equal(made.parts["new"].q, q)
+    assert_array_equal(made.parts["new"].qd, 2 * q)
+    sol, same = (rom.simulate(m, t_end=2e-3, dt=1e-4) for m in (made, mech))
+    assert_allclose(sol.q, same.q, rtol=0, atol=1e-12)
+    assert np.abs(sol.elastic("soft")).max() > 1e-9
+
+
+@pytest.mark.parametrize(("more", "message"), [
+    ("q = [1]\n", "q"),
+    ("rigid = true\nq = [0]\n", "a rigid body has no elastic coordinates"),
+    ("qd = [0, 0, 0, 0, 0, 0, 0, 1]\n", "qd"),
+])  # fmt: skip
+def test_elastic_coordinates_must_fit(more, message, soft, tmp_path):
+    with pytest.raises(rom.RomError) as refused:
+        made_of(soft, tmp_path, f'[bodies.new]\nfile = "soft.rom.npz"\n{more}')
+    assert message in str(refused.value) and "m.toml:12" in refused.value.where
