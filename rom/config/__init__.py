@@ -2,5 +2,7 @@
 
 `document` knows the lines of a file, `keys` what a table of keys says of it; `component` and
 `mechanism` read by those of `component_keys` and `mechanism_keys`, with `methods` and `laws` by
-name, `mechanism_fmu` packs a mechanism with its bodies; `page` is their documentation.
+name; `mechanism_fmu` packs a mechanism with its bodies, `page` is their documentation. In mechanism
+files, `expressions` reads formulas, `python_files` runs functions if they are trusted, `rods` and
+`conditions` make rods and events, `connections` calls the methods of a mechanism.
 """

@@ -35,12 +35,12 @@ from rom.units import in_si
 MAX_LETTERS = 1000  # of a formula
 MAX_BRACKETS, MAX_DEPTH = 40, 200  # inside each other; depth of the tree
 WINDOW_SIZE = 30  # letters of a formula on either side of what is wrong in it
-TOKEN = re.compile(
+TOKEN_PATTERN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<word>[A-Za-z_][A-Za-z_0-9]*)"
     r"|(?P<sign>\*\*|[-+*/^(),])|(?P<blank>[ \t\r\n]+)"
 )
 OPERATORS = {ast.Add: ADD, ast.Sub: SUB, ast.Mult: MUL, ast.Div: DIV, ast.Pow: POW}
-PI = {"pi": math.pi}
+CONSTANTS = {"pi": math.pi}
 
 
 class Token(NamedTuple):
@@ -70,7 +70,7 @@ class Reader:
     @property
     def names(self) -> list[str]:
         """All that may stand in it."""
-        return [*self.variables, *self.constants, *PI, *FUNCTIONS]
+        return [*self.variables, *self.constants, *CONSTANTS, *FUNCTIONS]
 
     def code(self) -> Code:
         """Its instructions.
@@ -102,7 +102,7 @@ class Reader:
     def _tokens(self) -> Iterator[Token]:
         at, before = 0, Token("blank", "", 0)
         while at < len(self.text):
-            found = TOKEN.match(self.text, at)
+            found = TOKEN_PATTERN.match(self.text, at)
             if found is None:
                 self._refuse(at, f"{self.text[at]!r} has no meaning here", self._known)
             token = Token(str(found.lastgroup), found[0], at)
@@ -194,7 +194,7 @@ class Reader:
             return VARIABLES[node.id], 0.0
         if node.id in FUNCTIONS:
             self._refuse(node.col_offset, f"{node.id} is a function", f"Write {node.id}(...).")
-        return NUMBER, {**PI, **self.constants}[node.id]
+        return NUMBER, {**CONSTANTS, **self.constants}[node.id]
 
     def _call(self, node: ast.Call, level: int) -> Iterator[tuple[int, float]]:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
@@ -277,7 +277,9 @@ class FormulaTable(Table):
         found = Table.read(self, value, place)
         constants = found.pop("constants", {})
         for name in constants:
-            if name in (*VARIABLES, *PI, *FUNCTIONS) or not re.fullmatch(r"[A-Za-z_]\w*", name):
+            if name in (*VARIABLES, *CONSTANTS, *FUNCTIONS) or not re.fullmatch(
+                r"[A-Za-z_]\w*", name
+            ):
                 at = place.at("constants").at(name)
                 raise at.error(f"{name!r} cannot be a constant.", "Take another name.")
         factor = found.pop("unit", 1.0)

@@ -7,6 +7,7 @@ from rom.config.component_keys import TABLE as COMPONENT
 from rom.config.keys import Either, Key, Kind, Named, Table, Variants
 from rom.config.laws import law_kind
 from rom.config.mechanism_keys import TABLE as MECHANISM
+from rom.mbs.elements.formulas.codes import FUNCTIONS
 from rom.units import UNITS, Dimension, dimension_name
 
 PAGE_HEADER = """\
@@ -36,15 +37,25 @@ def page(component: str, mechanism: str) -> str:
     parts += list(_sections(MECHANISM))
     parts += ["## Laws", LAWS_SECTION]
     parts += [f"**{name}.** {t.about}\n\n{keys(t)}" for name, t in tables(law_kind("1"))]
+    parts += ["## Formulas", FORMULA_SECTION]
     parts += ["## Units", "Products with a blank, powers with `^`, and each `/` belongs to the one"
               " unit behind it: `kg/m^3`, `N m/rad`, `m s^-2`.", _units()]  # fmt: skip
     return "\n\n".join(parts) + "\n"
 
 
 LAWS_SECTION = (
-    "Functions of time, where a key says so: a plain value is constant, a table has a kind. Values "
-    "have the unit of what they prescribe: an angle or a displacement for drives, a torque or a "
-    "force for motors, none for factors."
+    "Functions of time, where a key says so: a plain value is constant, a table has a kind, which "
+    "may be left out where there is an `expression` or a `function`. Values have the unit of what "
+    "they prescribe: an angle or a displacement for drives, a torque or a force for motors, none "
+    "for factors."
+)
+FORMULA_SECTION = (
+    "An `expression` has numbers, variables and constants of its place, `pi`, `+ - * / ^` (`**` is "
+    "the same), parentheses, and the functions "
+    + ", ".join(f"`{name}`" for name in FUNCTIONS)
+    + ". All numbers in it are in SI, angles in radians. `log` is the natural logarithm; "
+    "`step(t, start, end)` goes from 0 to 1 as 10 s^3 - 15 s^4 + 6 s^5 with s = (t - start) / "
+    "(end - start). Formulas are read, never executed."
 )
 
 

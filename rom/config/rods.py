@@ -9,16 +9,16 @@ if TYPE_CHECKING:
     from rom.mbs.elements.rods.energy import Rod
     from rom.model import Array
 
-LENGTH = Quantity("m", positive=True)
+LENGTH_KIND = Quantity("m", positive=True)
 SECTION_KINDS = {
-    "circle": Table("A full circle.", (Key("diameter", LENGTH, "Diameter.", ...),)),
+    "circle": Table("A full circle.", (Key("diameter", LENGTH_KIND, "Diameter.", ...),)),
     "tube": Table("A circle with a bore.", (
-        Key("diameter", LENGTH, "Outer diameter.", ...),
-        Key("thickness", LENGTH, "Of the wall.", ...),
+        Key("diameter", LENGTH_KIND, "Outer diameter.", ...),
+        Key("thickness", LENGTH_KIND, "Of the wall.", ...),
     )),
     "rectangle": Table("A full rectangle.", (
-        Key("width", LENGTH, "Along the first axis.", ...),
-        Key("height", LENGTH, "Along the second axis.", ...),
+        Key("width", LENGTH_KIND, "Along the first axis.", ...),
+        Key("height", LENGTH_KIND, "Along the second axis.", ...),
     )),
     "numbers": Table("A section by its rigidities; it takes no material.", (
         Key("stretch", Quantity("N", ((3,),)), "GA1, GA2, EA.", ...),
@@ -27,7 +27,7 @@ SECTION_KINDS = {
         Key("inertia", Quantity("kg m", ((3,),)), "Per length, about the axes.", ...),
     )),
 }  # fmt: skip
-MATERIAL = Table("An isotropic solid.", (
+MATERIAL_TABLE = Table("An isotropic solid.", (
     Key("E", Quantity("Pa"), "Young's modulus.", ...),
     Key("nu", Quantity(), "Poisson's ratio.", ...),
     Key("rho", Quantity("kg/m^3"), "Density.", ...),
@@ -37,7 +37,7 @@ ROD_KEYS = (
         "Its axis without stress, in its own frame: the line through two, a smooth curve through "
         "more.", ...),
     Key("section", Variants(SECTION_KINDS), "Its section.", ...),
-    Key("material", MATERIAL, "What it is made of."),
+    Key("material", MATERIAL_TABLE, "What it is made of."),
     Key("elements", Whole(1, 10000), "Number of segments, about equally long.", 20),
     Key("normal", Quantity("1", ((3,),)),
         "First axis of the section at the start, in its own frame; from there on it turns no more "
@@ -74,7 +74,7 @@ def _rigidities(values: dict[str, Any], place: Place) -> dict[str, Any]:
         Cowper, J. Appl. Mech. 33 (1966) 335, for the share of a section that carries shear;
         Timoshenko, Goodier, Theory of Elasticity (1970), section 109, for rectangles in torsion.
     """
-    from rom.material import Material
+    from rom.model import Material
 
     section = dict(values["section"])
     kind, given = section.pop("kind"), "material" in values

@@ -15,7 +15,7 @@ from cases.files.toml_files import PENDULUM
 from rom.cli.main import main
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, UnsafeFileError
-from rom.mbs.elements.formulas.codes import DIV, NUMBER, SUB, X
+from rom.mbs.elements.formulas.codes import DIV, FUNCTIONS, NUMBER, SUB, X
 from rom.mbs.elements.formulas.lines import line_law
 from rom.mbs.elements.formulas.programs import formula
 
@@ -472,3 +472,14 @@ def test_an_event_of_its_own_follows_what_it_asks_for():
     with pytest.raises(ConfigError, match="no joint 'guid'"):
         mech.event("far", lambda t, now: 1.0, follow=["guid"])
     assert_array_equal(mech.events.keys(), [])
+
+
+def test_the_file_of_the_page_about_laws_moves(tmp_path):
+    page = (ROOT / "docs" / "laws.md").read_text()
+    (tmp_path / "m.toml").write_text(page.split("```toml\n")[1].split("```")[0])
+    file = read_mechanism(tmp_path / "m.toml")
+    made = file.mechanism()
+    assert rom.check_law(made, "spring").ok and rom.check_law(made, "bump").ok
+    sol = file.simulate(made)
+    assert sol.events["middle"].t.size > 1 and rom.audit(sol).ok
+    assert all(f" {name}" in page.replace("`", " ") for name in FUNCTIONS)

@@ -5,7 +5,7 @@ import random
 import pytest
 
 import rom
-from cases.files.toml_files import ALL, CRANK, PENDULUM, SOLID
+from cases.files.toml_files import ALL, CRANK, MORE, PENDULUM, SOLID
 from rom.config.component import read_component
 from rom.config.mechanism import read_mechanism
 
@@ -50,8 +50,8 @@ def part(path):
 @pytest.mark.parametrize(
     ("text", "read"),
     [(SOLID, part), (PENDULUM, lambda path: read_mechanism(path).mechanism()),
-     (CRANK, read_mechanism), (ALL, read_mechanism)],
-    ids=["component", "pendulum", "crank", "everything"],
+     (CRANK, read_mechanism), (ALL, read_mechanism), (MORE, read_mechanism)],
+    ids=["component", "pendulum", "crank", "everything", "more"],
 )  # fmt: skip
 def test_damage_is_refused_or_harmless(text, read, tmp_path):
     found = [outcome(tmp_path / "x.toml", data, read) for data in mutants(text, seed=8)]

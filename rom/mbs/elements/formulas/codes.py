@@ -27,7 +27,7 @@ FUNCTIONS = {  # name: instruction, fewest and most arguments; None for any numb
 }
 VARIABLES = {"t": T, "x": X, "v": V}
 # instruction: by how much the stack grows
-GROWTH = {
+STACK_GROWTH = {
     **dict.fromkeys((NUMBER, T, X, V), 1),
     **dict.fromkeys((ADD, SUB, MUL, DIV, POW, ATAN2, MIN, MAX), -1),
     STEP: -2,
@@ -40,6 +40,6 @@ def depth(code: Code) -> int:
     """Largest number of values on the stack."""
     now = most = 0
     for instruction, _ in code:
-        now += GROWTH.get(instruction, 0)
+        now += STACK_GROWTH.get(instruction, 0)
         most = max(most, now)
     return most

@@ -26,15 +26,15 @@ from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
 # of Lobatto: with the ends among the points no jump hides between the last one and the end
-_LEGENDRE = np.polynomial.Legendre.basis(7)
-POINTS = np.concatenate([[-1.0], np.sort(_LEGENDRE.deriv().roots()), [1.0]])
-WEIGHTS = 1.0 / (28.0 * _LEGENDRE(POINTS) ** 2)
+_LEGENDRE_SEVENTH = np.polynomial.Legendre.basis(7)
+POINTS = np.concatenate([[-1.0], np.sort(_LEGENDRE_SEVENTH.deriv().roots()), [1.0]])
+WEIGHTS = 1.0 / (28.0 * _LEGENDRE_SEVENTH(POINTS) ** 2)
 INTEGRAL_RTOL = 1e-14  # of the largest force times the length of an interval
 SMALLEST_SHARE = 2.0**-46  # of the way: smaller intervals hold a jump, and are left as they are
 MOST_INTERVALS = 1000  # a force that needs more has a pole on the way
 HEAD_SIZE = 4  # numbers before the programs: length of all, stores or not, start, second program
-REST = (0.0, 0.0, 0.0)
-INTERPOLATIONS = ("monotone", "cubic")
+AT_REST = (0.0, 0.0, 0.0)
+SLOPE_RTOL = 1e-12  # of the steepest chord: a slope below it is the round-off of a level end
 
 
 @inner
@@ -42,7 +42,7 @@ def interval(program, a, b, stack, most):
     """Integral of a program of x from a to b by Lobatto; most[0] is the largest value so far."""
     half, middle, total = 0.5 * (b - a), 0.5 * (a + b), 0.0
     for k in range(8):
-        f = run(program, REST, (middle + half * POINTS[k], 0.0, 0.0), REST, stack)[0]
+        f = run(program, AT_REST, (middle + half * POINTS[k], 0.0, 0.0), AT_REST, stack)[0]
         most[0] = max(most[0], abs(f))
         total += WEIGHTS[k] * f
     return half * total
@@ -51,7 +51,7 @@ def interval(program, a, b, stack, most):
 @inner
 def integral(program, a, b, stack, space):
     """Integral of a program of x from a to b; not a number where it does not settle."""
-    most, way, total, count = space[0], abs(b - a), 0.0, 1
+    most, span, total, count = space[0], abs(b - a), 0.0, 1
     most[0] = 0.0
     space[1, 0], space[1, 1], space[1, 2] = a, b, interval(program, a, b, stack, most)
     for _ in range(MOST_INTERVALS):
@@ -62,7 +62,7 @@ def integral(program, a, b, stack, space):
         right = interval(program, middle, high, stack, most)
         miss = abs(left + right - before)
         width = abs(high - low)
-        if miss <= INTEGRAL_RTOL * most[0] * width or width <= SMALLEST_SHARE * way:
+        if miss <= INTEGRAL_RTOL * most[0] * width or width <= SMALLEST_SHARE * span:
             total += left + right
         elif not miss < math.inf:
             return math.nan
@@ -100,11 +100,11 @@ def line_force(t, parameters, motion, memory, out):
         answer[p], answer[3 + p] = -force * e[p], force * e[p]
     if given[1] == 0.0:
         return
-    resting = run(program, REST, (x, 0.0, 0.0), REST, stack)[0]
+    resting = run(program, AT_REST, (x, 0.0, 0.0), AT_REST, stack)[0]
     if given[3] > 0.0:
         second = given[int(given[3]) :]
-        now = run(second, REST, (x, 0.0, 0.0), REST, stack)[0]
-        answer[12] = run(second, REST, (start, 0.0, 0.0), REST, stack)[0] - now
+        now = run(second, AT_REST, (x, 0.0, 0.0), AT_REST, stack)[0]
+        answer[12] = run(second, AT_REST, (start, 0.0, 0.0), AT_REST, stack)[0] - now
     else:
         answer[12] = -integral(program, start, x, stack, np.empty((MAX_STACK + 8, 3)))
     answer[13] = -(force - resting) * v
@@ -195,6 +195,7 @@ def through_points(
     else:
         curve = (PchipInterpolator if interpolation == "monotone" else CubicSpline)(x, values)
         C, ends = curve.c.T, curve(x[[0, -1]], 1)
+        ends[np.abs(ends) < SLOPE_RTOL * np.abs(np.diff(values) / np.diff(x)).max()] = 0.0
     before, behind = ([0.0, 0.0, s, y] for s, y in zip(ends, values[[0, -1]], strict=True))
     C, centres = np.vstack([before, C, behind]), np.concatenate([x[:1], x[:-1], x[-1:]])
     return piecewise(x, centres, C), piecewise(x, centres, _integrals(x, C))

@@ -28,11 +28,11 @@ def sampled(program, given, by_time, out, stack):
 def along_coordinate(t, x, v, program, answer):
     """Write value and derivatives by x and v; the program begins with the length of all."""
     given = carray(program, (int(carray(program, (1,))[0]),))
-    stack, said = np.empty((MAX_STACK, 3)), carray(answer, (3,))
+    stack, found = np.empty((MAX_STACK, 3)), carray(answer, (3,))
     time = (t, 0.0, 0.0)
     by_x = run(given[1:], time, (x, 1.0, 0.0), (v, 0.0, 0.0), stack)
     by_v = run(given[1:], time, (x, 0.0, 0.0), (v, 1.0, 0.0), stack)
-    said[0], said[1], said[2] = by_x[0], by_x[1], by_v[1]
+    found[0], found[1], found[2] = by_x[0], by_x[1], by_v[1]
 
 
 @cache
