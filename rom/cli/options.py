@@ -132,7 +132,7 @@ def add_meshing(parser: argparse.ArgumentParser) -> None:
         "A .geo or .step is run in a process of its own, which can neither start others nor write "
         "files; a .geo that says it would is refused. A .py can do what you can.",
     )
-    group.add_argument("--trust", action="store_true", help="run a .py geometry; read it first")
+    group.add_argument("--trust", action="store_true", help="run .py files; read them first")
     group.add_argument(
         "--time-limit", metavar="SECONDS", type=limit, help="of meshing (default 1800, 0 for none)"
     )
