@@ -1,5 +1,6 @@
 """Formulas in files: values, exact derivatives, and a grammar that nothing leaves."""
 
+import ctypes
 import math
 import random
 
@@ -115,6 +116,16 @@ def test_values_and_derivatives_are_those_of_the_closed_form(text):
         wanted = [closed(float(x)) for x in t]
         assert_allclose(function(t), wanted, rtol=2e-13, atol=1e-13)
         assert function(0.71) == function(t)[1]
+
+
+def test_a_motor_has_the_slopes_of_its_formula():
+    """x^2 v^3 + t: 2 x v^3 by x, 3 x^2 v^2 by v; as compiled code asks for them."""
+    found = read("x^2*v^3 + t")
+    program, answer = np.concatenate([[found.program.size + 1.0], found.program]), np.zeros(3)
+    kinds = [ctypes.c_double] * 3 + [ctypes.c_void_p] * 2
+    asked = ctypes.CFUNCTYPE(None, *kinds)(found.address)
+    asked(0.5, 3.0, -2.0, program.ctypes.data, answer.ctypes.data)
+    assert_allclose(answer, [-71.5, -48.0, 108.0], rtol=1e-14)
 
 
 def test_every_function_has_a_closed_form():

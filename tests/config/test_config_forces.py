@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -257,6 +258,9 @@ def test_a_run_that_goes_on_counts_the_turns_of_the_first(tmp_path):
     second = rom.simulate(file.mechanism(), t_end=0.4, dt=1e-3, state=first.final)
     assert first.events["turns"].t.size == 0
     assert_allclose(second.events["turns"].t, [0.3], rtol=1e-9)
+    back = replace(second.final, v=-second.final.v)  # from four turns to three again
+    third = rom.simulate(file.mechanism(), t_end=0.55, dt=1e-3, state=back)
+    assert_allclose(third.events["turns"].t, [0.5], rtol=1e-9)
 
 
 def test_the_command_tells_when_events_happened(tmp_path, capsys):
