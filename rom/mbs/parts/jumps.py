@@ -18,6 +18,7 @@ JUMP_WIDTH_RTOL = 1e-9  # of the time looked at: both sides of a jump of the val
 TIME_RTOL = 1e-15  # of a time, below which two times are one
 DIFFERENCE_SPACING = 1e-4  # of an interval: points of a difference quotient
 ROUND_OFF = 2e-12  # of value over rate: they lie further apart than that, or say nothing
+NO_MOTION = 1e-15  # a jump [rad or m] smaller than any body: differences of numbers about one
 SMALL_JUMP = 1e-6  # of the range of the values so far, that no reaction shows
 VALUE_RTOL = 1e-12  # of the largest value
 SMALL_KINK = 1e-2  # of the largest rate so far
@@ -132,7 +133,7 @@ class Examined:
     def _look_at(self, t: Array, values: Array) -> None:
         self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
         largest = max(abs(self.low), abs(self.high))
-        small = max(SMALL_JUMP * (self.high - self.low), VALUE_RTOL * largest)
+        small = max(SMALL_JUMP * (self.high - self.low), VALUE_RTOL * largest, NO_MOTION)
         width = max(JUMP_WIDTH_RTOL * (t[-1] - t[0]), TIME_RTOL * float(np.abs(t).max()))
         jump = largest_jump(self.function, t, width, small)
         if jump is not None:
@@ -146,9 +147,8 @@ class Examined:
         speed = quotient if self.rate is None else self.rate
         values = speed(t)
         self.top = max(self.top, float(np.abs(values).max()))
-        if (
-            not np.isfinite(values).all()
-            or DIFFERENCE_SPACING * interval * self.top < ROUND_OFF * largest
+        if not np.isfinite(values).all() or DIFFERENCE_SPACING * interval * self.top < max(
+            ROUND_OFF * largest, NO_MOTION
         ):
             return
         kink = largest_jump(speed, t, 4 * DIFFERENCE_SPACING * interval, SMALL_KINK * self.top)

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
+import rom
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import Signal
@@ -68,3 +69,22 @@ def test_a_table_that_ends_with_the_run_drives_it_to_the_end(method, tolerance):
     assert sol.t[-1] == pytest.approx(1.0)
     assert_allclose(sol.omega("wheel")[:, 2], np.cos(sol.t), atol=tolerance)
     assert_allclose(sol.reaction("motor")[1:, 5], -0.5 * np.sin(sol.t[1:]), atol=tolerance)
+
+
+@pytest.mark.parametrize("t_end", [1e-10, 1e-8, 6e-8, 1e-6, 1e-4])
+@pytest.mark.parametrize("speed", [3.0, 300.0])
+def test_round_off_of_a_soft_start_is_no_jump(t_end, speed):
+    """Three terms of size one cancel to a motion of t^4: what is left at first is round-off."""
+    T = 2 * np.pi / 300.0
+
+    def angle(t):
+        start = t**2 / (2 * T) + T / (2 * np.pi) ** 2 * (np.cos(2 * np.pi * t / T) - 1)
+        return speed * start
+
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    crank = mech.add_rigid("crank", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    pin = crank.marker((0, 0, 0))
+    mech.revolute("bearing", mech.ground.marker((0, 0, 0)), pin, axis=(0, 0, 1))
+    mech.drive("motor", "bearing", angle)
+    sol = rom.simulate(mech, t_end=t_end, dt=t_end)
+    assert abs(sol.joint("bearing").angle[-1] - angle(t_end)) < 1e-14
