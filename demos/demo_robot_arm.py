@@ -195,7 +195,7 @@ view.history(
 )  # fmt: skip
 view.animate(
     robot(True), sol, options.out / "robot_arm.gif", frames=40,
-    view=(0.3, 0.3, 1.0), up=(0, 1, 0),
+    view=(0.3, 0.3, 1.0), up=(0, 1, 0), traces=("motor", "tool"),
     shapes={"motor": view.box((0.1, 0.1, 0.1)), "tool": view.box((0.12, 0.12, 0.12))},
 )  # fmt: skip
 

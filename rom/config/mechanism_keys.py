@@ -350,7 +350,8 @@ SIMULATION = Table("How it is moved.", (
 OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
     Key("history", Text(("csv", "h5")), "Form of the table of all motions, loads and energies.",
         "csv"),
-    Key("film", Text(("gif", "glb", "vtkhdf")), "A film: picture, browsers, ParaView."),
+    Key("film", Text(("gif", "mp4", "glb", "vtkhdf")),
+        "A film: pictures, pictures by ffmpeg, to turn around in browsers, ParaView."),
     Key("picture", Flag(), "A picture of four instants.", False),
     Key("plot", Words(), "Columns of the table to draw over time, without their unit.", ()),
     Key("magnify", Quantity("1", positive=True), "Deformations are drawn so much larger.", 1.0),

@@ -31,6 +31,7 @@ FILE_SIGNS = {  # kind of file: how each that rom writes begins
     "openfast": rb"! [^\n]*, " + MARK_BYTES + rb"\n",
     "png": rb"\x89PNG\r\n\x1a\n.{0,200}tEXtSoftware\x00rom.{4}\x00",
     "gif": rb"GIF8.*\x21\xfe." + MARK_BYTES,
+    "mp4": rb".{4}ftyp.*" + MARK_BYTES,
     "html": rb"<!DOCTYPE html>.*<meta name='generator' content='" + MARK_BYTES,
     "csv": TABLE_HEAD + rb"[^\r\n]*\r?\n[0-9eE+.-]+,[0-9eE+.,-]*\r?\n",
     "h5": rb"\x89HDF\r\n.*rom-history",

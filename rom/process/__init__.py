@@ -2,6 +2,6 @@
 
 `launcher` tells ranks and threads, `interruption` makes signals exceptions, `child` starts every
 other process by way of `child_entry`, `memory` says what may be taken. Processes that would make
-the same file take `turns`, and `patience` says how long a user waits. Nothing is imported here: the
-package comes by before the working folder is off the path of modules.
+the same file take `turns`, `patience` says how long a user waits and `progress` how far work is.
+Nothing is imported here: the package comes by before the working folder is off the path of modules.
 """

@@ -84,6 +84,7 @@ def run(
     folder: Path | None = None,
     limits: Limits | None = None,
     variables: Mapping[str, str] | None = None,
+    given: memoryview | None = None,
 ) -> Ended:
     """Run a command to its end; whatever interrupts this process ends the child with all its own.
 
@@ -92,14 +93,16 @@ def run(
         folder: where it runs; here by default.
         limits: what it may take.
         variables: of its environment, beside those of this process.
+        given: bytes on its standard input, which is empty without.
 
     Raises:
         OSError: if there is no such program.
     """
     limits = limits or Limits()
     with terminable():
-        process = start(command, folder=folder, limits=limits, variables=variables)
-        return finish(process, limits.seconds)
+        fed = given is not None
+        process = start(command, folder=folder, limits=limits, variables=variables, fed=fed)
+        return finish(process, limits.seconds, given)
 
 
 def start(
@@ -108,8 +111,12 @@ def start(
     folder: Path | None = None,
     limits: Limits | None = None,
     variables: Mapping[str, str] | None = None,
+    fed: bool = False,
 ) -> subprocess.Popen[bytes]:
-    """Start a command beside this process; arguments as in `run`, `finish` waits for it."""
+    """Start a command beside this process; arguments as in `run`, `finish` waits for it.
+
+    With ``fed`` its standard input is a pipe for what `finish` is given.
+    """
     limits = limits or Limits()
     entry = [sys.executable, "-P", str(ENTRY_FILE), str(os.getpid())]
     entry += [str(limits.processor), str(limits.memory)]
@@ -119,19 +126,21 @@ def start(
             [*entry, *command],
             cwd=folder,
             env=environment(own=own) | dict(variables or {}),
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,
         )
 
 
-def finish(process: subprocess.Popen[bytes], seconds: float = 0.0) -> Ended:
+def finish(
+    process: subprocess.Popen[bytes], seconds: float = 0.0, given: memoryview | None = None
+) -> Ended:
     """Wait until a child has ended; end it after so many seconds, or when this is interrupted."""
     overtime = False
     try:
         try:
-            out, err = process.communicate(timeout=seconds or None)
+            out, err = process.communicate(given, timeout=seconds or None)
         except subprocess.TimeoutExpired:
             overtime = True
             _end(process)

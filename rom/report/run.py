@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rom.model import Report
 
 RECORD_FILE, SCENE_FILE = "run.json", "scene.json"
-N_INSTANTS = 4  # in the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,18 +120,15 @@ class Run:
         names = {path.name: path for path in paths}
         look = {key: out[key] for key in ("view", "up") if key in out}
         if "instants.png" in names:
-            import numpy as np
-
             from rom.view.scenes.film import instants
 
-            times = np.linspace(solution.t[0], solution.t[-1], N_INSTANTS)
-            how = look | {"times": times, "magnify": out["magnify"]}
+            how = look | {"magnify": out["magnify"]}
             instants(solution.mechanism, solution, names["instants.png"], **how)
-        if "motion.gif" in names:
+        for path in (p for p in paths if p.suffix in (".gif", ".mp4")):
             from rom.view.scenes.film import animate
 
             how = look | {"magnify": out["magnify"]}
-            animate(solution.mechanism, solution, names["motion.gif"], **how)
+            animate(solution.mechanism, solution, path, **how)
         for path in (p for p in paths if p.suffix in (".glb", ".vtkhdf")):
             from rom.view.scenes.animation_files import write_animation
 

@@ -1,5 +1,13 @@
+from rom.view.canvas.films import Film as Film
 from rom.view.canvas.solids import box as box
+from rom.view.canvas.solids import coil as coil
 from rom.view.canvas.solids import cylinder as cylinder
+from rom.view.canvas.solids import ellipsoid as ellipsoid
+from rom.view.canvas.solids import extruded as extruded
+from rom.view.canvas.solids import gear as gear
+from rom.view.canvas.solids import joined as joined
+from rom.view.canvas.solids import ring as ring
+from rom.view.canvas.solids import tube as tube
 from rom.view.figures.curves import campbell as campbell
 from rom.view.figures.curves import convergence as convergence
 from rom.view.figures.curves import frequencies as frequencies
@@ -19,3 +27,4 @@ from rom.view.scenes.meshes import mesh as mesh
 from rom.view.scenes.mode_shapes import mode_shapes as mode_shapes
 from rom.view.scenes.rods import sleeves as sleeves
 from rom.view.scenes.wheels import wheel_modes as wheel_modes
+from rom.view.scenes.window import plotter as plotter

@@ -198,10 +198,10 @@ def test_pictures_are_recognised_and_those_of_others_are_not(tmp_path):
     from PIL import Image
 
     from rom.view.canvas import page
-    from rom.view.canvas.gif import write_gif
+    from rom.view.canvas.films import Film
 
-    ours = page.save(page.sheet(60, 40), tmp_path / "ours.png")
-    write_gif(tmp_path / "ours.gif", np.zeros((2, 8, 8, 3), np.uint8) + 7, 0.1)
+    ours = page.sheet(60, 40).save(tmp_path / "ours.png")
+    Film(np.zeros((2, 8, 8, 3), np.uint8) + 7, 0.1).save(tmp_path / "ours.gif")
     assert is_ours(ours, "png") and is_ours(tmp_path / "ours.gif", "gif")
     for name in ("theirs.png", "theirs.gif"):
         Image.new("RGB", (60, 40)).save(tmp_path / name)

@@ -19,7 +19,7 @@ from rom.mbs.analysis.campbell import Campbell  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
 from rom.view.canvas.offscreen import render  # noqa: E402
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
-from rom.view.scenes.film import _stage  # noqa: E402
+from rom.view.scenes.film import Look, _stage  # noqa: E402
 
 
 def pixels(path, frame=0):
@@ -159,13 +159,14 @@ def test_a_film_moves_and_loops(bar, tmp_path):
 def test_bodies_are_drawn_where_they_are(bar):
     """The surface node under a marker is at the marker, deformed and turned, at any instant."""
     mech, sol = swinging(bar)
-    stage = _stage(mech, sol, np.array([0, 40, 100]), {"ball": view.box((0.1, 0.1, 0.1))}, 1.0)
+    look = Look({"ball": view.box((0.1, 0.1, 0.1))})
+    stage = _stage(mech, sol, np.array([0, 40, 100]), look)
     wanted = sol.position("bar", "n7")[[0, 40, 100]]
     np.testing.assert_allclose(stage.actors[0].points[:, 7], wanted, atol=1e-12)
     centre = stage.actors[2].points.mean(axis=1)
     np.testing.assert_allclose(centre, sol.position("ball")[[0, 40, 100]], atol=1e-12)
     u = sol.elastic("bar")[[0, 40, 100]] @ bar.markers["n7"].translation.T
-    scale = {"m": 1.0, "mm": 1e3, "um": 1e6, "nm": 1e9}[stage.unit]
+    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[stage.unit]
     size = scale * np.linalg.norm(u, axis=1)
     np.testing.assert_allclose(stage.actors[0].values[:, 7], size, atol=1e-9 * size.max())
 

@@ -2,13 +2,17 @@
 
 import ast
 import inspect
+from base64 import b64encode
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("pyvista", reason="pictures need pyvista")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+from matplotlib.figure import Figure
 
 from cases.mbs.drawn import lattice_bar, squeezed, swinging
 from cases.paths import ROOT
@@ -57,6 +61,16 @@ PICTURES = {  # function -> what is drawn, words
         WORDS | {"structure": STRUCTURE, "label": "displacement per force [m/N]"}),
     "wheel_modes": lambda: ([*wheel()], WORDS | {"hidden": ("root", "tip")}),
 }  # fmt: skip
+AXES = {
+    "campbell": 2,
+    "convergence": 1,
+    "deformed": 2,
+    "frequencies": 1,
+    "history": 1,
+    "panels": 1,
+    "plane": 1,
+    "updating": 3,
+}  # that each of what is above wants
 FILMS = {
     "animate": lambda: ([*moved()], {"frames": 2}),
     "flow": lambda: ([np.array([0.0, 1e-6]), [squeezed(0.0), squeezed(0.5)]],
@@ -88,35 +102,70 @@ def test_things_come_first_then_the_path_then_words_by_name(name):
     assert place == things > 0
     assert set(kinds[: place + 1]) == {inspect.Parameter.POSITIONAL_OR_KEYWORD}
     assert set(kinds[place + 1 :]) <= {inspect.Parameter.KEYWORD_ONLY}
-    assert parameters(name)["path"].default is (inspect.Parameter.empty if name in FILMS else None)
+    assert parameters(name)["path"].default is None
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in PICTURES]
 )
 def test_a_picture_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
-    (things, words), draw = PICTURES[name](), getattr(view, name)
-    seen, file = draw(*things, **words), draw(*things, tmp_path / "a.png", **words)
-    assert file == tmp_path / "a.png" and file.read_bytes()[:4] == b"\x89PNG"
+    (things, words), draw, file = PICTURES[name](), getattr(view, name), tmp_path / "a.png"
+    seen = draw(*things, **words)
+    assert isinstance(seen, Figure) and seen.path is None and not list(tmp_path.iterdir())
+    written = draw(*things, file, **words)
+    assert isinstance(written, Figure) and Path(written) == written.path == file
+    assert file.read_bytes()[:4] == b"\x89PNG"
     assert seen._repr_png_() == seen.save(tmp_path / "b.png").read_bytes() == file.read_bytes()
     if name in PATH_CAME_FIRST:
         with pytest.warns(DeprecationWarning, match=f"{name} takes the path behind") as caught:
             earlier = draw(tmp_path / "c.png", *things, **words)
         assert caught[0].filename == __file__
-        assert earlier.read_bytes() == file.read_bytes()
+        assert Path(earlier).read_bytes() == file.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in AXES]
+)
+def test_curves_are_drawn_into_axes_of_the_caller(name, tmp_path):
+    """His figure comes back, holds what is drawn, and is written where he says only."""
+    (things, words), draw = PICTURES[name](), getattr(view, name)
+    words = {key: word for key, word in words.items() if key != "caption"}
+    figure = Figure(figsize=(12, 4))
+    own = figure.subplots(1, AXES[name] + 1, squeeze=False)[0]
+    given = own[0] if AXES[name] == 1 else own[:-1]
+    assert draw(*things, **words, ax=given) is figure and not list(tmp_path.iterdir())
+    assert all(a.lines or a.collections or a.images or a.patches for a in own[:-1])
+    assert not own[-1].has_data() and own[-1].get_title() == ""
+    assert draw(*things, tmp_path / "a.png", **words, ax=given) is figure
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    for wrong in ("axes", own if AXES[name] == 1 else own[0]):
+        with pytest.raises(ConfigError, match=rf"{name}: ax = .* must be {AXES[name]} Axes"):
+            draw(*things, **words, ax=wrong)
+
+
+def test_whatever_draws_curves_takes_axes():
+    assert {name for name in (*PICTURES, *FILMS) if "ax" in parameters(name)} == set(AXES)
 
 
 @pytest.mark.parametrize("name", FILMS)
-def test_a_film_needs_a_path_and_is_the_same_in_both_orders(name, tmp_path):
-    (things, words), draw = FILMS[name](), getattr(view, name)
-    with pytest.raises(ConfigError, match=f"{name}: path = None must be a path"):
-        draw(*things, None, **words)
-    file = draw(*things, tmp_path / "a.gif", **words)
+def test_a_film_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
+    (things, words), draw, file = FILMS[name](), getattr(view, name), tmp_path / "a.gif"
+    seen = draw(*things, **words)
+    assert isinstance(seen, view.Film) and seen.path is None and not list(tmp_path.iterdir())
+    assert Path(draw(*things, file, **words)) == file
     assert file.read_bytes()[:3] == b"GIF"
+    assert seen.save(tmp_path / "c.gif").read_bytes() == file.read_bytes()
+    assert b64encode(file.read_bytes()).decode() in seen._repr_html_()
     if name in PATH_CAME_FIRST:
         with pytest.warns(DeprecationWarning, match=f"{name} takes the path behind"):
             earlier = draw(tmp_path / "b.gif", *things, **words)
-        assert earlier.read_bytes() == file.read_bytes()
+        assert Path(earlier).read_bytes() == file.read_bytes()
+
+
+def test_what_was_not_written_stands_for_no_path():
+    seen = view.history(*PICTURES["history"]()[0])
+    with pytest.raises(ConfigError, match=r"picture was not written yet.*picture\.save"):
+        Path(seen)
 
 
 def test_a_picture_that_is_saved_later_is_refused_in_the_same_words(tmp_path):

@@ -52,7 +52,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--t-end", type=positive, help="duration [s]")
     parser.add_argument("--dt", type=positive, help="time step [s]")
     parser.add_argument(
-        "--film", choices=("glb", "vtkhdf"), help="film in space: for browsers, or for ParaView"
+        "--film",
+        choices=("gif", "mp4", "glb", "vtkhdf"),
+        help="pictures, pictures by ffmpeg, to turn around in browsers, or for ParaView",
     )
     parser.add_argument(
         "--history", choices=("csv", "h5"), help="every marker, reaction and energy, too"
@@ -77,8 +79,10 @@ def _mechanism(args: argparse.Namespace) -> Answer:
 
     require({OUTPUT_FLAG: args.output})
     file = mechanism(args)
-    for path in paths_of(file, claim(args)):
+    paths = paths_of(file, claim(args))
+    for path in paths:
         checked(args, path, inputs=files_in(file.values))
+    _check_encoder(paths)
     keep = _keeping(args, made_from(file))
     origin = {"command": _command(args), "version": __version__}
 
@@ -192,6 +196,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     tables = [path.with_suffix(f".history.{args.history}")] if args.history else []
     last = (folder / SCENE_FILE, folder / RECORD_FILE)
     paths = [checked(args, each) for each in (path, *films, *tables, *last)]
+    _check_encoder(films)
     hung = {"axis": args.axis, "gravity": args.gravity, "hinge": args.hinge}
     made_from = {f"--{name}": repr(value) for name, value in hung.items()}
     keep = _keeping(args, made_from | {str(args.file): file_digest(args.file)})
@@ -239,11 +244,23 @@ def _write_motion(path: Path, tables: list[Path], body: "FlexibleBody", solution
         write_history(solution, table)
 
 
+def _check_encoder(paths: list[Path]) -> None:
+    """Refuse a film that cannot be made before the motion is computed."""
+    if any(path.suffix == ".mp4" for path in paths):
+        from rom.view.canvas.films import encoder
+
+        encoder()
+
+
 def _write_films(films: list[Path], solution: Any) -> None:
     from rom.view.scenes.animation_files import write_animation
+    from rom.view.scenes.film import animate
 
     for film in films:
-        write_animation(solution, film)
+        if film.suffix in (".gif", ".mp4"):
+            animate(solution.mechanism, solution, film)
+        else:
+            write_animation(solution, film)
 
 
 def _write_scene(path: Path, body: "FlexibleBody", solution: Any) -> None:

@@ -62,6 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--magnify", type=positive, help="of deformations, default so that they are seen"
     )
     parser.add_argument("--film", action="store_true", help="a film, too; half a second a picture")
+    parser.add_argument("--mp4", action="store_true", help="a film as .mp4, by ffmpeg")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
     add_force(parser)
 
@@ -97,7 +98,12 @@ def run(args: argparse.Namespace) -> Answer:
 def _files(args: argparse.Namespace) -> dict[str, Path]:
     """What will be written, by its ending; refused before the computation."""
     folder = claim(args)
-    kinds = (".rom.npz", ".png", ".gif") if args.film else (".rom.npz", ".png")
+    films = [kind for kind, asked in ((".gif", args.film), (".mp4", args.mp4)) if asked]
+    if args.mp4:
+        from rom.view.canvas.films import encoder
+
+        encoder()
+    kinds = (".rom.npz", ".png", *films)
     return {kind: checked(args, inside(folder, args.file.stem, kind)) for kind in kinds}
 
 
@@ -237,8 +243,8 @@ def _write(
     times = np.linspace(0, 0.5 * motion[1].t[-1], N_INSTANTS)
     up = -np.asarray(motion[0].gravity, dtype=float)
     instants(*motion, files[".png"], times=times, magnify=magnify, up=up)
-    if ".gif" in files:
-        animate(*motion, files[".gif"], magnify=magnify, up=up, frames=40)
+    for path in (files[kind] for kind in (".gif", ".mp4") if kind in files):
+        animate(*motion, path, magnify=magnify, up=up, frames=40)
 
 
 def _text(body: "FlexibleBody", hinge: str, data: dict[str, Any]) -> str:

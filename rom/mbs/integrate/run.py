@@ -1,7 +1,6 @@
 """Settings of a run, and the record it fills."""
 
 import math
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -22,6 +21,7 @@ from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
 from rom.process.memory import free_bytes
+from rom.process.progress import Progress
 
 # a million steps a second, as the fastest mechanisms take, for eleven days
 MAX_STEPS = 10**12
@@ -224,12 +224,6 @@ def _is_finite(value: Any) -> bool:
         return False
 
 
-def line(text: str) -> None:
-    """Write text over the line of progress on stderr; an empty one clears it."""
-    sys.stderr.write(f"\r{text:<60}" if text else f"\r{'':<60}\r")
-    sys.stderr.flush()
-
-
 @dataclass
 class Record:
     """What a run has produced so far.
@@ -242,6 +236,7 @@ class Record:
         final: last state reached.
         given: state the run began from.
         statistics: counts, and seconds in compiled code.
+        progress: what reports it, once it has.
         watch: over the events of the mechanism, None if it has none.
         noted: what the watch knew at ``final``.
         keeping: folder that is written while the run lasts, or None.
@@ -258,6 +253,7 @@ class Record:
     compiled: float = 0.0
     counts: dict[str, float] = field(default_factory=dict)
     shown_at: float = 0.0
+    progress: Progress | None = None
     watch: Watch | None = None
     noted: Noted | None = None
     keeping: Keeping | None = None
@@ -320,8 +316,8 @@ class Record:
         if self.settings.progress and now - self.shown_at > 0.2:
             self.shown_at = now
             span = self.settings.t_end - self.settings.t_start
-            share = (self.t - self.settings.t_start) / span
-            line(f"t = {self.t:.6g} s  {100 * share:3.0f} %  {now - self.clock:.0f} s")
+            self.progress = self.progress or Progress(span)
+            self.progress.reach(self.t - self.settings.t_start, f"t = {self.t:.6g} s")
 
     def solution(self, status: str, *, failed: bool = False) -> Solution:
         """The motion so far.
@@ -330,8 +326,8 @@ class Record:
             status: how it ended.
             failed: prescribed functions that fail now are not a number where they do.
         """
-        if self.settings.progress:
-            line("")
+        if self.progress is not None:
+            self.progress.end()
         pieces = zip(*self.blocks, strict=True)
         t, q, v, a, lam, work, base = (np.concatenate(piece) for piece in pieces)
         signals = np.full((t.size, len(self.packed.signals), 3), np.nan)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+COUNT_FILE = "count"  # as long as there are pictures drawn
 EDGE_OFFSET = 2e-3  # of the picture's height, towards the eye; parallel projection does not show it
 CREASE_ANGLE = 35.0  # from which an edge stays sharp in shading [degree]
 
@@ -36,6 +37,8 @@ def main(folder: Path) -> None:
             add(plotter, scene, arrays, k, frame)
         plotter.render()
         pictures[frame] = averaged(plotter.screenshot(return_img=True)[..., :3], times)
+        with (folder / COUNT_FILE).open("ab") as count:  # a byte for each
+            count.write(b".")
     np.save(folder / "pictures.npy", pictures)
     plotter.close()
 

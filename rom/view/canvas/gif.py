@@ -1,17 +1,20 @@
 """Films as GIF files."""
 
 import io
-from pathlib import Path
 
 import numpy as np
 
-from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK
 from rom.view.canvas.offscreen import Image, require
 
 
-def write_gif(path: Path, pages: Image, duration: float) -> None:
-    """One palette for all pictures, so that colours do not flicker."""
+def gif(pages: Image, duration: float) -> bytes:
+    """The bytes of a film; one palette for all pictures, so that colours do not flicker.
+
+    Args:
+        pages: (f, height, width, 3) pictures.
+        duration: of each [s].
+    """
     require("PIL")
     from PIL import Image as Picture
 
@@ -33,4 +36,4 @@ def write_gif(path: Path, pages: Image, duration: float) -> None:
         loop=0,
         comment=ORIGIN_MARK.encode(),
     )
-    write_whole(path, lambda file: file.write(buffer.getvalue()))
+    return buffer.getvalue()

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from rom.errors import ConfigError, ResourceError
 from rom.process.child import Ended, python, run, scratch
+from rom.process.progress import followed
+from rom.view.canvas.draw import COUNT_FILE
 from rom.view.canvas.scene import Actor, Camera
 
 Image = npt.NDArray[np.uint8]
@@ -44,7 +46,10 @@ def render(
     require("pyvista")
     with scratch("view") as folder:
         write_scene(folder, actors, camera, limits, oversampling)
-        done = run(python("rom.view.canvas.draw", str(folder)))
+        n, count = max(len(actor.points) for actor in actors), folder / COUNT_FILE
+        said = f"drawing {n} pictures"
+        with followed(n, said, lambda: count.stat().st_size if count.exists() else 0):
+            done = run(python("rom.view.canvas.draw", str(folder)))
         pictures = folder / "pictures.npy"
         if done.code or not pictures.exists():
             raise child_failure(done)

@@ -1,20 +1,20 @@
 """Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left."""
 
-import io
 import textwrap
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.io.files import check_writable, write_whole
+from rom.io.files import check_writable
 from rom.view.canvas.offscreen import COLOUR_MAP, Image, require
 from rom.view.canvas.scene import TEXT_COLOUR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rom.view.canvas.picture import Picture
 
 DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
@@ -30,7 +30,7 @@ PAGE_STYLE = {
 }
 
 
-def sheet(width: int, height: int) -> "Figure":
+def sheet(width: int, height: int) -> "Picture":
     """A white sheet of that many pixels.
 
     Raises:
@@ -38,9 +38,10 @@ def sheet(width: int, height: int) -> "Figure":
     """
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
+    from rom.view.canvas.picture import Picture
+
+    figure = Picture(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -126,36 +127,35 @@ def pixels(figure: "Figure") -> Image:
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A finished picture that is not written yet; notebooks show it.
+def taken(ax: Any, n: int, name: str) -> tuple["Figure", list[Any]]:
+    """The axes of a caller, one for each of n diagrams, and their figure.
 
-    Attributes:
-        png: the bytes of its file.
+    Args:
+        ax: Axes of matplotlib, or several of them.
+        n: number of diagrams.
+        name: of the function that draws.
+
+    Raises:
+        ConfigError: if they are not so many.
     """
+    require("matplotlib")
+    from matplotlib.axes import Axes
 
-    png: bytes
-
-    def save(self, path: str | Path) -> Path:
-        """Write it as .png, whole or not at all.
-
-        Raises:
-            ConfigError: for another ending, or a place that is not writable.
-        """
-        place = checked(path, ".png")
-        write_whole(place, lambda file: file.write(self.png))
-        return place
-
-    def __repr__(self) -> str:
-        return f"Picture({len(self.png)} bytes; save(path) writes it)"
-
-    def _repr_png_(self) -> bytes:
-        return self.png
+    given = [ax] if isinstance(ax, Axes) else list(np.ravel(np.asarray(ax, dtype=object)))
+    if len(given) != n or not all(isinstance(axes, Axes) for axes in given):
+        raise ConfigError(
+            f"{name}: ax = {ax!r} must be {n} Axes of matplotlib, one for each diagram.",
+            hint=f"figure, ax = matplotlib.pyplot.subplots({n})",
+        )
+    return given[0].figure.figure, given
 
 
-def save(figure: "Figure", path: Path | None) -> Path | Picture:
-    """Write the sheet as PNG, or give it back where there is no path."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": "rom"})
-    picture = Picture(buffer.getvalue())
-    return picture if path is None else picture.save(path)
+def save(figure: "Figure", path: Path | None) -> "Figure":
+    """The figure, written as PNG where there is a path."""
+    from rom.view.canvas.picture import Picture, written
+
+    if path is not None and isinstance(figure, Picture):
+        figure.save(path)
+    elif path is not None:
+        written(figure, path)
+    return figure

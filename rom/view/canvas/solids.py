@@ -1,12 +1,18 @@
 """Surfaces of simple solids, to give rigid bodies a shape in pictures."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
+from rom.errors import ConfigError
 from rom.model import Array, Index
 
 Mesh = tuple[Array, Index]
+BORE_SIDES = 48  # of a hole at least
+FILLET_RATIO = 0.25  # of the gap of a gear, by which a tooth is wider at its root
 
 
 @typed
@@ -41,18 +47,281 @@ def cylinder(a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, *, sides: int 
         (2 sides + 2, 3) points and (4 sides, 3) triangles.
     """
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    axis = (b - a) / np.linalg.norm(b - a)
-    x = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    x /= np.linalg.norm(x)
-    angle = 2 * np.pi * np.arange(sides) / sides
-    ring = (
-        0.5 * diameter * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), np.cross(axis, x)))
-    )
+    return tube(np.stack([a, b]), diameter, sides=sides)
+
+
+@typed
+def ring(
+    a: npt.ArrayLike, b: npt.ArrayLike, inner: float, outer: float, *, sides: int = 48
+) -> Mesh:
+    """Hollow cylinder from one point to another: a bush, the film of a bearing, a tube.
+
+    Args:
+        a: (3,) middle of one end [m].
+        b: (3,) middle of the other end [m].
+        inner: diameter of the bore [m].
+        outer: diameter outside [m].
+        sides: number of flat faces around.
+
+    Returns:
+        (4 sides, 3) points and (8 sides, 3) triangles.
+
+    Raises:
+        ConfigError: if the bore is not inside.
+    """
+    if not 0.0 < inner < outer:
+        raise ConfigError(f"a bore of {inner:g} m is not inside a ring of {outer:g} m.")
+    x, y, _ = across(a, b)
+    loops = [_circle(x, y, d / 2, sides) for d in (inner, outer, outer, inner)]
+    ends = (a, a, b, b)
+    points = np.vstack([np.asarray(end) + loop for end, loop in zip(ends, loops, strict=True)])
     i = np.arange(sides)
-    j = (i + 1) % sides
-    first, last = np.full(sides, 2 * sides), np.full(sides, 2 * sides + 1)
-    triangles = [(i, j, sides + j), (i, sides + j, sides + i), (first, j, i)]
-    triangles.append((last, sides + i, sides + j))
-    return np.vstack([a + ring, b + ring, a, b]), np.vstack(
-        [np.stack(t, axis=1) for t in triangles]
+    return points, np.vstack([_band(k * sides + i, (k + 1) % 4 * sides + i) for k in range(4)])
+
+
+@typed
+def ellipsoid(
+    semi_axes: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0), *, sides: int = 32
+) -> Mesh:
+    """Ellipsoid, or ball, with its axes along x, y and z.
+
+    Args:
+        semi_axes: (3,) half of its lengths [m].
+        centre: (3,) its centre [m].
+        sides: number of flat faces around; half as many from pole to pole.
+
+    Returns:
+        Points and triangles; the points lie on the surface.
+    """
+    latitudes = np.pi * np.arange(1, sides // 2) / (sides // 2)
+    circle = _circle(np.eye(3)[0], np.eye(3)[1], 1.0, sides)
+    rows = [np.sin(u) * circle - np.cos(u) * np.eye(3)[2] for u in latitudes]
+    points = np.vstack([*rows, -np.eye(3)[2], np.eye(3)[2]])
+    i, j = np.arange(sides), np.roll(np.arange(sides), -1)
+    south, north = len(points) - 2, len(points) - 1
+    last = (len(rows) - 1) * sides
+    triangles = [_band(k * sides + i, (k + 1) * sides + i) for k in range(len(rows) - 1)]
+    triangles += [np.column_stack([0 * i + south, j, i])]
+    triangles += [np.column_stack([0 * i + north, last + i, last + j])]
+    scaled = points * np.asarray(semi_axes, dtype=float)
+    return scaled + np.asarray(centre, dtype=float), np.vstack(triangles)
+
+
+@typed
+def tube(line: npt.ArrayLike, diameter: float, *, sides: int = 16) -> Mesh:
+    """Round bar along a curve, closed at its ends.
+
+    Args:
+        line: (k, 3) points of its middle line, k > 1, no two of them in one place [m].
+        diameter: [m]; smaller than twice the radius of each bend.
+        sides: number of flat faces around.
+
+    Returns:
+        (k sides + 2, 3) points and triangles; sections are normal to the curve.
+
+    Raises:
+        ConfigError: if the points are no curve.
+    """
+    X = np.asarray(line, dtype=float)
+    if X.ndim != 2 or X.shape[1:] != (3,) or len(X) < 2:
+        raise ConfigError(f"the line of a tube is (k, 3) with k > 1, got {X.shape}.")
+    steps = np.diff(X, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    if not (lengths > 0.0).all():
+        raise ConfigError("two points of the line of a tube are in one place.")
+    ahead = steps / lengths[:, None]
+    along = np.vstack([ahead[:1], ahead[1:] + ahead[:-1], ahead[-1:]])
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    x = across(np.zeros(3), along[0])[0]
+    loops = []
+    for centre, t in zip(X, along, strict=True):
+        x = x - (x @ t) * t
+        x = x / np.linalg.norm(x)
+        loops.append(centre + _circle(x, np.cross(t, x), diameter / 2, sides))
+    i, j = np.arange(sides), np.roll(np.arange(sides), -1)
+    n, last = sides * len(X), sides * (len(X) - 1)
+    triangles = [_band(k * sides + i, (k + 1) * sides + i) for k in range(len(X) - 1)]
+    triangles += [np.column_stack([0 * i + n, j, i])]
+    triangles += [np.column_stack([0 * i + n + 1, last + i, last + j])]
+    return np.vstack([*loops, X[:1], X[-1:]]), np.vstack(triangles)
+
+
+@typed
+def coil(
+    a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6.0
+) -> Mesh:
+    """Helical spring from one point to another.
+
+    Args:
+        a: (3,) middle of one end [m].
+        b: (3,) middle of the other end [m].
+        diameter: of the middle line of the wire [m].
+        wire: diameter of the wire [m].
+        turns: number of turns.
+
+    Returns:
+        Points and triangles.
+
+    Raises:
+        ConfigError: if the wire is thicker than its bends allow.
+    """
+    if not 0.0 < wire < diameter:
+        raise ConfigError(f"a wire of {wire:g} m makes no coil of {diameter:g} m.")
+    return tube(helix(a, b, diameter, turns), wire, sides=12)
+
+
+def helix(a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, turns: float) -> Array:
+    """(k, 3) points on a helix about the line from a to b, 24 to a turn."""
+    x, y, z = across(a, b)
+    s = np.linspace(0.0, 1.0, int(np.ceil(24 * turns)) + 1)[:, None]
+    angle = 2 * np.pi * turns * s
+    length = np.linalg.norm(np.asarray(b, dtype=float) - np.asarray(a, dtype=float))
+    return (
+        np.asarray(a, dtype=float)
+        + 0.5 * diameter * (np.cos(angle) * x + np.sin(angle) * y)
+        + length * s * z
     )
+
+
+@typed
+def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh:
+    """Plate in the plane of x and y, half of its width on either side.
+
+    Args:
+        outline: (n, 2) corners, counter-clockwise, all of them in sight of the origin [m].
+        width: along z [m].
+        bore: diameter of a round hole about the origin [m]; 0 for none.
+
+    Returns:
+        Points and triangles.
+
+    Raises:
+        ConfigError: if the outline is not seen from the origin, or the bore leaves it.
+    """
+    P = np.asarray(outline, dtype=float)
+    if P.ndim != 2 or P.shape[1:] != (2,) or len(P) < 3:
+        raise ConfigError(f"an outline is (n, 2) with n > 2, got {P.shape}.")
+    Q = np.roll(P, -1, axis=0)
+    turning = P[:, 0] * Q[:, 1] - P[:, 1] * Q[:, 0]
+    if not (turning > 0.0).all():
+        raise ConfigError("the outline does not turn counter-clockwise about the origin.")
+    d = Q - P
+    foot = np.clip(-np.sum(P * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
+    nearest = float(np.linalg.norm(P + foot[:, None] * d, axis=1).min())
+    if not 0.0 <= bore < 2 * nearest:
+        raise ConfigError(
+            f"a bore of {bore:g} m does not fit into an outline {nearest:g} m from the origin."
+        )
+    if bore:  # as many points as a round hole needs
+        k = -(-BORE_SIDES // len(P))
+        share = np.arange(k)[:, None, None] / k
+        P = (P + share * d).swapaxes(0, 1).reshape(-1, 2)
+    radius = np.linalg.norm(P, axis=1)[:, None]
+    inside = bore / 2 * P / radius if bore else np.zeros((1, 2))
+    loops = [(inside, -1), (P, -1), (P, 1), (inside, 1)]
+    points = np.vstack([np.column_stack([x, np.full(len(x), s * width / 2)]) for x, s in loops])
+    n, m = len(P), len(inside)
+    first = np.cumsum([0, m, n, n])
+    rows = [at + (np.arange(n) if k in (1, 2) or bore else np.zeros(n, dtype=int))
+            for k, at in enumerate(first)]  # fmt: skip
+    bands = [_band(rows[k], rows[(k + 1) % 4]) for k in range(4 if bore else 3)]
+    triangles = np.vstack(bands)
+    area = [len(set(t)) == 3 for t in triangles.tolist()]  # a fan about one point has half of them
+    return points, triangles[area]
+
+
+@typed
+def gear(
+    teeth: int,
+    module: float,
+    width: float,
+    *,
+    bore: float = 0.0,
+    pressure_angle: float = np.deg2rad(20.0),
+    points: int = 6,
+) -> Mesh:
+    """Spur gear with involute flanks, its axis z, a space between two teeth on the x axis.
+
+    Args:
+        teeth: number of teeth, 6 or more.
+        module: pitch diameter / number of teeth [m].
+        width: [m].
+        bore: diameter of a round hole [m]; 0 for none.
+        pressure_angle: [rad].
+        points: on each flank.
+
+    Returns:
+        Points and triangles; addendum of one module, dedendum of 1.25. Below the base circle
+        straight lines widen the teeth, as fillets do.
+
+    Raises:
+        ConfigError: for too few teeth, or a pressure angle at which they are pointed.
+    """
+    return extruded(gear_outline(teeth, module, pressure_angle, points), width, bore=bore)
+
+
+def gear_outline(teeth: int, module: float, pressure_angle: float, points: int = 6) -> Array:
+    """(n, 2) outline of a spur gear, counter-clockwise [m]; see `gear`."""
+    pitch, top = 0.5 * teeth * module, (0.5 * teeth + 1.0) * module
+    base, root = pitch * np.cos(pressure_angle), (0.5 * teeth - 1.25) * module
+    half = np.pi / (2 * teeth) + involute(pressure_angle)  # angle of half a tooth at the base
+    if teeth < 6 or not involute(np.arccos(base / top)) < half:
+        raise ConfigError(
+            f"{teeth} teeth of a pressure angle of {np.rad2deg(pressure_angle):g} degrees are "
+            "pointed, or too few."
+        )
+    r = np.linspace(max(base, root), top, points)
+    flank = involute(np.arccos(np.minimum(base / r, 1.0))) - half
+    foot = flank[0] - (FILLET_RATIO * (np.pi / teeth + flank[0]) if root < base else 0.0)
+    tip = np.linspace(flank[-1], -flank[-1], points)[1:-1]
+    gap = np.linspace(-foot, 2 * np.pi / teeth + foot, points)
+    gap = gap[:-1] if root < base else gap[1:-1]  # the flanks begin on the root circle
+    angle = np.concatenate([flank, tip, -flank[::-1], gap])
+    radius = np.concatenate([r, np.full(tip.size, top), r[::-1], np.full(gap.size, root)])
+    if root < base:
+        angle, radius = np.append(foot, angle), np.append(root, radius)
+    turns = np.pi / teeth + 2 * np.pi * np.arange(teeth) / teeth
+    every = (turns[:, None] + angle).ravel()
+    return np.tile(radius, teeth)[:, None] * np.column_stack([np.cos(every), np.sin(every)])
+
+
+def involute(angle: Any) -> Any:
+    """Involute function: angle of a point on the curve where the pressure angle is that."""
+    return np.tan(angle) - angle
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Several surfaces as one."""
+    first = np.cumsum([0, *(len(points) for points, _ in meshes)])[:-1]
+    return np.vstack([points for points, _ in meshes]), np.vstack(
+        [triangles + n for n, (_, triangles) in zip(first, meshes, strict=True)]
+    )
+
+
+def across(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array, Array]:
+    """Right-handed unit vectors x, y and z with z from one point towards the other.
+
+    Raises:
+        ConfigError: if both are in one place.
+    """
+    z = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
+    length = np.linalg.norm(z)
+    if not length > 0.0:
+        raise ConfigError(f"two points in one place, {a!r}, have no direction.")
+    z = z / length
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x = x / np.linalg.norm(x)
+    return x, np.cross(z, x), z
+
+
+def _circle(x: Array, y: Array, radius: float, sides: int) -> Array:
+    """(sides, 3) points around the origin, from x towards y."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    circle: Array = radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y))
+    return circle
+
+
+def _band(one: Index, two: Index) -> Index:
+    """Triangles between two closed rows of as many points, the second one ahead of the first."""
+    i, j = np.roll(one, -1), np.roll(two, -1)
+    return np.vstack([np.column_stack([one, i, j]), np.column_stack([one, j, two])])

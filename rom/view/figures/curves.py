@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +10,12 @@ import numpy.typing as npt
 from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
+from rom.model import Array
 from rom.view.canvas import page
+from rom.view.canvas.scales import readable, without_round_off
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE_WIDTH, PANEL_HEIGHT = 1400, 330  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
@@ -28,60 +33,82 @@ def history(
     panels: Sequence[tuple[str, dict[str, Any]]],
     path: str | Path | None = None,
     *,
-    title: str,
-    caption: str,
+    title: str = "",
+    caption: str = "",
     over: str | None = None,
-) -> Path | page.Picture:
+    ax: Any = None,
+) -> "Figure":
     """Draw quantities over time, or over something else, one panel below the other.
 
     Args:
         t: (n,) time [s], or values of what is named by ``over``.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
             (times, values) is drawn as points.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
         over: label of the horizontal axis, with its unit, when that is not time.
+        ax: Axes of matplotlib to draw into, one for each panel; None for a page of its own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = page.wanted(path)
     t = np.asarray(t, dtype=float)
-    unit, factor = ("ms", 1e3) if np.ptp(t) < 1.0 and over is None else ("s", 1.0)
     with page.styled():
-        figure, areas = _panels(len(panels), title, caption)
+        figure, areas = _panels(ax, len(panels), "history", title, caption)
         for axes, (label, curves) in zip(areas, panels, strict=True):
-            for k, (name, values) in enumerate(curves.items()):
-                pair = isinstance(values, tuple)
-                x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
-                if y.shape != x.shape:
-                    raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
-                look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
-                look |= {"ls": "none", "marker": "o", "ms": 7} if pair else {}
-                axes.plot(factor * x, y, label=name, **look)
+            _histories(axes, t, curves)
+            axes.set_xlabel(over or "time [s]", size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
-            axes.set_xlim(factor * t[0], factor * t[-1])
+            axes.set_xlim(t[0], t[-1])
             if len(curves) > 2:
                 axes.margins(y=0.3)  # room for the legend
             finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
-        for axes in areas[:-1]:
-            axes.set_xticklabels([])
-        areas[-1].set_xlabel(over or f"time [{unit}]", size=page.BODY_SIZE)
+        _shared(areas, ax)
         return page.save(figure, path)
+
+
+def _histories(axes: Any, t: Array, curves: dict[str, Any]) -> None:
+    pairs = [isinstance(values, tuple) for values in curves.values()]
+    lines = []
+    for (name, values), pair in zip(curves.items(), pairs, strict=True):
+        x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
+        if y.shape != x.shape:
+            raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
+        lines.append((x, y))
+    flat = without_round_off([y for _, y in lines])
+    for k, (name, pair, (x, _), y) in enumerate(zip(curves, pairs, lines, flat, strict=True)):
+        look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
+        look |= {"ls": "none", "marker": "o", "ms": 7} if pair else {}
+        axes.plot(x, y, label=name, **look)
+
+
+def _shared(areas: Sequence[Any], ax: Any) -> None:
+    """One horizontal axis for all panels of a page; axes of a caller keep theirs."""
+    for axes in areas[:-1] if ax is None else ():
+        axes.set_xlabel("")
+        axes.tick_params(labelbottom=False)
 
 
 @path_came_first(1, 0)
 @typed
 def frequencies(
-    comparison: dict[str, Any], path: str | Path | None = None, *, title: str
-) -> Path | page.Picture:
+    comparison: dict[str, Any], path: str | Path | None = None, *, title: str = "", ax: Any = None
+) -> "Figure":
     """Draw the relative errors of reduced frequencies in several supports.
 
     Args:
         comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
+        ax: Axes of matplotlib to draw into; None for a page of its own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: without a comparison, or if pictures cannot be made here.
@@ -96,7 +123,7 @@ def frequencies(
         "frequencies are never below full ones."
     )
     with page.styled():
-        figure, (axes,) = _panels(1, title, caption)
+        figure, (axes,) = _panels(ax, 1, "frequencies", title, caption)
         longest = 0
         for k, (support, table) in enumerate(comparison.items()):
             full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
@@ -121,25 +148,30 @@ def convergence(
     path: str | Path | None = None,
     *,
     xlabel: str,
-    title: str,
-    caption: str,
-) -> Path | page.Picture:
+    title: str = "",
+    caption: str = "",
+    ax: Any = None,
+) -> "Figure":
     """Draw errors that fall with the size of a model, on logarithmic axes.
 
     Args:
         panels: (label of the axis, {name: (sizes (n,), errors (n,))}) from top to bottom; errors
             at or below round-off are drawn at 1e-12.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         xlabel: what the sizes count.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
+        ax: Axes of matplotlib to draw into, one for each panel; None for a page of its own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = page.wanted(path)
     with page.styled():
-        figure, areas = _panels(len(panels), title, caption)
+        figure, areas = _panels(ax, len(panels), "convergence", title, caption)
         for axes, (label, curves) in zip(areas, panels, strict=True):
             for k, (name, (sizes, errors)) in enumerate(curves.items()):
                 x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
@@ -147,13 +179,12 @@ def convergence(
                     raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
                 look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
                 axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
+            axes.set_xlabel(xlabel, size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             _near_ticks(axes)
             finish(axes, legend=True)
         _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
-        for axes in areas[:-1]:
-            axes.set_xticklabels([])
-        areas[-1].set_xlabel(xlabel, size=page.BODY_SIZE)
+        _shared(areas, ax)
         return page.save(figure, path)
 
 
@@ -165,9 +196,10 @@ def campbell(
     *,
     orders: Sequence[float] = (1.0,),
     names: Sequence[str] = (),
-    title: str,
-    caption: str,
-) -> Path | page.Picture:
+    title: str = "",
+    caption: str = "",
+    ax: Any = None,
+) -> "Figure":
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
 
     A ring marks where a mode meets a multiple of the speed. A second panel shows the damping,
@@ -175,24 +207,31 @@ def campbell(
 
     Args:
         diagram: what `rom.campbell` returned.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         orders: multiples of the speed to draw [1].
         names: one per mode, in the order of the columns; without names modes are numbered.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
+        ax: Axes of matplotlib to draw into, two if there is damping; None for a page of its own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if there is not one name per mode, or pictures cannot be made here.
     """
     path = page.wanted(path)
-    f, damping = diagram.frequencies, 100 * diagram.damping_ratios
+    f, damping = (
+        np.stack(without_round_off(list(values.T)), axis=1)
+        for values in (diagram.frequencies, 100 * diagram.damping_ratios)
+    )
     if names and len(names) != f.shape[1]:
         raise ConfigError(f"{len(names)} names for {f.shape[1]} modes.")
     labels = names or [f"mode {k + 1}" for k in range(f.shape[1])]
     turns = 30 * diagram.speeds / np.pi
     damped = np.abs(damping).max(initial=0.0) > 1e-3
     with page.styled():
-        figure, areas = _panels(2 if damped else 1, title, caption)
+        figure, areas = _panels(ax, 2 if damped else 1, "campbell", title, caption)
         for k, label in enumerate(labels):
             look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.6}
             areas[0].plot(turns, f[:, k], label=label, **look)
@@ -200,6 +239,7 @@ def campbell(
                 areas[1].plot(turns, damping[:, k], label=label, **look)
         _multiples(areas[0], diagram, turns, orders)
         for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
+            axes.set_xlabel("speed [1/min]", size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(turns[0], turns[-1])
             finish(axes, legend=False)
@@ -210,9 +250,7 @@ def campbell(
             loc="upper left",
             ncol=LEGEND_COLUMNS,
         )
-        for axes in areas[:-1]:
-            axes.set_xticklabels([])
-        areas[-1].set_xlabel("speed [1/min]", size=page.BODY_SIZE)
+        _shared(areas, ax)
         return page.save(figure, path)
 
 
@@ -262,7 +300,13 @@ def _near_ticks(axes: Any) -> None:
         axes.set_yticks(ticks, [f"{y:g}" for y in ticks])
 
 
-def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
+def _panels(ax: Any, n: int, name: str, title: str, caption: str) -> tuple[Any, list[Any]]:
+    """Figure and axes: those of the caller, or one below the other on a page."""
+    if ax is not None:
+        figure, areas = page.taken(ax, n, name)
+        if title:
+            areas[0].set_title(title, loc="left")
+        return figure, areas
     text, below = page.caption(caption, PAGE_WIDTH - 60)
     height = 80 + n * (PANEL_HEIGHT + 25) + 60 + below + 25
     figure = page.sheet(PAGE_WIDTH, height)
@@ -275,8 +319,9 @@ def _panels(n: int, title: str, caption: str) -> tuple[Any, list[Any]]:
     return figure, areas
 
 
-def finish(axes: Any, *, legend: bool, loc: str = "best") -> None:
-    """Grid, spines and legend of the house."""
+def finish(axes: Any, *, legend: bool, loc: str = "best", alike: bool = False) -> None:
+    """Grid, spines, units and legend of the house."""
+    readable(axes, alike=alike)
     axes.tick_params(labelsize=page.SMALL_SIZE)
     axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,11 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import COLOUR_MAP
+from rom.view.canvas.scales import readable
 from rom.view.figures.curves import LINES, MARKERS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1400  # [pixel]
 COLUMN_GAP = 120  # [pixel]
@@ -62,20 +66,25 @@ def plane(
     drawings: Sequence[Drawing],
     path: str | Path | None = None,
     *,
-    title: str,
-    caption: str,
+    title: str = "",
+    caption: str = "",
     columns: int = 2,
     height: int = 480,
-) -> Path | page.Picture:
+    ax: Any = None,
+) -> "Figure":
     """Draw things in a plane, side by side.
 
     Args:
         drawings: row by row, from the top left.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
         columns: drawings in a row.
         height: of each drawing [pixel].
+        ax: Axes of matplotlib to draw into, one for each drawing; None for a page of its own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: without a drawing, or if pictures cannot be made here.
@@ -83,6 +92,11 @@ def plane(
     path = page.wanted(path)
     if not drawings:
         raise ConfigError("there is nothing to draw.")
+    if ax is not None:
+        figure, areas = page.taken(ax, len(drawings), "plane")
+        for axes, drawing in zip(areas, drawings, strict=True):
+            _draw(figure, axes, drawing)
+        return page.save(figure, path)
     rows = -(-len(drawings) // columns)
     text, below = page.caption(caption, PAGE_WIDTH - 60)
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
@@ -126,6 +140,7 @@ def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
         axes.set_ylim(drawing.extent[2:])
     if drawing.equal:
         axes.set_aspect("equal", adjustable="box" if drawing.shade is not None else "datalim")
+    readable(axes, alike=drawing.equal)
     if axes.get_legend_handles_labels()[0]:
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
         axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=2, **place)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,11 @@ from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view.canvas import page
+from rom.view.canvas.scales import without_round_off
 from rom.view.figures.curves import LINES, PAGE_WIDTH, finish
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # pixel, of a diagram and around it
 PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
@@ -54,20 +58,35 @@ class Panel:
 @path_came_first(1, 0)
 @typed
 def panels(
-    rows: Sequence[Sequence[Panel]], path: str | Path | None = None, *, title: str, caption: str
-) -> Path | page.Picture:
+    rows: Sequence[Sequence[Panel]],
+    path: str | Path | None = None,
+    *,
+    title: str = "",
+    caption: str = "",
+    ax: Any = None,
+) -> "Figure":
     """Draw rows of diagrams.
 
     Args:
         rows: diagrams from top to bottom, and from left to right in each row.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
+        ax: Axes of matplotlib, one for each diagram, row by row; None for a page of its own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = page.wanted(path)
+    if ax is not None:
+        diagrams = [panel for row in rows for panel in row]
+        figure, areas = page.taken(ax, len(diagrams), "panels")
+        for area, panel in zip(areas, diagrams, strict=True):
+            _draw(area, panel, area.get_window_extent().size)
+        return page.save(figure, path)
     with page.styled():
         text, below = page.caption(caption, PAGE_WIDTH - 60)
         step = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN
@@ -88,13 +107,14 @@ def panels(
 
 
 def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
-    for k, (name, line) in enumerate(panel.curves.items()):
+    curves, points = _lines(panel)
+    for k, (name, line) in enumerate(curves.items()):
         look = {"color": LINES[k % len(LINES)], "lw": 1.4, "ls": "--" if k % 2 else "-"}
         look = GUIDE_STYLE if name.startswith("_") else look
-        axes.plot(*_paired(name, line), label=name, **look)
-    for name, line in panel.points.items():
+        axes.plot(*line, label=name, **look)
+    for name, line in points.items():
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
-        axes.plot(*_paired(name, line), "o", label=name, **look)
+        axes.plot(*line, "o", label=name, **look)
     if panel.bars:
         _draw_bars(axes, panel.bars)
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
@@ -112,7 +132,20 @@ def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
         axes.set_axis_off()
     if panel.equal:
         _same_scale(axes, shape)
-    finish(axes, legend=named > 0, loc="upper left")
+    finish(axes, legend=named > 0, loc="upper left", alike=panel.equal)
+
+
+def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
+    """Curves and points; along linear axes without round-off."""
+    given = [(name, line) for lines in (panel.curves, panel.points) for name, line in lines.items()]
+    names, lines = [name for name, _ in given], [_paired(name, line) for name, line in given]
+    if not panel.log and lines:
+        x, y = (without_round_off(list(values)) for values in zip(*lines, strict=True))
+        lines = list(zip(x, y, strict=True))
+    n = len(panel.curves)
+    return dict(zip(names[:n], lines[:n], strict=True)), dict(
+        zip(names[n:], lines[n:], strict=True)
+    )
 
 
 def _same_scale(axes: Any, shape: tuple[float, float]) -> None:

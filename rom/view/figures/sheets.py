@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,9 +12,13 @@ from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
-from rom.view.canvas.gif import write_gif
+from rom.view.canvas.films import Film, finished, wanted
 from rom.view.canvas.offscreen import COLOUR_MAP
+from rom.view.canvas.scales import clock_texts
 from rom.view.figures.curves import LINES, MARKERS, finish
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE_WIDTH, PANEL_HEIGHT = 1500, 430  # pixel
 FILM_SIZE = (640, 700)  # of the picture in a film [pixel]
@@ -55,25 +59,41 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     limit: tuple[str, float],
     xlabel: str,
     ylabel: str,
-    title: str,
-    caption: str,
-) -> Path | page.Picture:
+    title: str = "",
+    caption: str = "",
+    ax: Any = None,
+) -> "Figure":
     """Draw curves that tend to a limit beside the bodies they belong to.
 
     Args:
         curves: {name: (x (n,), y (n,))}, x on a logarithmic axis.
         shapes: bodies, from left to right.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         limit: name and value of a horizontal line, in units of y.
         xlabel: of the curves.
         ylabel: of the curves.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
+        ax: Axes of matplotlib, one for the curves and one for each shape; None for a page of its
+            own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if the shapes do not fit beside the curves, or pictures cannot be made here.
     """
-    path, left = page.wanted(path), PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
+    path = page.wanted(path)
+    if ax is not None:
+        figure, (axes, *areas) = page.taken(ax, 1 + len(shapes), "deformed")
+        _tending(axes, curves, limit, (xlabel, ylabel))
+        for area, shape in zip(areas, shapes, strict=True):
+            area.set_title(shape.title, size=page.BODY_SIZE)
+            drawn = _shape(area, shape)
+            if shape.values is not None:
+                figure.colorbar(drawn, ax=area, label=shape.label)
+        return page.save(figure, path)
+    left = PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
     if left < 400:
         raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves.")
     with page.styled():
@@ -82,16 +102,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         figure = page.sheet(PAGE_WIDTH, height)
         page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
         axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
-        for k, (name, (x, y)) in enumerate(curves.items()):
-            look = {"color": LINES[k], "marker": MARKERS[k], "lw": 1.5}
-            axes.semilogx(np.asarray(x), np.asarray(y), label=name, **look)
-        axes.axhline(limit[1], color=EDGE_COLOUR, ls="--", lw=1.0, label=limit[0])
-        ticks = np.unique(np.concatenate([np.asarray(x) for x, _ in curves.values()]))
-        axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
-        axes.minorticks_off()
-        axes.set_xlabel(xlabel, size=page.BODY_SIZE)
-        axes.set_ylabel(ylabel, size=page.BODY_SIZE)
-        finish(axes, legend=True)
+        _tending(axes, curves, limit, (xlabel, ylabel))
         for shape in shapes:
             page.words(figure, shape.title, left + 10, 80, size=page.BODY_SIZE)
             _shape(page.area(figure, left, 120, shape.width, PANEL_HEIGHT), shape)
@@ -104,29 +115,51 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
+def _tending(
+    axes: Any,
+    curves: dict[str, tuple[Any, Any]],
+    limit: tuple[str, float],
+    labels: tuple[str, str],
+) -> None:
+    """Curves and the limit they tend to."""
+    for k, (name, (x, y)) in enumerate(curves.items()):
+        look = {"color": LINES[k], "marker": MARKERS[k], "lw": 1.5}
+        axes.semilogx(np.asarray(x), np.asarray(y), label=name, **look)
+    axes.axhline(limit[1], color=EDGE_COLOUR, ls="--", lw=1.0, label=limit[0])
+    ticks = np.unique(np.concatenate([np.asarray(x) for x, _ in curves.values()]))
+    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel(labels[0], size=page.BODY_SIZE)
+    axes.set_ylabel(labels[1], size=page.BODY_SIZE)
+    finish(axes, legend=True)
+
+
 @path_came_first(1, 2, 0)
 @typed
 def flow(
     times: Array,
     shapes: Sequence[Shape],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     seconds: float = 4.0,
-    caption: str,
-) -> Path:
+    caption: str = "",
+) -> Film:
     """Film of one body; colours and frame stay the same from first to last.
 
     Args:
         times: (k,) of the shapes [s].
         shapes: (k) states of the body, with values.
-        path: film to write, .gif.
+        path: film to write, .gif or .mp4; None to write nothing.
         seconds: how long the film lasts [s].
         caption: what a stranger has to know.
+
+    Returns:
+        The film.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
-    path = page.checked(path, ".gif")
+    path = wanted(path)
     if len(times) != len(shapes):
         raise ConfigError(f"{len(times)} times for {len(shapes)} shapes.")
     highest = max(float(s.values.max()) for s in shapes if s.values is not None)
@@ -136,30 +169,31 @@ def flow(
     pages = []
     with page.styled():
         text, below = page.caption(caption, width - 40)
-        for t, shape in zip(times, shapes, strict=True):
+        for clock, shape in zip(clock_texts(times), shapes, strict=True):
             figure = page.sheet(width, height + 155 + below)
-            page.words(figure, f"t = {1e6 * t:.1f} \u00b5s", 20, 12)
+            page.words(figure, clock, 20, 12)
             axes = page.area(figure, 10, 45, width - 20, height)
             _shape(axes, shape, highest=highest, frame=frame)
             bar = (width / 2 - 200, height + 80, 400, 14)
             page.colour_bar(figure, (0.0, highest), shape.label, bar)
             page.words(figure, text, 20, height + 142, size=page.SMALL_SIZE)
             pages.append(page.pixels(figure))
-    write_gif(path, np.stack(pages), seconds / len(pages))
-    return path
+    return finished(np.stack(pages), seconds / len(pages), path)
 
 
 def _shape(
     axes: Any, shape: Shape, *, highest: float | None = None, frame: Array | None = None
-) -> None:
+) -> Any:
+    """Draw a body, and give back what has its colours."""
     x, y = shape.points.T
+    look: dict[str, Any] = {"facecolors": shape.values, "cmap": COLOUR_MAP, "vmin": 0.0,
+                            "edgecolors": "face", "lw": 0.7}  # fmt: skip
     if shape.values is None:
-        axes.tripcolor(x, y, shape.triangles, facecolors=np.zeros(len(shape.triangles)),
-                       cmap=_one_colour(), edgecolors=EDGE_COLOUR, lw=0.5)  # fmt: skip
+        plain = np.zeros(len(shape.triangles))
+        look = {"facecolors": plain, "cmap": _one_colour(), "edgecolors": EDGE_COLOUR, "lw": 0.5}
     else:
-        top = highest or float(shape.values.max())
-        axes.tripcolor(x, y, shape.triangles, facecolors=shape.values, cmap=COLOUR_MAP, vmin=0.0,
-                       vmax=top, edgecolors="face", lw=0.7)  # fmt: skip
+        look["vmax"] = highest or float(shape.values.max())
+    drawn = axes.tripcolor(x, y, shape.triangles, **look)
     for edge in _boundary(shape.triangles):
         axes.plot(*shape.before[edge].T, color=UNDEFORMED_COLOUR, ls="--", lw=0.9)
     both = np.vstack([shape.points, shape.before]) if frame is None else frame
@@ -169,6 +203,7 @@ def _shape(
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")
     axes.set_axis_off()
+    return drawn
 
 
 def _one_colour() -> Any:

@@ -1,7 +1,7 @@
 """Frequency responses before and after an update, with what was changed and where it was seen."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,9 @@ from rom.view.canvas import page
 from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import Actor, aimed
 from rom.view.figures.curves import LINES, finish
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE_WIDTH, TOP_HEIGHT, BOTTOM_HEIGHT = 1500, 430, 430  # pixel
 DOT_COLOUR, LINE_COLOUR = "#8b929c", "#6b7480"
@@ -29,20 +32,26 @@ def updating(  # noqa: PLR0913  keywords of one picture
     *,
     structure: tuple[Array, Index, Array, Array],
     label: str,
-    title: str,
-    caption: str,
-) -> Path | page.Picture:
+    title: str = "",
+    caption: str = "",
+    ax: Any = None,
+) -> "Figure":
     """Draw one response of test and model above the changes that explain it.
 
     Args:
         f: (n,) frequencies [Hz].
         curves: {name: (n,) complex receptance [m/N]}: test, model before, model after.
         changes: {parameter: (true, found, standard deviation)} as fractions [1].
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         structure: points (n, 3) [m], beams (m, 2), sensor and exciter positions (k, 3), (l, 3).
         label: what the response is, with its unit.
         title: heading.
-        caption: what a stranger has to know.
+        caption: what a stranger has to know; not written into axes of yours.
+        ax: three Axes of matplotlib, for responses, changes and structure; None for a page of its
+            own.
+
+    Returns:
+        The figure; that of ``ax`` where it is given.
 
     Raises:
         ConfigError: if lengths differ, or pictures cannot be made here.
@@ -52,6 +61,13 @@ def updating(  # noqa: PLR0913  keywords of one picture
         if np.shape(values) != f.shape:
             raise ConfigError(f"{name!r} has {np.size(values)} values for {f.size} frequencies.")
     image = _structure(*structure)
+    if ax is not None:
+        figure, (responses, bars, seen) = page.taken(ax, 3, "updating")
+        _responses(responses, f, curves, label)
+        _changes(bars, changes)
+        seen.imshow(image)
+        seen.set_axis_off()
+        return page.save(figure, path)
     with page.styled():
         text, below = page.caption(caption, PAGE_WIDTH - 60)
         height = 85 + TOP_HEIGHT + 110 + BOTTOM_HEIGHT + 95 + below

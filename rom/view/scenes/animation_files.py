@@ -15,7 +15,9 @@ from rom.model import Array
 from rom.names import named
 from rom.view.canvas.page import checked
 from rom.view.canvas.solids import Mesh
-from rom.view.scenes.film import bars, placed, shades_of
+from rom.view.scenes.film import shades_of
+from rom.view.scenes.places import placed
+from rom.view.scenes.rigid import bars, ends_of
 
 METAL_COLOURS = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bodies
 ELASTIC_COLOURS = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.63, 0.51))
@@ -39,7 +41,7 @@ def write_animation(
         path: ``.glb`` (glTF 2.0 binary) for browsers, slides and Blender; ``.vtkhdf`` for ParaView,
             with the displacement relative to the floating frame as a field.
         shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body; without one
-            it is drawn as bars between its markers.
+            it is drawn as tubes from its mass centre to its markers.
         frames: number of instants, evenly over the saved ones.
         seconds: how long the ``.glb`` lasts [s]; None for the true time.
         magnify: deformations are drawn so many times larger than they are [1].
@@ -82,7 +84,9 @@ def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) 
             )
             elastic += 1
         else:
-            points, triangles = shapes[name] if name in shapes else bars(part)
+            points, triangles = (
+                shapes[name] if name in shapes else bars(part, ends_of(solution.mechanism, name))
+            )
             modes, q = np.zeros((3 * len(points), 0)), np.zeros((len(steps), 0))
             colour = METAL_COLOURS[shades[name]]
         pose = solution.position(name)[steps], solution.orientation(name)[steps]

@@ -2,72 +2,95 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom import rotation
 from rom.arguments import AnyMechanism, AnySolution, typed
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import named, offered
 from rom.view.canvas import page
-from rom.view.canvas.gif import write_gif
+from rom.view.canvas.corner import BAR_SIZE, TRIAD_SIZE, corner
+from rom.view.canvas.corner import HEIGHT as CORNER_HEIGHT
+from rom.view.canvas.films import Film, finished, wanted
 from rom.view.canvas.offscreen import Image, render
+from rom.view.canvas.scales import clock_texts, prefixed
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
-from rom.view.canvas.solids import Mesh, cylinder
+from rom.view.canvas.solids import Mesh
+from rom.view.canvas.symbols import polyline
+from rom.view.scenes.connections import connections
+from rom.view.scenes.places import Places, different, moving, placed
+from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FILM_WIDTH, STILL_WIDTH = 900, 740  # of a film and of one instant in a series [pixel]
+HEIGHTS = (0.2, 0.85)  # bounds of the height of a picture, of its width
 CLOCK_HEIGHT = 40  # of the strip with the time [pixel]
+N_INSTANTS = 4  # that are chosen where none are asked for
 METAL_COLOURS = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
-SCALES = ((1.0, "m"), (1e3, "mm"), (1e6, "um"), (1e9, "nm"))  # per metre
+EDGE_COLOUR, TRACE_COLOUR = "#3a414b", "#d1495b"
+TRACE_POINTS = 1000
 
 
 @typed
 def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     mechanism: AnyMechanism,
     solution: AnySolution,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     shapes: dict[str, Mesh] | None = None,
     frames: int = 60,
     seconds: float = 4.0,
     magnify: float = 1.0,
+    symbols: bool = True,
+    traces: tuple[str, ...] = (),
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path:
+) -> Film:
     """Film of the mechanism, flexible bodies deformed and coloured by their deformation.
+
+    How much of it is drawn is shown on stderr, where that is a terminal.
 
     Args:
         mechanism: the mechanism.
         solution: its motion.
-        path: film to write, .gif.
+        path: film to write, .gif, or .mp4 by ffmpeg; None to write nothing.
         shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body; without one
-            it is drawn as bars between its markers.
+            it is drawn as tubes from its mass centre to its markers, in the box of its inertia.
         frames: number of pictures, evenly over the time of the solution.
         seconds: how long the film lasts [s].
         magnify: deformations are drawn so many times larger than they are [1].
+        symbols: draw joints, springs, planes of contact and the ground, too.
+        traces: bodies whose origin leaves a line behind, all of its way.
         view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
-        up: (3,) upright direction [1]; None: across the longest extent.
+        up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
+
+    Returns:
+        The film.
 
     Raises:
         ConfigError: for an unknown body, or if pictures cannot be made here.
+        ResourceError: for .mp4 without ffmpeg.
     """
-    path = page.checked(path, ".gif")
+    path = wanted(path)
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
-    stage = _stage(mechanism, solution, steps, shapes or {}, magnify)
+    up = upright(mechanism) if up is None else up
+    look = Look(shapes or {}, magnify, symbols, traces, up)
+    stage = _stage(mechanism, solution, steps, look)
     camera = stage.camera(FILM_WIDTH, view, up)
     # many small pictures: as large as they are, the smooth edges that the driver has will do
     images = render(stage.actors, camera, limits=stage.limits, oversampling=1)
     with page.styled():
-        blank = _film_sheet(stage, images.shape[1], magnify)
+        blank = _film_sheet(stage, camera, images.shape[1], magnify)
         clocks = np.stack([_clock(text) for text in clock_texts(solution.t[steps])])
     pages = np.repeat(blank[None], len(images), axis=0)
     pages[:, CLOCK_HEIGHT : CLOCK_HEIGHT + images.shape[1]] = images
     pages[:, :CLOCK_HEIGHT] = clocks
-    write_gif(path, pages, seconds / len(images))
-    return path
+    return finished(pages, seconds / len(images), path)
 
 
 @typed
@@ -76,26 +99,42 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     solution: AnySolution,
     path: str | Path | None = None,
     *,
-    times: npt.ArrayLike,
+    times: npt.ArrayLike | None = None,
     shapes: dict[str, Mesh] | None = None,
     magnify: float = 1.0,
+    symbols: bool = True,
+    traces: tuple[str, ...] = (),
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path | page.Picture:
+) -> "Figure":
     """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`.
 
-    The path ends in .png; without one the `Picture` itself is given back.
+    Without ``times`` the start and up to three more instants are drawn, at which the bodies are
+    farthest from where they are in the others. The path ends in .png.
 
     Raises:
         ConfigError: for an unknown body, or if pictures cannot be made here.
     """
     path = page.wanted(path)
-    wanted = np.asarray(times, dtype=float).ravel()
-    steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in wanted])
-    stage = _stage(mechanism, solution, steps, shapes or {}, magnify)
-    images = render(stage.actors, stage.camera(STILL_WIDTH, view, up), limits=stage.limits)
+    given = different(solution, N_INSTANTS) if times is None else np.asarray(times, dtype=float)
+    steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in given.ravel()])
+    up = upright(mechanism) if up is None else up
+    stage = _stage(mechanism, solution, steps, Look(shapes or {}, magnify, symbols, traces, up))
+    camera = stage.camera(STILL_WIDTH, view, up)
+    images = render(stage.actors, camera, limits=stage.limits)
     with page.styled():
-        return page.save(_series_sheet(stage, images, solution.t[steps], magnify), path)
+        return page.save(_series_sheet(stage, camera, images, solution.t[steps], magnify), path)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a mechanism is drawn; see `animate`."""
+
+    shapes: dict[str, Mesh]
+    magnify: float = 1.0
+    symbols: bool = True
+    traces: tuple[str, ...] = ()
+    up: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +142,7 @@ class Stage:
     """What is seen, and what its colours mean.
 
     Attributes:
-        actors: bodies and their edges.
+        actors: bodies, their edges and the symbols between them.
         limits: (2,) deformation at the ends of the colours, in ``unit``.
         unit: unit of the colours.
         name: names of the flexible bodies.
@@ -115,38 +154,84 @@ class Stage:
     name: str
 
     def camera(self, width: int, view: Any, up: Any) -> Camera:
-        """A camera that sees all bodies all the time."""
+        """A camera that sees everything all the time."""
         seen = np.concatenate([actor.points.reshape(-1, 3) for actor in self.actors])
-        return aimed(seen, width, view=view, up=up)
+        return aimed(seen, width, view=view, up=up, heights=HEIGHTS)
 
 
-def _stage(
-    mechanism: Any, solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float
-) -> Stage:
-    unknown = set(shapes) - set(mechanism.parts)
-    if unknown:
-        raise ConfigError(
-            f"shapes: no body {named(sorted(unknown))}; there are {offered(mechanism.parts)}."
-        )
+def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
+    for what, names in (("shapes", look.shapes), ("traces", look.traces)):
+        unknown = set(names) - set(mechanism.parts)
+        if unknown:
+            there = offered(mechanism.parts)
+            raise ConfigError(f"{what}: no body {named(sorted(unknown))}; there are {there}.")
+    places = moving(mechanism, solution, steps, look.magnify)
+    drawn = {name: _body(places, name, look) for name in mechanism.parts}
     actors: list[Actor] = []
     flexible: dict[str, int] = {}
-    shades = shades_of(mechanism)
-    for name, part in mechanism.parts.items():
-        pose = _poses(solution, name, steps)
+    for name, (surface, edges, *_) in drawn.items():
+        if surface.values is not None:
+            flexible[name] = len(actors)
+        actors += [surface, edges]
+    stage = _scaled(actors, flexible)
+    more = [actor for _, _, *rest in drawn.values() for actor in rest]
+    more += symbols_of(places, look) if look.symbols else []
+    more += [_trace(solution.position(name)) for name in look.traces]
+    return Stage([*stage.actors, *together(more)], stage.limits, stage.unit, stage.name)
+
+
+def _body(places: Places, name: str, look: Look) -> list[Actor]:
+    """Surface and edges of a body, and what is seen through of a rigid one."""
+    part, pose = places.mechanism.parts[name], places.pose(name)
+    colour = METAL_COLOURS[shades_of(places.mechanism)[name]]
+    surface = getattr(part.flexible, "surface", None)
+    ends = ends_of(places.mechanism, name)
+    if surface is None:
+        X, triangles = look.shapes[name] if name in look.shapes else bars(part, ends)
+        X, values = np.asarray(X, dtype=float)[None], None
+    else:
+        u = (places.elastic[name] @ surface.shape.T).reshape(len(places.elastic[name]), -1, 3)
+        X, triangles = surface.points + look.magnify * u, surface.triangles
+        values = np.linalg.norm(u, axis=2)
+    points = placed(X, pose)
+    edges = Actor(points, sharp_edges(X[0], triangles), colour=EDGE_COLOUR, width=1.0)
+    alone = surface is None and name not in look.shapes and not ends
+    opacity = BLOCK_OPACITY if alone else 1.0
+    actors = [Actor(points, triangles, values, colour, opacity=opacity), edges]
+    seen_through = None if surface is not None or name in look.shapes else shadow(part, ends)
+    if seen_through is not None:
+        points = placed(seen_through[0][None], pose)
+        actors.append(Actor(points, seen_through[1], colour=colour, opacity=BOX_OPACITY))
+    return actors
+
+
+def _trace(way: Array) -> Actor:
+    """A line through at most `TRACE_POINTS` of the places (n_t, 3) where a point has been."""
+    few = way[np.unique(np.linspace(0, len(way) - 1, TRACE_POINTS).round().astype(int))]
+    points, pairs = polyline(few)
+    return Actor(points[None], pairs, colour=TRACE_COLOUR, width=1.6)
+
+
+def symbols_of(places: Places, look: Look) -> list[Actor]:
+    """Symbols of joints, springs, contacts and the ground."""
+    drawn: dict[str, Array] = {}
+    surfaces = set(look.shapes)
+    for name, part in places.mechanism.parts.items():
         surface = getattr(part.flexible, "surface", None)
         if surface is not None:
-            flexible[name] = len(actors)
-            u = _deformation(surface, solution.elastic(name)[steps])
-            X, triangles, size = surface.points + magnify * u, surface.triangles, u
+            surfaces.add(name)
+            drawn[name] = surface.points
         else:
-            X, triangles = shapes[name] if name in shapes else bars(part)
-            X, size = np.asarray(X, dtype=float)[None], None
-        points = placed(X, pose)
-        values = None if size is None else np.linalg.norm(size, axis=2)
-        actors.append(Actor(points, triangles, values, METAL_COLOURS[shades[name]]))
-        edges = sharp_edges(X[0], triangles)
-        actors.append(Actor(points, edges, colour="#3a414b", width=1.0))
-    return _scaled(actors, flexible)
+            given = look.shapes.get(name) or bars(part, ends_of(places.mechanism, name))
+            drawn[name] = np.asarray(given[0], dtype=float)
+    up = np.array([0.0, 0.0, 1.0]) if look.up is None else np.asarray(look.up, dtype=float)
+    return connections(places, drawn, surfaces, up)
+
+
+def upright(mechanism: Any) -> Array | None:
+    """(3,) against gravity; None without."""
+    gravity = np.asarray(mechanism.gravity, dtype=float)
+    return -gravity if gravity.any() else None
 
 
 def shades_of(mechanism: Any) -> dict[str, int]:
@@ -167,7 +252,7 @@ def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:
         return Stage(together(actors), (0.0, 1.0), "m", "")
     sizes = {k: v for k in flexible.values() if (v := actors[k].values) is not None}
     largest = max(float(v.max()) for v in sizes.values())
-    factor, unit = next((s for s in SCALES if largest * s[0] >= 1.0), SCALES[-1])
+    factor, unit = prefixed(largest, "m")
     for k, v in sizes.items():
         scaled: Array = v * factor
         actors[k] = Actor(actors[k].points, actors[k].cells, scaled, actors[k].colour)
@@ -181,47 +266,14 @@ def together(actors: list[Actor]) -> list[Actor]:
     plain: dict[Any, list[Actor]] = {}
     for actor in actors:
         if actor.values is None:
-            look = actor.colour, actor.width, actor.opacity, actor.cells.shape[1]
-            plain.setdefault(look, []).append(actor)
-    for (colour, width, opacity, _), alike in plain.items():
+            look = actor.colour, actor.width, actor.opacity
+            plain.setdefault((*look, actor.cells.shape[1], len(actor.points)), []).append(actor)
+    for (colour, width, opacity, *_), alike in plain.items():
         first = np.cumsum([0, *(actor.points.shape[1] for actor in alike)])
         cells = np.vstack([a.cells + n for a, n in zip(alike, first[:-1], strict=True)])
         points = np.concatenate([actor.points for actor in alike], axis=1)
         kept.append(Actor(points, cells, None, colour, width, opacity))
     return kept
-
-
-def _poses(solution: Any, name: str, steps: Any) -> tuple[Array, Array]:
-    """(f, 3) origins and (f, 3, 3) orientations of a body frame."""
-    A = np.array([rotation.matrix(p) for p in solution.orientation(name)[steps]])
-    return solution.position(name)[steps], A
-
-
-def placed(X: Array, pose: tuple[Array, Array]) -> Array:
-    """(f, n, 3) world positions of body points (1 or f, n, 3)."""
-    r, A = pose
-    return r[:, None] + np.einsum("fab,fnb->fna", A, np.broadcast_to(X, (len(r), *X.shape[1:])))
-
-
-def _deformation(surface: Any, q: Array) -> Array:
-    """(f, s, 3) elastic displacement of the surface in the body frame [m]."""
-    return (q @ surface.shape.T).reshape(len(q), -1, 3)
-
-
-def bars(part: Any) -> Mesh:
-    """Round bars from the mass centre to the markers, or a small cube-like knot without any."""
-    ends = [np.asarray(p) for p in part.points.values() if np.linalg.norm(p) > 0]
-    reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
-    if not ends:
-        reach = float(np.sqrt(np.trace(part.second) / part.mass)) or 1e-2
-        ends = [np.array([reach, 0, 0]), np.array([-reach, 0, 0])]
-    points, triangles, count = [], [], 0
-    for end in ends:
-        X, T = cylinder(np.zeros(3), end, 0.15 * reach, sides=24)
-        points.append(X)
-        triangles.append(T + count)
-        count += len(X)
-    return np.vstack(points), np.vstack(triangles)
 
 
 def _words(stage: Stage, magnify: float) -> str:
@@ -234,13 +286,6 @@ def _words(stage: Stage, magnify: float) -> str:
     )
 
 
-def clock_texts(times: Array) -> list[str]:
-    """The time in words, in milliseconds if the motion lasts less than ten seconds."""
-    if np.ptp(times) >= 10.0:
-        return [f"t = {t:.2f} s" for t in times]
-    return [f"t = {t * 1e3:.3f} ms" for t in times]
-
-
 def _clock(text: str) -> Image:
     """The strip above a picture of the film, with the time."""
     strip = page.sheet(FILM_WIDTH, CLOCK_HEIGHT)
@@ -248,34 +293,37 @@ def _clock(text: str) -> Image:
     return page.pixels(strip)
 
 
-def _film_sheet(stage: Stage, height: int, magnify: float) -> Image:
+def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float) -> Image:
     """What stays around the pictures of a film."""
     text, below = page.caption(_words(stage, magnify), FILM_WIDTH - 40)
-    bar = 90 if stage.name else 10
     top = CLOCK_HEIGHT + height
-    figure = page.sheet(FILM_WIDTH, top + bar + below + 20)
-    _bar(figure, stage, FILM_WIDTH, top)
-    page.words(figure, text, 20, top + bar, size=page.SMALL_SIZE)
+    figure = page.sheet(FILM_WIDTH, top + CORNER_HEIGHT + below + 20)
+    _below(figure, stage, camera, FILM_WIDTH, top)
+    page.words(figure, text, 20, top + CORNER_HEIGHT, size=page.SMALL_SIZE)
     return page.pixels(figure)
 
 
-def _series_sheet(stage: Stage, images: Image, times: Array, magnify: float) -> Any:
+def _series_sheet(stage: Stage, camera: Camera, images: Image, times: Array, magnify: float) -> Any:
     columns = min(2, len(images))
     width, height = columns * (STILL_WIDTH + 20) + 20, images.shape[1] + 50
     rows = -(-len(images) // columns)
     text, below = page.caption(_words(stage, magnify), width - 60)
-    bar = 90 if stage.name else 10
-    figure = page.sheet(width, 20 + rows * height + bar + below + 30)
-    for k, (image, t) in enumerate(zip(images, times, strict=True)):
+    foot = 20 + rows * height
+    figure = page.sheet(width, foot + CORNER_HEIGHT + below + 40)
+    texts = clock_texts(times)
+    for k, (image, clock) in enumerate(zip(images, texts, strict=True)):
         left, top = 20 + (k % columns) * (STILL_WIDTH + 20), 20 + (k // columns) * height
-        page.words(figure, f"t = {t * 1e3:.4g} ms", left + 10, top)
+        page.words(figure, clock, left + 10, top)
         page.place(figure, image, left, top + 35)
-    _bar(figure, stage, width, 20 + rows * height)
-    page.words(figure, text, 30, 30 + rows * height + bar, size=page.SMALL_SIZE)
+    _below(figure, stage, camera, width, foot)
+    page.words(figure, text, 30, foot + CORNER_HEIGHT + 10, size=page.SMALL_SIZE)
     return figure
 
 
-def _bar(figure: Any, stage: Stage, width: int, top: int) -> None:
+def _below(figure: Any, stage: Stage, camera: Camera, width: int, top: int) -> None:
+    """The strip below a picture: axes, colours and their meaning, a length."""
+    corner(figure, camera, 15, width - 15, top)
     if stage.name:
+        wide = min(500, width - 2 * max(TRIAD_SIZE, BAR_SIZE) - 90)
         label = f"deformation of {stage.name} [{stage.unit}]"
-        page.colour_bar(figure, stage.limits, label, (width / 2 - 250, top + 30, 500, 16))
+        page.colour_bar(figure, stage.limits, label, ((width - wide) / 2, top + 38, wide, 16))

@@ -1,7 +1,7 @@
 """Picture of a finite element mesh with its interfaces."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,8 +10,13 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.view.canvas import page
+from rom.view.canvas.corner import HEIGHT as CORNER_HEIGHT
+from rom.view.canvas.corner import corner
 from rom.view.canvas.offscreen import render
-from rom.view.canvas.scene import TEXT_COLOUR, Actor, aimed, directed_edges
+from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, directed_edges
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1500  # [pixel]
 PART_COLOUR, EDGE_COLOUR = "#c9d1da", "#6b7480"
@@ -27,12 +32,12 @@ def mesh(
     title: str = "Mesh",
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path | page.Picture:
+) -> "Figure":
     """Draw the outer surface of a model, its elements and, in colour, its interfaces.
 
     Args:
         model: the model.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
         view: (3,) direction from the body to the eye [1]; None: mainly along its shortest extent.
         up: (3,) upright direction [1]; None: across its longest extent.
@@ -42,9 +47,10 @@ def mesh(
     """
     path = page.wanted(path)
     actors = mesh_actors(model)
-    image = render(actors, aimed(actors[0].points, PAGE_WIDTH, view=view, up=up))[0]
+    camera = aimed(actors[0].points, PAGE_WIDTH, view=view, up=up)
+    image = render(actors, camera)[0]
     with page.styled():
-        return page.save(_sheet(model, image, title), path)
+        return page.save(_sheet(model, camera, image, title), path)
 
 
 def mesh_actors(model: FEModel) -> list[Actor]:
@@ -68,7 +74,7 @@ def mesh_actors(model: FEModel) -> list[Actor]:
     return actors
 
 
-def _sheet(model: FEModel, image: Any, title: str) -> Any:
+def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
     size = np.ptp(model.points, axis=0) * 1e3
     words = (
         f"Finite element mesh: {model.n_dofs} displacement dofs, "
@@ -77,10 +83,11 @@ def _sheet(model: FEModel, image: Any, title: str) -> Any:
         "the rest of the mechanism."
     )
     text, height = page.caption(words, PAGE_WIDTH - 60)
-    top = image.shape[0] + 90
+    top = image.shape[0] + CORNER_HEIGHT + 90
     figure = page.sheet(PAGE_WIDTH, top + 50 + height + 20)
     page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     page.place(figure, image, 0, 80)
+    corner(figure, camera, 20, PAGE_WIDTH - 20, image.shape[0] + 80)
     left = 30
     for k, name in enumerate(model.interfaces):
         colour = MARK_COLOURS[k % len(MARK_COLOURS)]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,9 @@ from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, SurfaceMesh
 from rom.view.canvas import page
 from rom.view.scenes.mode_shapes import drawn, sheet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COINCIDENT_RTOL = 1e-6  # of the wheel's size: nodes of neighbouring sectors
 
@@ -30,14 +34,14 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     hidden: tuple[str, ...] = ("cyclic_low", "cyclic_high"),
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
     view: npt.ArrayLike | None = None,
-) -> Path | page.Picture:
+) -> "Figure":
     """Draw modes of a wheel on its deformed surface.
 
     Args:
         model: one sector, with its surface.
         shapes: {name: (N, 3 k) displacements of the k nodes of each sector, axes of the wheel, in
             units of any length}.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
         caption: what a stranger has to know.
         hidden: interfaces inside the wheel, not drawn.
@@ -61,9 +65,9 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     first, whole = _joined(points, np.vstack([triangles + j * nodes.size for j in range(N)]))
     moved: list[Array] = [u.reshape(N, -1, 3)[:, nodes].reshape(-1, 3)[first] for u in U]
     surface = SimpleNamespace(points=points[first], triangles=whole)
-    images = drawn(surface, moved, view, None)
+    images, camera = drawn(surface, moved, view, None)
     with page.styled():
-        return page.save(sheet(images, list(shapes), title, caption, "wheel"), path)
+        return page.save(sheet(images, camera, list(shapes), title, caption, "wheel"), path)
 
 
 def _outside(model: FEModel, surface: SurfaceMesh, hidden: tuple[str, ...]) -> tuple[Index, Index]:

@@ -8,17 +8,21 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rom.arguments import AnyBody, AnyMechanism, typed
 from rom.errors import ConfigError
+from rom.model import FEModel
 from rom.process.child import python, run, scratch
 from rom.view.canvas.draw import add, aim
 from rom.view.canvas.offscreen import child_failure, require, write_scene
 from rom.view.canvas.scene import Actor, aimed, sharp_edges
+from rom.view.scenes.mechanisms import start_actors
+from rom.view.scenes.meshes import mesh_actors
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 
 WINDOW_WIDTH = 1200  # [pixel]
@@ -50,6 +54,7 @@ def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
     """
     if body.surface is None:
         raise ConfigError(f"body {body.name!r} has no surface to draw.")
+    body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     X, size = body.surface.points, np.ptp(body.surface.points, axis=0).max()
     sine = np.sin(2 * np.pi * np.arange(N_FRAMES) / N_FRAMES)[:, None, None]
@@ -63,6 +68,61 @@ def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
         title = f"{body.name}, mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
         scenes.append(Scene(title, [surface, Actor(X[None], edges, colour="#7c828c")]))
     return scenes
+
+
+@typed
+def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
+    """A plotter of pyvista with a body, a model or a mechanism in it, to add to and turn around.
+
+    VTK does not live together with dolfinx: this works where dolfinx was not imported, e.g. with
+    bodies from files. All else of `rom.view` draws in a process of its own and needs no care.
+
+    Args:
+        thing: flexible body with a surface, in its n-th mode; model; or mechanism at its start.
+        n: number of the elastic mode of a body, from 1.
+
+    Returns:
+        A ``pyvista.Plotter``: ``plotter.show()`` opens it.
+
+    Raises:
+        ConfigError: if dolfinx is loaded here, there is nothing to draw, or no such mode.
+        ResourceError: if pyvista is missing.
+    """
+    if "dolfinx" in sys.modules:
+        raise ConfigError(
+            "dolfinx is loaded in this process, in which VTK may abort.",
+            hint="Save the body with rom.save and load it in another process.",
+        )
+    require("pyvista")
+    import pyvista
+
+    actors = _actors(thing, n)
+    made: Any = pyvista.Plotter(window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4])
+    made.set_background("white")
+    with scratch("view") as folder:
+        seen = np.concatenate([actor.points.reshape(-1, 3) for actor in actors])
+        write_scene(folder, actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
+        scene = json.loads((folder / "scene.json").read_text())
+        with np.load(folder / "arrays.npz", allow_pickle=False) as file:
+            arrays = dict(file)
+    for k in range(len(actors)):
+        add(made, scene, arrays, k, 0)
+    aim(made, scene, arrays)
+    made.add_axes()
+    return made
+
+
+def _actors(thing: Any, n: int) -> list[Actor]:
+    if isinstance(thing, FEModel):
+        return mesh_actors(thing)
+    if hasattr(thing, "parts"):
+        return start_actors(thing)
+    scenes = mode_scenes(thing, n)
+    if not 1 <= n <= len(scenes):
+        raise ConfigError(f"n = {n}: body {thing.name!r} has elastic modes 1 to {len(scenes)}.")
+    surface, still = scenes[n - 1].actors
+    largest = np.abs(surface.points - surface.points[0]).max(axis=(1, 2)).argmax()
+    return [replace(surface, points=surface.points[largest][None]), still]
 
 
 def show(scenes: Sequence[Scene]) -> None:

@@ -206,7 +206,7 @@ LINES = {  # command lines of which one thing is wrong
         "simulate good.npz --hinge root --axis 0,0,0 --t-end 1 --dt 1e-3 -o out",
         "axis",
     ),
-    "an unknown film": ("simulate pendulum.toml --film mp4 -o out", "mp4"),
+    "an unknown film": ("simulate pendulum.toml --film avi -o out", "avi"),
     "an option of bodies for a mechanism": (
         "simulate pendulum.toml --hinge root -o out",
         "--hinge",

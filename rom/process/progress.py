@@ -1,0 +1,89 @@
+"""How far work of known length is: one line on stderr, by tqdm where that is installed."""
+
+import logging
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from threading import Event, Thread
+from typing import Any
+
+from rom.process.launcher import ranks
+
+log = logging.getLogger("rom")
+LOOK_INTERVAL = 0.2  # [s] between looks at work that somebody else does
+TIME_FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}]"
+
+
+class Progress:
+    """A line of progress, written over itself.
+
+    Args:
+        total: amount of all work.
+    """
+
+    def __init__(self, total: float):
+        self.total = total
+        self._bar: Any = None
+        if sys.stderr.isatty() and find_spec("tqdm") is not None:
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=total, leave=False, file=sys.stderr, bar_format=TIME_FORMAT)
+
+    def reach(self, done: float, said: str) -> None:
+        """Show that so much is done, with a few words."""
+        if self._bar is None:
+            line(f"{said}  {100 * done / self.total:3.0f} %")
+            return
+        self._bar.n = done
+        self._bar.set_description_str(said)
+
+    def end(self) -> None:
+        """Clear the line."""
+        if self._bar is None:
+            line("")
+        else:
+            self._bar.close()
+
+
+def line(text: str) -> None:
+    """Write text over the line of progress on stderr; an empty one clears it."""
+    sys.stderr.write(f"\r{text:<60}" if text else f"\r{'':<60}\r")
+    sys.stderr.flush()
+
+
+def looked_for() -> bool:
+    """Whether a line of progress is seen and wanted, where no argument says so.
+
+    On the first rank, where stderr is a terminal; not with ``-q``, and not when the logger "rom"
+    is set to errors.
+    """
+    return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
+
+
+@contextmanager
+def followed(total: int, said: str, done: Callable[[], int]) -> Iterator[None]:
+    """Around waiting for another process, whose progress is asked for now and then.
+
+    Args:
+        total: amount of its work.
+        said: what it does.
+        done: gives the amount that is done.
+    """
+    if total < 2 or not looked_for():
+        yield
+        return
+    progress, ended = Progress(total), Event()
+
+    def follow() -> None:
+        while not ended.wait(LOOK_INTERVAL):
+            progress.reach(min(done(), total), said)
+
+    thread = Thread(target=follow, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        progress.end()

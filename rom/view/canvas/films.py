@@ -1,0 +1,128 @@
+"""Finished films: what functions of `rom.view` give back, and their files."""
+
+import base64
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rom.errors import ConfigError, ResourceError
+from rom.io.files import write_whole
+from rom.names import ORIGIN_MARK
+from rom.process.child import run, scratch
+from rom.view.canvas.gif import gif
+from rom.view.canvas.offscreen import Image
+from rom.view.canvas.page import checked
+
+ENDINGS = (".gif", ".mp4")
+ENCODER = "ffmpeg"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Film:
+    """A finished film; notebooks show it, `save` writes it.
+
+    Attributes:
+        pages: (f, height, width, 3) its pictures.
+        duration: of each picture [s].
+        path: where it was written, or None; the film may stand for this path.
+    """
+
+    pages: Image
+    duration: float
+    path: Path | None = None
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as .gif, or as .mp4 by ffmpeg; whole or not at all.
+
+        Raises:
+            ConfigError: for another ending, or a place that is not writable.
+            ResourceError: if ffmpeg is missing or fails.
+        """
+        place = film_path(path)
+        data = mp4(self) if place.suffix.lower() == ".mp4" else gif(self.pages, self.duration)
+        write_whole(place, lambda file: file.write(data))
+        return place
+
+    def __repr__(self) -> str:
+        f, height, width, _ = self.pages.shape
+        return f"Film({f} pictures of {width} x {height}, {f * self.duration:.3g} s)"
+
+    def __fspath__(self) -> str:
+        if self.path is None:
+            raise ConfigError("this film was not written yet.", hint="film.save(path) does.")
+        return str(self.path)
+
+    def _repr_html_(self) -> str:
+        code = base64.b64encode(gif(self.pages, self.duration)).decode("ascii")
+        return f"<img alt='{self!r}' src='data:image/gif;base64,{code}'>"
+
+
+def film_path(path: str | Path) -> Path:
+    """The path, if a film of that ending can be made and written; to be asked before drawing.
+
+    Raises:
+        ConfigError: naming the endings, or what is wrong with the folder.
+        ResourceError: if it takes ffmpeg, which is not there.
+    """
+    place = checked(path, *ENDINGS)
+    if place.suffix.lower() == ".mp4":
+        encoder()
+    return place
+
+
+def wanted(path: str | Path | None) -> Path | None:
+    """The path of a film, checked, if it is to be written."""
+    return None if path is None else film_path(path)
+
+
+def finished(pages: Image, duration: float, path: Path | None) -> Film:
+    """The film, written where there is a path."""
+    film = Film(pages, duration)
+    return film if path is None else replace(film, path=film.save(path))
+
+
+def encoder() -> str:
+    """The program that makes .mp4.
+
+    Raises:
+        ResourceError: if it is not on the PATH.
+    """
+    found = shutil.which(ENCODER)
+    if found is None:
+        raise ResourceError(
+            f".mp4 needs {ENCODER}, which is not on the PATH.",
+            hint=f"apt install {ENCODER}, or write the film as .gif.",
+        )
+    return found
+
+
+def mp4(film: Film) -> bytes:
+    """The bytes of a film in H.264, for every player.
+
+    Raises:
+        ResourceError: if ffmpeg is missing or fails.
+    """
+    pages = even(film.pages)
+    height, width = pages.shape[1:3]
+    with scratch("film") as folder:
+        out = folder / "film.mp4"
+        command = [encoder(), "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+        command += ["-s", f"{width}x{height}", "-framerate", f"{1 / film.duration:.6f}", "-i", "-"]
+        command += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+        command += ["-metadata", f"comment={ORIGIN_MARK}", str(out)]
+        done = run(command, given=np.ascontiguousarray(pages).reshape(-1).data)
+        if done.code or not out.is_file():
+            raise ResourceError(
+                f"{ENCODER} ended with code {done.code}: {done.last}.",
+                hint=f"This needs a build of {ENCODER} with libx264; .gif needs nothing.",
+            )
+        return out.read_bytes()
+
+
+def even(pages: Image) -> Image:
+    """Pictures of even height and width, as yuv420p needs: the last row or column twice."""
+    height, width = pages.shape[1:3]
+    rows, columns = ((0, n % 2) for n in (height, width))
+    return np.pad(pages, ((0, 0), rows, columns, (0, 0)), mode="edge")

@@ -1,0 +1,105 @@
+"""How numbers are read off a picture: prefixes of units, round lengths, and what is round-off."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rom.model import Array
+
+ROUND_OFF = 1e-9  # of the largest value of a panel; what varies by less is drawn as constant
+PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p"}
+LARGEST_POWERS = {"s": 0, "m": 3, "rad": 0}  # nobody reads kiloseconds
+UNIT_PATTERN = re.compile(r"(m|Pa|N|Hz|s|W|J|rad)(?=$|[ /])")
+LABEL_PATTERN = re.compile(r"(.*)\[([^\[\]]+)\]\s*")
+DEGREES = (0.1, 3600.0)  # sizes of angles that are read in degrees
+
+
+def prefixed(size: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a size is read off: between 1 and 1000, angles in degrees.
+
+    Args:
+        size: largest value, in ``unit``.
+        unit: m, Pa, N, Hz, s, W, J or rad, or products and quotients that begin with one of them;
+            others stay as they are, and so do units that have a prefix already.
+
+    Returns:
+        What values are multiplied by, and the unit they have then.
+    """
+    found = UNIT_PATTERN.match(unit)
+    if not found or not 0.0 < size < np.inf:
+        return 1.0, unit
+    if unit == "rad" and DEGREES[0] <= np.rad2deg(size) <= DEGREES[1]:
+        return float(np.rad2deg(1.0)), "deg"
+    power = 3 * int(np.floor(np.log10(size) / 3 + 1e-12))
+    power = min(max(power, min(PREFIXES)), LARGEST_POWERS.get(found[1], max(PREFIXES)))
+    return 10.0**-power, PREFIXES[power] + unit
+
+
+def written(size: float, unit: str) -> str:
+    """A size with its unit, for people: four digits and a prefix."""
+    factor, unit = prefixed(abs(size), unit)
+    return f"{factor * size:.4g} {unit}"
+
+
+def clock_texts(times: Array) -> list[str]:
+    """Times (n,) [s] for the pictures of a film, all in one unit and with as many digits."""
+    size, span = float(np.abs(times).max()), float(np.ptp(times))
+    factor, unit = prefixed(size, "s")
+    digits = max(0, 3 - int(np.floor(np.log10(factor * (span or size or 1.0)))))
+    return [f"t = {factor * t:.{min(digits, 6)}f} {unit}" for t in times]
+
+
+def round_length(largest: float) -> float:
+    """The largest 1, 2 or 5 times a power of ten that is not above a length."""
+    power = 10.0 ** np.floor(np.log10(largest))
+    return float(max(d * power for d in (1, 2, 5) if d * power <= largest * (1 + 1e-12)))
+
+
+def without_round_off(curves: Sequence[Array]) -> list[Array]:
+    """The curves of one panel; those that vary by round-off alone are constant.
+
+    Args:
+        curves: (n,) values each, all in one unit; NaN leaves a gap.
+    """
+    seen = [y[np.isfinite(y)] for y in curves]
+    size = max((np.abs(y).max(initial=0.0) for y in seen), default=0.0)
+    limit = ROUND_OFF * size
+    every = np.concatenate([*seen, np.zeros(0)])
+    if every.size and np.ptp(every) <= limit:  # all of them are one constant
+        return [np.where(np.isfinite(y), np.median(every), y) for y in curves]
+    return [
+        np.where(np.isfinite(y), _constant(known, limit), y)
+        if known.size and np.ptp(known) <= limit
+        else y
+        for y, known in zip(curves, seen, strict=True)
+    ]
+
+
+def _constant(y: Array, limit: float) -> float:
+    middle = float(np.median(y))
+    return 0.0 if abs(middle) <= limit else middle
+
+
+def readable(axes: Any, *, alike: bool = False) -> None:
+    """Ticks and labels of linear axes in prefixed units, where a label ends with "[unit]".
+
+    What is drawn stays in the unit of the label, so that more can be added in the same.
+
+    Args:
+        axes: of matplotlib, with labels and limits.
+        alike: whether both axes have one scale, and so one unit.
+    """
+    sizes = [float(np.abs(axis.get_view_interval()).max()) for axis in (axes.xaxis, axes.yaxis)]
+    for axis, size in zip((axes.xaxis, axes.yaxis), sizes, strict=True):
+        found = LABEL_PATTERN.fullmatch(axis.get_label_text())
+        if not found or axis.get_scale() != "linear":
+            continue
+        factor, unit = prefixed(max(sizes) if alike else size, found[2])
+        if unit != found[2]:
+            from rom.view.canvas.picture import ScaledPlaces, ScaledTicks
+
+            axis.set_major_locator(ScaledPlaces(factor))
+            axis.set_major_formatter(ScaledTicks(factor))
+            axis.set_label_text(f"{found[1]}[{unit}]")

@@ -1,0 +1,265 @@
+"""Joints, springs and contacts of a mechanism, as the symbols of machine drawings."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from rom.mbs.elements.contact.points import BORE, CYLINDER, DISC, PLANE
+from rom.mbs.kernels.system import NORMAL
+from rom.mbs.parts.bodies import GROUND, Marker
+from rom.model import Array
+from rom.rotation import matrix
+from rom.view.canvas import symbols
+from rom.view.canvas.scene import Actor
+from rom.view.canvas.solids import Mesh, across
+from rom.view.scenes.ground import (
+    JOINT_COLOUR,
+    Scenery,
+    at,
+    guide,
+    lines,
+    plane,
+    solid,
+    support,
+    symbol_size,
+    wall,
+)
+from rom.view.scenes.places import Places, placed
+
+SPRING_COLOUR, DAMPER_COLOUR, ROD_COLOUR = "#b5541c", "#4a5560", "#5c636e"
+LINE_WIDTH = 2.0  # of springs, rods and wheels [pixel]
+BUSHES: dict[str, Callable[[float], Mesh]] = {  # kind of joint: what is drawn at its second marker
+    "revolute": symbols.hinge, "cylindrical": symbols.round_sleeve, "screw": symbols.round_sleeve,
+    "prismatic": symbols.sleeve, "spherical": symbols.ball, "universal": symbols.cross,
+    "fixed": symbols.weld, "point on line": symbols.ball, "point on plane": symbols.ball,
+}  # fmt: skip
+BEARING_RATIO, MAX_BEARING_RATIO = 1.5, 5.0  # size of a bearing over its shaft; over other joints
+ROUND_RATIO = 0.2  # of its radius, by which the end of a shaft is beside its axis at most
+HANGING_COSINE = 0.5  # of a body below its joint, whose support is above then
+SLIDING = ("prismatic", "cylindrical", "screw", "point on line")
+ON_PLANES = ("planar", "point on plane", "rolling")
+
+
+def connections(
+    places: Places, drawn: dict[str, Array], surfaces: set[str], up: Array
+) -> list[Actor]:
+    """Symbols of everything between the bodies of a mechanism.
+
+    Args:
+        places: where bodies are.
+        drawn: {body: (n, 3)} points that bodies are drawn by, in their frames [m].
+        surfaces: bodies whose surface is drawn, which may hide symbols.
+        up: (3,) upright direction.
+    """
+    shapes = {name: X for name, X in drawn.items() if name in surfaces}
+    scenery = Scenery(places, shapes, symbol_size(places, drawn), up / np.linalg.norm(up))
+    mechanism = places.mechanism
+    actors: list[Actor] = []
+    for joint in mechanism.joints.values():
+        actors += _joint(scenery, joint)
+    for turn in mechanism.turns.values():
+        actors += _spiral(scenery, mechanism.joints[turn.joint])
+    for spring in mechanism.springs.values():
+        actors += _spring(scenery, spring)
+    for bushing in mechanism.bushings.values():
+        actors += _bushing(scenery, bushing.i, bushing.j)
+    return actors + list(_contacts(scenery))
+
+
+def axis_of(joint: Any, mechanism: Any) -> Array | None:
+    """(3,) axis of a joint, or normal of its plane, in the world at the start; None without one."""
+    one, two = (matrix(mechanism.part(m.body).p) for m in joint.markers[:2])
+    if joint.kind == "universal":
+        return two @ joint.rows[-1].b
+    if joint.kind in ("point on line", "point on plane", "rolling"):
+        return one @ (joint.displacement or joint.rows[0]).a
+    if joint.kind in ("fixed", "spherical"):
+        return None
+    return next((two @ row.b for row in joint.rows if row.kind == NORMAL), None)
+
+
+def _joint(scenery: Scenery, joint: Any) -> Iterator[Actor]:
+    mechanism, (first, second) = scenery.places.mechanism, joint.markers[:2]
+    axis = axis_of(joint, mechanism)
+    if joint.kind == "distance":
+        yield _rod(scenery.places, first, second)
+    if joint.kind in BUSHES:
+        yield from _bush(scenery, joint, axis)
+    if joint.kind in SLIDING and axis is not None:
+        yield from guide(scenery, first, second, matrix(mechanism.part(first.body).p).T @ axis)
+    elif joint.kind in ON_PLANES and axis is not None:
+        yield from _on_plane(scenery, joint, axis)
+    elif joint.kind in BUSHES and GROUND in (first.body, second.body):
+        yield from _grounded(scenery, joint, axis)
+
+
+def _bush(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Actor]:
+    places, second = scenery.places, joint.markers[1]
+    B = matrix(places.mechanism.part(second.body).p)
+    local = np.eye(3) if axis is None else np.column_stack(across(np.zeros(3), B.T @ axis))
+    if joint.kind == "universal":  # the other axis of its cross
+        A = matrix(places.mechanism.part(joint.markers[0].body).p)
+        x, z = B.T @ A @ joint.rows[-1].a, local[:, 2]
+        local = np.column_stack([x, np.cross(z, x), z])
+    shift, size = _bearing(scenery, joint, axis)
+    A = places.pose(second.body)[1]
+    yield from solid(
+        BUSHES[joint.kind](size),
+        at(places.point(second) + A @ (B.T @ shift), A @ local),
+        JOINT_COLOUR,
+    )
+
+
+def _bearing(scenery: Scenery, joint: Any, axis: Array | None) -> tuple[Array, float]:
+    """(3,) from a hinge on the ground to the nearer end of its shaft, and the size of its bush."""
+    mover = next((m for m in joint.markers if m.body in scenery.solid), None)
+    grounded = GROUND in {m.body for m in joint.markers}
+    if mover is None or axis is None or not grounded or joint.kind != "revolute":
+        return np.zeros(3), scenery.size
+    part = scenery.places.mechanism.part(mover.body)
+    along = matrix(part.p).T @ axis
+    ends = [scenery.beyond(mover, sign * along) for sign in (-1.0, 1.0)]
+    side = int(np.argmin(ends))
+    shift = (2 * side - 1) * ends[side]
+    X = scenery.solid[mover.body] - part.point(mover)
+    face = X[np.abs(X @ along - shift) < 0.02 * scenery.size]
+    radial = face - np.outer(face @ along, along)
+    radius = float(np.linalg.norm(radial, axis=1).max(initial=0.0))
+    round_ = len(face) > 2 and np.linalg.norm(radial.mean(axis=0)) < ROUND_RATIO * radius
+    size = BEARING_RATIO * radius if round_ else 0.0
+    size = float(np.clip(size, scenery.size, MAX_BEARING_RATIO * scenery.size))
+    beyond = 0.5 * size * (2 * side - 1) if round_ else 0.0  # most of the shaft stays in sight
+    return (shift + beyond) * axis, size
+
+
+def _grounded(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Actor]:
+    """Under a joint that holds a body to the ground."""
+    first, second = joint.markers
+    here, mover = (first, second) if first.body == GROUND else (second, first)
+    point = scenery.places.point(here)[0]
+    if joint.kind == "fixed":
+        yield from wall(scenery, point, _towards(scenery, mover))
+        return
+    shift, size = _bearing(scenery, joint, axis)
+    centre = scenery.places.pose(mover.body)[0][0] - point
+    hanging = bool(centre @ scenery.up < -HANGING_COSINE * np.linalg.norm(centre))
+    about = None if joint.kind == "spherical" else axis
+    yield from support(scenery, point + shift, about, above=hanging, size=size)
+
+
+def _towards(scenery: Scenery, marker: Marker) -> Array:
+    """(3,) direction of an axis of a body, from a marker to where most of the body is."""
+    part = scenery.places.mechanism.part(marker.body)
+    A = scenery.places.pose(marker.body)[1][0]
+    centre = np.asarray(part.first) / part.mass - part.point(marker)
+    k = int(np.argmax(np.abs(centre)))
+    if not np.abs(centre[k]) > 1e-9 * scenery.size:
+        return scenery.up
+    direction: Array = np.sign(centre[k]) * A[:, k]
+    return direction
+
+
+def _on_plane(scenery: Scenery, joint: Any, normal: Array) -> Iterator[Actor]:
+    places, (first, second) = scenery.places, joint.markers
+    radius = joint.rows[0].radius
+    if joint.kind == "rolling" and joint.rows[0].b.any():
+        yield _circle(places, second, joint.rows[0].b, radius)
+    elif joint.kind == "rolling" and second.body not in scenery.solid:
+        yield from _ball(places, second, radius)
+    A = matrix(places.mechanism.part(first.body).p)
+    yield from plane(scenery, first, A.T @ normal, [(second, radius)])
+
+
+def _rod(places: Places, first: Marker, second: Marker) -> Actor:
+    points = np.stack(_both(places, first, second), axis=1)
+    return Actor(points, np.array([[0, 1]]), colour=ROD_COLOUR, width=1.5 * LINE_WIDTH)
+
+
+def _both(places: Places, first: Marker, second: Marker) -> tuple[Array, Array]:
+    """(f, 3) where two markers are."""
+    a, b = np.broadcast_arrays(places.point(first), places.point(second))
+    return a, b
+
+
+def _ball(places: Places, marker: Marker, radius: float) -> list[Actor]:
+    pose = at(places.point(marker), places.pose(marker.body)[1])
+    return solid(symbols.ball(radius / symbols.BALL_RATIO), pose, JOINT_COLOUR, 0.5)
+
+
+def _spiral(scenery: Scenery, joint: Any) -> Iterator[Actor]:
+    axis = axis_of(joint, scenery.places.mechanism)
+    if axis is None:
+        return
+    second = joint.markers[1]
+    B = matrix(scenery.places.mechanism.part(second.body).p)
+    local = np.column_stack(across(np.zeros(3), B.T @ axis))
+    shift, size = _bearing(scenery, joint, axis)
+    A = scenery.places.pose(second.body)[1]
+    pose = at(scenery.places.point(second) + A @ (B.T @ (shift + 1.3 * size * axis)), A @ local)
+    yield lines(symbols.spiral(size), pose, SPRING_COLOUR, LINE_WIDTH)
+
+
+def _spring(scenery: Scenery, spring: Any) -> Iterator[Actor]:
+    """Coil and dashpot between two markers, stretched as they move."""
+    ends = _both(scenery.places, spring.i, spring.j)
+    if np.linalg.norm(ends[1] - ends[0], axis=1).max() < scenery.size:
+        yield from _bushing(scenery, spring.i, spring.j)
+        return
+    if spring.stiffness:
+        shape = symbols.spring(scenery.size)
+        yield stretched(shape, ends, SPRING_COLOUR)
+    if spring.damping:
+        yield stretched(symbols.dashpot(scenery.size), ends, DAMPER_COLOUR)
+    for k, marker in enumerate((spring.i, spring.j)):
+        if marker.body == GROUND:
+            gap = ends[1 - k][0] - ends[k][0]
+            normal = gap / np.linalg.norm(gap) if gap.any() else scenery.up
+            yield from wall(scenery, ends[k][0], normal)
+
+
+def stretched(shape: symbols.Lines, ends: tuple[Array, Array], colour: str) -> Actor:
+    """Lines along z from 0 to 1, drawn from one end (f, 3) to the other in all instants."""
+    a, b = ends
+    d = b - a
+    z = d / np.maximum(np.linalg.norm(d, axis=1)[:, None], 1e-300)
+    helper = np.eye(3)[np.argmin(np.abs(z).max(axis=0))]
+    x = np.cross(z, helper)
+    x /= np.maximum(np.linalg.norm(x, axis=1)[:, None], 1e-300)
+    axes = np.stack([x, np.cross(z, x), d], axis=2)
+    return Actor(placed(shape[0][None], (a, axes)), shape[1], colour=colour, width=LINE_WIDTH)
+
+
+def _bushing(scenery: Scenery, first: Marker, second: Marker) -> Iterator[Actor]:
+    places = scenery.places
+    pose = at(places.point(second), places.pose(second.body)[1])
+    yield from solid(symbols.weld(scenery.size), pose, SPRING_COLOUR)
+    for marker in (first, second):
+        if marker.body == GROUND:
+            yield from support(scenery, places.point(marker)[0], None)
+
+
+def _contacts(scenery: Scenery) -> Iterator[Actor]:
+    """Planes, bores and cylinders that bodies touch, each one once, and rims of discs."""
+    planes: dict[Any, list[tuple[Marker, float]]] = {}
+    rounds: set[Any] = set()
+    for contact in scenery.places.mechanism.contacts.values():
+        key = contact.i, tuple(np.asarray(contact.e).tolist())
+        if contact.kind in (PLANE, DISC):
+            planes.setdefault(key, []).append((contact.j, contact.radius[0]))
+            if contact.kind == DISC:
+                yield _circle(scenery.places, contact.j, contact.s, contact.radius[0])
+        elif contact.kind in (CYLINDER, BORE):
+            rounds.add((*key, contact.radius[1]))
+        if contact.radius[0] and contact.kind != DISC and contact.j.body not in scenery.solid:
+            yield from _ball(scenery.places, contact.j, contact.radius[0])
+    for (marker, normal), touching in planes.items():
+        yield from plane(scenery, marker, np.array(normal), touching)
+    for marker, axis, radius in rounds:
+        yield _circle(scenery.places, marker, np.array(axis), radius)
+
+
+def _circle(places: Places, marker: Marker, axis: Array, radius: float) -> Actor:
+    local = np.column_stack(across(np.zeros(3), axis))
+    pose = at(places.point(marker), places.pose(marker.body)[1] @ local)
+    return lines(symbols.circle(radius), pose, width=LINE_WIDTH)

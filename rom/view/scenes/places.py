@@ -1,0 +1,100 @@
+"""Where bodies and markers are in the instants that are drawn."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.mbs.parts.bodies import GROUND, Marker
+from rom.model import Array
+from rom.rotation import matrix
+
+Pose = tuple[Array, Array]  # (f, 3) origins and (f, 3, 3) axes, as columns in the world
+MAX_CANDIDATES = 400  # instants that are compared
+SAME_PLACE_RATIO = 0.02  # of the longest way, below which two places are one
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Bodies of a mechanism in f instants.
+
+    Attributes:
+        mechanism: whose bodies.
+        poses: of the frame of each body.
+        elastic: (f, r) elastic coordinates of each body.
+        magnify: deformations are drawn so many times larger than they are.
+    """
+
+    mechanism: Any
+    poses: dict[str, Pose]
+    elastic: dict[str, Array]
+    magnify: float = 1.0
+
+    def pose(self, body: str) -> Pose:
+        """Of the frame of a body, or the ground."""
+        return (np.zeros((1, 3)), np.eye(3)[None]) if body == GROUND else self.poses[body]
+
+    def point(self, marker: Marker) -> Array:
+        """(f, 3) where a marker is drawn; (1, 3) on the ground [m]."""
+        part = self.mechanism.part(marker.body)
+        X = part.point(marker)[None]
+        if part.flexible is not None:
+            X = X + self.magnify * self.elastic[marker.body] @ part.shapes(marker)[0].T
+        r, A = self.pose(marker.body)
+        return r + np.einsum("fab,fb->fa", A, np.broadcast_to(X, r.shape))
+
+    def direction(self, body: str, vector: Array) -> Array:
+        """(f, 3) direction in the world of one that is fixed in a body."""
+        return self.pose(body)[1] @ vector
+
+
+def at_start(mechanism: Any) -> Places:
+    """Bodies where they were added."""
+    parts = mechanism.parts.items()
+    poses = {name: (part.at[None], matrix(part.p)[None]) for name, part in parts}
+    return Places(mechanism, poses, {name: part.q[None] for name, part in parts})
+
+
+def moving(mechanism: Any, solution: Any, steps: Any, magnify: float) -> Places:
+    """Bodies at some of the instants of a motion."""
+    poses = {
+        name: (
+            solution.position(name)[steps],
+            np.array([matrix(p) for p in solution.orientation(name)[steps]]),
+        )
+        for name in mechanism.parts
+    }
+    elastic = {name: solution.elastic(name)[steps] for name in mechanism.parts}
+    return Places(mechanism, poses, elastic, magnify)
+
+
+def placed(X: Array, pose: Pose) -> Array:
+    """(f, n, 3) world positions of body points (1 or f, n, 3)."""
+    r, A = pose
+    return r[:, None] + np.einsum("fab,fnb->fna", A, np.broadcast_to(X, (len(r), *X.shape[1:])))
+
+
+def different(solution: Any, n: int) -> Array:
+    """(n,) instants [s] at which a mechanism differs most: each the farthest from those before.
+
+    The first one is the start. Fewer where the motion has no more places.
+
+    Args:
+        solution: the motion.
+        n: number of instants.
+    """
+    steps = np.unique(np.linspace(0, solution.t.size - 1, MAX_CANDIDATES).round().astype(int))
+    places = moving(solution.mechanism, solution, steps, 1.0)
+    points = [r for r, _ in places.poses.values()]
+    points += [
+        places.point(part.marker(name))
+        for part in solution.mechanism.parts.values()
+        for name in part.names
+    ]
+    X = np.concatenate(points, axis=1) if points else np.zeros((steps.size, 3))
+    chosen, away = [0], np.linalg.norm(X - X[0], axis=1)
+    least = SAME_PLACE_RATIO * away.max()
+    while len(chosen) < n and away.max() > least:
+        chosen.append(int(away.argmax()))
+        away = np.minimum(away, np.linalg.norm(X - X[chosen[-1]], axis=1))
+    return np.sort(solution.t[steps[chosen]])

@@ -1,0 +1,56 @@
+"""Rigid bodies without a shape of their own: tubes to their markers, and a box of their inertia."""
+
+from typing import Any
+
+import numpy as np
+
+from rom.model import Array
+from rom.view.canvas.solids import Mesh, box, cylinder, ellipsoid, joined
+
+TUBE_RATIO = 0.07  # diameter of a tube, of the reach of the body
+BOX_OPACITY, BLOCK_OPACITY = 0.22, 0.5  # of a box around tubes, and of one that is alone
+MAX_BOX_RATIO = 3.0  # of the reach of a body with markers; larger boxes say nothing of its shape
+
+
+def ends_of(mechanism: Any, name: str) -> list[Array]:
+    """(k) points (3,) of a rigid body beside its mass centre, named or held by something [m]."""
+    part = mechanism.parts[name]
+    held = [marker for joint in mechanism.joints.values() for marker in joint.markers]
+    held += [m for family, element in mechanism.elements.values() for m in family.ends(element)]
+    points = [*part.points.values(), *(part.point(m) for m in held if m.body == name)]
+    far = {tuple(np.asarray(p).tolist()) for p in points if np.linalg.norm(p) > 0}
+    return [np.array(p) for p in sorted(far)]
+
+
+def bars(part: Any, ends: list[Array]) -> Mesh:
+    """Tubes from the mass centre to some points; without any a box of the inertia of the body."""
+    if not ends:
+        return inertia_box(part)
+    wide = TUBE_RATIO * max(float(np.linalg.norm(p)) for p in ends)
+    tubes = [cylinder(np.zeros(3), end, wide, sides=24) for end in ends]
+    knots = [ellipsoid((0.75 * wide,) * 3, end, sides=16) for end in (np.zeros(3), *ends)]
+    return joined([*tubes, *knots])
+
+
+def shadow(part: Any, ends: list[Array]) -> Mesh | None:
+    """What is drawn half-transparent beside the bars: the box of the inertia, unless it is huge."""
+    reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
+    points, triangles = inertia_box(part)
+    if not reach or np.ptp(points, axis=0).max() > MAX_BOX_RATIO * reach:
+        return None
+    return points, triangles
+
+
+def inertia_box(part: Any) -> Mesh:
+    """The even block with the mass and the inertia of a body, in its frame."""
+    size, axes = block_of(np.asarray(part.second, dtype=float), part.mass)
+    points, triangles = box(size)
+    return points @ axes.T, triangles
+
+
+def block_of(second: Array, mass: float) -> tuple[Array, Array]:
+    """(3,) edges [m] and (3, 3) axes, as columns, of a block with such second moments [kg m^2]."""
+    moments, axes = np.linalg.eigh(second)
+    edges = np.sqrt(12 * np.maximum(moments, 0.0) / mass)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return np.maximum(edges, 1e-3 * edges.max()), axes

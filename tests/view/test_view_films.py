@@ -1,0 +1,143 @@
+"""Films: their files, what makes them, and how far they are."""
+
+import io
+import logging
+import shutil
+import subprocess
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+from rom.errors import ConfigError, ResourceError
+from rom.io.ours import is_ours
+from rom.process import progress
+from rom.view.canvas.films import Film, even, film_path
+
+PAGES = np.arange(3 * 5 * 7 * 3, dtype=np.uint8).reshape(3, 5, 7, 3)
+FAKE = """#!{python} -S
+import sys
+frames = sys.stdin.buffer.read()
+open(sys.argv[-1], "wb").write(b"0000ftyp" + " ".join(sys.argv[1:]).encode() + frames)
+"""
+
+
+def program(folder, text):
+    path = folder / "ffmpeg"
+    path.write_text(text)
+    path.chmod(0o755)
+    return path
+
+
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    """An ffmpeg that writes down what it was asked and given."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    program(folder, FAKE.format(python=sys.executable))
+    monkeypatch.setenv("PATH", str(folder))
+    return folder
+
+
+def test_pages_of_odd_size_are_made_even_by_their_last_row_and_column():
+    pages = even(PAGES)
+    assert pages.shape == (3, 6, 8, 3)
+    np.testing.assert_array_equal(pages[:, :5, :7], PAGES)
+    np.testing.assert_array_equal(pages[:, 5, :7], PAGES[:, 4])
+    np.testing.assert_array_equal(pages[:, :5, 7], PAGES[:, :, 6])
+    assert even(pages).shape == pages.shape
+
+
+def test_ffmpeg_is_given_all_frames_and_told_their_size_and_pace(fake, tmp_path):
+    path = Film(PAGES, 0.04).save(tmp_path / "a.mp4")
+    data = path.read_bytes()
+    assert data.endswith(even(PAGES).tobytes())
+    words = data[8 : -even(PAGES).size].decode().split(" ")
+    said = dict(pairwise(words))
+    assert (said["-f"], said["-pix_fmt"]) == ("rawvideo", "yuv420p")
+    assert (said["-s"], said["-c:v"], float(said["-framerate"])) == ("8x6", "libx264", 25.0)
+    assert is_ours(path, "mp4") and not is_ours(fake / "ffmpeg", "mp4")
+
+
+def test_a_program_that_fails_leaves_no_file_and_is_quoted(fake, tmp_path):
+    program(fake, f"#!{sys.executable} -S\nimport sys\nsys.exit('Unknown encoder')\n")
+    with pytest.raises(ResourceError, match="ended with code 1: Unknown encoder"):
+        Film(PAGES, 0.04).save(tmp_path / "a.mp4")
+    assert not (tmp_path / "a.mp4").exists()
+
+
+def test_a_missing_program_is_named_with_its_cure_before_anything_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ResourceError, match="ffmpeg, which is not on the PATH") as caught:
+        film_path(tmp_path / "a.mp4")
+    assert "apt install ffmpeg" in caught.value.hint and ".gif" in caught.value.hint
+    assert film_path(tmp_path / "a.gif") == tmp_path / "a.gif"
+    with pytest.raises(ConfigError, match=r"'\.avi' is unknown") as caught:
+        film_path(tmp_path / "a.avi")
+    assert ".gif or .mp4" in caught.value.hint
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_a_film_of_ffmpeg_plays_with_its_pictures(tmp_path):
+    """Decoded again: as many frames, of even size, in their colours."""
+    colours = np.array([[200, 30, 30], [30, 160, 30], [30, 30, 200]], dtype=np.uint8)
+    pages = np.broadcast_to(colours[:, None, None], (3, 33, 47, 3))
+    path = Film(pages, 0.1).save(tmp_path / "a.mp4")
+    assert is_ours(path, "mp4")
+    command = ["ffmpeg", "-v", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    frames = subprocess.run(command, capture_output=True, check=True).stdout
+    seen = np.frombuffer(frames, np.uint8).reshape(3, 34, 48, 3).astype(int)
+    assert np.abs(seen.mean(axis=(1, 2)) - colours).max() < 12
+
+
+class Terminal(io.StringIO):
+    """Somebody who looks."""
+
+    def isatty(self):
+        return True
+
+
+def followed(monkeypatch, stream, n=10):
+    """What is seen of work of 10 parts, asked for while it lasts."""
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "LOOK_INTERVAL", 1e-3)
+    asked = []
+    with progress.followed(n, "drawing", lambda: asked.append(1) or min(len(asked), n)):
+        while stream.isatty() and len(asked) < 3:
+            pass
+    return stream.getvalue()
+
+
+def test_progress_is_shown_on_a_terminal_and_cleared(monkeypatch):
+    monkeypatch.setattr(progress, "find_spec", lambda name: None)
+    text = followed(monkeypatch, Terminal())
+    assert "\rdrawing   20 %" in text and text.endswith("\r")
+    assert text.rsplit("\r", 2)[-2].strip() == ""
+
+
+def test_progress_is_shown_by_tqdm_where_it_is_installed(monkeypatch):
+    pytest.importorskip("tqdm", reason="tqdm is not installed")
+    assert "drawing" in followed(monkeypatch, Terminal())
+
+
+@pytest.mark.parametrize("why", ["no terminal", "another rank", "quiet"])
+def test_progress_is_silent_where_nobody_wants_it(why, monkeypatch):
+    log, stream = logging.getLogger("rom"), Terminal()
+    level = log.level
+    if why == "no terminal":
+        stream = io.StringIO()
+    elif why == "another rank":
+        monkeypatch.setattr(progress, "ranks", lambda: (1, 2))
+    else:
+        log.setLevel(logging.ERROR)
+    monkeypatch.setattr(sys, "stderr", stream)
+    try:
+        assert not progress.looked_for()
+        with progress.followed(10, "drawing", lambda: 5):
+            pass
+    finally:
+        log.setLevel(level)
+    assert stream.getvalue() == ""

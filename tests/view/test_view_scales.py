@@ -1,0 +1,148 @@
+"""Numbers on axes: prefixes, degrees, and round-off that is no signal."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+from matplotlib.figure import Figure
+
+from rom import view
+from rom.view.canvas.scales import (
+    clock_texts,
+    prefixed,
+    readable,
+    round_length,
+    without_round_off,
+    written,
+)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "factor", "shown"),
+    [
+        (0.00012, "m", 1e6, "µm"),
+        (2.1e11, "Pa", 1e-9, "GPa"),
+        (1500.0, "N", 1e-3, "kN"),
+        (0.02, "N m", 1e3, "mN m"),
+        (5e3, "N/m", 1e-3, "kN/m"),
+        (2.5e4, "Hz", 1e-3, "kHz"),
+        (0.05, "s", 1e3, "ms"),
+        (5e4, "s", 1.0, "s"),
+        (7e6, "m", 1e-3, "km"),
+        (3e6, "W", 1e-6, "MW"),
+        (4e-7, "J", 1e9, "nJ"),
+        (1e-15, "m", 1e12, "pm"),
+        (1000.0, "m", 1e-3, "km"),
+        (999.0, "m", 1.0, "m"),
+        (np.pi, "rad", 180 / np.pi, "deg"),
+        (1e-5, "rad", 1e6, "µrad"),
+        (400.0, "rad", 1.0, "rad"),
+        (0.0, "m", 1.0, "m"),
+        (1e-6, "1", 1.0, "1"),
+        (1e6, "%", 1.0, "%"),
+        (1e6, "mm", 1.0, "mm"),
+        (1e6, "m^2", 1.0, "m^2"),
+        (1e6, "min", 1.0, "min"),
+        (1e6, "kg", 1.0, "kg"),
+        (1e6, "1/min", 1.0, "1/min"),
+    ],
+)
+def test_sizes_are_read_between_one_and_a_thousand(size, unit, factor, shown):
+    found = prefixed(size, unit)
+    assert found == (pytest.approx(factor, rel=1e-12), shown)
+
+
+def labels(axis):
+    """{place: what stands there} with signs that `float` understands."""
+    axis.figure.canvas.draw()
+    texts = [text.get_text().replace("\u2212", "-") for text in axis.get_ticklabels()]
+    return dict(zip(axis.get_ticklocs().tolist(), texts, strict=True))
+
+
+def drawn(x, y, xlabel, ylabel):
+    axes = Figure().subplots()
+    axes.plot(x, y)
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(ylabel)
+    return axes
+
+
+def test_ticks_are_round_in_the_unit_that_is_read():
+    axes = drawn([0.0, 2.1e11], [-np.pi, np.pi], "stress [Pa]", "angle of the crank [rad]")
+    readable(axes)
+    assert axes.get_xlabel() == "stress [GPa]"
+    assert axes.get_ylabel() == "angle of the crank [deg]"
+    across, upwards = labels(axes.xaxis), labels(axes.yaxis)
+    assert {"0", "100", "200"} <= set(across.values())
+    for at, text in across.items():
+        assert float(text) == pytest.approx(1e-9 * at, abs=1e-9)
+    assert {"-100", "0", "100"} <= set(upwards.values())
+    for at, text in upwards.items():
+        assert float(text) == pytest.approx(np.rad2deg(at), abs=1e-6)
+        assert float(text) % 5 == 0
+
+
+def test_ticks_that_are_near_each_other_have_digits_that_tell_them_apart():
+    axes = drawn([0.0, 1.0], [2.10001e11, 2.10002e11], "x", "E [Pa]")
+    readable(axes)
+    texts = labels(axes.yaxis).values()
+    assert len(set(texts)) == len(texts) > 3
+
+
+def test_logarithms_and_plain_ratios_are_left_alone():
+    axes = drawn([1e-3, 1e3], [1e-6, 1e-3], "frequency [Hz]", "relative error")
+    axes.set_xscale("log")
+    before = labels(axes.xaxis), labels(axes.yaxis)
+    readable(axes)
+    assert (labels(axes.xaxis), labels(axes.yaxis)) == before
+    assert axes.get_xlabel() == "frequency [Hz]"
+
+
+def test_axes_of_one_scale_have_one_unit():
+    axes = drawn([0.0, 2.0], [0.0, 0.02], "x [m]", "y [m]")
+    readable(axes, alike=True)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
+    readable(axes)
+    assert axes.get_ylabel() == "y [mm]"
+
+
+def test_round_off_is_drawn_as_a_constant_and_what_is_larger_as_it_is():
+    noise = 1e-16 * np.array([1.0, -2.0, 3.0])
+    signal = np.array([0.0, 1.0, 2.0])
+    flat, kept, gap = without_round_off([noise, signal, np.array([3.0, np.nan, 3.0 + 1e-12])])
+    np.testing.assert_array_equal(flat, 0.0)
+    np.testing.assert_array_equal(kept, signal)
+    np.testing.assert_array_equal(gap[[0, 2]], gap[0])
+    assert np.isnan(gap[1]) and gap[0] == pytest.approx(3.0)
+    small = 1e-8 * signal
+    np.testing.assert_array_equal(without_round_off([small, signal])[0], small)
+    np.testing.assert_array_equal(without_round_off([noise])[0], noise)  # nothing to compare with
+    one, two = without_round_off([np.full(3, 5.0), np.full(3, 5.0 + 1e-12)])
+    assert set(one) == set(two) and len(set(one)) == 1
+    assert without_round_off([]) == []
+
+
+def test_a_panel_of_round_off_shows_it_as_flat():
+    """The figure the whole way: limits around the constant that hold no digit of the noise."""
+    t = np.linspace(0.0, 0.01, 50)
+    wave = 2.1e11 * (1 + 1e-13 * np.sin(900 * t))
+    axes = Figure().subplots()
+    view.history(t, [("stress [Pa]", {"one": wave})], ax=axes)
+    (line,) = axes.lines
+    assert np.ptp(line.get_ydata()) == 0.0
+    low, high = axes.get_ylim()
+    assert high - low > 1e-2 * 2.1e11
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [ms]", "stress [GPa]")
+    np.testing.assert_array_equal(line.get_xdata(), t)  # data stays in SI
+
+
+def test_clocks_of_a_film_have_one_unit():
+    assert clock_texts(np.array([0.0, 5e-7, 2e-6])) == ["t = 0.000 µs", "t = 0.500 µs",
+                                                        "t = 2.000 µs"]  # fmt: skip
+    assert clock_texts(np.array([10.0, 30.0])) == ["t = 10.00 s", "t = 30.00 s"]
+    assert clock_texts(np.zeros(1)) == ["t = 0.000 s"]
+
+
+def test_lengths_and_sizes_in_words():
+    assert [round_length(x) for x in (1.0, 1.9, 4.99, 0.051, 730.0)] == [1, 1, 2, 0.05, 500]
+    assert written(0.02, "m") == "20 mm" and written(-3e5, "N") == "-300 kN"

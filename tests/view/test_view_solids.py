@@ -1,0 +1,135 @@
+"""Shapes for pictures are closed, face outwards, and have the volumes of closed forms."""
+
+import numpy as np
+import pytest
+
+from rom import view
+from rom.errors import ConfigError
+from rom.view.canvas.scene import sharp_edges
+from rom.view.canvas.solids import gear_outline
+
+MODULE, WIDTH, ANGLE = 2e-3, 1e-2, np.deg2rad(20.0)
+FINE = 2000
+
+
+def volume(mesh):
+    points, triangles = mesh
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    return float(np.einsum("ti,ti->", a, np.cross(b, c)) / 6)
+
+
+def is_closed(mesh):
+    """Each edge belongs to two triangles, which run along it in opposite directions."""
+    edges = mesh[1][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    directed = {tuple(edge) for edge in edges.tolist()}
+    return len(directed) == len(edges) and all((b, a) in directed for a, b in directed)
+
+
+def involute(angle):
+    return np.tan(angle) - angle
+
+
+def gear_area(teeth, module, angle):
+    """Sectors under involutes, tips, roots and the lines between base and root circle.
+
+    Under an involute dA = r^2 d(theta) / 2 with r = r_b / cos(a), theta = tan(a) - a, so that
+    A = r_b^2 tan(a)^3 / 6.
+    """
+    pitch, top, root = (module * (teeth / 2 + x) for x in (0.0, 1.0, -1.25))
+    base = pitch * np.cos(angle)
+    half = np.pi / (2 * teeth) + involute(angle)
+    highest, lowest = np.arccos(base / top), np.arccos(min(1.0, base / max(base, root)))
+    tooth = 2 * base**2 / 6 * (np.tan(highest) ** 3 - np.tan(lowest) ** 3)
+    tooth += top**2 * (half - involute(highest))
+    foot = half - involute(lowest)
+    if root < base:
+        wider = 0.25 * (np.pi / teeth - foot)
+        tooth += base * root * np.sin(wider)
+        foot += wider
+    return teeth * (tooth + root**2 * (np.pi / teeth - foot))
+
+
+HELIX_LENGTH = np.hypot(1.0, 4 * np.pi * 0.5)
+SHAPES = {
+    "box": (view.box((1, 2, 3), (5, 5, 5)), 6.0),
+    "cylinder": (view.cylinder((0, 1, 0), (0, 3, 0), 2.0, sides=FINE), 2 * np.pi),
+    "ring": (view.ring((1, 0, 0), (1, 0, 2), 1.0, 2.0, sides=FINE), 2 * np.pi * (1 - 0.25)),
+    "ellipsoid": (view.ellipsoid((1, 2, 3), (4, 0, 0), sides=FINE // 2), 8 * np.pi),
+    "plate": (view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 0.5), 2.0),
+    "gear": (view.gear(20, MODULE, WIDTH, points=400), WIDTH * gear_area(20, MODULE, ANGLE)),
+    "gear whose root is outside its base circle": (
+        view.gear(60, MODULE, WIDTH, points=400), WIDTH * gear_area(60, MODULE, ANGLE)),
+    "gear with a bore": (
+        view.gear(20, MODULE, WIDTH, bore=0.01, points=400),
+        WIDTH * (gear_area(20, MODULE, ANGLE) - np.pi * 0.01**2 / 4)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_solids_are_closed_and_face_outwards(name):
+    mesh, expected = SHAPES[name]
+    assert is_closed(mesh)
+    assert volume(mesh) == pytest.approx(expected, rel=2e-5)
+
+
+def test_a_coil_has_the_volume_of_its_wire():
+    """Section times length of the helix (Pappus), sections being polygons of 12 sides."""
+    mesh = view.coil((0, 0, 0), (0, 0, 1), 0.5, 0.05, turns=4)
+    section = 12 / 2 * (0.05 / 2) ** 2 * np.sin(2 * np.pi / 12)
+    assert is_closed(mesh)
+    assert volume(mesh) == pytest.approx(section * HELIX_LENGTH, rel=0.02)  # chords for arcs
+    points = mesh[0]
+    assert np.hypot(*points[:, :2].T).max() == pytest.approx(0.275, rel=1e-2)
+    assert points[:, 2].min() > -0.05 and points[:, 2].max() < 1.05
+
+
+def test_a_tube_round_a_corner_keeps_its_ends():
+    points, triangles = view.tube([(0, 0, 0), (1, 0, 0), (1, 1, 0)], 0.1)
+    assert is_closed((points, triangles))
+    np.testing.assert_allclose(points[-2:], [(0, 0, 0), (1, 1, 0)])
+
+
+def test_teeth_are_as_thick_as_half_a_pitch_on_the_pitch_circle():
+    outline = gear_outline(18, MODULE, ANGLE, 2000)
+    radius, angle = np.linalg.norm(outline, axis=1), np.arctan2(*outline.T[::-1])
+    crossing = np.flatnonzero(np.diff(np.sign(radius - 9 * MODULE)))
+    at = np.sort(angle[crossing])
+    np.testing.assert_allclose(np.diff(at), np.pi / 18, rtol=2e-3)
+    assert np.abs(at).min() == pytest.approx(np.pi / 36, rel=2e-3)  # a space is on the x axis
+    assert (radius.max(), radius.min()) == pytest.approx((10 * MODULE, 7.75 * MODULE))
+
+
+def test_a_bore_shows_its_rim_and_no_other_line_across_the_face():
+    """Edges that are drawn lie on the outline, on the bore, or run from face to face."""
+    points, triangles = view.gear(12, MODULE, WIDTH, bore=0.006)
+    ends = points[sharp_edges(points, triangles)]
+    radii = np.linalg.norm(ends[..., :2], axis=2)
+    inner = np.isclose(radii, 0.003)
+    assert (inner[:, 0] == inner[:, 1]).all() and inner.any() and not inner.all()
+
+
+def test_meshes_are_joined_with_their_own_triangles():
+    one, two = view.box((1, 1, 1)), view.box((1, 1, 2), (5, 0, 0))
+    both = view.joined([one, two])
+    assert is_closed(both) and volume(both) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m is not inside"),
+        (lambda: view.ring((0, 0, 1), (0, 0, 1), 1.0, 2.0), "in one place"),
+        (lambda: view.tube([(0, 0, 0)], 0.1), r"\(k, 3\) with k > 1, got \(1, 3\)"),
+        (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
+        (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m makes no coil"),
+        (lambda: view.extruded([(0, 0), (1, 0)], 1.0), r"\(n, 2\) with n > 2, got \(2, 2\)"),
+        (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
+        (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore of 2 m"),
+        (lambda: view.gear(5, 1e-3, 1e-2), "5 teeth of a pressure angle of 20 degrees"),
+        (lambda: view.gear(20, 1e-3, 1e-2, pressure_angle=0.7), "40.1.* degrees are pointed"),
+        (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "a bore of 0.02 m does not fit"),
+    ],
+)
+def test_shapes_that_cannot_be_are_refused(call, words):
+    with pytest.raises(ConfigError, match=words):
+        call()

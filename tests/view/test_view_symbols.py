@@ -1,0 +1,249 @@
+"""Symbols of machine drawings are where joints, springs and the ground are, at all instants."""
+
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import rom
+from cases.mbs.drawn import lattice_bar, swinging
+from rom import view
+from rom.errors import ConfigError
+from rom.view.canvas import symbols
+from rom.view.canvas.corner import BAR_SIZE, projected, scale
+from rom.view.canvas.scene import aimed
+from rom.view.scenes.connections import SPRING_COLOUR, connections, stretched
+from rom.view.scenes.film import HEIGHTS, Look, _stage
+from rom.view.scenes.ground import GROUND_COLOUR, JOINT_COLOUR, PLANE_OPACITY
+from rom.view.scenes.places import at_start, different
+from rom.view.scenes.rigid import bars, block_of, ends_of
+
+UP = np.array([0.0, 0.0, 1.0])
+STEEL = rom.mbs.Impact(stiffness=1e5)
+
+
+def rod(mech, name="rod", at=(0.5, 0, 0), **more):
+    markers = {"a": (-0.5, 0, 0), "b": (0.5, 0, 0)}
+    return mech.add_rigid(name, mass=1.0, inertia=(1e-3, 0.1, 0.1), at=at, markers=markers, **more)
+
+
+def drawn(mech, surfaces=None):
+    shapes = {name: bars(part, ends_of(mech, name))[0] for name, part in mech.parts.items()}
+    return connections(at_start(mech), shapes | (surfaces or {}), set(surfaces or ()), UP)
+
+
+def of(actors, colour, opacity=1.0):
+    return [
+        a for a in actors if a.colour == colour and a.opacity == opacity and a.cells.shape[1] == 3
+    ]
+
+
+def middle(actor):
+    points = actor.points[0]
+    return 0.5 * (points.min(axis=0) + points.max(axis=0))
+
+
+KINDS = {
+    "revolute": lambda m, a, b: m.revolute("j", a, b, axis=(0, 1, 0)),
+    "cylindrical": lambda m, a, b: m.cylindrical("j", a, b, axis=(0, 1, 0)),
+    "screw": lambda m, a, b: m.screw("j", a, b, axis=(0, 1, 0), pitch=0.01),
+    "prismatic": lambda m, a, b: m.prismatic("j", a, b, axis=(0, 1, 0)),
+    "spherical": lambda m, a, b: m.spherical("j", a, b),
+    "universal": lambda m, a, b: m.universal("j", a, b, axis1=(1, 0, 0), axis2=(0, 1, 0)),
+    "fixed": lambda m, a, b: m.fixed("j", a, b),
+    "point on line": lambda m, a, b: m.point_on_line("j", a, b, axis=(0, 1, 0)),
+    "point on plane": lambda m, a, b: m.point_on_plane("j", a, b, normal=(0, 0, 1)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_joint_is_drawn_at_its_point_and_along_its_axis(kind, turned):
+    """Between two bodies, also where both frames are turned; the axis is the world's y."""
+    A = rom.rotation.matrix(rom.rotation.exp(np.array([0.4, -0.3, 0.8]))) if turned else np.eye(3)
+    mech = rom.Mechanism()
+    one, two = (rod(mech, name, at=at, orientation=A)
+                for name, at in (("one", A @ (0.5, 0, 0)), ("two", A @ (1.5, 0, 0))))  # fmt: skip
+    KINDS[kind](mech, one.marker("b"), two.marker("a"))
+    (joint,) = of(drawn(mech), JOINT_COLOUR)
+    np.testing.assert_allclose(middle(joint), A @ (1.0, 0, 0), atol=1e-12)
+    if kind in ("revolute", "cylindrical", "screw", "prismatic"):
+        size = np.ptp(joint.points[0], axis=0)
+        assert size[1] > 1.2 * size[0] and size[1] > 1.2 * size[2]
+    if kind == "universal":  # its arms along x and y
+        size = np.ptp(joint.points[0], axis=0)
+        assert size[0] == pytest.approx(size[1], rel=1e-2) and size[2] < 0.6 * size[0]
+
+
+def test_a_hinge_on_the_ground_stands_on_it_and_one_that_carries_hangs_from_it():
+    """Supports are below the joint, above it for a body that hangs; all else has none."""
+    for at, side in (((0.5, 0, 0), -1), ((0, 0, -0.5), 1)):
+        mech = rom.Mechanism()
+        A = np.eye(3) if side < 0 else np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+        part = rod(mech, at=at, orientation=A)
+        mech.revolute("j", mech.ground.marker((0, 0, 0)), part.marker("a"), axis=(0, 1, 0))
+        (ground,) = of(drawn(mech), GROUND_COLOUR)
+        assert middle(ground)[2] * side > 0 and abs(middle(ground)[0]) < 1e-12
+    assert not of(drawn(swinging(lattice_bar())[0]), "none")
+
+
+def test_what_slides_on_the_ground_has_a_rail_below_all_of_its_way():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    block = mech.add_rigid(
+        "block", mass=1.0, inertia=(1e-3,) * 3, at=(1, 0, 0.2), velocity=(2, 0, 0)
+    )
+    mech.prismatic("j", mech.ground.marker((0, 0, 0.2)), block.marker((0, 0, 0)), axis=(1, 0, 0))
+    sol = rom.simulate(mech, t_end=0.5, dt=0.05)
+    shape = view.box((0.2, 0.3, 0.1))
+    stage = _stage(mech, sol, np.array([0, 5, 10]), Look({"block": shape}, up=UP))
+    (rails,) = of(stage.actors, GROUND_COLOUR)
+    low, high = rails.points[0].min(axis=0), rails.points[0].max(axis=0)
+    assert low[0] < 0.9 and high[0] > 2.1  # from 1 to 2, and half of the block
+    assert high[2] == pytest.approx(0.15)  # the lower face of the block
+    assert (low[1], high[1]) == pytest.approx((-0.15, 0.15))
+
+
+def test_the_bearing_of_a_shaft_is_around_its_nearer_end():
+    mech = rom.Mechanism()
+    part = mech.add_rigid(
+        "shaft", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0), markers={"c": (0, 0, 0)}
+    )
+    mech.revolute("j", mech.ground.marker((0, 0, 0)), part.marker("c"), axis=(0, 1, 0))
+    shaft = view.cylinder((0, -0.3, 0), (0, 0.8, 0), 0.1)[0]
+    actors = drawn(mech, {"shaft": shaft})
+    bush = next(a for a in of(actors, JOINT_COLOUR) if abs(middle(a)[2]) < 1e-6)
+    assert middle(bush)[1] < -0.3 < bush.points[0][:, 1].max()
+    assert np.ptp(bush.points[0][:, 0]) > 0.1
+
+
+def test_springs_stretch_between_their_markers():
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, -0.5))
+    mech.spring_damper("s", mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0)), stiffness=50.0,
+                       damping=1.0)  # fmt: skip
+    sol = rom.simulate(mech, t_end=0.2, dt=0.02)
+    stage = _stage(mech, sol, np.array([0, 5, 10]), Look({}, up=UP))
+    coil = next(a for a in stage.actors if a.colour == SPRING_COLOUR)
+    np.testing.assert_allclose(coil.points[:, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(coil.points[:, -1], sol.position("ball")[[0, 5, 10]], atol=1e-12)
+    wide = np.linalg.norm(coil.points[..., :2], axis=2).max(axis=1)
+    np.testing.assert_allclose(wide, wide[0])  # it grows longer, not wider
+    assert coil.points[2, -1, 2] < coil.points[0, -1, 2] - 0.05
+
+
+def test_a_stretched_symbol_keeps_its_axes_right_handed():
+    ends = np.zeros((2, 3)), np.array([[0.0, 2, 0], [1, 1, 1]])
+    local = np.array([[0.1, 0, 0], [0, 0.1, 0], [0, 0, 1.0]])
+    x, y, z = np.moveaxis(stretched((local, np.array([[0, 1]])), ends, "#000000").points, 1, 0)
+    np.testing.assert_allclose(z, ends[1])
+    assert (np.einsum("fa,fa->f", np.cross(x, y), z) > 0).all()
+    np.testing.assert_allclose(np.linalg.norm(x, axis=1), 0.1)
+
+
+def test_a_plane_of_contact_holds_all_that_moves_on_it():
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, 0.1), velocity=(3, 1, 0))
+    floor = mech.ground.marker((0, 0, 0))
+    mech.sphere_on_plane("c", floor, ball.marker((0, 0, 0)), STEEL, normal=(0, 0, 1), radius=0.1)
+    sol = rom.simulate(mech, t_end=0.5, dt=1e-3)
+    stage = _stage(mech, sol, np.arange(0, 501, 50), Look({}, up=UP))
+    (plate,) = of(stage.actors, GROUND_COLOUR, PLANE_OPACITY)
+    assert plate.points[0][:, 2].max() == pytest.approx(0.0, abs=1e-12)
+    corners = plate.points[0][np.isclose(plate.points[0][:, 2], 0.0, atol=1e-12)][:, :2]
+    centre = corners.mean(axis=0)
+    along = np.array([3.0, 1.0]) / np.sqrt(10)
+    half = np.abs((corners - centre) @ along).max()
+    way = (sol.position("ball")[:, :2] - centre) @ along
+    assert np.abs(way).max() + 0.1 < half < np.abs(way).max() + 0.5
+
+
+def test_a_block_of_inertia_has_the_edges_of_the_block_it_came_from():
+    """m / 12 (b^2 + c^2) and so on, turned into other axes."""
+    size, mass = np.array([0.3, 0.2, 0.5]), 7.0
+    R = rom.rotation.matrix(rom.rotation.exp(np.array([0.2, 0.9, -0.4])))
+    edges, axes = block_of(R @ np.diag(mass / 12 * size**2) @ R.T, mass)
+    np.testing.assert_allclose(edges, np.sort(size), rtol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    np.testing.assert_allclose(np.abs(R.T @ axes)[[1, 0, 2], [0, 1, 2]], 1.0, rtol=1e-12)
+
+
+def test_tubes_lead_to_points_that_only_joints_know():
+    mech = rom.Mechanism()
+    part = mech.add_rigid("body", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0))
+    assert ends_of(mech, "body") == []
+    mech.spherical("j", mech.ground.marker((0, 0.4, 0)), part.marker((0, 0.4, 0)))
+    np.testing.assert_allclose(ends_of(mech, "body"), [(0, 0.4, 0)])
+    assert np.ptp(bars(part, ends_of(mech, "body"))[0][:, 1]) > 0.4
+
+
+def test_a_picture_without_symbols_has_bodies_only():
+    mech, sol = swinging(lattice_bar())
+    bare = _stage(mech, sol, np.array([0]), Look({}, symbols=False))
+    assert not of(bare.actors, JOINT_COLOUR) and not of(bare.actors, GROUND_COLOUR)
+    full = _stage(mech, sol, np.array([0]), Look({}))
+    assert of(full.actors, JOINT_COLOUR) and of(full.actors, GROUND_COLOUR)
+
+
+def test_a_trace_is_the_whole_way_of_a_body():
+    mech, sol = swinging(lattice_bar())
+    stage = _stage(mech, sol, np.array([0]), Look({}, traces=("bar",)))
+    line = stage.actors[-1]
+    np.testing.assert_allclose(line.points[0], sol.position("bar"), atol=1e-12)
+    with pytest.raises(ConfigError, match="traces: no body 'baar'"):
+        view.animate(mech, sol, traces=("baar",))
+
+
+def test_instants_that_are_chosen_differ():
+    """A pendulum over two periods: its start, and places far from it and from each other."""
+    mech = rom.Mechanism()
+    part = rod(mech)
+    mech.revolute("j", mech.ground.marker((0, 0, 0)), part.marker("a"), axis=(0, 1, 0))
+    sol = rom.simulate(mech, t_end=3.4, dt=0.01)
+    times = different(sol, 4)
+    tip = np.array([sol.position("rod", "b")[np.argmin(np.abs(sol.t - t))] for t in times])
+    apart = np.linalg.norm(tip[:, None] - tip, axis=2)[np.triu_indices(4, 1)]
+    assert times.size == 4 and times[0] == 0.0 and (np.diff(times) > 0).all()
+    assert apart.min() > 0.5
+    still = rom.Mechanism(gravity=(0, 0, 0))
+    rod(still)
+    assert different(rom.simulate(still, t_end=1.0, dt=0.1), 4).tolist() == [0.0]
+
+
+def test_the_length_beside_a_picture_is_true_and_the_axes_are_those_of_the_camera():
+    camera = aimed(np.array([[0.0, 0, 0], [0.9, 0.5, 0.2]]), 700, view=(0, -1, 0), up=(0, 0, 1))
+    length, wide = scale(camera)
+    assert wide == pytest.approx(length * camera.size[1] / camera.height)
+    assert BAR_SIZE / 2.6 < wide <= BAR_SIZE and length == pytest.approx(0.1)
+    np.testing.assert_allclose(projected(camera), [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
+
+
+def test_the_camera_of_a_film_holds_all_instants_and_wastes_little():
+    """The arm sweeps a half circle; its way fills the frame in one direction at least."""
+    mech, sol = swinging(lattice_bar())
+    stage = _stage(mech, sol, np.arange(0, 101, 5), Look({}, symbols=False))
+    camera = stage.camera(900, (0, 0, 1), (0, 1, 0))
+    seen = np.concatenate([a.points.reshape(-1, 3) for a in stage.actors])
+    right = np.cross(camera.up, camera.toward)
+    reach = np.abs((seen - camera.focus) @ np.column_stack([right, camera.up])).max(axis=0)
+    half = 0.5 * camera.height * np.array([camera.size[0] / camera.size[1], 1.0])
+    assert (reach < half).all() and (reach > 0.9 * half).any()
+    assert HEIGHTS[0] <= camera.size[1] / camera.size[0] <= HEIGHTS[1]
+
+
+def test_ground_is_hatched_all_around():
+    (points, triangles), (lines, pairs) = symbols.ground_plate(2.0, 1.0, 0.1)
+    assert points[:, 2].max() == 0.0 and points[:, 2].min() == pytest.approx(-0.1)
+    ends = lines[pairs]
+    slanted = ends[np.abs(np.diff(ends[..., 2], axis=1)[:, 0]) > 0.05]
+    sides = [np.isclose(np.abs(slanted[..., k]), half).all(axis=1).sum()
+             for k, half in ((0, 1.0), (1, 0.5))]  # fmt: skip
+    assert min(sides) >= 6 and sum(sides) >= len(slanted)
+    assert len(triangles) == 12
+
+
+def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
+    pytest.importorskip("pyvista", reason="pyvista is not installed")
+    monkeypatch.setitem(sys.modules, "dolfinx", ModuleType("dolfinx"))
+    with pytest.raises(ConfigError, match="dolfinx is loaded in this process"):
+        view.plotter(lattice_bar())
