@@ -84,7 +84,7 @@ def run(
     folder: Path | None = None,
     limits: Limits | None = None,
     variables: Mapping[str, str] | None = None,
-    given: memoryview | None = None,
+    given: bytes | None = None,
 ) -> Ended:
     """Run a command to its end; whatever interrupts this process ends the child with all its own.
 
@@ -134,7 +134,7 @@ def start(
 
 
 def finish(
-    process: subprocess.Popen[bytes], seconds: float = 0.0, given: memoryview | None = None
+    process: subprocess.Popen[bytes], seconds: float = 0.0, given: bytes | None = None
 ) -> Ended:
     """Wait until a child has ended; end it after so many seconds, or when this is interrupted."""
     overtime = False

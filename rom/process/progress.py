@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from shutil import get_terminal_size
 from threading import Event, Thread
 from typing import Any
 
@@ -28,15 +29,18 @@ class Progress:
         if sys.stderr.isatty() and find_spec("tqdm") is not None:
             from tqdm import tqdm
 
-            self._bar = tqdm(total=total, leave=False, file=sys.stderr, bar_format=TIME_FORMAT)
+            size = get_terminal_size()  # of a terminal without size tqdm would ask in vain
+            look: dict[str, Any] = {"bar_format": TIME_FORMAT, "leave": False}
+            look |= {"ncols": size.columns - 1, "nrows": size.lines}
+            self._bar = tqdm(total=total, file=sys.stderr, **look)
 
-    def reach(self, done: float, said: str) -> None:
+    def reach(self, done: float, label: str) -> None:
         """Show that so much is done, with a few words."""
         if self._bar is None:
-            line(f"{said}  {100 * done / self.total:3.0f} %")
+            line(f"{label}  {100 * done / self.total:3.0f} %")
             return
         self._bar.n = done
-        self._bar.set_description_str(said)
+        self._bar.set_description_str(label)
 
     def end(self) -> None:
         """Clear the line."""
@@ -62,12 +66,12 @@ def looked_for() -> bool:
 
 
 @contextmanager
-def followed(total: int, said: str, done: Callable[[], int]) -> Iterator[None]:
+def followed(total: int, label: str, done: Callable[[], int]) -> Iterator[None]:
     """Around waiting for another process, whose progress is asked for now and then.
 
     Args:
         total: amount of its work.
-        said: what it does.
+        label: what it does.
         done: gives the amount that is done.
     """
     if total < 2 or not looked_for():
@@ -77,7 +81,7 @@ def followed(total: int, said: str, done: Callable[[], int]) -> Iterator[None]:
 
     def follow() -> None:
         while not ended.wait(LOOK_INTERVAL):
-            progress.reach(min(done(), total), said)
+            progress.reach(min(done(), total), label)
 
     thread = Thread(target=follow, daemon=True)
     thread.start()

@@ -98,6 +98,16 @@ def test_logarithms_and_plain_ratios_are_left_alone():
     assert axes.get_xlabel() == "frequency [Hz]"
 
 
+@pytest.mark.parametrize(
+    "label", ["log10 of the gap [m]", "way [m], angle [rad]", "way", "way [mm]", "count [1]", "[%]"]
+)
+def test_labels_that_do_not_end_with_one_unit_of_the_axis_are_left_alone(label):
+    axes = drawn([0.0, 1.0], [0.0, 1e-4], "x", label)
+    before = labels(axes.yaxis)
+    readable(axes)
+    assert axes.get_ylabel() == label and labels(axes.yaxis) == before
+
+
 def test_axes_of_one_scale_have_one_unit():
     axes = drawn([0.0, 2.0], [0.0, 0.02], "x [m]", "y [m]")
     readable(axes, alike=True)

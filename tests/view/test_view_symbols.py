@@ -117,6 +117,16 @@ def test_the_bearing_of_a_shaft_is_around_its_nearer_end():
     assert np.ptp(bush.points[0][:, 0]) > 0.1
 
 
+def test_the_wall_of_a_clamped_body_is_wider_than_its_foot_and_behind_it():
+    mech = rom.Mechanism()
+    part = rod(mech)
+    mech.fixed("j", mech.ground.marker((0, 0, 0)), part.marker("a"))
+    (plate,) = of(drawn(mech, {"rod": view.box((1.0, 0.4, 0.2))[0]}), GROUND_COLOUR)
+    low, high = plate.points[0].min(axis=0), plate.points[0].max(axis=0)
+    assert high[0] == pytest.approx(0.0, abs=1e-12) and low[0] < 0
+    assert min(high[1] - 0.2, high[2] - 0.1, -0.2 - low[1], -0.1 - low[2]) > 0.02
+
+
 def test_springs_stretch_between_their_markers():
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     ball = mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0, 0, -0.5))

@@ -10,7 +10,7 @@ from rom.view.canvas.scene import TEXT_COLOUR, Camera
 
 AXIS_COLOURS = ("#c0392b", "#3a8f4d", "#2f6fb0")  # of x, y and z
 TRIAD_SIZE, BAR_SIZE = 96, 130  # of the square of the axes, and of the longest bar [pixel]
-HEIGHT = 100  # of the strip that holds both [pixel]
+STRIP_HEIGHT = 100  # of the strip that holds both [pixel]
 HIDDEN_LENGTH = 0.12  # of an axis towards the eye, which is a dot
 
 
@@ -22,7 +22,7 @@ def corner(figure: Any, camera: Camera, left: float, right: float, top: float) -
         camera: of the picture they belong to.
         left: end of the strip [pixel].
         right: its other end [pixel].
-        top: its upper edge [pixel]; it is `HEIGHT` high.
+        top: its upper edge [pixel]; it is `STRIP_HEIGHT` high.
     """
     triad(page.area(figure, left, top, TRIAD_SIZE, TRIAD_SIZE), camera)
     length, wide = scale(camera)

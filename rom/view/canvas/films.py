@@ -13,10 +13,10 @@ from rom.names import ORIGIN_MARK
 from rom.process.child import run, scratch
 from rom.view.canvas.gif import gif
 from rom.view.canvas.offscreen import Image
-from rom.view.canvas.page import checked
+from rom.view.canvas.style import checked
 
 ENDINGS = (".gif", ".mp4")
-ENCODER = "ffmpeg"
+ENCODER_PROGRAM = "ffmpeg"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,11 +89,11 @@ def encoder() -> str:
     Raises:
         ResourceError: if it is not on the PATH.
     """
-    found = shutil.which(ENCODER)
+    found = shutil.which(ENCODER_PROGRAM)
     if found is None:
         raise ResourceError(
-            f".mp4 needs {ENCODER}, which is not on the PATH.",
-            hint=f"apt install {ENCODER}, or write the film as .gif.",
+            f".mp4 needs {ENCODER_PROGRAM}, which is not on the PATH.",
+            hint=f"apt install {ENCODER_PROGRAM}, or write the film as .gif.",
         )
     return found
 
@@ -112,11 +112,11 @@ def mp4(film: Film) -> bytes:
         command += ["-s", f"{width}x{height}", "-framerate", f"{1 / film.duration:.6f}", "-i", "-"]
         command += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
         command += ["-metadata", f"comment={ORIGIN_MARK}", str(out)]
-        done = run(command, given=np.ascontiguousarray(pages).reshape(-1).data)
+        done = run(command, given=pages.tobytes())
         if done.code or not out.is_file():
             raise ResourceError(
-                f"{ENCODER} ended with code {done.code}: {done.last}.",
-                hint=f"This needs a build of {ENCODER} with libx264; .gif needs nothing.",
+                f"{ENCODER_PROGRAM} ended with code {done.code}: {done.last}.",
+                hint=f"This needs a build of {ENCODER_PROGRAM} with libx264; .gif needs nothing.",
             )
         return out.read_bytes()
 

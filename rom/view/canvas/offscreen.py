@@ -47,8 +47,8 @@ def render(
     with scratch("view") as folder:
         write_scene(folder, actors, camera, limits, oversampling)
         n, count = max(len(actor.points) for actor in actors), folder / COUNT_FILE
-        said = f"drawing {n} pictures"
-        with followed(n, said, lambda: count.stat().st_size if count.exists() else 0):
+        label = f"drawing {n} pictures"
+        with followed(n, label, lambda: count.stat().st_size if count.exists() else 0):
             done = run(python("rom.view.canvas.draw", str(folder)))
         pictures = folder / "pictures.npy"
         if done.code or not pictures.exists():
@@ -93,7 +93,7 @@ def write_scene(
 
 
 def child_failure(done: Ended) -> ConfigError:
-    """What a child process that did not end well has said."""
+    """What a child process that did not end well has label."""
     how = f"signal {-done.code}" if done.code < 0 else f"code {done.code}"
     return ConfigError(
         f"the process that draws ended with {how}: {done.last}.",

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.io.files import check_writable
 from rom.view.canvas.offscreen import COLOUR_MAP, Image, require
 from rom.view.canvas.scene import TEXT_COLOUR
+from rom.view.canvas.style import checked as checked
+from rom.view.canvas.style import styled as styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,15 +20,6 @@ if TYPE_CHECKING:
 DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
 LINE_HEIGHT = 26  # of small text [pixel]
-PAGE_STYLE = {
-    "font.family": "DejaVu Sans",
-    "text.color": TEXT_COLOUR,
-    "axes.labelcolor": TEXT_COLOUR,
-    "axes.edgecolor": "#5c636e",
-    "xtick.color": TEXT_COLOUR,
-    "ytick.color": TEXT_COLOUR,
-    "axes.linewidth": 0.8,
-}
 
 
 def sheet(width: int, height: int) -> "Picture":
@@ -44,27 +36,6 @@ def sheet(width: int, height: int) -> "Picture":
     figure = Picture(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
-
-
-def styled() -> Any:
-    """Context in which axes and words get the look of the house."""
-    require("matplotlib")
-    from matplotlib import rc_context
-
-    return rc_context(PAGE_STYLE)
-
-
-def checked(path: str | Path, *endings: str) -> Path:
-    """The path, if pictures of that ending are made and it can be written.
-
-    Raises:
-        ConfigError: naming the endings, or what is wrong with the folder.
-    """
-    path = check_writable(path)
-    if path.suffix.lower() not in endings:
-        known = " or ".join(endings)
-        raise ConfigError(f"{path}: the ending {path.suffix!r} is unknown.", hint=f"Use {known}.")
-    return path
 
 
 def wanted(path: str | Path | None) -> Path | None:

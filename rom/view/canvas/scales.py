@@ -12,7 +12,7 @@ ROUND_OFF = 1e-9  # of the largest value of a panel; what varies by less is draw
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p"}
 LARGEST_POWERS = {"s": 0, "m": 3, "rad": 0}  # nobody reads kiloseconds
 UNIT_PATTERN = re.compile(r"(m|Pa|N|Hz|s|W|J|rad)(?=$|[ /])")
-LABEL_PATTERN = re.compile(r"(.*)\[([^\[\]]+)\]\s*")
+LABEL_PATTERN = re.compile(r"((?!.*\blog)[^\[\]]*)\[([^\[\]]+)\]\s*")  # no logarithm of a quantity
 DEGREES = (0.1, 3600.0)  # sizes of angles that are read in degrees
 
 

@@ -13,8 +13,8 @@ from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
 from rom.model import Array
 from rom.names import named
-from rom.view.canvas.page import checked
 from rom.view.canvas.solids import Mesh
+from rom.view.canvas.style import checked
 from rom.view.scenes.film import shades_of
 from rom.view.scenes.places import placed
 from rom.view.scenes.rigid import bars, ends_of

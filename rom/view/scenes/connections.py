@@ -35,10 +35,11 @@ BUSHES: dict[str, Callable[[float], Mesh]] = {  # kind of joint: what is drawn a
     "fixed": symbols.weld, "point on line": symbols.ball, "point on plane": symbols.ball,
 }  # fmt: skip
 BEARING_RATIO, MAX_BEARING_RATIO = 1.5, 5.0  # size of a bearing over its shaft; over other joints
+FOOT_RATIO = 0.02  # of a body, the part that counts as its end at a wall
 ROUND_RATIO = 0.2  # of its radius, by which the end of a shaft is beside its axis at most
 HANGING_COSINE = 0.5  # of a body below its joint, whose support is above then
-SLIDING = ("prismatic", "cylindrical", "screw", "point on line")
-ON_PLANES = ("planar", "point on plane", "rolling")
+SLIDING_KINDS = ("prismatic", "cylindrical", "screw", "point on line")
+PLANE_KINDS = ("planar", "point on plane", "rolling")
 
 
 def connections(
@@ -86,9 +87,9 @@ def _joint(scenery: Scenery, joint: Any) -> Iterator[Actor]:
         yield _rod(scenery.places, first, second)
     if joint.kind in BUSHES:
         yield from _bush(scenery, joint, axis)
-    if joint.kind in SLIDING and axis is not None:
+    if joint.kind in SLIDING_KINDS and axis is not None:
         yield from guide(scenery, first, second, matrix(mechanism.part(first.body).p).T @ axis)
-    elif joint.kind in ON_PLANES and axis is not None:
+    elif joint.kind in PLANE_KINDS and axis is not None:
         yield from _on_plane(scenery, joint, axis)
     elif joint.kind in BUSHES and GROUND in (first.body, second.body):
         yield from _grounded(scenery, joint, axis)
@@ -139,13 +140,26 @@ def _grounded(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Acto
     here, mover = (first, second) if first.body == GROUND else (second, first)
     point = scenery.places.point(here)[0]
     if joint.kind == "fixed":
-        yield from wall(scenery, point, _towards(scenery, mover))
+        normal = _towards(scenery, mover)
+        yield from wall(scenery, point, normal, _foot(scenery, mover, normal))
         return
     shift, size = _bearing(scenery, joint, axis)
     centre = scenery.places.pose(mover.body)[0][0] - point
     hanging = bool(centre @ scenery.up < -HANGING_COSINE * np.linalg.norm(centre))
     about = None if joint.kind == "spherical" else axis
     yield from support(scenery, point + shift, about, above=hanging, size=size)
+
+
+def _foot(scenery: Scenery, marker: Marker, normal: Array) -> float:
+    """How wide a body is where it leaves a wall, about a marker [m]; 0 without a surface."""
+    if marker.body not in scenery.solid:
+        return 0.0
+    part = scenery.places.mechanism.part(marker.body)
+    X = scenery.solid[marker.body] - part.point(marker)
+    inward = scenery.places.pose(marker.body)[1][0].T @ normal
+    face = X[X @ inward < FOOT_RATIO * np.ptp(X, axis=0).max()]
+    radial = face - np.outer(face @ inward, inward)
+    return 2 * float(np.linalg.norm(radial, axis=1).max(initial=0.0))
 
 
 def _towards(scenery: Scenery, marker: Marker) -> Array:

@@ -12,8 +12,7 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import named, offered
 from rom.view.canvas import page
-from rom.view.canvas.corner import BAR_SIZE, TRIAD_SIZE, corner
-from rom.view.canvas.corner import HEIGHT as CORNER_HEIGHT
+from rom.view.canvas.corner import BAR_SIZE, STRIP_HEIGHT, TRIAD_SIZE, corner
 from rom.view.canvas.films import Film, finished, wanted
 from rom.view.canvas.offscreen import Image, render
 from rom.view.canvas.scales import clock_texts, prefixed
@@ -297,9 +296,9 @@ def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float) -> Im
     """What stays around the pictures of a film."""
     text, below = page.caption(_words(stage, magnify), FILM_WIDTH - 40)
     top = CLOCK_HEIGHT + height
-    figure = page.sheet(FILM_WIDTH, top + CORNER_HEIGHT + below + 20)
+    figure = page.sheet(FILM_WIDTH, top + STRIP_HEIGHT + below + 20)
     _below(figure, stage, camera, FILM_WIDTH, top)
-    page.words(figure, text, 20, top + CORNER_HEIGHT, size=page.SMALL_SIZE)
+    page.words(figure, text, 20, top + STRIP_HEIGHT, size=page.SMALL_SIZE)
     return page.pixels(figure)
 
 
@@ -309,14 +308,14 @@ def _series_sheet(stage: Stage, camera: Camera, images: Image, times: Array, mag
     rows = -(-len(images) // columns)
     text, below = page.caption(_words(stage, magnify), width - 60)
     foot = 20 + rows * height
-    figure = page.sheet(width, foot + CORNER_HEIGHT + below + 40)
+    figure = page.sheet(width, foot + STRIP_HEIGHT + below + 40)
     texts = clock_texts(times)
     for k, (image, clock) in enumerate(zip(images, texts, strict=True)):
         left, top = 20 + (k % columns) * (STILL_WIDTH + 20), 20 + (k // columns) * height
         page.words(figure, clock, left + 10, top)
         page.place(figure, image, left, top + 35)
     _below(figure, stage, camera, width, foot)
-    page.words(figure, text, 30, foot + CORNER_HEIGHT + 10, size=page.SMALL_SIZE)
+    page.words(figure, text, 30, foot + STRIP_HEIGHT + 10, size=page.SMALL_SIZE)
     return figure
 
 

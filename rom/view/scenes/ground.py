@@ -15,6 +15,7 @@ from rom.view.scenes.places import Places, Pose, placed
 GROUND_COLOUR, JOINT_COLOUR, INK_COLOUR = "#e3e7ec", "#f4f1e4", "#23282f"
 PLANE_OPACITY = 0.5
 SIZE_RATIOS = (0.022, 0.3)  # of a symbol: of all there is, and of the body of middle size
+WALL_RATIO = 1.6  # of a wall, of the width of what stands on it
 STRIP_RATIO = 0.3  # width of each strip of a rail, of what slides on both
 MAX_TOUCHING = 200  # markers by which the size of a plane is found
 
@@ -102,11 +103,18 @@ def support(
     yield from _hatched(plate, pose)
 
 
-def wall(scenery: Scenery, point: Array, normal: Array) -> Iterator[Actor]:
-    """Hatched ground whose surface is at a point (3,) and faces along a normal."""
+def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> Iterator[Actor]:
+    """Hatched ground whose surface is at a point (3,) and faces along a normal.
+
+    Args:
+        scenery: what symbols are drawn with.
+        point: (3,) on its surface [m].
+        normal: (3,) out of it.
+        foot: width of what stands on it [m].
+    """
     axes = np.roll(upright(normal, scenery.up), -1, axis=1)  # the normal last
-    size = 5.0 * scenery.size
-    plate = symbols.ground_plate(size, size, 0.8 * scenery.size)
+    size = max(5.0 * scenery.size, WALL_RATIO * foot)
+    plate = symbols.ground_plate(size, size, 0.16 * size)
     yield from _hatched(plate, at(point[None], axes[None]))
 
 

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, typed
 from rom.view.canvas import page
-from rom.view.canvas.corner import HEIGHT as CORNER_HEIGHT
-from rom.view.canvas.corner import corner
+from rom.view.canvas.corner import STRIP_HEIGHT, corner
 from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, sharp_edges
 from rom.view.scenes.film import Look, symbols_of, together, upright
@@ -93,7 +92,7 @@ def _sheet(mechanism: Any, camera: Camera, image: Any, title: str) -> Any:
             row, left = row + 1, 30
         rows.append((row, left))
         left += wide
-    top = image.shape[0] + CORNER_HEIGHT + 90
+    top = image.shape[0] + STRIP_HEIGHT + 90
     figure = page.sheet(PAGE_WIDTH, top + 35 * (row + 1) + 15 + below + 20)
     page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     page.place(figure, image, 0, 80)

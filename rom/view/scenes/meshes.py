@@ -10,8 +10,7 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.view.canvas import page
-from rom.view.canvas.corner import HEIGHT as CORNER_HEIGHT
-from rom.view.canvas.corner import corner
+from rom.view.canvas.corner import STRIP_HEIGHT, corner
 from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, directed_edges
 
@@ -83,7 +82,7 @@ def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
         "the rest of the mechanism."
     )
     text, height = page.caption(words, PAGE_WIDTH - 60)
-    top = image.shape[0] + CORNER_HEIGHT + 90
+    top = image.shape[0] + STRIP_HEIGHT + 90
     figure = page.sheet(PAGE_WIDTH, top + 50 + height + 20)
     page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     page.place(figure, image, 0, 80)
