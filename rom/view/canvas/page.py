@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rom.arguments import shortened
 from rom.errors import ConfigError
 from rom.view.canvas.offscreen import COLOUR_MAP, Image, require
 from rom.view.canvas.scene import TEXT_COLOUR
@@ -115,7 +116,7 @@ def taken(ax: Any, n: int, name: str) -> tuple["Figure", list[Any]]:
     given = [ax] if isinstance(ax, Axes) else list(np.ravel(np.asarray(ax, dtype=object)))
     if len(given) != n or not all(isinstance(axes, Axes) for axes in given):
         raise ConfigError(
-            f"{name}: ax = {ax!r} must be {n} Axes of matplotlib, one for each diagram.",
+            f"{name}: ax = {shortened(ax)} must be {n} Axes of matplotlib, one for each diagram.",
             hint=f"figure, ax = matplotlib.pyplot.subplots({n})",
         )
     return given[0].figure.figure, given
