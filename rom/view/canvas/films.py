@@ -4,9 +4,11 @@ import base64
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK
@@ -19,19 +21,20 @@ ENDINGS = (".gif", ".mp4")
 ENCODER_PROGRAM = "ffmpeg"
 
 
+@typed
 @dataclass(frozen=True, slots=True, eq=False)
 class Film:
     """A finished film; notebooks show it, `save` writes it.
 
     Attributes:
-        pages: (f, height, width, 3) its pictures.
+        pages: (f, height, width, 3) its pictures, whole numbers from 0 to 255.
         duration: of each picture [s].
         path: where it was written, or None; the film may stand for this path.
     """
 
-    pages: Image
+    pages: Any
     duration: float
-    path: Path | None = None
+    path: str | Path | None = None
 
     def save(self, path: str | Path) -> Path:
         """Write it as .gif, or as .mp4 by ffmpeg; whole or not at all.

@@ -290,6 +290,7 @@ def involute(angle: Any) -> Any:
     return np.tan(angle) - angle
 
 
+@typed
 def joined(meshes: Sequence[Mesh]) -> Mesh:
     """Several surfaces as one."""
     first = np.cumsum([0, *(len(points) for points, _ in meshes)])[:-1]
