@@ -226,7 +226,7 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
             for k, at in enumerate(first)]  # fmt: skip
     bands = [_band(rows[k], rows[(k + 1) % 4]) for k in range(4 if bore else 3)]
     triangles = np.vstack(bands)
-    area = [len(set(t)) == 3 for t in triangles.tolist()]  # a fan about one point has half of them
+    area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # a fan has half of them
     return points, triangles[area]
 
 
