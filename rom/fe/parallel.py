@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rom.errors import ParallelError, RomError
+from rom.process.launcher import ranks
 
 T = TypeVar("T")
 GRACE_PERIOD = 1.0  # [s] that other ranks leave rank 0 to print an error all of them have
@@ -27,8 +28,10 @@ def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named
 
     Raises:
         RomError: on all ranks, when the function raised one.
-        ParallelError: on all ranks, when the function raised anything else under mpirun.
+        ParallelError: on all ranks, when the function raised anything else under mpirun, or when
+            mpirun is that of another MPI.
     """
+    check_launcher()
     value: Any = None
     error: Exception | None = None
     if comm.rank == 0:
@@ -38,6 +41,22 @@ def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named
             error = raised
     _raise_together(comm, error)
     return comm.bcast(value) if comm.size > 1 else value
+
+
+def check_launcher() -> None:
+    """Make sure that the processes mpirun has started know of each other.
+
+    Raises:
+        ParallelError: if not: each would do all of the work, and write the same files.
+    """
+    started, known = ranks()[1], MPI.COMM_WORLD.size
+    if known == 1 < started:
+        library = MPI.Get_library_version().split(",")[0].splitlines()[0]
+        raise ParallelError(
+            f"mpirun has started {started} processes, and each knows only itself: mpirun is not of "
+            f"the MPI that Python loads, {library}.",
+            hint="`rom doctor` names the mpirun that is.",
+        )
 
 
 def on_first_rank(function: Callable[[], T]) -> T:
@@ -125,7 +144,7 @@ def stop_all_ranks(code: int, print_error: Callable[[], None]) -> None:
         code: exit code.
         print_error: prints the error.
     """
-    if MPI.COMM_WORLD.rank > 0:
+    if ranks()[0] > 0:
         time.sleep(GRACE_PERIOD)
     print_error()
     sys.stdout.flush()

@@ -20,6 +20,7 @@ from rom.body.rotating import rotating_matrices
 from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, LINEAR_LOADS, interface_loads
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
+from rom.process.mpirun import mpirun
 from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
@@ -280,7 +281,7 @@ def test_the_number_of_processes_does_not_matter(tmp_path):
     bodies = []
     for n in (1, *SHARED_BY):
         path = tmp_path / f"{n}.rom.npz"
-        command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-c", SCRIPT, path]
+        command = [*mpirun(n), sys.executable, "-c", SCRIPT, path]
         done = subprocess.run(
             command, env=os.environ | ENVIRONMENT, timeout=600, capture_output=True, text=True,
             check=False,

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 from cases.paths import ROOT
+from rom.process.mpirun import mpirun
 
 
 def environment(**more):
@@ -14,7 +15,7 @@ def environment(**more):
 
 def rom(*arguments, n=1, timeout=180, **options):
     """Finished process of ``rom …``, on n ranks."""
-    launcher = ["mpirun", "--oversubscribe", "-n", str(n)] if n > 1 else []
+    launcher = mpirun(n) if n > 1 else []
     command = [*launcher, sys.executable, "-m", "rom", *map(str, arguments)]
     options = {"env": environment(), "capture_output": True, "text": True, "check": False} | options
     return subprocess.run(command, timeout=timeout, **options)

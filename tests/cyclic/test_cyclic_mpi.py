@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.paths import RANKS, ROOT
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 from cases.ranks.environment import ENVIRONMENT
@@ -25,7 +26,7 @@ SCRIPT = RANKS / "sectors_under_mpi.py"
 def every(tmp_path_factory):
     file = tmp_path_factory.mktemp("sectors") / "ranks.json"
     done = subprocess.run(
-        ["mpirun", "--oversubscribe", "-n", "3", sys.executable, str(SCRIPT), str(file)],
+        [*mpirun(3), sys.executable, str(SCRIPT), str(file)],
         env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
         cwd=ROOT,
     )  # fmt: skip

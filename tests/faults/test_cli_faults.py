@@ -15,6 +15,7 @@ from cases.command import rom as command
 from cases.solid import block
 from rom.cli.main import main
 from rom.cli.verbs import check
+from rom.process.mpirun import mpirun
 
 BEAM = str(ROOT / "meshes" / "beam.geo")
 STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]
@@ -304,7 +305,7 @@ def test_a_rank_that_is_alone_with_its_error_ends_all(folder):
         "check.run = run\nsys.exit(main(['check', 'x']))\n"
     )
     start = time.perf_counter()
-    done = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", sys.executable, "alone.py"],
+    done = subprocess.run([*mpirun(2), sys.executable, "alone.py"],
                           env=environment(), capture_output=True, text=True, timeout=60,
                           check=False)  # fmt: skip
     assert done.returncode == 4

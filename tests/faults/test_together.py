@@ -3,7 +3,6 @@
 import json
 import multiprocessing
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -23,6 +22,7 @@ from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
 from rom.io.claim import LOCK_NAME, claimed
 from rom.io.files import write_whole
+from rom.process.mpirun import found, mpirun
 from rom.process.turns import Turns
 from rom.report.html import paragraph, write_report
 
@@ -235,16 +235,12 @@ if __name__ == "__main__":
 """
 
 
-RANKS_COMMAND = ["mpirun", "--oversubscribe", "-n", "3"]
-
-
-@pytest.mark.parametrize("launcher", [[], pytest.param(RANKS_COMMAND, marks=pytest.mark.mpi)])
-def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_kept(
-    tmp_path, launcher
-):
+@pytest.mark.parametrize("ranks", [1, pytest.param(3, marks=pytest.mark.mpi)])
+def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_kept(tmp_path, ranks):
     """A function for two types: two compilations, whoever makes them."""
     (tmp_path / "toy.py").write_text(TOY)
     command = [sys.executable, tmp_path / "toy.py"]
+    launcher = mpirun(ranks) if ranks > 1 else []
     run = [subprocess.Popen([*launcher, *command], env=environment(), text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)
            for _ in range(1 if launcher else 3)]  # fmt: skip
@@ -336,7 +332,7 @@ print(*found)
 @pytest.mark.parametrize("numpy_comes", ["early", "late"])
 @pytest.mark.parametrize("chosen", [None, "2"])
 def test_a_rank_has_one_thread_unless_the_user_chooses(numpy_comes, chosen):
-    if not shutil.which("mpirun") or len(os.sched_getaffinity(0)) < 2:
+    if not found() or len(os.sched_getaffinity(0)) < 2:
         pytest.skip("needs mpirun and two cores")
     env = {k: v for k, v in environment().items() if not k.endswith("_NUM_THREADS")}
     env |= {} if chosen is None else {"OMP_NUM_THREADS": chosen}

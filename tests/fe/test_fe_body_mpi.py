@@ -11,6 +11,7 @@ import rom
 from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import ROOT
 from cases.ranks.environment import ENVIRONMENT
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -31,7 +32,7 @@ def bodies(request, tmp_path_factory):
     folder, written = tmp_path_factory.mktemp("bodies"), {}
     for n in (1, *SHARED_BY):
         written[n] = folder / f"{n}.rom.npz"
-        command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-m", "rom", "reduce"]
+        command = [*mpirun(n), sys.executable, "-m", "rom", "reduce"]
         command += [str(ROD), "-p", "lc=8e-3", "--E", "210e9", "--nu", "0.3", "--rho", "7850"]
         command += [word for kind in KINDS[request.param] for word in ("-i", kind)]
         command += ["-m", "20", "--reference", "pin_a", "-q", "-o", str(written[n])]
@@ -79,7 +80,7 @@ def test_a_script_that_fails_on_one_rank_after_the_model_ends_on_all():
         "1 / (MPI.COMM_WORLD.rank - 1); MPI.COMM_WORLD.Barrier()"
     )
     done = subprocess.run(
-        ["mpirun", "--oversubscribe", "-n", "3", sys.executable, "-c", script],
+        [*mpirun(3), sys.executable, "-c", script],
         env=ENVIRONMENT, timeout=60, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode != 0

@@ -10,6 +10,7 @@ import pytest
 from cases.long import SHARED_BY
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -22,7 +23,7 @@ def found(tmp_path_factory):
     for n in (1, *SHARED_BY):
         file = folder / f"{n}.json"
         done = subprocess.run(
-            ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, str(SCRIPT), str(file)],
+            [*mpirun(n), sys.executable, str(SCRIPT), str(file)],
             env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
             cwd=ROOT,
         )  # fmt: skip

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from cases.paths import RANKS, TESTS
 from rom.errors import MaterialError, RomError
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -25,15 +26,8 @@ ENVIRONMENT = os.environ | {
 }
 
 
-def mpirun(n, *arguments, timeout=360):
-    command = [
-        "mpirun",
-        "--oversubscribe",
-        "-n",
-        str(n),
-        sys.executable,
-        str(RANKS / "under_mpi.py"),
-    ]
+def on_ranks(n, *arguments, timeout=360):
+    command = [*mpirun(n), sys.executable, str(RANKS / "under_mpi.py")]
     return subprocess.run(
         [*command, *map(str, arguments)],
         cwd=HERE, env=ENVIRONMENT, timeout=timeout, capture_output=True, text=True, check=False,
@@ -42,7 +36,7 @@ def mpirun(n, *arguments, timeout=360):
 
 def run_model(folder, n, cells, degree):
     path = folder / f"{n}.npz"
-    done = mpirun(n, "model", path, cells, degree)
+    done = on_ranks(n, "model", path, cells, degree)
     assert done.returncode == 0, done.stderr
     return dict(np.load(path))
 
@@ -95,7 +89,7 @@ def test_fewer_cells_than_ranks(tmp_path):
 )
 def test_a_rank_that_fails_ends_all_within_seconds(kind, code, words):
     start = time.perf_counter()
-    done = mpirun(2, "fail", kind, timeout=30)
+    done = on_ranks(2, "fail", kind, timeout=30)
     assert done.returncode == code
     assert words in done.stderr
     assert done.stderr.count(words) == 1

@@ -16,6 +16,7 @@ from cases.ranks.environment import ENVIRONMENT
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.parametric.affine import AffineModel
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -148,7 +149,7 @@ def families(tmp_path_factory):
     folder = tmp_path_factory.mktemp("families")
     for n in (1, *SHARED_BY):
         done = subprocess.run(
-            ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
+            [*mpirun(n), sys.executable,
              str(RANKS / "family_under_mpi.py"), "material", str(folder / f"{n}.npz")],
             env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip

@@ -19,6 +19,7 @@ from rom.eigen.verbs import rigid_motions
 from rom.errors import FileFormatError, ParameterError
 from rom.parametric.layers import Stretch
 from rom.parametric.stretched import StretchedModel
+from rom.process.mpirun import mpirun
 
 AXES = "xyz"
 
@@ -261,7 +262,7 @@ def test_layers_are_blind_to_the_number_of_processes(tmp_path):
     for n in (1, *SHARED_BY):
         path = tmp_path / f"{n}.npz"
         done = subprocess.run(
-            ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
+            [*mpirun(n), sys.executable,
              str(RANKS / "family_under_mpi.py"), "thickness", str(path)],
             env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
         )  # fmt: skip

@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from rom.process.mpirun import mpirun
+
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
 from cases.files.demos import DEMOS, LONG_DEMOS, MESHED, ON_TWO_PROCESSES, check
 from cases.long import ROM_LONG
@@ -23,7 +25,7 @@ SHARED = [demo for demo in MESHED if ROM_LONG or demo.stem in ON_TWO_PROCESSES]
 def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
     out, file = tmp_path / "out", tmp_path / "results.json"
     done = subprocess.run(
-        ["mpirun", "-n", "2", "--oversubscribe", sys.executable, str(RANKS / "demo_under_mpi.py"),
+        [*mpirun(2), sys.executable, str(RANKS / "demo_under_mpi.py"),
          str(file), str(demo), "--quiet", "--out", str(out)],
         env=ENVIRONMENT, capture_output=True, text=True, timeout=1740, check=False,
     )  # fmt: skip

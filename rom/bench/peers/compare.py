@@ -13,6 +13,7 @@ import numpy as np
 
 from rom.errors import ResourceError
 from rom.process import child
+from rom.process.mpirun import mpirun
 
 # scikit-sparse builds on the CHOLMOD of Debian 12, and for NumPy 1
 PACKAGES = ("exudyn==1.13.6", "scikit-sparse<0.4.13", "scipy<1.14", "numpy<2")
@@ -38,7 +39,7 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
         ours = answer_of([*rod, "rbe2", str(N_MODES), file])
         case = f"{ours['dofs']} dofs, rbe2"
         yield case, "rom, one process", ours["processor"], "s of the processor", ""
-        two = answer_of(["mpirun", "--oversubscribe", "-n", "2", *rod, "rbe2", str(N_MODES)])
+        two = answer_of([*mpirun(2), *rod, "rbe2", str(N_MODES)])
         yield case, "one process over two", ours["seconds"] / two["seconds"], "", "above 1"
         for program, aim in (("superlu", ""), ("cholmod", "above 1"), ("exudyn", "above 10")):
             theirs = answer_of([python, str(SCRIPT_FILE), file, program, "rbe2", str(N_MODES)])

@@ -27,6 +27,7 @@ from rom.components.assumed_strain import (
 )
 from rom.components.assumed_strain.space import bending
 from rom.errors import ConfigError, InterfaceError, MaterialError, MeshError, SolverError
+from rom.process.mpirun import mpirun
 
 COOK = [(0, 0), (48, 44), (48, 60), (0, 44)]
 COOK_TABLE = {  # n: tip deflections of CST, F3, F1 with one diagonal, then with the other
@@ -183,7 +184,7 @@ def test_two_processes_find_the_frequencies_of_one(tmp_path):
         "PYTHONPATH": PYTHONPATH,
     }
     subprocess.run(
-        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, str(script), str(tmp_path / "s")],
+        [*mpirun(2), sys.executable, str(script), str(tmp_path / "s")],
         env=os.environ | environment, check=True, timeout=600,
     )  # fmt: skip
     found = np.load(tmp_path / "s.npz")

@@ -16,6 +16,7 @@ from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.op4 import write_op4
 from rom.mbs.results.state import Memory, State
 from rom.process.child import environment
+from rom.process.mpirun import mpirun
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -177,7 +178,7 @@ def compile_kernels() -> None:
 
 def on_ranks(n: int, words: str) -> subprocess.CompletedProcess[bytes]:
     """A finished run of rom on some ranks; it must not inherit that this process uses MPI, too."""
-    launcher = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable, "-P", "-m", "rom"]
+    launcher = [*mpirun(n), sys.executable, "-P", "-m", "rom"]
     allowed = {k: v for k, v in os.environ.items() if k.startswith("OMPI_ALLOW")}
     return subprocess.run([*launcher, *words.split()], env=environment() | allowed,
                           capture_output=True, timeout=50, check=False)  # fmt: skip

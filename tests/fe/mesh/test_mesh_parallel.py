@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from cases.files.cells import solid
 from cases.paths import TESTS
 from rom.errors import MeshError
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -73,7 +74,7 @@ def test_integrals_tags_and_errors_are_the_same_on_any_number_of_ranks(ranks):
     here = TESTS
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     env = os.environ | allowed | {"OMP_NUM_THREADS": "1", "PYTHONPATH": f"{here}:{here.parent}"}
-    command = ["mpirun", "-n", str(ranks), "--oversubscribe", sys.executable, "-c", PROGRAM]
+    command = [*mpirun(ranks), sys.executable, "-c", PROGRAM]
     done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=600)
     lines = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
     assert lines, done.stderr[-2000:]

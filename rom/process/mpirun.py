@@ -1,0 +1,54 @@
+"""The program that starts ranks; those of another MPI than Python loads would never meet."""
+
+import re
+import shutil
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+from rom.errors import ResourceError
+
+NAME = "mpirun"
+OPEN_MPI, MPICH = "Open MPI", "MPICH"
+VERSIONS = (  # what they say of themselves
+    (OPEN_MPI, re.compile(r"\(Open MPI\) (\S+)")),
+    (MPICH, re.compile(r"HYDRA build details:\s+Version:\s+(\S+)")),
+)
+KINDS = (OPEN_MPI, MPICH)
+TIME_LIMIT = 20.0  # [s] for saying a version
+
+
+def found() -> str:
+    """Path of the launcher beside this Python, where pip and conda put it, or of the system.
+
+    Empty where there is none.
+    """
+    beside = shutil.which(NAME, path=str(Path(sys.executable).parent))
+    return beside or shutil.which(NAME) or ""
+
+
+@cache
+def version(program: str) -> str:
+    """Which MPI a launcher is of, e.g. "Open MPI 4.1.4"; empty if it does not say so."""
+    try:
+        said = subprocess.run(
+            [program, "--version"], capture_output=True, text=True, timeout=TIME_LIMIT, check=False
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    named = ((name, pattern.search(said)) for name, pattern in VERSIONS)
+    return next((f"{name} {told[1]}" for name, told in named if told), "")
+
+
+def mpirun(n: int) -> list[str]:
+    """What stands before a command that runs as n processes, also on fewer cores.
+
+    Raises:
+        ResourceError: if no launcher is installed.
+    """
+    program = found()
+    if not program:
+        raise ResourceError(f"{NAME} is not installed.", hint="`rom doctor` says what to type.")
+    crowded = ["--oversubscribe"] if version(program).startswith(OPEN_MPI) else []
+    return [program, *crowded, "-n", str(n)]
