@@ -42,7 +42,7 @@ SOURCES = {  # class -> where its objects come from, for people who have somethi
     "State": "from rom.equilibrium or solution.final",
     "Solution": "from rom.simulate",
 }
-ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))
+ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on: a kind by itself
 
 
 class Unfit(Exception):
@@ -134,7 +134,7 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
 def _alternatives(kinds: Iterable[Any]) -> list[Any]:
     """Members of a union; those that make up an array-like or a path stand for one thing."""
     found = list(kinds)
-    if ARRAY_LIKE.issubset(found):
+    if ARRAY_LIKE and ARRAY_LIKE.issubset(found):
         found = [*(kind for kind in found if kind not in ARRAY_LIKE), npt.ArrayLike]
     if Path in found:
         found.remove(str)
