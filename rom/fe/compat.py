@@ -1,4 +1,4 @@
-"""The only place that knows which dolfinx this is: 0.5, 0.9, or 0.10 and later, told by feature."""
+"""The only place that knows which dolfinx this is: 0.5, 0.9, 0.10, or 0.11, told by feature."""
 
 import inspect
 import logging
@@ -18,6 +18,8 @@ from rom.model import Array, Index, Integers
 
 # ffcx routes all warnings of the process into a log; a warning belongs to whoever listens for it.
 logging.captureWarnings(False)
+
+PARTS_KEEP_COLUMNS = (3, 23)  # the first PETSc not tried; 3.22 does not, 3.25 does
 
 
 def lagrange(mesh: Any, degree: int) -> Any:
@@ -93,7 +95,10 @@ def cell_name(mesh: Any) -> str:
 
 def geometry_degree(mesh: Any) -> int:
     """Polynomial degree of the map from the reference cell: 2 for curved cells."""
-    cmap = mesh.geometry.cmap
+    geometry = mesh.geometry
+    if hasattr(type(geometry), "cmaps"):
+        return geometry.cmaps[0].degree
+    cmap = geometry.cmap
     return (cmap() if callable(cmap) else cmap).degree
 
 
@@ -105,6 +110,15 @@ def sub_entities(name: str) -> list[list[list[int]]]:
 def to_global(index_map: Any, local: Integers) -> Index:
     """Global numbers of local entities."""
     return np.asarray(index_map.local_to_global(local.astype(np.int32)), dtype=np.int64)
+
+
+def same_layout(A: PETSc.Mat, B: PETSc.Mat) -> bool:
+    """Whether values of A can be copied into B, whose entries stand in the same places.
+
+    Ranks of PETSc 3.25 keep columns of other ranks in a part of a matrix in which nothing stands;
+    sums of such parts drop them.
+    """
+    return A.comm.size == B.comm.size == 1 or PETSc.Sys.getVersion() < PARTS_KEEP_COLUMNS
 
 
 def versions() -> dict[str, str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from rom.eigen.verbs import count_shift
 from rom.errors import ModesMissedError
+from rom.fe.compat import same_layout
 from rom.fe.operators.factor import Factor
 from rom.model import Array
 
@@ -42,7 +43,8 @@ def verify_count(ops: Any, lam: Array, m: int, n_rigid: int, spent: Any = None) 
 def _count_below(ops: Any, sigma: float, spent: Any) -> int:
     """Number of eigenvalues below sigma."""
     A = ops.shifted(sigma)
-    if isinstance(spent, Factor) and spent.A == ops.K and _n_entries(A) == _n_entries(ops.K):
+    of_K = isinstance(spent, Factor) and spent.A == ops.K and same_layout(A, ops.K)
+    if of_K and _n_entries(A) == _n_entries(ops.K):
         return _counted_in_place(ops.K, A, spent)
     if spent is not None:
         spent.release()

@@ -126,8 +126,21 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
     """A X for (n_local, k) rows."""
     if X.shape[1] == 0:
         return np.zeros((A.getLocalSize()[0], 0))
+    if not np.diff(A.getOwnershipRangesColumn()).all():
+        return _column_by_column(A, X)
     B = dense(X, A)
     Y = A.matMult(B)
     out = Y.getDenseArray().copy()
     B.destroy(), Y.destroy()
+    return out
+
+
+def _column_by_column(A: PETSc.Mat, X: Array) -> Array:
+    """A X where a rank owns no column of A, on which matMult of PETSc 3.25 crashes."""
+    out = np.empty((A.getLocalSize()[0], X.shape[1]))
+    x, y = A.createVecs()
+    for k, column in enumerate(X.T):
+        x.array[:] = column
+        A.mult(x, y)
+        out[:, k] = y.array
     return out

@@ -173,7 +173,10 @@ def _davidson(
     if deflated.shape[1]:
         solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
     solver.solve()
-    return mode_pairs(ops, solver, k)
+    found = mode_pairs(ops, solver, k)
+    # SLEPc 3.25 empties the preconditioner it holds when it goes; this one is still needed
+    transform.getKSP().setPC(PETSc.PC().create(ops.comm))
+    return found
 
 
 def _orthonormal(A: PETSc.Mat, X: Array) -> Array:
