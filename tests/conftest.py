@@ -3,6 +3,7 @@
 import os
 import signal
 
+import rom.fe  # noqa: F401  dolfinx of a wheel finds MPI only after it
 from cases.long import LONGEST_FIRST, ROM_LONG
 from cases.paths import TESTS
 
@@ -15,6 +16,7 @@ os.environ.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
 os.environ.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
 # processes that wait for others leave the core to them
 os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
+os.environ.setdefault("MPIR_CVAR_POLLS_BEFORE_YIELD", "1")
 
 
 def pytest_collection_modifyitems(config, items):

@@ -5,6 +5,7 @@
 
 import json
 import platform
+import shutil
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -12,19 +13,24 @@ from time import perf_counter
 from typing import Any
 
 from rom.doctor.probes import Finding
+from rom.fe import GMSH_LIBRARIES, WHEELS
+from rom.process import mpirun
 
-PACKAGES = {
-    "MPI": "python3-mpi4py",
-    "PETSc": "python3-petsc4py",
-    "MUMPS": "python3-petsc4py",
-    "SLEPc": "python3-slepc4py",
-    "dolfinx": "python3-dolfinx",
-    "gmsh": "python3-gmsh",
-    "meshio": "python3-meshio",
-    "h5py": "python3-h5py",
+PACKAGES = {  # of Debian, and of pip
+    "MPI": ("python3-mpi4py", "mpi4py mpich"),
+    "PETSc": ("python3-petsc4py", "dolfinx-solver-real"),
+    "MUMPS": ("python3-petsc4py", "dolfinx-solver-real"),
+    "SLEPc": ("python3-slepc4py", "dolfinx-solver-real"),
+    "dolfinx": ("python3-dolfinx", "dolfinx-solver-real"),
+    "gmsh": ("python3-gmsh", "gmsh"),
+    "meshio": ("python3-meshio", "meshio"),
+    "h5py": ("python3-h5py", "h5py"),
 }
+LAUNCHERS = ("openmpi-bin", "mpich")
+WHEELS_NEED = (3, 12)  # Python
 OLD_NUMPY = 'pip install "numpy<1.25": the library was compiled for an older NumPy'
-INSTALL_COMMAND = 'pip install pyvista matplotlib "vtk==9.5.2"'
+INSTALL_COMMAND = "pip install pyvista matplotlib"
+BESIDE_DEBIAN = ' "vtk==9.5.2"'  # later ones abort beside its dolfinx
 SYSTEM_COMMAND = "sudo apt-get install libgl1 libegl1 libxrender1"
 MIN_CONTRAST = 1.0  # standard deviation of grey levels; a lit sphere has about 50
 
@@ -49,8 +55,9 @@ def fenicsx(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
         ending: how the probe ended, "" if well.
     """
     findings = [_finding(name, found.get(name), ending) for name in PACKAGES]
+    findings.insert(1, _launcher(found.get("MPI", {}).get("version", "")))
     if any(f.state == "missing" for f in findings):
-        findings += _blind()
+        findings += _other_ways()
     return findings
 
 
@@ -58,27 +65,85 @@ def _finding(name: str, answer: dict[str, Any] | None, ending: str) -> Finding:
     if answer is None:
         return Finding("FEniCSx", name, ending or "no answer", "broken", "reinstall it")
     if answer.get("missing"):
-        advice = f"sudo apt-get install {PACKAGES[name]}"
-        return Finding("FEniCSx", name, "not installed", "missing", advice)
+        return Finding("FEniCSx", name, "not installed", "missing", command(*PACKAGES[name]))
     if "error" in answer:
-        binary = any(text in answer["error"] for text in ("dtype size", "NumPy 1.x", "multiarray"))
-        advice = OLD_NUMPY if binary else f"sudo apt-get install --reinstall {PACKAGES[name]}"
-        return Finding("FEniCSx", name, answer["error"], "broken", advice)
+        return Finding("FEniCSx", name, answer["error"], "broken", _repair(name, answer["error"]))
     return Finding("FEniCSx", name, answer["version"])
 
 
-def _blind() -> list[Finding]:
-    """Environments that cannot see what is installed in the system."""
+def _repair(name: str, error: str) -> str:
+    if name == "gmsh" and "cannot open shared object" in error and not sees_debian():
+        return f"sudo apt-get install {GMSH_LIBRARIES}"
+    if not sees_debian():
+        return f"pip install --force-reinstall {PACKAGES[name][1]}"
+    if any(text in error for text in ("dtype size", "NumPy 1.x", "multiarray")):
+        return OLD_NUMPY
+    return f"sudo apt-get install --reinstall {PACKAGES[name][0]}"
+
+
+def _launcher(library: str) -> Finding:
+    """The program that starts ranks, and whether it is of the MPI that Python loads.
+
+    Args:
+        library: what that MPI says of itself; empty without one.
+    """
+    program = mpirun.found()
+    if not program:
+        state = "missing" if library else "ok"
+        advice = command(*LAUNCHERS) if library else ""
+        return Finding("FEniCSx", mpirun.NAME, "not installed", state, advice)
+    told = mpirun.version(program)
+    value = f"{program}, {told or 'of which MPI is not known'}"
+    kinds = [kind for kind in mpirun.KINDS if library.startswith(kind)]
+    if told and kinds and not told.startswith(kinds[0]):
+        value += f"; Python loads {kinds[0]}, whose processes it cannot bring together"
+        return Finding("FEniCSx", mpirun.NAME, value, "note", command(*LAUNCHERS))
+    typed = shutil.which(mpirun.NAME)
+    if library and typed != program:
+        value += f"; what {mpirun.NAME} alone starts is {typed or 'nothing'}"
+        return Finding("FEniCSx", mpirun.NAME, value, "note", f"{program} -n 2 rom ...")
+    return Finding("FEniCSx", mpirun.NAME, value)
+
+
+def command(debian: str, pip: str) -> str:
+    """What to type for a library: of Debian where this Python looks for its packages, else of pip.
+
+    Args:
+        debian: name of the package there.
+        pip: names of the wheels.
+    """
+    if not sees_debian() and sys.version_info >= WHEELS_NEED:
+        return f"pip install {pip}"
+    return f"sudo apt-get install {debian}"
+
+
+def sees_debian() -> bool:
+    """Whether this Python looks where Debian installs its packages."""
+    return not _closed() and Path(sys.base_prefix).samefile("/usr")
+
+
+def _closed() -> bool:
     config = Path(sys.prefix, "pyvenv.cfg")
     text = config.read_text() if config.is_file() else ""
-    if "include-system-site-packages = false" in text:
-        advice = "/usr/bin/python3 -m venv --system-site-packages .venv"
-        value = "does not see the packages of the system"
-        return [Finding("FEniCSx", "environment", value, "note", advice)]
+    return "include-system-site-packages = false" in text
+
+
+def _other_ways() -> list[Finding]:
+    """Where this Python does not look, and what the other of both ways in needs."""
+    wheels = f"pip install {WHEELS}"
+    newer = ".".join(map(str, WHEELS_NEED))
+    if sees_debian():
+        value = f"or by pip alone, in a venv of its own with Python {newer} or later"
+        return [Finding("FEniCSx", "other way", value, "note", wheels)]
+    value = "does not see the packages of the system"
     if not Path(sys.base_prefix).samefile("/usr"):
         value = f"Debian's packages serve /usr/bin/python3, this is {sys.executable}"
-        return [Finding("FEniCSx", "environment", value, "note")]
-    return []
+    found = [Finding("FEniCSx", "environment", value, "note",
+                     "/usr/bin/python3 -m venv --system-site-packages .venv")]  # fmt: skip
+    if sys.version_info < WHEELS_NEED:
+        value = f"by pip alone with Python {newer} or later, this is {platform.python_version()}"
+        found.append(Finding("FEniCSx", "other way", value, "note", wheels))
+    return found
 
 
 def pictures(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
@@ -86,7 +151,7 @@ def pictures(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
     if "pyvista" not in found:
         state = "missing" if "No module named" in ending else "broken"
         value = "not installed" if state == "missing" else ending
-        return [Finding("pictures", "pyvista", value, state, INSTALL_COMMAND), _matplotlib()]
+        return [Finding("pictures", "pyvista", value, state, _for_pictures()), _matplotlib()]
     versions = [Finding("pictures", name, found[name]["version"]) for name in ("pyvista", "vtk")]
     return [*versions, _matplotlib(), _display(found.get("picture"), ending)]
 
@@ -95,7 +160,11 @@ def _matplotlib() -> Finding:
     try:
         return Finding("pictures", "matplotlib", version("matplotlib"))
     except PackageNotFoundError:
-        return Finding("pictures", "matplotlib", "not installed", "missing", INSTALL_COMMAND)
+        return Finding("pictures", "matplotlib", "not installed", "missing", _for_pictures())
+
+
+def _for_pictures() -> str:
+    return INSTALL_COMMAND + (BESIDE_DEBIAN if sees_debian() else "")
 
 
 def _display(picture: dict[str, Any] | None, ending: str) -> Finding:

@@ -43,11 +43,12 @@ def compiling(comm: MPI.Comm) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        if isinstance(error, RomError) or shutil.which(compiler()):
+        lacking = not_here()
+        if isinstance(error, RomError) or not lacking:
             raise
         raise ResourceError(
-            f"forms are compiled by a C compiler, and {compiler()} is not here.",
-            hint="On Debian: apt-get install gcc libc6-dev.",
+            f"forms are compiled by a C compiler for this Python, and {lacking} is not here.",
+            hint="On Debian: apt-get install gcc libc6-dev python3-dev.",
         ) from error
     finally:
         logging.disable(previous)
@@ -59,6 +60,14 @@ def compiler() -> str:
     """The C compiler that Python calls for extensions."""
     named = os.environ.get("CC") or sysconfig.get_config_var("CC") or "gcc"
     return str(named).split()[0]
+
+
+def not_here() -> str:
+    """What forms cannot be compiled without and is missing; empty where all is there."""
+    header = Path(sysconfig.get_path("include"), "Python.h")
+    if not shutil.which(compiler()):
+        return compiler()
+    return "" if header.exists() else str(header)
 
 
 def on_root_lock(comm: MPI.Comm) -> int | None:

@@ -11,9 +11,11 @@ import pytest
 
 from cases.command import environment
 from cases.command import rom as command
+from rom.doctor import libraries
 from rom.doctor.core import abilities, better
-from rom.doctor.libraries import PACKAGES, fenicsx, light, pictures
+from rom.doctor.libraries import OLD_NUMPY, PACKAGES, fenicsx, light, pictures, sees_debian
 from rom.doctor.machine import blas, damaged_files
+from rom.fe import GMSH_LIBRARIES, WHEELS
 
 OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
 REFERENCE = "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"
@@ -65,9 +67,12 @@ def test_what_is_missing_is_named_with_the_line_to_type(tmp_path):
     text = 'raise ModuleNotFoundError("No module named {0!r}", name={0!r})\n'
     found, code, _ = examine(tmp_path, fakes={name: text.format(name) for name in gone})
     assert code == 0
-    for name, package in PACKAGES.items():
+    for name, packages in PACKAGES.items():
         assert found[name]["state"] == "missing"
-        assert found[name]["advice"] == f"sudo apt-get install {package}"
+        assert found[name]["advice"].endswith(packages)  # of Debian or of pip
+    ways = [f["advice"] for f in found.values() if f["topic"] == "FEniCSx"]
+    if sys.version_info < (3, 12):
+        assert f"pip install {WHEELS}" in ways and "sudo apt-get install python3-gmsh" in ways
     assert found["pyvista"]["state"] == "missing" and "pip install" in found["pyvista"]["advice"]
 
 
@@ -82,7 +87,63 @@ def test_a_library_for_another_numpy_gets_the_cure(tmp_path):
     broken = "raise ValueError('numpy.dtype size changed, may indicate binary incompatibility')\n"
     found, code, _ = examine(tmp_path, fakes={"h5py": broken})
     assert code == 5
-    assert found["h5py"]["state"] == "broken" and '"numpy<1.25"' in found["h5py"]["advice"]
+    cure = '"numpy<1.25"' if sees_debian() else "pip install --force-reinstall h5py"
+    assert found["h5py"]["state"] == "broken" and cure in found["h5py"]["advice"]
+
+
+@pytest.mark.parametrize(
+    ("debian", "python", "advice"),
+    [(True, (3, 13), "sudo apt-get install python3-gmsh"), (False, (3, 12), "pip install gmsh"),
+     (False, (3, 11), "sudo apt-get install python3-gmsh")],
+)  # fmt: skip
+def test_what_to_type_fits_where_this_python_looks(monkeypatch, debian, python, advice):
+    """The wheels refuse an environment that sees Debian's petsc4py, and there is none for 3.11."""
+    monkeypatch.setattr(libraries, "sees_debian", lambda: debian)
+    monkeypatch.setattr(sys, "version_info", python)
+    found = {f.name: f for f in fenicsx({"gmsh": {"missing": "gmsh"}}, "")}
+    assert found["gmsh"].advice == advice
+    notes = " ".join(f.advice for f in found.values() if f.state == "note")
+    assert (f"pip install {WHEELS}" in notes) == (advice[:4] == "sudo")
+    assert ("--system-site-packages" in notes) == (not debian)
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "debian", "advice"),
+    [("gmsh", "OSError: libGLU.so.1: cannot open shared object file", False,
+      f"sudo apt-get install {GMSH_LIBRARIES}"),
+     ("gmsh", "OSError: libGLU.so.1: cannot open shared object file", True,
+      "sudo apt-get install --reinstall python3-gmsh"),
+     ("PETSc", "ImportError: no MPI", False, "pip install --force-reinstall dolfinx-solver-real"),
+     ("h5py", "ValueError: numpy.dtype size changed", True, OLD_NUMPY),
+     ("h5py", "ValueError: numpy.dtype size changed", False, "pip install --force-reinstall h5py")],
+)  # fmt: skip
+def test_what_is_broken_is_repaired_from_where_it_came(monkeypatch, name, error, debian, advice):
+    monkeypatch.setattr(libraries, "sees_debian", lambda: debian)
+    found = {f.name: f for f in fenicsx({name: {"error": error}}, "")}
+    assert (found[name].state, found[name].advice) == ("broken", advice)
+
+
+@pytest.mark.parametrize(
+    ("library", "beside", "told", "state", "words"),
+    [("Open MPI v4.1.4, mpi4py 3", "", "Open MPI 4.1.4", "ok", "/usr/bin/mpirun, Open MPI 4.1.4"),
+     ("MPICH 5.0.2, mpi4py 4", "", "MPICH 5.0.2", "ok", "/usr/bin/mpirun, MPICH 5.0.2"),
+     ("MPICH 5.0.2, mpi4py 4", "", "Open MPI 4.1.4", "note", "Python loads MPICH, whose processes"),
+     ("MPICH 5.0.2, mpi4py 4", "/e/bin/mpirun", "MPICH 5.0.2", "note", "starts is /usr/bin/mpirun"),
+     ("", "", "Open MPI 4.1.4", "ok", "/usr/bin/mpirun, Open MPI 4.1.4"),
+     ("MPICH 5.0.2, mpi4py 4", None, "", "missing", "not installed"),
+     ("", None, "", "ok", "not installed")],
+)  # fmt: skip
+def test_the_launcher_is_that_of_the_mpi_that_is_loaded(
+    monkeypatch, library, beside, told, state, words
+):
+    """Beside this Python, on the path alone, or nowhere."""
+    monkeypatch.setattr(libraries.shutil, "which", lambda name: "/usr/bin/mpirun")
+    program = "" if beside is None else beside or "/usr/bin/mpirun"
+    monkeypatch.setattr(libraries.mpirun, "found", lambda: program)
+    monkeypatch.setattr(libraries.mpirun, "version", lambda program: told)
+    found = {f.name: f for f in fenicsx({"MPI": {"version": library}} if library else {}, "")}
+    assert found["mpirun"].state == state and words in found["mpirun"].value
+    assert bool(found["mpirun"].advice) == (state != "ok")
 
 
 def test_libraries_after_a_crash_are_not_called_missing():

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from cases.command import environment
-from rom.errors import RomWarning
+from rom.errors import ResourceError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -112,3 +112,19 @@ def test_asking_for_rom_fe_starts_no_mpi():
 
     code = "import rom.fe.mesh, sys; sys.exit('mpi4py' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("there", "named"), [("", "Python.h"), ("Python.h", "")])
+def test_what_forms_are_compiled_with_is_named_where_it_is_missing(
+    tmp_path, monkeypatch, there, named
+):
+    """Packages of pip need the headers of Python and a compiler, and bring neither."""
+    from types import SimpleNamespace
+
+    (tmp_path / there).touch()
+    places = SimpleNamespace(get_path=lambda kind: str(tmp_path), get_config_var=lambda name: "sh")
+    monkeypatch.setattr(jit, "sysconfig", places)
+    kind = ResourceError if named else OSError
+    with pytest.raises(kind, match=f"{named} is not here.*python3-dev" if named else "broken"):
+        with jit.compiling(MPI.COMM_SELF):
+            raise OSError("the build is broken")

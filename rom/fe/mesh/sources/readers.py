@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rom.errors import FileFormatError, ResourceError, RomError
+from rom.fe import GMSH_LIBRARIES
 from rom.fe.mesh.solid import GEOMETRIES, Read
 
 
@@ -21,7 +22,13 @@ def read(request: dict[str, Any]) -> Read:
     except ModuleNotFoundError as error:
         raise ResourceError(
             f"reading this file needs {error.name}, which is not installed.",
-            hint=f"On Debian: apt-get install python3-{error.name}.",
+            hint=f"On Debian: apt-get install python3-{error.name}; else pip install {error.name}.",
+        ) from error
+    except OSError as error:
+        if request["reader"] not in GEOMETRIES or ".so" not in str(error):
+            raise
+        raise ResourceError(
+            f"gmsh cannot be loaded: {error}.", hint=f"On Debian: apt-get install {GMSH_LIBRARIES}."
         ) from error
     # parsers raise whatever the broken line provokes, and meshio leaves the process
     except (Exception, SystemExit) as error:
