@@ -14,6 +14,7 @@ from cases.long import LONGEST_FIRST
 from cases.paths import ROOT, TESTS
 from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
 from rom.doctor.machine import SLOW_ADVICE
+from rom.fe import DEBIAN, GMSH_LIBRARIES, WHEELS
 
 pytestmark = pytest.mark.once
 SETUP = ROOT / ".ci" / "setup.sh"
@@ -21,6 +22,10 @@ SETUP = ROOT / ".ci" / "setup.sh"
 
 def packages():
     return re.search(r'packages="([^"]+)"', SETUP.read_text()).group(1).split()
+
+
+def name_of(requirement):
+    return re.split(r"[<>=!~ ;\[]", requirement)[0]
 
 
 def deny_network(folder):
@@ -91,7 +96,7 @@ def test_what_first_motions_need_is_compiled_until_it_is_and_when_sources_change
 
 
 def test_scripts_are_valid_shell():
-    for script in (SETUP, ROOT / ".ci" / "run", ROOT / ".ci" / "newer_dolfinx.sh"):
+    for script in (ROOT / ".ci" / "run", *(ROOT / ".ci").glob("*.sh")):
         assert os.access(script, os.X_OK), f"{script} is not executable"
         subprocess.run(["sh", "-n", script], check=True)
 
@@ -131,14 +136,37 @@ def test_the_doctor_advises_packages_the_setup_installs():
         word for text in (SYSTEM_COMMAND, SLOW_ADVICE) for word in text.split() if word[:3] == "lib"
     }
     known = {*packages(), "python3-mpi4py"}  # comes with petsc4py
-    assert advised and advised | set(PACKAGES.values()) <= known
+    assert advised and advised | {debian for debian, _ in PACKAGES.values()} <= known
+    assert set(DEBIAN.split()) <= known
+
+
+def test_the_way_in_by_pip_alone_is_told_the_same_everywhere():
+    """The extra, what is advised where it is missing, the script that tries it, and the page."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    brought = [name_of(r) for r in project["optional-dependencies"]["fe"]]
+    assert brought == WHEELS.split()
+    fenicsx = {name for _, names in PACKAGES.values() for name in names.split()}
+    assert fenicsx - {"mpi4py", "mpich"} == set(brought)  # these two come with FEniCSx
+    newest = " ".join((ROOT / ".ci" / "newest_dolfinx.sh").read_text().split())
+    page = " ".join((ROOT / "docs" / "install.md").read_text().replace("\\\n", " ").split())
+    needed = set(re.search(r'packages="([^"]+)"', newest).group(1).split()) - {"python3-venv"}
+    install = re.search(r"apt-get install (gcc [^`]+?) python3 -m venv", page).group(1)
+    assert set(install.split()) == needed
+    assert needed > {*GMSH_LIBRARIES.split(), *SYSTEM_COMMAND.split()[3:]}
+    assert ".[fe,view,dev]" in newest and ".[fe,view]" in page
+    assert ".[fe,view]" in (ROOT / "README.md").read_text()
 
 
 def test_pip_does_not_shadow_what_debian_provides():
     """pip cannot see Debian's gmsh and h5py, and would put other builds in front of them."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
-    names = {re.split(r"[<>=!~ ;\[]", requirement)[0] for requirement in wanted}
+    extras = project["optional-dependencies"]
+    apart = extras.pop("fe")
+    for recipe in (SETUP, ROOT / "Dockerfile", ROOT / "Makefile"):
+        assert not re.search(r"\[[\w,]*\bfe\b", recipe.read_text())
+    wanted = [*project["dependencies"], *chain(*extras.values())]
+    names = {name_of(requirement) for requirement in wanted}
+    assert not names & {name_of(requirement) for requirement in apart}
     assert not names & {
         "gmsh",
         "h5py",
