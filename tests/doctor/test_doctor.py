@@ -15,7 +15,7 @@ from rom.doctor import libraries
 from rom.doctor.core import abilities, better
 from rom.doctor.libraries import OLD_NUMPY, PACKAGES, fenicsx, light, pictures, sees_debian
 from rom.doctor.machine import blas, damaged_files
-from rom.fe import GMSH_LIBRARIES, WHEELS
+from rom.fe import GMSH_LIBRARIES, HELPER, WHEELS
 
 OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
 REFERENCE = "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"
@@ -58,7 +58,8 @@ def test_versions_are_those_the_libraries_report(tmp_path):
     assert found["dolfinx"]["value"] == dolfinx.__version__
     version = ".".join(map(str, PETSc.Sys.getVersion()))
     assert found["PETSc"]["value"].startswith(f"{version} (float64")
-    assert found["MUMPS"]["value"][0] in "56"
+    within = importlib.util.find_spec(HELPER) is not None  # without a version
+    assert found["MUMPS"]["value"] == "works" if within else found["MUMPS"]["value"][0] in "56"
 
 
 def test_what_is_missing_is_named_with_the_line_to_type(tmp_path):

@@ -164,7 +164,7 @@ def test_petsc_reads_no_option_file_of_the_folder_but_its_variable(planted):
     code = "import rom.fe.jit; from petsc4py import PETSc; print(sorted(PETSc.Options().getAll()))"
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True,
                           env=environment(PETSC_OPTIONS="-mine 1"), check=True)  # fmt: skip
-    assert done.stdout.strip() == "['mine', 'skip_petscrc']"
+    assert done.stdout.splitlines()[0] == "['mine', 'skip_petscrc']"  # 3.25 adds a remark
 
 
 def test_a_child_is_told_no_path_but_full_ones(monkeypatch, tmp_path):
