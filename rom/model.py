@@ -33,8 +33,10 @@ class Interface:
             order does not depend on the partition.
         points: (k, 3) coordinates of the nodes [m].
         surface_mass: (k, k) sparse matrix of the integrals of N_i N_j over the surface [m^2].
-        origin: (3,) reference point in the body frame [m]: the centroid of the surface, or the
+        origin: (3,) reference point in the body frame [m]: on the axis, in the middle of the faces,
+            where the geometry knows them as cylinders; else the centroid of the surface, or the
             point chosen by the user.
+        axis: (3,) unit direction of the axis of such cylinders; None for other surfaces.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Interface:
     points: Array
     surface_mass: Any
     origin: Array
+    axis: Array | None = None
 
     def __post_init__(self) -> None:
         check_text(self.name, "an interface", InterfaceError)

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.options import meshing, number_or_text, unique, vector
+from rom.cli.options import faces, meshing, number_or_text, unique
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -116,11 +116,7 @@ def _interfaces(pairs: list[tuple[str, str]]) -> Changes:
 
 
 def _faces(pairs: list[tuple[str, str]]) -> Changes:
-    try:
-        points = {name: list(vector(text)) for name, text in unique(pairs, "--face").items()}
-    except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"--face: {error}.") from None
-    return {("geometry", "faces", name): point for name, point in points.items()}
+    return {("geometry", "faces", name): text for name, text in faces(pairs).items()}
 
 
 def _rayleigh(text: str) -> Changes:

@@ -18,6 +18,7 @@ GEOMETRY_OPTIONS: dict[str, Any] = {  # options of a geometry, and what they are
     "degree": 2,
     "solver": "direct",
     "parameter": [],
+    "face": [],
     "scale": 1.0,
     "trust": False,
     "time_limit": None,

@@ -120,6 +120,16 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
         help="parameter of the geometry, e.g. lc=4e-3; may be repeated",
     )
     parser.add_argument(
+        "--face",
+        metavar="NAME=FACE",
+        type=assignment,
+        action="append",
+        default=[],
+        help="name a face of a .step file: its number, as 12; a point X,Y,Z on it [m]; radius:R "
+        "[m] for all cylinders of that radius; normal:X,Y,Z for the plane that looks there; "
+        "several as 3+4; may be repeated",
+    )
+    parser.add_argument(
         "--scale", type=positive, default=1.0, help="factor on coordinates; 1e-3 for mm (default 1)"
     )
     add_meshing(parser)
@@ -180,7 +190,39 @@ def add_interfaces(parser: argparse.ArgumentParser) -> None:
 def reading(args: argparse.Namespace) -> dict[str, Any]:
     """Keyword arguments of `rom.fe.mesh.read.read_mesh`."""
     pairs = [number_or_text(pair) for pair in args.parameter]
-    return {"parameters": unique(pairs, "-p"), "scale": args.scale, **meshing(args)}
+    return {
+        "parameters": unique(pairs, "-p"),
+        "faces": faces(args.face),
+        "scale": args.scale,
+        **meshing(args),
+    }
+
+
+def faces(pairs: list[tuple[str, str]]) -> dict[str, str]:
+    """What picks each face, by name.
+
+    Raises:
+        ConfigError: if a name is given twice, or nothing is picked by what is written.
+    """
+    found = unique(pairs, "--face")
+    for text in found.values():
+        face(text, "--face")
+    return found
+
+
+def face(text: str, option: str) -> str:
+    """The text, if it picks a face.
+
+    Raises:
+        ConfigError: naming the option.
+    """
+    from rom.fe.mesh.picks import picks
+
+    try:
+        picks(text)
+    except ConfigError as error:
+        raise ConfigError(f"{option}: {error.message}", hint=error.hint) from None
+    return text
 
 
 def meshing(args: argparse.Namespace) -> dict[str, Any]:

@@ -20,6 +20,8 @@ from rom.config.keys import (
     Words,
 )
 from rom.config.methods import METHODS
+from rom.errors import ConfigError
+from rom.fe.mesh.picks import picks
 from rom.units import LENGTH, SYSTEMS, UNITS
 
 LENGTHS = tuple(name for name, u in UNITS.items() if u.dimension == LENGTH)
@@ -65,6 +67,21 @@ class _Solid:
         return (ORTHOTROPIC if other else ISOTROPIC).read(value, place)
 
 
+@dataclass(frozen=True, slots=True)
+class Faces:
+    """What picks faces of a STEP file."""
+
+    summary: str = "number, point, or text as `radius:0.006`"
+
+    def read(self, value: Any, place: Place) -> Any:
+        """The value, if it picks anything."""
+        try:
+            picks(value)
+        except ConfigError as error:
+            raise place.error(f"{place.name}: {error.message}", error.hint) from None
+        return value
+
+
 INTERFACE = Either(Text(), Variants({
     "full": Table("Keeps all its dofs.", ()),
     "rbe2": Table("Moves as a rigid surface.", ()),
@@ -88,8 +105,10 @@ TABLE = Table("A component.", (
             "Parameters of the geometry. A plain number goes there as it is; a length with its "
             "unit is converted to that of the geometry (`.step`: to metres), another quantity "
             "to SI."),
-        Key("faces", Named(Anything("number or points"), "faces"),
-            "Names for faces of a `.step`: a number, a point [m], or a list of these."),
+        Key("faces", Named(Faces(), "faces"),
+            "Names for faces of a `.step`: a number; a point [m]; \"radius:0.006\" for all "
+            "cylinders of that radius [m]; \"normal:0,0,1\" for the plane that looks there; "
+            "\"3+4\" or a list for several."),
     )), "The solid as a geometry or mesh."),
     Key("matrices", Table("The solid as matrices of another program, in place of a geometry.", (
         Key("stiffness", Text(), "File, `:NAME` behind it where it holds several.", ...),

@@ -19,13 +19,14 @@ from rom.fe.forms.nodes import all_points, interface, outer_surface
 from rom.fe.forms.region import Regions, forms
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
+from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.operators.aij import symmetric, wrapped
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
-from rom.model import Array, Attachment, FEModel, Index, Material, Orthotropic
+from rom.model import Array, Attachment, FEModel, Index, Interface, Material, Orthotropic
 
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
@@ -85,11 +86,12 @@ def model(
     install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
     read: list[SolidMesh] = []  # on rank 0; the others never hold the whole mesh
 
-    def head() -> tuple[dict[int, str], list[str], dict[str, Any]]:
+    def head() -> tuple[dict[int, str], list[str], dict[str, Any], dict[str, Axis]]:
         read.append(read_mesh(path, parameters=parameters, **mesh_options))
-        return read[0].region_names, list(read[0].warnings or ()), read[0].provenance
+        mesh = read[0]
+        return mesh.region_names, list(mesh.warnings or ()), mesh.provenance, mesh.axes
 
-    region_names, warnings, origin = on_root(comm, head)
+    region_names, warnings, origin, axes = on_root(comm, head)
     with compiling(comm):
         mesh, cell_tags, facet_tags = to_dolfinx(read.pop() if read else None, comm)
     made = assemble(
@@ -103,7 +105,19 @@ def model(
     )
     remarks = [*warnings, *made.provenance["warnings"]]
     provenance = origin | made.provenance | {"warnings": remarks}
-    return replace(made, operators=made.operators.solved_by(method), provenance=provenance)
+    return replace(
+        made,
+        operators=made.operators.solved_by(method),
+        provenance=provenance,
+        interfaces={key: _on_axis(x, axes.get(key)) for key, x in made.interfaces.items()},
+    )
+
+
+def _on_axis(interface: Interface, axis: Axis | None) -> Interface:
+    """The interface with its origin and axis from the CAD where that knows them."""
+    if axis is None:
+        return interface
+    return replace(interface, origin=np.array(axis.point), axis=np.array(axis.direction))
 
 
 @typed

@@ -89,7 +89,8 @@ class StretchedModel(AffineModel):
 
         def face(nominal: Interface) -> Interface:
             origin = self.stretch.mapped(nominal.origin[None], w)[0]
-            return replace(nominal, points=self.stretch.mapped(nominal.points, w), origin=origin)
+            points = self.stretch.mapped(nominal.points, w)
+            return replace(nominal, points=points, origin=origin, axis=None)
 
         faces = {name: face(nominal) for name, nominal in self.model.interfaces.items()}
         return replace(

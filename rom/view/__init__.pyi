@@ -20,6 +20,7 @@ from rom.view.figures.sheets import Shape as Shape
 from rom.view.figures.sheets import deformed as deformed
 from rom.view.figures.sheets import flow as flow
 from rom.view.figures.updating import updating as updating
+from rom.view.scenes.faces import faces as faces
 from rom.view.scenes.film import animate as animate
 from rom.view.scenes.film import instants as instants
 from rom.view.scenes.mechanisms import start as start

@@ -15,7 +15,7 @@ import rom
 from cases.command import environment
 from cases.command import rom as command
 from cases.files.schema import errors
-from cases.files.step_box import step_box
+from cases.files.step_parts import step_box
 from cases.solid import block
 from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main

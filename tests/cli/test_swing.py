@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.command import rom as run_rom
 from cases.files.schema import errors
-from cases.files.step_box import step_box
+from cases.files.step_parts import step_box
 from cases.solid import block
 from rom.cli.schemas import schema
 from rom.cli.verbs import swing

@@ -1,6 +1,7 @@
 """Make or read a mesh, check it, and say what it holds."""
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +10,8 @@ from rom.cli.described import component, described
 from rom.cli.options import (
     add_geometry,
     add_solid,
-    assignment,
     material,
     reading,
-    unique,
-    vector,
 )
 from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
@@ -23,13 +21,14 @@ if TYPE_CHECKING:
     from rom.model import Material
 
 DECK_SUFFIX = ".inp"
+FACE = "face"  # name of a listed face, before its number
 SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
   rom mesh meshes/connecting_rod.toml      # its geometry
   rom mesh part.msh --scale 1e-3 --save part.vtu
-  rom mesh part.step --faces
-  rom mesh part.step -p lc=0.002 --face pin=0,0,0.01
+  rom mesh part.step --faces --save faces.png        # the numbers of its faces
+  rom mesh part.step -p lc=0.002 --face pin=0,0,0.01 --face bore=radius:0.006
   rom mesh meshes/beam.geo --save beam.inp --E 210e9 --nu 0.3 --rho 7850   # then: ccx beam
 """
 
@@ -38,21 +37,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     add_geometry(parser)
     parser.add_argument(
-        "--face",
-        metavar="NAME=X,Y,Z",
-        type=assignment,
-        action="append",
-        default=[],
-        help="name the surface of a .step file next to a point [m]; may be repeated",
-    )
-    parser.add_argument(
-        "--faces", action="store_true", help="list every face of a .step file, by its number"
+        "--faces",
+        action="store_true",
+        help="list every face of a .step file: number, kind, radius, axis or normal, area, middle",
     )
     parser.add_argument(
         "--save",
         metavar="FILE",
         type=Path,
-        help=".vtu for ParaView; .inp for CalculiX and Abaqus, and with --E, --nu, --rho CalculiX "
+        help=".png for a picture of the interfaces, with --faces of all faces and their numbers; "
+        ".vtu for ParaView; .inp for CalculiX and Abaqus, and with --E, --nu, --rho CalculiX "
         "runs it and leaves matrices for rom modes and rom reduce",
     )
     add_solid(parser)
@@ -61,6 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Read, check, describe."""
+    from rom.fe.mesh.picks import EVERY_FACE
     from rom.fe.mesh.read import read_mesh
     from rom.fe.mesh.summary import summary
 
@@ -71,11 +66,15 @@ def run(args: argparse.Namespace) -> Answer:
         solid = part.material() if deck else None
     else:
         solid, file, how = _solid(args), args.file, reading(args)
-        how["faces"] = unique([(name, _point(at)) for name, at in args.face], "--face")
     if args.save:
         _check_save(args, file)
+    if args.faces and FACE in how["faces"]:
+        raise ConfigError(
+            f"--faces lists the faces as {FACE} 1, {FACE} 2, ..., so none can be called {FACE!r}.",
+            hint="Give it another name, or leave --faces out.",
+        )
     if args.faces:
-        how["faces"] = how["faces"] | {"face": "every"}
+        how["faces"] = how["faces"] | {FACE: EVERY_FACE}
     mesh = read_mesh(file, **how)
     data = summary(mesh)
     if not args.save:
@@ -84,19 +83,12 @@ def run(args: argparse.Namespace) -> Answer:
     return Answer(data, _text(data), write=lambda: _save(mesh, args.save, solid))
 
 
-def _point(text: str) -> tuple[float, float, float]:
-    try:
-        return vector(text)
-    except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"--face: {error}.") from None
-
-
 def _check_save(args: argparse.Namespace, geometry: Path) -> None:
     path = args.save
-    if path.suffix.lower() not in (".vtu", DECK_SUFFIX):
-        raise ConfigError(f"--save {path}: a mesh is written as .vtu or .inp only.")
-    kind = "deck" if path.suffix.lower() == DECK_SUFFIX else "vtu"
-    checked(args, path, kind, inputs=[geometry])
+    suffix = path.suffix.lower()
+    if suffix not in (".vtu", ".png", DECK_SUFFIX):
+        raise ConfigError(f"--save {path}: a mesh is written as .png, .vtu or .inp only.")
+    checked(args, path, "deck" if suffix == DECK_SUFFIX else suffix[1:], inputs=[geometry])
 
 
 def _solid(args: argparse.Namespace) -> "Material | None":
@@ -117,6 +109,9 @@ def _save(mesh: "SolidMesh", path: Path, solid: "Material | None") -> None:
     from rom.io.fields.vtu import grid
     from rom.io.files import write_whole
 
+    if path.suffix.lower() == ".png":
+        _draw(mesh, path)
+        return
     if path.suffix.lower() == DECK_SUFFIX:
         text = input_deck(mesh, material=solid, step="matrices")
     else:
@@ -124,12 +119,25 @@ def _save(mesh: "SolidMesh", path: Path, solid: "Material | None") -> None:
     write_whole(path, lambda file: file.write(text.encode()))
 
 
+def _draw(mesh: "SolidMesh", path: Path) -> None:
+    """Listed faces by their numbers, interfaces by their names."""
+    from rom.fe.mesh.summary import surface_triangles
+    from rom.view.scenes.faces import faces
+
+    numbers = {_numbered(asdict(face)): str(face.number) for face in mesh.faces}
+    patches = {numbers.get(k, k): t for k, t in surface_triangles(mesh).items()}
+    faces(mesh.points, patches, path, title=Path(mesh.provenance["path"]).name)
+
+
 def _text(data: dict[str, Any]) -> str:
+    listed = data.get("faces", [])
+    numbered = {_numbered(face) for face in listed}
     quality = ", ".join(f"{name} {value:.3g}" for name, value in data["quality"].items())
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
     faces = [
-        (name, str(f["facets"]), str(f["nodes"]), ", ".join(f"{x:.4g}" for x in f["middle"]))
+        (name, str(f["facets"]), str(f["nodes"]), _words(f["middle"]), _words(f.get("axis", ())))
         for name, f in data["interfaces"].items()
+        if name not in numbered
     ]
     box = " x ".join(f"{high - low:.4g}" for low, high in data["box"])
     parts = [
@@ -139,6 +147,30 @@ def _text(data: dict[str, Any]) -> str:
     ]
     if regions:
         parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
-    header = ("interface", "facets", "nodes", "middle [m]")
-    parts += ["", table(header, faces) if faces else "no interface"]
+    header = ("interface", "facets", "nodes", "middle [m]", "axis")
+    if faces or not listed:
+        parts += ["", table(header, faces) if faces else "no interface"]
+    if listed:
+        columns = ("face", "kind", "radius [m]", "area [m^2]", "middle [m]", "axis or normal", "")
+        parts += ["", table(columns, [_row(face) for face in listed])]
     return "\n".join(parts)
+
+
+def _row(face: dict[str, Any]) -> tuple[str, ...]:
+    """One line of the list of faces; the name only where somebody gave one."""
+    radius = "" if face["radius"] is None else f"{face['radius']:.6g}"
+    direction = _words(face["axis"] or face["normal"] or ())
+    name = "" if face["name"] == _numbered(face) else face["name"]
+    number, area, middle = str(face["number"]), f"{face['area']:.4g}", _words(face["middle"])
+    return number, face["kind"], radius, area, middle, direction, name
+
+
+def _numbered(face: dict[str, Any]) -> str:
+    """Name of a face without another one."""
+    return f"{FACE} {face['number']}"
+
+
+def _words(x: Any) -> str:
+    """Numbers as they may be copied into --face; what is round-off of one of them is zero."""
+    least = 1e-9 * max(map(abs, x), default=0.0)
+    return ",".join(f"{value if abs(value) > least else 0.0:.4g}" for value in x)

@@ -40,6 +40,8 @@ EXAMPLES = """\
       -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz
   rom reduce meshes/beam.geo --E 70e9 --nu 0.33 --rho 2700 -i root=rbe2 -i tip=rbe3 \\
       --f-max 3e3 --reference root,tip --damping-ratio 0.01 -o beam.rom.npz
+  rom reduce part.step --face bore=radius:0.006 --face foot=12 --E 210e9 --nu 0.3 --rho 7850 \\
+      -i bore=rbe2 -i foot=rbe2 --reference foot -o part.rom.npz
   rom reduce rod.op4:KAA --mass rod.op4:MAA --nodes rod.bdf --units mm-t-s \\
       --set pin_a=11-14 --set pin_b=81-84 -i pin_a=rbe2 -i pin_b=rbe2 -o rod.rom.npz
   rom reduce meshes/connecting_rod.toml -m 30 -o rod.rom.npz   # options go before the file

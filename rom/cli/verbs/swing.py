@@ -1,6 +1,8 @@
 """Mesh a part, reduce it, hang it on one of its faces and show how it swings, in one go.
 
-The part is released at rest, as it is drawn, with gravity across it. Of its certificate the rows
+The part is released at rest, as it is drawn, with gravity across it. On a bore, and whatever else
+the geometry knows as a cylinder, it turns about the axis of that; on another face about the
+horizontal axis across. Of its certificate the rows
 without support do not count here, for the hinge holds it. For everything else there are the single
 verbs: mesh, reduce, check, simulate, view.
 """
@@ -15,10 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
-from rom.cli.options import add_geometry, count, positive, reading, vector
+from rom.cli.options import add_geometry, count, face, positive, reading, unique, vector
 from rom.cli.output import add_force, checked, claim
 from rom.errors import ConfigError
-from rom.names import inside, is_whole
+from rom.names import inside
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -28,6 +30,7 @@ log = logging.getLogger("rom")
 SUMMARY = "show a part of yours, reduced and swinging, in one go"
 EXAMPLES = """\
   rom swing part.step --hinge 3 -o out   # the faces: rom mesh with --faces
+  rom swing part.step --hinge radius:0.006 -o out
   rom swing part.step --hinge 0,0,0.01 --material aluminium --gravity 0,0,-9.81 --film -o out
 """
 MATERIALS = {  # E [Pa], nu, rho [kg/m^3]; handbook values
@@ -46,7 +49,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_geometry(parser)
     parser.add_argument(
         "--hinge", metavar="FACE", required=True,
-        help="face it hangs on: a name, or in a .step file a number or a point X,Y,Z [m]",
+        help="face it hangs on: a name, or in a .step file what --face takes, e.g. 12 or "
+        "radius:0.006",
     )  # fmt: skip
     parser.add_argument(
         "--material", choices=sorted(MATERIALS), default="steel", help="default steel"
@@ -55,7 +59,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "-m", "--modes", type=count, help="modes kept (default: as many as are needed)"
     )
     parser.add_argument(
-        "--gravity", type=vector, help="[m/s^2], default 9.81 along the axis most across the part"
+        "--gravity",
+        type=vector,
+        help="[m/s^2], default 9.81 along the axis most across the part and across its bore",
     )
     parser.add_argument("--t-end", type=positive, help="duration [s], default one swing")
     parser.add_argument(
@@ -71,8 +77,8 @@ def run(args: argparse.Namespace) -> Answer:
     """Mesh, reduce, simulate; files are written at the end."""
     files = _files(args)
     hinge, faces = hinge_of(args.hinge)
-    body = _reduced(args, hinge, faces)
-    swing = planned(body, hinge, args.gravity, args.t_end)
+    body, bore = _reduced(args, hinge, faces)
+    swing = planned(body, hinge, args.gravity, args.t_end, axis=bore)
     log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
     if not compiled_before():
         log.info("move it without compiling first, which takes some seconds")
@@ -84,6 +90,7 @@ def run(args: argparse.Namespace) -> Answer:
         "files": [str(path) for path in files.values()],
         "mass": body.mass,
         "gravity": list(swing.gravity),
+        "axis": list(swing.axis),
         "t_end": swing.t_end,
         "magnify": magnify,
         "frequencies": body.frequencies(6, fixed=(hinge,)).tolist(),
@@ -109,17 +116,15 @@ def _files(args: argparse.Namespace) -> dict[str, Path]:
 
 def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
     """Name of the interface, and the face to pick for it if it has none."""
-    if is_whole(text):
-        return "hinge", {"hinge": int(text)}
-    if "," not in text:
-        return text, {}
-    try:
-        return "hinge", {"hinge": list(vector(text))}
-    except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"--hinge: {error}.") from None
+    from rom.fe.mesh.picks import is_pick
+
+    return ("hinge", {"hinge": face(text, "--hinge")}) if is_pick(text) else (text, {})
 
 
-def _reduced(args: argparse.Namespace, hinge: str, faces: dict[str, Any]) -> "FlexibleBody":
+def _reduced(
+    args: argparse.Namespace, hinge: str, faces: dict[str, Any]
+) -> "tuple[FlexibleBody, Any]":
+    """The body, and the axis of its hinge if that is a cylinder."""
     from rom.body.damping import ModalDamping
     from rom.fe.elasticity import model
     from rom.model import Material
@@ -127,12 +132,15 @@ def _reduced(args: argparse.Namespace, hinge: str, faces: dict[str, Any]) -> "Fl
     from rom.workflow import reduce
 
     E, nu, rho = MATERIALS[args.material]
-    full = model(args.file, material=Material(E=E, nu=nu, rho=rho), faces=faces, **reading(args))
+    how = reading(args)
+    how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
+    full = model(args.file, material=Material(E=E, nu=nu, rho=rho), **how)
     log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, full.mass(), args.material)
-    return reduce(
+    body = reduce(
         full, method=CraigBampton(args.modes), interfaces={hinge: "rbe2"}, reference=hinge,
         damping=ModalDamping(0.01), name=args.file.stem,
     )  # fmt: skip
+    return body, full.interfaces[hinge].axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +153,21 @@ class Swing:
 
 
 def planned(
-    body: "FlexibleBody", hinge: str, gravity: Any = None, t_end: float | None = None
+    body: "FlexibleBody",
+    hinge: str,
+    gravity: Any = None,
+    t_end: float | None = None,
+    *,
+    axis: Any = None,
 ) -> Swing:
-    """The swing of a body from rest: across gravity, for one period of the rigid pendulum.
+    """The swing of a body from rest, for one period of the rigid pendulum.
+
+    Args:
+        body: the body.
+        hinge: interface it hangs on.
+        gravity: (3,) [m/s^2]; None for 9.81 along the coordinate axis most across the body.
+        t_end: duration [s]; None for one period.
+        axis: (3,) unit direction about which it turns; None for the one across gravity.
 
     Raises:
         ConfigError: if the body hangs at rest already.
@@ -155,21 +175,36 @@ def planned(
     import numpy as np
 
     arm = body.first_moment / body.mass - body.marker(hinge).point
-    if gravity is None:
-        gravity = -9.81 * np.eye(3)[2 - int(np.argmin(np.abs(arm[::-1]).round(12)))]
-    g = np.asarray(gravity, dtype=float)
-    axis = np.cross(arm, g)
-    lever = np.linalg.norm(axis) / max(float(np.linalg.norm(g)), 1e-300)
+    g = _across(arm, axis) if gravity is None else np.asarray(gravity, dtype=float)
+    torque = np.cross(arm, g)  # per unit of mass
+    if axis is not None:
+        torque = np.outer(axis, axis) @ torque
+    lever = np.linalg.norm(torque) / max(float(np.linalg.norm(g)), 1e-300)
     if lever < 1e-3 * body.size:
+        turning = "" if axis is None else f", which turns about {np.round(axis, 6).tolist()}"
         raise ConfigError(
-            f"gravity {g.tolist()} passes {lever:.2g} m beside the hinge: nothing would swing.",
-            hint="Choose another --hinge, or --gravity across the part.",
+            f"gravity {g.tolist()} passes {lever:.2g} m beside the hinge{turning}: nothing would "
+            "swing.",
+            hint="Choose another --hinge, or --gravity across the part and across its axis.",
         )
-    n = axis / np.linalg.norm(axis)
+    n = torque / np.linalg.norm(torque)
     inertia = n @ body.inertia @ n - body.mass * _square_across(body.first_moment / body.mass, n)
     inertia += body.mass * _square_across(arm, n)
     period = 2 * pi * sqrt(inertia / (body.mass * float(np.linalg.norm(g)) * lever))
     return Swing(tuple(g.tolist()), tuple(n.tolist()), t_end or FAR_SWING * period)
+
+
+def _across(arm: Any, axis: Any) -> Any:
+    """Gravity along the coordinate axis most across the arm, less what pulls along the hinge."""
+    import numpy as np
+
+    if axis is None:
+        return -9.81 * np.eye(3)[2 - int(np.argmin(np.abs(arm[::-1]).round(12)))]
+    # of equals the last, and never the axis itself
+    preferred = 1e-9 * (np.linalg.norm(arm) or 1.0) * (1 - axis**2) * (1.0, 1.1, 1.2)
+    down = -np.eye(3)[int(np.argmax(np.abs(np.cross(arm, axis)) + preferred))]
+    down = down - (down @ axis) * axis
+    return 9.81 * down / np.linalg.norm(down) + 0.0
 
 
 def _square_across(x: Any, n: Any) -> float:
@@ -250,8 +285,10 @@ def _write(
 def _text(body: "FlexibleBody", hinge: str, data: dict[str, Any]) -> str:
     full = body.provenance["reduction"]["full dofs"]
     held = ", ".join(f"{f:.5g}" for f in data["frequencies"])
+    axis, down = (",".join(f"{x:.4g}" for x in data[key]) for key in ("axis", "gravity"))
     return (
         f"{body.name}: {body.mass:.4g} kg, {full} dofs reduced to 6 + {body.n_modes}\n"
         f"held at {hinge}: {held} Hz\n"
+        f"turning about {axis} under gravity {down} m/s^2\n"
         f"deformations drawn {data['magnify']:g} times larger\n" + "\n".join(data["files"])
     )

@@ -16,13 +16,17 @@ from rom.errors import (
     ConfigError,
     FileFormatError,
     ResourceError,
+    TagError,
     UnsafeFileError,
 )
+from rom.fe.mesh.cad import Axis, Face, from_plain, scaled
 from rom.fe.mesh.child import read_apart
+from rom.fe.mesh.picks import EVERY_FACE, picks
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, SolidMesh
 from rom.fe.mesh.validate import checked
+from rom.names import check_text
 
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
 READERS = {
@@ -61,8 +65,9 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         parameters: named values for a geometry: those with ``Name`` in a ``.geo``, the arguments of
             ``build``, or ``lc`` (element size [m]) for ``.step``.
         faces: surfaces to name in a ``.step``: a face number, a point (3) near the face, a box (6)
-            around it, or a list of these; lengths in metres. {"face": "every"} names all faces
-            without a name "face 1", "face 2", ...
+            around it, a text as "radius:0.006", "normal:0,0,1" or "3+4", see
+            `rom.fe.mesh.picks`, or a list of these; lengths in metres. {"face": "every"} names
+            all faces without a name "face 1", "face 2", ...
         scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
         order: degree of the geometry, 1 or 2, when the mesh is made here; None for the default.
         trust: run a ``.py`` file.
@@ -146,6 +151,11 @@ def _solid(
         facets={name: arrays[f"facets {i}"] for i, name in enumerate(notes["facet_names"])},
         provenance=provenance,
         cell_ids=arrays["cell_ids"],
+        axes={
+            name: scaled(from_plain(Axis, axis), scale)
+            for name, axis in notes.get("axes", {}).items()
+        },
+        faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
 
 
@@ -180,6 +190,10 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
             where=str(path),
             hint="Name physical surfaces in the geometry instead.",
         )
+    for name, wanted in request["faces"].items():
+        check_text(name, "a surface", TagError)
+        if not (isinstance(wanted, str) and wanted == EVERY_FACE):
+            _check_pick(path, name, wanted)
     if request["order"] not in (None, 1, 2) or (request["order"] and reader not in GEOMETRIES):
         raise ConfigError(
             f"order={request['order']!r}: the geometry has degree 1 or 2, and can be chosen only "
@@ -188,6 +202,15 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
         )
     if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):
         raise ConfigError(f"scale={scale!r} must be a positive number.", where=str(path))
+
+
+def _check_pick(path: Path, name: str, wanted: Any) -> None:
+    try:
+        picks(wanted)
+    except ConfigError as error:
+        raise ConfigError(
+            f"face {name!r}: {error.message}", where=str(path), hint=error.hint
+        ) from None
 
 
 def _check_trust(path: Path, reader: str, trust: bool) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.fe.mesh.cad import Axis, Face
 from rom.fe.mesh.cell_types import CELL_TYPES, CellType
 from rom.model import Array, Index, Integers
 
@@ -27,6 +28,8 @@ class SolidMesh:
         provenance: where the mesh comes from: path, sha256, parameters, versions.
         cell_ids: (m,) numbers of the cells in the file, for messages; None for 0, 1, 2, ...
         warnings: what `rom.fe.mesh.validate.validate` found worth saying; None before it was asked.
+        axes: axis of each named surface that the CAD knows as cylinder faces about one line.
+        faces: all faces of the CAD, where they were asked for.
     """
 
     points: Array
@@ -38,6 +41,8 @@ class SolidMesh:
     provenance: dict[str, Any] = field(default_factory=dict)
     cell_ids: Index | None = None
     warnings: tuple[str, ...] | None = None
+    axes: dict[str, Axis] = field(default_factory=dict)
+    faces: tuple[Face, ...] = ()
 
     @property
     def kind(self) -> CellType:

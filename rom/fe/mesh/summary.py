@@ -1,13 +1,16 @@
 """What a mesh holds, in numbers."""
 
+from dataclasses import asdict
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
 from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
 from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.topology import faces_of, row_ids
 from rom.model import Array, Index
 
 VTK_TYPES = {"tet4": 10, "tet10": 24, "hex8": 12, "hex27": 29}
@@ -42,6 +45,7 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
                 "facets": len(facets),
                 "nodes": len(np.unique(facets)),
                 "middle": _middle(mesh.points[facets.ravel()]),
+                **_axis(mesh.axes.get(name)),
             }
             for name, facets in mesh.facets.items()
         },
@@ -49,7 +53,31 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
             "smallest scaled Jacobian": float(scaled_jacobian(mesh).min()),
             "largest aspect ratio": float(aspect_ratio(mesh).max()),
         },
+        **({"faces": [asdict(face) for face in mesh.faces]} if mesh.faces else {}),
     }
+
+
+def surface_triangles(mesh: SolidMesh) -> dict[str, Index]:
+    """{name: (t, 3) corner nodes} of the named surfaces, and under "" of the rest of the skin."""
+    faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
+    skin = faces.corners[faces.count == 1]
+    named = {name: rows[:, : mesh.kind.corners_per_face] for name, rows in mesh.facets.items()}
+    every = np.sort(np.vstack([skin, *named.values()]), axis=1)
+    number, _ = row_ids(every, len(mesh.points))
+    rest = skin[~np.isin(number[: len(skin)], number[len(skin) :])]
+    return {name: _split(rows) for name, rows in (named | {"": rest}).items()}
+
+
+def _split(rows: Index) -> Index:
+    """Quadrilaterals as triangles; triangles as they are."""
+    if rows.shape[1] == 3:
+        return rows
+    return np.vstack([rows[:, [0, 1, 2]], rows[:, [0, 2, 3]]])
+
+
+def _axis(axis: Axis | None) -> dict[str, Any]:
+    """Where a joint on this interface sits, if the CAD knows an axis."""
+    return {"axis": list(axis.direction), "point": list(axis.point)} if axis else {}
 
 
 def _middle(points: Array) -> list[float]:

@@ -86,6 +86,8 @@ def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, fra
     if arrays[f"cells {k}"].shape[1] < 3:
         look |= {"lighting": False, "line_width": scene["oversampling"] * style["width"]}
         look |= {"point_size": look["line_width"], "render_points_as_spheres": True}
+    elif not style["lit"]:
+        look |= {"lighting": False}
     else:
         grid = grid.compute_normals(
             feature_angle=CREASE_ANGLE, split_vertices=True, cell_normals=False

@@ -86,7 +86,7 @@ def write_scene(
         if actor.values is not None:
             arrays[f"values {k}"] = actor.values.astype(np.float32)
     np.savez(folder / "arrays.npz", **arrays)
-    style = [{"colour": a.colour, "width": a.width, "opacity": a.opacity} for a in actors]
+    style = [{k: getattr(a, k) for k in ("colour", "width", "opacity", "lit")} for a in actors]
     scene = {"height": camera.height, "size": camera.size, "oversampling": oversampling}
     scene |= {"limits": limits, "actors": style}
     (folder / "scene.json").write_text(json.dumps(scene | {"colours": COLOUR_MAP}))

@@ -24,6 +24,7 @@ class Actor:
         colour: plain colour.
         width: width of lines or size of dots, in pixels of the finished picture.
         opacity: 0 to 1.
+        lit: whether light and shade fall on it; without, triangles have their colour exactly.
     """
 
     points: Array
@@ -32,6 +33,7 @@ class Actor:
     colour: str = "#9aa5b1"
     width: float = 1.0
     opacity: float = 1.0
+    lit: bool = True
 
 
 @dataclass(frozen=True, slots=True)

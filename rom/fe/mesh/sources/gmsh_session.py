@@ -3,14 +3,18 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
+from rom.fe.mesh.picks import EVERY_FACE
 from rom.fe.mesh.solid import PROGRAMS, Made, Read
 from rom.fe.mesh.sources import builder, step
+from rom.fe.mesh.sources.cad_faces import axes, faces
 from rom.fe.mesh.sources.confinement import confine
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
+from rom.fe.mesh.sources.picking import pick
 from rom.fe.mesh.sources.script import check_script
 from rom.plausible import scaled_doubt
 
@@ -36,9 +40,12 @@ def run(request: dict[str, Any]) -> Read:
             declared = path
         else:
             _generate(gmsh, request, declared)
-        step.pick(gmsh, request["faces"])
+        pick(gmsh, request["faces"], path.name)
         repeated = reader == "msh" and version(path) == 2
         arrays, notes = collect(gmsh, declared, strict=reader != "step", repeated=repeated)
+        notes["axes"] = {name: asdict(axis) for name, axis in axes(gmsh).items()}
+        if EVERY_FACE in request["faces"].values():
+            notes["faces"] = [asdict(face) for face in faces(gmsh)]
         notes["provenance"] = {
             "gmsh": gmsh.option.getString("General.Version"),
             "parameters": values,
