@@ -15,7 +15,7 @@ import rom
 from cases.command import environment
 from cases.command import rom as command
 from cases.files.schema import errors
-from cases.files.step_parts import step_box
+from cases.files.step_parts import step_box, step_plate
 from cases.solid import block
 from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
@@ -302,11 +302,52 @@ def test_mesh_says_what_is_inside(geometry, tmp_path, capsys):
 @pytest.mark.fenicsx
 def test_mesh_lists_the_faces_of_a_step_file(tmp_path, capsys):
     step_box(tmp_path / "box.step", 20, 10, 10)
-    found = answer(capsys, "mesh", tmp_path / "box.step", "-p", "lc=0.01", "--faces")["interfaces"]
+    data = answer(capsys, "mesh", tmp_path / "box.step", "-p", "lc=0.01", "--faces")
+    assert errors(data, schema("mesh")) == []
+    found = data["interfaces"]
+    for face in data["faces"]:
+        assert face["kind"] == "plane" and face["name"] == f"face {face['number']}"
+        assert_allclose(face["middle"], found[face["name"]]["middle"], atol=1e-12)
+        k = int(np.argmax(np.abs(face["normal"])))
+        assert face["normal"][k] == (1 if face["middle"][k] > 1e-6 else -1)
+        assert face["area"] == pytest.approx(1e-4 if k == 0 else 2e-4, rel=1e-12)
     assert sorted(found) == [f"face {k}" for k in range(1, 7)]
     middles = sorted(tuple(round(x, 9) for x in face["middle"]) for face in found.values())
     assert middles == [(0.0, 0.005, 0.005), (0.01, 0.0, 0.005), (0.01, 0.005, 0.0),
                        (0.01, 0.005, 0.01), (0.01, 0.01, 0.005), (0.02, 0.005, 0.005)]  # fmt: skip
+
+
+@pytest.mark.fenicsx
+def test_the_faces_of_a_plate_as_text_and_as_a_picture(tmp_path, capsys):
+    pytest.importorskip("pyvista", reason="pictures need pyvista")
+    step_plate(tmp_path / "plate.step")
+    picture = tmp_path / "faces.png"
+    assert main(["mesh", str(tmp_path / "plate.step"), "--faces", "--face", "pin=radius:0.006",
+                 "--save", str(picture)]) == 0  # fmt: skip
+    lines = capsys.readouterr().out.splitlines()
+    rows = [line.split() for line in lines if " cylinder " in line]
+    assert [row[2] for row in rows] == ["0.006", "0.01", "0.01"]
+    assert rows[0][4:] == ["0.03,0.03,0.005", "0,0,1", "pin"] and rows[1][5:] == ["0,0,1"]
+    assert any(line.split()[0] == "pin" and line.endswith("0,0,1") for line in lines if line)
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.fenicsx
+def test_faces_of_a_component_file_are_picked_in_the_same_words(tmp_path, capsys):
+    """Also those that the command line adds; a wrong one names its line."""
+    step_plate(tmp_path / "plate.step")
+    file = tmp_path / "plate.toml"
+    lines = ["[geometry]", 'file = "plate.step"', "[geometry.faces]", 'pin = "radius:0.006"',
+             "left = 1", "right = [0.1, 0.03, 0.005]", ""]  # fmt: skip
+    file.write_text("\n".join(lines))
+    found = answer(capsys, "mesh", "--face", "bore=radius:0.01", file)["interfaces"]
+    assert list(found) == ["pin", "left", "right", "bore"]
+    assert_allclose(found["bore"]["point"], (0.07, 0.03, 0.005), atol=1e-14)
+    assert "axis" not in found["left"]
+    file.write_text("\n".join([*lines[:4], 'left = "radius:6 mm"', ""]))
+    assert main(["mesh", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert "plate.toml:5" in said and "'radius:6 mm' is no face" in said
 
 
 @pytest.mark.fenicsx

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.command import rom as run_rom
 from cases.files.schema import errors
-from cases.files.step_parts import step_box
+from cases.files.step_parts import step_box, step_plate
 from cases.solid import block
 from rom.cli.schemas import schema
 from rom.cli.verbs import swing
@@ -45,6 +45,28 @@ def test_gravity_may_be_given_and_must_not_pass_through_the_hinge(bar):
         swing.planned(bar, "root", (9.81, 0, 0))
 
 
+def test_on_a_bore_it_turns_about_the_axis_of_that(bar):
+    """The moment of inertia is that about z; gravity lies across the bore, also an oblique one."""
+    plan = swing.planned(bar, "root", axis=np.array([0.0, 0.0, 1.0]))
+    assert plan.gravity == (0.0, -9.81, 0.0)
+    assert_allclose(np.abs(plan.axis), (0, 0, 1), atol=1e-12)
+    inertia_over_mass = (L**2 + B**2) / 12 + L**2 / 4
+    exact = 4 * 1.854074677 * np.sqrt(inertia_over_mass / (9.81 * L / 2))
+    assert plan.t_end == pytest.approx(exact, rel=1e-5)
+    oblique = np.array([0.0, 1.0, 1.0]) / np.sqrt(2)
+    plan = swing.planned(bar, "root", axis=oblique)
+    assert_allclose(plan.gravity, 9.81 * np.array([0.0, 1.0, -1.0]) / np.sqrt(2), atol=1e-12)
+    assert_allclose(np.cross(plan.axis, oblique), 0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("axis", "gravity"), [((1, 0, 0), None), ((0, 0, 1), (0, 0, -9.81)), ((0, 0, 1), (9.81, 0, 0))]
+)
+def test_gravity_along_the_bore_or_through_it_turns_nothing(bar, axis, gravity):
+    with pytest.raises(ConfigError, match=r"which turns about.*nothing would swing.*its axis"):
+        swing.planned(bar, "root", gravity, axis=np.array(axis, dtype=float))
+
+
 def test_a_single_stiff_interface_has_a_certificate_without_gaps(bar):
     """Its constraint modes are rigid motions, whose stiffness is round-off of either sign."""
     assert all(np.isfinite(row.value) for row in bar.certificate.rows)
@@ -61,10 +83,10 @@ def test_deformations_are_magnified_until_they_are_seen(bar):
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("12", ("hinge", {"hinge": 12})), ("0,0.5,-1", ("hinge", {"hinge": [0, 0.5, -1]})),
-     ("pin_a", ("pin_a", {}))],
+    [("12", ("hinge", {"hinge": "12"})), ("0,0.5,-1", ("hinge", {"hinge": "0,0.5,-1"})),
+     ("radius:6e-3", ("hinge", {"hinge": "radius:6e-3"})), ("pin_a", ("pin_a", {}))],
 )  # fmt: skip
-def test_a_hinge_is_a_number_a_point_or_a_name(text, expected):
+def test_a_hinge_is_what_picks_a_face_or_a_name(text, expected):
     assert swing.hinge_of(text) == expected
 
 
@@ -93,3 +115,31 @@ def test_a_step_file_swings_on_the_face_chosen(tmp_path):
     assert found["gravity"] == [0, 0, -9.81]
     left = {path.name for path in (tmp_path / "out").iterdir()}
     assert left == {"bar.rom.npz", "bar.png"} == {Path(f).name for f in found["files"]}
+
+
+@pytest.mark.fenicsx
+@pytest.mark.slow
+@pytest.mark.filterwarnings(f"ignore::{RomWarning.__module__}.RomWarning")
+def test_a_step_file_swings_about_its_bore(tmp_path):
+    """A plate with two bores, on the small one: a compound pendulum, released flat."""
+    pytest.importorskip("dolfinx", reason="the part is made of finite elements")
+    pytest.importorskip("pyvista", reason="pictures need pyvista")
+    step_plate(tmp_path / "plate.step")
+    done = run_rom("swing", "plate.step", "-p", "lc=0.006", "--face", "pin=radius:0.006",
+                   "--hinge", "pin", "-m", 4, "-o", "out", "--json", cwd=tmp_path,
+                   timeout=600)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert errors(found, schema("swing")) == []
+    assert_allclose(np.abs(found["axis"]), (0, 0, 1), atol=1e-12)
+    assert found["gravity"] == [0, -9.81, 0]
+    body = rom.load(tmp_path / "out" / "plate.rom.npz")
+    assert_allclose(body.marker("pin").point, (0.03, 0.03, 0.005), rtol=0, atol=1e-13)
+    parts = [(0.1 * 0.06, 0.05, (0.1**2 + 0.06**2) / 12)]  # area, middle, square of the inertia arm
+    parts += [(-np.pi * r**2, x, r**2 / 2) for r, x in ((0.006, 0.03), (0.01, 0.07))]
+    area, moment = (sum(a * x**k for a, x, _ in parts) for k in (0, 1))
+    inertia = sum(a * ((x - 0.03) ** 2 + square) for a, x, square in parts)
+    arm = moment / area - 0.03
+    assert found["mass"] == pytest.approx(7850 * 0.01 * area, rel=5e-3)
+    exact = 4 * 1.854074677 * np.sqrt(inertia / area / (9.81 * arm))
+    assert found["t_end"] == pytest.approx(exact, rel=1e-2)

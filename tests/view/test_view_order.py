@@ -46,6 +46,7 @@ PICTURES = {  # function -> what is drawn, words
     "deformed": lambda: (
         [{"coarse": ([1, 2, 4], [0.2, 0.7, 0.9])}, [squeezed(0.5)]],
         WORDS | {"limit": ("exact", 1.0), "xlabel": "size", "ylabel": "answer"}),
+    "faces": lambda: ([POINTS, {"1": [[0, 1, 2]], "2": [[0, 1, 3]]}], {}),
     "frequencies": lambda: ([{"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}],
                             {"title": "Title"}),
     "history": lambda: ([X, [("angle [rad]", {"one": np.sin(X)})]], WORDS),
@@ -77,7 +78,7 @@ FILMS = {
                      {"caption": "What a stranger has to know."}),
 }  # fmt: skip
 # seconds each; "mesh" and "start" are drawn by a child process in `make test`, too
-DRAWN_BY_A_CHILD = {"instants", "mode_shapes", "updating", "wheel_modes"}
+DRAWN_BY_A_CHILD = {"faces", "instants", "mode_shapes", "updating", "wheel_modes"}
 PATH_CAME_FIRST = {"campbell", "convergence", "deformed", "flow", "frequencies", "history",
                    "panels", "plane", "updating", "wheel_modes"}  # fmt: skip
 WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/family.py",

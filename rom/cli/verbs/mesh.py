@@ -132,10 +132,17 @@ def _draw(mesh: "SolidMesh", path: Path) -> None:
 def _text(data: dict[str, Any]) -> str:
     listed = data.get("faces", [])
     numbered = {_numbered(face) for face in listed}
+    size = max(high - low for low, high in data["box"])
     quality = ", ".join(f"{name} {value:.3g}" for name, value in data["quality"].items())
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
     faces = [
-        (name, str(f["facets"]), str(f["nodes"]), _words(f["middle"]), _words(f.get("axis", ())))
+        (
+            name,
+            str(f["facets"]),
+            str(f["nodes"]),
+            _words(f["middle"], size),
+            _words(f.get("axis", ())),
+        )
         for name, f in data["interfaces"].items()
         if name not in numbered
     ]
@@ -152,16 +159,16 @@ def _text(data: dict[str, Any]) -> str:
         parts += ["", table(header, faces) if faces else "no interface"]
     if listed:
         columns = ("face", "kind", "radius [m]", "area [m^2]", "middle [m]", "axis or normal", "")
-        parts += ["", table(columns, [_row(face) for face in listed])]
+        parts += ["", table(columns, [_row(face, size) for face in listed])]
     return "\n".join(parts)
 
 
-def _row(face: dict[str, Any]) -> tuple[str, ...]:
+def _row(face: dict[str, Any], size: float) -> tuple[str, ...]:
     """One line of the list of faces; the name only where somebody gave one."""
     radius = "" if face["radius"] is None else f"{face['radius']:.6g}"
     direction = _words(face["axis"] or face["normal"] or ())
     name = "" if face["name"] == _numbered(face) else face["name"]
-    number, area, middle = str(face["number"]), f"{face['area']:.4g}", _words(face["middle"])
+    number, area, middle = str(face["number"]), f"{face['area']:.4g}", _words(face["middle"], size)
     return number, face["kind"], radius, area, middle, direction, name
 
 
@@ -170,7 +177,7 @@ def _numbered(face: dict[str, Any]) -> str:
     return f"{FACE} {face['number']}"
 
 
-def _words(x: Any) -> str:
-    """Numbers as they may be copied into --face; what is round-off of one of them is zero."""
-    least = 1e-9 * max(map(abs, x), default=0.0)
+def _words(x: Any, size: float = 1.0) -> str:
+    """Numbers as they may be copied into --face; what is round-off of that size is zero."""
+    least = 1e-9 * size
     return ",".join(f"{value if abs(value) > least else 0.0:.4g}" for value in x)

@@ -21,6 +21,8 @@ def step_part(path):
     gmsh.initialize([], False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
+        # that of an earlier session of this process stays otherwise
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         yield gmsh.model.occ
         gmsh.model.occ.synchronize()
         gmsh.write(str(path))
