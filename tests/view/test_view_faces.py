@@ -32,7 +32,7 @@ def test_a_box_shows_three_faces_to_each_side():
     both = np.stack([points, scene._turned(points, camera)])
     spots = [scene._spots(n, list(patches)) for n in scene._numbers(both, patches, camera)]
     seen = [{spot.label for spot in side} for side in spots]
-    toward = {"xyz"[k] + "+-"[camera.toward[k] < 0] for k in range(3)}
+    toward = {"xyz"[k] + ("-" if camera.toward[k] < 0 else "+") for k in range(3)}
     assert seen == [toward, set(patches) - toward]
     right = np.cross(camera.up, camera.toward)
     for spot in spots[0]:  # in the middle of the face as it is projected, columns to the right
