@@ -144,6 +144,8 @@ ORDER = {
     "fe.mesh": (
         "cell_types",
         "topology",
+        "picks",
+        "cad",
         "solid",
         "sources",
         "child",

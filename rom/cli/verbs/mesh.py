@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rom.model import Material
 
 DECK_SUFFIX = ".inp"
-FACE = "face"  # name of a listed face, before its number
+FACE_WORD = "face"  # name of a listed face, before its number
 SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
   rom mesh meshes/connecting_rod.geo -p lc=4e-3
@@ -68,13 +68,13 @@ def run(args: argparse.Namespace) -> Answer:
         solid, file, how = _solid(args), args.file, reading(args)
     if args.save:
         _check_save(args, file)
-    if args.faces and FACE in how["faces"]:
+    if args.faces and FACE_WORD in how["faces"]:
         raise ConfigError(
-            f"--faces lists the faces as {FACE} 1, {FACE} 2, ..., so none can be called {FACE!r}.",
+            f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called {FACE_WORD!r}.",
             hint="Give it another name, or leave --faces out.",
         )
     if args.faces:
-        how["faces"] = how["faces"] | {FACE: EVERY_FACE}
+        how["faces"] = how["faces"] | {FACE_WORD: EVERY_FACE}
     mesh = read_mesh(file, **how)
     data = summary(mesh)
     if not args.save:
@@ -174,7 +174,7 @@ def _row(face: dict[str, Any], size: float) -> tuple[str, ...]:
 
 def _numbered(face: dict[str, Any]) -> str:
     """Name of a face without another one."""
-    return f"{FACE} {face['number']}"
+    return f"{FACE_WORD} {face['number']}"
 
 
 def _words(x: Any, size: float = 1.0) -> str:

@@ -22,7 +22,7 @@ from rom.errors import ConfigError
 EVERY_FACE = "every"  # in place of a pick: names all faces without a name by their numbers
 WORDS = {"radius": 1, "normal": 3}  # and how many numbers follow
 PLUS_PATTERN = re.compile(r"(?<![eE])\+")  # joins picks; 1e+3 is one number
-GRAMMAR = (
+GRAMMAR_HINT = (
     "A face is a number, as 12, a point X,Y,Z [m], radius:R [m] for cylinders, normal:X,Y,Z for a "
     "plane, or several of these, as 3+4."
 )
@@ -60,7 +60,7 @@ def picks(wanted: Any) -> tuple[Pick, ...]:
         return (_number(int(wanted)),)
     if isinstance(wanted, list | tuple):
         return tuple(_of_list(wanted))
-    raise ConfigError(f"{wanted!r} is no face.", hint=GRAMMAR)
+    raise ConfigError(f"{wanted!r} is no face.", hint=GRAMMAR_HINT)
 
 
 def is_pick(text: str) -> bool:
@@ -80,7 +80,7 @@ def _of_text(part: str, whole: str) -> Pick:
         why = f" ({part!r} has no meaning)" if part != whole else ""
         if size == 3 and values:
             why = f": {part!r} is not three numbers with commas, as in 0,0,1"
-        raise ConfigError(f"{whole!r} is no face{why}.", hint=GRAMMAR)
+        raise ConfigError(f"{whole!r} is no face{why}.", hint=GRAMMAR_HINT)
     return _checked(Pick(kind, values, part))
 
 
@@ -111,10 +111,12 @@ def _of_list(wanted: list[Any] | tuple[Any, ...]) -> Iterator[Pick]:
     if plain and len(wanted) in (3, 6):
         text = ",".join(f"{x:g}" for x in wanted)
         if not all(abs(x) < float("inf") for x in wanted):
-            raise ConfigError(f"{text} is no face: its numbers are not finite.", hint=GRAMMAR)
+            raise ConfigError(f"{text} is no face: its numbers are not finite.", hint=GRAMMAR_HINT)
         yield Pick("point" if len(wanted) == 3 else "box", tuple(map(float, wanted)), text)
         return
     if not wanted or (plain and not all(isinstance(x, Integral) for x in wanted)):
-        raise ConfigError(f"{wanted!r} is no face: a point has 3 numbers, a box 6.", hint=GRAMMAR)
+        raise ConfigError(
+            f"{wanted!r} is no face: a point has 3 numbers, a box 6.", hint=GRAMMAR_HINT
+        )
     for one in wanted:
         yield from picks(one)

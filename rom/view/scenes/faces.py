@@ -26,7 +26,7 @@ LETTER_SIZE = (10, 20)  # width and height of a letter of a label [pixel]
 LEAST_SEEN = 2.0  # [pixel] from the edges of what is seen of a face
 ROOM_SHARE = 0.9  # of the greatest such distance, from which a label may stand
 WAYS = ((0, -1), (1, 0), (0, 1), (-1, 0), (1, -1), (1, 1), (-1, 1), (-1, -1))  # labels are moved
-FURTHEST = 12  # steps of half a label, that it is moved at most
+MAX_STEPS = 12  # steps of half a label, that it is moved at most
 
 
 @typed
@@ -155,7 +155,7 @@ def _places(spot: Spot, wide: float, tall: float) -> Iterator[tuple[float, float
     """The middle of the face, then places around it, further and further away."""
     x, y = spot.at
     yield x, y
-    for step in range(2, FURTHEST):
+    for step in range(2, MAX_STEPS):
         for i, j in WAYS:
             yield x + i * step * wide, y + j * step * tall
 
@@ -167,8 +167,8 @@ def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
 def _words(x: Array, triangles: Mapping[str, Index], placed: list[Labels]) -> str:
     """The caption: how large the part is, and what has no label."""
     size = " x ".join(f"{length:.4g} mm" for length in 1e3 * np.ptp(x, axis=0))
-    shown = {spot.label for side in placed for spot, _ in side}
-    hidden = sorted(set(triangles) - shown - {""}, key=lambda label: (len(label), label))
+    labelled = {spot.label for side in placed for spot, _ in side}
+    hidden = sorted(set(triangles) - labelled - {""}, key=lambda label: (len(label), label))
     words = f"The part, {size}, from one side and, below, from the opposite one."
     return words + (f" Not seen, or too small: {', '.join(hidden)}." if hidden else "")
 

@@ -130,8 +130,8 @@ def _angle(a: Array, b: Array) -> float:
 
 
 def _listed(found: list[Face]) -> str:
-    shown = [f"{f.number} (middle {_words(f.middle)} m)" for f in found[:MAX_SHOWN]]
-    return ", ".join(shown) + (", ..." if len(found) > MAX_SHOWN else "")
+    words = [f"{f.number} (middle {_words(f.middle)} m)" for f in found[:MAX_SHOWN]]
+    return ", ".join(words) + (", ..." if len(found) > MAX_SHOWN else "")
 
 
 def _words(x: tuple[float, ...]) -> str:

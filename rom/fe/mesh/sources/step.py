@@ -68,10 +68,10 @@ def _check_solid(gmsh: Any) -> None:
         )
     if (n_parts := _parts(gmsh, solids)) > 1:
         volumes = sorted((gmsh.model.occ.getMass(3, tag) for tag in solids), reverse=True)
-        shown = ", ".join(f"{v:.4g}" for v in volumes[:MAX_SHOWN])
+        listed = ", ".join(f"{v:.4g}" for v in volumes[:MAX_SHOWN])
         more = ", ..." if n_parts > MAX_SHOWN else ""
         raise MeshError(
-            f"the STEP file holds {len(solids)} solids, of {shown}{more} m^3, that share no face; "
+            f"the STEP file holds {len(solids)} solids, of {listed}{more} m^3, that share no face; "
             "one model is one body.",
             hint="Unite them in the CAD program if they are one part, for solids that only touch "
             "are not connected; else export each into a file of its own and join them in a "
