@@ -70,7 +70,8 @@ def run(args: argparse.Namespace) -> Answer:
         _check_save(args, file)
     if args.faces and FACE_WORD in how["faces"]:
         raise ConfigError(
-            f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called {FACE_WORD!r}.",
+            f"--faces lists the faces as {FACE_WORD} 1, {FACE_WORD} 2, ..., so none can be called "
+            f"{FACE_WORD!r}.",
             hint="Give it another name, or leave --faces out.",
         )
     if args.faces:
