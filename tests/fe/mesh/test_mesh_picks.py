@@ -1,9 +1,13 @@
 """Words that pick faces, without a geometry."""
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
 from rom.errors import ConfigError
+from rom.fe.mesh.cad import Axis, Face, from_plain, scaled
 from rom.fe.mesh.picks import Pick, is_pick, picks
 
 PICKS = {
@@ -43,3 +47,15 @@ def test_what_picks_nothing_is_refused(wrong):
 @pytest.mark.parametrize("name", ["pin_a", "bolt 3", "a", "e", "Grund:oben"])
 def test_a_name_is_no_pick(name):
     assert not is_pick(name)
+
+
+def test_lengths_areas_and_places_scale_and_directions_do_not():
+    """Records survive JSON, in which the reader hands them over."""
+    face = Face(7, "cylinder", 3.0, (1.0, 2.0, 3.0), 0.5, (0.0, 0.0, 1.0), (1.0, 2.0, 0.0))
+    there = from_plain(Face, json.loads(json.dumps(asdict(face))))
+    assert there == face and scaled(face, 1.0) == face
+    assert scaled(face, 2.0) == Face(
+        7, "cylinder", 12.0, (2.0, 4.0, 6.0), 1.0, (0.0, 0.0, 1.0), (2.0, 4.0, 0.0)
+    )
+    axis = Axis((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), None)
+    assert scaled(axis, 3.0) == Axis((3.0, 0.0, 0.0), (0.0, 1.0, 0.0), None)
