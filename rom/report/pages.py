@@ -11,7 +11,7 @@ from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Report, Row
 from rom.process.child import scratch
 from rom.report import html
-from rom.report.run import N_INSTANTS, RECORD_FILE, SCENE_FILE, Run, run, versions
+from rom.report.run import RECORD_FILE, SCENE_FILE, Run, run, versions
 from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
 from rom.report.scene_file import read_scene
 from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
@@ -250,19 +250,16 @@ def _motion(moved: Run, look: dict[str, Any]) -> list[str]:
     solution, how = moved.solution, look | {"magnify": moved.file.values["output"]["magnify"]}
 
     def draw(path: Path) -> None:
-        import numpy as np
-
         from rom.view.scenes.film import instants
 
-        times = np.linspace(solution.t[0], solution.t[-1], N_INSTANTS)
-        instants(solution.mechanism, solution, path, times=times, **how)
+        instants(solution.mechanism, solution, path, **how)
 
     title = f"Motion of {moved.file.name}"
     return [
         html.paragraph(solution.status),
         *turning(
             lambda: motion_scene(solution, title=title, **how),
-            drawn(draw, "Four instants."),
+            drawn(draw, "Instants at which the bodies are farthest from each other."),
             MOTION_WORDS,
         ),
         html.checks(moved.audit, "Is the computed motion believable?"),

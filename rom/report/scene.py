@@ -21,9 +21,11 @@ from rom.report.coarse import array, coarsened, corners, quantised_column, quant
 from rom.rotation import matrix
 from rom.view.canvas.scene import aimed, sharp_edges
 from rom.view.canvas.solids import Mesh
-from rom.view.scenes.film import METAL_COLOURS, bars, placed, shades_of
+from rom.view.scenes.film import METAL_COLOURS, shades_of
 from rom.view.scenes.mechanisms import COLOURS
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
+from rom.view.scenes.places import placed
+from rom.view.scenes.rigid import bars, ends_of
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -133,7 +135,7 @@ def motion_scene(
     steps = _steps(solution)
     things = [
         _of_part(
-            part, colour, given.get(name),
+            part, colour, given.get(name) or _bars(mechanism, name),
             (solution.position(name)[steps], solution.orientation(name)[steps]),
             solution.elastic(name)[steps] if part.r else None,
         )
@@ -159,9 +161,10 @@ def start_scene(
 ) -> dict[str, Any]:
     """A mechanism as its bodies are placed; arguments as of `rom.view.mechanism`."""
     things = [
-        _of_part(part, COLOURS[k % len(COLOURS)], None, (part.at[None], part.p[None]), None)
+        _of_part(part, COLOURS[k % len(COLOURS)], _bars(mechanism, part.name),
+                 (part.at[None], part.p[None]), None)
         for k, part in enumerate(mechanism.parts.values())
-    ]
+    ]  # fmt: skip
     look = {"view": view, "up": up, "gravity": mechanism.gravity}
     return _scene(title, things, SHAPE_BYTES, look)
 
@@ -252,14 +255,18 @@ def _colours(mechanism: "Mechanism") -> list[str]:
     return found
 
 
+def _bars(mechanism: "Mechanism", name: str) -> Mesh:
+    """What stands for a body without a surface."""
+    return bars(mechanism.parts[name], ends_of(mechanism, name))
+
+
 def _of_part(
-    part: Any, colour: str, shape: Mesh | None, pose: tuple[Array, Array], q: Array | None
+    part: Any, colour: str, shape: Mesh, pose: tuple[Array, Array], q: Array | None
 ) -> Thing:
-    """A body of a mechanism, by its surface, the shape it was given, or as bars."""
+    """A body of a mechanism, by its surface, or else a shape."""
     surface = _surface(part.flexible)
     if surface is None:
-        points, triangles = bars(part) if shape is None else shape
-        return Thing(part.name, colour, points, triangles, *pose)
+        return Thing(part.name, colour, *shape, *pose)
     mesh = surface.points, surface.triangles
     if q is None or not part.r:
         return Thing(part.name, colour, *mesh, *pose)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import Image, render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, directed_edges
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1500  # [pixel]
 HEADER_HEIGHT, GAP = 80, 30  # [pixel]
@@ -38,13 +41,13 @@ def faces(
     title: str = "Faces",
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-) -> Path | page.Picture:
+) -> "Figure":
     """Draw the faces of a part with their labels, from one side and from the opposite one.
 
     Args:
         points: (n, 3) positions of the nodes [m].
         patches: {label: (t, 3) triangles of a face}; "" for the rest, which gets no label.
-        path: picture to write, .png; None to get the `Picture` itself.
+        path: picture to write, .png; None to write nothing.
         title: heading.
         view: (3,) direction from the part to the eye; None: mainly along its shortest extent.
         up: (3,) upright direction; None: across its longest extent.
