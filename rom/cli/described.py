@@ -23,6 +23,7 @@ PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "nu": ("material", "nu"),
     "rho": ("material", "rho"),
     "degree": ("geometry", "degree"),
+    "order": ("geometry", "order"),
     "solver": ("geometry", "solver"),
     "method": ("reduction", "method"),
     "modes": ("reduction", "modes"),

@@ -20,6 +20,7 @@ GEOMETRY_OPTIONS: dict[str, Any] = {  # options of a geometry, and what they are
     "parameter": [],
     "face": [],
     "scale": 1.0,
+    "order": None,
     "trust": False,
     "time_limit": None,
     "memory_limit": None,

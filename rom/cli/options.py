@@ -132,6 +132,11 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scale", type=positive, default=1.0, help="factor on coordinates; 1e-3 for mm (default 1)"
     )
+    parser.add_argument(
+        "--order", type=count, choices=(1, 2),
+        help="degree of the cells' edges: 1 straight, 2 curved (default: 2 where the geometry is "
+        "curved and --degree is not 1)",
+    )  # fmt: skip
     add_meshing(parser)
 
 
@@ -194,6 +199,7 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
         "parameters": unique(pairs, "-p"),
         "faces": faces(args.face),
         "scale": args.scale,
+        "order": args.order,
         **meshing(args),
     }
 

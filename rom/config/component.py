@@ -76,7 +76,8 @@ class Component:
             name: self._parameter(name, value, scale)
             for name, value in geometry.get("parameters", {}).items()
         }
-        keywords = {"parameters": parameters, "faces": geometry.get("faces", {}), "scale": scale}
+        keywords = {"parameters": parameters, "faces": geometry.get("faces", {}), "scale": scale,
+                    "order": geometry.get("order")}  # fmt: skip
         return geometry["file"], keywords | self.meshing
 
     def model(self) -> "FEModel":

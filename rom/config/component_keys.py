@@ -100,6 +100,8 @@ TABLE = Table("A component.", (
         Key("file", FilePath(), "`.geo`, `.py`, `.step`, `.msh`, `.inp` or `.bdf`.", ...),
         Key("unit", Text(LENGTHS), "Length unit of its coordinates; a `.step` knows its own.", "m"),
         Key("degree", Whole(1, 3), "Degree of the displacement.", 2),
+        Key("order", Whole(1, 2), "Degree of the cells' edges: 1 straight, 2 curved; 2 where the "
+            "geometry is curved if missing."),
         Key("solver", Text(), "How equations are solved, as `rom reduce --solver`.", "direct"),
         Key("parameters", Named(Anything("number or text"), "parameters"),
             "Parameters of the geometry. A plain number goes there as it is; a length with its "

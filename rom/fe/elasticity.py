@@ -13,13 +13,14 @@ import numpy as np
 from rom.arguments import typed
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MeshError, TagError, warn
-from rom.fe.compat import assemble_matrix, cell_name, lagrange, versions
+from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.forms.material import by_region, coefficients, described, doubts
 from rom.fe.forms.nodes import all_points, interface, outer_surface
 from rom.fe.forms.region import Regions, forms
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
+from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.operators.aij import symmetric, wrapped
 from rom.fe.operators.memory import give_back
@@ -59,7 +60,8 @@ def model(
             and without the count that proves no mode missed.
         comm: the ranks that share the model.
         mesh_options: ``scale``, ``faces``, ``order``, ``trust``, ``time_limit`` and
-            ``memory_limit`` of `rom.fe.mesh.read.read_mesh`.
+            ``memory_limit`` of `rom.fe.mesh.read.read_mesh`. Cells are curved where the geometry
+            is; straight with ``order=1`` or ``degree=1``.
 
     Returns:
         FEModel, free-free. On one process K and M are SciPy matrices, under mpirun PETSc
@@ -80,14 +82,16 @@ def model(
         >>> beam.interface_names
         ('root', 'tip')
     """
-    from rom.fe.mesh.read import read_mesh, to_dolfinx
+    from rom.fe.mesh.read import is_geometry, read_mesh, to_dolfinx
 
     method = parsed(solver)  # before a mesh is made in vain
     install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
     read: list[SolidMesh] = []  # on rank 0; the others never hold the whole mesh
 
     def head() -> tuple[dict[int, str], list[str], dict[str, Any], dict[str, Axis]]:
-        read.append(read_mesh(path, parameters=parameters, **mesh_options))
+        if degree == 1 and mesh_options.get("order") is None and is_geometry(path):
+            mesh_options["order"] = 1
+        read.append(without_middles(read_mesh(path, parameters=parameters, **mesh_options)))
         mesh = read[0]
         return mesh.region_names, list(mesh.warnings or ()), mesh.provenance, mesh.axes
 
@@ -173,6 +177,7 @@ def assemble(
         "provenance": {
             "material": described(named),
             "degree": degree,
+            "degree of the geometry": geometry_degree(mesh),
             "cells": {name: mesh.topology.index_map(3).size_global},
             "units": "SI",
             "versions": versions(),
@@ -201,6 +206,12 @@ def _check_mesh(mesh: Any, degree: int) -> str:
         raise MeshError(f"the mesh has cells of the kind {name}; it takes tetrahedra or hexahedra.")
     if degree not in DEGREES:
         raise ConfigError(f"degree = {degree!r}; the displacement may have degree 1, 2 or 3.")
+    if degree < (curved := geometry_degree(mesh)):
+        raise MeshError(
+            f"the cells have curved edges of degree {curved}, on which displacements of degree "
+            f"{degree} would strain when the body turns.",
+            hint="Use degree=2, or a mesh with straight edges.",
+        )
     return name
 
 

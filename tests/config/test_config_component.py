@@ -218,7 +218,7 @@ def test_what_contradicts_itself_is_told_before_anything_is_meshed(text, words, 
 
 def test_the_sample_describes_the_rod_of_the_demo():
     part = read_component(ROOT / "meshes" / "connecting_rod.toml")
-    how = {"parameters": {"lc": 5.5e-3}, "faces": {}, "scale": 1.0}
+    how = {"parameters": {"lc": 5.5e-3}, "faces": {}, "scale": 1.0, "order": None}
     how |= {"trust": False, "time_limit": None, "memory_limit": None}
     assert part.mesh == (ROOT / "meshes" / "connecting_rod.geo", how)
     assert part.material() == rom.Material(E=210e9, nu=0.3, rho=7850.0)

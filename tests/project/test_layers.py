@@ -149,6 +149,7 @@ ORDER = {
         "solid",
         "sources",
         "child",
+        "curving",
         "quality",
         "repair",
         "validate",

@@ -134,7 +134,10 @@ def _text(data: dict[str, Any]) -> str:
     listed = data.get("faces", [])
     numbered = {_numbered(face) for face in listed}
     size = max(high - low for low, high in data["box"])
-    quality = ", ".join(f"{name} {value:.3g}" for name, value in data["quality"].items())
+    quality = ", ".join(
+        f"{name} {value}" if isinstance(value, int) else f"{name} {value:.3g}"
+        for name, value in data["quality"].items()
+    )
     regions = [(name, str(r["cells"]), f"{r['volume']:.6g}") for name, r in data["regions"].items()]
     faces = [
         (

@@ -1,8 +1,8 @@
 """Meshes, from a file to dolfinx.
 
 `sources` reads files into a `solid`, in a `child` process; `picks` says which faces are meant,
-`cad` what is known of them; `topology`, `quality`, `repair`,
-`validate` and `summary` look at it; `cell_types` numbers nodes; `distribute` hands it to the ranks,
+`cad` what is known of them; `topology`, `curving`, `quality`, `repair`, `validate` and `summary`
+look at it; `cell_types` numbers nodes; `distribute` hands it to the ranks,
 `input_deck` to other programs; `read` does all.
 """
 

@@ -1,20 +1,29 @@
 """Shape of the cells: volume, Jacobian, aspect ratio."""
 
 from dataclasses import replace
+from itertools import chain, repeat
 
 import numpy as np
 
 from rom.errors import MeshError
 from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
+from rom.fe.mesh.curving import (
+    BOUND_GAP,
+    STRAIGHT,
+    bent,
+    smallest_determinants,
+    straightened,
+)
 from rom.fe.mesh.solid import SolidMesh, cell_names
 from rom.model import Array, Index, Mask
 
 # Smallest over largest possible determinant: round-off of coordinates gives 1e-16 times the
 # distance from the origin over the cell size, bad but usable cells of gmsh have 1e-4.
 FLAT_CELL_RTOL = 1e-10
-MIN_CURVED_QUALITY = 1e-3  # curved cells below are made straight if this is allowed
+MIN_CURVED_QUALITY = 1e-3  # curved cells below are made straighter if this is allowed
+SHARES = (0.1, 0.2, 0.4, 1.0)  # of the way to the straight cell, one after the other
+FEW_STRAIGHTENED = 0.01  # of the curved cells: a geometry with fillets has some in any mesh
 MAX_ASPECT_RATIO = 100.0  # beyond it we warn; tetrahedra of a good mesh stay below 10
-STRAIGHT_EDGE_RTOL = 1e-9  # of the edge: distance of its mid-side node from the middle
 BLOCK_SIZE = 20_000  # cells looked at together, bounds the memory
 
 
@@ -24,21 +33,21 @@ def check_shape(mesh: SolidMesh) -> list[str]:
     Raises:
         MeshError: with the numbers of the cells and the worst quality.
     """
-    quality = scaled_jacobian(mesh)
+    quality, sampled = scaled_jacobian(mesh), _sampled(mesh) / _longest_edge(mesh) ** 3
     _refuse(
         mesh,
-        np.abs(quality) < FLAT_CELL_RTOL,
-        quality,
+        np.abs(sampled) < FLAT_CELL_RTOL,
+        sampled,
         "have no volume",
         "Mesh again; see gmsh's Mesh.Optimize.",
     )
     _refuse(
         mesh,
-        quality < 0,
+        quality < -FLAT_CELL_RTOL,
         quality,
         "are inverted: the Jacobian changes sign inside",
-        "Mid-side nodes are too far out or corners are crossed; use smaller elements or "
-        "straight edges.",
+        "Mid-side nodes are too far out or corners are crossed; use smaller elements, straight "
+        "edges, or Mesh.HighOrderOptimize of gmsh.",
     )
     ratio = aspect_ratio(mesh)
     slender = np.flatnonzero(ratio > MAX_ASPECT_RATIO)
@@ -61,49 +70,61 @@ def _refuse(mesh: SolidMesh, bad: Mask, quality: Array, what: str, hint: str) ->
 
 
 def scaled_jacobian(mesh: SolidMesh) -> Array:
-    """(m,) smallest Jacobian determinant at the quadrature points over the cube of the cell.
+    """(m,) smallest Jacobian determinant over the cube of the cell.
 
     1 for a cube and 0.71 for a regular tetrahedron; 0 for a flat cell, negative for an inverted
-    one.
+    one. Of straight cells at the quadrature points, of curved ones anywhere in the cell, to 1e-4.
     """
-    kind = mesh.kind
-    straight = CELL_TYPES["tet4" if kind.shape == "tetrahedron" else "hex8"]
-    smallest = _smallest(mesh.points, mesh.corners, straight)
+    kind, cube, smallest = mesh.kind, _longest_edge(mesh) ** 3, _sampled(mesh)
     if kind.degree == 2:
-        curved = np.flatnonzero(_bent(mesh.points, mesh.cells, kind))
-        smallest[curved] = _smallest(mesh.points, mesh.cells[curved], kind)
-    return smallest / _longest_edge(mesh) ** 3
+        curved = np.flatnonzero(bent(mesh))
+        smallest[curved] = smallest_determinants(
+            mesh.points, mesh.cells[curved], kind, BOUND_GAP * cube[curved]
+        )
+    return smallest / cube
 
 
 def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
-    """Straight edges where curved ones would turn a cell inside out.
+    """Straighter edges where curved ones would turn a cell inside out.
 
-    Where two curved surfaces touch, a second-order mesh cannot follow both. For meshes made from a
+    A tetrahedron with two faces on one smooth surface has no angle between them once both follow
+    it. Its nodes go back towards the straight cell, no further than needed. For meshes made from a
     geometry; in a finished mesh inverted cells are an error.
 
     Returns:
-        The mesh, and a remark with the number of cells and the largest shift of a node.
+        The mesh, with the numbers of curved and straightened cells in its provenance, and a remark
+        where they are many.
     """
-    kind, start = mesh.kind, mesh.points
-    if kind.degree == 1:
+    if mesh.kind.degree == 1:
         return mesh, []
+    start, curved = mesh.points, bent(mesh)
     changed = np.zeros(len(mesh.cells), dtype=bool)
-    while True:
-        bad = (scaled_jacobian(mesh) < MIN_CURVED_QUALITY) & _bent(mesh.points, mesh.cells, kind)
+    for share in chain(SHARES, repeat(1.0)):
+        bad = (scaled_jacobian(mesh) < MIN_CURVED_QUALITY) & bent(mesh)
         if not bad.any():
             break
         changed |= bad
-        points, cells = mesh.points.copy(), mesh.cells[bad]
-        for node, support in enumerate(kind.supports[kind.n_corners :], kind.n_corners):
-            points[cells[:, node]] = points[cells[:, list(support)]].mean(axis=1)
-        mesh = replace(mesh, points=points)
-    if not changed.any():
+        mesh = straightened(mesh, bad, share)
+    numbers = {"curved cells": int(curved.sum()), "straightened cells": int(changed.sum())}
+    mesh = replace(mesh, provenance=mesh.provenance | numbers)
+    if changed.sum() <= FEW_STRAIGHTENED * curved.sum():
         return mesh, []
     shift = np.linalg.norm(mesh.points - start, axis=1).max()
     return mesh, [
-        f"{changed.sum()} cells got straight edges, because curved ones would have turned them "
-        f"inside out; nodes moved by up to {shift:.2g} m."
+        f"{changed.sum()} of {curved.sum()} curved cells got straighter edges, because they would "
+        f"have been turned inside out; nodes moved by up to {shift:.2g} m. Smaller elements follow "
+        "the surface."
     ]
+
+
+def _sampled(mesh: SolidMesh) -> Array:
+    """(m,) smallest determinant at the quadrature points."""
+    kind = mesh.kind
+    smallest = _smallest(mesh.points, mesh.corners, CELL_TYPES[STRAIGHT[kind.shape]])
+    if kind.degree == 2:
+        curved = np.flatnonzero(bent(mesh))
+        smallest[curved] = _smallest(mesh.points, mesh.cells[curved], kind)
+    return smallest
 
 
 def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
@@ -112,16 +133,6 @@ def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
     blocks = [cells[i : i + BLOCK_SIZE] for i in range(0, len(cells), BLOCK_SIZE)]
     found = [jacobians(points[block], gradients).min(axis=1) for block in blocks]
     return np.concatenate(found) if found else np.empty(0)
-
-
-def _bent(points: Array, cells: Index, kind: CellType) -> Mask:
-    """(m,) whether any node lies away from the mean of its corners."""
-    bent = np.zeros(len(cells), dtype=np.bool_)
-    for node, support in enumerate(kind.supports[kind.n_corners :], kind.n_corners):
-        corners = points[cells[:, list(support)]]
-        away = np.abs(points[cells[:, node]] - corners.mean(axis=1)).max(axis=1)
-        bent |= away > STRAIGHT_EDGE_RTOL * np.ptp(corners, axis=1).max(axis=1)
-    return bent
 
 
 def _edges(kind: CellType) -> list[tuple[int, int]]:

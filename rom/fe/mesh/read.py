@@ -21,6 +21,7 @@ from rom.errors import (
 )
 from rom.fe.mesh.cad import Axis, Face, from_plain, scaled
 from rom.fe.mesh.child import read_apart
+from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.picks import EVERY_FACE, picks
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
@@ -69,7 +70,9 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
             `rom.fe.mesh.picks`, or a list of these; lengths in metres. {"face": "every"} names
             all faces without a name "face 1", "face 2", ...
         scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
-        order: degree of the geometry, 1 or 2, when the mesh is made here; None for the default.
+        order: degree of the geometry when the mesh is made here: 1 for straight edges, 2 for
+            curved ones, with nodes amid edges and faces on the surface; None for 2 where the body
+            is curved and 1 where it is not.
         trust: run a ``.py`` file.
         time_limit: of meshing a geometry [s]; by default half an hour, 0 for none.
         memory_limit: of meshing a geometry [bytes]; by default 80 % of the machine's, 0 for none.
@@ -106,6 +109,7 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
     if request["reader"] in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
+        mesh = mesh if order else without_middles(mesh)
         remarks = [*remarks, *straightened]
     if request["reader"] == "step" and scale != 1.0:
         remarks = [*remarks, _scaled_twice(mesh.size, scale)]
@@ -175,6 +179,11 @@ def _reader(path: Path) -> str:
             f"no reader for the suffix {path.suffix!r}; readable are {sorted(READERS)}.",
             where=str(path),
         ) from None
+
+
+def is_geometry(path: str | Path) -> bool:
+    """Whether a file is meshed here, and is no finished mesh."""
+    return READERS.get(Path(path).suffix.lower()) in GEOMETRIES
 
 
 def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:

@@ -135,7 +135,7 @@ def test_parts_of_the_frame_meet_in_their_nodes_and_fill_the_whole():
     parts = (left, beam, right)
     assert sum(map(volume, parts)) == pytest.approx(volume(whole), rel=1e-9)
     exact = 2 * np.pi * 0.02**2 * 0.25 + 0.47 * 0.07 * 0.05
-    assert volume(whole) == pytest.approx(exact, rel=0.03)
+    assert volume(whole) == pytest.approx(exact, rel=3e-4)
     for column, bore, x in ((left, "bore_left", 0.0), (right, "bore_right", 0.4)):
         seat = column.points[np.unique(column.facets["seat"])]
         hole = beam.points[np.unique(beam.facets[bore])]
@@ -145,7 +145,7 @@ def test_parts_of_the_frame_meet_in_their_nodes_and_fill_the_whole():
         assert (column.points[np.unique(column.facets["foot"]), 2] == 0.0).all()
         assert areas(column)["seat"] == pytest.approx(areas(beam)[bore], rel=1e-12)
     other = read_mesh(MESHES / "frame.geo", parameters={"part": 3, "n_right": 6, "n_along": 5})
-    assert np.unique(other.facets["seat"]).size == 12 * 6
+    assert np.unique(other.facets["seat"][:, :3]).size == 12 * 6
 
 
 @pytest.mark.parametrize("hexahedra", [0, 1])

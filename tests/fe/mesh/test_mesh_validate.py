@@ -4,6 +4,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cases.files.cells import grid, second_order, solid, tetrahedra
 from cases.measures import volume
 from rom.errors import MeshError, TagError
-from rom.fe.mesh.cell_types import CELL_TYPES
-from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
+from rom.fe.mesh.cell_types import CELL_TYPES, jacobians
+from rom.fe.mesh.curving import smallest_determinants, without_middles
+from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian, straighten
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, parts_by_face, row_ids
@@ -347,3 +349,71 @@ def test_cells_are_named_by_their_numbers_in_the_file():
     with pytest.raises(MeshError) as caught:
         validate(repair(replace(mesh, cell_ids=1000 + np.arange(len(mesh.cells)))))
     assert f"cells {1000 + cells[0]}" in str(caught.value)
+
+
+def pulled(kind, share):
+    """A second-order box, one node amid an edge pulled along it by a share of the edge."""
+    mesh = second_order(solid(kind))
+    row = mesh.cells[0]
+    node = next(i for i, s in enumerate(mesh.kind.supports) if sorted(s) == [0, 1])
+    a, b = mesh.points[row[0]], mesh.points[row[1]]
+    points = mesh.points.copy()
+    points[row[node]] += share * (b - a)
+    return replace(mesh, points=points)
+
+
+@pytest.mark.parametrize("kind", ["tet4", "hex8"])
+def test_cells_inverted_near_a_corner_alone_are_refused(kind):
+    """The tangent at a corner turns over when the node amid its edge is nearer than a quarter.
+
+    At 0.26 of the edge from the middle, every quadrature point still has a positive determinant.
+    """
+    bad = pulled(kind, 0.26)
+    at_points = jacobians(bad.points[bad.cells], bad.kind.gradients(bad.kind.quadrature))
+    assert at_points.min() > 0.02 * at_points.max()
+    with pytest.raises(MeshError, match="inverted: the Jacobian changes sign inside"):
+        validate(bad)
+    validate(pulled(kind, 0.24))
+    validate(pulled(kind, 0.25))  # no determinant in the corner, as at the tip of a crack
+
+
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
+def test_the_smallest_determinant_of_a_curved_cell_is_found(kind):
+    """Never above what a fine grid finds, and below it by no more than the grid misses."""
+    kind, rng = CELL_TYPES[kind], np.random.default_rng(3)
+    x = kind.nodes + 0.05 * rng.standard_normal((12, kind.n_nodes, 3))
+    points, cells = x.reshape(-1, 3), np.arange(x.size // 3).reshape(len(x), -1)
+    found = smallest_determinants(points, cells, kind, np.full(len(x), 1e-4))
+    grid = np.array(list(product(np.linspace(0, 1, 31), repeat=3)))
+    if kind.shape == "tetrahedron":
+        grid = grid[grid.sum(axis=1) <= 1 + 1e-12]
+    sampled = jacobians(x, kind.gradients(grid)).min(axis=1)
+    assert np.all(found <= sampled + 1e-4 + 1e-12)
+    assert np.all(found >= sampled - 0.02)
+    assert found.min() < 0 < found.max() and np.ptp(found) > 0.1
+
+
+def test_cells_are_straightened_no_more_than_needed():
+    """A cell that its curving turns inside out goes a tenth of the way back where that is enough."""
+    start = pulled("tet4", 0.26)
+    mesh, remarks = straighten(start)
+    validate(mesh)
+    n = len(second_order(solid("tet4")).cells)
+    assert mesh.provenance["straightened cells"] <= mesh.provenance["curved cells"] < n
+    assert "curved cells got straighter edges" in remarks[0] and "Smaller elements" in remarks[0]
+    moved = np.linalg.norm(mesh.points - start.points, axis=1)
+    assert_allclose(moved.max() / np.linalg.norm(start.points - pulled("tet4", 0).points, axis=1).max(),
+                    0.1, rtol=1e-9)  # fmt: skip
+
+
+def test_meshes_without_a_curved_cell_lose_the_nodes_amid_their_edges():
+    for kind in ("tet4", "hex8"):
+        mesh = solid(kind)
+        flat = without_middles(second_order(mesh))
+        assert flat.cell_type == kind
+        assert_allclose(flat.points[flat.cells], mesh.points[mesh.cells], atol=1e-15)
+        assert_allclose(
+            flat.points[flat.facets["tip"]], mesh.points[mesh.facets["tip"]], atol=1e-15
+        )
+        curved = pulled(kind, 0.1)
+        assert without_middles(curved) is curved

@@ -177,14 +177,16 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
     gmsh.option.setNumber("General.NumThreads", 1)
     if gmsh.option.getNumber("Mesh.Algorithm3D") == HXT_ALGORITHM:
         gmsh.option.setNumber("Mesh.Algorithm3D", 1)
-    if request["order"]:
-        gmsh.option.setNumber("Mesh.ElementOrder", request["order"])
     _check_order(gmsh.option.getNumber("Mesh.ElementOrder"))
+    order = request["order"] or HIGHEST_ORDER
+    gmsh.option.setNumber("Mesh.ElementOrder", order)
     gmsh.write(str(declared))
     check_declared(gmsh, declared)
     if not any(len(tags) for tags in gmsh.model.mesh.getElements(3)[1]):
         with complaints(gmsh, MeshError):
             gmsh.model.mesh.generate(3)
+    else:  # the geometry has made its mesh itself
+        gmsh.model.mesh.setOrder(order)
 
 
 def _check_order(order: float) -> None:
