@@ -98,15 +98,17 @@ Physical Volume("body") = {v[1]};
 """
 
 
-def test_axisymmetric_modes_of_a_free_cylinder_fv41(tmp_path):
+@pytest.mark.parametrize(("order", "rtol"), [(2, 2e-4), (1, 6e-3)])
+def test_axisymmetric_modes_of_a_free_cylinder_fv41(tmp_path, order, rtol):
     """NAFEMS FV41, values of converged axisymmetric elements; a quarter of half the cylinder.
 
     Modes that are even and odd about the middle are found with their own support of that plane.
     The odd ones can slide along the axis, so they are computed with a negative shift in SciPy.
+    Straight edges err fifty times as much.
     """
     path = tmp_path / "cylinder.geo"
     path.write_text(CYLINDER)
-    quarter = model(path, material=NAFEMS, order=2)
+    quarter = model(path, material=NAFEMS, order=order)
     assert quarter.provenance["cells"] == {"hexahedron": 84}
     x, y, z = quarter.points.T
     r = np.hypot(x, y)
@@ -124,7 +126,8 @@ def test_axisymmetric_modes_of_a_free_cylinder_fv41(tmp_path):
         found += list(frequency[fraction_in(quarter, Phi, fields) > 0.98])
     assert_allclose(np.sort(found)[0], 0.0, atol=1e-2)
     expected = [243.4955, 377.3851, 394.2119, 397.8363, 405.3223]
-    assert_allclose(np.sort(found)[1:6], expected, rtol=1e-3)
+    assert_allclose(np.sort(found)[1:6], expected, rtol=rtol)
+    assert order == 2 or np.abs(np.sort(found)[1:6] / expected - 1).max() > 5e-3
 
 
 SPHERE = """

@@ -25,7 +25,7 @@ STRAIGHT_EDGE_RTOL = 1e-9  # of the edge: distance of its mid-side node from the
 BLOCK_SIZE = 5000  # cells looked at together, bounds the memory
 BOUND_GAP = 1e-4  # of the cube of the cell: how well the smallest determinant is known
 MOST_HALVINGS = 12
-STRAIGHT = {"tetrahedron": "tet4", "hexahedron": "hex8"}
+STRAIGHT_KINDS = {"tetrahedron": "tet4", "hexahedron": "hex8"}
 DEGREES = {"tetrahedron": 3, "hexahedron": 5}  # of the determinant
 # Corners of the eight halves of a tetrahedron: a number, or two for the middle of an edge.
 TET_HALVES = (
@@ -51,7 +51,7 @@ def without_middles(mesh: SolidMesh) -> SolidMesh:
     """The same body with cells of first order, where no cell is curved; else the mesh itself."""
     if mesh.kind.degree == 1 or bent(mesh).any():
         return mesh
-    kind = CELL_TYPES[STRAIGHT[mesh.kind.shape]]
+    kind = CELL_TYPES[STRAIGHT_KINDS[mesh.kind.shape]]
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.corners] = True
     new = np.cumsum(used) - 1

@@ -9,7 +9,7 @@ from rom.errors import MeshError
 from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
 from rom.fe.mesh.curving import (
     BOUND_GAP,
-    STRAIGHT,
+    STRAIGHT_KINDS,
     bent,
     smallest_determinants,
     straightened,
@@ -120,7 +120,7 @@ def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
 def _sampled(mesh: SolidMesh) -> Array:
     """(m,) smallest determinant at the quadrature points."""
     kind = mesh.kind
-    smallest = _smallest(mesh.points, mesh.corners, CELL_TYPES[STRAIGHT[kind.shape]])
+    smallest = _smallest(mesh.points, mesh.corners, CELL_TYPES[STRAIGHT_KINDS[kind.shape]])
     if kind.degree == 2:
         curved = np.flatnonzero(bent(mesh))
         smallest[curved] = _smallest(mesh.points, mesh.cells[curved], kind)

@@ -13,7 +13,7 @@ from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
 from rom.model import Array, Index
 
-COUNTED = ("curved cells", "straightened cells")  # where the mesh was made here
+COUNTED_CELLS = ("curved cells", "straightened cells")  # where the mesh was made here
 VTK_TYPES = {"tet4": 10, "tet10": 24, "hex8": 12, "hex27": 29}
 # Corner sets of VTK's nodes where its order differs from gmsh's.
 VTK_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
@@ -53,7 +53,7 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
         "quality": {
             "smallest scaled Jacobian": float(scaled_jacobian(mesh).min()),
             "largest aspect ratio": float(aspect_ratio(mesh).max()),
-            **{name: mesh.provenance[name] for name in COUNTED if name in mesh.provenance},
+            **{name: mesh.provenance[name] for name in COUNTED_CELLS if name in mesh.provenance},
         },
         **({"faces": [asdict(face) for face in mesh.faces]} if mesh.faces else {}),
     }

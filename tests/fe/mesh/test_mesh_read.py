@@ -8,11 +8,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cases.files.cells import blocks_of, solid, write_msh
-from cases.measures import areas
+from cases.measures import areas, volume
 from cases.paths import ROOT
 from rom.errors import ConfigError, RomWarning, TagError
 from rom.fe.mesh.quality import scaled_jacobian
 from rom.fe.mesh.read import read_mesh
+from rom.fe.mesh.sources.gmsh_session import session
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -271,3 +272,32 @@ def test_wrong_options_are_refused(options, culprit):
     assert culprit in str(caught.value)
     if "lcc" in culprit:
         assert "['L', 'b', 'h', 'hex', 'lc', 'nx', 'ny', 'nz']" in str(caught.value)
+
+
+PIN = """
+SetFactory("OpenCASCADE");
+Cylinder(1) = {0, 0, 0, 0, 0, %g, %g};
+Mesh.MeshSizeMin = 0.006; Mesh.MeshSizeMax = 0.006;
+Physical Volume("body") = {1};
+"""
+
+
+@pytest.mark.parametrize("way", ["geo", "meshed by itself", "step"])
+def test_nodes_of_a_pin_lie_on_its_surface_whoever_meshes_it(tmp_path, way):
+    """By default and with order=2; straight edges with order=1 cut off more than 7 %."""
+    path = tmp_path / "pin.geo"
+    path.write_text(PIN % (0.03, 0.01) + ("Mesh 3;\n" if way == "meshed by itself" else ""))
+    if way == "step":
+        path.write_text(PIN % (30, 10))  # gmsh says millimetre in the STEP files it writes
+        with session(gmsh):
+            gmsh.open(str(path))
+            gmsh.write(str(path.with_suffix(".step")))
+        path = path.with_suffix(".step")
+    how = {"parameters": {"lc": 0.006}} if way == "step" else {}
+    mesh, same, straight = (read_mesh(path, order=k, **how) for k in (None, 2, 1))
+    assert (mesh.cell_type, straight.cell_type) == ("tet10", "tet4")
+    assert_array_equal(mesh.points, same.points)
+    exact = np.pi * 0.01**2 * 0.03
+    assert volume(mesh) == pytest.approx(exact, rel=2e-3)
+    assert volume(straight) < 0.93 * exact
+    assert np.hypot(*mesh.points[:, :2].T).max() == pytest.approx(0.01, rel=1e-9)
