@@ -1,6 +1,5 @@
 // Sector of a rotor that turns about z: a shaft with a small bore and two discs on it. N sectors
-// make the rotor, each one cell wide. Lengths in m; radii are of circles that have the area of the
-// polygons with N corners that are meshed.
+// make the rotor, each one cell wide. Lengths in m.
 // Volumes "shaft" and "discs"; surfaces "left" and "right" (the ends of the shaft), "cyclic_low"
 // and "cyclic_high", whose meshes are turned copies.
 DefineConstant[
@@ -28,16 +27,15 @@ If (!(w < 2 * at_1 && at_1 + w < at_2 && at_2 + w / 2 < L))
   Abort;
 EndIf
 angle = 2 * Pi / N;
-grown = 1 / Sqrt(Sin(angle) / angle);
 z() = {0, at_1 - w / 2, at_1 + w / 2, at_2 - w / 2, at_2 + w / 2, L};
 // Section: points 10 k + j at z(j) on the bore, the shaft (k = 1) and the discs (k = 2)
 For j In {0 : 5}
   r = (j < 3) ? d_1 / 2 : d_2 / 2;
-  Point(j) = {bore / 2 * grown, 0, z(j)};
-  Point(10 + j) = {d / 2 * grown, 0, z(j)};
+  Point(j) = {bore / 2, 0, z(j)};
+  Point(10 + j) = {d / 2, 0, z(j)};
   Line(100 + j) = {j, 10 + j};
   If (j > 0 && j < 5)
-    Point(20 + j) = {r * grown, 0, z(j)};
+    Point(20 + j) = {r, 0, z(j)};
     Line(110 + j) = {10 + j, 20 + j};
   EndIf
 EndFor

@@ -23,6 +23,7 @@ pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tetrahedra")]
 
 from rom.fe.elasticity import assemble, model  # noqa: E402
+from rom.fe.forms import region  # noqa: E402
 from rom.fe.mesh.read import read_mesh, to_dolfinx  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
@@ -202,6 +203,18 @@ def test_a_round_rod_bends_and_twists_as_it_should(tmp_path):
     assert np.abs(curved).max() < 1e-3 < 0.012 < np.abs(straight).max()
     default = errors(path, exact, parameters=size)
     assert_array_equal(default, curved)
+
+
+def test_more_quadrature_would_change_nothing(tmp_path, monkeypatch):
+    """The mass is exact on the quadratic geometry, the stiffness far better than the mesh."""
+    path, size = written(tmp_path, ROD), round_bore(8, 0.01)
+    made = model(path, material=STEEL, parameters=size)
+    monkeypatch.setattr(region, "_quadrature", lambda *_: (12, 12))
+    fine = model(path, material=STEEL, parameters=size)
+    assert abs(made.M - fine.M).max() < 1e-12 * abs(fine.M).max()
+    assert 1e-12 * abs(fine.K).max() < abs(made.K - fine.K).max()  # it was another quadrature
+    found, better = (rom.modes(m, 14).frequencies[6:] for m in (made, fine))
+    assert_allclose(found, better, rtol=5e-5)
 
 
 def test_a_tube_ovalises_and_twists_as_it_should(tmp_path):

@@ -284,7 +284,7 @@ Physical Volume("body") = {1};
 
 @pytest.mark.parametrize("way", ["geo", "meshed by itself", "step"])
 def test_nodes_of_a_pin_lie_on_its_surface_whoever_meshes_it(tmp_path, way):
-    """By default and with order=2; straight edges with order=1 cut off more than 7 %."""
+    """By default and with order=2; straight edges with order=1 cut off more than 1.5 %."""
     path = tmp_path / "pin.geo"
     path.write_text(PIN % (0.03, 0.01) + ("Mesh 3;\n" if way == "meshed by itself" else ""))
     if way == "step":
@@ -299,5 +299,5 @@ def test_nodes_of_a_pin_lie_on_its_surface_whoever_meshes_it(tmp_path, way):
     assert_array_equal(mesh.points, same.points)
     exact = np.pi * 0.01**2 * 0.03
     assert volume(mesh) == pytest.approx(exact, rel=2e-3)
-    assert volume(straight) < 0.93 * exact
+    assert volume(straight) < 0.985 * exact
     assert np.hypot(*mesh.points[:, :2].T).max() == pytest.approx(0.01, rel=1e-9)
