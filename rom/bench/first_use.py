@@ -79,7 +79,23 @@ def _elements() -> None:
             kernel.link()
     mech = pendulum()
     mech.law("law", lambda t, parameters, motion, memory, out: None, mech.ground.marker(ORIGIN))
+    mech.rotational_spring("turn", "hinge", stiffness=1.0)
+    _move(mech).element("turn")
+
+
+def _formulas() -> None:
+    """A motor and a force along a line by formulas, and a drive by one of time."""
+    from rom.mbs.elements.formulas.codes import MUL, NUMBER, X
+    from rom.mbs.elements.formulas.lines import line_law
+    from rom.mbs.elements.formulas.programs import formula
+
+    twice = formula(((X, 0.0), (NUMBER, -2.0), (MUL, 0.0)))
+    mech = pendulum()
+    mech.motor("motor", "hinge", twice)
+    line_law(mech, "line", mech.ground.marker((0.1, 0.0, 0.0)), mech.part("bob").marker(ORIGIN),
+             twice)  # fmt: skip
     _move(mech)
+    twice.rate(0.0)
 
 
 def _rod() -> None:
@@ -173,6 +189,7 @@ CASES: dict[str, Callable[[], object]] = {
     "stabilised": lambda: _move(pendulum(), stabilised=True),
     "dop853": lambda: _move(pendulum(), method="dop853"),
     "elements": _elements,
+    "formulas": _formulas,
     "chain": lambda: _move(rigid_chain(12)),
     "rod": _rod,
     "wind": _wind,

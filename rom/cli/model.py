@@ -15,7 +15,8 @@ def read_model(args: argparse.Namespace) -> "FEModel":
     if args.mass is not None:
         return read_matrices(args)
     check_geometry(args)
+    numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
+    how = numbers | reading(args)  # refused before dolfinx is loaded
     from rom.fe.elasticity import model
 
-    numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
-    return model(args.file, **numbers, **reading(args))
+    return model(args.file, **how)

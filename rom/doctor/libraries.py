@@ -13,7 +13,7 @@ from time import perf_counter
 from typing import Any
 
 from rom.doctor.probes import Finding
-from rom.fe import GMSH_LIBRARIES, WHEELS
+from rom.fe import GMSH_LIBRARIES, WHEEL_PACKAGES
 from rom.process import mpirun
 
 PACKAGES = {  # of Debian, and of pip
@@ -91,18 +91,18 @@ def _launcher(library: str) -> Finding:
     if not program:
         state = "missing" if library else "ok"
         advice = command(*LAUNCHERS) if library else ""
-        return Finding("FEniCSx", mpirun.NAME, "not installed", state, advice)
-    told = mpirun.version(program)
-    value = f"{program}, {told or 'of which MPI is not known'}"
+        return Finding("FEniCSx", mpirun.PROGRAM_NAME, "not installed", state, advice)
+    launcher = mpirun.version(program)
+    value = f"{program}, {launcher or 'of which MPI is not known'}"
     kinds = [kind for kind in mpirun.KINDS if library.startswith(kind)]
-    if told and kinds and not told.startswith(kinds[0]):
+    if launcher and kinds and not launcher.startswith(kinds[0]):
         value += f"; Python loads {kinds[0]}, whose processes it cannot bring together"
-        return Finding("FEniCSx", mpirun.NAME, value, "note", command(*LAUNCHERS))
-    typed = shutil.which(mpirun.NAME)
+        return Finding("FEniCSx", mpirun.PROGRAM_NAME, value, "note", command(*LAUNCHERS))
+    typed = shutil.which(mpirun.PROGRAM_NAME)
     if library and typed != program:
-        value += f"; what {mpirun.NAME} alone starts is {typed or 'nothing'}"
-        return Finding("FEniCSx", mpirun.NAME, value, "note", f"{program} -n 2 rom ...")
-    return Finding("FEniCSx", mpirun.NAME, value)
+        value += f"; what {mpirun.PROGRAM_NAME} alone starts is {typed or 'nothing'}"
+        return Finding("FEniCSx", mpirun.PROGRAM_NAME, value, "note", f"{program} -n 2 rom ...")
+    return Finding("FEniCSx", mpirun.PROGRAM_NAME, value)
 
 
 def command(debian: str, pip: str) -> str:
@@ -130,7 +130,7 @@ def _closed() -> bool:
 
 def _other_ways() -> list[Finding]:
     """Where this Python does not look, and what the other of both ways in needs."""
-    wheels = f"pip install {WHEELS}"
+    wheels = f"pip install {WHEEL_PACKAGES}"
     newer = ".".join(map(str, WHEELS_NEED))
     if sees_debian():
         value = f"or by pip alone, in a venv of its own with Python {newer} or later"

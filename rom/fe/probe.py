@@ -39,8 +39,8 @@ def _write(name: str, look: Callable[[], dict[str, Any]]) -> None:
 def _mpi() -> str:
     from mpi4py import MPI
 
-    said = MPI.Get_library_version().split(",")[0].split("\n")[0].strip("\0 ")
-    library = re.sub(r" Version:\s+", " ", said)  # as MPICH says it
+    line = MPI.Get_library_version().split(",")[0].split("\n")[0].strip("\0 ")
+    library = re.sub(r" Version:\s+", " ", line)  # as MPICH says it
     return f"{library}, mpi4py {_package('mpi4py')}"
 
 

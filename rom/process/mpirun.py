@@ -9,13 +9,13 @@ from pathlib import Path
 
 from rom.errors import ResourceError
 
-NAME = "mpirun"
-OPEN_MPI, MPICH = "Open MPI", "MPICH"
+PROGRAM_NAME = "mpirun"
+OPEN_MPI, MPICH_NAME = "Open MPI", "MPICH"
 VERSIONS = (  # what they say of themselves
     (OPEN_MPI, re.compile(r"\(Open MPI\) (\S+)")),
-    (MPICH, re.compile(r"HYDRA build details:\s+Version:\s+(\S+)")),
+    (MPICH_NAME, re.compile(r"HYDRA build details:\s+Version:\s+(\S+)")),
 )
-KINDS = (OPEN_MPI, MPICH)
+KINDS = (OPEN_MPI, MPICH_NAME)
 TIME_LIMIT = 20.0  # [s] for saying a version
 
 
@@ -24,21 +24,21 @@ def found() -> str:
 
     Empty where there is none.
     """
-    beside = shutil.which(NAME, path=str(Path(sys.executable).parent))
-    return beside or shutil.which(NAME) or ""
+    beside = shutil.which(PROGRAM_NAME, path=str(Path(sys.executable).parent))
+    return beside or shutil.which(PROGRAM_NAME) or ""
 
 
 @cache
 def version(program: str) -> str:
     """Which MPI a launcher is of, e.g. "Open MPI 4.1.4"; empty if it does not say so."""
     try:
-        said = subprocess.run(
+        output = subprocess.run(
             [program, "--version"], capture_output=True, text=True, timeout=TIME_LIMIT, check=False
         ).stdout
     except (OSError, subprocess.TimeoutExpired):
         return ""
-    named = ((name, pattern.search(said)) for name, pattern in VERSIONS)
-    return next((f"{name} {told[1]}" for name, told in named if told), "")
+    named = ((name, pattern.search(output)) for name, pattern in VERSIONS)
+    return next((f"{name} {match[1]}" for name, match in named if match), "")
 
 
 def mpirun(n: int) -> list[str]:
@@ -49,6 +49,8 @@ def mpirun(n: int) -> list[str]:
     """
     program = found()
     if not program:
-        raise ResourceError(f"{NAME} is not installed.", hint="`rom doctor` says what to type.")
+        raise ResourceError(
+            f"{PROGRAM_NAME} is not installed.", hint="`rom doctor` says what to type."
+        )
     crowded = ["--oversubscribe"] if version(program).startswith(OPEN_MPI) else []
     return [program, *crowded, "-n", str(n)]

@@ -233,6 +233,7 @@ def test_messages_for_surfaces_that_do_not_meet():
             rom.Assembly({"left": left, "right": other}, COUPLED, projection=rom.Polynomial(2))
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_moments_of_quadratic_blocks_converge_to_the_matching_study():
     """Three against two elements, and six against four: never softer with order."""

@@ -129,6 +129,7 @@ def test_other_programs_reduce_the_same_model(bar, tmp_path):
     assert found["seconds"] > 0.0
 
 
+@pytest.mark.long
 def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
     from rom.bench.peers import compare
 
@@ -163,6 +164,7 @@ def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
     assert all(value > 0.0 for value in figures.values())
 
 
+@pytest.mark.long
 def test_compiled_loops_are_timed_on_motions_that_are_right():
     """A short arch that rests on its abutments, postures near an isotropic one, a coarse bar."""
     figures = {

@@ -31,6 +31,7 @@ print(len(first), *sorted(f.__qualname__ for f, x in first.items() if not x.over
 """
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_cases_of_first_use_ask_for_all_that_can_be_compiled():
     """Whatever no other kernel calls, every stage too, has been called or linked by a case."""

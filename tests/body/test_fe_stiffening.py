@@ -276,6 +276,7 @@ if model.operators.first == 0:
 """
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 def test_the_number_of_processes_does_not_matter(tmp_path):
     bodies = []

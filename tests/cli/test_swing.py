@@ -95,6 +95,7 @@ def test_half_a_point_is_refused():
         swing.hinge_of("0,1")
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 @pytest.mark.slow
 @pytest.mark.filterwarnings(f"ignore::{RomWarning.__module__}.RomWarning")

@@ -34,6 +34,7 @@ def every(tmp_path_factory):
     return json.loads(file.read_text())
 
 
+@pytest.mark.long
 def test_three_ranks_find_the_waves_of_one_process(every, monkeypatch):
     monkeypatch.chdir(ROOT)
     one, _ = wheel()

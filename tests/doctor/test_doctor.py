@@ -15,7 +15,7 @@ from rom.doctor import libraries
 from rom.doctor.core import abilities, better
 from rom.doctor.libraries import OLD_NUMPY, PACKAGES, fenicsx, light, pictures, sees_debian
 from rom.doctor.machine import blas, damaged_files
-from rom.fe import GMSH_LIBRARIES, HELPER, WHEELS
+from rom.fe import GMSH_LIBRARIES, HELPER_MODULE, WHEEL_PACKAGES
 
 OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
 REFERENCE = "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"
@@ -58,7 +58,7 @@ def test_versions_are_those_the_libraries_report(tmp_path):
     assert found["dolfinx"]["value"] == dolfinx.__version__
     version = ".".join(map(str, PETSc.Sys.getVersion()))
     assert found["PETSc"]["value"].startswith(f"{version} (float64")
-    within = importlib.util.find_spec(HELPER) is not None  # without a version
+    within = importlib.util.find_spec(HELPER_MODULE) is not None  # without a version
     assert found["MUMPS"]["value"] == "works" if within else found["MUMPS"]["value"][0] in "56"
 
 
@@ -73,7 +73,9 @@ def test_what_is_missing_is_named_with_the_line_to_type(tmp_path):
         assert found[name]["advice"].endswith(packages)  # of Debian or of pip
     ways = [f["advice"] for f in found.values() if f["topic"] == "FEniCSx"]
     if sys.version_info < (3, 12):
-        assert f"pip install {WHEELS}" in ways and "sudo apt-get install python3-gmsh" in ways
+        assert (
+            f"pip install {WHEEL_PACKAGES}" in ways and "sudo apt-get install python3-gmsh" in ways
+        )
     assert found["pyvista"]["state"] == "missing" and "pip install" in found["pyvista"]["advice"]
 
 
@@ -104,7 +106,7 @@ def test_what_to_type_fits_where_this_python_looks(monkeypatch, debian, python, 
     found = {f.name: f for f in fenicsx({"gmsh": {"missing": "gmsh"}}, "")}
     assert found["gmsh"].advice == advice
     notes = " ".join(f.advice for f in found.values() if f.state == "note")
-    assert (f"pip install {WHEELS}" in notes) == (advice[:4] == "sudo")
+    assert (f"pip install {WHEEL_PACKAGES}" in notes) == (advice[:4] == "sudo")
     assert ("--system-site-packages" in notes) == (not debian)
 
 
@@ -229,6 +231,7 @@ def old(path, data=b"x", age=3600):
     return path
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_forms_left_by_a_killed_compilation_are_found_and_removed(tmp_path):
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")

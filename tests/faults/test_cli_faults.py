@@ -80,7 +80,7 @@ USAGE = {
                               "--hinge: 'radius:x' is no face"),
     "hinge named as a face": (["swing", BEAM, "--face", "hinge=1", "--hinge", "2", "-o", "out"],
                               "--face hinge is given twice"),
-    "face of a geometry": (["modes", BEAM, *STEEL, "--face", "pin=1"],
+    "face of a geometry": (["mesh", BEAM, "--face", "pin=1"],
                            "faces=['pin'] can be picked in a .step file only"),
     "face of matrices": (["modes", "x.mtx", "--mass", "m.mtx", "--nodes", "n.csv", "--face", "a=1"],
                          "--face is for geometries"),

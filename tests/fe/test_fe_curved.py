@@ -184,6 +184,7 @@ def errors(path, exact, **options):
     return rom.modes(made, 6 + len(exact)).frequencies[6:] / exact - 1
 
 
+@pytest.mark.long
 def test_reference_frequencies_of_cylinders_agree_with_closed_forms():
     """Torsion sqrt(G / rho) / 2L exactly, whatever the bore; bending by more functions."""
     torsion = np.sqrt(STEEL.stiffness[3, 3] / STEEL.rho) / (2 * 0.1)
@@ -217,6 +218,7 @@ def test_more_quadrature_would_change_nothing(tmp_path, monkeypatch):
     assert_allclose(found, better, rtol=5e-5)
 
 
+@pytest.mark.long
 def test_a_tube_ovalises_and_twists_as_it_should(tmp_path):
     """A thick tube of 12 edges round the bore; conforming elements on the true shape are stiff."""
     path, exact = written(tmp_path, TUBE), spectrum(0.02, 0.04, 0.1, 12)
@@ -348,6 +350,7 @@ def test_straight_second_order_meshes_are_read_as_straight(tmp_path):
     assert made[1].n_dofs == 3 * len(box.points)
 
 
+@pytest.mark.long
 def test_curved_models_are_the_same_on_any_number_of_ranks(tmp_path):
     """Mass, frequencies, area and stress of a plate with a bore on one, two and three ranks."""
     path, found = written(tmp_path, PLATE), {}

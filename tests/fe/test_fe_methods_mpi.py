@@ -32,6 +32,7 @@ def found(tmp_path_factory):
     return frequencies
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_every_method_is_blind_to_the_number_of_processes(found, n):
     assert len(found[1]) == 14

@@ -9,7 +9,7 @@ import pytest
 
 from cases.command import environment
 from cases.command import rom as command
-from rom.fe import HELPER
+from rom.fe import HELPER_MODULE
 
 PETSC = """
 def ImportPETSc(arch=None):
@@ -33,7 +33,7 @@ def started(folder, helper=None):
     (package / "lib" / "__init__.py").write_text(PETSC)
     (package / "PETSc.py").write_text("def _initialize(arguments): print(*arguments)\n")
     if helper is not None:
-        (folder / f"{HELPER}.py").write_text(helper)
+        (folder / f"{HELPER_MODULE}.py").write_text(helper)
     path = os.pathsep.join([str(folder), environment()["PYTHONPATH"]])
     return subprocess.run([sys.executable, "-c", START], env=environment(PYTHONPATH=path),
                           capture_output=True, text=True, timeout=60, check=False)  # fmt: skip
@@ -46,7 +46,7 @@ def test_the_helper_of_the_wheel_is_loaded_before_petsc_and_not_with_rom(tmp_pat
 
 
 def test_petsc_of_the_system_has_no_helper_to_wait_for(tmp_path):
-    if find_spec(HELPER) is not None:
+    if find_spec(HELPER_MODULE) is not None:
         pytest.skip("here the helper is installed, and refuses this PETSc")
     assert started(tmp_path).stdout.split("\n")[:3] == ["rom", "PETSc", "rom -skip_petscrc"]
 

@@ -157,6 +157,7 @@ def families(tmp_path_factory):
     return {n: rom.load(folder / f"{n}.npz") for n in (1, *SHARED_BY)}
 
 
+@pytest.mark.long
 @pytest.mark.mpi
 @pytest.mark.slow
 @pytest.mark.parametrize("n", SHARED_BY)

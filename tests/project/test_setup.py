@@ -14,7 +14,7 @@ from cases.long import LONGEST_FIRST
 from cases.paths import ROOT, TESTS
 from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
 from rom.doctor.machine import SLOW_ADVICE
-from rom.fe import DEBIAN, GMSH_LIBRARIES, WHEELS
+from rom.fe import DEBIAN_PACKAGES, GMSH_LIBRARIES, WHEEL_PACKAGES
 
 pytestmark = pytest.mark.once
 SETUP = ROOT / ".ci" / "setup.sh"
@@ -137,14 +137,14 @@ def test_the_doctor_advises_packages_the_setup_installs():
     }
     known = {*packages(), "python3-mpi4py"}  # comes with petsc4py
     assert advised and advised | {debian for debian, _ in PACKAGES.values()} <= known
-    assert set(DEBIAN.split()) <= known
+    assert set(DEBIAN_PACKAGES.split()) <= known
 
 
 def test_the_way_in_by_pip_alone_is_told_the_same_everywhere():
     """The extra, what is advised where it is missing, the script that tries it, and the page."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     brought = [name_of(r) for r in project["optional-dependencies"]["fe"]]
-    assert brought == WHEELS.split()
+    assert brought == WHEEL_PACKAGES.split()
     fenicsx = {name for _, names in PACKAGES.values() for name in names.split()}
     assert fenicsx - {"mpi4py", "mpich"} == set(brought)  # these two come with FEniCSx
     newest = " ".join((ROOT / ".ci" / "newest_dolfinx.sh").read_text().split())

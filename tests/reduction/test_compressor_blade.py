@@ -75,6 +75,7 @@ def test_the_mesh_is_fit_for_use_and_always_the_same():
     assert 10e3 < 3 * len(read_mesh(GEOMETRY, parameters=COARSE, order=2).points) < 20e3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("crown", [pytest.param(0.0, marks=pytest.mark.long), 0.03])
 @pytest.mark.parametrize("change", [{}, {"beta": 60.0, "l_root": 0.040, "R": 0.001}])
 def test_flanks_are_planes_or_cylinders_where_the_dovetail_has_them(crown, change):
@@ -147,6 +148,7 @@ def cantilever(span=0.12, stagger=20.0, twist=30.0, n=30):
     return np.sqrt(eigh(K[4:, 4:], M[4:, 4:], eigvals_only=True)[:2]) / (2 * np.pi)
 
 
+@pytest.mark.long
 def test_the_held_blade_bends_like_a_twisted_beam():
     """Below it, for root and platform give way and the beam does not shear; torsion is no beam."""
     for stagger, twist in ((20.0, 30.0), (20.0, 0.0)):

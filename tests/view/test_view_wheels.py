@@ -22,9 +22,10 @@ def test_a_wheel_is_drawn_from_one_sector(tmp_path):
     assert len(triangles) == len(model.surface.triangles) - 2 * 8
     rng = np.random.default_rng(0)
     shapes = {f"mode {k}": rng.normal(size=(6, model.n_dofs)) for k in (1, 2)}
-    one = view.wheel_modes(model, shapes, tmp_path / "one.png", **WORDS)
+    one, two = (tmp_path / f"{name}.png" for name in ("one", "two"))
+    view.wheel_modes(model, shapes, one, **WORDS)
     shapes["mode 2"] = shapes["mode 1"]
-    two = view.wheel_modes(model, shapes, tmp_path / "two.png", **WORDS)
+    view.wheel_modes(model, shapes, two, **WORDS)
     assert one.read_bytes() != two.read_bytes()
     first, joined = _joined(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1e-9]]), np.array([[0, 1, 2]]))
     assert sorted(first) == [0, 1]

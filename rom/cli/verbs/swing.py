@@ -125,6 +125,8 @@ def _reduced(
     args: argparse.Namespace, hinge: str, faces: dict[str, Any]
 ) -> "tuple[FlexibleBody, Any]":
     """The body, and the axis of its hinge if that is a cylinder."""
+    how = reading(args)  # refused before dolfinx is loaded
+    how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     from rom.body.damping import ModalDamping
     from rom.fe.elasticity import model
     from rom.model import Material
@@ -132,8 +134,6 @@ def _reduced(
     from rom.workflow import reduce
 
     E, nu, rho = MATERIALS[args.material]
-    how = reading(args)
-    how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     full = model(args.file, material=Material(E=E, nu=nu, rho=rho), **how)
     log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, full.mass(), args.material)
     body = reduce(

@@ -109,6 +109,7 @@ def test_what_does_not_fit_is_named():
         solid_finger(solids, SPRINGS[:2])
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_bones_of_polyamide_add_less_than_a_hundredth():
     """Solids of 18, 12 and 10 mm; PA12 is our choice. In every direction springs are the finger."""

@@ -65,6 +65,7 @@ def test_derivatives_of_a_period_are_those_of_its_differences(lossy):
         assert_allclose(rows @ d.ravel(), change, atol=0.03 * np.abs(change).max())
 
 
+@pytest.mark.long
 def test_multipliers_are_those_of_the_linearised_unit():
     """The slowest vibrations, in which teeth count by their mean stiffness."""
     state = rest(unit(torque=300.0, speed=300.0))
@@ -84,6 +85,7 @@ def test_beyond_the_threshold_the_motion_is_not_stable():
         assert steady(state, steps=STEPS).stable == whirl(state).stable == (speed < 1000)
 
 
+@pytest.mark.long
 def test_a_sweep_goes_on_from_speed_to_speed(lossy, found):
     """From another speed to the same motion."""
     passed = sweep(lossy.unit, [144.0, 150.0], steps=STEPS)

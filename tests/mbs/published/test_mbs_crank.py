@@ -33,6 +33,7 @@ def compare(sol, want, positions, velocities):
     assert_allclose(-drive[5], want["drive"], rtol=velocities)
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_published_solution_of_the_flexible_slider_crank():
     """C2: 13 digits of an independent formulation, with its own inertia integrals."""
