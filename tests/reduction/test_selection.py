@@ -6,6 +6,7 @@ import pytest
 import rom
 from cases.solid import block
 from rom.errors import ConfigError
+from rom.workflow import judged_in
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 BODIES = [  # size [m], cells
@@ -81,6 +82,8 @@ def test_the_default_passes_its_certificate():
     model = block(size=(1.0, 0.3, 0.05), cells=(10, 4, 2))
     body = rom.reduce(model, interfaces=KINDS)
     assert body.certificate.ok, body.certificate
+    parts = (np.arange(6), np.arange(6, 12))
+    assert judged_in(rom.WithLoads(rom.CraigBampton()), parts).method.supports == parts
     loaded = rom.reduce(model, method=rom.WithLoads(rom.CraigBampton()), interfaces=KINDS)
     assert loaded.certificate.ok and loaded.n_modes > body.n_modes
     finer = rom.reduce(model, method=rom.CraigBampton(tol=1e-5), interfaces=KINDS, certify=False)

@@ -93,6 +93,15 @@ def test_together_they_are_what_acts_on_the_block(slid):
     assert set(slid.elements) == set(slide().elements)
 
 
+def test_tables_of_a_motion_have_all_forces_and_asking_changes_nothing(slid):
+    places = slid.packed.places
+    before = [len(x) for x in (places.signals, places.coordinates, places.remembered)]
+    found = {" ".join(c.path[1:]): c.values for c in channels(slid)}
+    assert_allclose(found["load force"][:, 0], np.cos(5 * slid.t), rtol=1e-14)
+    assert_allclose(found["spring force"], slid.element("spring").force[:, 1], atol=1e-12)
+    assert [len(x) for x in (places.signals, places.coordinates, places.remembered)] == before
+
+
 def test_energies_and_losses_add_up(slid):
     energy = sum(slid.element(name).energy for name in slid.elements)
     assert_allclose(energy, slid.energy.strain, atol=1e-9)
