@@ -2,12 +2,12 @@
 
 import re
 import shutil
-import subprocess
 import sys
 from functools import cache
 from pathlib import Path
 
 from rom.errors import ResourceError
+from rom.process.child import Limits, run
 
 PROGRAM_NAME = "mpirun"
 OPEN_MPI, MPICH_NAME = "Open MPI", "MPICH"
@@ -32,11 +32,10 @@ def found() -> str:
 def version(program: str) -> str:
     """Which MPI a launcher is of, e.g. "Open MPI 4.1.4"; empty if it does not say so."""
     try:
-        output = subprocess.run(
-            [program, "--version"], capture_output=True, text=True, timeout=TIME_LIMIT, check=False
-        ).stdout
-    except (OSError, subprocess.TimeoutExpired):
+        ended = run([program, "--version"], limits=Limits(seconds=TIME_LIMIT))
+    except OSError:
         return ""
+    output = ended.out
     named = ((name, pattern.search(output)) for name, pattern in VERSIONS)
     return next((f"{name} {match[1]}" for name, match in named if match), "")
 

@@ -260,7 +260,6 @@ IN_OS = ("system", "popen", "exec", "spawn", "posix_spawn", "fork")
 EXCEPTIONS = {
     "process/child.py": "the one way",
     "process/child_entry.py": "becomes the command",
-    "process/mpirun.py": "asks a launcher for its version, as the user will start it",
 }
 
 

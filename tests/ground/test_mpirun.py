@@ -27,6 +27,7 @@ def places(tmp_path, monkeypatch):
     beside, system = tmp_path / "environment", tmp_path / "system"
     beside.mkdir()
     system.mkdir()
+    (beside / "python").symlink_to(sys.executable)  # which starts every other program
     monkeypatch.setattr(sys, "executable", str(beside / "python"))
     monkeypatch.setenv("PATH", f"{system}:/usr/bin:/bin")
     return beside, system
