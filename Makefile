@@ -30,8 +30,8 @@ test: setup
 	$(LIGHT) -m pytest -m "not fenicsx and not once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 long: setup
-	ROM_LONG=1 $(PYTHON) -m pytest $(LONG)
-	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider
+	ROM_LONG=1 $(PYTHON) -m pytest $(LONG) $(SIDE_BY_SIDE)
+	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 docs: setup
 	$(PYTHON) -m sphinx -W -n -q docs build/site

@@ -3,8 +3,10 @@
 import os
 import signal
 
+import pytest
+
 import rom.fe  # noqa: F401  dolfinx of a wheel finds MPI only after it
-from cases.long import LONGEST_FIRST, ROM_LONG
+from cases.long import LONGEST_FIRST, ONCE, ROM_LONG
 from cases.paths import TESTS
 
 # a shell lets what it starts in the background ignore Ctrl-C, and processes pass that on
@@ -19,8 +21,12 @@ os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
 os.environ.setdefault("MPIR_CVAR_POLLS_BEFORE_YIELD", "1")
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(config, items):
     """Leave to `make long` what is marked so; begin with what takes longest, all else in order."""
+    for item in items:
+        if any(item.path.is_relative_to(TESTS / place) for place in ONCE):
+            item.add_marker("once")
     left = [] if ROM_LONG else [item for item in items if item.get_closest_marker("long")]
     if left:
         config.hook.pytest_deselected(items=left)

@@ -95,6 +95,7 @@ def test_the_integrator_is_measured_without_fenicsx():
     assert done.stdout.splitlines() == expected, done.stderr
 
 
+@pytest.mark.long
 def test_chains_of_all_lengths_are_measured():
     """One figure for each length, of as many elastic coordinates, and how the cost grew."""
     figures = list(benchmarks.chain((2, 12, 24)))
@@ -103,6 +104,7 @@ def test_chains_of_all_lengths_are_measured():
     assert all(figure.value > 0.0 for figure in figures)
 
 
+@pytest.mark.long
 def test_steps_of_chosen_length_are_measured_against_those_of_one_length():
     figures = list(benchmarks.adaptive(duration=0.5, links=2, turns=1, top_time=0.01))
     cases = ["pendulum"] * 3 + ["2 links"] * 3 + ["slider-crank"] * 3

@@ -9,6 +9,7 @@ import pytest
 
 from cases.command import environment
 from cases.command import rom as command
+from cases.long import few
 from rom.bench import first_use
 from rom.bench.benchmarks import start
 from rom.doctor.compilation import compiled
@@ -83,6 +84,7 @@ def test_after_the_set_up_first_motions_compile_nothing():
     assert (done.stdout.split(), done.stderr) == (["0", "1"], "")
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_first_uses_are_measured_with_nothing_compiled_and_again():
     """A case of few functions, of which Numba keeps each in a file."""
@@ -98,7 +100,8 @@ def test_first_uses_are_measured_with_nothing_compiled_and_again():
     assert short < seconds and load > 0
 
 
-@pytest.mark.parametrize("how", ["--quiet", "aloud"])
+@pytest.mark.once
+@pytest.mark.parametrize("how", few(1, ["aloud", "--quiet"]))
 def test_the_doctor_says_what_it_compiles_unless_asked_not_to(how):
     """In processes that compile nothing, which takes seconds anywhere."""
     more = [] if how == "aloud" else [how]

@@ -24,6 +24,7 @@ def theirs(monkeypatch):
     return found
 
 
+@pytest.mark.long
 def test_both_programs_are_held_against_the_same_row(theirs):
     rows = {quantity: value for _, quantity, value, _, _ in films.coefficients_compared()}
     ours = rows["rom, coefficients off Lund and Thomsen"]

@@ -40,6 +40,7 @@ def test_beams_have_the_sections_of_the_blade():
         assert_allclose(A[:, 1], between / np.linalg.norm(between), atol=2e-2)
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_the_rotor_here_is_the_run_up_of_its_blades(monkeypatch):
     monkeypatch.setattr(rods, "RISE_TIME", 4.0)

@@ -108,6 +108,7 @@ def pulled(sector, Ks, loads):
     return np.array([before @ a[j] + after @ a[ahead[j]] for j in range(N)])
 
 
+@pytest.mark.long
 def test_equal_blades_are_the_travelling_waves_of_the_sector(model, small):
     n_waves = small.free.size - small.root.size - small.cantilever.size
     disk = rom.bladed_wheel(small, n_waves)

@@ -1,10 +1,20 @@
 """What is left to `make long`, which sets ROM_LONG=1, and what of `make test` takes longest."""
 
 import os
+from itertools import repeat
+
+import pytest
 
 ROM_LONG = bool(os.environ.get("ROM_LONG"))
 # numbers of processes whose results are compared with those of one
 SHARED_BY = (2, 3) if ROM_LONG else (2,)
+# folders and files marked `once` as a whole
+ONCE = (
+    "components",
+    "faults/test_archive_faults.py",
+    "mbs/elements/test_mbs_laws.py",
+    "mbs/equations/test_mbs_cache.py",
+)
 # files of `make test` that begin, so that no worker is left alone with one of them at the end
 LONGEST_FIRST = (
     "project/test_demos.py",
@@ -25,3 +35,15 @@ LONGEST_FIRST = (
     "fe/test_fe_methods_mpi.py",
     "reduction/test_methods_on_components.py",
 )
+
+
+def few(number, cases):
+    """Cases of a test, all but the first ones left to `make long`."""
+    long = [*repeat([], number), *repeat([pytest.mark.long], len(cases) - number)]
+    return [with_marks(case, marks) for case, marks in zip(cases, long, strict=True)]
+
+
+def with_marks(case, marks):
+    if hasattr(case, "marks"):
+        return pytest.param(*case.values, marks=[*case.marks, *marks], id=case.id)
+    return pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=marks)

@@ -63,6 +63,7 @@ value = "1 m"
 """
 
 
+@pytest.mark.once
 def test_a_duffing_oscillator_has_the_period_of_the_elliptic_integral(tmp_path):
     """x = A cn(W t, m) with W^2 = (k + c A^2) / mass, m = c A^2 / 2 / (k + c A^2)."""
     A, k, c, mass = 0.1, 50.0, 4e4, 2.0
@@ -442,6 +443,7 @@ def test_a_mistake_of_a_law_or_event_is_told(case, tmp_path):
     assert refused.value.where.partition("m.toml:")[2] in map(str, range(14, 20))
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_an_fmu_has_formulas_and_python_functions(tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")

@@ -14,6 +14,7 @@ from scipy.special import ellipk
 import rom
 from cases.command import ROOT, environment
 from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
+from cases.long import few
 from cases.solid import block
 from rom.cli.main import main
 from rom.config.document import parsed
@@ -270,6 +271,7 @@ def test_it_moves_without_fenicsx_and_pictures(folder):
     assert (folder / "out" / "motion.csv").exists()
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
     """Its bodies are meshed and reduced, here coarsely; the rod stays as long as it is."""
@@ -307,7 +309,7 @@ FMU_CASES = {
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("case", FMU_CASES)
+@pytest.mark.parametrize("case", few(1, FMU_CASES))
 def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
     """Bodies travel inside, the folder may go; nothing but rom need be found."""
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
@@ -332,6 +334,7 @@ def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):
     assert_allclose(found["'main bearing'.angle"], sol.joint("main bearing").angle, atol=1e-8)
 
 
+@pytest.mark.once
 def test_the_command_line_writes_fmus_of_mechanisms(folder, capsys):
     assert main(["export", "pendulum.toml", "p.fmu", "--dt", "1e-3", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["format"] == "fmu"

@@ -130,6 +130,7 @@ def test_an_axis_through_the_sector_is_no_axis_of_its_wheel(bladed_disk):
         rom.CyclicSector.from_model(bladed_disk, axis=(1, 0, 0), fixed=("bore",))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fixed", [pytest.param((), marks=pytest.mark.long), ("bore",)])
 def test_a_reduced_sector_of_few_dofs_has_ten_families(fixed):
     """Polynomials on the cyclic face, under 5 % of the dofs: 0.1 % for all nodal diameters."""

@@ -46,6 +46,7 @@ def test_three_ranks_find_the_waves_of_one_process(every, monkeypatch):
     assert np.all(np.array(one["loaded"]) < one["at rest"])
 
 
+@pytest.mark.long
 def test_all_ranks_refuse_alike(every):
     said = [errors for _, errors in every]
     assert said[0] == said[1] == said[2]

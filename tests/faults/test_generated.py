@@ -19,9 +19,9 @@ LEAST_NAMED = 0.98
 CASES = all_cases()
 # Classes that share a process.
 GROUPS = ("1", "2", "3", "4", "5", "6", "7", "8", "R")
-# most of these start processes; `make test` runs one of ten, each of them is in `make long`
-SAMPLED = {"1", "3", "4", "8", "R"}
-SAMPLED_SHARE, LEAST_SHARE = (1.0, 1.0) if ROM_LONG else (1 / 10, 0.7)
+# What of them `make test` runs, most of those of a tenth start processes; `make long` runs all.
+SHARES = dict.fromkeys("1348R", 1 / 10) | dict.fromkeys("567", 1 / 4)
+LEAST_SHARE = 1.0 if ROM_LONG else 0.2
 
 
 def runs_here(one):
@@ -31,7 +31,7 @@ def runs_here(one):
 def of(group):
     """Names of the cases of some classes, of a sample where they are sampled."""
     can = [name for name, one in CASES.items() if name[0] in group and runs_here(one)]
-    size = round(len(can) * (SAMPLED_SHARE if group in SAMPLED else 1.0))
+    size = round(len(can) * (1.0 if ROM_LONG else SHARES.get(group, 1.0)))
     sample = set(random.Random(group).sample(can, size))
     return [name for name in can if name in sample]
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from cases.command import environment
-from cases.long import ROM_LONG
+from cases.long import ROM_LONG, few
 from rom.process import child
 
 pytestmark = [
@@ -116,7 +116,7 @@ def test_a_signal_at_any_instant_leaves_nothing(work, number, tmp_path):
         assert set(tmp_path.iterdir()) - {tmp_path / "film"} <= before
 
 
-@pytest.mark.parametrize("number", SIGNALS, ids=lambda n: n.name)
+@pytest.mark.parametrize("number", few(1, SIGNALS), ids=lambda n: n.name)
 def test_a_signal_while_the_mesher_works_is_survived_by_nobody(number, tmp_path):
     """At the instant that matters: the child is at work, its folder is there."""
     if find_spec("gmsh") is None:

@@ -22,7 +22,7 @@ import pytest
 
 import rom
 from cases.command import ROOT, environment
-from cases.long import ROM_LONG
+from cases.long import ROM_LONG, few
 from cases.solid import block
 from rom.process import child
 
@@ -147,7 +147,7 @@ STARTERS = {
 }
 
 
-@pytest.mark.parametrize("function", STARTERS)
+@pytest.mark.parametrize("function", few(4, STARTERS))
 def test_no_function_that_starts_a_process_runs_what_lies_in_the_folder(function, planted):
     """Whether it succeeds on this machine is not asked."""
     if function == "mesh" and not HAS_FE:

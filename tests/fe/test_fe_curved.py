@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.command import environment
 from cases.files.cells import second_order, solid
+from cases.long import few
 from cases.paths import RANKS, ROOT
 from rom import rotation
 from rom.eigen.verbs import rigid_motions
@@ -99,8 +100,8 @@ def ball(r):
 
 @pytest.mark.parametrize(
     ("text", "more", "exact", "limit"),
-    [(PLATE, {}, plate_with_a_bore(), 1e-5), (TUBE, {"L": 0.02}, tube(0.02), 1e-5),
-     (BALL, {}, ball(0.02), 2e-4)],
+    few(1, [(PLATE, {}, plate_with_a_bore(), 1e-5), (TUBE, {"L": 0.02}, tube(0.02), 1e-5),
+            (BALL, {}, ball(0.02), 2e-4)]),
     ids=["plate with a bore", "hollow cylinder", "sphere"],
 )  # fmt: skip
 def test_mass_and_inertia_of_round_bodies_converge_with_the_fourth_power(
@@ -194,6 +195,7 @@ def test_reference_frequencies_of_cylinders_agree_with_closed_forms():
         assert_allclose(spectrum(a, b, 0.1, 6, N=8), found[:6], rtol=2e-4)
 
 
+@pytest.mark.long
 def test_a_round_rod_bends_and_twists_as_it_should(tmp_path):
     """Chords of 12 edges make it thinner and 1.5 % slow in bending; curved edges 80 times less."""
     path, exact = written(tmp_path, ROD), spectrum(0.0, 0.01, 0.1, 6)
@@ -296,7 +298,7 @@ def test_a_bore_is_an_interface_of_its_true_area(tmp_path):
     assert_allclose(r, 0.02, rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["rbe2", "rbe3", "polynomial:2", "full"])
+@pytest.mark.parametrize("kind", few(3, ["rbe2", "rbe3", "polynomial:2", "full"]))
 def test_bodies_are_reduced_to_curved_interfaces(tmp_path, kind):
     """Compared with the full curved model: statics, mass and rigid motions exactly."""
     made = model(written(tmp_path, PLATE), material=STEEL, parameters=round_bore(10))

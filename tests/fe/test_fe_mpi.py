@@ -65,6 +65,7 @@ def test_rbe2_ties_and_free_modes_are_different_models(runs):
     assert np.all(runs[1]["tied"][6:] > 1.0002 * runs[1]["free"][6:10])
 
 
+@pytest.mark.long
 def test_fewer_cells_than_ranks(tmp_path):
     """Six tetrahedra on eight ranks: some own nothing."""
     one = run_model(tmp_path, 1, "1,1,1", 1)

@@ -53,6 +53,7 @@ def test_twenty_modes_give_six_frequencies_within_a_tenth_of_a_per_cent(body, fu
     assert error.min() > -1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fixed", [(), ("pin_b",)])
 def test_every_mode_more_lowers_the_frequencies_towards_the_full_ones(body, full, fixed):
     steps = np.array([frequencies(body(n), fixed) for n in (6, 12, 24, 48)])
@@ -60,6 +61,7 @@ def test_every_mode_more_lowers_the_frequencies_towards_the_full_ones(body, full
     assert_allclose(steps[-1], full[fixed], rtol=3e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind", ["rbe2", *(pytest.param(kind, marks=pytest.mark.long) for kind in ("full", "rbe3"))]
 )

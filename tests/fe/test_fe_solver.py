@@ -27,6 +27,7 @@ def reduced(model):
     return rom.reduce(model, method=rom.CraigBampton(8), interfaces=KINDS, certify=False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_gives_the_frequencies_of_the_direct_one(direct, solver):
     model = beam(solver)

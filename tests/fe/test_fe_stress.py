@@ -147,6 +147,7 @@ MOVING = {"a": np.array([-0.3, 9.81, -2.0]), "alpha": np.array([3.0, -2.0, 5.0])
           "omega": np.array([20.0, 30.0, -10.0])}  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", [rom.CraigBampton(5), rom.Guyan(), rom.MomentMatching()])
 def test_modes_left_out_follow_inertia(model, method):
     """A cantilever carried along: its stress is that of the full equilibrium, in any frame."""

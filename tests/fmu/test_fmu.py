@@ -127,6 +127,7 @@ def moved(step, force, dt, end=0.1):
     return driven.get([5, 8])
 
 
+@pytest.mark.once
 def test_the_error_falls_with_the_second_power_of_the_step():
     """Communication steps as long as the time step is allowed to be."""
     exact = native(simulate_quietly(crank_by_hand(), t_end=0.1, dt=1e-4))[-1, [0, 3]]
@@ -241,6 +242,7 @@ def hanging(tmp_path_factory):
                              dt=1e-2, files=[body])  # fmt: skip
 
 
+@pytest.mark.once
 def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tmp_path):
     one = Instance(hanging, tmp_path).begin(rho_inf=0.8)
     names = [f"one.b.position[{k}]" for k in (1, 2, 3)]
@@ -278,6 +280,7 @@ def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tm
     one.fmu.freeInstance()
 
 
+@pytest.mark.once
 def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     one = Instance(hanging, tmp_path)
     assert "before its initialisation" in one.fails(one.fmu.doStep, 0.0, 0.1)
@@ -306,6 +309,7 @@ def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     one.fmu.freeInstance()
 
 
+@pytest.mark.once
 def test_a_warning_is_logged_once(crank, tmp_path):
     """That constraints repeat each other does not stop a run."""
     one = Instance(crank, tmp_path).begin()

@@ -290,6 +290,7 @@ def test_hostile_sizes_take_no_memory(tmp_path):
         read_sid(tmp_path / "none.SID_FEM")
 
 
+@pytest.mark.once
 def test_the_command_line_writes_checks_and_reads_back(nodes, tmp_path):
     body = nodal_body(*nodes)
     rom.save(body, tmp_path / "b.rom.npz")

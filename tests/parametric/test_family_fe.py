@@ -42,6 +42,7 @@ def family(model):
     )
 
 
+@pytest.mark.long
 def test_a_panel_of_two_regions_at_a_point_of_its_range(family):
     body, full = family.at(**POINT), panel(**POINT)
     core, faces = 0.4 * 0.1 * 0.02 * 60.0 * 1.6, 0.4 * 0.1 * 0.004 * 2700.0

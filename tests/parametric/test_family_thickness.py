@@ -204,6 +204,7 @@ def test_a_family_with_layers_travels(tmp_path):
 POINT = {"t_core": 1.5, "t_faces": 0.8}
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_core_and_faces_of_a_panel_change_their_thickness():
     """The mesh of another thickness is the same mesh stretched."""

@@ -109,6 +109,7 @@ def test_a_spinning_bar_stretches_as_its_differential_equation_says():
     assert abs(linear.max() / u[axis, 0].max() - 1) > 0.05
 
 
+@pytest.mark.long
 def test_at_small_speed_the_displacement_is_that_of_the_linear_solid(bent):
     """The difference falls with the fourth power of the speed; about an axis elsewhere."""
     blade = rom.held_solid(bent, fixed=("root",), axis=(0.1, 0, 1), at=(-0.2, 0, 0.1))
@@ -130,6 +131,7 @@ def test_a_straight_blade_hardly_needs_it():
     assert_allclose(large.omega, linear.omega, rtol=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("eta", [2.0, 4.5, 6.0])
 def test_a_bent_blade_vibrates_like_a_geometrically_exact_rod(bent, run_up, eta):
     """Rotation straightens it; shapes 1, 3 and 4 bend across its thin side and in its plane."""

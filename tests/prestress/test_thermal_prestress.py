@@ -40,6 +40,7 @@ def bar():
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_clamped_bar_buckles_at_the_load_of_euler(bar):
     """P_cr = 4 pi^2 EI / L^2 with P = E A alpha dT; shear takes a few per mille off."""
     assert_allclose(rom.thermal_buckling(bar, heat(4 * EULER), fixed=ENDS), 1.0, rtol=2e-3)

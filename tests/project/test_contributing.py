@@ -86,6 +86,7 @@ def flow(monkeypatch):
     return site_flow
 
 
+@pytest.mark.long
 def test_the_picture_is_drawn_from_all_modules(flow, tmp_path):
     """Each has a stage, the curves count what the source imports, and the file is a picture."""
     stages = {flow.stage_of(module) for module in flow.modules() if module}

@@ -179,6 +179,7 @@ def test_formulas_mean_what_is_written(formula, meaning, pages):
         site_text.mathml(formula + r"\nonsense")
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 @pytest.mark.slow
 def test_the_site_builds_without_warnings(tmp_path):

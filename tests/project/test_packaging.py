@@ -80,6 +80,7 @@ def environment(folder):
     return os.environ | {"PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
 
 
+@pytest.mark.once
 def test_the_wheel_holds_every_module_and_its_data(shipped):
     names = set(zipfile.ZipFile(shipped[1]).namelist())
     files = [p for p in (ROOT / "rom").rglob("*") if p.is_file() and "__pycache__" not in p.parts]

@@ -48,6 +48,7 @@ def test_it_plants_one_thing():
     ]
 
 
+@pytest.mark.long
 def test_what_it_plants_is_python_and_has_tests():
     for path in plant.files():
         text, name = path.read_text(), str(path.relative_to(ROOT))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cases.long import LONGEST_FIRST
+from cases.long import LONGEST_FIRST, ONCE
 from cases.paths import ROOT, TESTS
 from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
 from rom.doctor.machine import SLOW_ADVICE
@@ -119,6 +119,7 @@ def test_make_test_covers_style_types_and_both_environments():
 def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
     """A file under another name would come last again; `make long` finds files by what they say."""
     assert [name for name in LONGEST_FIRST if not (TESTS / name).is_file()] == []
+    assert [name for name in ONCE if not (TESTS / name).exists()] == []
     importing = {path for path in TESTS.rglob("*.py") if "cases.long" in path.read_text()}
     apart = {TESTS / "conftest.py", Path(__file__)}
     assert importing >= apart

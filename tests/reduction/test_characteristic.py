@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.halves import COUPLED, FULL, ROOT, half, joined, study
+from cases.long import few
 from cases.solid import block
 from rom.errors import ConfigError, InterfaceError
 
@@ -163,7 +164,7 @@ TABLE = {
 
 
 @pytest.mark.fenicsx
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", few(1, LEVELS))
 def test_study_of_characteristic_modes_on_two_blocks(level):
     bodies, couplings = study("full")
     assembly = rom.Assembly(bodies, couplings)

@@ -66,6 +66,7 @@ def test_the_blade_is_accepted_without_a_remark(blade):
     assert model.provenance["gmsh_warnings"] == []
 
 
+@pytest.mark.long
 def test_the_mesh_is_fit_for_use_and_always_the_same():
     mesh, again = (read_mesh(GEOMETRY) for _ in range(2))
     assert np.array_equal(mesh.points, again.points) and np.array_equal(mesh.cells, again.cells)
@@ -164,6 +165,7 @@ def test_the_held_blade_bends_like_a_twisted_beam():
         assert 0.88 * beam[1] < f[1] < beam[1]
 
 
+@pytest.mark.long
 def test_a_tenth_of_the_dofs_gives_ten_modes(blade):
     """From above and nested: frequencies fall with the order, towards those of finite elements."""
     model, exact, crown = blade

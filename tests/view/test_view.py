@@ -131,6 +131,7 @@ def test_mode_shapes_fill_one_panel_each(bar, tmp_path):
         assert colourful(half).mean() > 0.01
 
 
+@pytest.mark.long
 def test_the_colours_of_a_mesh_are_those_of_its_interfaces(tmp_path):
     points, triangles = view.box((2, 1, 1))
     right = np.flatnonzero(points[:, 0] > 0)

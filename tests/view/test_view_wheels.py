@@ -11,6 +11,7 @@ pytest.importorskip("pyvista", reason="pyvista is not installed")
 WORDS = {"title": "Wheel", "caption": "A test.", "hidden": ("root", "tip")}
 
 
+@pytest.mark.long
 def test_a_wheel_is_drawn_from_one_sector(tmp_path):
     """Waves that differ give pictures that differ; faces inside the wheel are left out."""
     from rom.view.scenes.wheels import _joined, _outside

@@ -10,14 +10,16 @@ from cases.paths import ROOT
 
 DEMOS = sorted((ROOT / "demos").glob("demo_*.py"))
 MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
-# one that writes files, one about wheels
-ON_TWO_PROCESSES = {"demo_exchange", "demo_mistuning"}
+# one that writes files
+ON_TWO_PROCESSES = {"demo_exchange"}
 # about ten seconds each and more, of what has tests of its own
 LONG_DEMOS = {
-    "demo_assembly", "demo_bent_blade", "demo_bladed_disk", "demo_compressor_blade", "demo_hand",
-    "demo_large_mesh", "demo_lost_tip", "demo_masonry", "demo_parameters", "demo_pendulum_chain",
-    "demo_robot_arm", "demo_rotating_blade", "demo_rotor", "demo_satellite", "demo_sheet",
-    "demo_spin_up", "demo_transmission", "demo_whole_turbine", "demo_wind_turbine",
+    "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
+    "demo_compressor_blade", "demo_hand", "demo_large_mesh", "demo_lost_tip", "demo_masonry",
+    "demo_mistuning", "demo_parameters", "demo_pendulum_chain", "demo_robot_arm",
+    "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade", "demo_rotor",
+    "demo_satellite", "demo_sheet", "demo_spin_up", "demo_transmission", "demo_updating",
+    "demo_whole_turbine", "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},

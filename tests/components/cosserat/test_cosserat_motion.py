@@ -150,6 +150,7 @@ def test_cost_of_a_step_grows_with_the_number_of_segments():
     assert count[3] < 16.01 * count[0]
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_viscosity_damps_a_mode_at_its_rate():
     """Stiffness-proportional damping: half the ratio times omega^2."""

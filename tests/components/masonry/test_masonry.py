@@ -86,6 +86,7 @@ def test_mean_axes_are_the_strains_orthogonal_to_rotation():
     assert_allclose(square.M[:3, 3:], 0.0, atol=1e-12 * square.M.max())
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("Omega", "factor", "period"),

@@ -388,6 +388,7 @@ def test_a_mechanism_of_bodies_says_the_same(slab_body, recovery):
     assert found[:, 2].max() == pytest.approx(got.deflection, rel=2e-3)
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_slab_of_dolfinx_bends_as_its_unreduced_elements():
     """Newmark's mean acceleration on 5000 dofs under the force of the reduced impact."""

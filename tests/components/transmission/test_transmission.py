@@ -9,6 +9,7 @@ from scipy.linalg import eigh, eigvals
 from scipy.optimize import brentq
 
 from cases.gear_unit import NODES, journal, unit
+from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
 from rom.components.journal_bearing import equilibrium, stability
 from rom.components.transmission import (
@@ -172,6 +173,7 @@ def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
     assert s.whirl_ratio == pytest.approx(0.5, abs=0.03)
 
 
+@pytest.mark.long
 def test_fast_and_lightly_loaded_journals_whirl():
     light = unit(torque=8.0, clearance=90e-6)
     limit = threshold(light, 150.0, 2500.0, within=0.02)
@@ -231,7 +233,7 @@ def test_the_response_to_the_mesh_is_where_a_motion_settles():
 
 
 @pytest.mark.once
-@pytest.mark.parametrize(("helix", "rel"), [(0.0, 0.15), (HELIX, 0.25)])
+@pytest.mark.parametrize(("helix", "rel"), few(1, [(0.0, 0.15), (HELIX, 0.25)]))
 def test_slow_units_have_the_error_of_their_teeth(helix, rel):
     """The error is that of rest; but films resist the tilt of helical gears more when squeezed."""
     p = GearPair((26, 157), 4e-3, 0.04, helix)

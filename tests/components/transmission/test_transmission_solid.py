@@ -78,6 +78,7 @@ def supported_beam(z, shaft):
     return M, K
 
 
+@pytest.mark.long
 def test_beam_and_solid_have_the_same_frequencies(solid, beam):
     M, K = supported_solid(solid)
     three = np.sqrt(np.abs(eigh(K, M, eigvals_only=True)))

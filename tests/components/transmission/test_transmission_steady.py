@@ -77,6 +77,7 @@ def test_multipliers_are_those_of_the_linearised_unit():
     assert np.abs(1 - np.exp(slow * period)).max() > 0.02
 
 
+@pytest.mark.long
 def test_beyond_the_threshold_the_motion_is_not_stable():
     """The same unit whirls at rest, see `test_fast_and_lightly_loaded_journals_whirl`."""
     light = unit(torque=8.0, clearance=90e-6)

@@ -139,6 +139,7 @@ def test_a_stiff_rotor_takes_the_power_of_its_strips():
     assert 0.38 < share < 16 / 27
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_the_wind_bends_the_blades_of_the_turbine_downwind():
     """Metres, as in published runs at 11.4 m/s, where the tip goes 5 to 6 m."""

@@ -50,6 +50,7 @@ def test_geometry_and_yaw_are_those_of_the_definition():
         whole.axis, fast["blade 2.3"].at - whole.hub), atol=1e-12)  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
     """Largest lag 0.25181 m at 10.07 s, flapping -0.0492 m, stretch 14.02 mm at speed."""

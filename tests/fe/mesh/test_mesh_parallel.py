@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.files.cells import solid
+from cases.long import few
 from cases.paths import TESTS
 from rom.errors import MeshError
 from rom.process.mpirun import mpirun
@@ -68,7 +69,7 @@ EXACT = [1.0, 1.5, 1.25, 3.25, 4.5, 0.0, 0.0]
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 4])
+@pytest.mark.parametrize("ranks", few(2, [1, 2, 4]))
 def test_integrals_tags_and_errors_are_the_same_on_any_number_of_ranks(ranks):
     """Two bricks on four ranks: some ranks own no cell."""
     here = TESTS

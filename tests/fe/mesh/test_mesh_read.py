@@ -282,6 +282,7 @@ Physical Volume("body") = {1};
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", ["geo", "meshed by itself", "step"])
 def test_nodes_of_a_pin_lie_on_its_surface_whoever_meshes_it(tmp_path, way):
     """By default and with order=2; straight edges with order=1 cut off more than 1.5 %."""

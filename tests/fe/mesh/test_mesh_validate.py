@@ -160,6 +160,7 @@ def test_a_slit_gets_a_warning():
     assert "slit" in text and text.startswith("4 nodes")
 
 
+@pytest.mark.long
 def test_a_million_cells_are_checked_in_seconds():
     """Measured 2.9 s on one core of the machine it was written on."""
     points, bricks = grid((55, 55, 55))

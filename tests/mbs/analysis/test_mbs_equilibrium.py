@@ -120,6 +120,7 @@ def test_the_torque_that_holds_a_slider_crank():
     assert_allclose(state.q[14], l1 * np.cos(phi) + l2 * np.sqrt(1 - s**2), rtol=1e-10)
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_statics_are_where_a_damped_motion_ends():
     """Two links, a spring across, a flexible arm at the end."""
@@ -193,6 +194,7 @@ def test_wrong_arguments_are_named():
         rom.equilibrium("crane")
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("height", [-1e-5, 0.0, 0.5])
 def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):
     """depth = (m g / k)^(2/3), and small vibrations with 3/2 k sqrt(depth)."""
@@ -209,6 +211,7 @@ def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):
     assert_allclose(2 * np.pi * found.frequencies, np.sqrt(1.5 * k * np.sqrt(depth) / 2), rtol=1e-9)
 
 
+@pytest.mark.once
 def test_a_body_sags_in_its_bushing():
     """m g / k down, m g a / k_r about y; the overhang turns with it."""
     mech, k, turn, arm = Mechanism(gravity=(0, 0, -g)), 5e3, 400.0, 0.2

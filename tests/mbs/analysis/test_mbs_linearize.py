@@ -145,6 +145,7 @@ def clamped(body, **pose):
     return mech
 
 
+@pytest.mark.once
 def test_a_clamped_flexible_body_has_its_clamped_frequencies():
     """Somewhere in space, in its own frame and in that of its free vibrations."""
     body = stiffened_beam(3.0, 2.0, 0.4, n_modes=8)

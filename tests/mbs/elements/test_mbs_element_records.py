@@ -48,6 +48,7 @@ def slid():
     return rom.simulate(slide(), t_end=0.5, dt=5e-4)
 
 
+@pytest.mark.once
 def test_each_element_by_its_own_law(slid):
     x, v = slid.position("block")[:, 0], slid.velocity("block")[:, 0]
     spring = slid.element("spring")

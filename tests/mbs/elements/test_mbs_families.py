@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 import rom
+from cases.long import few
 from cases.mbs.mechanisms import simulate_quietly
 from cases.paths import ROOT
 from rom.mbs.elements.family import Family, integers, rows_of
@@ -195,6 +196,7 @@ def test_the_audit_counts_on_momentum_where_a_family_says_so():
     ]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("add", WAYS)
 def test_a_run_that_was_saved_goes_on_to_the_same_bits(add, tmp_path):
     whole = simulate_quietly(bob(add), t_end=0.2, dt=1e-3)
@@ -212,9 +214,7 @@ def test_a_wrong_tangent_would_cost_newton_passes(add):
 
 
 @pytest.mark.once
-@pytest.mark.parametrize(
-    "name", ["add_family", pytest.param("add_law", marks=pytest.mark.long), "add_python_law"]
-)
+@pytest.mark.parametrize("name", few(1, ["add_family", "add_law", "add_python_law"]))
 def test_it_moves_inside_an_fmu(name, tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "tests")]))

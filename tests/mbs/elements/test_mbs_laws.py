@@ -46,6 +46,7 @@ def shaken(*, compiled=True, law=slipping, cycles=None, **options):
     return mech
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("compiled", "method"),
     [(True, "generalized-alpha"), (False, "generalized-alpha"), (True, "dop853")],

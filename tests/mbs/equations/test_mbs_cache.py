@@ -10,6 +10,7 @@ import pytest
 from numba import njit
 
 from cases.command import environment
+from cases.long import few
 from cases.paths import ROOT
 from rom.mbs.compiler import cache
 from rom.mbs.compiler.cache import CodeFiles
@@ -54,7 +55,7 @@ def place_for_code(where, tmp_path, toy):
     return {"NUMBA_CACHE_DIR": "", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
 
 
-@pytest.mark.parametrize("where", ["beside", *ELSEWHERE])
+@pytest.mark.parametrize("where", few(2, ["beside", *ELSEWHERE]))
 def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     """Constants and a function built in from other files; a file that gives none is no source."""
     package = tmp_path / "rom"
@@ -119,7 +120,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize(
-    ("level", "rank", "said"), [("INFO", "0", 1), ("ERROR", "0", 0), ("INFO", "1", 0)]
+    ("level", "rank", "said"), few(1, [("INFO", "0", 1), ("ERROR", "0", 0), ("INFO", "1", 0)])
 )
 def test_who_waits_for_the_compiler_is_told_once(tmp_path, level, rank, said):
     """From Python, without any option; then nothing is left to wait for."""

@@ -245,6 +245,7 @@ def test_what_rolls_down_a_slope_has_the_acceleration_of_the_closed_form(roller,
     assert "largest slip of what rolls / speed" in [row.quantity for row in audit(sol).rows]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
 def test_a_ball_on_a_turntable_circles_with_two_sevenths_of_its_speed(method):
     """The path of the centre is a circle run through with 2/7 of the speed of the table."""

@@ -63,6 +63,7 @@ def rigid_tip(data, times):
     return np.array([x[0] + rotation.matrix(p / np.linalg.norm(p)) @ arm[14] for p in out[:4].T])
 
 
+@pytest.mark.once
 def test_flexible_pendulum_follows_the_unreduced_nonlinear_model():
     """What is left is of second order: ten times stiffer, at least thirty times less.
 
@@ -199,6 +200,7 @@ def hinged(body, tip_mass=0.5, scale=1.0):
     return mech
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_the_frame_changes_the_motion_at_second_order_in_the_deformation_only(beam):
     """Ten times the load, ten times the deformation: a hundred times the difference of frames."""

@@ -182,6 +182,7 @@ def squeezer():
     return mech
 
 
+@pytest.mark.once
 def test_andrews_squeezer_ends_where_it_was_published():
     def points(q):
         centres = squeezer_geometry(q)[0] * np.sqrt(S["m"])[:, None]
@@ -265,6 +266,7 @@ def test_bricards_linkage_moves_although_it_is_overconstrained():
 # A05: a governor whose couplers are stiff springs with dampers -----------------------------------
 
 
+@pytest.mark.once
 def test_a_flyball_governor_with_stiff_couplers():
     """Arms of 1 m at 30 degrees to the shaft, balls of 5 kg, a slider of 3 kg, 1 turn a second."""
     m, ball, slide, width, k, c, rest = 0.3, 5.0, 3.0, 0.01, 8e5, 4e4, 0.5
@@ -330,6 +332,7 @@ def test_a_flyball_governor_with_stiff_couplers():
 # A chain that falls ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_a_folded_chain_falls():
     """Four links hang, four stand beside them and are let go."""

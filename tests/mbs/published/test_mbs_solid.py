@@ -116,6 +116,7 @@ def gaps():
     return np.array(found)
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_a_driven_bar_moves_like_its_finite_elements(gaps):
     """What is left is of second order: four times stiffer, at least eight times less."""
