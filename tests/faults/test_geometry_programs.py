@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cases.command import rom as command
-from cases.long import ROM_LONG
+from cases.long import few
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -144,7 +144,7 @@ def test_a_geometry_that_does_more_is_refused(case, here):
 
 
 @LINUX
-@pytest.mark.parametrize("case", [*STARTERS, *WRITERS][:: 1 if ROM_LONG else 3])
+@pytest.mark.parametrize("case", few(6, [*STARTERS, *WRITERS]))
 def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
     """The same without the look at the text; a name that is wrong to gmsh is an error as well."""
     files = (STARTERS | WRITERS)[case]
@@ -206,7 +206,7 @@ subprocess.run(["true"])
     assert (tmp_path / "kept").read_text() == "kept"
 
 
-@pytest.mark.parametrize("case", HARMLESS)
+@pytest.mark.parametrize("case", few(6, HARMLESS))
 def test_a_geometry_that_makes_a_geometry_is_meshed(case, here):
     files = {"box.geo": BOX + HARMLESS[case], "more.geo": "x = 1;\n", "more.pos": 'View "a" {};\n'}
     assert len(read_mesh(lay(files, here)).cells) == 24
@@ -245,7 +245,7 @@ ENDLESS = {
 }
 
 
-@pytest.mark.parametrize("case", ENDLESS)
+@pytest.mark.parametrize("case", few(1, ENDLESS))
 def test_an_endless_geometry_ends_by_the_limit(case, here):
     lay({"box.geo": BOX + ENDLESS[case]}, here)
     began = time.perf_counter()
@@ -262,7 +262,7 @@ def test_the_limit_of_the_command_line_ends_with_exit_code_6(here):
     assert "limit of 2 s" in done.stderr
 
 
-@pytest.mark.parametrize("script", ["box.geo", "box.py"])
+@pytest.mark.parametrize("script", few(1, ["box.py", "box.geo"]))
 def test_memory_beyond_the_limit_is_a_resource_error(script, here):
     loop = "l[] = LinSpace[0, 1, 1e9];\n"
     hoard = "def build(gmsh):\n    x = [0]\n    while True:\n        x = x + x\n"

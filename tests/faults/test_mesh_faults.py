@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from cases.files.cells import blocks_of, solid, write_msh
-from cases.long import ROM_LONG
+from cases.long import ROM_LONG, few
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -254,7 +254,7 @@ CELLS = {
 CASES = FILES | TAGS | CELLS
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", few(24, CASES))
 def test_bad_file_is_a_clear_error_within_seconds(case, tmp_path, monkeypatch, capfd):
     name, make, error, culprit = CASES[case]
     monkeypatch.chdir(tmp_path)

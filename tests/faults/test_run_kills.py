@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import rom
-from cases.long import ROM_LONG
+from cases.long import ROM_LONG, few
 from rom.cli.main import main
 from rom.mbs.integrate import keeping
 
@@ -99,7 +99,7 @@ def kill_within(folder, number, rng, *more):
     return os.waitstatus_to_exitcode(status), (folder / "said.txt").read_text()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", few(1, [signal.SIGKILL, signal.SIGINT, signal.SIGTERM]))
 def test_a_run_that_is_killed_goes_on_to_the_same_bits(number, whole, folder, capsys):
     rng, more = random.Random(int(number)), ()
     for _ in range(KILLS):
