@@ -3,7 +3,7 @@
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
 # make test    style, types, all tests, then those of the light half without FEniCSx
 # make long    what takes minutes: all demos under mpirun, signals at ten instants, slow tests twice
-# make docs    the site, in build/site/; pictures of demos that have run stand in it
+# make docs    the site, in build/site/; runs its notebooks; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
@@ -34,12 +34,13 @@ long: setup
 	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 docs: setup
-	$(PYTHON) -m sphinx -W -n -q docs build/site
+	$(PYTHON) -m sphinx -W -n -q -D nb_execution_mode=cache docs build/site
 	@echo "open build/site/index.html"
 
 pictures: setup
 	set -e; for demo in demos/demo_*.py; do $(PYTHON) $$demo -q; done
 
 clean:
-	rm -rf out build/site docs/generated .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf out build/site build/notebooks build/jupyter_execute docs/generated docs/notebooks/*.npz
+	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find rom tests demos meshes -name __pycache__ -prune -exec rm -rf {} +

@@ -1,5 +1,7 @@
 """Configuration of the site: ``make docs``; no network is needed once Sphinx is installed."""
 
+import hashlib
+import os
 import sys
 from pathlib import Path
 
@@ -8,13 +10,20 @@ sys.path.insert(0, str(HERE))
 
 import rom  # noqa: E402
 
+
+def digest(root: Path) -> str:
+    """Of all that notebooks show the results of."""
+    files = sorted([*root.glob("rom/**/*.py"), *root.glob("meshes/*")])
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
+
+
 project = "rom"
 author = "the fenicsx-rom authors"
 copyright = author
 version = release = rom.__version__
 
 extensions = [
-    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser", "site_flow", "site_pages",
+    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb", "site_flow", "site_pages",
     "site_text",
 ]  # fmt: skip
 exclude_patterns = ["build"]
@@ -31,6 +40,14 @@ napoleon_attr_annotations = False
 napoleon_custom_sections = [
     "Source", "Sources", "Returns", ("Attributes", "params_style"),
 ]  # fmt: skip
+
+nb_execution_mode = "off"  # `make docs` runs notebooks, and again when the sources have changed
+nb_execution_cache_path = str(HERE.parent / "build" / "notebooks" / digest(HERE.parent))
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600  # of a cell [s]
+nb_merge_streams = True
+for name in ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"):  # one starts mpirun
+    os.environ.setdefault(name, "1")
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
