@@ -1,15 +1,20 @@
 """The site builds without a warning, and its generated pages say what the project is."""
 
+import csv
 import importlib
+import json
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 
 import rom
+from cases import command
 from cases.paths import ROOT
 from cases.solid import block, composite
 from rom import errors
@@ -20,6 +25,7 @@ DOCS = ROOT / "docs"
 WRITTEN = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.parts)
 CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 TOUR = DOCS / "tour.md"  # its blocks start from files of their own
+STEP_PART = DOCS / "step_part.md"
 TRIED = [path for path in WRITTEN if path != TOUR and CODE.search(path.read_text())]
 PARTS = """# # A title
 #
@@ -224,6 +230,52 @@ def test_code_on_a_page_runs(page, beam, tmp_path, monkeypatch):
     for found in CODE.finditer(text):
         line = text.count("\n", 0, found.start(1))
         exec(compile("\n" * line + found.group(1), str(page), "exec"), names)
+    HOLDS.get(page, lambda names: None)(names)
+
+
+def lever_balances(names):
+    """Statics of the bell crank, about its pivot; arms that bend vibrate more slowly."""
+    assert names["crank"].certificate.ok and rom.audit(names["sol"]).ok
+    weight = names["crank"].first_moment[0] * 9.81  # [N m]
+    turned = np.arctan2(*(names["rest"].q[[6, 3]])) * 2  # [rad]
+    assert 0 < turned < 0.03
+    assert -names["pull"] == pytest.approx((400 * 0.12 - weight) / 0.08, rel=5e-3)
+    assert 0.9 * names["rigid"] < names["flexible"] < 0.99 * names["rigid"]
+
+
+HOLDS = {STEP_PART: lever_balances}
+
+
+@pytest.mark.fenicsx
+@pytest.mark.long
+def test_commands_of_the_page_about_a_part_run(tmp_path, monkeypatch):
+    """As typed, one after the other, with the file that the page shows."""
+    pytest.importorskip("gmsh", reason="gmsh writes the part")
+    monkeypatch.chdir(tmp_path)
+    text = STEP_PART.read_text()
+    exec(CODE.search(text).group(1), {})
+    (mechanism,) = re.findall(r"^```toml\n(.*?)^```$", text, re.M | re.S)
+    (tmp_path / "push.toml").write_text(mechanism)
+    blocks = "".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)).replace("\\\n", " ")
+    said = {}
+    for line in blocks.splitlines():
+        program, verb, *arguments = shlex.split(line)
+        assert program == "rom"
+        done = command.rom(verb, *arguments, "--json", cwd=tmp_path, timeout=600)
+        assert done.returncode == 0, (line, done.stderr)
+        said.setdefault(verb, json.loads(done.stdout))
+    radii = {face["number"]: face["radius"] for face in said["mesh"]["faces"]}
+    assert [radii[k] for k in (15, 17, 20)] == pytest.approx([0.01, 0.006, 0.005])
+    n_dofs = said["reduce"]["provenance"]["reduction"]["full dofs"]
+    assert n_dofs == pytest.approx(12_675, rel=0.2)  # other versions of gmsh mesh otherwise
+    with open(tmp_path / "run" / "motion.csv") as file:
+        pulls = [float(row["suspension force x [N]"]) for row in csv.DictReader(file)]
+    assert pulls[-1] == pytest.approx(600, rel=5e-3)
+    assert max(pulls) == pytest.approx(1080, rel=5e-3)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "bell_crank.step", "faces.png", "bell_crank.rom.npz", "swing", "push.toml", "run",
+        "push.html",
+    }  # fmt: skip
 
 
 def bar_deck(folder):
