@@ -5,6 +5,7 @@
 # make long    what takes minutes: all demos under mpirun, signals at ten instants, slow tests twice
 # make docs    the site, in build/site/; runs its notebooks; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
+# make thumbnails  small copies of these pictures, kept in docs/thumbnails/
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
 # tests that try more where there is time
@@ -15,7 +16,7 @@ LIGHT = .venv-light/bin/python
 # what Python compiles of sources is kept even where the system would not
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test long docs pictures clean
+.PHONY: setup demo test long docs pictures thumbnails clean
 setup:
 	@.ci/setup.sh
 
@@ -39,6 +40,9 @@ docs: setup
 
 pictures: setup
 	set -e; for demo in demos/demo_*.py; do $(PYTHON) $$demo -q; done
+
+thumbnails:
+	$(PYTHON) docs/site_thumbnails.py
 
 clean:
 	rm -rf out build/site build/notebooks build/jupyter_execute docs/generated docs/notebooks/*.npz

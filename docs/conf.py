@@ -61,6 +61,8 @@ html_theme_options = {
     "font_family": "sans-serif",
     "show_powered_by": False,
 }
+html_static_path = ["static"]
+html_css_files = ["gallery.css"]
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_copy_source = False

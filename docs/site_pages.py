@@ -28,6 +28,7 @@ from rom.config.page import page
 ROOT = Path(rom.__file__).parents[1]
 DEMOS = ROOT / "demos"
 PICTURES = (ROOT / "out", DEMOS)  # what `make pictures` leaves, then those of the README
+THUMBNAILS = Path(__file__).with_name("thumbnails")  # of the demos, by the name of the script
 PICTURE = re.compile(r"\b(\w+\.(?:png|gif))\b")
 ALSO = {  # what public functions give back or raise
     "errors": ("errors",),
@@ -103,17 +104,25 @@ def _spoken(name: str) -> str:
     return Path(name).stem.replace("_", " ").capitalize()
 
 
-def gallery_page(scripts: list[Path], pictures: dict[str, Path]) -> str:
-    """All demos: the picture where there is one, the title, the first paragraph."""
+def gallery_page(scripts: list[Path], thumbnails: Path = THUMBNAILS) -> str:
+    """All demos: a small picture where there is one, the title, the first paragraph.
+
+    Args:
+        scripts: the demos.
+        thumbnails: folder of small pictures named as the demos.
+    """
     parts = ["# Demos", "Each demo is one script; it ends in numbers that a test checks.\n"]
+    parts.append("::::{container} gallery")
     for script in scripts:
         text = "\n".join(_blocks(script.read_text())[0])
-        title, about = (re.sub("^# ?", "", t, flags=re.M) for t in re.split(r"\n#\n", text)[:2])
-        names = [n for n in PICTURE.findall(script.read_text()) if n in pictures]
-        parts += [f"## [{title.lstrip('# ')}]({script.stem}.md)", about]
-        parts += [f"![{_spoken(names[0])}]({names[0]})"] if names else []
+        heading, about = (re.sub("^# ?", "", t, flags=re.M) for t in re.split(r"\n#\n", text)[:2])
+        title, page = heading.lstrip("# "), f"{script.stem}.md"
+        small = thumbnails / f"{script.stem}.png"
+        drawn = f"[![{title}](../{thumbnails.name}/{small.name})]({page})\n\n"
+        entry = f"{drawn if small.exists() else ''}**[{title}]({page})**\n\n{about}"
+        parts.append(f":::{{container}} demo\n{entry}\n:::")
     listed = "\n".join(script.stem for script in scripts)
-    return "\n\n".join(parts) + f"\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
+    return "\n\n".join(parts) + f"\n\n::::\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
 
 
 def error_page() -> str:
@@ -328,7 +337,7 @@ def write_all(out: Path) -> None:
     pictures = {name: path for name, path in pictures.items() if PICTURE.fullmatch(name)}
     pages = {f"{s.stem}.md": demo_page(s, pictures) for s in scripts}
     pages |= interface_pages()
-    pages["demos.md"] = gallery_page(scripts, pictures)
+    pages["demos.md"] = gallery_page(scripts)
     pages["errors.md"], pages["commands.md"] = error_page(), command_page()
     pages["files.md"], pages["answers.md"] = files_page(), answers_page()
     pages["changelog.md"] = (ROOT / "CHANGELOG.md").read_text()

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
 from xml.etree import ElementTree as ET
@@ -64,6 +65,69 @@ def test_a_demo_becomes_text_and_code(pages, tmp_path):
     assert "![Drawn](drawn.png)" in page and "Not drawn yet" in page and "`absent.png`." in page
     code = "import rom\n\nx = 1  # a remark\n# a remark of its own\n\ny = 2"
     assert f"```python\n{code}\n```\n\n## A section\n\nMore prose.\n\n```python\nz = 3" in page
+
+
+def test_the_page_of_demos_has_each_with_its_small_picture(pages, tmp_path):
+    scripts = sorted(pages.DEMOS.glob("demo_*.py"))
+    page = pages.gallery_page(scripts)
+    entries = page.split("\n:::{container} demo\n")[1:]
+    assert len(entries) == len(scripts) > 20
+    for script, entry in zip(scripts, entries, strict=True):
+        title = script.read_text().split("\n")[0].removeprefix("# # ")
+        kept = pages.THUMBNAILS / f"{script.stem}.png"
+        assert f"\n**[{title}]({script.stem}.md)**\n\n" in f"\n{entry}"
+        drawn = f"[![{title}](../thumbnails/{script.stem}.png)]({script.stem}.md)"
+        assert (drawn in entry) == kept.exists()
+        draws = pages.PICTURE.search(script.read_text())
+        assert kept.exists() or not draws, f"{script.name}: run it, then make thumbnails"
+    without = pages.gallery_page(scripts, tmp_path)
+    assert "![" not in without and without.count(":::{container} demo") == len(scripts)
+
+
+def test_small_pictures_stay_small_and_are_of_demos(pages):
+    kept = sorted(pages.THUMBNAILS.iterdir())
+    assert {path.stem for path in kept} <= {path.stem for path in pages.DEMOS.glob("demo_*.py")}
+    sizes = [path.stat().st_size for path in kept]
+    assert max(sizes) < 15_000 and sum(sizes) < 400_000
+    for path in kept:  # signature, then width and height of a PNG
+        head = path.read_bytes()[:24]
+        assert head[:8] == b"\x89PNG\r\n\x1a\n"
+        assert struct.unpack(">II", head[16:]) == (240, 170), path.name
+
+
+def test_a_small_picture_is_the_upper_part_without_heading_or_a_whole_film(pages, tmp_path):
+    """Of a sheet of four colours below a line of text, and of a tall film."""
+    image = pytest.importorskip("PIL.Image", reason="small pictures need the extra [docs]")
+    import site_thumbnails
+
+    red, green, blue, grey = (200, 0, 0), (0, 150, 0), (0, 0, 200), (90, 90, 90)
+    sheet = image.new("RGB", (1500, 1400), "white")
+    sheet.paste(grey, (100, 10, 700, 40))
+    for k, colour in enumerate((red, green, blue)):
+        sheet.paste(colour, (20, 100 + 400 * k, 1480, 500 + 400 * k))
+    sheet.save(tmp_path / "sheet.png")
+    frames = [image.new("RGB", (200, 800), colour) for colour in (red, green, blue)]
+    frames[0].save(tmp_path / "film.gif", save_all=True, append_images=frames[1:])
+    script = tmp_path / "demo_x.py"
+    script.write_text("# # X\n# Writes: `sheet.png`, `x_modes.png`, `film.gif`\n")
+    assert site_thumbnails.shown(script, (tmp_path,)) == tmp_path / "film.gif"
+
+    def small(name):
+        site_thumbnails.thumbnail(tmp_path / name, tmp_path / "small.png")
+        with image.open(tmp_path / "small.png") as found:
+            assert found.size == (240, 170)
+            return found.convert("RGB")
+
+    of_sheet, of_film = small("sheet.png"), small("film.gif")
+    bands = np.array([of_sheet.getpixel((120, y)) for y in (2, 60, 72, 125, 140)])
+    assert bands == pytest.approx(np.array([red, red, green, green, blue]), abs=8)
+    assert of_film.getpixel((120, 2)) == pytest.approx(green, abs=8)
+    assert of_film.getpixel((120, 167)) == pytest.approx(green, abs=8)
+    assert of_film.getpixel((40, 85)) == (255, 255, 255)
+    (tmp_path / "film.gif").unlink()
+    assert site_thumbnails.shown(script, (tmp_path,)) == tmp_path / "sheet.png"
+    (tmp_path / "sheet.png").unlink()
+    assert site_thumbnails.shown(script, (tmp_path,)) is None
 
 
 def test_the_error_page_has_every_error(pages):
