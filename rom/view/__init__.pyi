@@ -19,12 +19,16 @@ from rom.view.figures.panels import panels as panels
 from rom.view.figures.sheets import Shape as Shape
 from rom.view.figures.sheets import deformed as deformed
 from rom.view.figures.sheets import flow as flow
+from rom.view.figures.things import Scene as Scene
+from rom.view.figures.things import Thing as Thing
+from rom.view.figures.things import film as film
 from rom.view.figures.updating import updating as updating
 from rom.view.scenes.faces import faces as faces
 from rom.view.scenes.film import animate as animate
 from rom.view.scenes.film import instants as instants
 from rom.view.scenes.mechanisms import start as start
 from rom.view.scenes.meshes import mesh as mesh
+from rom.view.scenes.meshes import meshed as meshed
 from rom.view.scenes.mode_shapes import mode_shapes as mode_shapes
 from rom.view.scenes.rods import sleeves as sleeves
 from rom.view.scenes.wheels import wheel_modes as wheel_modes

@@ -75,6 +75,8 @@ AXES = {
 }  # that each of what is above wants
 FILMS = {
     "animate": lambda: ([*moved()], {"frames": 2}),
+    "film": lambda: ([np.array([0.0]), view.Scene("box", {"steel": view.box((0.1, 0.1, 0.2))})],
+                     {"caption": "What a stranger has to know."}),
     "flow": lambda: ([np.array([0.0, 1e-6]), [squeezed(0.0), squeezed(0.5)]],
                      {"caption": "What a stranger has to know."}),
 }  # fmt: skip

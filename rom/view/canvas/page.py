@@ -1,6 +1,7 @@
 """Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left."""
 
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
 LINE_HEIGHT = 26  # of small text [pixel]
+LETTER_WIDTH = 0.545 * SMALL_SIZE * DPI / 72  # of small text, on the average [pixel]
+HANDLE_WIDTH, ROW_HEIGHT = 80, 27  # of a legend: beside its names, and of a row [pixel]
 
 
 def sheet(width: int, height: int) -> "Picture":
@@ -71,9 +74,49 @@ def words(figure: "Figure", text: str, left: float, top: float, **options: Any) 
 
 def caption(text: str, width: int) -> tuple[str, int]:
     """The text broken into lines that fit into so many pixels, and its height."""
-    letters = int(width / (SMALL_SIZE * DPI / 72 * 0.545))
-    lines = textwrap.wrap(text, letters)
+    lines = textwrap.wrap(text, int(width / LETTER_WIDTH))
     return "\n".join(lines), LINE_HEIGHT * len(lines)
+
+
+def packed(names: Sequence[str], width: float) -> list[tuple[int, float]]:
+    """Row and left end [pixel] of small names with a square each, in rows of that width."""
+    places, row, left = [], 0, 15.0
+    for name in names:
+        wide = 56 + LETTER_WIDTH * len(name)
+        if left > 15.0 and left + wide > width:
+            row, left = row + 1, 15.0
+        places.append((row, left))
+        left += wide
+    return places
+
+
+def legend_shape(names: Sequence[str], width: float) -> tuple[int, int]:
+    """Rows and columns of a legend that fits into so many pixels."""
+    if not names:
+        return 0, 1
+    wide = HANDLE_WIDTH + LETTER_WIDTH * max(map(len, names))
+    columns = min(len(names), max(1, int(width / wide)))
+    rows = -(-len(names) // columns)
+    return rows, -(-len(names) // rows)
+
+
+def legend_above(axes: Any, width: float, height: int = 0) -> None:
+    """Names of the curves between axes that are so many pixels wide and their title.
+
+    The title is so high above the axes at least [pixel].
+    """
+    handles, names = axes.get_legend_handles_labels()
+    rows, columns = legend_shape(names, width)
+    if rows:
+        axes.legend(handles, names, fontsize=SMALL_SIZE, frameon=False, ncol=columns,
+                    loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.2, borderaxespad=0.1,
+                    handlelength=2.0, handletextpad=0.6, columnspacing=1.3, labelspacing=0.35,
+                    )  # fmt: skip
+    title = axes.get_title(loc="left")
+    if title:
+        axes.set_title(
+            title, loc="left", size=BODY_SIZE, pad=8 + max(height, rows * ROW_HEIGHT) * 72 / DPI
+        )
 
 
 def colour_bar(

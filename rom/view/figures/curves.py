@@ -1,6 +1,7 @@
 """Curves over time, and how far reduced frequencies are from full ones."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,22 +14,23 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.scales import readable, without_round_off
+from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE_WIDTH, PANEL_HEIGHT = 1400, 330  # pixel
+PAGE_WIDTH, PANEL_HEIGHT, BESIDE_WIDTH = 1400, 330, 440  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 MARKERS = ("o", "s", "^", "D", "v", "x")
 GREY = "#5c636e"
-LEGEND_COLUMNS = 5  # of a wide legend
+RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
 @path_came_first(1, 2, 0)
 @typed
-def history(
+def history(  # noqa: PLR0913  keywords of one picture
     t: npt.ArrayLike,
     panels: Sequence[tuple[str, dict[str, Any]]],
     path: str | Path | None = None,
@@ -36,6 +38,7 @@ def history(
     title: str = "",
     caption: str = "",
     over: str | None = None,
+    beside: Scene | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw quantities over time, or over something else, one panel below the other.
@@ -48,7 +51,9 @@ def history(
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
         over: label of the horizontal axis, with its unit, when that is not time.
-        ax: Axes of matplotlib to draw into, one for each panel; None for a page of its own.
+        beside: what the curves belong to; None for curves alone.
+        ax: Axes of matplotlib to draw into, one for each panel and one for what is beside them;
+            None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -59,15 +64,14 @@ def history(
     path = page.wanted(path)
     t = np.asarray(t, dtype=float)
     with page.styled():
-        figure, areas = _panels(ax, len(panels), "history", title, caption)
+        names = [list(filter(None, curves)) for _, curves in panels]
+        figure, areas = _panels(ax, names, "history", Words(title, caption, beside))
         for axes, (label, curves) in zip(areas, panels, strict=True):
             _histories(axes, t, curves)
             axes.set_xlabel(over or "time [s]", size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(t[0], t[-1])
-            if len(curves) > 2:
-                axes.margins(y=0.3)  # room for the legend
-            finish(axes, legend=len(curves) > 1 or bool(next(iter(curves))))
+            finish(axes, legend=ax is not None and any(curves))
         _shared(areas, ax)
         return page.save(figure, path)
 
@@ -83,13 +87,22 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any]) -> None:
     flat = without_round_off([y for _, y in lines])
     for k, (name, pair, (x, _), y) in enumerate(zip(curves, pairs, lines, flat, strict=True)):
         look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
-        look |= {"ls": "none", "marker": "o", "ms": 7} if pair else {}
+        look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pair else {}
         axes.plot(x, y, label=name, **look)
 
 
 def _shared(areas: Sequence[Any], ax: Any) -> None:
-    """One horizontal axis for all panels of a page; axes of a caller keep theirs."""
-    for axes in areas[:-1] if ax is None else ():
+    """One horizontal axis for all panels of a page, and legends above them, equal ones once.
+
+    Axes of a caller keep theirs.
+    """
+    if ax is not None:
+        return
+    names = [axes.get_legend_handles_labels()[1] for axes in areas]
+    for axes, once in zip(areas, _once(names), strict=True):
+        if once:
+            page.legend_above(axes, axes.get_window_extent().width)
+    for axes in areas[:-1]:
         axes.set_xlabel("")
         axes.tick_params(labelbottom=False)
 
@@ -97,7 +110,12 @@ def _shared(areas: Sequence[Any], ax: Any) -> None:
 @path_came_first(1, 0)
 @typed
 def frequencies(
-    comparison: dict[str, Any], path: str | Path | None = None, *, title: str = "", ax: Any = None
+    comparison: dict[str, Any],
+    path: str | Path | None = None,
+    *,
+    title: str = "",
+    beside: Scene | None = None,
+    ax: Any = None,
 ) -> "Figure":
     """Draw the relative errors of reduced frequencies in several supports.
 
@@ -105,7 +123,8 @@ def frequencies(
         comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
         path: picture to write, .png; None to write nothing.
         title: heading.
-        ax: Axes of matplotlib to draw into; None for a page of its own.
+        beside: what the frequencies belong to; None for curves alone.
+        ax: Axes of matplotlib to draw into, two with what is beside; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -123,7 +142,8 @@ def frequencies(
         "frequencies are never below full ones."
     )
     with page.styled():
-        figure, (axes,) = _panels(ax, 1, "frequencies", title, caption)
+        words = Words(title, caption, beside)
+        figure, (axes,) = _panels(ax, [[*comparison]], "frequencies", words)
         longest = 0
         for k, (support, table) in enumerate(comparison.items()):
             full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
@@ -137,7 +157,8 @@ def frequencies(
         axes.set_xticks(range(1, longest + 1))
         axes.set_xlabel("elastic mode", size=page.BODY_SIZE)
         axes.set_ylabel("relative error", size=page.BODY_SIZE)
-        finish(axes, legend=True)
+        finish(axes, legend=ax is not None)
+        _shared([axes], ax)
         return page.save(figure, path)
 
 
@@ -150,6 +171,7 @@ def convergence(
     xlabel: str,
     title: str = "",
     caption: str = "",
+    beside: Scene | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw errors that fall with the size of a model, on logarithmic axes.
@@ -161,7 +183,9 @@ def convergence(
         xlabel: what the sizes count.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        ax: Axes of matplotlib to draw into, one for each panel; None for a page of its own.
+        beside: what the errors belong to; None for curves alone.
+        ax: Axes of matplotlib to draw into, one for each panel and one for what is beside them;
+            None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -171,7 +195,8 @@ def convergence(
     """
     path = page.wanted(path)
     with page.styled():
-        figure, areas = _panels(ax, len(panels), "convergence", title, caption)
+        names = [[*curves] for _, curves in panels]
+        figure, areas = _panels(ax, names, "convergence", Words(title, caption, beside))
         for axes, (label, curves) in zip(areas, panels, strict=True):
             for k, (name, (sizes, errors)) in enumerate(curves.items()):
                 x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
@@ -182,7 +207,7 @@ def convergence(
             axes.set_xlabel(xlabel, size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             _near_ticks(axes)
-            finish(axes, legend=True)
+            finish(axes, legend=ax is not None)
         _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
         _shared(areas, ax)
         return page.save(figure, path)
@@ -190,7 +215,7 @@ def convergence(
 
 @path_came_first(1, 0)
 @typed
-def campbell(
+def campbell(  # noqa: PLR0913  keywords of one picture
     diagram: Any,
     path: str | Path | None = None,
     *,
@@ -198,6 +223,7 @@ def campbell(
     names: Sequence[str] = (),
     title: str = "",
     caption: str = "",
+    beside: Scene | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
@@ -212,7 +238,9 @@ def campbell(
         names: one per mode, in the order of the columns; without names modes are numbered.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        ax: Axes of matplotlib to draw into, two if there is damping; None for a page of its own.
+        beside: what vibrates; None for curves alone.
+        ax: Axes of matplotlib to draw into, two if there is damping, and one for what is beside
+            them; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -231,7 +259,8 @@ def campbell(
     turns = 30 * diagram.speeds / np.pi
     damped = np.abs(damping).max(initial=0.0) > 1e-3
     with page.styled():
-        figure, areas = _panels(ax, 2 if damped else 1, "campbell", title, caption)
+        legends = [[*labels, RAYS_LABEL], *([[*labels]] if damped else [])]
+        figure, areas = _panels(ax, legends, "campbell", Words(title, caption, beside))
         for k, label in enumerate(labels):
             look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.6}
             areas[0].plot(turns, f[:, k], label=label, **look)
@@ -242,28 +271,18 @@ def campbell(
             axes.set_xlabel("speed [1/min]", size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(turns[0], turns[-1])
-            finish(axes, legend=False)
-        areas[0].legend(
-            fontsize=page.SMALL_SIZE,
-            framealpha=0.9,
-            edgecolor="none",
-            loc="upper left",
-            ncol=LEGEND_COLUMNS,
-        )
+            finish(axes, legend=ax is not None)
         _shared(areas, ax)
         return page.save(figure, path)
 
 
 def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
     """Rays of the orders, each named where it leaves the picture, and rings where modes meet."""
-    rows = -(
-        -(diagram.frequencies.shape[1] + 1) // LEGEND_COLUMNS
-    )  # of the legend, above all modes
-    top = (1.06 + 0.1 * rows) * diagram.frequencies.max()
+    top = 1.06 * diagram.frequencies.max()
     axes.set_ylim(0.0, top)
     for k, order in enumerate(orders):
         end = min(turns[-1], 60 * top / order)
-        label = "multiples of the speed" if k == 0 else None
+        label = RAYS_LABEL if k == 0 else None
         axes.plot([turns[0], end], [order * turns[0] / 60, order * end / 60], color=GREY, lw=0.9,
                   label=label)  # fmt: skip
         where = {"xytext": (5, 0), "ha": "left", "va": "center"}
@@ -300,21 +319,51 @@ def _near_ticks(axes: Any) -> None:
         axes.set_yticks(ticks, [f"{y:g}" for y in ticks])
 
 
-def _panels(ax: Any, n: int, name: str, title: str, caption: str) -> tuple[Any, list[Any]]:
-    """Figure and axes: those of the caller, or one below the other on a page."""
+def _once(legends: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Names of each legend; none where they are those of the first one."""
+    first = list(legends[0])
+    return [first, *([] if list(names) == first else list(names) for names in legends[1:])]
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Around the panels of a page: heading, caption, and what stands beside them."""
+
+    title: str
+    caption: str
+    beside: Scene | None = None
+
+
+def _panels(
+    ax: Any, legends: Sequence[Sequence[str]], name: str, words: Words
+) -> tuple[Any, list[Any]]:
+    """Figure and axes: those of the caller, or one below the other on a page.
+
+    Args:
+        ax: of the caller.
+        legends: names of the curves of each panel.
+        name: of the function that draws.
+        words: what stands around.
+    """
+    beside, n = words.beside, len(legends)
     if ax is not None:
-        figure, areas = page.taken(ax, n, name)
-        if title:
-            areas[0].set_title(title, loc="left")
-        return figure, areas
-    text, below = page.caption(caption, PAGE_WIDTH - 60)
-    height = 80 + n * (PANEL_HEIGHT + 25) + 60 + below + 25
+        figure, areas = page.taken(ax, n + (beside is not None), name)
+        if words.title:
+            areas[0].set_title(words.title, loc="left")
+        if beside is not None:
+            draw_scene(figure, areas[-1], beside)
+        return figure, areas[:n]
+    text, below = page.caption(words.caption, PAGE_WIDTH - 60)
+    width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if beside is not None else 0)
+    rows = np.array([page.legend_shape(names, width)[0] for names in _once(legends)])
+    feet = 60 + np.cumsum(PANEL_HEIGHT + 25 + page.ROW_HEIGHT * rows)
+    height = int(feet[-1]) + 80 + below + 25
     figure = page.sheet(PAGE_WIDTH, height)
-    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
-    areas = [
-        page.area(figure, 150, 85 + k * (PANEL_HEIGHT + 25), PAGE_WIDTH - 190, PANEL_HEIGHT)
-        for k in range(n)
-    ]
+    page.words(figure, words.title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    areas = [page.area(figure, 150, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
+    if beside is not None:
+        left = PAGE_WIDTH - BESIDE_WIDTH - 20
+        draw_scene(figure, page.area(figure, left, 105, BESIDE_WIDTH, feet[-1] - 45), beside)
     page.words(figure, text, 30, height - below - 20, size=page.SMALL_SIZE)
     return figure, areas
 

@@ -13,12 +13,14 @@ from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.figures.curves import LINES, PAGE_WIDTH, finish
+from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # pixel, of a diagram and around it
 PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
+ROW_STEP = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN
 GUIDE_STYLE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
 Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
 
@@ -58,7 +60,7 @@ class Panel:
 @path_came_first(1, 0)
 @typed
 def panels(
-    rows: Sequence[Sequence[Panel]],
+    rows: Sequence[Sequence[Panel | Scene]],
     path: str | Path | None = None,
     *,
     title: str = "",
@@ -68,7 +70,7 @@ def panels(
     """Draw rows of diagrams.
 
     Args:
-        rows: diagrams from top to bottom, and from left to right in each row.
+        rows: diagrams and scenes from top to bottom, and from left to right in each row.
         path: picture to write, .png; None to write nothing.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
@@ -85,32 +87,66 @@ def panels(
         diagrams = [panel for row in rows for panel in row]
         figure, areas = page.taken(ax, len(diagrams), "panels")
         for area, panel in zip(areas, diagrams, strict=True):
-            _draw(area, panel, area.get_window_extent().size)
+            if isinstance(panel, Scene):
+                draw_scene(figure, area, panel)
+            else:
+                _draw(area, panel, alone=True)
         return page.save(figure, path)
     with page.styled():
         text, below = page.caption(caption, PAGE_WIDTH - 60)
-        step = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN
-        total = 65 + len(rows) * step + below + 25
+        legends = [_legend_height(row) for row in rows]
+        feet = 65 + np.cumsum([legend + ROW_STEP for legend in legends])
+        total = int(feet[-1]) + below + 25
         figure = page.sheet(PAGE_WIDTH, total)
         page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
-        for i, row in enumerate(rows):
-            width = (PAGE_WIDTH - 2 * RIGHT_MARGIN) / len(row)
-            for j, panel in enumerate(row):
-                left = RIGHT_MARGIN + j * width + LEFT_MARGIN + (90 if panel.bars else 0)
-                right = RIGHT_MARGIN + (j + 1) * width - RIGHT_MARGIN
-                area = page.area(
-                    figure, left, 65 + i * step + TOP_MARGIN, right - left, PANEL_HEIGHT
-                )
-                _draw(area, panel, (right - left, PANEL_HEIGHT))
+        for row, legend, foot in zip(rows, legends, feet, strict=True):
+            top = foot - BOTTOM_MARGIN - PANEL_HEIGHT
+            for panel, (left, width) in zip(row, _columns(row), strict=True):
+                if isinstance(panel, Scene):
+                    tall = legend + PANEL_HEIGHT + BOTTOM_MARGIN
+                    axes = page.area(figure, left, top - legend, width, tall)
+                    draw_scene(figure, axes, panel)
+                else:
+                    axes = page.area(figure, left, top, width, PANEL_HEIGHT)
+                    _draw(axes, panel, alone=False)
+                    page.legend_above(axes, width, legend)
         page.words(figure, text, 30, total - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 
-def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
+def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:
+    """Left end and width of each diagram [pixel]; names of bars stand left of them."""
+    width = (PAGE_WIDTH - 2 * RIGHT_MARGIN) / len(row)
+    columns = []
+    for j, panel in enumerate(row):
+        left = RIGHT_MARGIN + j * width + (LEFT_MARGIN if isinstance(panel, Panel) else 0)
+        if isinstance(panel, Panel) and panel.bars:
+            left += page.LETTER_WIDTH * max(map(len, panel.bars)) + 25 - LEFT_MARGIN
+        columns.append((left, RIGHT_MARGIN + (j + 1) * width - RIGHT_MARGIN - left))
+    return columns
+
+
+def _legend_height(row: Sequence[Panel | Scene]) -> int:
+    """Of the highest legend in a row [pixel]."""
+    rows = [
+        page.legend_shape(_named(panel), width)[0] if isinstance(panel, Panel) else 0
+        for panel, (_, width) in zip(row, _columns(row), strict=True)
+    ]
+    return page.ROW_HEIGHT * max(rows, default=0)
+
+
+def _named(panel: Panel) -> list[str]:
+    return [name for name in (*panel.curves, *panel.points) if not name.startswith("_")]
+
+
+def _draw(axes: Any, panel: Panel, *, alone: bool) -> None:
+    """A diagram; alone, with its legend where there is room."""
     curves, points = _lines(panel)
-    for k, (name, line) in enumerate(curves.items()):
+    named = _named(panel)
+    for name, line in curves.items():
+        k = named.index(name) if name in named else 0
         look = {"color": LINES[k % len(LINES)], "lw": 1.4, "ls": "--" if k % 2 else "-"}
-        look = GUIDE_STYLE if name.startswith("_") else look
+        look = look if name in named else GUIDE_STYLE
         axes.plot(*line, label=name, **look)
     for name, line in points.items():
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
@@ -120,19 +156,14 @@ def _draw(axes: Any, panel: Panel, shape: tuple[float, float]) -> None:
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(panel.xlabel, size=page.SMALL_SIZE)
     axes.set_ylabel(panel.ylabel, size=page.SMALL_SIZE)
-    named = sum(not name.startswith("_") for name in (*panel.curves, *panel.points))
-    low, high = axes.get_ylim()
-    room = 0.11 * (named + 0.5)  # for the legend above all lines
     if panel.log:
         axes.set_xscale("log")
         axes.set_yscale("log")
-    elif named and not panel.bars:
-        axes.set_ylim(low, high + room * (high - low))
     if not (panel.xlabel or panel.ylabel):
         axes.set_axis_off()
     if panel.equal:
-        _same_scale(axes, shape)
-    finish(axes, legend=named > 0, loc="upper left", alike=panel.equal)
+        _same_scale(axes, axes.get_window_extent().size)
+    finish(axes, legend=alone and bool(named), alike=panel.equal)
 
 
 def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:

@@ -85,13 +85,8 @@ def _sheet(mechanism: Any, camera: Camera, image: Any, title: str) -> Any:
     )
     text, below = page.caption(words, PAGE_WIDTH - 60)
     names = list(mechanism.parts)[:MAX_LEGEND_BODIES]
-    rows, row, left = [], 0, 30
-    for name in names:
-        wide = 60 + 13 * len(name)
-        if left + wide > PAGE_WIDTH - 30:
-            row, left = row + 1, 30
-        rows.append((row, left))
-        left += wide
+    rows = page.packed(names, PAGE_WIDTH - 45)
+    row = max((line for line, _ in rows), default=0)
     top = image.shape[0] + STRIP_HEIGHT + 90
     figure = page.sheet(PAGE_WIDTH, top + 35 * (row + 1) + 15 + below + 20)
     page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
@@ -99,7 +94,7 @@ def _sheet(mechanism: Any, camera: Camera, image: Any, title: str) -> Any:
     corner(figure, camera, 20, PAGE_WIDTH - 20, image.shape[0] + 80)
     for k, (name, (line, at)) in enumerate(zip(names, rows, strict=True)):
         colour = COLOURS[k % len(COLOURS)]
-        page.words(figure, "\u25a0", at, top + 35 * line, color=colour, size=page.TITLE_SIZE)
-        page.words(figure, name, at + 30, top + 35 * line + 3, size=page.BODY_SIZE)
+        page.words(figure, "\u25a0", at + 15, top + 35 * line, color=colour, size=page.TITLE_SIZE)
+        page.words(figure, name, at + 41, top + 35 * line + 3, size=page.SMALL_SIZE)
     page.words(figure, text, 30, top + 35 * (row + 1) + 10, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure

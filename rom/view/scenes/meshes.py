@@ -13,12 +13,14 @@ from rom.view.canvas import page
 from rom.view.canvas.corner import STRIP_HEIGHT, corner
 from rom.view.canvas.offscreen import render
 from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, directed_edges
+from rom.view.figures.things import Scene, Thing, actors_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1500  # [pixel]
-PART_COLOUR, EDGE_COLOUR = "#c9d1da", "#6b7480"
+PART_COLOUR = "#c9d1da"
+NO_LINES = np.zeros((0, 2), dtype=int)
 # one per interface
 MARK_COLOURS = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")
 
@@ -52,8 +54,12 @@ def mesh(
         return page.save(_sheet(model, camera, image, title), path)
 
 
-def mesh_actors(model: FEModel) -> list[Actor]:
-    """The outer surface, its elements, and its interfaces in colour.
+@typed
+def meshed(model: FEModel) -> dict[str, Thing]:
+    """The outer surface with its elements, and its interfaces by name, as things of a `Scene`.
+
+    Args:
+        model: the model.
 
     Raises:
         ConfigError: if the model has no surface.
@@ -62,15 +68,34 @@ def mesh_actors(model: FEModel) -> list[Actor]:
         raise ConfigError("the model has no surface to draw.", hint="Give it a `SurfaceMesh`.")
     points, triangles = model.points[model.surface.nodes], model.surface.triangles
     edges = np.unique(np.sort(directed_edges(triangles)[0], axis=1), axis=0)
-    actors = [Actor(points[None], triangles, colour=PART_COLOUR)]
-    actors.append(Actor(points[None], edges, colour=EDGE_COLOUR, width=0.6))
-    place = {int(node): k for k, node in enumerate(model.surface.nodes)}
-    for k, interface in enumerate(model.interfaces.values()):
-        on = np.zeros(len(points), dtype=bool)
-        on[[place[int(node)] for node in interface.nodes if int(node) in place]] = True
+    things = {"_surface": Thing(points, triangles, PART_COLOUR, edges=edges)}
+    for k, (name, interface) in enumerate(model.interfaces.items()):
+        on = np.isin(model.surface.nodes, interface.nodes)
         patch = triangles[on[triangles].all(axis=1)]
-        actors.append(Actor(points[None], patch, colour=MARK_COLOURS[k % len(MARK_COLOURS)]))
-    return actors
+        colour = MARK_COLOURS[k % len(MARK_COLOURS)]
+        things[name] = Thing(points, patch, colour, edges=NO_LINES)
+    return things
+
+
+def in_sight(model: FEModel, name: str, camera: Camera) -> bool:
+    """Whether some triangle of an interface is turned towards the eye, as far as the mesh tells."""
+    things = meshed(model)
+    X, whole = np.asarray(things["_surface"].points), np.asarray(things["_surface"].cells)
+    around, _ = directed_edges(whole)
+    volume = np.einsum("ti,ti->", X[whole[:, 0]], np.cross(X[whole[:, 1]], X[whole[:, 2]])) / 6
+    if len(np.unique(around, axis=0)) < len(around) or volume <= 0.0:
+        return True
+    a, b, c = np.moveaxis(X[np.asarray(things[name].cells)], 1, 0)
+    return bool((np.cross(b - a, c - a) @ camera.toward > 0).any())
+
+
+def mesh_actors(model: FEModel) -> list[Actor]:
+    """The outer surface, its elements, and its interfaces in colour.
+
+    Raises:
+        ConfigError: if the model has no surface.
+    """
+    return actors_of(Scene("mesh", meshed(model)))
 
 
 def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
@@ -91,7 +116,8 @@ def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
     for k, name in enumerate(model.interfaces):
         colour = MARK_COLOURS[k % len(MARK_COLOURS)]
         page.words(figure, "\u25a0", left, top, color=colour, size=page.TITLE_SIZE)
-        page.words(figure, name, left + 30, top + 3, size=page.BODY_SIZE)
-        left += 60 + 16 * len(name)
+        note = "" if in_sight(model, name, camera) else " (turned away)"
+        page.words(figure, name + note, left + 30, top + 3, size=page.BODY_SIZE)
+        left += 60 + 16 * len(name + note)
     page.words(figure, text, 30, top + 45, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure

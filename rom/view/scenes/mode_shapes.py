@@ -101,7 +101,7 @@ def sheet(images: Any, camera: Camera, names: list[str], title: str, words: str,
     width = columns * (PANEL_WIDTH + 20) + 20
     rows, height = -(-len(images) // columns), images[0].shape[0] + 50
     text, below = page.caption(
-        f"{words} The largest displacement is drawn as {AMPLITUDE_RATIO:.0%} of the size of "
+        f"{words} The largest displacement is drawn as {100 * AMPLITUDE_RATIO:g} % of the size of "
         f"the {what}; grey lines show the undeformed edges.",
         width - 60,
     )

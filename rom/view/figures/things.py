@@ -1,0 +1,265 @@
+"""Things in space beside curves, and films of them: bodies, blocks, rods, meshes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import typed
+from rom.errors import ConfigError
+from rom.model import Array, Index
+from rom.view.canvas import page
+from rom.view.canvas.corner import BAR_SIZE, STRIP_HEIGHT, TRIAD_SIZE, corner
+from rom.view.canvas.films import Film, finished, wanted
+from rom.view.canvas.offscreen import Image, render
+from rom.view.canvas.scales import clock_texts
+from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
+from rom.view.canvas.solids import Mesh
+
+# of things without one
+COLOURS = ("#9aa5b1", "#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#c3c9d0", "#5c636e")
+EDGE_COLOUR = "#3a414b"
+FILM_WIDTH, CLOCK_HEIGHT = 900, 40  # of a film, and of the strip with the time [pixel]
+HEIGHTS = (0.2, 0.75)  # bounds of the height of its pictures, of their width
+ROW_HEIGHT = 32  # of names [pixel]
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """Something to be seen.
+
+    Attributes:
+        points: (n, 3) places, or (f, n, 3) in f pictures of a film [m].
+        cells: (m, 3) triangles, (m, 2) lines or (m, 1) dots.
+        colour: as "#9aa5b1"; empty for the next one of the house.
+        values: (n,), or (f, n), what its colours show, in units of the label of the scene; None for
+            one colour.
+        opacity: 0 to 1.
+        width: of lines or dots [pixel].
+        edges: (k, 2) lines between its points, drawn on it; None for its sharp edges.
+    """
+
+    points: npt.ArrayLike
+    cells: npt.ArrayLike
+    colour: str = ""
+    values: npt.ArrayLike | None = None
+    opacity: float = 1.0
+    width: float = 3.0
+    edges: npt.ArrayLike | None = None
+
+
+@typed
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Things in space, seen from one place; stands among the diagrams of `panels`, too.
+
+    Attributes:
+        title: what is seen.
+        things: {name: thing, or its points (n, 3) and triangles (m, 3)}; without a square in the
+            legend if the name starts with "_" or its colours show values.
+        label: what the values of things are, with their unit.
+        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
+        up: (3,) upright direction [1]; None: across the longest extent.
+
+    Example:
+        >>> scene = rom.view.Scene("A block", {"steel": rom.view.box((0.1, 0.2, 0.1))})
+        >>> list(scene.things)
+        ['steel']
+    """
+
+    title: str
+    things: Mapping[str, Thing | Mesh]
+    label: str = ""
+    view: npt.ArrayLike | None = None
+    up: npt.ArrayLike | None = None
+
+
+@typed
+def film(
+    times: npt.ArrayLike,
+    scene: Scene,
+    path: str | Path | None = None,
+    *,
+    seconds: float = 4.0,
+    caption: str = "",
+) -> Film:
+    """Film of things whose places are known.
+
+    Args:
+        times: (f,) of the pictures [s].
+        scene: things with places in f pictures, and others that stay.
+        path: film to write, .gif or .mp4; None to write nothing.
+        seconds: how long the film lasts [s].
+        caption: what a stranger has to know.
+
+    Returns:
+        The film.
+
+    Raises:
+        ConfigError: if lengths differ, or pictures cannot be made here.
+        ResourceError: for .mp4 without ffmpeg.
+    """
+    path, t = wanted(path), np.asarray(times, dtype=float)
+    actors = actors_of(scene)
+    frames = max(len(actor.points) for actor in actors)
+    if t.shape != (frames,):
+        raise ConfigError(f"{t.size} times for {frames} pictures of {scene.title!r}.")
+    camera = aimed(_seen(actors), FILM_WIDTH, view=scene.view, up=scene.up, heights=HEIGHTS)
+    limits = _limits(actors)
+    images = render(actors, camera, limits=limits, oversampling=1)
+    top, height = CLOCK_HEIGHT, images.shape[1]
+    foot = top + height + below_height(scene, FILM_WIDTH)
+    with page.styled():
+        text, below = page.caption(caption, FILM_WIDTH - 40)
+        figure = page.sheet(FILM_WIDTH, foot + below + 20)
+        page.words(figure, scene.title, FILM_WIDTH - 20, 8, ha="right")
+        _below(figure, scene, camera, limits, (0, FILM_WIDTH, top + height))
+        page.words(figure, text, 20, foot + 5, size=page.SMALL_SIZE)
+        pages = np.repeat(page.pixels(figure)[None], frames, axis=0)
+        clocks = np.stack([_clock(text) for text in clock_texts(t)])
+    pages[:, top : top + height] = images
+    pages[:, :top, : FILM_WIDTH // 4] = clocks
+    return finished(pages, seconds / frames, path)
+
+
+def draw_scene(figure: Any, axes: Any, scene: Scene) -> None:
+    """Draw the first picture of a scene into axes of a figure, with what stands below it.
+
+    Raises:
+        ConfigError: if something is no thing, or pictures cannot be made here.
+    """
+    wide, tall = figure.get_size_inches() * page.DPI
+    place = axes.get_position()
+    left, right, top = place.x0 * wide, place.x1 * wide, (1 - place.y1) * tall
+    width = round(right - left)
+    height = max(2, round(place.height * tall) - below_height(scene, width))
+    actors = [
+        Actor(a.points[:1], a.cells, None if a.values is None else a.values[:1], a.colour, a.width,
+              a.opacity) for a in actors_of(scene)
+    ]  # fmt: skip
+    shape = height / width
+    camera = aimed(_seen(actors), width, view=scene.view, up=scene.up, heights=(shape, shape))
+    limits = _limits(actors)
+    image = render(actors, camera, limits=limits)[0]
+    axes.set_title(scene.title, size=page.BODY_SIZE, loc="left")
+    axes.set_axis_off()
+    axes.imshow(image, extent=(0, width, 0, len(image)), aspect="auto", interpolation="nearest")
+    axes.set_ylim(len(image) - place.height * tall, len(image))
+    _below(figure, scene, camera, limits, (left, right, top + len(image)))
+
+
+def below_height(scene: Scene, width: int) -> int:
+    """Of what stands below a picture of that width [pixel]."""
+    rows = page.packed(_legend(scene), width)
+    return STRIP_HEIGHT + ROW_HEIGHT * (1 + max((row for row, _ in rows), default=-1))
+
+
+def actors_of(scene: Scene) -> list[Actor]:
+    """What is drawn: each thing, and its edges."""
+    drawn = []
+    for (name, thing), colour in zip(scene.things.items(), _colours(scene).values(), strict=True):
+        drawn += thing_actors(name, thing, colour)
+    if not drawn:
+        raise ConfigError(f"there is nothing to draw in {scene.title!r}.")
+    return drawn
+
+
+def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
+    """A thing and its edges.
+
+    Raises:
+        ConfigError: for numbers of another shape, or cells between points that are not there.
+    """
+    thing = thing if isinstance(thing, Thing) else Thing(*thing)
+    points, cells = np.asarray(thing.points, dtype=float), np.asarray(thing.cells)
+    points = points[None] if points.ndim == 2 else points
+    if points.ndim != 3 or points.shape[2] != 3:
+        raise ConfigError(f"{name!r}: points are (n, 3) or (f, n, 3), got {points.shape}.")
+    n = points.shape[1]
+    if cells.ndim != 2 or not 1 <= cells.shape[1] <= 3 or not _between(cells, n):
+        raise ConfigError(f"{name!r}: cells are (m, 1), (m, 2) or (m, 3) numbers from 0 to {n - 1}"
+                          f", got {cells.dtype} {cells.shape}.")  # fmt: skip
+    values = None if thing.values is None else np.atleast_2d(np.asarray(thing.values, dtype=float))
+    if values is not None and values.shape not in ((1, n), points.shape[:2]):
+        raise ConfigError(f"{name!r} has {values.shape} values for {points.shape[:2]} points.")
+    if values is not None:
+        values = np.broadcast_to(values, points.shape[:2])
+    body = Actor(points, cells, values, colour, thing.width, thing.opacity)
+    return [body, *_edges(name, thing, points, cells)]
+
+
+def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
+    if cells.shape[1] < 3:
+        return []
+    if thing.edges is None:
+        return [Actor(points, sharp_edges(points[0], cells), colour=EDGE_COLOUR)]
+    pairs = np.asarray(thing.edges).reshape(-1, 2)
+    if not _between(pairs, points.shape[1]):
+        raise ConfigError(f"{name!r}: edges are pairs of numbers from 0 to {points.shape[1] - 1}.")
+    return [Actor(points, pairs, colour="#6b7480", width=0.6)]
+
+
+def _between(numbers: Any, n: int) -> bool:
+    whole = np.issubdtype(numbers.dtype, np.integer) or not numbers.size
+    return bool(whole and (numbers >= 0).all() and (numbers < n).all())
+
+
+def _colours(scene: Scene) -> dict[str, str]:
+    """Of each thing: its own, or the next one of the house."""
+    chosen = {}
+    for name, thing in scene.things.items():
+        own = thing.colour if isinstance(thing, Thing) else ""
+        free = sum(1 for c in chosen.values() if c in COLOURS)
+        chosen[name] = own or COLOURS[free % len(COLOURS)]
+    return chosen
+
+
+def _legend(scene: Scene) -> list[str]:
+    return [
+        name
+        for name, thing in scene.things.items()
+        if not name.startswith("_") and getattr(thing, "values", None) is None
+    ]
+
+
+def _limits(actors: Sequence[Actor]) -> tuple[float, float]:
+    values = [actor.values for actor in actors if actor.values is not None]
+    low = min((float(v.min()) for v in values), default=0.0)
+    high = max((float(v.max()) for v in values), default=1.0)
+    return min(0.0, low), high if high > min(0.0, low) else min(0.0, low) + 1.0
+
+
+def _seen(actors: Sequence[Actor]) -> Array:
+    return np.concatenate([actor.points.reshape(-1, 3) for actor in actors])
+
+
+def _below(
+    figure: Any,
+    scene: Scene,
+    camera: Camera,
+    limits: tuple[float, float],
+    strip: tuple[float, float, float],
+) -> None:
+    """Axes, colours and a length, and names below; the strip is its left, right and top."""
+    left, right, top = strip
+    corner(figure, camera, left, right, top)
+    if any(getattr(thing, "values", None) is not None for thing in scene.things.values()):
+        wide = min(500.0, right - left - TRIAD_SIZE - BAR_SIZE - 60)
+        middle = (left + TRIAD_SIZE + right - BAR_SIZE) / 2
+        page.colour_bar(figure, limits, scene.label, (middle - wide / 2, top + 38, wide, 16))
+    colours, names = _colours(scene), _legend(scene)
+    for name, (row, at) in zip(names, page.packed(names, right - left), strict=True):
+        at, level = left + at, top + STRIP_HEIGHT + ROW_HEIGHT * row
+        page.words(figure, "\u25a0", at, level - 3, color=colours[name], size=page.TITLE_SIZE)
+        page.words(figure, name, at + 26, level, size=page.SMALL_SIZE)
+
+
+def _clock(text: str) -> Image:
+    """The strip above a picture of the film, with the time."""
+    strip = page.sheet(FILM_WIDTH // 4, CLOCK_HEIGHT)
+    page.words(strip, text, 20, 8)
+    return page.pixels(strip)

@@ -1,0 +1,193 @@
+"""Things in space beside curves, their films, and legends that hide nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pyvista", reason="pictures need pyvista")
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from cases.solid import block
+from rom import view
+from rom.errors import ConfigError
+from rom.model import SurfaceMesh
+from rom.view.canvas.scene import aimed
+from rom.view.figures.curves import LINES
+from rom.view.figures.things import COLOURS, actors_of
+from rom.view.scenes.meshes import in_sight
+
+X = np.linspace(0.0, 1.0, 20)
+BOX = view.box((0.3, 0.2, 0.1))
+LONG_NAMES = [f"a curve with quite a long name, {k}" for k in range(5)]
+
+
+def boxes(figure):
+    """Extents on the page of all words, legends row by row."""
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    texts = list(figure.texts)
+    for axes in figure.axes:
+        texts += [axes._left_title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
+        texts += axes.get_legend().get_texts() if axes.get_legend() else []
+    return {t.get_text(): t.get_window_extent(renderer) for t in texts if t.get_text().strip()}
+
+
+def no_words_overlap_or_leave_the_page(figure):
+    found = boxes(figure)
+    wide, tall = figure.get_size_inches() * figure.dpi
+    for name, box in found.items():
+        assert 0 <= box.x0 and box.x1 <= wide and 0 <= box.y0 and box.y1 <= tall, name
+    pairs = [(a, b) for a in found for b in found if a < b and "\u25a0" not in (a, b)]
+    assert [(a, b) for a, b in pairs if found[a].shrunk(0.98, 0.9).overlaps(found[b])] == []
+    return found
+
+
+def test_legends_stand_above_the_curves_and_hide_nothing():
+    curves = {name: (X, X**k) for k, name in enumerate(LONG_NAMES)}
+    panels = [[view.Panel("Many names", "x [m]", "y [m]", curves),
+               view.Panel("One name", "x", "y", {"short": (X, X)})],
+              [view.Panel("Below", "x", "z", {"other": (X, X)}, {"seen": (X, X)})]]  # fmt: skip
+    figure = view.panels(panels, title="Heading", caption="Words. " * 60)
+    found = no_words_overlap_or_leave_the_page(figure)
+    assert {*LONG_NAMES, "short", "other", "seen", "Heading"} <= set(found)
+    for axes in figure.axes:
+        for text in axes.get_legend().get_texts():
+            assert text.get_window_extent().y0 >= axes.get_window_extent().y1
+        low, high = axes.get_ylim()
+        values = np.concatenate([line.get_ydata() for line in axes.lines])
+        assert np.ptp(values) > 0.85 * (high - low)  # no room is kept for a legend
+    many, one, _ = figure.axes
+    assert many._left_title.get_window_extent().y0 == one._left_title.get_window_extent().y0
+
+
+def test_equal_legends_of_curves_over_time_stand_once():
+    same = {"one": X, "two": X**2}
+    figure = view.history(
+        X, [("a [m]", same), ("b [m]", same), ("c [m]", {"third": X})], title="T", caption="C"
+    )
+    legends = [axes.get_legend() for axes in figure.axes]
+    assert legends[1] is None
+    assert [t.get_text() for t in legends[0].get_texts()] == ["one", "two"]
+    assert [t.get_text() for t in legends[2].get_texts()] == ["third"]
+    no_words_overlap_or_leave_the_page(figure)
+
+
+def test_thin_lines_without_a_name_take_no_colour():
+    guides = {f"_{k}": (X, k * X) for k in range(4)}
+    figure = view.panels([[view.Panel("P", "x", "y", {**guides, "first": (X, X)})]])
+    (axes,) = figure.axes
+    assert to_hex(axes.lines[-1].get_color()) == LINES[0]
+    assert axes.lines[-1].get_linestyle() == "-"
+
+
+def test_names_of_bars_stay_on_the_page_and_leave_the_neighbour_alone():
+    bars = {"a parameter with a long name": (-1.0, 2.0), "b": (-0.5, 0.5)}
+    left = view.Panel("Left", "x", "y", {"one": (X, X)})
+    figure = view.panels([[left, view.Panel("Bars", "change [%]", bars=bars)]])
+    no_words_overlap_or_leave_the_page(figure)
+    label = figure.axes[1].get_yticklabels()[0].get_window_extent()
+    assert label.x0 > figure.axes[0].get_window_extent().x1
+
+
+def test_things_have_their_edges_and_colours_in_turn():
+    scene = view.Scene("Two", {"a": BOX, "mine": view.Thing(*BOX, colour="#123456"), "b": BOX,
+                               "_line": view.Thing(BOX[0], [[0, 1], [1, 2]])})  # fmt: skip
+    actors = actors_of(scene)
+    assert [actor.cells.shape for actor in actors] == [(12, 3), (12, 2)] * 3 + [(2, 2)]
+    assert [actors[k].colour for k in (0, 2, 4, 6)] == [
+        COLOURS[0], "#123456", COLOURS[1], COLOURS[2]]  # fmt: skip
+
+
+@pytest.mark.long
+def test_a_scene_stands_beside_curves_with_its_names_axes_and_length():
+    scene = view.Scene("Body", {"steel": BOX, "loaded": view.Thing(*BOX, values=np.arange(8.0))},
+                       "stress [MPa]")  # fmt: skip
+    panel = view.Panel("Curve", "x [m]", "y [m]", {"one": (X, X)})
+    for figure in (
+        view.panels([[panel, scene]], title="T", caption="C"),
+        view.history(X, [("y [m]", {"one": X})], title="T", caption="C", beside=scene),
+    ):
+        found = no_words_overlap_or_leave_the_page(figure)
+        assert {"steel", "x", "y", "z", "100 mm", "Body"} <= set(found)
+        assert "loaded" not in found  # the colour bar explains it
+        bars = [axes for axes in figure.axes if axes.get_title() == "stress [MPa]"]
+        assert [axes.get_xlim() for axes in bars] == [(0.0, 7.0)]
+        (picture,) = [axes for axes in figure.axes if axes.get_title(loc="left") == "Body"]
+        height, width = picture.images[0].get_array().shape[:2]
+        box = picture.get_window_extent()  # a pixel of the picture is one of the page
+        assert abs(width - box.width) < 2
+        assert abs(height / np.ptp(picture.get_ylim()) - height / box.height) < 0.01
+
+
+@pytest.mark.long
+def test_a_scene_is_drawn_into_axes_of_the_caller():
+    scene = view.Scene("Body", {"steel": BOX})
+    figure = Figure(figsize=(12, 4))
+    one, two = figure.subplots(1, 2)
+    assert view.history(X, [("y [m]", {"one": X})], beside=scene, ax=[one, two]) is figure
+    assert one.lines and two.images
+    with pytest.raises(ConfigError, match="must be 2 Axes"):
+        view.history(X, [("y [m]", {"one": X})], beside=scene, ax=one)
+
+
+@pytest.mark.parametrize(
+    ("thing", "words"),
+    [
+        (view.Thing(np.zeros((3, 2)), [[0, 1, 2]]), r"points are \(n, 3\)"),
+        (view.Thing(np.zeros((3, 3)), [[0, 1, 3]]), "numbers from 0 to 2"),
+        (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "numbers from 0 to 2"),
+        (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "numbers from 0 to 2"),
+        (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "numbers from 0 to 3"),
+        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values for \(1, 8\) points"),
+        (view.Thing(*BOX, edges=[[0, 8]]), "edges are pairs of numbers from 0 to 7"),
+    ],
+)
+def test_wrong_things_are_refused_by_name(thing, words):
+    with pytest.raises(ConfigError, match=f"'odd'.*{words}|'odd' {words}"):
+        view.film([0.0], view.Scene("S", {"odd": thing}))
+
+
+def test_a_film_needs_a_time_for_each_picture_and_something_to_draw():
+    moving = view.Thing(BOX[0] + np.zeros((3, 1, 1)), BOX[1])
+    with pytest.raises(ConfigError, match="2 times for 3 pictures of 'S'"):
+        view.film([0.0, 1.0], view.Scene("S", {"box": moving}))
+    with pytest.raises(ConfigError, match="nothing to draw in 'S'"):
+        view.film([0.0], view.Scene("S", {}))
+
+
+def test_a_film_shows_what_moves_from_one_place_and_leaves_the_rest():
+    """A box goes to the right: the mean place of its colour does, too; the ground stays."""
+    way = np.array([0.0, 0.2, 0.4])[:, None, None] * [1.0, 0, 0]
+    scene = view.Scene(
+        "S", {"ground": view.box((1.0, 0.02, 0.3), (0.2, -0.2, 0)),
+              "box": view.Thing(BOX[0] + way, BOX[1], "#ff0000")},
+        view=(0, 0, 1), up=(0, 1, 0))  # fmt: skip
+    film = view.film([0.0, 1.0, 2.0], scene, caption="Words.")
+    assert film.pages.shape[0] == 3
+    pages = film.pages[:, 40:-200].astype(int)
+    red = pages[..., 0] - pages[..., 1] > 60
+    places = [np.nonzero(frame)[1].mean() for frame in red]
+    steps = np.diff(places)
+    metre = 0.94 * film.pages.shape[2] / 1.0  # the ground is a metre wide, with margins of 3 %
+    np.testing.assert_allclose(steps, 0.2 * metre, rtol=0.02)
+
+
+def test_an_interface_on_the_far_side_is_said_to_be_turned_away():
+    model = block()
+    points, triangles = model.points[model.surface.nodes], model.surface.triangles
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    inward = np.sum(np.cross(b - a, c - a) * (a - points.mean(axis=0)), axis=1) < 0
+    outward = np.where(inward[:, None], triangles[:, ::-1], triangles)
+    unknown, model = model, replace(model, surface=SurfaceMesh(model.surface.nodes, outward))
+    faces = {name: aimed(model.points, 100, view=v, up=(0, 0, 1))
+             for name, v in (("left", (-1, 0.2, 0.1)), ("right", (1, 0.2, 0.1)))}  # fmt: skip
+    near = "root" if model.points[model.interfaces["root"].nodes, 0].mean() < 0.1 else "tip"
+    far = {"root": "tip", "tip": "root"}[near]
+    assert in_sight(model, near, faces["left"]) and not in_sight(model, far, faces["left"])
+    assert in_sight(model, far, faces["right"]) and not in_sight(model, near, faces["right"])
+    assert all(in_sight(unknown, n, face) for n in ("root", "tip") for face in faces.values())
+    figure = view.mesh(model, view=(-1, 0.2, 0.1), up=(0, 0, 1))
+    assert f"{far} (turned away)" in [text.get_text() for text in figure.texts]
