@@ -22,6 +22,7 @@ from rom.view.figures.sheets import flow as flow
 from rom.view.figures.things import Scene as Scene
 from rom.view.figures.things import Thing as Thing
 from rom.view.figures.things import film as film
+from rom.view.figures.things import plates as plates
 from rom.view.figures.updating import updating as updating
 from rom.view.scenes.faces import faces as faces
 from rom.view.scenes.film import animate as animate

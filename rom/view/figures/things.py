@@ -17,7 +17,7 @@ from rom.view.canvas.films import Film, finished, wanted
 from rom.view.canvas.offscreen import Image, render
 from rom.view.canvas.scales import clock_texts
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
-from rom.view.canvas.solids import Mesh
+from rom.view.canvas.solids import Mesh, extruded, joined
 
 # of things without one
 COLOURS = ("#9aa5b1", "#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#c3c9d0", "#5c636e")
@@ -76,6 +76,46 @@ class Scene:
     label: str = ""
     view: npt.ArrayLike | None = None
     up: npt.ArrayLike | None = None
+
+
+@typed
+def plates(
+    outlines: Sequence[Sequence[npt.ArrayLike]],
+    width: float,
+    *,
+    values: npt.ArrayLike | None = None,
+    colour: str = "#d9d2c3",
+) -> Thing:
+    """Stones of a wall, or other plates upright in the plane of x and y, as they move.
+
+    Args:
+        outlines: of B plates in f pictures, (k, 2) corners each, counter-clockwise and in sight of
+            their mean [m].
+        width: along z, half of it on either side [m].
+        values: (B,) what their colours show; None for one colour.
+        colour: of all of them.
+
+    Raises:
+        ConfigError: if an outline is none, or there is not one value per plate.
+    """
+    frames = [[_plate(outline, width) for outline in still] for still in outlines]
+    counts = [len(points) for points, _ in frames[0]] if frames else []
+    if not counts or any([len(p) for p, _ in still] != counts for still in frames):
+        raise ConfigError("there is no plate, or their corners differ from picture to picture.")
+    if values is not None:
+        values = np.atleast_1d(np.asarray(values, dtype=float))
+        if values.shape != (len(counts),):
+            raise ConfigError(f"{len(counts)} plates have {values.shape} values.")
+        values = np.repeat(values, counts)
+    points = np.stack([joined(still)[0] for still in frames])
+    return Thing(points, joined(frames[0])[1], colour, values=values)
+
+
+def _plate(outline: npt.ArrayLike, width: float) -> Mesh:
+    corners = np.asarray(outline, dtype=float)
+    middle = corners.mean(axis=0)
+    points, triangles = extruded(corners - middle, width)
+    return points + np.append(middle, 0.0), triangles
 
 
 @typed
