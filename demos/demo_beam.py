@@ -78,6 +78,7 @@ if first:
         body.provenance["comparison"],
         options.out / "beam_frequencies.png",
         title="Beam, 24 fixed-interface modes",
+        beside=view.Scene("Its mesh and interfaces", view.meshed(model), view=(-0.5, 0.4, 0.9)),
     )
 
 # ## What to remember

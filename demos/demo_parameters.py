@@ -77,6 +77,20 @@ for point in points:
     worst, above = max(worst, np.abs(error).max()), min(above, error.min())
     say(f"{point}: full {np.round(full, 2)} Hz, errors", *(f"{e:.1e}" for e in error))
 
+# ## The picture
+
+
+def layers(core, face):
+    """Core and faces of a panel that ends in a clamp."""
+    size, outside = (0.4, 0.1), (core + face) / 2
+    faces = [view.box((*size, face), (0.2, 0, z)) for z in (-outside, outside)]
+    return {
+        "foam": view.Thing(*view.box((*size, core), (0.2, 0, 0)), "#edae49"),
+        "aluminium": view.Thing(*view.joined(faces), "#c3c9d0"),
+        "clamp": view.Thing(*view.box((0.03, 0.13, 0.06), (-0.015, 0, 0)), "#5c636e"),
+    }
+
+
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
     names = [f"mode {k + 1}" for k in range(n)]
@@ -84,15 +98,18 @@ if first:
         t * 20.0,
         [
             ("frequency [Hz]", dict(zip(names, over_t.T, strict=True))),
-            ("of a core of 20 mm", dict(zip(names, (over_t / family.frequencies(
+            ("frequency / that of a 20 mm core", dict(zip(names, (over_t / family.frequencies(
                 n, fixed=clamped)).T, strict=True))),
         ],
         options.out / "parameters.png",
         over="thickness of the core [mm]",
-        title="A clamped sandwich panel, swept over the thickness of its core",
-        caption="Natural frequencies of a hundred panels of 400 mm x 100 mm with faces of 2 mm, "
-        "from one reduced model: in hertz, and as multiples of those of the nominal panel. Curves "
-        "kink where two modes change places.",
+        beside=view.Scene("The panel with a core of 20 mm", layers(0.02, 0.002),
+                          view=(1.0, -0.8, 0.7), up=(0, 0, 1)),
+        title="A sandwich panel, one end clamped, swept over the thickness of its core",
+        caption="Natural frequencies of a hundred panels of 400 mm x 100 mm, one end clamped, "
+        "a core of foam between faces of aluminium of 2 mm, from one reduced model: in hertz, and "
+        "as multiples of those of the nominal panel. Modes are numbered by frequency; curves kink "
+        "where two of them change places.",
     )  # fmt: skip
 
 # ## What to remember

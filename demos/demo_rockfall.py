@@ -6,7 +6,7 @@
 # reproduced.
 #
 # Run: `python demos/demo_rockfall.py`, or under `mpirun -n 2`
-# Writes: `rockfall.png` into `out/`; another folder with `--out`
+# Writes: `rockfall.png` and `rockfall.gif` into `out/`; another folder with `--out`
 
 import argparse
 from dataclasses import replace
@@ -89,22 +89,46 @@ lost = max(np.abs(i.balance).max() / i.energy[0, 0] for i in impacts.values())
 # ## The picture
 
 
-def sketch():
-    """Circle, blocks and springs, {name: (x, y)}, apart by NaN."""
-    turn, gap = np.linspace(0, 2 * np.pi, 60), [np.nan]
-    wide = np.array([-1, 1, 1, -1, -1]) / 2
-    tall = np.array([-1, -1, 1, 1, -1]) / 2
-    zigzag = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.25
-    steps = np.linspace(0, 1, 9)
-    parts = {
-        "boulder on cushion": (0.8 * np.cos(turn), 5.3 + 0.8 * np.sin(turn), 3.3, 4.5),
-        "plug in shear": (1.6 * wide, 2.9 + 0.8 * tall, 1.5, 2.5),
-        "slab in bending": (4.4 * wide, 1.3 + 0.4 * tall, 0.0, 1.1),
-    }
+DEPTH, RADIUS, MAGNIFY = 0.5, (3e3 / (4 * np.pi * 2650.0)) ** (1 / 3), 20.0  # of sand, rock [m]
+LINES = ("#2f7f9f", "#d1495b", "#edae49")  # of the three forces
+PARTS = {"rock": "#8b7d6b", "sand": "#e6d7a8", "plug": "#d1495b", "walls": "#9aa5b1"}
+
+
+def gallery(impact, steps):
+    """Boulder, sand, plug, slab and walls at some steps of the impact on the reduced slab."""
+    motion = impact.modal[steps] @ body.modes(fixed=supports).shapes.T
+    X = body.surface.points
+    u = motion[:, None, :3] + np.cross(motion[:, None, 3:6], X)
+    u += (motion[:, 6:] @ body.surface.shape.T).reshape(u.shape)
+    top, down = X[:, 2].max(), impact.z[steps][:, :, None, None] * [0, 0, -1]
+    ball, triangles = view.ellipsoid((RADIUS,) * 3, (0, 0, top + DEPTH + RADIUS))
+    plug, faces = view.box((0.7, 0.7, 0.25), (0, 0, top + 0.125))
+    walls = [view.box((0.15, 3.5, 1.2), (x, 0, -0.6)) for x in (-2.175, 2.175)]
     return {
-        name: (np.concatenate([x, gap, zigzag]), np.concatenate([y, gap, a + (b - a) * steps]))
-        for name, (x, y, a, b) in parts.items()
+        "boulder": view.Thing(ball + down[:, 0], triangles, PARTS["rock"]),
+        "sand": view.Thing(*view.box((4.5, 3.5, DEPTH), (0, 0, top + DEPTH / 2)), PARTS["sand"],
+                           opacity=0.35),
+        "plug": view.Thing(plug + MAGNIFY * down[:, 1], faces, PARTS["plug"]),
+        "slab": view.Thing(X + MAGNIFY * u, body.surface.triangles, values=-1e3 * u[..., 2]),
+        "walls": view.Thing(*view.joined(walls), PARTS["walls"]),
+    }  # fmt: skip
+
+
+def chain():
+    """Three masses on three springs, from top to bottom in the colours of their forces."""
+    ball, plate = view.ellipsoid((0.45,) * 3, (0, 0, 4.55)), view.box((2.4, 1.6, 0.25), (0, 0, 1.2))
+    springs = [view.coil((0, 0, low), (0, 0, high), 0.4, 0.06, turns=4)
+               for low, high in ((3.0, 4.1), (1.32, 2.5), (0.0, 1.08))]  # fmt: skip
+    names = ("spring of the cushion", "in shear", "in bending")
+    masses = {
+        "_boulder": (ball, "rock"),
+        "_plug": (view.box((0.7, 0.7, 0.5), (0, 0, 2.75)), "sand"),
+        "_slab": (plate, "walls"),
+        "_ground": (view.box((2.8, 2.0, 0.1), (0, 0, -0.05)), "walls"),
     }
+    return ({n: view.Thing(*mesh, PARTS[part]) for n, (mesh, part) in masses.items()}
+            | {n: view.Thing(*mesh, colour)
+               for n, mesh, colour in zip(names, springs, LINES, strict=True)})  # fmt: skip
 
 
 def forces(name, title):
@@ -118,10 +142,16 @@ if first:
     options.out.mkdir(parents=True, exist_ok=True)
     bent = {name: (1e3 * i.t, 1e3 * i.z[:, 2]) for name, i in impacts.items()}
     bars = {name: tuple(100 * np.sort(change)) for name, change in ordered}
+    meshed_impact = impacts["reduced slab"]
+    deepest = [int(meshed_impact.z[:, 2].argmax())]
+    look = {"label": "deflection of the slab [mm]", "view": (0.6, -1.0, 0.35), "up": (0, 0, 1)}
     view.panels(
         [
-            [view.Panel("Three masses, three springs", "", "", sketch(), equal=True),
-             forces("three masses", "Forces, three masses"),
+            [view.Scene(f"The gallery after {1e3 * meshed_impact.t[deepest[0]]:.0f} ms",
+                        gallery(meshed_impact, deepest), **look),
+             view.Scene("Its model: three masses, three springs", chain(), view=(0.6, -1.0, 0.2),
+                        up=(0, 0, 1))],
+            [forces("three masses", "Forces, three masses"),
              forces("reduced slab", "Forces, slab of finite elements")],
             [view.Panel("Deflection of the slab", "time [ms]", "deflection [mm]", bent),
              view.Panel("Each parameter halved and doubled", "change of the bending force [%]",
@@ -129,15 +159,25 @@ if first:
         ],
         options.out / "rockfall.png",
         title="A boulder falls on a rockfall gallery",
-        caption="A tonne of rock falls 15 m onto a sand cushion over a concrete slab, 4.5 m x "
-        "3.5 m x 0.25 m, held along two edges; parameters for illustration. The boulder presses "
-        "the cushion (blue), a plug of cushion and concrete is pushed into the slab (red), the "
-        "slab bends (yellow). Top: the force in each spring when the slab is one mass, and when it "
-        f"is a reduced finite element model of {model.n_dofs} dofs. Bottom left: one mode alone is "
-        "too stiff; where the slab yields, a deflection stays. Bottom right: how much the largest "
-        "force in the slab changes. The fall and the cushion decide; plug and shear hardly matter. "
-        "A prediction is as good as what is known of the cushion.",
+        caption="Top left: a tonne of rock fell 15 m onto a sand cushion over a concrete slab, "
+        "4.5 m x 3.5 m x 0.25 m, held along two edges; deflections drawn "
+        f"{MAGNIFY:g} times larger, "
+        "parameters and the depth of the sand for illustration. Top right: the boulder presses the "
+        "cushion, a plug of cushion and concrete is pushed into the slab, the slab bends. "
+        "Middle: the force in each spring when the slab is one mass, and when it is a reduced "
+        f"finite element model of {model.n_dofs} dofs. Bottom left: one mode alone is too stiff; "
+        "where the slab yields, a deflection stays. Bottom right: how much the largest force in "
+        "the slab changes. The fall and the cushion decide; plug and shear hardly matter. A "
+        "prediction is as good as what is known of the cushion.",
     )  # fmt: skip
+    steps = np.linspace(0, meshed_impact.t.size - 1, 40).round().astype(int)
+    view.film(
+        meshed_impact.t[steps],
+        view.Scene("Boulder on a gallery", gallery(meshed_impact, steps), **look),
+        options.out / "rockfall.gif",
+        caption="A tonne of rock meets the sand over a slab of concrete at 17 m/s. The boulder "
+        f"moves in true size, plug and slab {MAGNIFY:g} times as far as they do.",
+    )
 
 # ## What to remember
 #

@@ -16,7 +16,7 @@ import numpy as np
 
 from rom import view
 from rom.components.updating import (
-    LINKS,
+    PARTS,
     AtSensors,
     Measurement,
     ParametricModel,
@@ -98,27 +98,37 @@ for name, update in found.items():
     say(f"{name:28s}: worst change wrong by {worst[name]:.4f}; residual {update.residual:.4f}")
 
 best = found["responses, reduced"]
-before, after = (responses(model, *x, omega, inputs) for x in ((start, guess), (best.p, best.zeta)))
+fine = np.linspace(f[0], f[-1], 2000)
+before, after = (
+    responses(model, *x, 2 * np.pi * fine, inputs)[:, 2, 0]
+    for x in ((start, guess), (best.p, best.zeta))
+)
 names = [*(f"{name} stiffness" for name in stiffness), *masses]
-lines = np.vstack([bed.beams, [[bed.node(a), bed.node(b)] for a, b in LINKS]])
+things = {"aluminium": view.joined(
+    [view.bar(part.path[0], part.path[-1], part.size, part.broad) for part in PARTS]
+)}  # fmt: skip
+for name, which, radius in (("sensors", range(len(sensors)), 0.025), ("exciters", inputs, 0.035)):
+    balls = [view.ellipsoid((radius,) * 3, sensors[k][0], sides=16) for k in which]
+    things[name] = view.joined(balls)
 options.out.mkdir(parents=True, exist_ok=True)
 view.updating(
     f,
     {
         f"test, {100 * options.noise:g} % noise": test.H[:, 2, 0],
-        "model as drawn": before[:, 2, 0],
-        "model updated": after[:, 2, 0],
+        "model as drawn": (fine, before),
+        "model updated": (fine, after),
     },
     {n: x for n, *x in zip(names, true, best.p, best.deviation, strict=False)},
     options.out / "updating.png",
-    structure=(bed.points, lines, *(np.array([sensors[k][0] for k in which], dtype=float)
-               for which in (range(len(sensors)), inputs))),
+    structure=view.Scene("The test bed", things, view=(1.0, 0.9, 0.8), up=(0, 0, 1)),
     label="displacement per force [m/N]",
     title="An aircraft-like test bed: six errors of the model, found from noisy responses",
     caption="Top: vertical motion of one wing tip due to a force at the other one. Each peak is a "
     "natural mode; the model as drawn has them in the wrong places. Bottom left: how the test "
     f"object differs from the drawing, and what the update finds from {f.size} frequencies, "
-    f"{len(sensors)} sensors and two exciters, damping of eight modes being unknown as well.",
+    f"{len(sensors)} sensors and two exciters, damping of eight modes being unknown as well. "
+    "Bottom middle: what is left of the error, with the scatter that the update expects from "
+    "the noise. Bottom right: fuselage, wing with drums at its tips, fin and tailplane.",
 )  # fmt: skip
 
 # ## What to remember

@@ -60,7 +60,7 @@ TASKS: dict[str, tuple[str, str]] = {
         view.frequencies view.convergence view.campbell view.history view.Panel view.panels
         view.Drawing view.plane view.Shape view.deformed view.flow view.updating view.faces
         view.Thing view.Scene view.meshed view.plates view.film
-        view.Film view.plotter view.box view.cylinder view.ring view.tube view.coil view.ellipsoid
+        view.Film view.plotter view.bar view.box view.cylinder view.ring view.tube view.coil view.ellipsoid
         view.extruded view.gear view.joined view.sleeves write_animation write_report""",
     ),
     "Files": (

@@ -1,4 +1,5 @@
 from rom.view.canvas.films import Film as Film
+from rom.view.canvas.solids import bar as bar
 from rom.view.canvas.solids import box as box
 from rom.view.canvas.solids import coil as coil
 from rom.view.canvas.solids import cylinder as cylinder

@@ -71,7 +71,7 @@ AXES = {
     "history": 1,
     "panels": 1,
     "plane": 1,
-    "updating": 3,
+    "updating": 4,
 }  # that each of what is above wants
 FILMS = {
     "animate": lambda: ([*moved()], {"frames": 2}),

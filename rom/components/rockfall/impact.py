@@ -145,6 +145,7 @@ class Impact:
         deepest: penetration of the cushion [m].
         deflection, plastic: largest deflection of the slab, and what stays of it [m].
         state: "whole", "cracked" or "punched".
+        modal: (n, r) modal coordinates of the slab [kg^1/2 m].
     """
 
     t: Array
@@ -157,6 +158,7 @@ class Impact:
     deflection: float
     plastic: float
     state: str
+    modal: Array
 
     @property
     def balance(self) -> Array:
@@ -191,7 +193,7 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
     )
     laws = tuple(tuple(map(float, group)) for group in numbers)
     modes = tuple(np.array(x, dtype=float) for x in (g.slab.phi, g.slab.omega))
-    out, last = np.zeros((n // every + 1, 17)), np.zeros(7)
+    out, last = np.zeros((n // every + 1, 17 + modes[0].size)), np.zeros(7)
     kernels.strike(laws, modes, t_end / n, every, out, last)
     finite = np.isfinite(out).all(axis=1)
     if not finite.all():
@@ -203,11 +205,9 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
 
 
 def _impact(out: Array, last: Array) -> Impact:
-    t, z, v, forces, energy = np.split(out, [1, 4, 7, 10], axis=1)
-    deepest, deflection, plastic = map(float, last[3:6])
-    return Impact(
-        t[:, 0], z, v, forces, energy, last[:3], deepest, deflection, plastic, STATES[int(last[6])]
-    )
+    t, z, v, forces, energy, modal = np.split(out, [1, 4, 7, 10, 17], axis=1)
+    stays = map(float, last[3:6])
+    return Impact(t[:, 0], z, v, forces, energy, last[:3], *stays, STATES[int(last[6])], modal)
 
 
 VARIED_NUMBERS = {  # what `sensitivity` changes: where it stands, and the power of the factor there

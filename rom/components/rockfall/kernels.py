@@ -29,7 +29,7 @@ def _shear(d, rate, s, state):
 
 @kernel
 def strike(numbers, modes, h, every, out, last):
-    """Rows of out: time, ways, speeds, forces, energies; last: peaks and what stays."""
+    """Rows of out: time, ways, speeds, forces, energies, modes; last: peaks and what stays."""
     (m1, m2, g, v1), c, s, (zeta, capacity, k3) = numbers
     phi, omega = modes
     z1, z2, v2, d, e, F1, F2, deepest, yielded = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -47,6 +47,8 @@ def strike(numbers, modes, h, every, out, last):
         F3 = k3 * (z3 - yielded + 2.0 * zeta * (phi / omega * w).sum())
         took[1] += 0.5 * (F1 + f1) * (d - d0)
         took[2] += 0.5 * (F2 + f2) * (e - e0)
+        if i % every == 0:
+            out[i // every, 17:] = q
         half = h if i else 0.5 * h
         n1, n2 = v1 + half * (g - F1 / m1), v2 + half * (F1 - F2) / m2
         u1, u2, u3 = (0.5 * (v1 + n1), 0.5 * (v2 + n2), 0.0) if i else (v1, v2, 0.0)
@@ -65,7 +67,7 @@ def strike(numbers, modes, h, every, out, last):
         if i % every == 0:
             row = out[i // every]
             row[:10] = i * h, z1, z2, z3, u1, u2, u3, F1, F2, F3
-            row[10:] = took
+            row[10:17] = took
         last[0], last[1], last[2] = max(last[0], F1), max(last[1], F2), max(last[2], F3)
         last[4] = max(last[4], z3)
         v1, v2 = n1, n2

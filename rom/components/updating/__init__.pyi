@@ -1,4 +1,5 @@
 from rom.components.updating.airframe import LINKS as LINKS
+from rom.components.updating.airframe import PARTS as PARTS
 from rom.components.updating.airframe import Airframe as Airframe
 from rom.components.updating.airframe import airframe as airframe
 from rom.components.updating.frf_data import beside_poles as beside_poles

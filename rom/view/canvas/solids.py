@@ -34,6 +34,31 @@ def box(size: npt.ArrayLike, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
 
 
 @typed
+def bar(
+    a: npt.ArrayLike, b: npt.ArrayLike, size: tuple[float, float], broad: npt.ArrayLike
+) -> Mesh:
+    """Rectangular bar from one point to another.
+
+    Args:
+        a: (3,) middle of one end [m].
+        b: (3,) middle of the other end [m].
+        size: of the section along ``broad`` and across it [m].
+        broad: (3,) direction across the bar [1].
+
+    Raises:
+        ConfigError: if the direction is that of the bar, or both ends are in one place.
+    """
+    a, b, broad = (np.asarray(x, dtype=float) for x in (a, b, broad))
+    along = across(a, b)[2]
+    side = broad - (broad @ along) * along
+    if not np.linalg.norm(side) > 1e-9 * np.linalg.norm(broad):
+        raise ConfigError(f"broad = {broad} is no direction across the bar from {a} to {b}.")
+    side /= np.linalg.norm(side)
+    points, triangles = box((float(np.linalg.norm(b - a)), *size))
+    return points @ np.array([along, side, np.cross(along, side)]) + (a + b) / 2, triangles
+
+
+@typed
 def cylinder(a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, *, sides: int = 48) -> Mesh:
     """Round bar from one point to another, closed at its ends.
 

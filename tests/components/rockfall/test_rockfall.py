@@ -196,6 +196,17 @@ def test_impulses_are_changes_of_momentum():
     assert_allclose([-J[0], J[0] - J[1], J[1] - J[2]], momentum, atol=2e-4 * 4000 * g.speed)
 
 
+def test_modal_coordinates_of_the_slab_answer_its_force_and_add_up_to_its_deflection():
+    """Against Duhamel's integral of each undamped mode under the force of the plug."""
+    slab = Slab(np.array([0.02, 0.015, 0.01]), np.array([150.0, 420.0, 900.0]), damping=0.0)
+    got = strike(baseline(slab=slab), t_end=0.05)
+    assert_allclose(got.modal @ slab.phi, got.z[:, 2], atol=1e-12)
+    for k, (phi, omega) in enumerate(zip(slab.phi, slab.omega, strict=True)):
+        late = omega * (got.t[-1] - got.t)
+        duhamel = trapezoid(phi * got.forces[:, 1] * np.sin(late), got.t) / omega
+        assert got.modal[-1, k] == pytest.approx(duhamel, rel=2e-3)
+
+
 def test_a_yielding_slab_dissipates_its_capacity_times_what_stays():
     slab = Slab.of_mass(6000.0, 1.2e8, damping=0.0, capacity=1.2e6)
     got = strike(baseline(slab=slab), t_end=0.2)
