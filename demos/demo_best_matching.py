@@ -119,7 +119,7 @@ def floating(body):
     start = np.linalg.lstsq(system, bend.ravel(), rcond=None)[0]
     mech = rom.Mechanism(gravity=(0, 0, 0))
     mech.add_flexible("beam", body, velocity=start[:3], omega=start[3:6], qd=start[6:])
-    sol = rom.simulate(mech, t_end=0.04, dt=5e-5, save_every=4)
+    sol = rom.simulate(mech, t_end=0.04, dt=5e-5, save_every=2)
     axes = np.array([rotation.matrix(p) for p in sol.orientation("beam")])
     local = X + (sol.elastic("beam") @ shapes.T).reshape(len(sol.t), -1, 3)
     nodes = sol.position("beam")[:, None] + np.einsum("tab,tnb->tna", axes, local)
@@ -144,8 +144,12 @@ say(
 if first:
     circle = np.linspace(0, 2 * np.pi, 200)
     names = [f"mass {mass:g}" for mass in m]
-    some, few = slice(0, None, 20), slice(0, None, 5)
+    some, few = slice(0, None, 20), slice(0, None, 10)
     orbits = {"Newton": (x[some, :, 0].ravel(), x[some, :, 1].ravel())}
+    beams = {
+        f"after {1e3 * t_beam[k]:.0f} ms": (nodes[k], model.surface.triangles)
+        for k in (0, t_beam.size // 2, t_beam.size - 1)
+    }
     options.out.mkdir(parents=True, exist_ok=True)
     view.panels(
         [
@@ -166,7 +170,11 @@ if first:
                 view.Panel("Complexity: how clustered", "Newton's time", "C",
                            {"complexity": (t, complexity)},
                            {"smallest size": (janus, np.interp(janus, t, complexity))}),
-                view.Panel("A floating beam: which way it faces", "time [ms]", "angle [mrad]",
+            ],
+            [
+                view.Scene("A floating beam in true size", beams, view=(0.15, 0.3, 1.0),
+                           up=(0, 1, 0)),
+                view.Panel("Which way it faces", "time [ms]", "angle [mrad]",
                            {"frame on one end": (1e3 * t_beam, 1e3 * on_root),
                             "mean-axis frame": (1e3 * t_beam, 1e3 * mean_axis)},
                            {"best matched": (1e3 * t_beam[few], 1e3 * np.array(best)[few])}),
@@ -178,12 +186,12 @@ if first:
         "films tangles (left). Every picture laid over the one before, so that the mass-weighted "
         "sum of squares of what differs is smallest, gives Newton's orbits back (middle). Right: "
         "the shape of the triangle is a point on a sphere; mechanics of shapes alone, without "
-        "size, frame or clock, draws the same line as Newton's. Bottom left: without energy and "
+        "size, frame or clock, draws the same line as Newton's. Middle left: without energy and "
         "rotation the system has one smallest size, and D, half the rate of I = sum m r^2, one "
-        "direction. Middle: from there the triangle becomes more clustered both ways, though not "
-        "steadily. Right: the same projection in engineering, a free steel beam that turns and "
-        "bends. A frame fixed to one end wobbles; the undeformed beam, laid over the nodes, finds "
-        "the mean-axis frame.",
+        "direction. Middle right: from there the triangle becomes more clustered both ways, "
+        "though not steadily. Bottom: the same projection in engineering, a free steel beam that "
+        "turns and bends. A frame fixed to one end wobbles; the undeformed beam, laid over the "
+        "nodes, finds the mean-axis frame.",
     )  # fmt: skip
 
 # ## What to remember

@@ -137,14 +137,20 @@ if first:
         f"Interference diagram at {30 * RUN / np.pi:.0f} 1/min", "nodal diameters",
         "frequency [Hz]", curves=line | families, points=hits,
     )  # fmt: skip
+    wave = rom.cyclic_modes(sector, 2, F).on_wheel()[:, :, 1]
+    wheel = view.Scene("A wave of two nodal diameters", {"wheel": view.wheel(
+        [model] * N, shape=list(wave), magnify=0.03 / abs(wave).max(),
+        scale=1 / np.linalg.norm(wave.reshape(-1, 3), axis=1).max())},
+        "displacement / largest", view=(0.5, -0.6, 1.0))  # fmt: skip
     view.panels(
-        [[campbell], [split], [safe]], options.out / "bladed_disk_diagrams.png",
+        [[wheel, campbell], [split, safe]], options.out / "bladed_disk_diagrams.png",
         title=f"A bladed disk of {N} sectors: {full.n_wheel} dofs from {sector.free.size}",
-        caption="Top: thin rays are disturbances at rest with 1 to 4 lobes; centrifugal stress "
-        "lifts all waves. Middle: Coriolis forces part waves that run with the rotation (forward) "
-        "from those against it. Bottom: the thin line folds the engine orders 0 to 24 back at half "
-        "the number of blades; rings mark families that it meets within 5 % at the right number "
-        "of nodal diameters.",
+        caption="Top left: a wave of the second family, magnified. Top right: thin rays are "
+        "disturbances at rest with 1 to 4 lobes; centrifugal stress lifts all waves. Bottom left: "
+        "Coriolis forces part waves that run with the rotation (forward) from those against it, n "
+        "being the number of nodal diameters. Bottom right: the thin line folds the engine orders "
+        "0 to 24 back at half the number of blades; rings mark families that it meets within 5 % "
+        "at the right number of nodal diameters.",
     )  # fmt: skip
 
 # ## What to remember

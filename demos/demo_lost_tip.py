@@ -119,15 +119,19 @@ if first:
         hz = w / (2 * np.pi)
         curves = {f"_blade {j}": (hz, 1e3 * u[:, j]) for j in range(N) if j != 5}
         curves["short blade"] = (hz, 1e3 * u[:, 5])
-        drawn.append([view.Panel(title, "frequency [Hz]", "amplitude of the tip [mm]", curves)])
+        drawn.append(view.Panel(title, "frequency [Hz]", "amplitude of the tip [mm]", curves))
+    models = [damaged if j == 5 else model for j in range(N)]
+    others = view.wheel(models, sectors=[j for j in range(N) if j != 5])
+    seen = {"whole blades": others, "sector of the short one": view.wheel(models, sectors=[5])}
+    wheel = view.Scene("The wheel", seen, view=(0.3, -0.4, 1.0))
     view.panels(
-        drawn, options.out / "lost_tip.png",
+        [[wheel, *drawn]], options.out / "lost_tip.png",
         title=f"One of {N} blades has lost a fifth of its length",
-        caption=f"Titanium wheel of {ops.n} dofs; disk and blades are substructures, "
-        f"{omega.size} coordinates in all. 1 N per blade, engine order {ORDER}, {100 * ZETA:g} % "
-        "damping; stiffnesses scatter by 1 %. Thin lines are whole blades. Top: they answer each "
-        "at its own frequency, the short one stands still. Bottom: the short blade answers where "
-        "the wheel had no mode.",
+        caption=f"Titanium wheel of {ops.n} dofs; disk and blades are substructures, {omega.size} "
+        f"coordinates in all. 1 N per blade, engine order {ORDER}, {100 * ZETA:g} % damping; "
+        "stiffnesses scatter by 1 %. Thin lines are whole blades. Middle: they answer each at "
+        "its own frequency, the short one stands still. Right: the short blade answers where the "
+        "wheel had no mode.",
     )  # fmt: skip
 
 # ## What to remember

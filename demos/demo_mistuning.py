@@ -76,7 +76,7 @@ tuned = np.linalg.norm(wheel.response(np.zeros(N), force, **sweep), axis=-1)
 # frequencies is half as large. Whitehead's bound (1 + sqrt(N)) / 2 holds for one family of modes.
 # Processes share the wheels.
 
-SCATTER = (0.0005, 0.001, 0.002, 0.004, 0.01, 0.02)
+SCATTER = (0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.01, 0.015, 0.02)
 factors, seconds = {}, {}
 say(" scatter   median    99 %   largest  seconds")
 for s in SCATTER:
@@ -130,12 +130,19 @@ if first:
         f"{options.wheels} wheels for each scatter: amplification of the worst blade",
         "standard deviation of the blade stiffness [%]", "amplification factor", curves=level,
     )  # fmt: skip
+    loud = sweep["omega"][one[:, worst].argmax()]
+    moved = wheel.response(pattern, force, **sweep | {"omega": np.array([loud]), "at": sector.Psi})
+    moved = np.real(moved[0] * np.exp(-1j * np.angle(moved.ravel()[abs(moved).argmax()])))
+    seen = view.Scene(f"The wheel at {loud / (2 * np.pi):.1f} Hz", {"wheel": view.wheel(
+        [model] * N, shape=list(moved), magnify=0.02 / abs(moved).max(), scale=1e6)},
+        "displacement [\u00b5m]", view=(0.5, -0.6, 1.0))  # fmt: skip
     view.panels(
-        [[one_wheel], [many]],
+        [[seen, one_wheel], [many]],
         options.out / "mistuning.png",
         title=f"A disk of {N} blades that differ, driven by engine order {ORDER}",
         caption=f"Titanium wheel of {full.n_wheel} dofs, reduced to {sector.free.size} per sector, "
-        f"with {100 * ZETA:g} % damping. Top: one wheel whose blades scatter by 0.4 % in "
+        f"with {100 * ZETA:g} % damping. Top left: it at the peak of its worst blade, "
+        "much magnified. Top right: one wheel whose blades scatter by 0.4 % in "
         "stiffness; thin lines are its other blades. Bottom: small scatter suffices to make one "
         "blade vibrate far more than those of a perfect wheel; with larger scatter blades no "
         "longer reach each other, and the amplification falls. Whitehead's bound for "

@@ -132,31 +132,40 @@ for speed, mode, order in met:
 
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
+    axes = view.meshed(beam_model)
+    for name, axis, colour in (("axis: flap", (0, 0, 0.25), "#66a182"),
+                               ("axis: lag", (0, 0.25, 0), "#edae49")):  # fmt: skip
+        ends = np.array([-0.5, 0.5])[:, None] * axis
+        axes[name] = view.Thing(*view.cylinder(*ends, 0.01), colour)
     etas = np.array(list(FLAP), dtype=float)
     view.history(
         etas,
         [
-            (f"flap {mode + 1}  [units]", {
+            (f"flap {mode + 1} / unit", {
                 "reduced solid": np.array([table[eta][0][0][mode] for eta in FLAP]),
                 "exact beam": (etas, [FLAP[eta][mode] for eta in FLAP]),
             })
             for mode in range(3)
-        ] + [("lag 1  [units]", {
+        ] + [("lag 1 / unit", {
             "reduced solid": np.array([table[eta][1][0][0] for eta in FLAP]),
             "exact beam": (etas, [table[eta][1][1][0] for eta in FLAP]),
         })],
         options.out / "rotating_beam.png",
-        over="speed of rotation [units]",
+        over="speed of rotation / unit",
+        beside=view.Scene("The bar and its axes of rotation", axes, view=(0.8, -0.6, 0.5),
+                          up=(0, 0, 1)),
         title="A rotating cantilever: reduced solid and exact beam",
-        caption=f"A clamped bar of {beam_model.n_dofs} dofs, reduced to {beam.n_modes} coordinates "
-        "with the geometric stiffness of centrifugal force, turns about its root. Frequencies and "
-        "speeds in units of sqrt(EI / rho A L^4). Across the plane of rotation (flap) tension "
-        "stiffens it; in the plane (lag) spin softening takes off the square of the speed. Largest "
-        f"error {100 * max(*worst.values(), worst_lag):.2f} %: the solid knows shear, the beam "
-        "does not.",
+        caption=f"A clamped bar of {beam_model.n_dofs} dofs, reduced to {beam.n_modes} "
+        "coordinates with the geometric stiffness of centrifugal force, turns about its root. "
+        "The unit of frequencies and speeds is sqrt(EI / rho A L^4). Across the plane of "
+        "rotation (flap) tension stiffens it; in the plane (lag) spin softening takes off the "
+        f"square of the speed. Largest error {100 * max(*worst.values(), worst_lag):.2f} %: the "
+        "solid knows shear, the beam does not.",
     )  # fmt: skip
     view.campbell(
         diagram, options.out / "blade_campbell.png", orders=(1, 2, 3, 4, 6, 8),
+        beside=view.Scene("The blade; its flanks are held", view.meshed(blade_model),
+                          view=(0.9, -1.0, 0.35), up=(0, 0, 1)),
         title="Campbell diagram of a compressor blade on its rotor",
         caption=f"Titanium blade of {blade_model.n_dofs} dofs, reduced to {blade.n_modes} "
         "coordinates, its platform at a radius of 250 mm. Frequencies are seen from the blade; "

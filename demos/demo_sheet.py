@@ -110,18 +110,20 @@ view.deformed(
     options.out / "sheet.png",
     limit=("converged", 23.965),
     xlabel="divisions of each side",
-    ylabel="deflection of the tip",
+    ylabel="deflection of the tip [unit of length]",
     title="Triangles that ask their neighbours",
-    caption="Left: deflection of a tapered panel under shear, for the same unknowns; ordinary "
-    "triangles are far too stiff on coarse meshes. Middle: that panel, drawn to scale; dashed: "
-    "before. Right: a copper bar after it hit a wall at 227 m/s, computed with F1 on half "
-    "its section; its foot has flowed to more than twice its radius.",
+    caption="Left: deflection of a tapered panel, 48 units of length wide, held on its left and "
+    "sheared by a unit force on its right, for the same unknowns; ordinary triangles are far too "
+    "stiff on coarse meshes. Middle: that panel, drawn to scale; dashed: before. Right: the "
+    "section of a copper bar, 32.4 mm long and 6.4 mm thick, after it hit a wall at 227 m/s, "
+    "computed with F1 on half its section; its foot has flowed to more than twice its radius.",
 )
 view.flow(
     flight.t,
     [whole(k) for k in range(len(flight.t))],
     options.out / "taylor_bar.gif",
-    caption="A copper cylinder hits a rigid wall at 227 m/s; drawn to scale, dashed: before.",
+    caption="Section of a copper cylinder, 32.4 mm long, that hits a rigid wall at 227 m/s; "
+    "drawn to scale, dashed: before.",
 )
 
 # ## What to remember

@@ -110,8 +110,8 @@ if first:
     omega = sol.omega("bar")[:, 2]
     at = {f"after {sol.t[v.argmin()]:.1f} s": (stiff, sol, v.argmin(), "#2f7f9f"),
           f"without, {t_away:.1f} s": (soft, sol_soft, np.argmax(np.abs(v_soft) > 1.0), "#d1495b"),
-          "at rest": (stiff, sol, 0, "#9aa5b1")}  # fmt: skip
-    seen = {"base": view.cylinder((0, 0, -0.3), (0, 0, 0.3), 0.5)}
+          "at rest": (stiff, sol, 0, "#c3c9d0")}  # fmt: skip
+    seen = {"base": view.cylinder((0, 0, -0.3), (0, 0, 0.3), 0.5)}  # seen along the axis
     for name, (body, motion, k, colour) in at.items():
         bent = (body.surface.shape @ motion.elastic("bar")[k]).reshape(-1, 3)
         seen[name] = view.Thing(body.surface.points + bent, body.surface.triangles, colour)
@@ -128,7 +128,7 @@ if first:
             }),
         ],
         options.out / "spin_up.png",
-        beside=view.Scene("The bar, seen along the axis and turned with its base", seen,
+        beside=view.Scene("The bar, turned with its base", seen,
                           view=(0, 0, 1), up=(1, 0, 0)),
         title="Spin-up of a flexible bar: 10 m, from rest to 6 rad/s",
         caption="Right: the bar in true size. The base accelerates and the tip lags behind; after "

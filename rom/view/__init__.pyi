@@ -33,5 +33,6 @@ from rom.view.scenes.meshes import mesh as mesh
 from rom.view.scenes.meshes import meshed as meshed
 from rom.view.scenes.mode_shapes import mode_shapes as mode_shapes
 from rom.view.scenes.rods import sleeves as sleeves
+from rom.view.scenes.wheels import wheel as wheel
 from rom.view.scenes.wheels import wheel_modes as wheel_modes
 from rom.view.scenes.window import plotter as plotter

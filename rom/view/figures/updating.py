@@ -90,9 +90,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def _responses(
-    axes: Any, f: Array, curves: dict[str, tuple[Any, Any]], label: str
-) -> None:
+def _responses(axes: Any, f: Array, curves: dict[str, tuple[Any, Any]], label: str) -> None:
     looks: tuple[dict[str, Any], ...] = (
         {"ls": "", "marker": ".", "ms": 5, "color": DOT_COLOUR},
         {"ls": "--", "lw": 1.3, "color": LINES[2]},

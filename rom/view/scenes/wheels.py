@@ -1,6 +1,7 @@
 """Pictures of a whole wheel from the surface of one sector."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
@@ -12,8 +13,9 @@ from rom import rotation
 from rom.arguments import typed
 from rom.deprecated import path_came_first
 from rom.errors import ConfigError
-from rom.model import Array, FEModel, Index, SurfaceMesh
+from rom.model import Array, FEModel, Index
 from rom.view.canvas import page
+from rom.view.figures.things import Thing
 from rom.view.scenes.mode_shapes import drawn, sheet
 
 if TYPE_CHECKING:
@@ -58,20 +60,104 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     N = U[0].shape[0]
     if any(u.shape != (N, 3 * model.points.shape[0]) for u in U):
         raise ConfigError(f"each shape needs {3 * model.points.shape[0]} numbers per sector.")
-    nodes, triangles = _outside(model, model.surface, hidden)
-    e = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    turns = [rotation.matrix(rotation.exp(2 * np.pi * j / N * e)) for j in range(N)]
-    points = np.vstack([model.points[nodes] @ R.T for R in turns])
-    first, whole = _joined(points, np.vstack([triangles + j * nodes.size for j in range(N)]))
-    moved: list[Array] = [u.reshape(N, -1, 3)[:, nodes].reshape(-1, 3)[first] for u in U]
-    surface = SimpleNamespace(points=points[first], triangles=whole)
+    around = _around([model] * N, hidden, axis)
+    moved = [around.displaced(list(u)) for u in U]
+    surface = SimpleNamespace(points=around.points, triangles=around.triangles)
     images, camera = drawn(surface, moved, view, None)
     with page.styled():
         return page.save(sheet(images, camera, list(shapes), title, caption, "wheel"), path)
 
 
-def _outside(model: FEModel, surface: SurfaceMesh, hidden: tuple[str, ...]) -> tuple[Index, Index]:
+@typed
+def wheel(
+    models: Sequence[FEModel],
+    *,
+    shape: Sequence[npt.ArrayLike] | None = None,
+    sectors: Sequence[int] | None = None,
+    magnify: float = 1.0,
+    scale: float = 1.0,
+    hidden: tuple[str, ...] = ("cyclic_low", "cyclic_high"),
+    axis: npt.ArrayLike = (0.0, 0.0, 1.0),
+) -> Thing:
+    """A wheel, or some of its sectors, as a thing of a `Scene`.
+
+    Args:
+        models: of the sectors, one after the other around the axis, each as if it were the first
+            one.
+        shape: (3 k,) displacements of the k nodes of each sector drawn, axes of the wheel [m],
+            whose sizes the colours show; None for one colour.
+        sectors: numbers of those that are drawn; None for all.
+        magnify: displacements are drawn so many times larger than they are [1].
+        scale: of the values that colours show, per metre.
+        hidden: interfaces inside the wheel, not drawn.
+        axis: (3,) axis of the wheel, through the origin of coordinates [1].
+
+    Raises:
+        ConfigError: if there is no surface, or the shape does not fit.
+    """
+    chosen = list(range(len(models)) if sectors is None else sectors)
+    if not chosen or not all(0 <= j < len(models) for j in chosen):
+        raise ConfigError(f"sectors {chosen} are not some of {len(models)}.")
+    around = _around(models, hidden, axis, chosen)
+    if shape is None:
+        return Thing(around.points, around.triangles)
+    u = [np.asarray(one, dtype=float).ravel() for one in shape]
+    sizes = [3 * len(models[j].points) for j in chosen]
+    if [one.size for one in u] != sizes:
+        raise ConfigError(f"the shape has {[one.size for one in u]} numbers per sector, not "
+                          f"{sizes}.")  # fmt: skip
+    moved = around.displaced(u)
+    values = scale * np.linalg.norm(moved, axis=1)
+    return Thing(around.points + magnify * moved, around.triangles, values=values)
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """The outer surface of sectors in their places.
+
+    Attributes:
+        nodes: of each sector that lie on it.
+        first: (n,) which of all these nodes the points are.
+        points: (n, 3) [m].
+        triangles: (t, 3) between them.
+    """
+
+    nodes: list[Index]
+    first: Index
+    points: Array
+    triangles: Index
+
+    def displaced(self, u: Sequence[Array]) -> Array:
+        """(n, 3) displacements of the points, from (3 k,) those of each sector."""
+        parts = [one.reshape(-1, 3)[nodes] for one, nodes in zip(u, self.nodes, strict=True)]
+        return np.vstack(parts)[self.first]
+
+
+def _around(
+    models: Sequence[FEModel],
+    hidden: tuple[str, ...],
+    axis: npt.ArrayLike,
+    sectors: Sequence[int] | None = None,
+) -> Around:
+    e = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    outside = {id(m): _outside(m, hidden) for m in models}
+    chosen = range(len(models)) if sectors is None else sectors
+    turns = [rotation.matrix(rotation.exp(2 * np.pi * j / len(models) * e)) for j in chosen]
+    nodes = [outside[id(models[j])][0] for j in chosen]
+    triangles = [outside[id(models[j])][1] for j in chosen]
+    starts = np.cumsum([0, *(n.size for n in nodes)])[:-1]
+    points = np.vstack([models[j].points[n] @ R.T
+                        for j, n, R in zip(chosen, nodes, turns, strict=True)])  # fmt: skip
+    every = np.vstack([t + start for t, start in zip(triangles, starts, strict=True)])
+    first, whole = _joined(points, every)
+    return Around(nodes, first, points[first], whole)
+
+
+def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
     """Nodes of the model on the outer surface of the wheel, and triangles between them."""
+    surface = model.surface
+    if surface is None:
+        raise ConfigError("a sector without a surface cannot be drawn.")
     inside = np.zeros(len(surface.triangles), dtype=np.bool_)
     for name in hidden:
         inside |= np.isin(surface.nodes[surface.triangles], model.interfaces[name].nodes).all(1)
