@@ -134,15 +134,15 @@ if first:
     moved = wheel.response(pattern, force, **sweep | {"omega": np.array([loud]), "at": sector.Psi})
     moved = np.real(moved[0] * np.exp(-1j * np.angle(moved.ravel()[abs(moved).argmax()])))
     seen = view.Scene(f"The wheel at {loud / (2 * np.pi):.1f} Hz", {"wheel": view.wheel(
-        [model] * N, shape=list(moved), magnify=0.02 / abs(moved).max(), scale=1e6)},
-        "displacement [\u00b5m]", view=(0.5, -0.6, 1.0))  # fmt: skip
+        [model] * N, shape=list(moved), scale=1e3)},
+        "displacement [mm]", view=(0.5, -0.6, 1.0))  # fmt: skip
     view.panels(
         [[seen, one_wheel], [many]],
         options.out / "mistuning.png",
         title=f"A disk of {N} blades that differ, driven by engine order {ORDER}",
         caption=f"Titanium wheel of {full.n_wheel} dofs, reduced to {sector.free.size} per sector, "
-        f"with {100 * ZETA:g} % damping. Top left: it at the peak of its worst blade, "
-        "much magnified. Top right: one wheel whose blades scatter by 0.4 % in "
+        f"with {100 * ZETA:g} % damping. Top left: the wheel of the top right at "
+        "the peak of its worst blade, in true size. Top right: one wheel whose blades scatter by 0.4 % in "
         "stiffness; thin lines are its other blades. Bottom: small scatter suffices to make one "
         "blade vibrate far more than those of a perfect wheel; with larger scatter blades no "
         "longer reach each other, and the amplification falls. Whitehead's bound for "

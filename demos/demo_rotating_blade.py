@@ -66,6 +66,16 @@ def beam_frequencies(eta, axis):
 
 
 FLAPPING, LAGGING = (0, 0, 1), (0, 1, 0)
+
+
+def between(eta, axis):
+    """The same at a speed of which no exact frequencies are known; their squares are near lines."""
+    near = [np.interp(eta**2, np.square(list(FLAP)), np.square(f)) for f in zip(*FLAP.values())]
+    near = np.sqrt(np.array(near) - (0.0 if axis == FLAPPING else eta**2))
+    found = 2 * np.pi * beam.rotating_frequencies(eta * unit, axis, fixed=("root",)) / unit
+    return [found[np.argmin(abs(found - f))] for f in near]
+
+
 table = {}
 say(f"beam of {beam_model.n_dofs} dofs, {beam.n_modes} coordinates\n eta  flap 1..3 and lag 1")
 for eta in FLAP:
@@ -132,28 +142,25 @@ for speed, mode, order in met:
 
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
-    axes = view.meshed(beam_model)
+    axes = {"bar": (beam.surface.points, beam.surface.triangles)}
     for name, axis, colour in (("axis: flap", (0, 0, 0.25), "#66a182"),
                                ("axis: lag", (0, 0.25, 0), "#edae49")):  # fmt: skip
         ends = np.array([-0.5, 0.5])[:, None] * axis
         axes[name] = view.Thing(*view.cylinder(*ends, 0.01), colour)
     etas = np.array(list(FLAP), dtype=float)
+    fine = np.linspace(0.0, etas[-1], 49)
+    flaps, lags = (np.array([between(eta, axis) for eta in fine]) for axis in (FLAPPING, LAGGING))
+    exact = [np.array([table[eta][k][1] for eta in FLAP]) for k in (0, 1)]
+    names = ("reduced solid", "exact beam")
     view.history(
-        etas,
-        [
-            (f"flap {mode + 1} / unit", {
-                "reduced solid": np.array([table[eta][0][0][mode] for eta in FLAP]),
-                "exact beam": (etas, [FLAP[eta][mode] for eta in FLAP]),
-            })
-            for mode in range(3)
-        ] + [("lag 1 / unit", {
-            "reduced solid": np.array([table[eta][1][0][0] for eta in FLAP]),
-            "exact beam": (etas, [table[eta][1][1][0] for eta in FLAP]),
-        })],
+        fine,
+        [(f"flap {mode + 1} / unit", dict(zip(names, (flaps[:, mode], (etas, exact[0][:, mode])),
+                                              strict=True))) for mode in range(3)]
+        + [("lag 1 / unit", dict(zip(names, (lags[:, 0], (etas, exact[1][:, 0])), strict=True)))],
         options.out / "rotating_beam.png",
         over="speed of rotation / unit",
-        beside=view.Scene("The bar and its axes of rotation", axes, view=(0.8, -0.6, 0.5),
-                          up=(0, 0, 1)),
+        beside=view.Scene("The bar and its axes of rotation", axes, view=(0.2, -0.8, 0.6),
+                          up=(1, 0, 0)),
         title="A rotating cantilever: reduced solid and exact beam",
         caption=f"A clamped bar of {beam_model.n_dofs} dofs, reduced to {beam.n_modes} "
         "coordinates with the geometric stiffness of centrifugal force, turns about its root. "

@@ -175,6 +175,46 @@ def test_a_film_shows_what_moves_from_one_place_and_leaves_the_rest():
     np.testing.assert_allclose(steps, 0.2 * metre, rtol=0.02)
 
 
+def test_plates_are_their_outlines_made_thick_and_move_with_them():
+    square = np.array([[0.0, 0], [0.4, 0], [0.4, 0.2], [0, 0.2]])
+    other = square + (1.0, 0.5)
+    frames = [[square, other], [square, other + (0.0, 0.3)]]
+    thing = view.plates(frames, 0.5, values=[1.0, 2.0])
+    p, q, r = np.moveaxis(thing.points[0][thing.cells], 1, 0)
+    assert np.sum(p * np.cross(q, r)) / 6 == pytest.approx(2 * 0.4 * 0.2 * 0.5)
+    second = thing.values == 2.0
+    step = thing.points[1] - thing.points[0]
+    np.testing.assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
+    np.testing.assert_array_equal(step[~second], 0.0)
+    assert np.ptp(thing.points[..., 2]) == pytest.approx(0.5)
+    with pytest.raises(ConfigError, match=r"2 plates have \(1,\) values"):
+        view.plates(frames, 0.5, values=[1.0])
+    with pytest.raises(ConfigError, match="there is no plate"):
+        view.plates([[square], [square, other]], 0.5)
+
+
+@pytest.mark.long
+def test_what_is_left_of_an_update_has_a_scale_of_its_own():
+    """Error bars are two standard deviations long, and fill their diagram."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    structure = points, np.array([[0, 1], [1, 2]]), points, points[:1]
+    changes = {"one": (0.4, 0.401, 0.0005), "two": (-0.3, -0.3, 0.0002)}
+    fine = np.linspace(0.0, 1.0, 200)
+    figure = view.updating(
+        X, {"test": 1 / (3 - X), "before": (fine, 1 / (2 - fine))}, changes,
+        structure=structure, label="u [m]", title="T", caption="C")  # fmt: skip
+    found = no_words_overlap_or_leave_the_page(figure)
+    assert {"found", "true", "sensors", "exciters"} <= set(found)
+    (errors,) = [a for a in figure.axes if a.get_xlabel() == "found - true [%]"]
+    ends = [segment[:, 0] for segment in errors.collections[0].get_segments()]
+    np.testing.assert_allclose(ends, [(0.0, 0.2), (-0.04, 0.04)], atol=1e-12)
+    assert np.ptp(errors.get_xlim()) < 0.3
+    responses = figure.axes[0].lines
+    assert [line.get_xdata().size for line in responses] == [X.size, fine.size]
+    with pytest.raises(ConfigError, match="'test' has 2 values for 20 frequencies"):
+        view.updating(X, {"test": [1.0, 2.0]}, changes, structure=structure, label="u")
+
+
 def test_an_interface_on_the_far_side_is_said_to_be_turned_away():
     model = block()
     points, triangles = model.points[model.surface.nodes], model.surface.triangles
