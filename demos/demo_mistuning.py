@@ -140,13 +140,13 @@ if first:
         [[seen, one_wheel], [many]],
         options.out / "mistuning.png",
         title=f"A disk of {N} blades that differ, driven by engine order {ORDER}",
-        caption=f"Titanium wheel of {full.n_wheel} dofs, reduced to {sector.free.size} per sector, "
-        f"with {100 * ZETA:g} % damping. Top left: the wheel of the top right at "
-        "the peak of its worst blade, in true size. Top right: one wheel whose blades scatter by 0.4 % in "
+        caption=f"Titanium wheel of {full.n_wheel} dofs, reduced to {sector.free.size} per "
+        f"sector, with {100 * ZETA:g} % damping. Top left: the wheel of the top right at the peak "
+        "of its worst blade, in true size. Top right: one wheel whose blades scatter by 0.4 % in "
         "stiffness; thin lines are its other blades. Bottom: small scatter suffices to make one "
         "blade vibrate far more than those of a perfect wheel; with larger scatter blades no "
-        "longer reach each other, and the amplification falls. Whitehead's bound for "
-        f"{N} blades is {whitehead(N):.2f}.",
+        f"longer reach each other, and the amplification falls. Whitehead's bound for {N} blades "
+        f"is {whitehead(N):.2f}.",
     )
 
 # ## What to remember

@@ -70,7 +70,10 @@ FLAPPING, LAGGING = (0, 0, 1), (0, 1, 0)
 
 def between(eta, axis):
     """The same at a speed of which no exact frequencies are known; their squares are near lines."""
-    near = [np.interp(eta**2, np.square(list(FLAP)), np.square(f)) for f in zip(*FLAP.values())]
+    near = [
+        np.interp(eta**2, np.square(list(FLAP)), np.square(f))
+        for f in np.transpose(list(FLAP.values()))
+    ]
     near = np.sqrt(np.array(near) - (0.0 if axis == FLAPPING else eta**2))
     found = 2 * np.pi * beam.rotating_frequencies(eta * unit, axis, fixed=("root",)) / unit
     return [found[np.argmin(abs(found - f))] for f in near]

@@ -177,8 +177,8 @@ def test_a_film_shows_what_moves_from_one_place_and_leaves_the_rest():
 
 def test_plates_are_their_outlines_made_thick_and_move_with_them():
     square = np.array([[0.0, 0], [0.4, 0], [0.4, 0.2], [0, 0.2]])
-    other = square + (1.0, 0.5)
-    frames = [[square, other], [square, other + (0.0, 0.3)]]
+    other = square + np.array([1.0, 0.5])
+    frames = [[square, other], [square, other + np.array([0.0, 0.3])]]
     thing = view.plates(frames, 0.5, values=[1.0, 2.0])
     p, q, r = np.moveaxis(thing.points[0][thing.cells], 1, 0)
     assert np.sum(p * np.cross(q, r)) / 6 == pytest.approx(2 * 0.4 * 0.2 * 0.5)
