@@ -206,8 +206,11 @@ def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: in
 
 def _impact(out: Array, last: Array) -> Impact:
     t, z, v, forces, energy, modal = np.split(out, [1, 4, 7, 10, 17], axis=1)
-    stays = map(float, last[3:6])
-    return Impact(t[:, 0], z, v, forces, energy, last[:3], *stays, STATES[int(last[6])], modal)
+    deepest, deflection, plastic = map(float, last[3:6])
+    state = STATES[int(last[6])]
+    return Impact(
+        t[:, 0], z, v, forces, energy, last[:3], deepest, deflection, plastic, state, modal
+    )
 
 
 VARIED_NUMBERS = {  # what `sensitivity` changes: where it stands, and the power of the factor there

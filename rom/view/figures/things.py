@@ -102,13 +102,12 @@ def plates(
     counts = [len(points) for points, _ in frames[0]] if frames else []
     if not counts or any([len(p) for p, _ in still] != counts for still in frames):
         raise ConfigError("there is no plate, or their corners differ from picture to picture.")
-    if values is not None:
-        values = np.atleast_1d(np.asarray(values, dtype=float))
-        if values.shape != (len(counts),):
-            raise ConfigError(f"{len(counts)} plates have {values.shape} values.")
-        values = np.repeat(values, counts)
+    shown = None if values is None else np.atleast_1d(np.asarray(values, dtype=float))
+    if shown is not None and shown.shape != (len(counts),):
+        raise ConfigError(f"{len(counts)} plates have {shown.shape} values.")
+    of_points = None if shown is None else np.repeat(shown, counts)
     points = np.stack([joined(still)[0] for still in frames])
-    return Thing(points, joined(frames[0])[1], colour, values=values)
+    return Thing(points, joined(frames[0])[1], colour, values=of_points)
 
 
 def _plate(outline: npt.ArrayLike, width: float) -> Mesh:
@@ -250,10 +249,10 @@ def _between(numbers: Any, n: int) -> bool:
 
 def _colours(scene: Scene) -> dict[str, str]:
     """Of each thing: its own, or the next one of the house."""
-    chosen = {}
+    chosen: dict[str, str] = {}
     for name, thing in scene.things.items():
         own = thing.colour if isinstance(thing, Thing) else ""
-        free = sum(1 for c in chosen.values() if c in COLOURS)
+        free = len([c for c in chosen.values() if c in COLOURS])
         chosen[name] = own or COLOURS[free % len(COLOURS)]
     return chosen
 

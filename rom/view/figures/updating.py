@@ -82,7 +82,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
         page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
         _responses(page.area(figure, 130, 85, PAGE_WIDTH - 170, TOP_HEIGHT), f, lines, label)
         areas = [page.area(figure, left, top, 270, BOTTOM_HEIGHT) for left in (250, 560)]
-        _changes(*areas, changes)
+        _changes(areas[0], areas[1], changes)
         for axes in areas:
             page.legend_above(axes, 270)
         draw_scene(figure, page.area(figure, 880, top - 10, 590, BOTTOM_HEIGHT + 85), scene)
