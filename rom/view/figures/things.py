@@ -102,10 +102,10 @@ def plates(
     counts = [len(points) for points, _ in frames[0]] if frames else []
     if not counts or any([len(p) for p, _ in still] != counts for still in frames):
         raise ConfigError("there is no plate, or their corners differ from picture to picture.")
-    shown = None if values is None else np.atleast_1d(np.asarray(values, dtype=float))
-    if shown is not None and shown.shape != (len(counts),):
-        raise ConfigError(f"{len(counts)} plates have {shown.shape} values.")
-    of_points = None if shown is None else np.repeat(shown, counts)
+    per_plate = None if values is None else np.atleast_1d(np.asarray(values, dtype=float))
+    if per_plate is not None and per_plate.shape != (len(counts),):
+        raise ConfigError(f"{len(counts)} plates have {per_plate.shape} values.")
+    of_points = None if per_plate is None else np.repeat(per_plate, counts)
     points = np.stack([joined(still)[0] for still in frames])
     return Thing(points, joined(frames[0])[1], colour, values=of_points)
 
