@@ -9,6 +9,7 @@ from rom.view.canvas.solids import gear as gear
 from rom.view.canvas.solids import joined as joined
 from rom.view.canvas.solids import ring as ring
 from rom.view.canvas.solids import tube as tube
+from rom.view.canvas.solids import wound as wound
 from rom.view.figures.curves import campbell as campbell
 from rom.view.figures.curves import convergence as convergence
 from rom.view.figures.curves import frequencies as frequencies
@@ -28,6 +29,7 @@ from rom.view.figures.updating import updating as updating
 from rom.view.scenes.faces import faces as faces
 from rom.view.scenes.film import animate as animate
 from rom.view.scenes.film import instants as instants
+from rom.view.scenes.film import posed as posed
 from rom.view.scenes.mechanisms import start as start
 from rom.view.scenes.meshes import mesh as mesh
 from rom.view.scenes.meshes import meshed as meshed

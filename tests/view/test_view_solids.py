@@ -84,6 +84,21 @@ def test_a_coil_has_the_volume_of_its_wire():
     assert points[:, 2].min() > -0.05 and points[:, 2].max() < 1.05
 
 
+def test_a_spring_is_wound_about_a_bent_line():
+    """A quarter of a circle of radius 1: the wire is as long as a helix on a torus."""
+    u = np.linspace(0.0, np.pi / 2, 60)
+    line = np.column_stack([np.cos(u), np.sin(u), 0 * u])
+    points, triangles = view.wound(line, 0.2, 0.01, turns=8)
+    ring = np.linalg.norm(points[:, :2], axis=1) - 1.0
+    away = np.hypot(ring, points[:, 2])[:-2]  # from the middle line, without the middles of ends
+    assert abs(away - 0.1).max() < 0.0055
+    s = np.linspace(0.0, 1.0, 20001)
+    turn = 16 * np.pi * s
+    around, along = 16 * np.pi * 0.1, np.pi / 2 * (1 + 0.1 * np.cos(turn))
+    length = np.hypot(around, along).mean()
+    assert abs(volume((points, triangles)) / (np.pi / 4 * 0.01**2 * length) - 1) < 0.06
+
+
 def test_a_tube_round_a_corner_keeps_its_ends():
     points, triangles = view.tube([(0, 0, 0), (1, 0, 0), (1, 1, 0)], 0.1)
     assert is_closed((points, triangles))
@@ -123,6 +138,7 @@ def test_meshes_are_joined_with_their_own_triangles():
         (lambda: view.tube([(0, 0, 0)], 0.1), r"\(k, 3\) with k > 1, got \(1, 3\)"),
         (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
         (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m makes no coil"),
+        (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "are in one place"),
         (lambda: view.extruded([(0, 0), (1, 0)], 1.0), r"\(n, 2\) with n > 2, got \(2, 2\)"),
         (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
         (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore of 2 m"),

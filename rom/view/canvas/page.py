@@ -23,6 +23,7 @@ DPI = 150
 TITLE_SIZE, BODY_SIZE, SMALL_SIZE = 12.5, 9.5, 8.5  # points
 LINE_HEIGHT = 26  # of small text [pixel]
 LETTER_WIDTH = 0.545 * SMALL_SIZE * DPI / 72  # of small text, on the average [pixel]
+TICK_WIDTH = 45  # of a tick below a colour bar, with its number [pixel]
 HANDLE_WIDTH, ROW_HEIGHT = 80, 27  # of a legend: beside its names, and of a row [pixel]
 
 
@@ -132,7 +133,7 @@ def colour_bar(
     )
     axes.set_yticks([])
     axes.tick_params(labelsize=SMALL_SIZE, pad=3, length=4)
-    axes.locator_params(axis="x", nbins=6)
+    axes.locator_params(axis="x", nbins=int(np.clip(rectangle[2] / TICK_WIDTH, 1, 6)))
     axes.set_title(label, size=SMALL_SIZE, pad=6)
 
 

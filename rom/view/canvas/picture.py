@@ -76,7 +76,7 @@ class ScaledTicks(Formatter):
     """Labels of ticks in a multiple of what is drawn, with as many digits as tell them apart."""
 
     def __init__(self, factor: float):
-        self.factor, self.digits = factor, 6
+        self.factor, self.digits, self.written = factor, 6, 0
 
     def set_locs(self, locs: Any) -> None:
         """Choose the digits from the distance of the ticks."""
@@ -84,7 +84,10 @@ class ScaledTicks(Formatter):
         steps = np.abs(np.diff(self.factor * np.unique(locs)))
         if steps.size:
             self.digits = max(0, 2 - int(np.floor(np.log10(steps.min()))))
+        shown = [f"{abs(self.factor * x):.{self.digits}f}" for x in np.unique(locs)]
+        self.written = max((len(x.rstrip("0").partition(".")[2]) for x in shown), default=0)
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """The label of one tick."""
-        return f"{round(self.factor * x, self.digits) + 0.0:.12g}".replace("-", "\u2212")
+        value = round(self.factor * x, self.digits) + 0.0
+        return f"{value:.{self.written}f}".replace("-", "\u2212")

@@ -12,6 +12,7 @@ from rom.model import Array, Index
 
 Mesh = tuple[Array, Index]
 BORE_SIDES = 48  # of a hole at least
+COIL_POINTS = 24  # of a spring, to a turn
 FILLET_RATIO = 0.25  # of the gap of a gear, by which a tooth is wider at its root
 
 
@@ -147,22 +148,9 @@ def tube(line: npt.ArrayLike, diameter: float, *, sides: int = 16) -> Mesh:
     Raises:
         ConfigError: if the points are no curve.
     """
-    X = np.asarray(line, dtype=float)
-    if X.ndim != 2 or X.shape[1:] != (3,) or len(X) < 2:
-        raise ConfigError(f"the line of a tube is (k, 3) with k > 1, got {X.shape}.")
-    steps = np.diff(X, axis=0)
-    lengths = np.linalg.norm(steps, axis=1)
-    if not (lengths > 0.0).all():
-        raise ConfigError("two points of the line of a tube are in one place.")
-    ahead = steps / lengths[:, None]
-    along = np.vstack([ahead[:1], ahead[1:] + ahead[:-1], ahead[-1:]])
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    x = across(np.zeros(3), along[0])[0]
-    loops = []
-    for centre, t in zip(X, along, strict=True):
-        x = x - (x @ t) * t
-        x = x / np.linalg.norm(x)
-        loops.append(centre + _circle(x, np.cross(t, x), diameter / 2, sides))
+    X = _curve(line)[0]
+    loops = [centre + _circle(x, y, diameter / 2, sides)
+             for centre, x, y in zip(X, *_sections(X), strict=True)]  # fmt: skip
     i, j = np.arange(sides), np.roll(np.arange(sides), -1)
     n, last = sides * len(X), sides * (len(X) - 1)
     triangles = [_band(k * sides + i, (k + 1) * sides + i) for k in range(len(X) - 1)]
@@ -190,22 +178,63 @@ def coil(
     Raises:
         ConfigError: if the wire is thicker than its bends allow.
     """
+    return wound(np.stack([np.asarray(a, dtype=float), np.asarray(b, dtype=float)]), diameter,
+                 wire, turns=turns)  # fmt: skip
+
+
+@typed
+def wound(line: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6.0) -> Mesh:
+    """Helical spring about a curve: one that is bent.
+
+    Args:
+        line: (k, 3) points of its middle line, k > 1, no two of them in one place [m].
+        diameter: of the middle line of the wire [m].
+        wire: diameter of the wire [m].
+        turns: number of turns.
+
+    Returns:
+        Points and triangles.
+
+    Raises:
+        ConfigError: if the points are no curve, or the wire is thicker than its bends allow.
+    """
     if not 0.0 < wire < diameter:
         raise ConfigError(f"a wire of {wire:g} m makes no coil of {diameter:g} m.")
-    return tube(helix(a, b, diameter, turns), wire, sides=12)
+    X, s = _curve(line)
+    even = np.linspace(0.0, s[-1], int(np.ceil(COIL_POINTS * turns)) + 1)
+    X = np.column_stack([np.interp(even, s, x) for x in X.T])
+    x, y = _sections(X)
+    angle = (2 * np.pi * turns * even / s[-1])[:, None]
+    return tube(X + 0.5 * diameter * (np.cos(angle) * x + np.sin(angle) * y), wire, sides=12)
 
 
-def helix(a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, turns: float) -> Array:
-    """(k, 3) points on a helix about the line from a to b, 24 to a turn."""
-    x, y, z = across(a, b)
-    s = np.linspace(0.0, 1.0, int(np.ceil(24 * turns)) + 1)[:, None]
-    angle = 2 * np.pi * turns * s
-    length = np.linalg.norm(np.asarray(b, dtype=float) - np.asarray(a, dtype=float))
-    return (
-        np.asarray(a, dtype=float)
-        + 0.5 * diameter * (np.cos(angle) * x + np.sin(angle) * y)
-        + length * s * z
-    )
+def _curve(line: npt.ArrayLike) -> tuple[Array, Array]:
+    """(k, 3) points of a curve and (k,) way along it [m].
+
+    Raises:
+        ConfigError: if the points are no curve.
+    """
+    X = np.asarray(line, dtype=float)
+    if X.ndim != 2 or X.shape[1:] != (3,) or len(X) < 2:
+        raise ConfigError(f"the line of a tube is (k, 3) with k > 1, got {X.shape}.")
+    lengths = np.linalg.norm(np.diff(X, axis=0), axis=1)
+    if not (lengths > 0.0).all():
+        raise ConfigError("two points of the line of a tube are in one place.")
+    return X, np.concatenate([[0.0], np.cumsum(lengths)])
+
+
+def _sections(X: Array) -> tuple[Array, Array]:
+    """(k, 3) axes x and y across a curve, which turn about it as little as can be."""
+    steps = np.diff(X, axis=0)
+    ahead = steps / np.linalg.norm(steps, axis=1)[:, None]
+    along = np.vstack([ahead[:1], ahead[1:] + ahead[:-1], ahead[-1:]])
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    x, rows = across(np.zeros(3), along[0])[0], []
+    for t in along:
+        x = x - (x @ t) * t
+        x = x / np.linalg.norm(x)
+        rows.append(x)
+    return np.array(rows), np.cross(along, rows)
 
 
 @typed

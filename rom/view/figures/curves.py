@@ -19,10 +19,11 @@ from rom.view.figures.things import Scene, draw_scene
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE_WIDTH, PANEL_HEIGHT, BESIDE_WIDTH = 1400, 330, 440  # pixel
+PAGE_WIDTH, PANEL_HEIGHT, BESIDE_WIDTH, SCENE_GAP = 1400, 330, 440, 45  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
 MARKERS = ("o", "s", "^", "D", "v", "x")
 GREY = "#5c636e"
+LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
@@ -38,7 +39,7 @@ def history(  # noqa: PLR0913  keywords of one picture
     title: str = "",
     caption: str = "",
     over: str | None = None,
-    beside: Scene | None = None,
+    beside: Scene | Sequence[Scene] | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw quantities over time, or over something else, one panel below the other.
@@ -46,14 +47,16 @@ def history(  # noqa: PLR0913  keywords of one picture
     Args:
         t: (n,) time [s], or values of what is named by ``over``.
         panels: (label of the axis with its unit, {name: (n,) values}) from top to bottom; a pair
-            (times, values) is drawn as points.
+            (times, values) is drawn as points, a single number as a thin level line; values that
+            are words become rows, the first word lowest.
         path: picture to write, .png; None to write nothing.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
         over: label of the horizontal axis, with its unit, when that is not time.
-        beside: what the curves belong to; None for curves alone.
-        ax: Axes of matplotlib to draw into, one for each panel and one for what is beside them;
-            None for a page of its own.
+        beside: what the curves belong to, or several scenes from top to bottom; None for curves
+            alone.
+        ax: Axes of matplotlib to draw into, one for each panel and one for each scene beside
+            them; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -78,17 +81,29 @@ def history(  # noqa: PLR0913  keywords of one picture
 
 def _histories(axes: Any, t: Array, curves: dict[str, Any]) -> None:
     pairs = [isinstance(values, tuple) for values in curves.values()]
+    levels = [not pair and np.ndim(v) == 0 for v, pair in zip(curves.values(), pairs, strict=True)]
     lines = []
     for (name, values), pair in zip(curves.items(), pairs, strict=True):
+        values = np.full_like(t, values) if np.ndim(values) == 0 else values
+        if not pair and np.asarray(values).dtype.kind == "U":
+            values = _rows(axes, values)
         x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
         if y.shape != x.shape:
             raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
         lines.append((x, y))
     flat = without_round_off([y for _, y in lines])
-    for k, (name, pair, (x, _), y) in enumerate(zip(curves, pairs, lines, flat, strict=True)):
+    for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
         look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
-        look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pair else {}
+        look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pairs[k] else {}
+        look |= LEVEL_STYLE if levels[k] else {}
         axes.plot(x, y, label=name, **look)
+
+
+def _rows(axes: Any, words: Any) -> Array:
+    """(n,) numbers of words in the order in which they come, named at the axis."""
+    names = list(dict.fromkeys(words))
+    axes.set_yticks(range(len(names)), names)
+    return np.array([names.index(word) for word in words], dtype=float)
 
 
 def _shared(areas: Sequence[Any], ax: Any) -> None:
@@ -114,7 +129,7 @@ def frequencies(
     path: str | Path | None = None,
     *,
     title: str = "",
-    beside: Scene | None = None,
+    beside: Scene | Sequence[Scene] | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw the relative errors of reduced frequencies in several supports.
@@ -123,8 +138,8 @@ def frequencies(
         comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
         path: picture to write, .png; None to write nothing.
         title: heading.
-        beside: what the frequencies belong to; None for curves alone.
-        ax: Axes of matplotlib to draw into, two with what is beside; None for a page of its own.
+        beside: what vibrates, or several scenes from top to bottom; None for curves alone.
+        ax: Axes of matplotlib to draw into, and one for each scene; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -171,7 +186,7 @@ def convergence(
     xlabel: str,
     title: str = "",
     caption: str = "",
-    beside: Scene | None = None,
+    beside: Scene | Sequence[Scene] | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw errors that fall with the size of a model, on logarithmic axes.
@@ -183,9 +198,10 @@ def convergence(
         xlabel: what the sizes count.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        beside: what the errors belong to; None for curves alone.
-        ax: Axes of matplotlib to draw into, one for each panel and one for what is beside them;
-            None for a page of its own.
+        beside: what the errors belong to, or several scenes from top to bottom; None for curves
+            alone.
+        ax: Axes of matplotlib to draw into, one for each panel and one for each scene beside
+            them; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -206,7 +222,7 @@ def convergence(
                 axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
             axes.set_xlabel(xlabel, size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
-            _near_ticks(axes)
+            near_ticks(axes.yaxis)
             finish(axes, legend=ax is not None)
         _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
         _shared(areas, ax)
@@ -221,9 +237,10 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     *,
     orders: Sequence[float] = (1.0,),
     names: Sequence[str] = (),
+    marks: dict[str, float] | None = None,
     title: str = "",
     caption: str = "",
-    beside: Scene | None = None,
+    beside: Scene | Sequence[Scene] | None = None,
     ax: Any = None,
 ) -> "Figure":
     """Draw natural frequencies over the speed of rotation, with multiples of the speed.
@@ -236,11 +253,13 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         path: picture to write, .png; None to write nothing.
         orders: multiples of the speed to draw [1].
         names: one per mode, in the order of the columns; without names modes are numbered.
+        marks: {name: speed [rad/s]} drawn as upright lines.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        beside: what vibrates; None for curves alone.
-        ax: Axes of matplotlib to draw into, two if there is damping, and one for what is beside
-            them; None for a page of its own.
+        beside: what vibrates, or several scenes from top to bottom; None for curves
+            alone.
+        ax: Axes of matplotlib to draw into, two if there is damping, and one for each scene
+            beside them; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -259,7 +278,8 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     turns = 30 * diagram.speeds / np.pi
     damped = np.abs(damping).max(initial=0.0) > 1e-3
     with page.styled():
-        legends = [[*labels, RAYS_LABEL], *([[*labels]] if damped else [])]
+        legends = [[*labels, RAYS_LABEL, *(marks or {})]]
+        legends += [[*labels, *(marks or {})]] if damped else []
         figure, areas = _panels(ax, legends, "campbell", Words(title, caption, beside))
         for k, label in enumerate(labels):
             look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.6}
@@ -271,6 +291,8 @@ def campbell(  # noqa: PLR0913  keywords of one picture
             axes.set_xlabel("speed [1/min]", size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(turns[0], turns[-1])
+            for name, speed in (marks or {}).items():
+                axes.axvline(30 * speed / np.pi, label=name, **LEVEL_STYLE)
             finish(axes, legend=ax is not None)
         _shared(areas, ax)
         return page.save(figure, path)
@@ -309,14 +331,21 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
         axes.set_xlim(low, high)
 
 
-def _near_ticks(axes: Any) -> None:
-    """Ticks at 1, 2 and 5 where the values span too little for powers of ten."""
-    low, high = axes.get_ylim()
+def near_ticks(axis: Any) -> None:
+    """Ticks at 1, 2 and 5 where the values on a logarithmic axis span too little for powers of ten.
+
+    Args:
+        axis: of matplotlib, horizontal or vertical.
+    """
+    from matplotlib.ticker import NullFormatter
+
+    low, high = axis.get_view_interval()
     if high < 100 * low:
         powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
         ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
         ticks = ticks[(ticks >= low) & (ticks <= high)]
-        axes.set_yticks(ticks, [f"{y:g}" for y in ticks])
+        axis.set_ticks(ticks, [f"{x:g}" for x in ticks])
+        axis.set_minor_formatter(NullFormatter())
 
 
 def _once(legends: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -331,7 +360,13 @@ class Words:
 
     title: str
     caption: str
-    beside: Scene | None = None
+    beside: Scene | Sequence[Scene] | None = None
+
+    @property
+    def scenes(self) -> list[Scene]:
+        """What stands beside the panels, from top to bottom."""
+        beside = [] if self.beside is None else self.beside
+        return [beside] if isinstance(beside, Scene) else list(beside)
 
 
 def _panels(
@@ -345,25 +380,26 @@ def _panels(
         name: of the function that draws.
         words: what stands around.
     """
-    beside, n = words.beside, len(legends)
+    scenes, n = words.scenes, len(legends)
     if ax is not None:
-        figure, areas = page.taken(ax, n + (beside is not None), name)
+        figure, areas = page.taken(ax, n + len(scenes), name)
         if words.title:
             areas[0].set_title(words.title, loc="left")
-        if beside is not None:
-            draw_scene(figure, areas[-1], beside)
+        for axes, scene in zip(areas[n:], scenes, strict=True):
+            draw_scene(figure, axes, scene)
         return figure, areas[:n]
     text, below = page.caption(words.caption, PAGE_WIDTH - 60)
-    width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if beside is not None else 0)
+    width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if scenes else 0)
     rows = np.array([page.legend_shape(names, width)[0] for names in _once(legends)])
     feet = 60 + np.cumsum(PANEL_HEIGHT + 25 + page.ROW_HEIGHT * rows)
     height = int(feet[-1]) + 80 + below + 25
     figure = page.sheet(PAGE_WIDTH, height)
     page.words(figure, words.title, 30, 25, size=page.TITLE_SIZE, weight="bold")
     areas = [page.area(figure, 150, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
-    if beside is not None:
-        left = PAGE_WIDTH - BESIDE_WIDTH - 20
-        draw_scene(figure, page.area(figure, left, 105, BESIDE_WIDTH, feet[-1] - 45), beside)
+    tall = (feet[-1] - 45 + SCENE_GAP) / max(1, len(scenes))
+    for k, scene in enumerate(scenes):
+        left, top = PAGE_WIDTH - BESIDE_WIDTH - 20, 105 + k * tall
+        draw_scene(figure, page.area(figure, left, top, BESIDE_WIDTH, tall - SCENE_GAP), scene)
     page.words(figure, text, 30, height - below - 20, size=page.SMALL_SIZE)
     return figure, areas
 

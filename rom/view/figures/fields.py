@@ -15,6 +15,7 @@ from rom.view.canvas import page
 from rom.view.canvas.offscreen import COLOUR_MAP
 from rom.view.canvas.scales import readable
 from rom.view.figures.curves import LINES, MARKERS
+from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +24,8 @@ PAGE_WIDTH = 1400  # [pixel]
 COLUMN_GAP = 120  # [pixel]
 ROW_GAP = 150  # [pixel]
 BAR_WIDTH = 60  # of a colour bar [pixel]
+LABEL_RATIO = 0.04  # of a drawing, that the names of level curves stay away from its edge
+ON_SHADE = (("#d1495b", "white"), ("white", "#22262b"))  # fill and edge of points on colours
 STONE_COLOUR, EDGE_COLOUR = "#d9d2c3", "#5c636e"
 
 
@@ -44,6 +47,7 @@ class Drawing:
         curves: {label: list of (k, 2) curves in units of the axes}; labels that start with "_" stay
             out of the legend.
         points: {label: (k, 2) points in units of the axes}.
+        levels: {value: list of (k, 2) level curves of the shade}, thin and named by their value.
         equal: the same scale along x and y.
     """
 
@@ -57,13 +61,14 @@ class Drawing:
     values: Array | None = None
     curves: dict[str, list[Array]] = field(default_factory=dict)
     points: dict[str, Array] = field(default_factory=dict)
+    levels: dict[float, list[Array]] = field(default_factory=dict)
     equal: bool = True
 
 
 @path_came_first(1, 0)
 @typed
 def plane(
-    drawings: Sequence[Drawing],
+    drawings: Sequence[Drawing | Scene],
     path: str | Path | None = None,
     *,
     title: str = "",
@@ -75,7 +80,7 @@ def plane(
     """Draw things in a plane, side by side.
 
     Args:
-        drawings: row by row, from the top left.
+        drawings: drawings and scenes row by row, from the top left.
         path: picture to write, .png; None to write nothing.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
@@ -107,14 +112,16 @@ def plane(
         for k, drawing in enumerate(drawings):
             row, column = divmod(k, columns)
             left = 95 + column * (width + COLUMN_GAP)
-            narrow = BAR_WIDTH if drawing.label else 0
+            narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
             axes = page.area(figure, left, 110 + row * (height + ROW_GAP), width - narrow, height)
             _draw(figure, axes, drawing)
         page.words(figure, text, 30, tall - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 
-def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
+def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
+    if isinstance(drawing, Scene):
+        return draw_scene(figure, axes, drawing)
     axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(drawing.x, size=page.SMALL_SIZE)
     axes.set_ylabel(drawing.y, size=page.SMALL_SIZE)
@@ -132,8 +139,11 @@ def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
             colour = "white" if drawing.shade is not None else LINES[k % len(LINES)]
             look = {"color": colour, "lw": 1.0 if drawing.shade is not None else 2.0, "zorder": 3}
             axes.plot(*curve.T, label=label if n == 0 else f"_{label}", **look)
+    _draw_levels(axes, drawing)
+    over = drawing.shade is not None
     for k, (label, points) in enumerate(drawing.points.items()):
-        look = {"color": LINES[(k + 1) % len(LINES)], "edgecolor": "white", "zorder": 4}
+        fill, edge = ON_SHADE[k % 2] if over else (LINES[(k + 1) % len(LINES)], "white")
+        look = {"color": fill, "edgecolor": edge, "zorder": 4}
         axes.scatter(*points.T, s=48, marker=MARKERS[k % len(MARKERS)], label=label, **look)
     if drawing.extent is not None:
         axes.set_xlim(drawing.extent[:2])
@@ -144,6 +154,27 @@ def _draw(figure: Any, axes: Any, drawing: Drawing) -> None:
     if axes.get_legend_handles_labels()[0]:
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
         axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=2, **place)
+
+
+def _draw_levels(axes: Any, drawing: Drawing) -> None:
+    """Level curves, each value written once on them, far from the other values and the points."""
+    if not drawing.levels or drawing.extent is None:
+        return
+    low, high = np.reshape(drawing.extent, (2, 2)).T
+    taken = [(xy - low) / (high - low) for xy in drawing.points.values()]
+    for value, curves in drawing.levels.items():
+        for curve in curves:
+            axes.plot(*curve.T, color="white", lw=1.0, zorder=3)
+        places = (np.vstack(curves) - low) / (high - low)
+        places = places[(abs(places - 0.5) < 0.5 - LABEL_RATIO).all(axis=1)]
+        if not len(places):
+            continue
+        apart = [np.linalg.norm(places[:, None] - others, axis=2).min(axis=1) for others in taken]
+        best = places[np.argmax(np.min([*apart, np.ones(len(places))], axis=0))]
+        taken.append(best[None])
+        axes.text(*(low + best * (high - low)), f"{value:g}", size=page.SMALL_SIZE, ha="center",
+                  va="center", color="white", zorder=5,
+                  bbox={"fc": "#22262b", "ec": "none", "alpha": 0.65, "pad": 1.2})  # fmt: skip
 
 
 def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:

@@ -12,7 +12,7 @@ from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
-from rom.view.figures.curves import LINES, PAGE_WIDTH, finish
+from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, near_ticks
 from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ class Panel:
         points: {name: (x (n,), y (n,))} drawn as small circles over them.
         bars: {name: (low, high)} horizontal bars from low to high in units of the axis, from top to
             bottom.
+        notes: {words: (x, y)} written beside that place.
         equal: the same scale along both axes.
         log: logarithmic scales along both axes.
 
@@ -53,6 +54,7 @@ class Panel:
     curves: Mapping[str, Line] = field(default_factory=dict)
     points: Mapping[str, Line] = field(default_factory=dict)
     bars: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    notes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     equal: bool = False
     log: bool = False
 
@@ -153,12 +155,18 @@ def _draw(axes: Any, panel: Panel, *, alone: bool) -> None:
         axes.plot(*line, "o", label=name, **look)
     if panel.bars:
         _draw_bars(axes, panel.bars)
+    for words, place in panel.notes.items():
+        axes.annotate(words, place, (6, 0), textcoords="offset points", va="center",
+                      size=page.SMALL_SIZE, color=page.TEXT_COLOUR,
+                      bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})  # fmt: skip
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(panel.xlabel, size=page.SMALL_SIZE)
     axes.set_ylabel(panel.ylabel, size=page.SMALL_SIZE)
     if panel.log:
         axes.set_xscale("log")
         axes.set_yscale("log")
+        near_ticks(axes.xaxis)
+        near_ticks(axes.yaxis)
     if not (panel.xlabel or panel.ylabel):
         axes.set_axis_off()
     if panel.equal:

@@ -64,6 +64,7 @@ class Scene:
         label: what the values of things are, with their unit.
         view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
         up: (3,) upright direction [1]; None: across the longest extent.
+        limits: (2,) values at the ends of the colours, in units of the label; None for the largest.
 
     Example:
         >>> scene = rom.view.Scene("A block", {"steel": rom.view.box((0.1, 0.2, 0.1))})
@@ -76,6 +77,7 @@ class Scene:
     label: str = ""
     view: npt.ArrayLike | None = None
     up: npt.ArrayLike | None = None
+    limits: tuple[float, float] | None = None
 
 
 @typed
@@ -148,7 +150,7 @@ def film(
     if t.shape != (frames,):
         raise ConfigError(f"{t.size} times for {frames} pictures of {scene.title!r}.")
     camera = aimed(_seen(actors), FILM_WIDTH, view=scene.view, up=scene.up, heights=HEIGHTS)
-    limits = _limits(actors)
+    limits = scene.limits or _limits(actors)
     images = render(actors, camera, limits=limits, oversampling=1)
     top, height = CLOCK_HEIGHT, images.shape[1]
     foot = top + height + below_height(scene, FILM_WIDTH)
@@ -182,7 +184,7 @@ def draw_scene(figure: Any, axes: Any, scene: Scene) -> None:
     ]  # fmt: skip
     shape = height / width
     camera = aimed(_seen(actors), width, view=scene.view, up=scene.up, heights=(shape, shape))
-    limits = _limits(actors)
+    limits = scene.limits or _limits(actors)
     image = render(actors, camera, limits=limits)[0]
     axes.set_title(scene.title, size=page.BODY_SIZE, loc="left")
     axes.set_axis_off()

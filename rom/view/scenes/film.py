@@ -19,7 +19,9 @@ from rom.view.canvas.scales import clock_texts, prefixed
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
 from rom.view.canvas.solids import Mesh
 from rom.view.canvas.symbols import polyline
+from rom.view.figures.things import Scene, Thing
 from rom.view.scenes.connections import connections
+from rom.view.scenes.meshes import NO_LINES
 from rom.view.scenes.places import Places, different, moving, placed
 from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
 
@@ -33,6 +35,7 @@ N_INSTANTS = 4  # that are chosen where none are asked for
 METAL_COLOURS = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 EDGE_COLOUR, TRACE_COLOUR = "#3a414b", "#d1495b"
 TRACE_POINTS = 1000
+POSED_AMONG = 60  # instants of a motion from which the colours of one of them follow
 
 
 @typed
@@ -123,6 +126,51 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     images = render(stage.actors, camera, limits=stage.limits)
     with page.styled():
         return page.save(_series_sheet(stage, camera, images, solution.t[steps], magnify), path)
+
+
+@typed
+def posed(  # noqa: PLR0913  keywords of one picture, all with defaults
+    mechanism: AnyMechanism,
+    solution: AnySolution,
+    time: float,
+    *,
+    title: str = "",
+    shapes: dict[str, Mesh] | None = None,
+    magnify: float = 1.0,
+    symbols: bool = True,
+    traces: tuple[str, ...] = (),
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+) -> Scene:
+    """The mechanism at an instant as a `Scene`, to stand beside curves; otherwise as `animate`.
+
+    Args:
+        mechanism: the mechanism.
+        solution: its motion.
+        time: the instant [s]; the step nearest to it is drawn. Colours, rails and planes are those
+            of the whole motion.
+        title: what is seen.
+        shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body.
+        magnify: deformations are drawn so many times larger than they are [1].
+        symbols: draw joints, springs, planes of contact and the ground, too.
+        traces: bodies whose origin leaves a line behind, all of its way.
+        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
+        up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
+
+    Raises:
+        ConfigError: for an unknown body.
+    """
+    step = int(np.argmin(np.abs(solution.t - time)))
+    others = np.linspace(0, solution.t.size - 1, POSED_AMONG).round().astype(int)
+    up = upright(mechanism) if up is None else up
+    look = Look(shapes or {}, magnify, symbols, traces, up)
+    stage = _stage(mechanism, solution, np.array([step, *others]), look)
+    things: dict[str, Thing | Mesh] = {
+        f"_{k}": Thing(a.points[0], a.cells, a.colour, None if a.values is None else a.values[0],
+                       a.opacity, a.width, NO_LINES) for k, a in enumerate(stage.actors)
+    }  # fmt: skip
+    label = f"deformation [{stage.unit}]" if stage.name else ""
+    return Scene(title, things, label, view, up, stage.limits if stage.name else None)
 
 
 @dataclass(frozen=True, slots=True)
