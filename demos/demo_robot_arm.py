@@ -172,32 +172,32 @@ say(f"the tool sags by {1e3 * np.linalg.norm(sag):.1f} mm and swings with {frequ
 energy = sol.energy
 spent = energy.total - energy.total[0] + energy.damping
 options.out.mkdir(parents=True, exist_ok=True)
+look = {
+    "view": (0.3, 0.3, 1.0), "up": (0, 1, 0), "traces": ("motor", "tool"),
+    "shapes": {"motor": view.box((0.1, 0.1, 0.1)), "tool": view.box((0.12, 0.12, 0.12))},
+}  # fmt: skip
 view.history(
     t,
     [
         ("joints [deg]", {"shoulder": np.degrees(sol.base[:, 0] + PICK[0]),
                           "elbow": np.degrees(sol.base[:, 1] + PICK[1])}),
-        ("miss, sideways [mm]", {"flexible": 1e3 * miss[:, 0],
-                                               "rigid": 1e3 * miss_rigid[:, 0]}),
-        ("miss, upwards [mm]", {"flexible": 1e3 * miss[:, 1],
-                                                "rigid": 1e3 * miss_rigid[:, 1]}),
+        ("miss, sideways [mm]", {"flexible": 1e3 * miss[:, 0], "rigid": 1e3 * miss_rigid[:, 0]}),
+        ("miss, upwards [mm]", {"flexible": 1e3 * miss[:, 1], "rigid": 1e3 * miss_rigid[:, 1]}),
         ("power [W]", {"of the motors": np.gradient(energy.drives, t),
                        "into energy and losses": np.gradient(spent, t)}),
     ],
     options.out / "robot_arm.png",
     title="Pick and place with a light arm",
+    beside=[view.posed(robot(True), sol, time, title=f"After {time:g} s", **look)
+            for time in (0.0, 0.26, END)],
     caption=f"Links of {L1:g} m and {L2:g} m, {masses[0]:.1f} kg and {masses[1]:.1f} kg, carry an "
     f"elbow motor of {ELBOW:g} kg and a tool of {TOOL:g} kg through {MOVE:g} s of motion. From top "
     "to bottom: angles of both joints, which follow their path; how far the tool is from where a "
-    "rigid arm on this path would hold it; what both motors spend, and where it goes. The tool "
-    f"hangs {1e3 * abs(sag[1]):.0f} mm too low in the end, and swings at {frequency:.2f} Hz "
-    "although its joints stand almost still.",
+    "rigid arm on this path would hold it; what both motors spend, and where it goes. Red lines: "
+    f"paths of motor and tool. The tool hangs {1e3 * abs(sag[1]):.0f} mm too low in the end, and "
+    f"swings at {frequency:.2f} Hz although its joints stand almost still.",
 )  # fmt: skip
-view.animate(
-    robot(True), sol, options.out / "robot_arm.gif", frames=40,
-    view=(0.3, 0.3, 1.0), up=(0, 1, 0), traces=("motor", "tool"),
-    shapes={"motor": view.box((0.1, 0.1, 0.1)), "tool": view.box((0.12, 0.12, 0.12))},
-)  # fmt: skip
+view.animate(robot(True), sol, options.out / "robot_arm.gif", frames=75, seconds=6.0, **look)
 
 # ## What to remember
 #
