@@ -158,6 +158,11 @@ say(f"tumbling: momentum changes by {p:.1e}, angular momentum by {L_total:.1e}, 
 # ## Pictures
 
 options.out.mkdir(parents=True, exist_ok=True)
+look = {
+    "view": (0.3, -1.0, 0.8), "up": (0, 0, 1),
+    "shapes": {"hub": view.box((1, 1, 1)),
+               "wheel": view.cylinder((0, -0.55, 0), (0, 0.55, 0), 0.3)},
+}  # fmt: skip
 view.history(
     t,
     [
@@ -168,6 +173,8 @@ view.history(
     ],
     options.out / "satellite.png",
     title="A satellite turns by sixty degrees and stays there",
+    beside=[view.posed(satellite(True), sol, time, title=f"After {time:g} s", **look)
+            for time in (0.0, 1.5, 4.5)],
     caption=f"Hub of {HUB:g} kg, two panels of {L:g} m and {m:.1f} kg, a wheel that gains and "
     f"loses {TORQUE * SLEW / np.pi:.0f} N m s within {SLEW:g} s. From top to bottom: angle of the "
     "hub, its deviation from a satellite with rigid panels, deflection of both tips out of the "
@@ -175,11 +182,7 @@ view.history(
     f"the panels swing against each other at {floating[1]:.2f} Hz, faster than at {clamped:.2f} Hz "
     "on a wall, because the hub turns the other way.",
 )  # fmt: skip
-view.animate(
-    satellite(True), sol, options.out / "satellite.gif", frames=36, view=(0.3, -1.0, 0.8),
-    up=(0, 0, 1), shapes={"hub": view.box((1, 1, 1)), "wheel": view.cylinder(
-        np.array([0, -0.55, 0]), np.array([0, 0.55, 0]), 0.3)},
-)  # fmt: skip
+view.animate(satellite(True), sol, options.out / "satellite.gif", frames=72, seconds=6.0, **look)
 
 # ## What to remember
 #
