@@ -19,6 +19,7 @@ from rom import view
 from rom.bench.models import bar
 from rom.components.cosserat import HelicalSpring
 from rom.components.hand import (
+    GROUPS,
     HAND_SPRING,
     INDEX_LENGTHS,
     Bar,
@@ -40,7 +41,7 @@ options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
 options.out.mkdir(parents=True, exist_ok=True)
 say = (lambda *_: None) if options.quiet else print
-MM, MN = 1e-3, 1e-3
+MM, MN, THICK = 1e-3, 1e-3, 5e-3  # half the thickness of a finger
 
 # ## A finger closes
 
@@ -48,8 +49,32 @@ finger = Finger(n=12)
 postures = [rest(finger)]
 for tension in (0.5, 1.0, 1.5, 2.0, 2.5, 3.5):
     postures.append(close(finger, tension=tension, start=postures[-1]))
-closing = {f"{p.tension:g} N": (p.shape.x[:, 0] / MM, p.shape.x[:, 2] / MM)
-           for p in postures[::2]}  # fmt: skip
+
+
+def built(posture, aside, side=1):
+    """Phalanges, springs and cable of a finger, moved aside (3,); on the thumb's side if -1."""
+    one, x = posture.finger, posture.shape.x
+    links = [view.cylinder(x[t], x[t + 1], 2 * THICK) for *_, t, _ in one.joints]
+    wires = [view.wound(x[b : t + 1], spring.diameter, spring.wire, turns=spring.coils)
+             for spring, (b, _, t, _) in zip(one.springs, one.joints, strict=True)]  # fmt: skip
+    cable = view.tube(one.tendon.points(posture.shape), 1.2 * MM)
+    placed = [(p * (side, 1, 1) + np.array(aside), cells)
+              for p, cells in (view.joined(links), view.joined(wires), cable)]  # fmt: skip
+    return {"phalanges": placed[0], "springs": placed[1], "cable": placed[2]}
+
+
+def fingers_as_things(kept):
+    """{name: solids} of several fingers as one thing of each kind."""
+    colours = {"phalanges": "#c3c9d0", "springs": "#2f7f9f", "cable": "#d1495b"}
+    return {kind: view.Thing(*view.joined([parts[kind] for parts in kept]), colour)
+            for kind, colour in colours.items()}  # fmt: skip
+
+
+closing = view.Scene(
+    f"Index finger under {', '.join(f'{p.tension:g}' for p in postures[::2])} N",
+    fingers_as_things([built(p, (50 * MM * k, 0, 0)) for k, p in enumerate(postures[::2])]),
+    view=(0.2, -1.0, 0.25), up=(0, 0, 1),
+)  # fmt: skip
 
 
 def loop(friction):
@@ -110,29 +135,32 @@ bar = Bar((26 * MM, 20 * MM), 20 * MM)
 held = {name: grasp(f, bar, np.linspace(0.25, 2.5, 10))[-1] for name, f in fingers.items()}
 grip = {name: bar.pressure(p)[0].sum() for name, p in held.items()}
 say("pressed on the bar:", *(f"{name} {f:.2f} N" for name, f in grip.items()))
-circle = np.linspace(0, 2 * np.pi, 100)
-seen = {"_bar": (26 + 20 * np.cos(circle), 20 + 20 * np.sin(circle))}
-for name, p in held.items():
-    x, z = p.shape.x[:, 0] / MM, p.shape.x[:, 2] / MM
-    seen[name] = (52 - x, z) if name == "thumb" else (x, z)
+beside = {"index": 33.0, "middle": 11.0, "ring": -11.0, "little": -33.0}
+seen = fingers_as_things(
+    [
+        built(p, (52 * MM, 0, 0), -1) if name == "thumb" else built(p, (0, beside[name] * MM, 0))
+        for name, p in held.items()
+    ]
+)
+(x, z), reach = bar.centre, 50 * MM
+seen["bar"] = view.Thing(*view.cylinder((x, -reach, z), (x, reach, z), 2 * bar.radius), "#edae49")
 
 drawn = {f"friction {mu:g}": loop(mu) for mu in (0.2, 0.0)}
 view.panels(
     [
-        [Panel("Index finger, tension of the cable", "towards the palm [mm]", "along [mm]",
-               curves=closing, equal=True),
+        [closing,
          Panel("Cable drawn in and let out", "pull [mm]", "tension [N]", curves=drawn)],
         [Panel("Fingertip in the plane of flexion", "force [mN]", "deflection [mm]",
                curves=bending),
          Panel("Fingertip sideways", "force [mN]", "deflection [mm]", curves=sideways)],
         [Panel("Sideways stiffness of a spring", "compression [%]", "stiffness [N/m]",
                curves=columns),
-         Panel("Five fingers around a bar of 40 mm", "across the hand [mm]", "along [mm]",
-               curves=seen, equal=True)],
+         view.Scene("Five fingers around a bar of 40 mm", seen, view=(-0.5, -1.0, 0.45),
+                    up=(0, 0, 1))],
     ],
     options.out / "hand.png",
     title="Fingers whose joints are springs",
-    caption="Centre lines; fingers are 10 mm thick. Top: beyond 2.65 N coils touch on the palm "
+    caption="Phalanges are 10 mm thick. Top: beyond 2.65 N coils touch on the palm "
     "side; friction of the cable opens a loop. Middle: the slack finger is as soft sideways as in "
     "flexion, stiffeners in the joints cure that. Bottom: a long spring loses its sideways "
     "stiffness under compression and buckles at 20 %; fingers and thumb close with 2.5 N each.",
@@ -150,8 +178,8 @@ commands = Chart().follow(effort[0][::10], effort[1][::10], 10 * dt)
 pulls = np.repeat(commands.fingers(), 10, axis=0) / MM
 view.history(
     t, [
-        ("effort", {"flexor": effort[0], "extensor": effort[1]}),
-        ("selected group,\n0 thumb to 4 all", {"": np.repeat(commands.groups, 10)}),
+        ("effort, share of the largest", {"flexor": effort[0], "extensor": effort[1]}),
+        ("selected group", {"": np.repeat([(*GROUPS, "none")[k] for k in commands.groups], 10)}),
         ("pull [mm]", dict(zip(("thumb", "index", "middle", "ring", "little"), pulls.T,
                                strict=True))),
     ],
@@ -159,7 +187,8 @@ view.history(
     title="From two muscles to five fingers",
     caption="Top: envelopes of two synthetic muscle signals. Their ratio selects a group, in "
     "sectors of 18 degrees, their strength how far it closes. Middle: a group is kept through rest "
-    "and noise; -1 before the first. Bottom: fingers hold what they reached.",
+    "and noise. Bottom: fingers hold what they reached; middle, ring and little finger move "
+    "together.",
 )  # fmt: skip
 
 # ## What to remember

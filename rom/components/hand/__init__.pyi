@@ -8,6 +8,7 @@ from rom.components.hand.compliant_hand import Posture as Posture
 from rom.components.hand.compliant_hand import close as close
 from rom.components.hand.compliant_hand import hand as hand
 from rom.components.hand.compliant_hand import rest as rest
+from rom.components.hand.control_chart import GROUPS as GROUPS
 from rom.components.hand.control_chart import Chart as Chart
 from rom.components.hand.control_chart import Commands as Commands
 from rom.components.hand.control_chart import envelope as envelope
