@@ -106,9 +106,20 @@ if first:
     curves = {name: (np.tile([*turns, np.nan], 3),
                      np.vstack([beam[:, k::2] / (2 * np.pi), gap]).T.ravel())
               for k, name in enumerate(("backward whirl", "forward whirl"))}  # fmt: skip
+    metal = [view.cylinder((0, 0, 0), (0, 0, L), D)]
+    metal += [view.cylinder((0, 0, at - WIDE / 2), (0, 0, at + WIDE / 2), d)
+              for at, d in DISCS.items()]  # fmt: skip
+    springs = [view.coil((s * x, s * y, z), (s * (x + 0.12 * (x > 0)), s * (y + 0.12 * (y > 0)), z),
+                         0.03, 0.004) for z in (0.01, L - 0.01) for s in (-1, 1)
+               for x, y in ((D / 2, 0), (0, D / 2))]  # fmt: skip
+    machine = view.Scene(
+        "The rotor on its springs", {"steel": view.joined(metal), "springs": view.joined(springs)},
+        view=(1.0, 0.5, 0.4), up=(0, 1, 0),
+    )  # fmt: skip
     upper = view.Panel(
         "Beams, discs on a point", "speed [1/min]", "frequency [Hz]",
         curves={"_speed": (turns, turns / 60)} | curves, points=dots,
+        notes={"speed of rotation": (turns[6], 66.0)},
     )  # fmt: skip
     lower = view.Panel(
         "Solid over beams", "speed [1/min]", "frequency, solid over beams",
@@ -116,13 +127,13 @@ if first:
                 for k, name in enumerate(names)},
     )  # fmt: skip
     view.panels(
-        [[upper], [lower]], options.out / "rotor_whirl.png",
+        [[machine, upper], [lower]], options.out / "rotor_whirl.png",
         title="A shaft with two discs on two bearings",
         caption="Rings: Friswell et al., Dynamics of Rotating Machines, example 5.9.1. The thin "
         "line is the speed of rotation; where it meets a whirl, unbalance resonates. Below: discs "
         "70 mm wide stiffen a solid shaft, which beams with discs on a point leave out.",
     )  # fmt: skip
-    still = rom.cyclic_modes(sector, 1, 3)
+    still = rom.cyclic_modes(sector, 1, 4)
     view.wheel_modes(
         model, {f"whirl {k + 1} at rest: {f:.4g} Hz": still.on_wheel()[:, :, k]
          for k, f in enumerate(still.frequencies)},
