@@ -138,6 +138,27 @@ say(f"rigid modes kept beside the frame: singular value ratio {singular:.1e}")
 # ## The picture
 
 options.out.mkdir(parents=True, exist_ok=True)
+x, wedge = np.linspace(0, 1, N + 1), view.extruded([(-0.06, -0.08), (0.06, -0.08), (0, 0.02)], 0.1)
+wall = view.box((0.04, 0.3, 0.2), (-0.02, 0, 0))
+
+
+def held_beam(joint, supports):
+    """The beam in its joints, bent as in its first mode."""
+    zero = joints[joint][0]
+    kept = np.setdiff1d(np.arange(2 * N + 2), zero)
+    mode = np.zeros(2 * N + 2)
+    mode[kept] = eigh(K[np.ix_(kept, kept)], M[np.ix_(kept, kept)])[1][:, 0]
+    w = 0.15 * mode[::2] / np.abs(mode[::2]).max()
+    bent, still = (np.column_stack([x, y, 0 * x]) for y in (w, 0 * w))
+    lines = np.arange(N)[:, None] + np.arange(2)
+    things = {"first mode": view.tube(bent, 0.03), "joints": view.joined(supports),
+              "_still": view.Thing(still, lines, "#23282f")}  # fmt: skip
+    title = f"{joint[0].upper()}{joint[1:]}"
+    return view.Scene(title, things, view=(0.25, 0.35, 1.0), up=(0, 1, 0))
+
+
+supports = {"pinned at both ends": [wedge, (wedge[0] + np.array([1, 0, 0]), wedge[1])],
+            "clamped at one end": [wall]}  # fmt: skip
 view.convergence(
     [
         (
@@ -149,6 +170,7 @@ view.convergence(
     options.out / "reference_conditions.png",
     xlabel="number of shapes beside the rigid motion of the frame",
     title="One resonance from different reference conditions",
+    beside=[held_beam(joint, metal) for joint, metal in supports.items()],
     caption="First natural frequency of a uniform beam held by joints, relative error against the "
     "closed form. The floating frame carries shapes that obey four different reference "
     "conditions. Clamped-clamped shapes cannot represent the motion and stay wrong; free-free "
