@@ -59,9 +59,10 @@ TASKS: dict[str, tuple[str, str]] = {
         """view.mesh view.mode_shapes view.start view.animate view.instants view.wheel_modes
         view.frequencies view.convergence view.campbell view.history view.Panel view.panels
         view.Drawing view.plane view.Shape view.deformed view.flow view.updating view.faces
-        view.Thing view.Scene view.meshed view.wheel view.plates view.film
-        view.Film view.plotter view.bar view.box view.cylinder view.ring view.tube view.coil view.ellipsoid
-        view.extruded view.gear view.joined view.sleeves write_animation write_report""",
+        view.Thing view.Scene view.meshed view.wheel view.plates view.film view.posed
+        view.Film view.plotter view.bar view.box view.cylinder view.ring view.tube view.coil
+        view.wound view.ellipsoid view.extruded view.gear view.joined view.sleeves
+        write_animation write_report""",
     ),
     "Files": (
         "Bodies and motions written and read, for this toolkit and for others.",

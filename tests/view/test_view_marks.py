@@ -89,6 +89,17 @@ def test_level_curves_are_named_on_them_and_away_from_points():
     assert not np.allclose(other.get_facecolor(), other.get_edgecolor())
 
 
+def test_fields_side_by_side_share_the_colours_that_are_asked_for():
+    fields = [view.Drawing("Field", "x", "y", (0.0, 1.0, 0.0, 1.0), value * np.eye(3), "load",
+                           limits=(0.0, 5.0)) for value in (2.0, 5.0)]  # fmt: skip
+    square = view.Drawing("Stone", "x", "y", polygons=[np.array([[0, 0], [1, 0], [1, 1.0]])],
+                          values=np.array([3.0]), label="load", limits=(0.0, 5.0))  # fmt: skip
+    figure = view.plane([*fields, square])
+    drawn = [a.images[0] for a in figure.axes if a.images]
+    drawn += [c for a in figure.axes if a.get_title(loc="left") == "Stone" for c in a.collections]
+    assert [image.get_clim() for image in drawn] == [(0.0, 5.0)] * 3
+
+
 def test_a_mechanism_is_posed_as_the_film_shows_it_then():
     mechanism, solution = swinging(lattice_bar())
     scene = view.posed(mechanism, solution, 0.0502, title="Then", up=(0, 0, 1))

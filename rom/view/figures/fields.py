@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH = 1400  # [pixel]
 COLUMN_GAP = 120  # [pixel]
-ROW_GAP = 150  # [pixel]
+ROW_GAP, BARE_GAP = 150, 90  # below a drawing with a legend, and without [pixel]
 BAR_WIDTH = 60  # of a colour bar [pixel]
 LABEL_RATIO = 0.04  # of a drawing, that the names of level curves stay away from its edge
 ON_SHADE = (("#d1495b", "white"), ("white", "#22262b"))  # fill and edge of points on colours
@@ -41,6 +41,8 @@ class Drawing:
             holds.
         shade: (n, m) values in units of the label over the extent, first index along x; or None.
         label: what the colours of the shade or the polygons mean.
+        limits: (2,) values at the ends of these colours, in units of the label; None for the
+            smallest and the largest.
         polygons: (k, 2) outlines in units of the axes, filled.
         values: (number of polygons,) what their colours mean, in units of the label, or None for
             the colour of stone.
@@ -57,6 +59,7 @@ class Drawing:
     extent: tuple[float, float, float, float] | None = None
     shade: Array | None = None
     label: str = ""
+    limits: tuple[float, float] | None = None
     polygons: Sequence[Array] = ()
     values: Array | None = None
     curves: dict[str, list[Array]] = field(default_factory=dict)
@@ -103,20 +106,27 @@ def plane(
             _draw(figure, axes, drawing)
         return page.save(figure, path)
     rows = -(-len(drawings) // columns)
+    gap = ROW_GAP if any(map(_named, drawings)) else BARE_GAP
     text, below = page.caption(caption, PAGE_WIDTH - 60)
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
     with page.styled():
-        tall = 110 + rows * (height + ROW_GAP) + below + 10
+        tall = 110 + rows * (height + gap) + below + 10
         figure = page.sheet(PAGE_WIDTH, tall)
         page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
         for k, drawing in enumerate(drawings):
             row, column = divmod(k, columns)
             left = 95 + column * (width + COLUMN_GAP)
             narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
-            axes = page.area(figure, left, 110 + row * (height + ROW_GAP), width - narrow, height)
+            axes = page.area(figure, left, 110 + row * (height + gap), width - narrow, height)
             _draw(figure, axes, drawing)
         page.words(figure, text, 30, tall - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
+
+
+def _named(drawing: Drawing | Scene) -> bool:
+    """Whether it has a legend below it."""
+    names = [] if isinstance(drawing, Scene) else [*drawing.curves, *drawing.points]
+    return any(not name.startswith("_") for name in names)
 
 
 def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
@@ -130,6 +140,7 @@ def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
         image = axes.imshow(
             drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP, aspect="auto"
         )
+        image.set_clim(drawing.limits)
         bar = figure.colorbar(image, ax=axes, fraction=0.05, pad=0.03)
         bar.set_label(drawing.label, size=page.SMALL_SIZE)
         bar.ax.tick_params(labelsize=page.SMALL_SIZE)
@@ -189,6 +200,7 @@ def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
     else:
         values = np.asarray(drawing.values, dtype=float)
         blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOUR_MAP, **look)
+        blocks.set_clim(drawing.limits)
         axes.add_collection(blocks)
         bar = figure.colorbar(blocks, ax=axes, fraction=0.05, pad=0.03)
         bar.set_label(drawing.label, size=page.SMALL_SIZE)
