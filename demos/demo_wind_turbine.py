@@ -16,7 +16,7 @@ import numpy as np
 
 from rom import view
 from rom.components.cosserat import bend_in_pieces, equilibrium, loads, modes
-from rom.components.wind import HUB_RADIUS, blade, run_up
+from rom.components.wind import HUB_RADIUS, RATED_SPEED, blade, run_up
 from rom.mbs import Campbell
 from rom.view import Panel
 
@@ -44,6 +44,7 @@ table = np.array(table)
 diagram = Campbell(speeds, 2j * np.pi * table[:, :3], np.ones((len(speeds) - 1, 3)))
 view.campbell(
     diagram, options.out / "wind_turbine_campbell.png", orders=(1, 3, 6), names=names,
+    marks={"rated speed": RATED_SPEED},
     title="Campbell diagram of a blade of the NREL 5 MW turbine",
     caption="Natural frequencies of one blade on a rigid hub, Coriolis and centrifugal forces "
     "included. The latter stiffen the blade, most where it flaps; rings mark where a mode meets "
@@ -72,7 +73,7 @@ total = sum(run.torque for run in runs)
 labels = ("first blade", "second blade", "third blade")
 view.history(
     t, [
-        ("speed [1/min]", {"": runs[0].speed * 30 / np.pi}),
+        ("speed [1/min]", {"rotor": runs[0].speed * 30 / np.pi, "rated": RATED_SPEED * 30 / np.pi}),
         ("tip behind the root,\nin the plane [m]",
          {name: run.tip[:, 1] for name, run in zip(labels, runs, strict=True)}),
         ("tip out of the\nplane, downwind [m]",
@@ -89,39 +90,52 @@ view.history(
 
 # ## Shapes
 
-LARGER = 15
+LARGER, WIDE = 15, np.linspace(4.0, 1.2, 49)[:, None]  # widths are chosen for the eye
+pairs = np.arange(48)[:, None] + np.arange(2)
+CELLS = np.arange(48)[:, None] + np.vstack([[0, 1, 49], [1, 50, 49]])[:, None]
+hub = view.cylinder((-2, 0, 0), (2, 0, 0), 2 * HUB_RADIUS + 1)
+tower = view.cylinder((8, 0, -75), (8, 0, 0), 5.0)
 
 
 def seen(run, k):
-    """Blade from upwind, its deflection enlarged."""
-    a = run.angle[k]
-    c, s = np.cos(a), np.sin(a)
-    y, z = (run.motion.rod.x[:, 1:] @ np.array([[c, s], [-s, c]])).T
-    u = run.motion.x[k][:, 1:] - np.column_stack([y, z])
-    return -(y + LARGER * u[:, 0]), z + LARGER * u[:, 1], -y, z
+    """Blade of a run as a leaf, its deflection enlarged, and the line of one that does not bend."""
+    c, s = np.cos(run.angle[k]), np.sin(run.angle[k])
+    straight = run.motion.rod.x @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+    line = straight + LARGER * (run.motion.x[k] - straight)
+    edge = WIDE / 2 * np.cross([1, 0, 0], straight[-1] / np.linalg.norm(straight[-1]))
+    return (np.vstack([line - edge, line + edge]), CELLS.reshape(-1, 3)), straight
 
 
-rows = []
-for instant in (6.0, 10.0, 14.0, 30.0):
+def rotor(instant):
+    """The rotor from upwind."""
     k = round(instant / 0.02)
     drawn = [seen(run, k) for run in runs]
-    curves = {name: line[:2] for name, line in zip(labels, drawn, strict=True)}
-    curves |= {f"_{i}": line[2:] for i, line in enumerate(drawn)}
-    rows.append(Panel(f"{instant:g} s, {runs[0].speed[k] * 30 / np.pi:.1f} 1/min",
-                      "across [m]", "up [m]", curves=curves, equal=True))  # fmt: skip
-side = {name: (x[-4:, 2] - HUB_RADIUS, x[-4:, 0]) for name, x in bent.items()}
+    things = {f"_{name}": view.Thing(*leaf, colour) for name, (leaf, _), colour in
+              zip(labels, drawn, ("#2f7f9f", "#d1495b", "#edae49"), strict=True)}  # fmt: skip
+    things |= {f"_{i}": view.Thing(x - np.array([6, 0, 0]), pairs, "#23282f", width=1.5)
+               for i, (_, x) in enumerate(drawn)}  # fmt: skip
+    things |= {"_hub": view.Thing(*hub, "#9aa5b1"), "_tower": view.Thing(*tower, "#c3c9d0")}
+    title = f"{instant:g} s, {runs[0].speed[k] * 30 / np.pi:.1f} 1/min"
+    return view.Scene(title, things, view=(-1, 0, 0), up=(0, 0, 1))
+
+
+along = np.append(0.0, np.cumsum(rod.h))
+apart = {name: (along, np.linalg.norm(x - bent["rod"], axis=1))
+         for name, x in bent.items() if name != "rod"}  # fmt: skip
 whole = {"rod": (bent["rod"][:, 2] - HUB_RADIUS, bent["rod"][:, 0]),
          "_straight": (rod.x[:, 2] - HUB_RADIUS, rod.x[:, 0])}  # fmt: skip
 view.panels(
-    [rows[:2], rows[2:],
+    [[rotor(instant) for instant in (6.0, 10.0, 14.0, 30.0)],
      [Panel("Blade under 267 kN", "along it [m]", "downwind [m]", curves=whole, equal=True),
-      Panel("Its last four metres", "along it [m]", "downwind [m]", curves=side, equal=True)]],
+      Panel("Linear bodies in series, away from the rod", "along it [m]", "distance [m]",
+            curves=apart)]],
     options.out / "wind_turbine_shapes.png",
     title="Shapes of the blades",
-    caption=f"Above: the rotor seen from upwind at four instants of the run-up, deflections drawn "
-    f"{LARGER} times larger; grey lines are blades that do not bend. Below: a blade under a static "
-    "load, true to scale, as a rod and as linear bodies in series. The tip of the rod comes in by "
-    "0.7 m; that of a single linear body does not.",
+    caption="Above: the rotor seen from upwind at four instants of the run-up, its first blade "
+    f"blue, the second red, the third yellow, deflections drawn {LARGER} times larger; dark lines "
+    "are blades that do not bend. Below: a blade under a static load, true to scale, and how far "
+    "linear bodies in series are from it. The tip of the rod comes in by 0.7 m; that of a single "
+    "linear body does not.",
 )  # fmt: skip
 
 # ## What to remember
