@@ -194,7 +194,12 @@ rom.export(rod, out / "rod.vtu")
 view.mesh(rod_model, out / "rod_mesh.png", title="Connecting rod", **look)
 view.mesh(crank_model, out / "crank_mesh.png", title="Crank", view=(0.4, 1.0, -0.6), up=(0, 0, 1))
 view.mode_shapes(rod, out / "rod_modes.png", **look)
-view.frequencies(comparison, out / "rod_frequencies.png", title="Reduced against full rod")
+view.frequencies(
+    comparison,
+    out / "rod_frequencies.png",
+    title="Reduced against full rod",
+    beside=view.Scene("Connecting rod", view.meshed(rod_model), **look),
+)
 view.history(
     t,
     [
@@ -202,21 +207,26 @@ view.history(
             "slider position [mm]",
             {"flexible rod": 1e3 * slider, "rigid rod": 1e3 * slider_rigid},
         ),
-        ("flexible - rigid [um]", {"slider": 1e6 * (slider - slider_rigid)}),
-        ("stretch [um]", {"distance of the pins": 1e6 * stretch}),
+        ("flexible - rigid [µm]", {"slider": 1e6 * (slider - slider_rigid)}),
+        ("stretch [µm]", {"distance of the pins": 1e6 * stretch}),
         ("crank pin force [N]", {"flexible rod": force, "rigid rod": force_rigid}),
     ],
     out / "motion.png",
     title="Slider-crank with a flexible connecting rod",
+    beside=[
+        view.posed(flexible, moved, share * turn, title=f"After {share:g} turns", **scene)
+        for share in (5.0, 5.25, 5.75)
+    ],
     caption=f"Crank radius {1e3 * radius:.0f} mm, distance of the pins {1e3 * length:.0f} mm, "
     f"slider {slider_mass:g} kg. The motor brings the crank to {speed:g} rad/s within the "
     "first turn. From top to bottom: position of the slider, how far the flexible rod "
-    "displaces it, change of the distance of the pins, force in the crank pin.",
+    "displaces it, change of the distance of the pins, force in the crank pin. Beside them: the "
+    "mechanism, deformation of the rod drawn 50 times larger.",
 )
 view.history(
     sol.t,
     [
-        ("pin_b across the rod [um]", {name: 1e6 * u for name, u in across.items()}),
+        ("pin_b across the rod [µm]", {name: 1e6 * u for name, u in across.items()}),
         ("slider, difference [nm]", {name: 1e9 * u for name, u in apart.items()}),
     ],
     out / "frames.png",
@@ -224,7 +234,7 @@ view.history(
     caption="The first three turns. Above: where the far bore is in the axes of the rod, by the "
     "place of the frame: fixed to a bore, through both pins, on the mean axes. Below: "
     "position of the slider against that with the frame through the pins. The bending seen "
-    f"depends on the frame, up to {1e6 * bending:.0f} um; the motion differs by "
+    f"depends on the frame, up to {1e6 * bending:.0f} µm; the motion differs by "
     f"{1e9 * furthest:.2g} nm, the square of the deformation.",
 )
 instants = (turns - 1 + np.array([0.0, 0.25, 0.5, 0.75])) * turn
@@ -249,7 +259,7 @@ report.write_report(
                 f"reduced to {rod.n_modes} elastic coordinates; its frequencies deviate by at "
                 f"most {worst:.1e} from the full model in {len(comparison)} supports. In a "
                 f"slider-crank at {speed:g} rad/s it stretches by up to "
-                f"{1e6 * np.abs(stretch).max():.1f} um and loads the crank pin with up to "
+                f"{1e6 * np.abs(stretch).max():.1f} µm and loads the crank pin with up to "
                 f"{force.max():.0f} N ({force_rigid.max():.0f} N with a rigid rod)."
             ),
             report.motion(last, out / "slider_crank.gif", **scene),
