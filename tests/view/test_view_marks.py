@@ -52,6 +52,20 @@ def test_a_number_is_drawn_as_a_level_and_words_as_rows():
     np.testing.assert_array_equal(group.lines[0].get_ydata()[[0, 25, 40]], [0, 1, 0])
 
 
+def test_a_name_has_one_colour_in_all_panels():
+    upper = {"a": X, "b": X, "c": X, "d": X}
+    lower = {"d": X, "new": X, "a": X}
+    figure = view.history(X, [("one", upper), ("two", lower)])
+    one, two = ({line.get_label(): line.get_color() for line in axes.lines} for axes in figure.axes)
+    assert len(set(one.values())) == 4 and len(set(two.values())) == 3
+    assert two["a"] == one["a"] and two["d"] == one["d"]
+
+
+def test_points_of_another_length_are_refused():
+    with pytest.raises(ConfigError, match="'seen' has 2 values for 3 times"):
+        view.history(X, [("y", {"seen": ([0.0, 0.5, 1.0], [1.0, 2.0])})])
+
+
 def test_a_speed_is_marked_in_a_campbell_diagram():
     speeds = np.linspace(0.0, 100.0, 3)
     diagram = Campbell(speeds, (60j + 0.1j * speeds)[:, None], np.ones((2, 1)))

@@ -69,8 +69,9 @@ def history(  # noqa: PLR0913  keywords of one picture
     with page.styled():
         names = [list(filter(None, curves)) for _, curves in panels]
         figure, areas = _panels(ax, names, "history", Words(title, caption, beside))
-        for axes, (label, curves) in zip(areas, panels, strict=True):
-            _histories(axes, t, curves)
+        numbers = _numbered([list(curves) for _, curves in panels])
+        for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
+            _histories(axes, t, curves, looks)
             axes.set_xlabel(over or "time [s]", size=page.BODY_SIZE)
             axes.set_ylabel(label, size=page.BODY_SIZE)
             axes.set_xlim(t[0], t[-1])
@@ -79,12 +80,25 @@ def history(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def _histories(axes: Any, t: Array, curves: dict[str, Any]) -> None:
+def _numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:
+    """Number of the look of each curve: a name looks the same in all panels."""
+    known: dict[str, int] = {}
+    numbers = []
+    for names in panels:
+        taken = {known[name] for name in names if name in known}
+        free = iter(k for k in range(len(names) + len(known)) if k not in taken)
+        own = [known[name] if name in known else next(free) for name in names]
+        known |= {name: k for name, k in zip(names, own, strict=True) if name}
+        numbers.append(own)
+    return numbers
+
+
+def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[int]) -> None:
     pairs = [isinstance(values, tuple) for values in curves.values()]
     levels = [not pair and np.ndim(v) == 0 for v, pair in zip(curves.values(), pairs, strict=True)]
     lines = []
-    for (name, values), pair in zip(curves.items(), pairs, strict=True):
-        values = np.full_like(t, values) if np.ndim(values) == 0 else values
+    for (name, values), pair, level in zip(curves.items(), pairs, levels, strict=True):
+        values = np.full_like(t, values) if level else values
         if not pair and np.asarray(values).dtype.kind == "U":
             values = _rows(axes, values)
         x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
@@ -93,7 +107,8 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any]) -> None:
         lines.append((x, y))
     flat = without_round_off([y for _, y in lines])
     for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
-        look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.4}
+        number = numbers[k]
+        look = {"color": LINES[number % len(LINES)], "ls": "--" if number % 2 else "-", "lw": 1.4}
         look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pairs[k] else {}
         look |= LEVEL_STYLE if levels[k] else {}
         axes.plot(x, y, label=name, **look)
