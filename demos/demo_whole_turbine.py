@@ -63,7 +63,18 @@ say(rom.audit(motion))
 say(f"{motion.statistics['steps']} steps, {motion.statistics['steps_per_second']:.0f} a second")
 
 # ## What moves
+#
+# The pictures show blades and tower as boxes around their segments, whose widths are chosen for
+# the eye.
 
+
+chord = np.column_stack([np.linspace(1.2, 0.3, 24), np.linspace(3.6, 1.2, 24)])
+wall = np.repeat(np.linspace(6.0, 3.9, 16)[:, None], 2, axis=1)
+bodies = {k: v for blade in plant.blades for k, v in view.sleeves(blade, chord).items()}
+bodies |= view.sleeves(plant.tower, wall)
+bodies |= {"nacelle": view.box((12, 4, 4)), "hub": view.box((3, 3, 3)),
+           "wheel": view.box((0.5, 3, 3)), "generator": view.box((1.5, 1.5, 1.5))}  # fmt: skip
+look = {"shapes": bodies, "view": (-1.0, -0.9, 0.15), "up": (0, 0, 1)}
 t, per_minute = motion.t, 30 / np.pi
 rotor = motion.omega("hub")[:, 0] * per_minute
 fast = motion.omega("generator") @ plant.axis * per_minute / 97
@@ -73,7 +84,8 @@ tips = [plant.tip(motion, k) for k in range(3)]
 labels = ("first blade", "second blade", "third blade")
 view.history(
     t, [
-        ("speed [1/min]", {"rotor": rotor, "generator / 97": fast}),
+        ("speed [1/min]", {"rotor": rotor, "generator / 97": fast,
+                           "rated": RATED_SPEED * per_minute}),
         ("tip behind the root,\nin the plane [m]",
          {name: tip[:, 1] for name, tip in zip(labels, tips, strict=True)}),
         ("tip out of the\nplane, downwind [m]",
@@ -82,6 +94,8 @@ view.history(
     ],
     options.out / "whole_turbine.png",
     title="A wind turbine is brought to its speed by a torque",
+    beside=[view.posed(plant.mechanism, motion, time, title=f"After {time:g} s", **look)
+            for time in (0.0, 10.0, 40.0)],
     caption="Tower and blades are rods, nacelle, hub and generator rigid. A torque that is limited "
     "and vanishes at 12.1 turns a minute starts the rotor from rest. Blades lag behind while they "
     "gain speed and swing under their weight once a turn, a third of a turn after each other. The "
@@ -89,18 +103,11 @@ view.history(
     "sways at its own 0.31 Hz.",
 )  # fmt: skip
 
-# ## The film: blades and tower as boxes around their segments, whose sizes are only drawn
+# ## The film
 
-chord = np.column_stack([np.linspace(1.2, 0.3, 24), np.linspace(3.6, 1.2, 24)])
-wall = np.repeat(np.linspace(6.0, 3.9, 16)[:, None], 2, axis=1)
-bodies = {k: v for blade in plant.blades for k, v in view.sleeves(blade, chord).items()}
-bodies |= view.sleeves(plant.tower, wall)
-bodies |= {"nacelle": view.box((12, 4, 4)), "hub": view.box((3, 3, 3)),
-           "wheel": view.box((0.5, 3, 3)), "generator": view.box((1.5, 1.5, 1.5))}  # fmt: skip
 view.animate(
-    plant.mechanism, motion, options.out / "whole_turbine.gif", shapes=bodies, frames=80,
-    seconds=8.0, view=(-1.0, -0.9, 0.15), up=(0, 0, 1),
-)  # fmt: skip
+    plant.mechanism, motion, options.out / "whole_turbine.gif", frames=80, seconds=8.0, **look
+)
 
 # ## What to remember
 #
