@@ -60,9 +60,10 @@ LEVELS = {"rigid": (0.5, 0.7, 0.9, 0.97, 0.995), "bending": (0.9955, 0.997, 0.99
 maps, loci, found = {}, {}, {}
 for name, inertia in {"rigid": rigid.inertia, "bending": soft_inertia}.items():
     maps[name] = isotropy_index(inertia(*angle_grid(400)))
-    loci[name] = [c for level in LEVELS[name] for c in closed_loci(maps[name], level)]
+    loci[name] = {level: closed_loci(maps[name], level) for level in LEVELS[name]}
+    curves = [curve for closed in loci[name].values() for curve in closed]
     found[name] = isotropic_configurations(inertia, n=200)
-    say(f"{name} cranks: index from {maps[name].min():.3f}, {len(loci[name])} closed curves")
+    say(f"{name} cranks: index from {maps[name].min():.3f}, {len(curves)} closed curves")
     for q, a, w in zip(np.degrees(found[name].q), found[name].inertia, found[name].winding,
                        strict=True):  # fmt: skip
         say(f"  q = ({q[0]:9.5f}, {q[1]:9.5f}) deg, inertia {a:.6f} kg m^2, winding {w:+d}")
@@ -84,7 +85,7 @@ def torus(name, title):
     q, w = np.degrees(found[name].q), found[name].winding
     return view.Drawing(
         title, "left crank [deg]", "right crank [deg]", (0.0, 360.0, 0.0, 360.0), maps[name],
-        "isotropy index", curves={"_levels": in_degrees(loci[name])},
+        "isotropy index", levels={level: in_degrees(c) for level, c in loci[name].items()},
         points={"isotropic, winding +1": q[w > 0], "isotropic, winding -1": q[w < 0]},
     )  # fmt: skip
 
@@ -96,26 +97,41 @@ def answer(q):
     return (a / np.linalg.norm(a, axis=0).mean()).T
 
 
+def machine(q, aside):
+    """Links with their pins in one posture, and motors below the cranks."""
+    P = np.column_stack([rigid.posture(*q), np.zeros(5)]) + np.array([aside, 0, 0])
+    up = np.array([0, 0, 0.03])
+    heights = (0, 1, 2, 0)  # cranks below, couplers above each other
+    links = [view.cylinder(a + h * up, b + h * up, 0.035)
+             for a, b, h in zip(P, P[1:], heights, strict=False)]  # fmt: skip
+    pins = [view.cylinder(p - up, p + 3 * up, 0.05) for p in P]
+    motors = [view.cylinder(p - 8 * up, p - up, 0.14) for p in (P[0], P[-1])]
+    return view.joined(links + pins), view.joined(motors)
+
+
 lowest = maps["rigid"].min()
 names = {"isotropic, index 1": best, f"worst, index {lowest:.2f}": worst}
+things = {}
+for (name, q), colour, aside in zip(names.items(), ("#2f7f9f", "#d1495b"), (0.0, 1.1), strict=True):
+    links, motors = machine(q, aside)
+    things |= {name: view.Thing(*links, colour), f"_motors, {name}": view.Thing(*motors, "#9aa5b1")}
 options.out.mkdir(parents=True, exist_ok=True)
 view.plane(
     [
         torus("rigid", "Rigid cranks"),
         torus("bending", "Cranks that bend under sudden torque"),
-        view.Drawing("The linkage in two postures", "x [m]", "y [m]",
-                     curves={name: [rigid.posture(*q)] for name, q in names.items()}),
-        view.Drawing("Accelerations caused by torques of equal size", "left motor", "right motor",
+        view.Scene("The linkage in two postures", things, view=(0.35, 0.3, 1.0), up=(0, 1, 0)),
+        view.Drawing("Accelerations caused by torques of equal size", "left motor, over the mean",
+                     "right motor, over the mean",
                      curves={f"_{name}": [answer(q)] for name, q in names.items()}),
     ],
     options.out / "isotropy.png",
     title="Where two motors of a five-bar linkage feel the same inertia",
     caption="Top: isotropy index 2 sqrt(det A) / tr A of the generalised inertia A over the angles "
-    "of both cranks; left and right edges belong together, as do top and bottom. White: its curves "
-    f"at {str(LEVELS['rigid'])[1:-1]} and, right, {str(LEVELS['bending'])[1:-1]}; "
-    "all are closed. Marks: the isotropic postures, index 1, where A is a multiple of the "
+    "of both cranks; left and right edges belong together, as do top and bottom. Level curves are "
+    "all closed. Marks: the isotropic postures, index 1, where A is a multiple of the "
     "identity; the vector (a11 - a22, 2 a12) turns once to the left or to the right around them, "
-    "as often one as the other. Bottom left: links from motor to motor over elbows and tool. "
+    "as often one as the other. Bottom left: motors grey, the tool at the top. "
     "Bottom right: torques of the same size in all directions (both motors together, or one "
     "against the other) accelerate an isotropic posture equally, on a circle.",
 )  # fmt: skip
@@ -135,7 +151,8 @@ results = {
     "inertia with the tool at rest [kg m^2]": (values[:4].max(), still, 1e-9),
     "largest isotropic inertia [kg m^2]": (values[-1], 0.224984, 3e-6),
     "loci that close": (
-        np.mean([np.allclose(np.exp(1j * c[0]), np.exp(1j * c[-1])) for c in loci["rigid"]]),
+        np.mean([np.allclose(np.exp(1j * c[0]), np.exp(1j * c[-1])) for c in
+                 [curve for closed in loci["rigid"].values() for curve in closed]]),
         1.0, 1e-12),
     "1 + largest shift of postures by bending [rad]": (
         1 + np.abs(found["bending"].q - found["rigid"].q).max(), 1.0, 1e-8),
