@@ -152,11 +152,26 @@ free = pair.frequencies(7)
 # ## The picture
 
 options.out.mkdir(parents=True, exist_ok=True)
+apart, camera = np.array([[-0.06, 0, 0], [0, 0, 0.1], [0.06, 0, 0]]), {"up": (0, 0, 1)}
 view.convergence(
     [("error, meshes match", errors), ("error, right seat does not match", projected)],
     options.out / "assembly_errors.png",
     xlabel="coordinates of both seats (above), moments coupled on the right seat (below)",
     title="A frame from three reduced parts",
+    beside=[
+        view.Scene(
+            "The parts, moved apart",
+            {
+                name: (model.points[model.surface.nodes] + aside, model.surface.triangles)
+                for (name, model), aside in zip(models.items(), apart, strict=True)
+            },
+            view=(0.4, -1.0, 0.4),
+            **camera,
+        ),
+        view.Scene(
+            "The mesh of a column", view.meshed(models["right"]), view=(0.4, -1.0, -0.4), **camera
+        ),
+    ],
     caption="Largest relative error of the ten lowest frequencies of a portal frame with clamped "
     "feet, against the full model on the same meshes. Above: cylinders that move by all their "
     "dofs, by polynomials, or by characteristic constraint modes of the whole frame or of its "
