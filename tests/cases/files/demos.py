@@ -31,7 +31,7 @@ LEFT_BEHIND = {
     "demo_hand": {"hand.png", "hand_control.png"},
     "demo_exchange": {
         "beam.SID_FEM", "beam.csv", "beam.dat", "beam.dmig", "beam.fem", "beam.glb", "beam.inp",
-        "beam.mat", "beam.op4", "beam.py", "beam.vtu",
+        "beam.mat", "beam.op4", "beam.py", "beam.vtu", "exchange.png",
     },
     "demo_isotropy": {"isotropy.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
