@@ -243,17 +243,17 @@ def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
 def test_values_within_two_decades_have_ticks_at_one_two_five():
     from matplotlib.figure import Figure
 
-    from rom.view.figures.curves import _near_ticks
+    from rom.view.figures.curves import near_ticks
 
     axes = Figure().subplots()
     axes.loglog([1, 10], [2.5, 40])
     axes.set_ylim(2.5, 40)
-    _near_ticks(axes)
+    near_ticks(axes.yaxis)
     assert list(axes.get_yticks()) == [5, 10, 20]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["5", "10", "20"]
     axes.set_ylim(1e-3, 1)
     before = list(axes.get_yticks())
-    _near_ticks(axes)
+    near_ticks(axes.yaxis)
     assert list(axes.get_yticks()) == before
 
 
