@@ -108,7 +108,8 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[in
     flat = without_round_off([y for _, y in lines])
     for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
         number = numbers[k]
-        look = {"color": LINES[number % len(LINES)], "ls": "--" if number % 2 else "-", "lw": 1.4}
+        look: dict[str, Any] = {"color": LINES[number % len(LINES)], "lw": 1.4}
+        look |= {"ls": "--" if number % 2 else "-"}
         look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pairs[k] else {}
         look |= LEVEL_STYLE if levels[k] else {}
         axes.plot(x, y, label=name, **look)

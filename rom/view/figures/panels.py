@@ -12,6 +12,7 @@ from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
+from rom.view.canvas.scene import TEXT_COLOUR
 from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, near_ticks
 from rom.view.figures.things import Scene, draw_scene
 
@@ -157,7 +158,7 @@ def _draw(axes: Any, panel: Panel, *, alone: bool) -> None:
         _draw_bars(axes, panel.bars)
     for words, place in panel.notes.items():
         axes.annotate(words, place, (6, 0), textcoords="offset points", va="center",
-                      size=page.SMALL_SIZE, color=page.TEXT_COLOUR,
+                      size=page.SMALL_SIZE, color=TEXT_COLOUR,
                       bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})  # fmt: skip
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(panel.xlabel, size=page.SMALL_SIZE)
