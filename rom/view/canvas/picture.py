@@ -84,8 +84,8 @@ class ScaledTicks(Formatter):
         steps = np.abs(np.diff(self.factor * np.unique(locs)))
         if steps.size:
             self.digits = max(0, 2 - int(np.floor(np.log10(steps.min()))))
-        shown = [f"{abs(self.factor * x):.{self.digits}f}" for x in np.unique(locs)]
-        self.written = max((len(x.rstrip("0").partition(".")[2]) for x in shown), default=0)
+        numbers = [f"{abs(self.factor * x):.{self.digits}f}" for x in np.unique(locs)]
+        self.written = max((len(x.rstrip("0").partition(".")[2]) for x in numbers), default=0)
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """The label of one tick."""
