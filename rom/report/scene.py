@@ -211,7 +211,7 @@ def _modes(body: "FlexibleBody") -> Iterator[dict[str, Any]]:
             continue
         omega, V = body.modes(fixed=fixed)
         for i, k in enumerate(np.flatnonzero(omega > 0)[: n or N_MODES]):
-            label = f"mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
+            label = f"{support}, mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
             yield {
                 "group": support.capitalize() if not fixed else support,
                 "label": label, "rigid": V[:6, k], "q": V[6:, k],
