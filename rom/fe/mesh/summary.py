@@ -60,21 +60,42 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
 
 
 def surface_triangles(mesh: SolidMesh) -> dict[str, Index]:
-    """{name: (t, 3) corner nodes} of the named surfaces, and under "" of the rest of the skin."""
+    """{name: (t, 3) nodes} of the named surfaces, and under "" of the rest of the skin.
+
+    Facets of cells of second order come in pieces between their corners and middles of edges.
+    """
     faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
     skin = faces.corners[faces.count == 1]
     named = {name: rows[:, : mesh.kind.corners_per_face] for name, rows in mesh.facets.items()}
     every = np.sort(np.vstack([skin, *named.values()]), axis=1)
     number, _ = row_ids(every, len(mesh.points))
     rest = skin[~np.isin(number[: len(skin)], number[len(skin) :])]
-    return {name: _split(rows) for name, rows in (named | {"": rest}).items()}
+    return {name: _pieces(mesh, rows) for name, rows in (named | {"": rest}).items()}
 
 
-def _split(rows: Index) -> Index:
-    """Quadrilaterals as triangles; triangles as they are."""
-    if rows.shape[1] == 3:
-        return rows
-    return np.vstack([rows[:, [0, 1, 2]], rows[:, [0, 2, 3]]])
+def _pieces(mesh: SolidMesh, rows: Index) -> Index:
+    """Triangles of facets, given by their corners."""
+    k = rows.shape[1]
+    inner, around = rows, np.empty((0, 3), dtype=np.int64)
+    if mesh.kind.degree == 2:
+        after = np.roll(rows, -1, axis=1)
+        inner = _edge_middles(mesh, np.stack([rows, after], axis=-1).reshape(-1, 2)).reshape(-1, k)
+        around = np.stack([np.roll(inner, 1, axis=1), rows, inner], axis=-1).reshape(-1, 3)
+    if k == 4:
+        inner = np.vstack([inner[:, [0, 1, 2]], inner[:, [0, 2, 3]]])
+    return np.vstack([inner, around])
+
+
+def _edge_middles(mesh: SolidMesh, edges: Index) -> Index:
+    """(m,) node in the middle of each edge (m, 2) of cells of second order."""
+    n, supports = len(mesh.points), mesh.kind.supports
+    middle = {i: list(s) for i, s in enumerate(supports) if len(s) == 2}
+    pairs = np.vstack([np.sort(mesh.cells[:, ends], axis=1) for ends in middle.values()])
+    keys, first = np.unique(pairs[:, 0] * n + pairs[:, 1], return_index=True)
+    wanted = np.sort(edges, axis=1)
+    nodes = mesh.cells[:, list(middle)].T.ravel()[first]
+    found: Index = nodes[np.searchsorted(keys, wanted[:, 0] * n + wanted[:, 1])]
+    return found
 
 
 def _axis(axis: Axis | None) -> dict[str, Any]:
