@@ -22,6 +22,9 @@ SHELL_PATTERN = re.compile(
     r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^)]*)\)", re.I
 )
 ELEMENTS_ACROSS = 20  # default element size: this part of the diagonal
+EDGES_PER_TURN = (
+    8  # of round faces, at least: with fewer, cells at small bores are turned inside out
+)
 CELLS_PER_CUBE = 8.0  # tetrahedra in a cube of the element size
 MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 
@@ -53,6 +56,7 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     lc = request["parameters"].get("lc", default)
     _check_size(gmsh, lc)
     gmsh.option.setNumber("Mesh.MeshSizeMax", lc)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", EDGES_PER_TURN)
     return {"lc": lc}, {"lc": default}
 
 
