@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 Sections = dict[str, Sequence[str]]
 N_FREQUENCIES = 6
 SHOWN_KEYS = (
-    "path", "sha256", "parameters", "scale", "material", "degree", "solver", "K", "M", "units",
+    "path", "sha256", "parameters", "faces", "scale", "material", "degree", "solver",
+    "K", "M", "units",
 )  # fmt: skip
 BODY_COLUMNS = ("body", "mass [kg]", "elastic coordinates", "markers")
 NO_STILL = "The run made no picture: picture = true of its [output] asks for one."
@@ -93,7 +95,7 @@ def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
         "Mass properties": [_mass_table(body)],
         "Frequencies": _frequency_blocks(body),
         "Interfaces": [_interface_table(body)],
-        "Checks": [html.checks(check(body), "What `rom check` says.")],
+        "Checks": [html.checks(check(body), "What rom check says.")],
         "How it was made": [*made, *_provenance(body)],
     }
     return f"Flexible body {body.name}", sections
@@ -102,7 +104,7 @@ def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
 def _sentence(body: "FlexibleBody") -> str:
     reduction = body.provenance.get("reduction", {})
     full = f" from {reduction['full dofs']} dofs" if "full dofs" in reduction else ""
-    method = f" by {reduction['method']}" if "method" in reduction else ""
+    method = f" by {_method_words(reduction)}" if "method" in reduction else ""
     evidence = "carries no certificate"
     if body.certificate is not None:
         evidence = "has a certificate that " + ("holds" if body.certificate.ok else "FAILS")
@@ -111,6 +113,15 @@ def _sentence(body: "FlexibleBody") -> str:
         f"reduced{full} to {body.n_modes} elastic coordinates{method}; its frame follows "
         f"{body.reference}. It {evidence}."
     )
+
+
+def _method_words(reduction: dict[str, Any]) -> str:
+    """The method as it was called, without what was not given, and how many modes that came to."""
+    said = re.sub(r"\b\w+=None(, )?", "", reduction["method"]).replace(", )", ")")
+    modes = len(reduction.get("frequencies of the modes kept [Hz]", ()))
+    if said.endswith("()"):
+        said = f"{said[:-2]}, asked for as many modes as the certificate needs"
+    return f"{said}: {modes} modes" if modes else said
 
 
 def _mass_table(body: "FlexibleBody") -> str:
@@ -191,8 +202,20 @@ def _provenance(body: "FlexibleBody") -> list[str]:
         known["seconds to reduce"] = body.provenance["seconds to reduce"]
     if not known:
         return [html.paragraph("The body file does not say what it was made from.")]
-    rows = [(key, str(value)) for key, value in known.items()]
+    rows = [(key, _plain(value)) for key, value in known.items()]
     return [html.table(("", "made from"), rows, "What the body file says of its origin.")]
+
+
+def _plain(value: Any) -> str:
+    """A value for a reader: 1,2 for lists, a: 1, b: 2 for tables."""
+    if isinstance(value, dict):
+        return ", ".join(
+            f"{key} ({_plain(inner)})" if isinstance(inner, dict) else f"{key}: {_plain(inner)}"
+            for key, inner in value.items()
+        )
+    if isinstance(value, list | tuple):
+        return "+".join(map(_plain, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def of_mechanism(

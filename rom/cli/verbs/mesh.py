@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rom.model import Material
 
 DECK_SUFFIX = ".inp"
+CAD_RTOL = 1e-5  # of the size: error of middles of faces, which the CAD finds by integration
 FACE_WORD = "face"  # name of a listed face, before its number
 SUMMARY = "make or read a mesh, check it, show its regions and interfaces"
 EXAMPLES = """\
@@ -182,6 +183,6 @@ def _numbered(face: dict[str, Any]) -> str:
 
 
 def _words(x: Any, size: float = 1.0) -> str:
-    """Numbers as they may be copied into --face; what is round-off of that size is zero."""
-    least = 1e-9 * size
+    """Numbers as they may be copied into --face; what the CAD integrates no closer is zero."""
+    least = CAD_RTOL * size
     return ",".join(f"{value if abs(value) > least else 0.0:.4g}" for value in x)

@@ -40,7 +40,7 @@ def run(request: dict[str, Any]) -> Read:
             declared = path
         else:
             _generate(gmsh, request, declared)
-        pick(gmsh, request["faces"], path.name)
+        picked = pick(gmsh, request["faces"], path.name)
         repeated = reader == "msh" and version(path) == 2
         arrays, notes = collect(gmsh, declared, strict=reader != "step", repeated=repeated)
         notes["axes"] = {name: asdict(axis) for name, axis in axes(gmsh).items()}
@@ -49,6 +49,7 @@ def run(request: dict[str, Any]) -> Read:
         notes["provenance"] = {
             "gmsh": gmsh.option.getString("General.Version"),
             "parameters": values,
+            **({"faces": picked} if picked else {}),
             "gmsh_warnings": _log(gmsh, "Warning"),
         }
         doubts = (scaled_doubt(name, values[name], x) for name, x in defaults.items())

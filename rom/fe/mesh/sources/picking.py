@@ -138,7 +138,7 @@ def _words(x: tuple[float, ...]) -> str:
     return ",".join(f"{value:.4g}" for value in x)
 
 
-def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> None:
+def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> dict[str, list[int]]:
     """Name the picked faces of a meshed geometry.
 
     Args:
@@ -146,10 +146,14 @@ def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> None:
         wanted: {name: what `rom.fe.mesh.picks.picks` takes, or `EVERY_FACE`}.
         file: name of the file, for messages.
 
+    Returns:
+        Numbers of the faces that were picked, by name.
+
     Raises:
         TagError: nothing, or two faces, at the place given; two names for one face.
     """
     named: dict[int, str] = {}
+    found: dict[str, list[int]] = {}
     picker = Picker(gmsh)
     for name, wishes in wanted.items():
         if wishes == EVERY_FACE:
@@ -165,10 +169,12 @@ def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> None:
                 hint="Pick each face once; an interface may serve several joints.",
             )
         named |= dict.fromkeys(tags, name)
+        found[name] = tags
         group(gmsh, name, tags)
     for name, wishes in wanted.items():
         if wishes == EVERY_FACE:
             _number(gmsh, name)
+    return found
 
 
 def _number(gmsh: Any, name: str) -> None:
