@@ -181,10 +181,10 @@ def _display(picture: dict[str, Any] | None, ending: str) -> Finding:
 def draw() -> None:
     """Write one JSON line per thing found."""
     import pyvista
-    import vtk
+    from vtkmodules.vtkCommonCore import vtkVersion  # all of vtk is twice the work
 
     _write("pyvista", version=pyvista.__version__)
-    _write("vtk", version=vtk.vtkVersion().GetVTKVersion())
+    _write("vtk", version=vtkVersion().GetVTKVersion())
     began = perf_counter()
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=[200, 200])
     plotter.add_mesh(pyvista.Sphere())
