@@ -212,6 +212,14 @@ def test_wrong_requests_are_refused(bar, tmp_path):
         view.mode_shapes(bar, tmp_path / "modes.png", fixed=("tip",))
     with pytest.raises(ConfigError, match="no two directions"):
         view.mode_shapes(bar, tmp_path / "modes.png", view=(0, 0, 1), up=(0, 0, 2))
+    for wrong, words in [
+        ({"view": (0, 1)}, r"view has shape \(2,\), needed is \(3,\).*three numbers"),
+        ({"up": "z"}, r"up = 'z' is not made of numbers.*e.g. \(0, 0, 1\)"),
+        ({"up": (0, np.nan, 1)}, "up = .*nan.* is not finite"),
+        ({"view": (0, 0, 0)}, r"view = \(0, 0, 0\) and up = None are no two directions.*not zero"),
+    ]:
+        with pytest.raises(ConfigError, match=f"(?s){words}"):
+            aimed(np.eye(3), 100, **wrong)
     with pytest.raises(ConfigError, match="'one' has 3 values for 2 times"):
         view.history([0, 1], [("x", {"one": [1, 2, 3]})], tmp_path / "h.png", title="", caption="")
     assert not list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ import numpy as np
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places
 from rom.mbs.elements.laws import LAWS_FAMILY
-from rom.mbs.equations.equations import element_energy, evaluate
+from rom.mbs.equations.equations import element_energy
 from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.element_calls import residuals
@@ -19,6 +19,7 @@ from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import sample_all
 from rom.mbs.results.interface_loads import at_instants
 from rom.mbs.results.law_record import law_record
+from rom.mbs.results.recomputed import evaluate_at
 from rom.model import Array, Index
 from rom.names import offered
 
@@ -98,8 +99,7 @@ def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -
     motion = (solution.q, solution.v, solution.lam, solution.base, signals)
     for k in range(n) if asked else ():
         answered = tuple(x[k : k + 1] for x in motion)
-        W.signal[:], W.base[:] = signals[k], solution.base[k]
-        evaluate(system, W, solution.q[k], solution.v[k])
+        evaluate_at(system, W, solution.q[k], solution.v[k], solution.base[k], signals[k])
         apply_laws(asked, W, float(solution.t[k]))
         track_element(system, W, answered, rows, c, ElementTracks(*(x[k : k + 1] for x in found)))
     if not asked:
@@ -132,9 +132,7 @@ def track_element(s, W, motion, rows, c, out):
     """Fill the tracks of a system of one element, which acts along coordinate c if there is one."""
     Q, V, L, base, signals = motion
     for k in range(Q.shape[0]):
-        copy(signals[k], W.signal)
-        copy(base[k], W.base)
-        evaluate(s, W, Q[k], V[k])
+        evaluate_at(s, W, Q[k], V[k], base[k], signals[k])
         W.wrench[:] = 0.0
         W.power[:] = 0.0
         W.driven[0] = 0.0

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from rom.mbs.equations.equations import evaluate, residual
+from rom.mbs.equations.equations import residual
 from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.kernels.work import Work, workspace
+from rom.mbs.results.recomputed import evaluate_at
 from rom.model import Array
 
 
@@ -37,8 +38,7 @@ def at_instants(solution: Any) -> Iterator[Work]:
         strict=True,
     )
     for t, q, v, a, lam, signals, base in rows:
-        W.signal[:], W.base[:] = signals, base
-        evaluate(system, W, q, v)
+        evaluate_at(system, W, q, v, base, signals)
         apply_laws(forces, W, float(t))
         residual(system, W, q, v, a, lam)
         yield W

@@ -49,9 +49,7 @@ def track(s, W, motion, marker, rows, out):
     """Fill the tracks."""
     Q, V, L, base, signals = motion
     for k in range(Q.shape[0]):
-        copy(signals[k], W.signal)
-        copy(base[k], W.base)
-        evaluate(s, W, Q[k], V[k])
+        evaluate_at(s, W, Q[k], V[k], base[k], signals[k])
         copy(W.P[marker], out.position[k])
         copy(W.E[marker], out.axes[k])
         copy(W.V[marker], out.twist[k])
@@ -66,6 +64,14 @@ def track(s, W, motion, marker, rows, out):
             out.energy[k, 1] += strain
             out.energy[k, 2] += height
             body_momentum(s.bodies, W, b, Q[k], V[k], out.momentum[k])
+
+
+@kernel
+def evaluate_at(s, W, q, v, base, signals):
+    """Evaluate places and velocities at an instant whose signals and bases are known."""
+    copy(signals, W.signal)
+    copy(base, W.base)
+    evaluate(s, W, q, v)
 
 
 @inner

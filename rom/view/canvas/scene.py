@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
@@ -73,7 +74,7 @@ def aimed(
         heights: bounds of the height of the picture, as shares of its width.
 
     Raises:
-        ConfigError: if the directions are parallel or zero.
+        ConfigError: if a direction is not three numbers, or they are parallel or zero.
     """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
     toward, upright = _directions(points, view, up)
@@ -92,14 +93,28 @@ def _directions(
 ) -> tuple[Array, Array]:
     axes = np.eye(3)[np.argsort(np.ptp(points, axis=0), kind="stable")]
     short, middle, long = axes
-    toward = short + 0.5 * middle - 0.35 * long if view is None else np.asarray(view, dtype=float)
-    upright = middle if up is None else np.asarray(up, dtype=float)
+    toward = short + 0.5 * middle - 0.35 * long if view is None else _direction("view", view)
+    upright = middle if up is None else _direction("up", up)
     if up is None and np.linalg.norm(np.cross(toward, upright)) < 1e-3 * np.linalg.norm(toward):
         upright = long
     across = upright - toward * (upright @ toward) / max(toward @ toward, 1e-300)
-    if not np.linalg.norm(across) > 1e-6 * np.linalg.norm(upright) > 0:
-        raise ConfigError(f"view = {view!r} and up = {up!r} are no two directions.")
+    if not (toward.any() and np.linalg.norm(across) > 1e-6 * np.linalg.norm(upright) > 0):
+        raise ConfigError(
+            f"view = {shortened(view)} and up = {shortened(up)} are no two directions.",
+            hint="Give two that are not zero and not along one line, e.g. (1, -1, 0.5) and "
+            "(0, 0, 1), or leave one out.",
+        )
     return toward / np.linalg.norm(toward), across / np.linalg.norm(across)
+
+
+def _direction(name: str, value: npt.ArrayLike) -> Array:
+    """A direction (3,) somebody gave, of size 1 or so; zero stays."""
+    try:
+        found = finite(name, value, (3,))
+    except ConfigError as error:
+        hint = "A direction is three numbers, e.g. (0, 0, 1)."
+        raise ConfigError(error.message, hint=hint) from None
+    return found / (np.abs(found).max() or 1.0)
 
 
 def sharp_edges(points: Array, triangles: Index) -> Index:
