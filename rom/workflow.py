@@ -28,6 +28,7 @@ from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Modes
 from rom.names import check_name
+from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.bases.method import CraigBampton, Method
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect
@@ -127,8 +128,11 @@ def modes(
     kinds = by_name(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)
-    omega, Phi = connection.ops.modes(held, n)
-    residual = _residual(connection.ops, held, omega, Phi)
+    with stages(2, long=connection.ops.n > MANY_DOFS) as begin:
+        begin(f"{n} modes of {connection.ops.n} dofs")
+        omega, Phi = connection.ops.modes(held, n)
+        begin(f"residuals of {n} modes")
+        residual = _residual(connection.ops, held, omega, Phi)
     return Modes(omega, connection.ops.expand(Phi), residual)
 
 
@@ -197,6 +201,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
             interfaces, ``body.K_geo``: fast rotation and tension then stiffen it.
         certify: compare with the full model; costs one more factorisation per support.
 
+    On a terminal a line says how far the reduction of a large model is; not under ``-q``, and not
+    where the logger "rom" is set to errors.
+
     Returns:
         FlexibleBody, or ReducedSector; its ``certificate`` tells how far to trust it.
 
@@ -230,10 +237,12 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         method = method.method
         say("full interfaces follow %d coordinates", connection.boundary.size)
     chosen = judged_in(method, tuple(connection.parts.values()))
-    with _on_interfaces(interfaces):
+    with _on_interfaces(interfaces), stages(2, long=ops.n > MANY_DOFS) as begin:
+        begin(f"shapes of {ops.n} dofs")
         basis = chosen.basis(connection.ops, connection.boundary, connection.labels)
-    Psi = connection.ops.expand(basis.Psi)
-    elastic = elastic_part(ops, Psi)
+        begin(f"energies of {basis.Psi.shape[1]} shapes")
+        Psi = connection.ops.expand(basis.Psi)
+        elastic = elastic_part(ops, Psi)
 
     def left_out(markers: dict[str, Marker]) -> Array | None:
         holds = {name: marker.hold for name, marker in markers.items()}

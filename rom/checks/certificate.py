@@ -10,6 +10,7 @@ from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
 from rom.eigen.verbs import Held, Operators, given_rigid_motions, mac, residual_errors
 from rom.model import Array, Basis, Report, Row
+from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
@@ -44,10 +45,13 @@ def certify_body(
     statics = body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     inner = connection.ops.hold(connection.boundary) if statics else None
-    for fixed in supports:
-        table = compared(connection, ops, body, (basis, inner), fixed)
-        if table["reduced"]:
-            comparison[" + ".join(fixed) + " held" if fixed else "free"] = table
+    with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
+        for fixed in supports:
+            support = " + ".join(fixed) + " held" if fixed else "free"
+            begin(f"compare with the full model, {support}")
+            table = compared(connection, ops, body, (basis, inner), fixed)
+            if table["reduced"]:
+                comparison[support] = table
     if not connection.ops.affordable:
         rows.append(Row("dofs; full modes are too dear, errors estimated", ops.n, "--", True))
     for support, table in comparison.items():

@@ -13,6 +13,7 @@ from rom.process.launcher import ranks
 
 log = logging.getLogger("rom")
 LOOK_INTERVAL = 0.2  # [s] between looks at work that somebody else does
+MANY_DOFS = 20_000  # of a finite element model whose work takes long enough to say how far it is
 TIME_FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}]"
 
 
@@ -63,6 +64,37 @@ def looked_for() -> bool:
     is set to errors.
     """
     return not ranks()[0] and sys.stderr.isatty() and log.isEnabledFor(logging.WARNING)
+
+
+def in_silence(label: str) -> None:
+    """Say nothing."""
+
+
+@contextmanager
+def stages(total: int, *, long: bool = True) -> Iterator[Callable[[str], None]]:
+    """Around work in stages, of which each is named where it begins; silent where nobody looks.
+
+    Args:
+        total: number of stages.
+        long: whether the work is long enough for a line of progress.
+
+    Yields:
+        What takes the name of a stage at its begin.
+    """
+    if not (long and looked_for()):
+        yield in_silence
+        return
+    progress, begun = Progress(total), 0
+
+    def begin(label: str) -> None:
+        nonlocal begun
+        progress.reach(min(begun, total), label)
+        begun += 1
+
+    try:
+        yield begin
+    finally:
+        progress.end()
 
 
 @contextmanager

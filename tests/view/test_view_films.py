@@ -12,6 +12,10 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
+import rom
+from cases.solid import block
+from rom import workflow
+from rom.checks import certificate
 from rom.errors import ConfigError, ResourceError
 from rom.io.ours import is_ours
 from rom.process import progress
@@ -121,6 +125,55 @@ def test_progress_is_shown_on_a_terminal_and_cleared(monkeypatch):
 def test_progress_is_shown_by_tqdm_where_it_is_installed(monkeypatch):
     pytest.importorskip("tqdm", reason="tqdm is not installed")
     assert "drawing" in followed(monkeypatch, Terminal())
+
+
+def staged(monkeypatch, stream, **options):
+    """What is seen of two stages of work."""
+    monkeypatch.setattr(sys, "stderr", stream)
+    with progress.stages(2, **options) as begin:
+        begin("factor")
+        begin("solve")
+    return stream.getvalue()
+
+
+def test_stages_are_named_as_they_begin_and_cleared(monkeypatch):
+    monkeypatch.setattr(progress, "find_spec", lambda name: None)
+    text = staged(monkeypatch, Terminal())
+    assert [part.strip() for part in text.split("\r")[1:]] == [
+        "factor    0 %",
+        "solve   50 %",
+        "",
+        "",
+    ]
+    assert staged(monkeypatch, Terminal(), long=False) == ""
+    assert staged(monkeypatch, io.StringIO()) == ""
+    monkeypatch.setattr(progress, "ranks", lambda: (1, 2))
+    assert staged(monkeypatch, Terminal()) == ""
+
+
+def test_reductions_and_modes_of_large_models_say_how_far_they_are(monkeypatch):
+    """On the command line, whose -q sets the logger, as in Python."""
+    for module in (workflow, certificate):
+        monkeypatch.setattr(module, "MANY_DOFS", 100)
+    monkeypatch.setattr(progress, "find_spec", lambda name: None)
+
+    def seen(level):
+        stream = Terminal()
+        monkeypatch.setattr(sys, "stderr", stream)
+        monkeypatch.setattr(logging.getLogger("rom"), "level", level)
+        logging.getLogger("rom").manager._clear_cache()
+        model = block()
+        rom.modes(model, 8)
+        rom.reduce(model, method=rom.CraigBampton(4), interfaces={"root": "rbe2"})
+        return [part.strip() for part in stream.getvalue().split("\r") if part.strip()]
+
+    assert seen(logging.WARNING) == [
+        "8 modes of 243 dofs    0 %", "residuals of 8 modes   50 %",
+        "shapes of 243 dofs    0 %", "energies of 10 shapes   50 %",
+        "compare with the full model, free    0 %",
+        "compare with the full model, root held   50 %",
+    ]  # fmt: skip
+    assert seen(logging.ERROR) == []
 
 
 @pytest.mark.parametrize("why", ["no terminal", "another rank", "quiet"])
