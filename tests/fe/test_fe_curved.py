@@ -127,7 +127,7 @@ def test_mass_and_inertia_of_round_bodies_converge_with_the_fourth_power(
 @pytest.mark.parametrize(("n", "limit"), [(12, 0.1), (24, 0.03)])
 def test_a_sphere_errs_by_what_its_triangles_leave_out(tmp_path, n, limit):
     """With edges L on the unit sphere the volume is 11 L^4 / 640 too small, see curved_cells.md."""
-    mesh = read_mesh(written(tmp_path, BALL + 'Physical Surface("skin") = Surface{:};'),
+    mesh = read_mesh(written(tmp_path, BALL + 'Physical Surface("skin") = Surface{:};\n'),
                      parameters=round_bore(n))  # fmt: skip
     corners = mesh.points[mesh.facets["skin"][:, :3]] / 0.02
     lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
