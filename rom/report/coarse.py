@@ -13,7 +13,9 @@ MAX_INT16 = np.iinfo(np.int16).max
 TYPES = {"int16": "<i2", "uint16": "<u2", "uint32": "<u4", "float32": "<f4"}
 CELL_GROWTH = 1.1
 MOST_COLLAPSED = 10  # times the wanted number of points: more are put together in cells first
-EVENNESS = 0.01  # weight of the squared way of a point against its squared distance from planes
+EVENNESS_RATIO = (
+    0.01  # weight of the squared way of a point against its squared distance from planes
+)
 LEAST_HEIGHT = 0.02  # of a triangle that changes, over its longer side
 LEAST_COSINE = 0.2  # between the normals of a triangle before and after
 
@@ -102,7 +104,7 @@ def _error(Q: Array, area: Array, x: Array, moved: Array) -> Array:
     """What it costs to stand at x (m, 3), which is so far (m, 3) from where one stood."""
     at = np.column_stack([x, np.ones(len(x))])
     off = np.einsum("mi,mij,mj->m", at, Q, at)
-    return off + EVENNESS * area * np.einsum("mi,mi->m", moved, moved)
+    return off + EVENNESS_RATIO * area * np.einsum("mi,mi->m", moved, moved)
 
 
 def _cheapest(X: Array, triangles: Index, Q: Array, area: Array) -> tuple[Index, Index]:
