@@ -117,11 +117,11 @@ def _sentence(body: "FlexibleBody") -> str:
 
 def _method_words(reduction: dict[str, Any]) -> str:
     """The method as it was called, without what was not given, and how many modes that came to."""
-    said = re.sub(r"\b\w+=None(, )?", "", reduction["method"]).replace(", )", ")")
+    label = re.sub(r"\b\w+=None(, )?", "", reduction["method"]).replace(", )", ")")
     modes = len(reduction.get("frequencies of the modes kept [Hz]", ()))
-    if said.endswith("()"):
-        said = f"{said[:-2]}, asked for as many modes as the certificate needs"
-    return f"{said}: {modes} modes" if modes else said
+    if label.endswith("()"):
+        label = f"{label[:-2]}, asked for as many modes as the certificate needs"
+    return f"{label}: {modes} modes" if modes else label
 
 
 def _mass_table(body: "FlexibleBody") -> str:
