@@ -199,7 +199,7 @@ def test_one_sector_is_the_whole_wheel(wheel):
     assert stretch > 0.015 * 0.16
     linear = rom.rotating_sector(sector, part)
     change = rom.travelling_modes(linear, 2, 2, speed=speed).omega / found[2][:2] - 1
-    assert np.abs(change).max() > 0.005
+    assert np.abs(change).max() > 0.002
 
 
 def test_a_reduced_wheel_follows_the_speed(wheel):

@@ -26,7 +26,7 @@ from rom.fe.compat import (
     geometry_degree,
     per_cell,
 )
-from rom.fe.forms.material import stress
+from rom.fe.forms.material import geometric_stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import symmetric, wrapped
 from rom.model import Array
@@ -121,7 +121,7 @@ class FiniteStrain:
     def _geometric(self) -> Any:
         w, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
         sigma = self._stress(ufl.sym(ufl.grad(self.u)))
-        return self._compiled(ufl.inner(ufl.dot(ufl.grad(w), sigma), ufl.grad(v)))
+        return self._compiled(geometric_stiffness(w, v, sigma))
 
     @property
     def _F(self) -> Any:

@@ -106,6 +106,21 @@ def stress(strain: Any, numbers: dict[str, Any]) -> Any:
     return ufl.as_matrix([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
 
 
+def geometric_stiffness(u: Any, v: Any, sigma: Any) -> Any:
+    """Density of the stiffness that a stress gives to displacements u and v, a ufl expression.
+
+    Second variation of the work of the stress on the engineering strain U - 1, with U the stretch
+    of F = R U: sigma : (grad u^T grad v - eps(u) eps(v)). Green's strain has the first term alone;
+    by it a pulled bar is stiffer against more pull by sigma / E, which Hooke's law does not say.
+
+    Source:
+        Biot, Mechanics of Incremental Deformations, Wiley (1965), chapter 2.
+    """
+    turned = ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v))
+    stretched = ufl.inner(ufl.dot(ufl.sym(ufl.grad(u)), sigma), ufl.sym(ufl.grad(v)))
+    return turned - stretched
+
+
 def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Iterator[str]:
     """Sentences about input that is legal but unusual.
 

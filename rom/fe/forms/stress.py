@@ -20,7 +20,7 @@ from rom.fe.compat import (
     to_global,
 )
 from rom.fe.forms.finite_strain import FiniteStrain
-from rom.fe.forms.material import stress
+from rom.fe.forms.material import geometric_stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
 from rom.fe.operators.factor import dense_rows
@@ -88,7 +88,7 @@ class Stresses:
     def geometric_stiffness(self, U: Array, Psi: Array) -> Array:
         """Stiffness that the stress of loads gives to shapes, at any element degree.
 
-        The second variation of the strain energy: integral of sigma_l : grad(psi_i)^T grad(psi_j).
+        The second variation of the strain energy, see `material.geometric_stiffness`.
 
         Args:
             U: (n_local, l) displacements under the loads [m].
@@ -142,7 +142,7 @@ class Stresses:
         else:
             degree = 3 * self.degree + 2 * curved
         dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": max(degree, 1)})
-        return ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * dx
+        return geometric_stiffness(u, v, sigma) * dx
 
     def _evaluated(self, U: Array, cells: Integers, X: Array) -> Any:
         """(cells, points, 6) stress of each column."""
