@@ -239,14 +239,18 @@ def test_heat_joins_in():
 
 
 def test_a_shaft_beyond_its_critical_speed_is_refused():
-    """About its own axis a bar softens without stiffening: Omega = omega_1 is the end."""
+    """About its own axis a bar softens without stiffening: Omega = omega_1 is the end.
+
+    It is hardly displaced there, by 3e-9 of its length, and rounding is amplified: nearer than one
+    step of the search it is told all the same.
+    """
     model = straight(nx=4)
     shaft = rom.held_solid(model, fixed=("root",), axis=(1.0, 0.0, 0.0))
     limit = rom.cyclic_modes(shaft, 0, 1).omega[0]
     with pytest.raises(ModelError, match=r"above ([\d.]+) rad/s: rotation has used up") as caught:
         rom.spin_up(shaft, model, speed=1.1 * limit, n_states=3)
     reached = float(str(caught.value).split("above ")[1].split()[0])
-    assert 0.98 * limit < reached < limit
+    assert 0.998 * limit < reached < limit
     assert rom.spin_up(shaft, model, speed=0.98 * limit, n_states=2).modes(1, speed=0.0).omega > 0
 
 
