@@ -18,13 +18,12 @@ from rom import errors
 from rom.errors import (
     ConfigError,
     FileFormatError,
-    MeshError,
     ResourceError,
     RomError,
     UnsafeFileError,
 )
 from rom.fe.mesh.solid import GEOMETRIES, Read
-from rom.fe.mesh.sources.readers import read
+from rom.fe.mesh.sources.readers import read, unmeshable
 from rom.process import child
 from rom.process.memory import total_bytes
 
@@ -203,18 +202,12 @@ def _too_large(reading: Reading) -> RomError:
 
 
 def _crashed(how: str, reading: Reading) -> RomError:
-    """A geometry is a program: what it does depends on its parameters."""
-    if not reading.geometry:
-        return FileFormatError(
-            f"the reader crashed ({how}): the file is damaged.",
-            where=reading.where,
-            hint="Open it in gmsh and save it again.",
-        )
-    cause = "with these parameters" if reading.given else "with the values it holds"
-    return MeshError(
-        f"gmsh ended without a mesh ({how}): the geometry cannot be meshed {cause}.",
+    if reading.geometry:
+        return unmeshable(how, reading.where, given=reading.given)
+    return FileFormatError(
+        f"the reader crashed ({how}): the file is damaged.",
         where=reading.where,
-        hint="Check the element size (lc = 0?), lengths that vanish and volumes that overlap.",
+        hint="Open it in gmsh and save it again.",
     )
 
 

@@ -15,6 +15,7 @@ from rom.fe.mesh.sources.cad_faces import axes, faces
 from rom.fe.mesh.sources.confinement import confine
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
 from rom.fe.mesh.sources.picking import pick
+from rom.fe.mesh.sources.readers import unmeshable
 from rom.fe.mesh.sources.script import check_script
 from rom.plausible import scaled_doubt
 
@@ -81,12 +82,17 @@ def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[No
     except MemoryError:
         raise
     except Exception as error:  # gmsh raises bare Exception
-        messages = _log(gmsh, "Error") or [str(error)]
-        if NO_MEMORY.search(messages[0]):
-            raise MemoryError from error
-        text = re.sub(r"'[^']*/([^'/]*)'", r"'\1'", messages[0]).rstrip(".")
+        text = _complaint(gmsh, error)
         text = f"gmsh says: {text}." if text else "gmsh cannot read it: the file is damaged."
         raise kind(text, hint="Open the file in gmsh to see more.") from error
+
+
+def _complaint(gmsh: Any, error: Exception) -> str:
+    """First words of gmsh on an error, without folders."""
+    message = (_log(gmsh, "Error") or [str(error)])[0]
+    if NO_MEMORY.search(message):
+        raise MemoryError from error
+    return re.sub(r"'[^']*/([^'/]*)'", r"'\1'", message).rstrip(".")
 
 
 def _log(gmsh: Any, kind: str) -> list[str]:
@@ -184,8 +190,11 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
     gmsh.write(str(declared))
     check_declared(gmsh, declared)
     if not any(len(tags) for tags in gmsh.model.mesh.getElements(3)[1]):
-        with complaints(gmsh, MeshError):
+        try:
             gmsh.model.mesh.generate(3)
+        except Exception as error:  # gmsh raises bare Exception
+            given = bool(request["parameters"])
+            raise unmeshable(_complaint(gmsh, error), given=given) from error
     else:  # the geometry has made its mesh itself
         gmsh.model.mesh.setOrder(order)
 
