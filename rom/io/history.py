@@ -13,6 +13,7 @@ import numpy as np
 from rom.arguments import AnySolution, typed, whole
 from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable, write_whole
+from rom.io.hdf5 import h5py
 from rom.model import Array
 
 AXIS_LETTERS = ("x", "y", "z")
@@ -58,7 +59,7 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
 
     Raises:
         ConfigError: for another ending, a wrong ``every``, or a place that is not writable.
-        ResourceError: if h5py is missing for ``.h5``, or the disk is full.
+        ResourceError: if h5py is missing or clashes for ``.h5``, or the disk is full.
     """
     ending = Path(path).suffix.lower()
     if ending not in WRITERS:
@@ -210,14 +211,8 @@ def table(head: list[str], values: Array, number: str) -> bytes:
 
 
 def _tree(solution: Any, t: Array, found: tuple[Channel, ...]) -> bytes:
-    try:
-        import h5py
-    except ModuleNotFoundError as error:
-        raise ResourceError(
-            "h5py is not installed.", hint="rom doctor says what to type; .csv needs nothing."
-        ) from error
-    memory = io.BytesIO()
-    with h5py.File(memory, "w", track_order=True) as file:
+    hdf5, memory = h5py(".csv"), io.BytesIO()
+    with hdf5.File(memory, "w", track_order=True) as file:
         file.attrs["schema"], file.attrs["version"] = "rom-history", (1, 0)
         file.attrs["status"] = solution.status
         file["time"] = t

@@ -3,6 +3,7 @@
 import csv
 import json
 import struct
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -15,12 +16,31 @@ from cases.mbs.mechanisms import random_body
 from cases.solid import block
 from rom.errors import ConfigError, ResourceError
 from rom.io.fields.gltf import MovingMesh, write_glb
+from rom.io.fields.vtkhdf import write_vtkhdf
+from rom.io.hdf5 import h5py
 from rom.rotation import matrix
 
 BOX = (
     np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.1, 0], [0, 0, 0.05]]),
     np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
 )
+
+LOAD_BOTH = """
+import rom.fe.elasticity
+from mpi4py import MPI
+import dolfinx, numpy, sys
+from dolfinx.io import XDMFFile
+from rom.io.fields.vtkhdf import write_vtkhdf
+import rom.io.hdf5
+cube = dolfinx.mesh.create_unit_cube(MPI.COMM_WORLD, 1, 1, 1)
+with XDMFFile(MPI.COMM_WORLD, "cube.xdmf", "w") as file:
+    file.write_mesh(cube)
+corners = numpy.array([[[0.0, 0, 0], [1, 0, 0], [0, 2, 0]]])
+write_vtkhdf(corners, numpy.array([[0, 1, 2]]), [0.0], "corner.vtkhdf", fields={})
+open_file = rom.io.hdf5.h5py("").File
+with open_file("corner.vtkhdf") as file, open_file("cube.h5") as cube:
+    sys.stdout.write(f"{file['VTKHDF/Points'][:].tolist()} {cube['Mesh/mesh/geometry'].shape}")
+"""
 
 
 @pytest.fixture(scope="module")
@@ -116,9 +136,9 @@ def test_a_wrong_share_of_instants_is_named(mixed):
 
 
 def test_the_tree_is_read_by_h5py(motion, tmp_path):
-    h5py = pytest.importorskip("h5py", reason="h5py is not installed")
+    hdf5 = pytest.importorskip("h5py", reason="h5py is not installed")
     path = rom.write_history(motion, tmp_path / "m.h5", every=5)
-    with h5py.File(path) as file:
+    with hdf5.File(path) as file:
         assert_array_equal(file["time"], motion.t[::5])
         tip = file["bodies/rod/markers/tip/position"]
         assert_array_equal(tip, motion.position("rod", "tip")[::5])
@@ -127,7 +147,7 @@ def test_the_tree_is_read_by_h5py(motion, tmp_path):
         assert_array_equal(file["energy/total"], motion.energy.total[::5])
         assert file["bodies/rod/elastic"].attrs["unit"] == "m sqrt(kg)"
         datasets = []
-        file.visititems(lambda _, x: datasets.append(x) if isinstance(x, h5py.Dataset) else None)
+        file.visititems(lambda _, x: datasets.append(x) if isinstance(x, hdf5.Dataset) else None)
         assert len(datasets) > 20 and all("unit" in x.attrs for x in datasets)
 
 
@@ -348,3 +368,44 @@ def test_a_film_of_given_motions_is_played_by_the_rules(tmp_path):
             r, p = poses[body == "bob"]
             expected = points @ matrix(p[frame]).T + r[frame]
             assert_allclose(found[body], expected @ up.T, atol=1e-5)
+
+
+class Broken:
+    """Finds h5py and fails to load it."""
+
+    def find_spec(self, name, path=None, target=None):
+        if name == "h5py":
+            raise ValueError("Not a datatype")
+
+
+def test_a_missing_h5py_is_named(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(ResourceError, match=r"h5py is not installed.*rom doctor.*\.glb"):
+        write_vtkhdf(np.zeros((1, 3, 3)), np.array([[0, 1, 2]]), np.zeros(1),
+                     tmp_path / "a.vtkhdf", fields={})  # fmt: skip
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("beside", "match"),
+    [(True, r"dolfinx has loaded another HDF5 before \(Not a datatype\)\. Import h5py first"),
+     (False, r"cannot be loaded \(Not a datatype\)\. rom doctor")],
+)  # fmt: skip
+def test_an_h5py_that_does_not_load_is_told_with_the_cure(beside, match, monkeypatch):
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("h5py", "dolfinx")]:
+        monkeypatch.delitem(sys.modules, name)
+    if beside:
+        monkeypatch.setitem(sys.modules, "dolfinx", sys)
+    monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
+    with pytest.raises(ResourceError, match=rf"{match}.*\.csv needs nothing"):
+        h5py(".csv")
+
+
+@pytest.mark.fenicsx
+def test_rom_and_dolfinx_write_hdf5_in_one_process(tmp_path):
+    """Wheels bring an HDF5 each, and dolfinx shows its own to all that is loaded later."""
+    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+    done = subprocess.run(
+        [sys.executable, "-c", LOAD_BOTH], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]] (8, 3)", done.stderr

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rom.errors import ResourceError
 from rom.io.files import write_whole
+from rom.io.hdf5 import h5py
 from rom.model import Array, Index
 from rom.names import ORIGIN_MARK
 
@@ -31,22 +31,16 @@ def write_vtkhdf(
 
     Raises:
         ConfigError: if the place is not writable.
-        ResourceError: if h5py is missing, or the disk is full.
+        ResourceError: if h5py is missing or clashes, or the disk is full.
     """
-    try:
-        import h5py
-    except ModuleNotFoundError as error:
-        raise ResourceError(
-            "h5py is not installed.", hint="rom doctor says what to type; .glb needs nothing."
-        ) from error
     f, n = points.shape[:2]
     every, zero = n * np.arange(f), np.zeros(f, dtype=np.int64)
-    memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
+    hdf5, memory = h5py(".glb"), io.BytesIO()
+    with hdf5.File(memory, "w") as file:
         file.attrs["generator"] = ORIGIN_MARK
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = (2, 0)
-        root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))
+        root.attrs.create("Type", b"UnstructuredGrid", dtype=hdf5.string_dtype("ascii", 16))
         root["NumberOfPoints"] = [n]  # one part, the same at all instants
         root["NumberOfCells"] = [len(triangles)]
         root["NumberOfConnectivityIds"] = [triangles.size]
