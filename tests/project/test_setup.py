@@ -18,6 +18,7 @@ from rom.fe import DEBIAN_PACKAGES, GMSH_LIBRARIES, WHEEL_PACKAGES
 
 pytestmark = pytest.mark.once
 SETUP = ROOT / ".ci" / "setup.sh"
+OTHER_SYSTEMS = ROOT / ".ci" / "other_systems.sh"
 
 
 def packages():
@@ -141,6 +142,18 @@ def test_the_doctor_advises_packages_the_setup_installs():
     assert set(DEBIAN_PACKAGES.split()) <= known
 
 
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [((), "debian or pip, not ''"), (("conda", "trixie"), "debian or pip, not 'conda'"),
+     (("pip",), "which release")],
+)  # fmt: skip
+def test_other_systems_are_made_by_a_way_in_and_a_release(wrong, said):
+    done = subprocess.run(
+        ["sh", OTHER_SYSTEMS, *wrong], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1 and said in done.stderr
+
+
 def test_the_way_in_by_pip_alone_is_told_the_same_everywhere():
     """The extra, what is advised where it is missing, the script that tries it, and the page."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -148,13 +161,13 @@ def test_the_way_in_by_pip_alone_is_told_the_same_everywhere():
     assert brought == WHEEL_PACKAGES.split()
     fenicsx = {name for _, names in PACKAGES.values() for name in names.split()}
     assert fenicsx - {"mpi4py", "mpich"} == set(brought)  # these two come with FEniCSx
-    newest = " ".join((ROOT / ".ci" / "newest_dolfinx.sh").read_text().split())
+    script = " ".join(OTHER_SYSTEMS.read_text().split())
     page = " ".join((ROOT / "docs" / "install.md").read_text().replace("\\\n", " ").split())
-    needed = set(re.search(r'packages="([^"]+)"', newest).group(1).split()) - {"python3-venv"}
+    needed = set(re.search(r'packages="([^"]+)"', script).group(1).split())
     install = re.search(r"apt-get install (gcc [^`]+?) python3 -m venv", page).group(1)
     assert set(install.split()) == needed
     assert needed > {*GMSH_LIBRARIES.split(), *SYSTEM_COMMAND.split()[3:]}
-    assert ".[fe,view,dev]" in newest and ".[fe,view]" in page
+    assert ".[fe,view,dev]" in script and ".[fe,view]" in page
     assert ".[fe,view]" in (ROOT / "README.md").read_text()
 
 
