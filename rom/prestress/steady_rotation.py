@@ -21,7 +21,7 @@ from rom.model import Array
 
 MAX_ITERATIONS = 25
 INCREMENT_RTOL = 1e-9  # last increment, of the displacement; the next one is its square
-ROUNDING = 1e-12  # of the extent; smaller increments are noise, which an instability amplifies
+NOISE_RTOL = 1e-12  # of the extent; smaller increments are noise, which an instability amplifies
 MIN_LOAD_STEP = 1 / 256  # of a stretch of load, at which a path is given up
 
 
@@ -47,7 +47,7 @@ class SteadyRotation:
         self.K_cold = solid.tangent(np.zeros(sector.n))
         solid.warm(1.0)
         self.pull = self.softening @ (sector.points - sector.at).ravel()
-        self.rounding = ROUNDING * np.linalg.norm(sector.points - sector.points.mean(axis=0))
+        self.noise = NOISE_RTOL * np.linalg.norm(sector.points - sector.points.mean(axis=0))
 
     @property
     def at_rest(self) -> Array:
@@ -85,7 +85,7 @@ class SteadyRotation:
             size, whole = np.linalg.norm(step), np.linalg.norm(a)
             if not np.isfinite(size):
                 return None
-            if size <= INCREMENT_RTOL * whole + self.rounding:
+            if size <= INCREMENT_RTOL * whole + self.noise:
                 return a if (lu.U.diagonal() > 0).all() else None
         return None
 

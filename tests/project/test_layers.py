@@ -160,6 +160,7 @@ ORDER = {
     ),
     "io": (
         "files",
+        "hdf5",
         "archive",
         "native",
         "fields",

@@ -23,7 +23,8 @@ from rom.errors import (
     UnsafeFileError,
 )
 from rom.fe.mesh.solid import GEOMETRIES, Read
-from rom.fe.mesh.sources.readers import read, unmeshable
+from rom.fe.mesh.sources.builder import unmeshable
+from rom.fe.mesh.sources.readers import read
 from rom.process import child
 from rom.process.memory import total_bytes
 

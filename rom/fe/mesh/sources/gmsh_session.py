@@ -15,7 +15,6 @@ from rom.fe.mesh.sources.cad_faces import axes, faces
 from rom.fe.mesh.sources.confinement import confine
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
 from rom.fe.mesh.sources.picking import pick
-from rom.fe.mesh.sources.readers import unmeshable
 from rom.fe.mesh.sources.script import check_script
 from rom.plausible import scaled_doubt
 
@@ -194,7 +193,7 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             given = bool(request["parameters"])
-            raise unmeshable(_complaint(gmsh, error), given=given) from error
+            raise builder.unmeshable(_complaint(gmsh, error), given=given) from error
     else:  # the geometry has made its mesh itself
         gmsh.model.mesh.setOrder(order)
 

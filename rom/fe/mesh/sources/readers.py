@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from rom.errors import FileFormatError, MeshError, ResourceError, RomError
+from rom.errors import FileFormatError, ResourceError, RomError
 from rom.fe import GMSH_LIBRARIES
 from rom.fe.mesh.solid import GEOMETRIES, Read
 
@@ -52,19 +52,3 @@ def _reader(name: str) -> Callable[[dict[str, Any]], Read]:
     from rom.fe.mesh.sources import gmsh_session
 
     return gmsh_session.run
-
-
-def unmeshable(how: str, where: str = "", *, given: bool) -> MeshError:
-    """What is said of a geometry without a mesh: it is a program and does what its values ask for.
-
-    Args:
-        how: how gmsh ended, by a crash or in its own words.
-        where: name of the file.
-        given: whether the geometry was given parameters.
-    """
-    cause = "with these parameters" if given else "with the values it holds"
-    return MeshError(
-        f"gmsh ended without a mesh ({how}): the geometry cannot be meshed {cause}.",
-        where=where,
-        hint="Check the element size (lc = 0?), lengths that vanish and volumes that overlap.",
-    )
