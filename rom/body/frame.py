@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 from rom.body.records import Body, Marker
 from rom.body.reference import MEAN_AXES, moved_frame, reference_motion
-from rom.body.stiffening import moved_stiffening
+from rom.body.stiffening import SecondOrder, moved_stiffening
 from rom.errors import ConfigError, ModelError
 from rom.model import OWN_FRAME, Array
 
@@ -17,7 +17,7 @@ def on_mean_axes(body: Body) -> Body:
     """The same elastic coordinates on mean axes, see `FlexibleBody.on_mean_axes`."""
     if not body.K_geo or body.reference in MEAN_AXES:
         return body
-    body.second_order()  # refuses matrices of no load
+    SecondOrder.of(body)  # refuses matrices of no load
     if OWN_FRAME in body.markers:
         raise ConfigError(
             f"body {body.name!r} has an interface {OWN_FRAME!r}, which is the name of its frame.",
