@@ -41,6 +41,7 @@ def test_axes_are_turned_to_the_load():
     assert_allclose(films.along_the_load(np.array([[0, 1.0], [0, 0]])), [[0, 0], [-1.0, 0]])
 
 
+@pytest.mark.long
 def test_the_unit_that_runs_through_its_speeds_carries_its_load():
     state = rest(films.gear_unit(cells=(48, 4)))
     given, taken, heat = state.powers

@@ -13,7 +13,7 @@ from scipy.linalg import eigh, eigvalsh
 
 import rom
 from cases.beam import gauss_hermite, hermite_beam
-from cases.long import SHARED_BY
+from cases.long import SHARED_BY, few
 from cases.ranks.environment import ENVIRONMENT
 from rom.body.prestress import _turning, centrifugal
 from rom.body.rotating import rotating_matrices
@@ -297,7 +297,7 @@ def test_the_number_of_processes_does_not_matter(tmp_path):
             assert_allclose(many.K_geo[load], A, atol=1e-9 * np.abs(A).max(), err_msg=load)
 
 
-@pytest.mark.parametrize("stiffening", [False, True])
+@pytest.mark.parametrize("stiffening", few(1, [True, False]))
 def test_a_bar_stretched_by_its_rotation_follows_hooke(stiffening):
     """4 % of strain at the hub: u'' + k^2 (x + u) / L^2 = 0, stretched by L (tan(k) / k - 1)."""
     model = solid(nu=0.0, nx=24, ny=1, nz=1)

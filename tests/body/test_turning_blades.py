@@ -126,6 +126,7 @@ def test_equal_blades_are_the_travelling_waves_of_the_sector(model, small):
     assert found[0] > 100 * found[1]  # struts at rest seem to run back
 
 
+@pytest.mark.long
 def test_waves_of_a_wheel_of_different_blades_at_speed(disk, blades, whole):
     """Stiffening, softening and Coriolis, each of which is seen."""
     K, M, G = whole

@@ -19,7 +19,6 @@ ONCE = (
 LONGEST_FIRST = (
     "project/test_demos.py",
     "faults/test_generated.py",
-    "project/test_demos_under_mpi.py",
     "mbs/published/test_mbs_crank.py",
     "mbs/analysis/test_mbs_equilibrium.py",
     "fe/test_fe_body_mpi.py",

@@ -16,6 +16,7 @@ from cases.command import environment
 from cases.command import rom as command
 from cases.files.schema import errors
 from cases.files.step_parts import step_box, step_plate
+from cases.long import few
 from cases.solid import block
 from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
@@ -446,13 +447,16 @@ def test_fixed_interfaces_may_be_written_with_blanks():
 @pytest.mark.fenicsx
 @pytest.mark.parametrize(
     ("options", "label", "n_modes"),
-    [
-        (("--method", "rubin", "-m", 30), "free 30", 15 + 30),
-        (("--method", "herting", "-m", 25), "free 25", 15 + 25),
-        (("--f-max", 700, "--tol", 1e-3), "fixed-interface", None),
-        (("--method", "moment-matching", "--at", "0,300", "-m", 1), "moment", None),
-        (("--method", "balanced", "-m", 12, "--gravity-shapes"), "balanced", 9 + 12 + 3),
-    ],
+    few(
+        2,
+        [
+            (("--method", "rubin", "-m", 30), "free 30", 15 + 30),
+            (("--method", "herting", "-m", 25), "free 25", 15 + 25),
+            (("--f-max", 700, "--tol", 1e-3), "fixed-interface", None),
+            (("--method", "moment-matching", "--at", "0,300", "-m", 1), "moment", None),
+            (("--method", "balanced", "-m", 12, "--gravity-shapes"), "balanced", 9 + 12 + 3),
+        ],
+    ),
 )
 def test_reduce_takes_a_method_or_a_tolerance(geometry, tmp_path, capsys, options, label, n_modes):
     """A rigid end and one with linear functions: 6 and 9 coordinates."""

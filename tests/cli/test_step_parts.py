@@ -20,7 +20,6 @@ FACES = {  # number of faces; faces by number, point, radius and normal, and the
     "rack": (200, {"left": ("normal:-1,0,0", "rbe2"), "bolts": ("199+200", "rbe2")}),
 }
 PICKED = {"bracket": {"foot": [10, 11, 12, 13], "bore": [14]}, "crank": {"bore": [6], "pin": [8]}}
-parts = [pytest.param(name, marks=() if name == "wheel" else pytest.mark.long) for name in PARTS]
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +37,8 @@ def done(folder, *words):
 
 
 @pytest.mark.fenicsx
-@pytest.mark.once
-@pytest.mark.parametrize("part", parts)
+@pytest.mark.long
+@pytest.mark.parametrize("part", PARTS)
 def test_a_part_becomes_a_report_by_three_commands(folder, part):
     """Nothing is said but faces: sizes and numbers of modes are found, the certificate holds."""
     volume = PARTS[part](folder / f"{part}.step")

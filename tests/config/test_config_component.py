@@ -227,6 +227,7 @@ def test_the_sample_describes_the_rod_of_the_demo():
     assert part.damping() == rom.ModalDamping(0.01) and part.name == "rod"
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_sample_is_meshed_as_the_shell_changes_it(capsys, monkeypatch):
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")

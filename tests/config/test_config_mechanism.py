@@ -308,6 +308,7 @@ FMU_CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize("case", few(1, FMU_CASES))
 def test_an_fmu_of_a_file_moves_as_the_file(case, folder, monkeypatch):

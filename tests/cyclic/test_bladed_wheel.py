@@ -102,6 +102,7 @@ def test_the_certificates_of_sector_and_wheel(small, disk):
     assert not replace(disk, sector=replace(small, blade=weak)).certificate.ok
 
 
+@pytest.mark.long
 def test_every_blade_may_be_another_one(model, full, small, disk, short):
     """A fifth of the stiffness lost, a denser one, a shorter one: frequencies, response, factor."""
     (K, M), (K_short, M_short) = region(model, "blade"), region(short, "blade")
@@ -157,6 +158,7 @@ def test_cantilever_frequencies_that_deviate(model, full, small, disk):
     assert abs(omega / tuned[:24] - 1).max() > 0.01
 
 
+@pytest.mark.long
 def test_a_blade_that_lost_most_of_its_stiffness(full, small, disk):
     """Tuned modes do not contain what it does: a substructure does, and shows where it moves."""
     delta = np.zeros(N)

@@ -89,6 +89,7 @@ def quick(monkeypatch):
     monkeypatch.setattr("os.fsync", lambda handle: None)
 
 
+@pytest.mark.long
 def test_a_manifest_with_any_other_value_is_refused_or_harmless(file):
     """What was computed and how is told to people alone; of the certificate one row will do."""
     path, manifest, arrays, read = file
@@ -104,6 +105,7 @@ def test_a_manifest_with_any_other_value_is_refused_or_harmless(file):
     assert sum(error is not None for error in found.values()) > len(found) // 3
 
 
+@pytest.mark.long
 def test_arrays_of_any_other_shape_are_refused_or_harmless(file):
     path, manifest, arrays, read = file
     refused = n = 0

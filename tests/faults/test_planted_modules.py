@@ -99,7 +99,12 @@ def left(marks):
 
 
 # each verb in one form, each form with every other verb; with more time all pairs
-PAIRS = [pair for k, pair in enumerate(product(VERBS, FORMS)) if ROM_LONG or k % 4 in (0, 3)]
+SLOW = {"report", "swing", "view"}
+PAIRS = [
+    pair
+    for k, pair in enumerate(product(VERBS, FORMS))
+    if ROM_LONG or (k % 4 in (0, 3) and pair[0] not in SLOW)
+]
 
 
 @pytest.mark.parametrize(("verb", "form"), PAIRS)

@@ -16,6 +16,7 @@ import pytest
 import rom
 from cases.command import environment
 from cases.command import rom as command
+from cases.long import few
 from cases.paths import TESTS
 from cases.solid import block
 from rom.cli.main import main
@@ -235,7 +236,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(3, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize("ranks", few(1, [pytest.param(3, marks=pytest.mark.mpi), 1]))
 def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_kept(tmp_path, ranks):
     """A function for two types: two compilations, whoever makes them."""
     (tmp_path / "toy.py").write_text(TOY)
@@ -296,6 +297,7 @@ with jit.compiling(MPI.COMM_SELF):
 """
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_forms_compiled_by_two_processes_at_once_are_the_same(tmp_path):
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")

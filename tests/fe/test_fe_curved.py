@@ -266,7 +266,7 @@ def test_displacements_of_degree_one_need_straight_edges(tmp_path):
         assemble(mesh, material=STEEL, degree=1)
 
 
-@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("degree", few(1, [2, 3]))
 def test_linear_fields_are_exact_on_curved_cells(tmp_path, degree):
     """Rigid motions without energy, uniform stress at all nodes, and its geometric stiffness.
 
@@ -310,7 +310,7 @@ def test_a_bore_is_an_interface_of_its_true_area(tmp_path):
     assert_allclose(r, 0.02, rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", few(3, ["rbe2", "rbe3", "polynomial:2", "full"]))
+@pytest.mark.parametrize("kind", few(1, ["rbe2", "rbe3", "polynomial:2", "full"]))
 def test_bodies_are_reduced_to_curved_interfaces(tmp_path, kind):
     """Compared with the full curved model: statics, mass and rigid motions exactly."""
     made = model(written(tmp_path, PLATE), material=STEEL, parameters=round_bore(10))

@@ -139,6 +139,7 @@ def test_points_are_read_back_from_the_rigid_motions(small):
     assert_allclose(spectrum.points_of(small.operators.rigid), small.points, atol=1e-15)
 
 
+@pytest.mark.long
 def test_modes_of_equal_frequency_do_not_depend_on_the_way_they_were_found():
     """A square beam: two planes of bending for each frequency, fixed by convention only."""
     model = beam((8, 2, 2), (1.0, 0.1, 0.1), degree=2)

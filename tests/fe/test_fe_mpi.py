@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.long import SHARED_BY
 from cases.paths import RANKS, TESTS
 from rom.errors import MaterialError, RomError
 from rom.process.mpirun import mpirun
@@ -44,10 +45,10 @@ def run_model(folder, n, cells, degree):
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ranks")
-    return {n: run_model(folder, n, "6,2,2", 2) for n in (1, 2, 3)}
+    return {n: run_model(folder, n, "6,2,2", 2) for n in (1, *SHARED_BY)}
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", SHARED_BY)
 def test_ranks_agree_with_one_process(runs, n):
     """Frequencies and mass to 1e-9, interfaces node by node, shapes with their signs."""
     one, many = runs[1], runs[n]

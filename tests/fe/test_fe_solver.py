@@ -41,6 +41,7 @@ def test_every_solver_gives_the_frequencies_of_the_direct_one(direct, solver):
         assert found.omega[elastic] == pytest.approx(expected.omega[elastic], rel=1e-8)
 
 
+@pytest.mark.long
 def test_static_solutions_by_iteration_are_those_of_the_factor(direct):
     from rom.workflow import operators
 
@@ -57,6 +58,7 @@ def test_iteration_refuses_a_body_that_can_move(direct):
         operators(beam("iterative")).hold(direct.interfaces["root"].dofs[:3])
 
 
+@pytest.mark.long
 def test_a_missed_mode_is_found_by_the_second_search(monkeypatch):
     from rom.fe.operators import iterative
 

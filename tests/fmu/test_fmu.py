@@ -369,6 +369,7 @@ def test_where_its_writer_is_gone_the_usual_python_runs_it(hanging, tmp_path, mo
     assert "python3 ended at once" in log[0]
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_a_mechanism_that_cannot_start_says_why(tmp_path):
     """Here its file is gone from the resources."""

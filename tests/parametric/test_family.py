@@ -280,6 +280,7 @@ def test_terms_that_do_not_fit_are_refused(family, tmp_path):
         rom.load(rom.save(cut, tmp_path / "cut.npz"))
 
 
+@pytest.mark.long
 def test_a_thousand_points_need_no_finite_elements(family, tmp_path):
     """The file in a process that cannot import FEniCSx and whose sparse solvers are gone."""
     path = rom.save(family, tmp_path / "family.npz")

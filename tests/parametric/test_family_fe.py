@@ -75,6 +75,7 @@ def test_matrices_and_stress_are_sums_over_the_regions(solids):
     assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.long
 def test_stress_of_the_body_is_that_of_its_material(family):
     """Modes of the stress recovery: the first bending mode, clamped at the root."""
     body, full = family.at(**POINT), panel(**POINT)

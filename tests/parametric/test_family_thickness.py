@@ -224,6 +224,7 @@ def test_core_and_faces_of_a_panel_change_their_thickness():
         assert np.all(found >= expected - 1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 def test_faces_of_one_thickness_move_with_the_core():
     """Nothing stretches the faces, but the rigid motions of the whole change."""

@@ -147,6 +147,7 @@ def test_a_bent_blade_vibrates_like_a_geometrically_exact_rod(bent, run_up, eta)
     assert_allclose(found[3], exact[3], rtol=0.012)  # the solid has kinks of 2.5 degrees
 
 
+@pytest.mark.long
 def test_the_stress_of_the_linear_solid_is_wrong_by_a_quarter(bent, blade, run_up):
     linear = rom.travelling_modes(rom.rotating_sector(blade, bent), 0, 1, speed=run_up.top)
     ratio = linear.omega[0] / run_up.waves(1, speed=run_up.top).omega[0]
@@ -169,6 +170,7 @@ def test_a_reduced_blade_follows_the_speed(run_up):
     assert_allclose(state.Psi.T @ (run_up.sector.M @ state.Psi), state.M.toarray(), atol=1e-9)
 
 
+@pytest.mark.long
 def test_too_few_states_are_confessed(bent, blade):
     states = rom.spin_up(blade, bent, speed=6 * UNIT, n_states=3)
     with pytest.warns(RomWarning, match="off by .* ask for more states"):

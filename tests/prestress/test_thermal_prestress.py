@@ -52,6 +52,7 @@ def test_a_clamped_bar_buckles_at_the_load_of_euler(bar):
     assert_allclose(rom.modes(cooled, 1, fixed=ENDS).omega[0] / cold, np.sqrt(2.0), rtol=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [-2.0, 0.4, 0.9])
 def test_a_pinned_bar_softens_as_the_beam_does(bar, share):
     """omega^2 = omega_0^2 (1 - P / P_cr), exact as the shape stays a sine.
@@ -122,6 +123,7 @@ def test_a_disc_hot_at_its_rim_has_the_stress_of_timoshenko():
     assert_allclose(w.ravel() @ (dK @ w.ravel()), exact, rtol=5e-3)
 
 
+@pytest.mark.long
 def test_one_hot_sector_is_the_hot_wheel():
     """The whole wheel meshed, held and heated as a solid."""
     N, sizes = 6, {"degree": 1, "cells": (4, 2, 2, 2)}

@@ -163,6 +163,7 @@ TABLE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("level", few(1, LEVELS))
 def test_study_of_characteristic_modes_on_two_blocks(level):

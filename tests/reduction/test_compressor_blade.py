@@ -59,6 +59,7 @@ def seated(body):
     return np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=(0, 9))) / (2 * np.pi)
 
 
+@pytest.mark.long
 def test_the_blade_is_accepted_without_a_remark(blade):
     model, _, _ = blade
     assert model.interface_names == FLANKS
@@ -98,6 +99,7 @@ def test_flanks_are_planes_or_cylinders_where_the_dovetail_has_them(crown, chang
         assert areas(mesh)[name] == pytest.approx(arc * p["l_root"], rel=2e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("stagger", "twist"), [(20.0, 30.0), (10.0, -25.0)])
 def test_the_tip_is_turned_by_stagger_and_twist(stagger, twist):
     p = {"stagger": stagger, "twist": twist, "camber": 0.0}

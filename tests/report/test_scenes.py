@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.sparse.linalg import spsolve
 
 import rom
+from cases.long import few
 from cases.solid import block
 from rom import report
 from rom.body.recovery import StressRecovery
@@ -155,7 +156,7 @@ def volume(X, triangles):
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
 
 
-@pytest.mark.parametrize("n_max", [300, 1500])
+@pytest.mark.parametrize("n_max", few(1, [300, 1500]))
 def test_a_coarser_surface_keeps_points_and_shape(n_max):
     X, triangles = sphere(60)
     kept, found = coarse.coarsened(X, triangles, n_max)
@@ -197,6 +198,7 @@ def test_a_small_surface_stays_and_what_no_triangle_uses_is_left_out():
     assert (kept == np.arange(len(X))).all() and (found == triangles).all()
 
 
+@pytest.mark.long
 def test_a_fine_surface_takes_no_more_than_its_share_of_the_page(body):
     (sent,) = scene.modes_scene(body, size=6 * 3 * body.n_modes * scene.MIN_POINTS)["bodies"]
     assert len(points(sent)) <= scene.MIN_POINTS

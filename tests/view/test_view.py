@@ -145,6 +145,7 @@ def test_the_colours_of_a_mesh_are_those_of_its_interfaces(tmp_path):
     assert ((red[..., 0] - red[..., 1]) > 80).mean() < 0.01
 
 
+@pytest.mark.long
 def test_a_film_moves_and_loops(bar, tmp_path):
     mech, sol = swinging(bar)
     view.animate(mech, sol, tmp_path / "film.gif", frames=5, seconds=1.0, magnify=10.0)

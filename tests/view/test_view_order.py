@@ -81,7 +81,9 @@ FILMS = {
                      {"caption": "What a stranger has to know."}),
 }  # fmt: skip
 # seconds each; "mesh" and "start" are drawn by a child process in `make test`, too
-DRAWN_BY_A_CHILD = {"faces", "instants", "mode_shapes", "updating", "wheel_modes"}
+DRAWN_BY_A_CHILD = {
+    "faces", "instants", "mesh", "mode_shapes", "start", "updating", "wheel_modes"
+}  # fmt: skip
 PATH_CAME_FIRST = {"campbell", "convergence", "deformed", "flow", "frequencies", "history",
                    "panels", "plane", "updating", "wheel_modes"}  # fmt: skip
 WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/family.py",

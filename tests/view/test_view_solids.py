@@ -65,6 +65,7 @@ SHAPES = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize("name", SHAPES)
 def test_solids_are_closed_and_face_outwards(name):

@@ -215,6 +215,7 @@ def test_what_is_left_of_an_update_has_a_scale_of_its_own():
         view.updating(X, {"test": [1.0, 2.0]}, changes, structure=structure, label="u")
 
 
+@pytest.mark.long
 def test_an_interface_on_the_far_side_is_said_to_be_turned_away():
     model = block()
     points, triangles = model.points[model.surface.nodes], model.surface.triangles

@@ -1,7 +1,7 @@
 """The demos, how each of them runs, what its numbers must be, and what it leaves behind.
 
-In `make test` each that is not of `LONG_DEMOS` runs once, those of `ON_TWO_PROCESSES` under mpirun;
-in `make long` all run alone, and all with a mesh under mpirun, too.
+In `make test` each that is not of `LONG_DEMOS` runs; in `make long` all do, and all with a mesh
+under mpirun, too.
 """
 
 import pytest
@@ -10,16 +10,14 @@ from cases.paths import ROOT
 
 DEMOS = sorted((ROOT / "demos").glob("demo_*.py"))
 MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
-# one that writes files
-ON_TWO_PROCESSES = {"demo_exchange"}
 # about ten seconds each and more, of what has tests of its own
 LONG_DEMOS = {
     "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
-    "demo_compressor_blade", "demo_hand", "demo_large_mesh", "demo_lost_tip", "demo_masonry",
-    "demo_mistuning", "demo_parameters", "demo_pendulum_chain", "demo_robot_arm",
-    "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade", "demo_rotor",
-    "demo_satellite", "demo_sheet", "demo_spin_up", "demo_transmission", "demo_updating",
-    "demo_whole_turbine", "demo_wind_turbine",
+    "demo_compressor_blade", "demo_exchange", "demo_hand", "demo_large_mesh", "demo_lost_tip",
+    "demo_masonry", "demo_mistuning", "demo_parameters", "demo_pendulum_chain",
+    "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
+    "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_spin_up",
+    "demo_transmission", "demo_updating", "demo_whole_turbine", "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},

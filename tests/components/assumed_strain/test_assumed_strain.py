@@ -65,6 +65,7 @@ def solved(body, metal, f, held):
     return u.reshape(-1, 2)
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize("n", few(1, COOK_TABLE))
 def test_cooks_membrane(n):
@@ -76,6 +77,7 @@ def test_cooks_membrane(n):
     assert_allclose(found, COOK_TABLE[n], atol=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize(
     ("n", "element", "expected"),
@@ -362,6 +364,7 @@ def test_only_one_point_lets_the_foot_of_taylors_bar_flow(element, length, foot,
     assert flight.plastic[-1].max() == pytest.approx(plastic, rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_taylor_bar():
     """Copper cylinder against a rigid wall at 227 m/s; plastic flow keeps the volume."""

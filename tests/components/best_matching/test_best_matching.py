@@ -306,6 +306,7 @@ def test_simplest_shapes_are_the_known_ones_and_collapse_in_themselves(n, expect
     assert_allclose(bodies.acceleration(x), pull * x, atol=1e-5 * np.abs(pull * x).max())
 
 
+@pytest.mark.long
 def test_many_bodies_spread_evenly_over_a_ball_tend_to_its_complexity():
     assert 0.6**1.5 == pytest.approx(0.464758, abs=1e-6)
     grid = np.stack(np.meshgrid(*[np.arange(-10.0, 11.0)] * 3), axis=-1).reshape(-1, 3)

@@ -151,6 +151,7 @@ def test_every_locus_closes(index, level):
         assert_allclose(on, level, atol=5e-4)
 
 
+@pytest.mark.long
 def test_loci_near_one_surround_the_isotropic_points_one_by_one(found):
     """On a finer grid, so that each gets its own: those at 64 and 71 deg are near."""
     n = 800

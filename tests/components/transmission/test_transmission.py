@@ -201,6 +201,7 @@ def test_teeth_of_constant_stiffness_excite_little():
     assert np.abs(run.q - s.q).max() < 0.01 * np.abs(s.q).max()
 
 
+@pytest.mark.long
 def test_steps_converge_to_a_reference_of_a_tenth_of_the_step(loaded):
     """Through the loss and the gain of a pair of teeth."""
     fine = simulate(loaded, periods=0.4, steps=1000)
@@ -232,6 +233,7 @@ def test_the_response_to_the_mesh_is_where_a_motion_settles():
     assert linear.load_factor - 1 == pytest.approx(np.std(run.teeth[last]) / linear.mean, rel=0.3)
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize(("helix", "rel"), few(1, [(0.0, 0.15), (HELIX, 0.25)]))
 def test_slow_units_have_the_error_of_their_teeth(helix, rel):

@@ -101,6 +101,7 @@ def in_plane(body):
     return np.block([[rigid, elastic], [elastic.T, body.S_kl[0, 0] + body.S_kl[1, 1]]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [200.0, 600.0])
 def test_beam_and_solid_respond_alike_to_unbalance(solid, beam, speed):
     """In axes that spin, an unbalanced solid is at rest; the beam whirls in axes that do not."""

@@ -42,6 +42,7 @@ def test_it_is_where_motion_through_time_settles(lossy, found):
     assert found.load_factor == pytest.approx(top, rel=0.03)
 
 
+@pytest.mark.long
 def test_it_ends_as_it_began(found):
     assert found.t[-1] == pytest.approx(found.unit.mesh_period)
     assert found.q.shape == (STEPS + 1, found.unit.load.size)

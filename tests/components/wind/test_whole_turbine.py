@@ -68,6 +68,7 @@ def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
     assert rom.audit(sol).ok
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_frequencies_of_the_turbine_at_rest():
     """FAST and ADAMS with modes and coarse elements say tower 0.31 to 0.32, flap 0.70 Hz.

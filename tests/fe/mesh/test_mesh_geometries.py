@@ -129,6 +129,7 @@ def test_volume_of_the_crank_is_that_of_hull_and_cylinders():
     assert_allclose((pin[:, 2].min(), pin[:, 2].max()), (0.0, 0.026), atol=1e-12)
 
 
+@pytest.mark.long
 def test_parts_of_the_frame_meet_in_their_nodes_and_fill_the_whole():
     whole, left, beam, right = (
         read_mesh(MESHES / "frame.geo", parameters={"part": part}) for part in range(4)
@@ -198,6 +199,7 @@ def blade_volume(p):
     return airfoil + p["l_platform"] * p["w_platform"] * p["t_platform"] + p["l_root"] * root
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(5 if ROM_LONG else 2))
 def test_the_blade_meshes_over_its_range(seed):
     rng = np.random.default_rng(seed)

@@ -194,6 +194,7 @@ def test_wrong_arguments_are_named():
         rom.equilibrium("crane")
 
 
+@pytest.mark.long
 @pytest.mark.once
 @pytest.mark.parametrize("height", [-1e-5, 0.0, 0.5])
 def test_a_ball_falls_on_a_floor_and_rests_on_hertzs_contact(height):

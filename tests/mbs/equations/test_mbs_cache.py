@@ -55,7 +55,7 @@ def place_for_code(where, tmp_path, toy):
     return {"NUMBA_CACHE_DIR": "", "HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
 
 
-@pytest.mark.parametrize("where", few(2, ["beside", *ELSEWHERE]))
+@pytest.mark.parametrize("where", few(1, ["beside", *ELSEWHERE]))
 def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     """Constants and a function built in from other files; a file that gives none is no source."""
     package = tmp_path / "rom"

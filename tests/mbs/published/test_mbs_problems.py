@@ -241,6 +241,7 @@ def bricard():
     return mech
 
 
+@pytest.mark.long
 def test_bricards_linkage_moves_although_it_is_overconstrained():
     def points(q):
         moment = np.sqrt([1 / 12, WIDTH**2 / 12, WIDTH**2 / 12])
@@ -266,6 +267,7 @@ def test_bricards_linkage_moves_although_it_is_overconstrained():
 # A05: a governor whose couplers are stiff springs with dampers -----------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_a_flyball_governor_with_stiff_couplers():
     """Arms of 1 m at 30 degrees to the shaft, balls of 5 kg, a slider of 3 kg, 1 turn a second."""
