@@ -64,7 +64,7 @@ def test_an_update_is_drawn_with_its_changes(tmp_path):
     image = pixels(view.updating(f, curves, path=tmp_path / "u.png", **more))
     assert colourful(image).sum() > 1000
     bars = (image == (213, 218, 225)).all(axis=2).sum(axis=1)
-    middle = int(np.flatnonzero(bars > 60).mean())
+    middle = int(np.flatnonzero(bars > 20).mean())
     assert bars[:middle].max() == pytest.approx(4 * bars[middle:].max(), rel=0.03)
     with pytest.raises(ConfigError, match="7 values for 50"):
         view.updating(f, {"test": f[:7]}, path=tmp_path / "u.png", **more)

@@ -22,6 +22,7 @@ MAX_PASSES = 60
 MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
+LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
 STALLED_TOL = 1e-7  # below it, corrections that no longer shrink are round-off
 
 
@@ -187,17 +188,15 @@ class _Search:
 
 def _described(packed: Packed, motion: Array) -> str:
     """The body that moves most, and how."""
-    bodies = packed.system.bodies
-    sizes = []
-    for b, at in enumerate(bodies.v_at):
-        shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
-        sizes.append((shift @ shift + packed.length**2 * turn @ turn) * bodies.mass[b])
-    b = int(np.argmax(sizes))
-    at = bodies.v_at[b]
-    if not sizes[b] > 0.0:  # frames on interfaces that are held stay where they are
-        bent = [np.abs(motion[at + 6 : at + 6 + r]).max(initial=0.0)
-                for at, r in zip(bodies.v_at, bodies.r, strict=True)]  # fmt: skip
-        return f"body {packed.names[int(np.argmax(bent))]!r} deforms"
+    bodies, sizes = packed.system.bodies, []
+    for b, (at, r) in enumerate(zip(bodies.v_at, bodies.r, strict=True)):
+        shift, turn, bent = np.split(motion[at : at + 6 + r], [3, 6])
+        rigid = (shift @ shift + packed.length**2 * turn @ turn) * bodies.mass[b]
+        sizes.append((rigid, bent @ bodies.M[bodies.flex[b], :r, :r] @ bent if r else 0.0))
+    b = int(np.argmax(np.sum(sizes, axis=1)))
+    at, (rigid, bent) = bodies.v_at[b], sizes[b]
+    if not bent <= LEAST_BENDING * rigid:
+        return f"body {packed.names[b]!r} deforms"
     shift, turn = motion[at : at + 3], motion[at + 3 : at + 6]
     turns = np.linalg.norm(turn) * packed.length > 1e-6 * np.linalg.norm(shift)
     direction = turn if turns else shift
