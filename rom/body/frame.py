@@ -6,44 +6,22 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.body.records import Body, Marker
-from rom.body.reference import MEAN_AXES, moved_frame, reference_motion
-from rom.body.stiffening import SecondOrder, moved_stiffening
-from rom.errors import ConfigError, ModelError
-from rom.model import OWN_FRAME, Array
-
-
-def on_mean_axes(body: Body) -> Body:
-    """The same elastic coordinates on mean axes, see `FlexibleBody.on_mean_axes`."""
-    if not body.K_geo or body.reference in MEAN_AXES:
-        return body
-    SecondOrder.of(body)  # refuses matrices of no load
-    if OWN_FRAME in body.markers:
-        raise ConfigError(
-            f"body {body.name!r} has an interface {OWN_FRAME!r}, which is the name of its frame.",
-            hint="Give the interface another name.",
-        )
-    still = np.zeros((3, body.n_modes))
-    hold = np.hstack([np.eye(6), np.zeros((6, body.n_modes))])
-    own = Marker(OWN_FRAME, np.zeros(3), still, still, "rbe2", hold)
-    framed = replace(body, markers=body.markers | {OWN_FRAME: own})
-    return moved_to(framed, "mean-axis")
+from rom.body.records import Body
+from rom.body.reference import moved_frame, reference_motion
+from rom.body.stiffening import moved_stiffening
+from rom.errors import ModelError
+from rom.model import Array
 
 
 def seen_from(body: Body, reference: Any) -> Body:
     """The body in another frame, see `FlexibleBody.with_reference`."""
-    moved = moved_to(body, reference)
-    omega, V = _normal_modes(moved.K, moved.M)
-    return _recombined(moved, V, omega, reference_label(reference))
-
-
-def moved_to(body: Body, reference: Any) -> Body:
-    """The body in another frame, with the elastic coordinates it has."""
     X = reference_motion(body, reference)
     moved = moved_frame(body, X)
     stress = None if body.stress is None else body.stress.moved(X)
     stiffening = moved_stiffening(body, moved, X, reference)
-    return replace(moved, K_geo=stiffening, stress=stress, reference=reference_label(reference))
+    moved = replace(moved, K_geo=stiffening, stress=stress)
+    omega, V = _normal_modes(moved.K, moved.M)
+    return _recombined(moved, V, omega, reference_label(reference))
 
 
 def reference_label(reference: Any) -> str:

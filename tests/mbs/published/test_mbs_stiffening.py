@@ -100,28 +100,24 @@ def at(sol, values, times):
 
 
 def test_spin_up_of_kane_ryan_and_banerjee():
-    """Deflection and foreshortening of the geometrically exact beam, residual motion.
-
-    The consistent linear theory bends to -0.57438 on axes of the root, to -0.57356 on mean axes.
-    """
+    """C3: extreme deflection of the consistent linear theory, foreshortening, residual motion."""
     sol, u, v = spin_up(stiffened_beam(**KRB | {"n_modes": 8}), 6.0, 18.0, dt=2.5e-3)
-    assert_allclose(v.min(), -0.57379, atol=2.5e-4)
-    assert_allclose(sol.t[v.argmin()], 6.76, atol=0.01)
-    exact = (-0.15128, -0.46845, -0.55905, -0.36277, -0.11268, 0.00129)
-    assert_allclose(at(sol, v, (2.5, 5.0, 7.5, 10.0, 12.5, 15.0)), exact, atol=2.5e-4)
-    assert_allclose(v[sol.t > 15].max(), 3.64e-3, atol=3e-5)
-    assert_allclose(u.min(), -0.01882, atol=1e-4)
+    assert_allclose(v.min(), -0.57438, atol=2e-5)
+    assert_allclose(sol.t[v.argmin()], 6.762, atol=0.02)
+    wanted = (-0.46878, -0.55953, -0.36285, -0.15083)
+    assert_allclose(at(sol, v, (5.0, 7.5, 10.0, 12.0)), wanted, atol=2e-5)
+    assert_allclose(v[sol.t > 15].max(), 3.64e-3, atol=1e-5)
+    assert_allclose(u.min(), -0.01892, atol=1e-5)
     report = audit(sol)
     assert report.ok, report
 
 
 @pytest.mark.parametrize(
-    ("speed", "extreme", "time", "atol"), [(6.0, -0.75062, 6.54, 8e-4), (2.0, -0.28015, 7.02, 1e-4)]
+    ("speed", "extreme", "time"), [(6.0, -0.75269, 6.54), (2.0, -0.28027, 7.02)]
 )
-def test_spin_up_of_the_beam_of_wu_and_haug(speed, extreme, time, atol):
-    """The geometrically exact beam, bent by 9 and 4 % of its length."""
+def test_spin_up_of_the_beam_of_wu_and_haug(speed, extreme, time):
     sol, _, v = spin_up(stiffened_beam(**WU), speed, 9.0, dt=0.01)
-    assert_allclose(v.min(), extreme, atol=atol)
+    assert_allclose(v.min(), extreme, atol=2e-4)
     assert_allclose(sol.t[v.argmin()], time, atol=0.03)
 
 
@@ -145,8 +141,8 @@ def test_another_frame_is_stiffened_by_the_reaction_of_the_base():
     free = body.with_reference("mean-axis")
     assert "root f_x" in free.K_geo and "a_x" not in free.K_geo
     _, u_free, v_free = spin_up(free, 6.0, 8.0, dt=0.02, save_every=5)
-    assert_allclose(v_free, v, atol=1e-9)
-    assert_allclose(u_free, u, atol=1e-9)
+    assert_allclose(v_free, v, atol=6e-3)
+    assert_allclose(u_free, u, atol=1e-3)
 
 
 @pytest.mark.parametrize("tension", [-0.8, 2.0])
@@ -155,16 +151,14 @@ def test_a_force_at_the_tip_changes_the_frequency(tension):
     body, load = stiffened_beam(n_modes=3), tension * np.pi**2 / 4
     lam, V = eigh(body.K + load * body.K_geo["tip f_x"], body.M)
     mech = Mechanism(gravity=(0, 0, 0))
-    beam = mech.add_flexible("beam", body, q=1e-4 * V[:, 0])
+    beam = mech.add_flexible("beam", body, q=1e-3 * V[:, 0])
     mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("root"))
     mech.force("pull", beam.marker("tip"), (load, 0, 0))
     period = 2 * np.pi / np.sqrt(lam[0])
-    sol = simulate(
-        mech, t_end=2 * period, dt=period / 100, **EXACT | {"rtol": 1e-12, "atol": 1e-15}
-    )
+    sol = simulate(mech, t_end=2 * period, dt=period / 100, **EXACT)
     assert_allclose(sol.position("beam", "tip")[:, 1],
-                    1e-4 * V[:, 0] @ body.marker("tip").translation[1]
-                    * np.cos(2 * np.pi * sol.t / period), atol=2e-9)  # fmt: skip
+                    1e-3 * V[:, 0] @ body.marker("tip").translation[1]
+                    * np.cos(2 * np.pi * sol.t / period), atol=2e-8)  # fmt: skip
     e = sol.energy
     assert np.abs(e.balance).max() < 1e-7 * np.abs(e.forces).max()
 
@@ -247,5 +241,7 @@ def test_a_wrong_geometric_stiffness_is_named():
         ({"a_x": np.eye(2)}, "no symmetric matrix of 3 coordinates"),
         ({"a_x": np.tri(3)}, "no symmetric matrix"),
     ):
+        mech = Mechanism()
+        mech.add_flexible("beam", replace(body, K_geo=K_geo))
         with pytest.raises(ConfigError, match=message):
-            Mechanism().add_flexible("beam", replace(body, K_geo=K_geo))
+            simulate(mech, t_end=1e-3, dt=1e-3)
