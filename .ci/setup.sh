@@ -60,6 +60,7 @@ try_optional() {
 
 [ "$(cat .venv/.stamp 2>/dev/null)" = "$wanted" ] || try_optional
 
+# Python compiles what is imported when it is; all that lies there would take as long as to install it
 environment() { # folder, options of venv, what pip installs
   [ -x "$1/bin/python" ] && [ "$(cat "$1/.stamp" 2>/dev/null)" = "$wanted" ] && return
   echo "setup: making $1"
@@ -67,7 +68,7 @@ environment() { # folder, options of venv, what pip installs
   /usr/bin/python3 -m venv $2 "$1"
   folder="$1"
   shift 2
-  "$folder/bin/python" -m pip install -q --disable-pip-version-check "$@"
+  "$folder/bin/python" -m pip install -q --no-compile --disable-pip-version-check "$@"
   echo "$wanted" >"$folder/.stamp"
 }
 
