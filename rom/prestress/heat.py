@@ -64,6 +64,12 @@ class Heat:
             )
         return alpha, dict.fromkeys(names, 0.0), values
 
+    def largest_strain(self, model: FEModel) -> float:
+        """Largest free expansion [1], of region and nodes together."""
+        alpha, by_region, at_nodes = self.on(model)
+        more = float(np.abs(at_nodes).max(initial=0.0))
+        return max(abs(alpha[name]) * (abs(by_region[name]) + more) for name in by_region)
+
     def described(self, share: float) -> str:
         """A share [1] of the temperature, for messages."""
         given = self.temperature

@@ -28,6 +28,7 @@ from rom.model import Array, FEModel, Index
 from rom.names import named, offered
 from rom.prestress.heat import Heat
 
+LARGEST_STRAIN = 0.5  # of heat, far beyond what a linear solid can say
 RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain
 
 
@@ -99,7 +100,8 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
 def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> float:
     """Factor [1] on the temperature at which the solid buckles; infinite if it never does.
 
-    The smallest positive tau with a singular K + tau K_geo; cooling has another one.
+    The smallest positive tau with a singular K + tau K_geo; cooling has another one. Where only
+    strains beyond Hooke's law would make it singular, it never buckles.
 
     Args:
         model: finite elements, on one process.
@@ -114,7 +116,8 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ())
         of Finite Element Analysis (2002).
     """
     _, K, K_geo, held = _stressed(model, heat, fixed)
-    return critical_factor(*_loose(held, K, K_geo))
+    factor = critical_factor(*_loose(held, K, K_geo))
+    return factor if factor * heat.largest_strain(model) < LARGEST_STRAIN else np.inf
 
 
 def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
