@@ -68,7 +68,7 @@ class Heat:
         """Largest free expansion [1], of region and nodes together."""
         alpha, by_region, at_nodes = self.on(model)
         more = float(np.abs(at_nodes).max(initial=0.0))
-        return max(abs(alpha[name]) * (abs(by_region[name]) + more) for name in by_region)
+        return max((abs(alpha[r]) * (abs(T) + more) for r, T in by_region.items()), default=0.0)
 
     def described(self, share: float) -> str:
         """A share [1] of the temperature, for messages."""

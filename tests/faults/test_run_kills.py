@@ -99,6 +99,7 @@ def kill_within(folder, number, rng, *more):
     return os.waitstatus_to_exitcode(status), (folder / "said.txt").read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", few(1, [signal.SIGKILL, signal.SIGINT, signal.SIGTERM]))
 def test_a_run_that_is_killed_goes_on_to_the_same_bits(number, whole, folder, capsys):
     rng, more = random.Random(int(number)), ()

@@ -101,6 +101,7 @@ def test_the_description_is_valid_and_names_no_place_of_this_machine(crank):
             assert str(crank.parent).encode() not in archive.read(name), name
 
 
+@pytest.mark.once
 def test_the_slider_crank_is_the_native_run(crank):
     """Two time steps in each communication step; the integrator keeps its memory in between."""
     motion = simulate_quietly(crank_by_hand(), t_end=0.1, dt=1e-3)

@@ -111,6 +111,7 @@ def test_the_tip_is_turned_by_stagger_and_twist(stagger, twist):
     assert_allclose(np.abs(across).max(), 0.0012, rtol=0.05)
 
 
+@pytest.mark.long
 def test_mass_is_that_of_profiles_platform_and_dovetail(blade):
     """Fillets add above the flanks what they take below; a crown adds a segment of its circle."""
     model, _, crown = blade

@@ -97,6 +97,7 @@ def driven():
     return whole, rom.simulate(whole.mechanism, t_end=12.0, dt=0.01, rho_inf=0.9)
 
 
+@pytest.mark.long
 def test_momentum_is_the_impulse_of_the_torque(driven):
     """About the shaft; the generator stores its own times the ratio of the gear."""
     _, sol = driven

@@ -63,6 +63,7 @@ def rigid_tip(data, times):
     return np.array([x[0] + rotation.matrix(p / np.linalg.norm(p)) @ arm[14] for p in out[:4].T])
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_flexible_pendulum_follows_the_unreduced_nonlinear_model():
     """What is left is of second order: ten times stiffer, at least thirty times less.

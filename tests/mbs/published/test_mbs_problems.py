@@ -182,6 +182,7 @@ def squeezer():
     return mech
 
 
+@pytest.mark.long
 @pytest.mark.once
 def test_andrews_squeezer_ends_where_it_was_published():
     def points(q):
