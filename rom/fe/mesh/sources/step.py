@@ -22,9 +22,8 @@ SHELL_PATTERN = re.compile(
     r"=\s*(?:CLOSED|OPEN)_SHELL\s*\(\s*'(?:[^']|'')*'\s*,\s*\(([^)]*)\)", re.I
 )
 ELEMENTS_ACROSS = 20  # default element size: this part of the diagonal
-EDGES_PER_TURN = (
-    8  # of round faces, at least: with fewer, cells at small bores are turned inside out
-)
+# of round faces, at least: with fewer, cells at small bores are turned inside out
+EDGES_PER_TURN = 8
 CELLS_PER_CUBE = 8.0  # tetrahedra in a cube of the element size
 MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 
