@@ -1,8 +1,9 @@
 # make setup   Debian packages, .venv over them, .venv-light without FEniCSx, and for both what first
 #              motions need, compiled on all cores; seconds when done
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
-# make test    style, types, all tests, then those of the light half without FEniCSx
-# make long    what takes minutes: all demos under mpirun, signals at ten instants, slow tests twice
+# make test    style, types, the tests that need FEniCSx, then those of the light half without it
+# make long    what takes minutes: all demos under mpirun, signals at ten instants; and each test of
+#              the light half in the environment where `make test` does not run it
 # make docs    the site, in build/site/; runs its notebooks; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
 # make thumbnails  small copies of these pictures, kept in docs/thumbnails/
@@ -27,11 +28,12 @@ test: setup
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	MYPY_NUM_WORKERS=2 $(PYTHON) -m mypy
-	$(PYTHON) -m pytest $(SIDE_BY_SIDE)
+	$(PYTHON) -m pytest -m "fenicsx or once" $(SIDE_BY_SIDE)
 	$(LIGHT) -m pytest -m "not fenicsx and not once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 long: setup
 	ROM_LONG=1 $(PYTHON) -m pytest $(LONG) $(SIDE_BY_SIDE)
+	$(PYTHON) -m pytest -m "not fenicsx and not once" $(SIDE_BY_SIDE)
 	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 docs: setup

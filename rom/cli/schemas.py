@@ -130,6 +130,7 @@ VERBS: dict[str, Schema] = {
             "all faces, with --faces",
         ),
         quality=by_name(number("figure"), "figures of quality"),
+        parameters=by_name(number("as used"), "those of the geometry that are numbers, e.g. lc"),
         saved=text("the file written by --save"),
     ),
     "modes": record(

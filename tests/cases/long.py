@@ -12,9 +12,13 @@ SHARED_BY = (2, 3) if ROM_LONG else (2,)
 ONCE = (
     "components",
     "faults/test_archive_faults.py",
+    "fe/mesh/test_mesh_decks.py",
     "mbs/elements/test_mbs_laws.py",
     "mbs/equations/test_mbs_cache.py",
+    "project/test_docs.py",
 )
+# what the light environment has not
+ABSENT = ("dolfinx", "gmsh", "h5py", "matplotlib", "meshio", "pyvista")
 # files of `make test` that begin, so that no worker is left alone with one of them at the end
 LONGEST_FIRST = (
     "project/test_demos.py",

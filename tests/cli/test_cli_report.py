@@ -51,6 +51,7 @@ def without_pictures(monkeypatch):
     monkeypatch.setattr(offscreen, "require", refuse)
 
 
+@pytest.mark.once
 def test_a_body_is_described_with_its_numbers(folder):
     """Mass, centre, frequencies of both models, interfaces, checks, command."""
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")

@@ -45,6 +45,7 @@ def test_without_a_display_it_draws_and_says_so(folder, capsys, monkeypatch):
     assert (body.name, str(path), how) == ("bar", "rod.png", {"n": 1, "fixed": ("root",)})
 
 
+@pytest.mark.once
 def test_a_mechanism_is_drawn_with_its_names(folder, capsys):
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     assert main(["view", "crank.toml", "-o", "start.png", "--json"]) == 0
@@ -97,6 +98,7 @@ print(all(drawn), all(moved), np.abs(pictures[0] - pictures[3]).max() < 50, wind
 """
 
 
+@pytest.mark.once
 def test_keys_and_time_change_what_the_window_shows(bar, tmp_path):
     """Off-screen: six frames on, the next mode, and around to the first again."""
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")
@@ -106,6 +108,7 @@ def test_keys_and_time_change_what_the_window_shows(bar, tmp_path):
     assert done.stdout.split() == ["True", "True", "True", "0"], done.stderr
 
 
+@pytest.mark.once
 def test_a_window_that_does_not_open_is_an_error(bar, monkeypatch):
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     monkeypatch.setattr(sys, "executable", "/bin/false")

@@ -102,6 +102,7 @@ def test_simulate_leaves_a_folder_that_says_how_it_came_about(folder, capsys):
     assert record["joints"] == {"pivot": "revolute"} and record["bodies"]["bob"]["mass"] == 2.0
 
 
+@pytest.mark.once
 def test_a_film_and_another_form_of_the_table_when_the_file_asks(folder):
     pytest.importorskip("h5py", reason="h5py is not installed")
     text = CRANK + '[output]\nfilm = "glb"\nhistory = "h5"\nmagnify = 20\n'

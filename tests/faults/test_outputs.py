@@ -35,6 +35,10 @@ WRITERS = {  # case: (what to type, the file it writes)
     "scene": ([*PENDULUM, "-o", "out"], "out/scene.json"),
     "report": (["report", "good.npz", "-o", "x.html"], "x.html"),
 }
+OF_HDF5 = [case for case, (words, _) in WRITERS.items() if {"h5", "vtkhdf"} & set(words)]
+MARKED_WRITERS = [
+    pytest.param(case, marks=[pytest.mark.once] * (case in OF_HDF5)) for case in WRITERS
+]
 BEFORE_COMPUTING = {  # case: (what to type, the file it would write); nothing of it is there
     "mesh": (["mesh", "none.geo", "--save", "x.vtu"], "x.vtu"),
     "deck": (["mesh", "none.geo", "--save", "x.inp"], "x.inp"),
@@ -60,9 +64,9 @@ def folder(body, tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("case", WRITERS)
+@pytest.mark.parametrize("case", MARKED_WRITERS)
 def test_a_file_of_the_user_is_kept_until_force_is_said(case, folder, capsys, monkeypatch):
-    if {"h5", "vtkhdf"} & set(WRITERS[case][0]):
+    if case in OF_HDF5:
         pytest.importorskip("h5py", reason="h5py is not installed")
     monkeypatch.setattr(pages, "drawn", lambda *_: [])  # pictures take seconds
     words, name = WRITERS[case]
@@ -192,6 +196,7 @@ def test_a_format_without_room_for_a_mark_says_so(tmp_path):
         check_replaceable(tmp_path / "x.op4", "op4")
 
 
+@pytest.mark.once
 def test_pictures_are_recognised_and_those_of_others_are_not(tmp_path):
     pytest.importorskip("matplotlib")
     pytest.importorskip("PIL")

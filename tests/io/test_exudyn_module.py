@@ -90,6 +90,7 @@ def test_six_nodes_move_and_turn_like_their_interface():
     assert_allclose(u - phi[:, 0].T @ q, np.cross(turn @ q, X - x[0]), atol=1e-14)
 
 
+@pytest.mark.once
 @pytest.mark.skipif(not PEER.exists(), reason="Exudyn is not installed beside")
 def test_exudyn_moves_the_body_as_we_do(tmp_path):
     """A soft pendulum, its tip bending by several centimetres, after 0.2 s."""

@@ -135,6 +135,7 @@ def test_a_wrong_share_of_instants_is_named(mixed):
         mixed.to_pandas(every=0)
 
 
+@pytest.mark.once
 def test_the_tree_is_read_by_h5py(motion, tmp_path):
     hdf5 = pytest.importorskip("h5py", reason="h5py is not installed")
     path = rom.write_history(motion, tmp_path / "m.h5", every=5)

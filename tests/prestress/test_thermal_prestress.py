@@ -95,7 +95,8 @@ def test_a_free_body_expands_without_stress(bar):
     """At uniform temperature, and at one that grows linearly: plane sections stay plane."""
     for temperature in (300.0, lambda x: 500.0 * x[:, 0] - 2e4 * x[:, 2], 100.0 * bar.points[:, 1]):
         hot = rom.heated(bar, rom.Heat(ALPHA, temperature))
-        assert abs(hot.K - bar.K).max() < 1e-12 * abs(bar.K).max()
+        # to round-off of the solve, 1e-9 of a stress that would change K by 3e-3
+        assert abs(hot.K - bar.K).max() < 1e-11 * abs(bar.K).max()
 
 
 def test_a_free_bar_hot_inside_keeps_its_rigid_motions(bar):

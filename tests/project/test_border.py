@@ -121,6 +121,7 @@ def test_a_wrong_argument_is_a_mistake_of_the_user_and_named(label, tmp_path, mo
     assert not bad, "\n".join(bad)
 
 
+@pytest.mark.once
 def test_nearly_every_refusal_names_the_argument(capsys):
     """Of the calls above; the others name what the argument belongs to, a joint or an interface."""
     if not COUNTED["callables"]:

@@ -111,7 +111,7 @@ def test_make_test_covers_style_types_and_both_environments():
     makefile = (ROOT / "Makefile").read_text()
     recipe = makefile.partition("\ntest: setup\n")[2].partition("\n\n")[0]
     for part in ("ruff check", "ruff format --check", "-m mypy",
-                 "$(PYTHON) -m pytest $(SIDE_BY_SIDE)",
+                 '$(PYTHON) -m pytest -m "fenicsx or once" $(SIDE_BY_SIDE)',
                  '$(LIGHT) -m pytest -m "not fenicsx and not once"'):  # fmt: skip
         assert part in recipe + "\n"
     assert "ignore" not in recipe and "-k" not in recipe

@@ -31,6 +31,7 @@ def test_the_earlier_order_gives_the_same_and_warns():
     assert draw.__doc__ == "What was handed over."
 
 
+@pytest.mark.once
 def test_a_report_and_a_picture_in_the_earlier_order(tmp_path):
     with pytest.warns(DeprecationWarning, match="write_report takes the path behind"):
         html.write_report(tmp_path / "old.html", "title", {"one": ["<p>x</p>"]})

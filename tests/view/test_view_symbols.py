@@ -252,6 +252,7 @@ def test_ground_is_hatched_all_around():
     assert len(triangles) == 12
 
 
+@pytest.mark.once
 def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
     pytest.importorskip("pyvista", reason="pyvista is not installed")
     monkeypatch.setitem(sys.modules, "dolfinx", ModuleType("dolfinx"))

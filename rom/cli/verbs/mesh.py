@@ -157,6 +157,10 @@ def _text(data: dict[str, Any]) -> str:
         f"size {box} m, volume {data['volume']:.6g} m^3",
         f"quality: {quality}",
     ]
+    if data["parameters"]:
+        parts.append(
+            "parameters: " + ", ".join(f"{k} = {x:.6g}" for k, x in data["parameters"].items())
+        )
     if regions:
         parts += ["", table(("region", "cells", "volume [m^3]"), regions)]
     header = ("interface", "facets", "nodes", "middle [m]", "axis")

@@ -25,6 +25,7 @@ from rom.names import inside
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.mbs.mechanism import Mechanism
+    from rom.workflow import MassProperties
 
 log = logging.getLogger("rom")
 SUMMARY = "show a part of yours, reduced and swinging, in one go"
@@ -41,6 +42,7 @@ MATERIALS = {  # E [Pa], nu, rho [kg/m^3]; handbook values
 }
 N_STEPS, N_INSTANTS = 240, 4  # of the motion; shown in the picture
 FAR_SWING = 1.18034  # period of a swing from the horizontal over that of a small one
+LEAST_LEVER = 3e-3  # of gravity about the hinge, of the radius of gyration
 DRAWN_DEFORMATION_RATIO = 0.05  # largest deformation as drawn, of the body's size
 
 
@@ -77,8 +79,7 @@ def run(args: argparse.Namespace) -> Answer:
     """Mesh, reduce, simulate; files are written at the end."""
     files = _files(args)
     hinge, faces = hinge_of(args.hinge)
-    body, bore = _reduced(args, hinge, faces)
-    swing = planned(body, hinge, args.gravity, args.t_end, axis=bore)
+    body, swing = _reduced(args, hinge, faces)
     log.info("%s hangs on %s and swings for %.3g s", body.name, args.hinge, swing.t_end)
     if not compiled_before():
         log.info("move it without compiling first, which takes some seconds")
@@ -123,24 +124,27 @@ def hinge_of(text: str) -> tuple[str, dict[str, Any]]:
 
 def _reduced(
     args: argparse.Namespace, hinge: str, faces: dict[str, Any]
-) -> "tuple[FlexibleBody, Any]":
-    """The body, and the axis of its hinge if that is a cylinder."""
+) -> "tuple[FlexibleBody, Swing]":
+    """The body, and how it will swing, which is refused before the reduction."""
     how = reading(args)  # refused before dolfinx is loaded
     how["faces"] = unique([*how["faces"].items(), *faces.items()], "--face")
     from rom.body.damping import ModalDamping
     from rom.fe.elasticity import model
     from rom.model import Material
     from rom.reduction.bases.method import CraigBampton
-    from rom.workflow import reduce
+    from rom.reduction.interfaces.connection import found
+    from rom.workflow import mass_properties, reduce
 
     E, nu, rho = MATERIALS[args.material]
     full = model(args.file, material=Material(E=E, nu=nu, rho=rho), **how)
-    log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, full.mass(), args.material)
+    (at,), rigid = found(full, [hinge]), mass_properties(full)
+    log.info("%s: %d dofs, %.4g kg of %s", args.file, full.n_dofs, rigid.mass, args.material)
+    swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
     body = reduce(
         full, method=CraigBampton(args.modes), interfaces={hinge: "rbe2"}, reference=hinge,
         damping=ModalDamping(0.01), name=args.file.stem,
     )  # fmt: skip
-    return body, full.interfaces[hinge].axis
+    return body, swing
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +157,8 @@ class Swing:
 
 
 def planned(
-    body: "FlexibleBody",
-    hinge: str,
+    rigid: "MassProperties",
+    point: Any,
     gravity: Any = None,
     t_end: float | None = None,
     *,
@@ -163,8 +167,8 @@ def planned(
     """The swing of a body from rest, for one period of the rigid pendulum.
 
     Args:
-        body: the body.
-        hinge: interface it hangs on.
+        rigid: its mass, mass centre and inertia.
+        point: (3,) the hinge [m].
         gravity: (3,) [m/s^2]; None for 9.81 along the coordinate axis most across the body.
         t_end: duration [s]; None for one period.
         axis: (3,) unit direction about which it turns; None for the one across gravity.
@@ -174,13 +178,14 @@ def planned(
     """
     import numpy as np
 
-    arm = body.first_moment / body.mass - body.marker(hinge).point
+    arm = rigid.centre - point
     g = _across(arm, axis) if gravity is None else np.asarray(gravity, dtype=float)
     torque = np.cross(arm, g)  # per unit of mass
     if axis is not None:
         torque = np.outer(axis, axis) @ torque
     lever = np.linalg.norm(torque) / max(float(np.linalg.norm(g)), 1e-300)
-    if lever < 1e-3 * body.size:
+    gyration = sqrt(0.5 * np.trace(rigid.inertia) / rigid.mass)
+    if lever < LEAST_LEVER * gyration:
         turning = "" if axis is None else f", which turns about {np.round(axis, 6).tolist()}"
         raise ConfigError(
             f"gravity {g.tolist()} passes {lever:.2g} m beside the hinge{turning}: nothing would "
@@ -188,9 +193,8 @@ def planned(
             hint="Choose another --hinge, or --gravity across the part and across its axis.",
         )
     n = torque / np.linalg.norm(torque)
-    inertia = n @ body.inertia @ n - body.mass * _square_across(body.first_moment / body.mass, n)
-    inertia += body.mass * _square_across(arm, n)
-    period = 2 * pi * sqrt(inertia / (body.mass * float(np.linalg.norm(g)) * lever))
+    inertia = n @ rigid.inertia @ n + rigid.mass * _square_across(arm, n)
+    period = 2 * pi * sqrt(inertia / (rigid.mass * float(np.linalg.norm(g)) * lever))
     return Swing(tuple(g.tolist()), tuple(n.tolist()), t_end or FAR_SWING * period)
 
 

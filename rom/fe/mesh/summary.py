@@ -32,6 +32,11 @@ def summary(mesh: SolidMesh) -> dict[str, Any]:
         "cell_type": mesh.cell_type,
         "cells": len(mesh.cells),
         "nodes": len(mesh.points),
+        "parameters": {
+            name: value
+            for name, value in mesh.provenance.get("parameters", {}).items()
+            if isinstance(value, int | float)
+        },
         "box": np.column_stack([mesh.points.min(axis=0), mesh.points.max(axis=0)]).tolist(),
         "volume": float(volumes.sum()),
         "regions": {
