@@ -34,10 +34,10 @@ def examine(tmp_path, *options, fakes=None):
     return found, done.returncode, done.stderr
 
 
-def test_the_doctor_is_right_about_this_machine_within_15_seconds(tmp_path):
+def test_the_doctor_is_right_about_this_machine_within_a_minute(tmp_path):
     start = time.perf_counter()
     found, code, stderr = examine(tmp_path)
-    assert time.perf_counter() - start < 15
+    assert time.perf_counter() - start < 60
     for name, module in MODULES.items():
         there = importlib.util.find_spec(module) is not None
         assert found[name]["state"] == ("ok" if there else "missing"), found[name]

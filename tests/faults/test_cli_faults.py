@@ -19,6 +19,7 @@ from rom.process.mpirun import mpirun
 
 BEAM = str(ROOT / "meshes" / "beam.geo")
 STEEL = ["--E", "210e9", "--nu", "0.3", "--rho", "7850"]
+A_HANG = 60.0  # s; on a loaded machine Python alone starts for ten
 REDUCE = ["reduce", BEAM, *STEEL, "-i", "root=rbe2"]
 
 
@@ -299,7 +300,7 @@ def test_two_ranks_complain_once_and_end_within_seconds(arguments, code, words, 
     assert done.returncode == code, done.stderr
     assert done.stderr.count("error: ") == 1 and words in done.stderr
     assert done.stdout == "" and "Traceback" not in done.stderr
-    assert time.perf_counter() - start < 10
+    assert time.perf_counter() - start < A_HANG
 
 
 @pytest.mark.fenicsx
@@ -321,5 +322,5 @@ def test_a_rank_that_is_alone_with_its_error_ends_all(folder):
                           check=False)  # fmt: skip
     assert done.returncode == 4
     assert "error: rank 1: rho = 0." in done.stderr
-    assert time.perf_counter() - start < 10
+    assert time.perf_counter() - start < A_HANG
     (folder / "alone.py").unlink()

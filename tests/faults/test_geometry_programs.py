@@ -252,7 +252,7 @@ def test_an_endless_geometry_ends_by_the_limit(case, here):
     words = r"box\.geo: meshing did not end within the limit of 2 s.*--time-limit"
     with pytest.raises(ResourceError, match=words):
         read_mesh("box.geo", time_limit=2)
-    assert time.perf_counter() - began < 6
+    assert time.perf_counter() - began < 30
 
 
 def test_the_limit_of_the_command_line_ends_with_exit_code_6(here):

@@ -30,7 +30,7 @@ from rom.fe.mesh.read import read_mesh
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
-SECONDS = 10.0
+SECONDS = 30.0
 MUTANTS = 60 if ROM_LONG else 10
 
 BOX = solid()

@@ -199,7 +199,7 @@ def test_limits_of_a_child_hold():
     hoard = [sys.executable, "-c", "x = bytearray(2**30)"]
     assert "MemoryError" in child.run(hoard, limits=child.Limits(memory=2**29)).err
     assert child.run(hoard).code == 0
-    assert time.monotonic() - began < 20
+    assert time.monotonic() - began < 60
 
 
 def test_a_child_that_ignores_the_polite_signal_ends_with_its_own_children(tmp_path):

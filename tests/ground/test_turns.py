@@ -41,7 +41,7 @@ def test_a_turn_ends_with_the_process_that_has_it_whatever_ends_that(tmp_path):
         began = time.perf_counter()
         os.kill(other.pid, 9)
         assert turns.take(path)
-    assert time.perf_counter() - began < 10
+    assert time.perf_counter() - began < 60
 
 
 def test_who_waits_goes_on_when_the_turn_is_over(tmp_path):

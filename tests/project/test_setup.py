@@ -50,7 +50,7 @@ def test_a_second_run_takes_seconds_and_no_network(tmp_path):
     done = subprocess.run([SETUP], env=deny_network(tmp_path), capture_output=True, text=True,
                           timeout=60, check=False)  # fmt: skip
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
-    assert time.perf_counter() - start < 5
+    assert time.perf_counter() - start < 30
     assert [stamp.stat().st_mtime_ns for stamp in stamps] == before
 
 
