@@ -21,6 +21,8 @@ logging.captureWarnings(False)
 
 PARTS_KEEP_COLUMNS = (3, 23)  # the first PETSc not tried; 3.22 does not, 3.25 does
 
+CELLS_AT_ONCE = 100_000  # whose coordinates are computed, which takes some ten megabytes
+
 
 def lagrange(mesh: Any, degree: int) -> Any:
     """Space of continuous displacements: three components at each node."""
@@ -95,11 +97,15 @@ def cell_name(mesh: Any) -> str:
 
 def geometry_degree(mesh: Any) -> int:
     """Polynomial degree of the map from the reference cell: 2 for curved cells."""
+    return _cell_map(mesh).degree
+
+
+def _cell_map(mesh: Any) -> Any:
+    """The map from the reference cell, of which all cells have the same kind."""
     geometry = mesh.geometry
     if hasattr(type(geometry), "cmaps"):
-        return geometry.cmaps[0].degree
-    cmap = geometry.cmap
-    return (cmap() if callable(cmap) else cmap).degree
+        return geometry.cmaps[0]
+    return geometry.cmap() if callable(geometry.cmap) else geometry.cmap
 
 
 def sub_entities(name: str) -> list[list[list[int]]]:
@@ -190,6 +196,29 @@ def reference_points(space: Any) -> Array:
     """(k, 3) where the nodes of a cell lie in the reference cell."""
     points = space.element.interpolation_points
     return np.asarray(points() if callable(points) else points)
+
+
+def node_coordinates(space: Any) -> Array:
+    """(k, 3) coordinates of the nodes this rank owns [m], the same bits from whatever cell.
+
+    Shape functions of the geometry are halves, quarters or eighths at the nodes of second degree of
+    straight cells, zero and one at those of curved ones; their round-off, which dolfinx leaves in,
+    follows the cell.
+    """
+    geometry, nodes, X = space.mesh.geometry, cell_dofs(space), reference_points(space)
+    if not len(nodes):  # a rank may have no cell
+        return np.zeros((0, 3))
+    corners = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(len(nodes), -1)
+    unit = np.eye(corners.shape[1], -(-corners.shape[1] // 3) * 3)
+    push = _cell_map(space.mesh).push_forward
+    table = [push(X, unit[:, k : k + 3].copy()) for k in range(0, unit.shape[1], 3)]
+    shapes = np.hstack(table)[:, : corners.shape[1]]
+    eighths = np.round(8 * shapes) / 8
+    shapes = np.where(np.abs(shapes - eighths) < 1e-12, eighths, shapes)
+    x = np.zeros((space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, 3))
+    for some in np.array_split(np.arange(len(nodes)), 1 + len(nodes) // CELLS_AT_ONCE):
+        x[nodes[some]] = shapes @ geometry.x[corners[some]]
+    return x[: space.dofmap.index_map.size_local]
 
 
 def quadrature_points(mesh: Any, degree: int) -> Array:

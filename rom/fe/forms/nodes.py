@@ -13,7 +13,14 @@ from dolfinx.mesh import exterior_facet_indices
 from scipy.sparse import csr_matrix
 
 from rom.errors import InterfaceError
-from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, sub_entities, to_global
+from rom.fe.compat import (
+    assemble_matrix,
+    cell_dofs,
+    cell_name,
+    node_coordinates,
+    sub_entities,
+    to_global,
+)
 from rom.model import Array, Index, Integers, Interface, Numbers, SurfaceMesh
 
 COINCIDENT_RTOL = 1e-8  # of the size, when nodes are sorted
@@ -27,8 +34,7 @@ def gathered(comm: MPI.Comm, rows: Numbers) -> Numbers:
 
 def all_points(V: Any) -> Array:
     """(n/3, 3) coordinates of all nodes in global numbering [m]."""
-    owned = V.tabulate_dof_coordinates()[: V.dofmap.index_map.size_local]
-    return np.ascontiguousarray(gathered(V.mesh.comm, owned))
+    return np.ascontiguousarray(gathered(V.mesh.comm, node_coordinates(V)))
 
 
 def by_position(points: Array, size: float) -> Index:
