@@ -10,7 +10,7 @@ from inspect import ismodule
 
 import pytest
 
-from cases.marks import where_they_run
+from cases.files.modules import where_they_run
 from cases.paths import ROOT
 from rom.lazy import Front
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from cases.marks import where_they_run
+from cases.files.modules import where_they_run
 from rom import moved
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.integrate.consistent_start import initial_state

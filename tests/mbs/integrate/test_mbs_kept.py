@@ -133,7 +133,8 @@ def test_a_function_that_breaks_is_named_and_the_repaired_run_has_the_same_bits(
         if FAULTS[fault][1] is InterruptedRun:  # while functions of a chunk to come are sampled
             at = 0.85 * T_END
         error = failed(where, method, fault, at, tmp_path / fault)
-        assert at / 5 < error.solution.final.t <= at >= error.solution.t[-1]
+        # a step of dop853 that is tried may be ten times the last one
+        assert at / 11 < error.solution.final.t <= at >= error.solution.t[-1]
         known = np.isin(error.solution.t, reference.t)  # the last one may lie between
         assert known[:-1].all()
         assert_array_equal(error.solution.q[known], reference.q[: known.sum()])
