@@ -20,6 +20,7 @@ Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.integer[Any]]
 Numbers = TypeVar("Numbers", Array, Index)
+OWN_FRAME = "frame of the body"  # the marker that is the frame a body was given in
 
 
 @typed

@@ -86,6 +86,14 @@ def exp(theta: npt.ArrayLike) -> Array:
     return np.concatenate(([np.cos(angle / 2)], 0.5 * np.sinc(angle / (2 * np.pi)) * theta))
 
 
+def spatial_tangent(theta: npt.ArrayLike) -> Array:
+    """(3, 3) angular velocity per rate of the rotation vector theta [1], fixed axes."""
+    S, angle = skew(theta), float(np.linalg.norm(theta))
+    # (angle - sin) / angle^3 without its cancellation
+    cubic = (1 - np.sinc(angle / np.pi)) / angle**2 if angle > 1e-3 else 1 / 6 - angle**2 / 120
+    return np.eye(3) + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * S + cubic * S @ S
+
+
 def log(p: npt.ArrayLike) -> Array:
     """(3,) rotation vector of a unit quaternion, angle in [0, pi] [rad]."""
     p = np.asarray(p, dtype=float)
@@ -94,3 +102,10 @@ def log(p: npt.ArrayLike) -> Array:
     if sine == 0.0:
         return np.zeros(3)
     return 2 * np.arctan2(sine, p[0]) / sine * p[1:]
+
+
+def continuous(p: npt.ArrayLike) -> Array:
+    """(n, 4) quaternions with the signs that let each be near the one before."""
+    p = np.asarray(p, dtype=float)
+    flips = np.einsum("ti,ti->t", p[1:], p[:-1]) < 0
+    return p * np.cumprod(np.r_[1.0, np.where(flips, -1.0, 1.0)])[:, None]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rom.body.records import Body, BodyData, Marker, Patch
 from rom.body.recovery import N_FRAME_LOADS, StressRecovery
-from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, LINEAR_LOADS
+from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, ELASTIC_LOAD, LINEAR_LOADS
 from rom.errors import ModelError
 from rom.model import Array
 from rom.units import UnitSystem, unit_system
@@ -53,6 +53,8 @@ class Factors:
             return self.length / self.time**2
         if name in (*CENTRIFUGAL_LOADS, *ANGULAR_LOADS):
             return self.time**-2
+        if name.startswith(ELASTIC_LOAD):
+            return self.length / (self.shape * self.time**2)
         turns = name.rpartition(" ")[2].startswith("m_")
         return self.force * (self.length if turns else 1.0)
 

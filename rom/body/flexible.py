@@ -9,7 +9,7 @@ from scipy.linalg import eigh, null_space
 
 from rom.arguments import typed, whole
 from rom.body.conversion import converted
-from rom.body.frame import seen_from
+from rom.body.frame import on_mean_axes, seen_from
 from rom.body.records import BodyData, Marker, Patch, Surface
 from rom.body.reference import rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
@@ -116,6 +116,24 @@ class FlexibleBody(BodyData):
             True
         """
         return seen_from(self, reference)
+
+    def on_mean_axes(self) -> "FlexibleBody":
+        """The body as a mechanism integrates it, with the elastic coordinates it has.
+
+        Inertia of second order is kept to the order of the stiffness. On mean axes what that leaves
+        out is small, and the mass matrix stays definite. On an interface the second order contains
+        rigid motion of the whole body, whose missing squares make the mass matrix of a slender beam
+        indefinite at deflections of 0.2 %. The frame of the body is kept as the marker
+        `rom.model.OWN_FRAME`; a body without geometric stiffness, or on mean axes, stays as it is.
+
+        Raises:
+            ConfigError: if an interface has the name of that marker.
+
+        Example:
+            >>> rom.load("beam.rom.npz").on_mean_axes().reference
+            'mean-axis'
+        """
+        return on_mean_axes(self)
 
     def surface_areas(self, where: Where = None) -> Array:
         """(s,) area that belongs to each point of the surface, undeformed [m^2].

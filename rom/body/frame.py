@@ -6,22 +6,56 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.body.records import Body
+from rom.body.records import Body, Marker
 from rom.body.reference import moved_frame, reference_motion
-from rom.body.stiffening import moved_stiffening
-from rom.errors import ModelError
-from rom.model import Array
+from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
+from rom.errors import ConfigError, ModelError
+from rom.model import OWN_FRAME, Array
+
+STILL = 1e-9  # momentum of a shape, of the largest that its mass lets it have
+
+
+def on_mean_axes(body: Body) -> Body:
+    """The same elastic coordinates on mean axes, see `FlexibleBody.on_mean_axes`."""
+    if not body.K_geo or _moves_around_rest(body):
+        return body
+    if OWN_FRAME in body.markers:
+        raise ConfigError(
+            f"body {body.name!r} has an interface {OWN_FRAME!r}, which is the name of its frame.",
+            hint="Give the interface another name.",
+        )
+    still = np.zeros((3, body.n_modes))
+    hold = np.hstack([np.eye(6), np.zeros((6, body.n_modes))])
+    own = Marker(OWN_FRAME, np.zeros(3), still, still, "rbe2", hold)
+    framed = replace(body, markers=body.markers | {OWN_FRAME: own})
+    return moved_to(framed, "mean-axis")
+
+
+def _moves_around_rest(body: Body) -> bool:
+    """Whether neither shapes nor second order have momentum or moment of momentum."""
+    psi, r = SecondOrder.of(body), body.n_modes
+    limit = STILL * np.sqrt(np.diag(body.M).max(initial=0.0) * body.mass)
+    for S, X in ((body.S, body.Ibar_kl), (psi.S, psi.Ibar)):
+        turning = (X - X.swapaxes(0, 1)) / body.size
+        if max(np.abs(S).max(initial=0.0), np.abs(turning).max(initial=0.0)) > limit:
+            return False
+    return r > 0
 
 
 def seen_from(body: Body, reference: Any) -> Body:
     """The body in another frame, see `FlexibleBody.with_reference`."""
+    moved = moved_to(body, reference)
+    omega, V = _normal_modes(moved.K, moved.M)
+    return _recombined(moved, V, omega, reference_label(reference))
+
+
+def moved_to(body: Body, reference: Any) -> Body:
+    """The body in another frame, with the elastic coordinates it has."""
     X = reference_motion(body, reference)
     moved = moved_frame(body, X)
     stress = None if body.stress is None else body.stress.moved(X)
     stiffening = moved_stiffening(body, moved, X, reference)
-    moved = replace(moved, K_geo=stiffening, stress=stress)
-    omega, V = _normal_modes(moved.K, moved.M)
-    return _recombined(moved, V, omega, reference_label(reference))
+    return replace(moved, K_geo=stiffening, stress=stress, reference=reference_label(reference))
 
 
 def reference_label(reference: Any) -> str:
@@ -69,7 +103,7 @@ def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
         S_kl=0.5 * (S_kl + S_kl.transpose(1, 0, 3, 2)),
         K=np.diag(omega**2),
         D=_symmetric(V.T @ body.D @ V),
-        K_geo={load: _symmetric(V.T @ A @ V) for load, A in body.K_geo.items()},
+        K_geo=recombined_stiffening(body.K_geo, V),
         markers=markers,
         surface=surface,
         stress=stress,

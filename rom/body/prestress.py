@@ -2,8 +2,9 @@
 
 Every load is balanced by the inertia of the free body (inertia relief), so that no support carries
 a part of it, and its stress comes from the full finite element equations: the tension of a
-spinning bar is exact even when no mode kept stretches it. Acceleration and angular acceleration
-of a free body need no stress; they act through the forces at its interfaces.
+spinning bar is exact even when no mode kept stretches it. The inertia of its shapes is balanced for
+itself. Acceleration and angular acceleration of a free body need no stress; they act through the
+forces at its interfaces.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from scipy.linalg import qr
 
 from rom.body.records import Marker
 from rom.body.recovery import PRODUCTS
-from rom.body.stiffening import CENTRIFUGAL_LOADS, interface_loads
+from rom.body.stiffening import CENTRIFUGAL_LOADS, elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError
@@ -60,15 +61,21 @@ class UnitLoads:
             Carried(self.model.interfaces[a.interface], *carried_displacements(a, self.model))
             for a in self.model.attachments
         ]
-        names = [*CENTRIFUGAL_LOADS, *(load for m in markers for load in interface_loads(m))]
-        accelerations, wrenches = self._balanced(carried, tuple(markers))
-        forces = self.mesh.apply_M(accelerations(self._points))
-        U = self._answer(forces + wrenches + self._carried_load(carried, accelerations))
+        of_interfaces = (load for m in markers for load in interface_loads(m))
+        names = [*CENTRIFUGAL_LOADS, *of_interfaces, *elastic_loads(E.shape[1])]
+        balanced, wrenches = self._balanced(carried, tuple(markers))
+        wrenches = np.hstack([wrenches, np.zeros_like(E)])
+        forces = self.mesh.apply_M(np.hstack([balanced(self._points), -E]))
+        felt = [
+            np.hstack([balanced(c.points), -c.N @ self.mesh.rows(E, c.interface.dofs)])
+            for c in carried
+        ]
+        U = self._answer(forces + wrenches + self._carried_load(carried, felt, len(names)))
         K = self.model.stresses.geometric_stiffness(U, E)
         K += self._surfaces(U, forces, E, markers, carried)
-        for c in carried:
+        for c, accelerations in zip(carried, felt, strict=True):
             arms = c.points - c.interface.origin
-            f = c.masses[:, None] * accelerations(c.points).reshape(len(arms), -1)
+            f = c.masses[:, None] * accelerations.reshape(len(arms), -1)
             moment = np.einsum("pal,pb->lab", f.reshape(len(arms), 3, -1), arms)
             K -= _turning(moment, self._rotation(c.interface, E))
         return dict(zip(names, 0.5 * (K + K.transpose(0, 2, 1)), strict=True))
@@ -91,14 +98,16 @@ class UnitLoads:
             return np.hstack([fields, np.zeros((fields.shape[0], 6 * len(names)))])
 
         load = self.mesh.apply_M(unbalanced(self._points)) + wrenches
-        load += self._carried_load(carried, unbalanced)
+        felt = [unbalanced(c.points) for c in carried]
+        load += self._carried_load(carried, felt, load.shape[1])
         rigid = np.linalg.solve(self.whole.gram(R, self.whole.apply_M(R)), self.mesh.gram(R, load))
         return lambda points: unbalanced(points) - rigid_motions(points) @ rigid, wrenches
 
-    def _carried_load(self, carried: list[Carried], accelerations: Any) -> Array:
-        load = np.zeros((self.mesh.n_local, accelerations(self._points[:1]).shape[1]))
-        for c in carried:
-            f = np.repeat(c.masses, 3)[:, None] * accelerations(c.points)
+    def _carried_load(self, carried: list[Carried], felt: list[Array], n: int) -> Array:
+        """(n_local, n) forces of what is carried under the accelerations that its points feel."""
+        load = np.zeros((self.mesh.n_local, n))
+        for c, accelerations in zip(carried, felt, strict=True):
+            f = np.repeat(c.masses, 3)[:, None] * accelerations
             self._add(load, c.interface, c.N.T @ f)
         return load
 

@@ -7,14 +7,16 @@ because to second order a material point is displaced by::
     u = sum_k phi_k q_k + 1/2 sum_kl psi_kl q_k q_l,    load l . psi_kl = -K_l[k, l]
 
 (foreshortening). Loads of unit acceleration of a body with density rho thereby give the integrals
-of rho psi and rho X psi, loads on an interface the displacements psi of its marker. Body forces
-of the moving frame, gravity, joints and springs then stiffen the body by their virtual work on
-psi, whatever they are, and energy and momentum stay exactly balanced.
+of rho psi and rho X psi, loads by the inertia of its shapes those of rho phi psi, loads on an
+interface the displacements psi of its marker. Body forces of the moving frame, gravity, joints and
+springs then stiffen the body by their virtual work on psi, whatever they are, and energy and
+momentum stay exactly balanced.
 
 Names of the loads: "omega_x^2" and "omega_x omega_y" for centrifugal force, "domega_x" for
-angular acceleration, "a_x" for acceleration of the frame, each per unit of the quantity and as the
-force -rho times acceleration it stands for; "tip f_x" and "tip m_x" for force and moment on the
-interface "tip". A load left out has no geometric stiffness.
+angular acceleration, "a_x" for acceleration of the frame, "ddq_1" for that of the first elastic
+coordinate, each per unit of the quantity and as the force -rho times acceleration it stands for;
+"tip f_x" and "tip m_x" for force and moment on the interface "tip". A load left out has no
+geometric stiffness.
 
 Source:
     Wallrapp and Schwertassek, Representation of geometric stiffening in multibody system
@@ -40,6 +42,12 @@ CENTRIFUGAL_LOADS = tuple(
 )
 ANGULAR_LOADS = tuple(f"domega_{axis}" for axis in AXIS_NAMES)
 LINEAR_LOADS = tuple(f"a_{axis}" for axis in AXIS_NAMES)
+ELASTIC_LOAD = "ddq_"  # before the number of the coordinate
+
+
+def elastic_loads(r: int) -> tuple[str, ...]:
+    """Names of the accelerations of r elastic coordinates."""
+    return tuple(f"{ELASTIC_LOAD}{k + 1}" for k in range(r))
 
 
 def interface_loads(name: str) -> tuple[str, ...]:
@@ -50,7 +58,8 @@ def interface_loads(name: str) -> tuple[str, ...]:
 def known_loads(body: BodyData) -> tuple[str, ...]:
     """All loads a body can have a geometric stiffness for."""
     interfaces = (load for name in body.markers for load in interface_loads(name))
-    return (*CENTRIFUGAL_LOADS, *ANGULAR_LOADS, *LINEAR_LOADS, *interfaces)
+    elastic = elastic_loads(body.n_modes)
+    return (*CENTRIFUGAL_LOADS, *ANGULAR_LOADS, *LINEAR_LOADS, *interfaces, *elastic)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +69,13 @@ class SecondOrder:
     Attributes:
         S: (3, r, r) integral of rho psi_kl [kg m].
         Ibar: (3, 3, r, r) entry [a, b, k, l] is the integral of rho X_a psi_kl,b [kg m^2].
+        N: (r, r, r) entry [m, k, l] is the integral of rho phi_m . psi_kl.
         markers: {interface: (6, r, r) translation and rotation vector of its marker}.
     """
 
     S: Array
     Ibar: Array
+    N: Array
     markers: dict[str, Array]
 
     @classmethod
@@ -87,7 +98,8 @@ class SecondOrder:
             "abc,ckl->bakl", skew_tensor(), [K[load] for load in ANGULAR_LOADS]
         )
         markers = {m: -np.array([K[load] for load in interface_loads(m)]) for m in body.markers}
-        return cls(np.array([K[load] for load in LINEAR_LOADS]), symmetric + turning, markers)
+        S, N = (np.array([K[load] for load in loads]) for loads in (LINEAR_LOADS, elastic_loads(r)))
+        return cls(S, symmetric + turning, N.reshape(r, r, r), markers)
 
     def without_round_off(self, mass: float, size: float) -> "SecondOrder":
         """Zeros where a frame leaves nothing: on its own support, or of the mean motion."""
@@ -102,11 +114,12 @@ class SecondOrder:
             name: np.where(np.abs(motion * scale).max(initial=0.0) > limit, motion, 0.0)
             for name, motion in self.markers.items()
         }
-        return SecondOrder(S, self.Ibar if keep else self.Ibar - turning, markers)
+        return replace(self, S=S, Ibar=self.Ibar if keep else self.Ibar - turning, markers=markers)
 
     def matrices(self) -> dict[str, Array]:
         """Geometric stiffness per unit load; loads without any are left out."""
         X, K = self.Ibar, dict(zip(LINEAR_LOADS, self.S, strict=True))
+        K |= dict(zip(elastic_loads(len(self.N)), self.N, strict=True))
         K |= {
             load: _product(X, i, j)
             for (i, j), load in zip(PRODUCTS, CENTRIFUGAL_LOADS, strict=True)
@@ -152,7 +165,7 @@ def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: Any) -> 
     """
     if not old.K_geo:
         return {}
-    psi, w, r = SecondOrder.of(old), X[3:], old.n_modes
+    psi, t, w = SecondOrder.of(old), X[:3], X[3:]
     P = 0.5 * np.trace(old.inertia) * np.eye(3) - old.inertia  # integral of rho X X^T
     W = np.einsum("abc,ck->abk", skew_tensor(), w)
     WW = _symmetrised(np.einsum("abk,bcl->ackl", W, W))
@@ -160,8 +173,11 @@ def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: Any) -> 
     S -= np.einsum("abkl,b->akl", WW, old.first_moment)
     Ibar = psi.Ibar - _symmetrised(2 * np.einsum("bck,acl->abkl", W, new.Ibar_kl))
     Ibar -= np.einsum("ac,bckl->abkl", P, WW)
+    N = psi.N - np.einsum("am,akl->mkl", t, psi.S) - np.einsum("bam,abkl->mkl", W, psi.Ibar)
+    N -= _symmetrised(2 * np.einsum("abk,abml->mkl", W, new.S_kl))
+    N -= np.einsum("ackl,cam->mkl", WW, new.Ibar_kl)
     markers = {m: _turned(psi.markers[m], old.markers[m], new.markers[m], W) for m in old.markers}
-    found = _without_rigid(old, SecondOrder(S, Ibar, markers), r, reference)
+    found = _without_rigid(new, SecondOrder(S, Ibar, N, markers), reference)
     return found.without_round_off(old.mass, old.size).matrices()
 
 
@@ -174,8 +190,19 @@ def _turned(motion: Array, old: Marker, new: Marker, W: Array) -> Array:
     return motion - np.concatenate([shift, turn])
 
 
-def _without_rigid(body: BodyData, psi: SecondOrder, r: int, reference: Any) -> SecondOrder:
+def recombined_stiffening(K_geo: dict[str, Array], V: Array) -> dict[str, Array]:
+    """Geometric stiffness for other elastic coordinates, q = V q_new."""
+    found = {load: V.T @ A @ V for load, A in K_geo.items()}
+    old, new = elastic_loads(len(V)), elastic_loads(V.shape[1])
+    if given := [k for k, load in enumerate(old) if load in found]:
+        N = np.einsum("mn,mkl->nkl", V[given], [found.pop(old[k]) for k in given])
+        found |= dict(zip(new, N, strict=True))
+    return {load: 0.5 * (A + A.T) for load, A in found.items()}
+
+
+def _without_rigid(body: BodyData, psi: SecondOrder, reference: Any) -> SecondOrder:
     """Every pair k, l counts as one shape of a body, whose frame obeys the reference condition."""
+    r = body.n_modes
     flat = {name: motion.reshape(6, -1) for name, motion in psi.markers.items()}
     pairs = replace(
         body,
@@ -194,9 +221,11 @@ def _without_rigid(body: BodyData, psi: SecondOrder, r: int, reference: Any) -> 
     )
     X = reference_motion(pairs, reference)
     S, Ibar = moved_integrals(pairs, X)
+    W = np.einsum("abc,cp->abp", skew_tensor(), X[3:])
+    N = psi.N.reshape(r, -1) - body.S.T @ X[:3] - np.einsum("bap,abm->mp", W, body.Ibar_kl)
     moved = [moved_marker(marker, X) for marker in pairs.markers.values()]
     motions = {m.name: np.vstack([m.translation, m.rotation]).reshape(6, r, r) for m in moved}
-    return SecondOrder(S.reshape(3, r, r), Ibar.reshape(3, 3, r, r), motions)
+    return SecondOrder(S.reshape(3, r, r), Ibar.reshape(3, 3, r, r), N.reshape(r, r, r), motions)
 
 
 def _symmetrised(A: Array) -> Array:

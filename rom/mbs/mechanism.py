@@ -292,9 +292,13 @@ class Mechanism:
             finite("q", np.zeros(r) if q is None else q, (r,)),
             finite("qd", np.zeros(r) if qd is None else qd, (r,)),
         )
-        return self._enter(
-            flexible_part(name, body, start_pose(at, orientation, velocity, omega), elastic)
-        )
+        pose = start_pose(at, orientation, velocity, omega)
+        return self._enter(flexible_part(name, body, self._moving(body), pose, elastic))
+
+    def _moving(self, body: Any) -> Any:
+        """The body as it is integrated, one for all parts that are the same body."""
+        same = (part.moving for part in self.parts.values() if part.flexible is body)
+        return next(same, None) or body.on_mean_axes()
 
     def add(self, name: str, element: Any, family: Family) -> None:
         """Add an element of any family, one of your own too.

@@ -21,7 +21,7 @@ import numpy as np
 
 from rom.body.flexible import FlexibleBody
 from rom.body.reference import skew_tensor
-from rom.body.stiffening import known_loads
+from rom.body.stiffening import ELASTIC_LOAD, known_loads
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array
@@ -105,12 +105,13 @@ def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:
 
 
 def _stiffening(body: FlexibleBody) -> Iterator[str]:
-    numbers = {load: k for k, load in enumerate(known_loads(body), 1)}
+    own = {load: k for k, load in enumerate(known_loads(body), 1)}
+    taken = [load for load in body.K_geo if not load.startswith(ELASTIC_LOAD)]
     yield from _group(19, "MODAL STRESS STIFFENING MATRIX")
-    yield f"{len(body.K_geo)}"
-    for load, A in body.K_geo.items():
-        yield f"{numbers[load]}"
-        yield from map(_row, A)
+    yield f"{len(taken)}"
+    for load in taken:
+        yield f"{own[load]}"
+        yield from map(_row, body.K_geo[load])
 
 
 def _group(number: int, title: str, rows: Array | None = None) -> Iterator[str]:

@@ -26,6 +26,7 @@ from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch2, Tab
 from rom.mbs.parts.bodies import Part
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
+from rom.rotation import skew
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,8 @@ def spread_load(
 ) -> None:
     """Load on all points of a flexible body: pressure, traction, force per mass.
 
-    In the frame "body" the forces turn with it, as a pressure does; in the "world" they keep
+    In the frame "body" the forces turn with it, as a pressure does: with its frame, or with the
+    mean axes of a body that has geometric stiffness; in the "world" they keep
     their direction, given in the axes of the world. Either way they act on the points as they
     deform, which changes moments; the area they were reduced for stays the undeformed one.
 
@@ -77,9 +79,20 @@ def spread_load(
         )
     function = amplitude if callable(amplitude) else None
     constant = 0.0 if function else number("amplitude", amplitude)
-    arrays = (load.force, load.first, shapes)
+    arrays = (load.force, load.first, shapes + _by_the_frame(part, load))
     spread = Spread(part.name, *arrays, constant, function, int(frame == "world"))
     self.add(name, spread, SPREAD_LOADS_FAMILY)
+
+
+def _by_the_frame(part: Part, load: Any) -> Array:
+    """(r, 3, 3) what the sums of shapes and forces gain from the frame that is integrated."""
+    if part.own_frame is None:
+        return np.zeros((part.r, 3, 3))
+    move, turn = part.shapes(part.own_frame)
+    sums = (
+        np.outer(t, load.force) + skew(w) @ load.first for t, w in zip(move.T, turn.T, strict=True)
+    )
+    return np.array(list(sums))
 
 
 @table

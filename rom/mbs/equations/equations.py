@@ -54,7 +54,7 @@ def body_masses(s, W):
     """Set W.S to the mass matrix of all bodies; `evaluate` first."""
     W.S[:] = 0.0
     for b in range(s.bodies.mass.size):
-        body_mass(s.bodies, W, b, 1.0, own_block(s, b, W.S))
+        body_mass(s, W, b, 1.0, own_block(s, b, W.S))
 
 
 @kernel
@@ -95,7 +95,7 @@ def tangents(s, W, v, a, lam, c):
     W.S[:] = 0.0
     W.Kt[:] = 0.0
     for b in range(s.bodies.mass.size):
-        body_mass(s.bodies, W, b, c[0], own_block(s, b, W.S))
+        body_mass(s, W, b, c[0], own_block(s, b, W.S))
         body_damping(s, W, b, v, c[1], own_block(s, b, W.S))
         body_stiffness(s, W, b, v, a, c[2], own_block(s, b, W.Kt))
     wrench_stiffness(s, W, c[2], W.Kt)

@@ -20,7 +20,7 @@ from rom.mbs.kernels.system import (
 )
 from rom.mbs.kernels.tables import Table
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.bodies import GROUND, Marker, Part
+from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
 from rom.mbs.parts.joints import Joint, Row
 from rom.mbs.parts.signals import Signal, drive_signal
 from rom.model import Array, Index
@@ -166,8 +166,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         index,
         tuple(places.owners),
         tuple(places.signals),
-        np.concatenate([np.r_[part.at, part.p, part.q] for part in parts]),
-        np.concatenate([np.r_[part.velocity, part.omega, part.qd] for part in parts]),
+        *map(np.concatenate, zip(*map(moving_start, parts), strict=True)),
         max([_length(parts), *(whole.reach for whole in mechanism.nonlinear.values())]),
         sum(part.mass for part in parts),
         elements,
@@ -189,6 +188,7 @@ def coupled_by(elements: dict[Family, Table], body: Index) -> list[Any]:
 def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
     """Every named marker, every marker in use, and the origin of every body."""
     found = [Marker(part.name, name) for part in parts for name in part.names]
+    found += [part.own_frame for part in parts if part.own_frame]
     found += [m for joint in mechanism.joints.values() for m in joint.markers]
     found += [m for family, x in mechanism.elements.values() for m in family.ends(x)]
     found += [m for event in mechanism.events.values() for m in event.markers]
@@ -223,8 +223,8 @@ def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
     r = np.array([part.r for part in parts], dtype=np.int64)
     flexible = [part for part in parts if part.r]
     flex = np.zeros(len(parts), dtype=np.int64)
-    kinds = {id(part.flexible): part for part in flexible}  # equal links share their tables
-    flex[r > 0] = [list(kinds).index(id(part.flexible)) for part in flexible]
+    kinds = {id(part.moving): part for part in flexible}  # equal links share their tables
+    flex[r > 0] = [list(kinds).index(id(part.moving)) for part in flexible]
     flexible = list(kinds.values())
     tables = _flexible_tables(flexible, max(len(flexible), 1), R)
     return Bodies(
@@ -250,7 +250,7 @@ def _flexible_tables(parts: list[Part], n: int, R: int) -> tuple[Array, ...]:
     S, S1, S2 = np.zeros((n, 3, R)), np.zeros((n, R, 9)), np.zeros((n, R, 9 * R))
     M, K, C = (np.zeros((n, R, R)) for _ in range(3))
     for f, part in enumerate(parts):
-        body, r = part.flexible, part.r
+        body, r = part.moving, part.r
         S[f, :, :r] = body.S
         S1[f, :r] = np.transpose(body.Ibar_kl, (2, 0, 1)).reshape(r, 9)
         S2[f, :r, : 9 * r] = np.transpose(body.S_kl, (2, 3, 0, 1)).reshape(r, 9 * r)
@@ -260,25 +260,29 @@ def _flexible_tables(parts: list[Part], n: int, R: int) -> tuple[Array, ...]:
 
 def bent(part: Part) -> bool:
     """Whether a body has displacements of second order, its geometric stiffness."""
-    return bool(part.r and part.flexible.K_geo)
+    return bool(part.r and part.moving.K_geo)
 
 
-def _second_order(parts: list[Part], n: int, R: int) -> tuple[Array, Array]:
-    """Tables T and T1 of `rom.mbs.kernels.system.Bodies`; empty when no body is stiffened."""
+def _second_order(parts: list[Part], n: int, R: int) -> tuple[Index, Array, Array]:
+    """Tables H_at, H and T1 of `rom.mbs.kernels.system.Bodies`; empty when no body is stiffened."""
     R = R if any(map(bent, parts)) else 0
-    T, T1 = np.zeros((n, R, 3 * R)), np.zeros((n, R, 9 * R))
+    H_at, H, T1 = np.zeros(n, dtype=np.int64), [np.zeros(0)], np.zeros((n, R, 9 * R))
     for f, part in enumerate(parts):
+        H_at[f] = sum(map(len, H))
         if bent(part):
-            psi, r = part.flexible.second_order(), part.r
-            T[f, :r, : 3 * r] = np.transpose(psi.S, (1, 2, 0)).reshape(r, 3 * r)
-            T1[f, :r, : 9 * r] = np.transpose(psi.Ibar, (2, 3, 0, 1)).reshape(r, 9 * r)
-    return T, T1
+            body, psi, r = part.moving, part.moving.second_order(), part.r
+            share = np.linalg.solve(body.M, psi.N.reshape(r, -1)).reshape(r, r, r)
+            rest = psi.Ibar - np.einsum("abm,mkl->abkl", body.Ibar_kl, share)
+            rest = 0.5 * (rest + rest.swapaxes(0, 1))  # on mean axes nothing turns
+            T1[f, :r, : 9 * r] = np.transpose(rest, (2, 3, 0, 1)).reshape(r, 9 * r)
+            H.append(np.transpose(share, (2, 0, 1)).ravel())
+    return H_at, np.concatenate(H), T1
 
 
 def _bends(mechanism: Mechanism, handles: list[Marker], R: int) -> Array:
     """(k, 6, R, R) second-order motion of markers; empty when no body is stiffened."""
     bodies = {name: part for name, part in mechanism.parts.items() if bent(part)}
-    motions = {name: part.flexible.second_order().markers for name, part in bodies.items()}
+    motions = {name: part.moving.second_order().markers for name, part in bodies.items()}
     bend = np.zeros((len(handles), 6, *2 * (R if bodies else 0,)))
     for k, marker in enumerate(handles):
         if marker.body in bodies and marker.place in motions[marker.body]:

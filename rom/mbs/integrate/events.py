@@ -19,6 +19,7 @@ from rom.mbs.results.solution import Occurrences
 from rom.mbs.results.state import State
 from rom.model import Array
 from rom.names import offered
+from rom.rotation import quaternion
 
 START_ATOL = 1e-10  # time after the start [s] within which a zero is the start, not an event
 ROOT_RTOL = 1e-14  # of the step
@@ -51,6 +52,7 @@ class Instant:
         Raises:
             ConfigError: if the body or the marker is unknown.
         """
+        marker = self._frame(body) if marker is None else marker
         if marker is not None:
             return self._evaluated(body).P[self._row(body, marker)].copy()
         at = self._start(body, self._packed.system.bodies.q_at)
@@ -62,6 +64,7 @@ class Instant:
         Raises:
             ConfigError: if the body or the marker is unknown.
         """
+        marker = self._frame(body) if marker is None else marker
         if marker is not None:
             return self._evaluated(body).V[self._row(body, marker), :3].copy()
         at = self._start(body, self._packed.system.bodies.v_at)
@@ -82,6 +85,8 @@ class Instant:
             ConfigError: if the body is unknown.
         """
         at = self._start(body, self._packed.system.bodies.q_at) + 3
+        if frame := self._frame(body):
+            return quaternion(self.axes(body, frame))
         return self.q[at : at + 4].copy()
 
     def omega(self, body: str) -> Array:
@@ -91,6 +96,9 @@ class Instant:
             ConfigError: if the body is unknown.
         """
         at = self._start(body, self._packed.system.bodies.v_at) + 3
+        if frame := self._frame(body):
+            row = self._row(body, frame)
+            return self._evaluated(body).E[row].T @ self.W.V[row, 3:]
         return self.v[at : at + 3].copy()
 
     def elastic(self, body: str) -> Array:
@@ -118,6 +126,11 @@ class Instant:
             f"the coordinate of joint {name!r} is not followed.",
             hint=f"Add the event with follow=[{name!r}].",
         )
+
+    def _frame(self, body: str) -> Marker | None:
+        """Marker that is the frame of the body, where its motion is that of another frame."""
+        self._start(body, self._packed.system.bodies.q_at)
+        return self._mechanism.part(body).own_frame
 
     def _start(self, body: str, starts: Any) -> int:
         names = self._packed.names

@@ -43,13 +43,13 @@ def add_multiple(factor, x, n, out):
 
 
 @inner
-def contract(S2, x, at, r, line, out):
+def contract(S2, x, r, line, out):
     """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out; ``line`` is working memory."""
     n = 9 * r
     for j in range(n):
         line[j] = 0.0
     for l in range(r):
-        add_multiple(x[at + l], S2[l], n, line)
+        add_multiple(x[l], S2[l], n, line)
     for k in range(r):
         for p in range(9):
             out[k, p] += line[9 * k + p]

@@ -1,29 +1,23 @@
 """Displacements of second order: how load, rotation and acceleration stiffen a body.
 
 To second order a point lies at P = X + sum q_k phi_k + 1/2 sum q_k q_l psi_kl, see
-`rom.body.stiffening`. With it the first moment of the body and its product with the undeformed
-positions gain quadratic parts, kept to the order of the stiffness; everything else follows from
-the kinetic energy, so that nothing is lost or gained: energy, momentum and the symmetry of the
-mass matrix are exact.
+`rom.body.stiffening`. What shapes combine to of psi, sum phi_m H_mkl with M H the integral of
+rho phi psi, is taken for what it is, other amplitudes of the shapes::
+
+    P = X + sum y_m phi_m + rest,    y_m = q_m + 1/2 sum H_mkl q_k q_l
+
+The body has the inertia of linear shapes in the coordinates y, and in q that of the chain rule: it
+is complete to the first order of q, and definite however far the body bends. On mean axes the rest
+has no momentum and no moment of momentum; its product with the undeformed positions is kept, by
+which rotation stiffens. All follows from the kinetic energy: energy, momentum and the symmetry of
+the mass matrix are exact.
 """
 
 from numba import types
 
-from rom.mbs.kernels.algebra import (
-    add,
-    cross,
-    dot,
-    mtv,
-    mv,
-    place,
-    row,
-    scale,
-    spatial_tangent,
-    sub,
-    vec,
-)
+from rom.mbs.kernels.algebra import dot, place, scale, spatial_tangent, sub, vec
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.integrals import contract, dual, times, trace, transposed_times
+from rom.mbs.kernels.integrals import contract, times, trace
 from rom.mbs.kernels.stages import REAL_BLOCK, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
@@ -31,83 +25,77 @@ from rom.mbs.kernels.work import Work
 REAL_3 = types.UniTuple(types.float64, 3)
 
 
-def _has_stiffened(system):
+def has_stiffened(system):
+    """Whether a body of the system has displacements of second order."""
     return system.bodies.stiffened.any()
 
 
 @inner
-def contract_moment(T, x, at, r, out):
-    """Set the rows of out to the integrals of rho psi_kl x_l."""
-    for k in range(r):
-        for i in range(3):
-            out[k, i] = 0.0
-            for l in range(r):
-                out[k, i] += T[l, 3 * k + i] * x[at + l]
+def bend(bodies, b, x, at, out):
+    """Set out to the sum of H_mkl x_l, m its row and k its column."""
+    r, row = bodies.r[b], bodies.H_at[bodies.flex[b]]
+    for m in range(r):
+        for k in range(r):
+            out[m, k] = 0.0
+    for l in range(r):
+        for m in range(r):
+            for k in range(r):
+                out[m, k] += x[at + l] * bodies.H[row + k]
+            row += r
 
 
-@stage(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, needed=_has_stiffened)
-def bent_integrals(s, W, b, q, v):
-    """Add the second order to W.SP, W.Ct and W.J (before its trace), set W.Td and W.T1d."""
+@stage(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
+def bent_coordinates(s, W, b, q, v):
+    """Set W.y, W.yd, and the derivatives of y and yd by q, W.Y and W.Yd."""
+    r, at, vt = s.bodies.r[b], s.bodies.q_at[b] + 7, s.bodies.v_at[b] + 6
+    y, yd, Y = W.y[b], W.yd[b], W.Y[b]
+    bend(s.bodies, b, q, at, Y)
+    bend(s.bodies, b, v, vt, W.Yd[b])
+    for m in range(r):
+        y[m], yd[m] = q[at + m], v[vt + m]
+        for k in range(r):
+            y[m] += 0.5 * Y[m, k] * q[at + k]
+            yd[m] += Y[m, k] * v[vt + k]
+        Y[m, m] += 1.0
+
+
+@inner
+def bent_rates(W, b, r, vt, v, a):
+    """Set W.ydd to the second rates of y."""
+    for m in range(r):
+        total = 0.0
+        for k in range(r):
+            total += W.Y[b, m, k] * a[vt + k] + W.Yd[b, m, k] * v[vt + k]
+        W.ydd[b, m] = total
+
+
+@stage(types.void, System, Work, types.int64, needed=has_stiffened)
+def bent_integrals(s, W, b):
+    """Add what no combination of shapes contains to W.SP and W.J (before its trace), set W.T1d."""
     bodies = s.bodies
-    f, r, at, vt = bodies.flex[b], bodies.r[b], bodies.q_at[b], bodies.v_at[b]
-    J, moment, spread = W.J[b], W.Ta, W.T1a
-    contract_moment(bodies.T[f], q, at + 7, r, moment)
-    contract_moment(bodies.T[f], v, vt + 6, r, W.Td[b])
+    f, r, y, J, spread = bodies.flex[b], bodies.r[b], W.y[b], W.J[b], W.T1a
     spread[:] = 0.0
     W.T1d[b] = 0.0
-    contract(bodies.T1[f], q, at + 7, r, W.line, spread)
-    contract(bodies.T1[f], v, vt + 6, r, W.line, W.T1d[b])
+    contract(bodies.T1[f], y, r, W.line, spread)
+    contract(bodies.T1[f], W.yd[b], r, W.line, W.T1d[b])
     for k in range(r):
         for i in range(3):
-            W.Ct[b, i, k] += moment[k, i]
             for j in range(3):
-                half = 0.5 * q[at + 7 + k] * spread[k, 3 * i + j]
-                J[i, j] -= half
-                J[j, i] -= half
+                J[i, j] -= y[k] * spread[k, 3 * i + j]
                 W.SP[b, k, 3 * i + j] += spread[k, 3 * i + j]
 
 
 @inner
-def bent_push(W, b, r, v, vt):
-    """Force of the elastic rates alone: integral of rho psi_kl v_k v_l."""
-    force = (0.0, 0.0, 0.0)
-    for k in range(r):
-        force = add(force, scale(v[vt + 6 + k], row(W.Td[b], k, 0)))
-    return force
-
-
-@inner
-def bent_twist(W, b, r, v, vt):
-    """Moment of the elastic rates alone: integral of rho X x psi_kl v_k v_l."""
-    moment = (0.0, 0.0, 0.0)
-    for k in range(r):
-        moment = add(moment, scale(v[vt + 6 + k], dual(W.T1d[b, k], 0)))
-    return moment
-
-
-@stage(
-    *(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, types.float64, REAL_BLOCK),
-    needed=_has_stiffened,
-)
-def bent_stiffness(s, W, b, v, a, c, S):
-    """Add what the second order adds to the columns of the elastic coordinates."""
+def spread_stiffness(s, W, b, v, S):
+    """Add what `bent_integrals` adds to the derivatives by y."""
     bodies = s.bodies
-    f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
-    w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
-    a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
-    contract_moment(bodies.T[f], a, t + 6, r, W.Ta)
-    W.T1a[:] = 0.0
-    contract(bodies.T1[f], a, t + 6, r, W.line, W.T1a)
+    f, r, w = bodies.flex[b], bodies.r[b], vec(v, bodies.v_at[b] + 3)
     for l in range(r):
-        e, spread = 6 + l, W.T1d[b, l]
-        force = add(row(W.Ta, l, 0), scale(2.0, cross(w, row(W.Td[b], l, 0))))
-        place(S, 0, e, c, mv(A, force))
-        spin = sub(scale(trace(spread, 0), w), transposed_times(spread, w))
-        place(S, 3, e, c, add(dual(W.T1a[l], 0), scale(2.0, spin)))
+        e, rate = 6 + l, W.T1d[b, l]
+        place(S, 3, e, 2.0, sub(scale(trace(rate, 0), w), times(rate, w)))
         for k in range(r):
             T1 = bodies.T1[f, l, 9 * k : 9 * k + 9]
-            inertia = dot(row(bodies.T[f], l, 3 * k), a_minus_g) + dot(dw, dual(T1, 0))
-            S[6 + k, e] += c * (inertia + dot(w, times(T1, w)) - dot(w, w) * trace(T1, 0))
+            S[6 + k, e] += dot(w, times(T1, w)) - dot(w, w) * trace(T1, 0)
 
 
 @inner
@@ -136,7 +124,7 @@ def bent_sum(bend, p, x, at, r):
 
 @stage(
     *(types.UniTuple(REAL_3, 2), System, Work, types.int64, REAL_VECTOR, REAL_VECTOR),
-    needed=_has_stiffened,
+    needed=has_stiffened,
 )
 def bent_motion(s, W, m, q, v):
     """Set W.move to what elastic rates do to a marker; its accelerations of second order."""
@@ -148,7 +136,7 @@ def bent_motion(s, W, m, q, v):
 
 @stage(
     *(types.void, System, Work, types.int64, REAL_3, REAL_3, types.float64, REAL_BLOCK),
-    needed=_has_stiffened,
+    needed=has_stiffened,
 )
 def bent_wrench_stiffness(s, W, m, f, n, c, S):
     """Stiffness that the force and moment on a marker give to its body, in its block S."""

@@ -44,8 +44,9 @@ class Bodies(Table):
         S2: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho phi_l,a phi_k,b.
         M, K, C: (f, R, R) elastic mass, stiffness, damping.
         stiffened: (b,) 1 for bodies with displacements psi_kl of second order, else 0.
-        T: (f, R, 3 R) row l, entry 3 k + a: integral of rho psi_kl,a.
-        T1: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho X_a psi_kl,b.
+        H_at: (f,) first entry of a body in H.
+        H: (h,) entry r^2 l + r m + k: share of the shape m in psi_kl.
+        T1: (f, R, 9 R) row l, entry 9 k + 3 a + b: integral of rho X_a psi_kl,b without those.
         gravity: (3,) [m/s^2].
     """
 
@@ -63,7 +64,8 @@ class Bodies(Table):
     K: Array3
     C: Array3
     stiffened: Index1
-    T: Array3
+    H_at: Index1
+    H: Array1
     T1: Array3
     gravity: Array1
 

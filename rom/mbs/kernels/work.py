@@ -29,7 +29,14 @@ class Work(Table):
     """Memory for the quantities of one instant; nothing is allocated during a time step."""
 
     A: Array3  # (b, 3, 3) orientation
-    Ct: Array3  # (b, 3, R) first moment per elastic coordinate
+    y: Array2  # (b, R) amplitudes of the shapes
+    yd: Array2  # (b, R) their rates
+    ydd: Array2  # (b, R) their second rates
+    Y: Array3  # (b, R, R) derivative of y by q, of stiffened bodies
+    Yd: Array3  # (b, R, R) that of yd
+    Ya: Array2  # (R, R) that of ydd
+    of_y: Array3  # (4, 6 + R, 6 + R) mass, damping, stiffness of one body in y, and memory
+    pull: Array2  # (b, R) inertia and gravity for each shape
     d: Array2  # (b, 3) first moment
     dd: Array2  # (b, 3) rate of the first moment in the body frame
     J: Array3  # (b, 3, 3) inertia about the origin
@@ -37,10 +44,8 @@ class Work(Table):
     Sd: Array3  # (b, R, 9) integral of rho (dP/dt) phi_k
     SPd: Array3  # (b, 3, 3) integral of rho P (dP/dt)
     Sa: Array2  # (R, 9) integral of rho (d2P/dt2) phi_k
-    Td: Array3  # (b, R, 3) integral of rho psi_kl dq_l/dt
-    T1d: Array3  # (b, R, 9) integral of rho X psi_kl dq_l/dt
-    Ta: Array2  # (R, 3) integral of rho psi_kl d2q_l/dt2
-    T1a: Array2  # (R, 9) integral of rho X psi_kl d2q_l/dt2
+    T1d: Array3  # (b, R, 9) integral of rho X psi_kl dy_l/dt, of what T1 has
+    T1a: Array2  # (R, 9) integral of rho X psi_kl y_l
     line: Array1  # (9 R,) the rows of a contraction, one after the other
     P: Array2  # (k, 3) marker positions
     E: Array3  # (k, 3, 3) marker axes
@@ -138,7 +143,7 @@ def workspace(system: System, n_signals: int) -> Work:
     link(system)
     bodies, markers, rows = system.bodies, system.markers, system.rows
     b, k, m, c = bodies.mass.size, markers.body.size, rows.kind.size, system.coordinates.kind.size
-    R = bodies.K.shape[1]
+    R, bent = bodies.K.shape[1], int((bodies.r * bodies.stiffened).max(initial=0))
     n = int(6 * b + bodies.r.sum())
     square, wide, whole = (n, n), n, n + m
     if system.graph.compact:
@@ -151,10 +156,11 @@ def workspace(system: System, n_signals: int) -> Work:
         **dict.fromkeys(("A", "J", "SPd"), (b, 3, 3)),
         **dict.fromkeys(("d", "dd"), (b, 3)),
         **dict.fromkeys(("SP", "Sd"), (b, R, 9)),
-        "Ct": (b, 3, R),
-        "Td": (b, R, 3),
+        **dict.fromkeys(("y", "yd", "ydd", "pull"), (b, R)),
+        **dict.fromkeys(("Y", "Yd"), (b, *2 * (bent,))),
+        "Ya": 2 * (bent,),
+        "of_y": (4, *2 * (6 * min(bent, 1) + bent,)),
         "T1d": (b, R, 9),
-        "Ta": (R, 3),
         **dict.fromkeys(("Sa", "T1a"), (R, 9)),
         "line": (9 * R,),
         "move": (k, 6, R),

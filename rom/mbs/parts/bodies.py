@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from rom import rotation
 from rom.arguments import finite, typed
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
+from rom.model import OWN_FRAME, Array
 from rom.names import offered
 from rom.notebook import listed
 from rom.plausible import GYRATION, SIZE, warn_outside
@@ -47,6 +48,7 @@ class Part:
         velocity, omega: (3,), (3,) of the frame at the start; world, body frame [m/s, rad/s].
         points: {name: (3,) point of a rigid body, body frame [m]}.
         flexible: the ``FlexibleBody``, None for a rigid body.
+        moving: the same as it is integrated, see `FlexibleBody.on_mean_axes`.
         q, qd: (r,) elastic coordinates and rates at the start, in the units of the body's shapes.
     """
 
@@ -60,6 +62,7 @@ class Part:
     omega: Array
     points: dict[str, Array] = field(default_factory=dict)
     flexible: Any = None
+    moving: Any = None
     q: Array = field(default_factory=lambda: np.zeros(0))
     qd: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -113,6 +116,8 @@ class Part:
         row = self._surface_row(marker.place)
         if row is not None:
             return np.asarray(self.flexible.surface.points[row], dtype=float)
+        if marker == self.own_frame:
+            return np.zeros(3)
         self.marker(marker.place)
         if not isinstance(marker.place, str):
             return np.array(marker.place)
@@ -120,15 +125,20 @@ class Part:
             return self.points[marker.place]
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
 
+    @property
+    def own_frame(self) -> Marker | None:
+        """Marker that is the frame of the body, where its motion is that of another frame."""
+        return None if self.moving is self.flexible else Marker(self.name, OWN_FRAME)
+
     def shapes(self, marker: Marker) -> tuple[Array, Array]:
         """(3, r) displacement [m] and (3, r) rotation [rad] of a marker per elastic coordinate."""
         if self.flexible is None:
             return np.zeros((3, 0)), np.zeros((3, 0))
         row = self._surface_row(marker.place)
         if row is not None:
-            shape = np.asarray(self.flexible.surface.shape, dtype=float)
+            shape = np.asarray(self.moving.surface.shape, dtype=float)
             return shape[3 * row : 3 * row + 3], np.zeros((3, self.r))
-        m = self.flexible.markers[marker.place]
+        m = self.moving.markers[marker.place]
         return np.asarray(m.translation, dtype=float), np.asarray(m.rotation, dtype=float)
 
     def _surface_row(self, place: Any) -> int | None:
@@ -181,8 +191,8 @@ def _doubt_inertia(name: str, moment: float, mass: float, points: dict[str, Arra
         warn_outside(SIZE, radius, f"body {name!r} by its inertia")
 
 
-def flexible_part(name: str, body: Any, pose: Any, elastic: Any) -> Part:
-    """A flexible body.
+def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) -> Part:
+    """A flexible body, integrated as the body ``moving``.
 
     Raises:
         ModelError: if its mass matrix is singular.
@@ -192,9 +202,30 @@ def flexible_part(name: str, body: Any, pose: Any, elastic: Any) -> Part:
     first = np.asarray(body.first_moment, dtype=float)
     at, p, velocity, omega = pose
     still = name, float(body.mass), first, second, at, p
-    part = Part(*still, velocity, omega, {}, body, *elastic)
+    part = Part(*still, velocity, omega, {}, body, moving, *elastic)
     _check_mass(part)
     return part
+
+
+def moving_start(part: Part) -> tuple[Array, Array]:
+    """(7 + r,) coordinates and (6 + r,) velocities at the start, of the frame that is integrated.
+
+    Its origin and axes are those of the frame of the body without what the deformation adds.
+    """
+    at, p, velocity, omega = part.at, part.p, part.velocity, part.omega
+    if part.own_frame and (part.q.any() or part.qd.any()):
+        marker = part.moving.markers[OWN_FRAME]
+        bend = part.moving.second_order().markers[OWN_FRAME]
+        move = np.vstack([marker.translation, marker.rotation])
+        shift, theta = np.split((move + 0.5 * bend @ part.q) @ part.q, 2)
+        slip, rate = np.split((move + bend @ part.q) @ part.qd, 2)
+        p = rotation.multiply(part.p, rotation.exp(-theta))
+        A = rotation.matrix(p)
+        omega = rotation.matrix(rotation.exp(theta)) @ part.omega
+        omega = omega - rotation.spatial_tangent(theta) @ rate
+        at = part.at - A @ shift
+        velocity = part.velocity - A @ (np.cross(omega, shift) + slip)
+    return np.r_[at, p, part.q], np.r_[velocity, omega, part.qd]
 
 
 def _check_mass(part: Part) -> None:
@@ -221,7 +252,7 @@ def mass_at_rest(part: Part) -> Array:
     rigid = np.block([[part.mass * np.eye(3), -d], [d, J]])
     if part.flexible is None:
         return rigid
-    B = np.asarray(part.flexible.Ibar_kl)
+    B = np.asarray(part.moving.Ibar_kl)
     Cr = np.array([B[1, 2] - B[2, 1], B[2, 0] - B[0, 2], B[0, 1] - B[1, 0]])
-    coupling = np.vstack([np.asarray(part.flexible.S), Cr])
-    return np.block([[rigid, coupling], [coupling.T, np.asarray(part.flexible.M)]])
+    coupling = np.vstack([np.asarray(part.moving.S), Cr])
+    return np.block([[rigid, coupling], [coupling.T, np.asarray(part.moving.M)]])

@@ -9,7 +9,7 @@ from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
-SCHEMA_NAME, VERSION = "rom-state", (1, 0)
+SCHEMA_NAME, VERSION = "rom-state", (2, 0)
 NEEDED_FIELDS = ("q", "v", "a", "lam")
 STATE_KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED_FIELDS)
 OPTIONAL_FIELDS = ("algorithmic", "base")

@@ -82,7 +82,7 @@ def body_momentum(bodies, W, b, q, v, out):
     linear = add(scale(bodies.mass[b], u), add(cross(w, d), vec(W.dd[b], 0)))
     angular = add(cross(d, u), mv(W.J[b], w))
     for k in range(r):
-        angular = add(angular, scale(v[t + 6 + k], dual(W.SP[b, k], 0)))
+        angular = add(angular, scale(W.yd[b, k], dual(W.SP[b, k], 0)))
     p = mv(A, linear)
     put(out, 0, p)
     put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))

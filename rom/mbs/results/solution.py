@@ -26,7 +26,7 @@ from rom.mbs.results.state import State
 from rom.model import Array
 from rom.names import offered
 from rom.notebook import html_table, listed
-from rom.rotation import matrix
+from rom.rotation import continuous, matrix, quaternion
 
 
 @dataclass(frozen=True)
@@ -192,6 +192,7 @@ class Solution:
         """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, marker, self.position)
+        marker = self._frame(body) if marker is None else marker
         if marker is None:
             at = self._start_of(body)
             return self.q[:, at : at + 3]
@@ -205,6 +206,7 @@ class Solution:
         """
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, marker, self.velocity)
+        marker = self._frame(body) if marker is None else marker
         if marker is None:
             at = self._start_of(body, velocity=True)
             return self.v[:, at : at + 3]
@@ -230,6 +232,8 @@ class Solution:
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, None, self.orientation)
         at = self._start_of(body)
+        if frame := self._frame(body):
+            return continuous(np.array([quaternion(E) for E in self._track(body, frame).axes]))
         return self.q[:, at + 3 : at + 7]
 
     def omega(self, body: str) -> Array:
@@ -241,6 +245,9 @@ class Solution:
         if body in self.mechanism.nonlinear:
             return self._of_frames(body, None, self.omega)
         at = self._start_of(body, velocity=True)
+        if frame := self._frame(body):
+            track = self._track(body, frame)
+            return np.einsum("tij,ti->tj", track.axes, track.twist[:, 3:])
         return self.v[:, at + 3 : at + 6]
 
     def elastic(self, body: str) -> Array:
@@ -423,6 +430,11 @@ class Solution:
         if marker is not None:
             return ask(whole.marker(marker).body)
         return np.stack([ask(part.name) for part in whole.parts], axis=1)
+
+    def _frame(self, body: str) -> Marker | None:
+        """Marker that is the frame of the body, where its motion is that of another frame."""
+        self._start_of(body)
+        return self.mechanism.part(body).own_frame
 
     def _start_of(self, body: str, *, velocity: bool = False) -> int:
         if body not in self.packed.names:

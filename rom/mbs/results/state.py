@@ -32,7 +32,8 @@ class State:
 
     Attributes:
         t: time [s].
-        q: (n_q,) per body: origin (3) [m], quaternion (4) [1], elastic coordinates (r).
+        q: (n_q,) per body: origin (3) [m], quaternion (4) [1], elastic coordinates (r); the origin
+            and axes of a body with geometric stiffness are its mean ones.
         v: (n,) per body: velocity of the origin, world (3) [m/s], angular velocity, body frame (3)
             [rad/s], elastic rates (r).
         a: (n,) rates of v [m/s^2, rad/s^2].

@@ -189,7 +189,8 @@ ASKED = {  # stages -> what asks for them
     ],
     "elastic_damping elastic_stiffness": [lambda m, a, b: flexible_body(m)],
     "elastic_damping elastic_stiffness "
-    "bent_integrals bent_motion bent_stiffness bent_wrench_stiffness": [
+    "bent_coordinates bent_integrals bent_mass bent_damping bent_motion bent_stiffness "
+    "bent_wrench_stiffness": [
         lambda m, a, b: flexible_body(m, stiffened=True),
     ],
 }

@@ -19,6 +19,7 @@ from cases.mbs.mechanisms import (
 )
 from rom import rotation
 from rom.body.stiffening import SecondOrder
+from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, RomWarning
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -100,24 +101,28 @@ def at(sol, values, times):
 
 
 def test_spin_up_of_kane_ryan_and_banerjee():
-    """C3: extreme deflection of the consistent linear theory, foreshortening, residual motion."""
+    """Deflection and foreshortening of the geometrically exact beam, residual motion.
+
+    The consistent linear theory bends to -0.57438 on axes of the root, to -0.57356 on mean axes.
+    """
     sol, u, v = spin_up(stiffened_beam(**KRB | {"n_modes": 8}), 6.0, 18.0, dt=2.5e-3)
-    assert_allclose(v.min(), -0.57438, atol=2e-5)
-    assert_allclose(sol.t[v.argmin()], 6.762, atol=0.02)
-    wanted = (-0.46878, -0.55953, -0.36285, -0.15083)
-    assert_allclose(at(sol, v, (5.0, 7.5, 10.0, 12.0)), wanted, atol=2e-5)
-    assert_allclose(v[sol.t > 15].max(), 3.64e-3, atol=1e-5)
-    assert_allclose(u.min(), -0.01892, atol=1e-5)
+    assert_allclose(v.min(), -0.57379, atol=2.5e-4)
+    assert_allclose(sol.t[v.argmin()], 6.76, atol=0.01)
+    exact = (-0.15128, -0.46845, -0.55905, -0.36277, -0.11268, 0.00129)
+    assert_allclose(at(sol, v, (2.5, 5.0, 7.5, 10.0, 12.5, 15.0)), exact, atol=2.5e-4)
+    assert_allclose(v[sol.t > 15].max(), 3.64e-3, atol=3e-5)
+    assert_allclose(u.min(), -0.01882, atol=1e-4)
     report = audit(sol)
     assert report.ok, report
 
 
 @pytest.mark.parametrize(
-    ("speed", "extreme", "time"), [(6.0, -0.75269, 6.54), (2.0, -0.28027, 7.02)]
+    ("speed", "extreme", "time", "atol"), [(6.0, -0.75062, 6.54, 8e-4), (2.0, -0.28015, 7.02, 1e-4)]
 )
-def test_spin_up_of_the_beam_of_wu_and_haug(speed, extreme, time):
+def test_spin_up_of_the_beam_of_wu_and_haug(speed, extreme, time, atol):
+    """The geometrically exact beam, bent by 9 and 4 % of its length."""
     sol, _, v = spin_up(stiffened_beam(**WU), speed, 9.0, dt=0.01)
-    assert_allclose(v.min(), extreme, atol=2e-4)
+    assert_allclose(v.min(), extreme, atol=atol)
     assert_allclose(sol.t[v.argmin()], time, atol=0.03)
 
 
@@ -141,8 +146,8 @@ def test_another_frame_is_stiffened_by_the_reaction_of_the_base():
     free = body.with_reference("mean-axis")
     assert "root f_x" in free.K_geo and "a_x" not in free.K_geo
     _, u_free, v_free = spin_up(free, 6.0, 8.0, dt=0.02, save_every=5)
-    assert_allclose(v_free, v, atol=6e-3)
-    assert_allclose(u_free, u, atol=1e-3)
+    assert_allclose(v_free, v, atol=1e-9)
+    assert_allclose(u_free, u, atol=1e-9)
 
 
 @pytest.mark.parametrize("tension", [-0.8, 2.0])
@@ -151,16 +156,18 @@ def test_a_force_at_the_tip_changes_the_frequency(tension):
     body, load = stiffened_beam(n_modes=3), tension * np.pi**2 / 4
     lam, V = eigh(body.K + load * body.K_geo["tip f_x"], body.M)
     mech = Mechanism(gravity=(0, 0, 0))
-    beam = mech.add_flexible("beam", body, q=1e-3 * V[:, 0])
+    beam = mech.add_flexible("beam", body, q=1e-4 * V[:, 0])
     mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("root"))
     mech.force("pull", beam.marker("tip"), (load, 0, 0))
     period = 2 * np.pi / np.sqrt(lam[0])
-    sol = simulate(mech, t_end=2 * period, dt=period / 100, **EXACT)
+    sol = simulate(
+        mech, t_end=2 * period, dt=period / 100, **EXACT | {"rtol": 1e-12, "atol": 1e-15}
+    )
     assert_allclose(sol.position("beam", "tip")[:, 1],
-                    1e-3 * V[:, 0] @ body.marker("tip").translation[1]
-                    * np.cos(2 * np.pi * sol.t / period), atol=2e-8)  # fmt: skip
+                    1e-4 * V[:, 0] @ body.marker("tip").translation[1]
+                    * np.cos(2 * np.pi * sol.t / period), atol=2e-9)  # fmt: skip
     e = sol.energy
-    assert np.abs(e.balance).max() < 1e-7 * np.abs(e.forces).max()
+    assert np.abs(e.balance).max() < 1e-6 * np.abs(e.forces).max()
 
 
 def test_energy_and_momentum_of_a_stiffened_free_body_are_exact():
@@ -199,31 +206,67 @@ def nodal_residual(nodes, psi, state, a, gravity):
     return found
 
 
-def test_stiffened_equations_are_those_of_nodes_on_curved_paths():
-    """Small vibrations of a frame in any motion: what is left is of second order."""
-    rng = np.random.default_rng(8)
-    nodes, gravity = random_nodes(rng), np.array([0.3, -9.0, 2.0])
+def without_rigid(nodes, fields):
+    """Fields (..., n, 3) of nodes without their mean motion, weighted with the mass."""
     x, Ms = nodes[:2]
-    psi = rng.normal(size=(4, 4, 7, 3))
-    psi = psi + psi.transpose(1, 0, 2, 3)
+    M, R = np.kron(Ms, np.eye(3)), rigid_motions(x)
+    flat = fields.reshape(-1, x.size)
+    mean = np.linalg.solve(R.T @ M @ R, R.T @ M @ flat.T)
+    return (flat - (R @ mean).T).reshape(fields.shape)
+
+
+def on_curved_paths(nodes, psi):
+    """The body of nodes at x + phi q + psi q q / 2, both without mean motion."""
+    x, Ms, phi = nodes[:3]
     second = SecondOrder(
-        np.einsum("ij,klia->akl", Ms, psi), np.einsum("ia,ij,kljb->abkl", x, Ms, psi), {}
+        np.einsum("ij,klia->akl", Ms, psi),
+        np.einsum("ia,ij,kljb->abkl", x, Ms, psi),
+        np.einsum("mia,ij,klja->mkl", phi, Ms, psi),
+        {},
     )
-    soft, pose = nodal_body(*nodes), random_pose(rng)
-    bodies = {"soft": soft, "stiffened": replace(soft, K_geo=second.matrices())}
-    q, qd, a, errors = rng.normal(size=4), rng.normal(size=4), rng.normal(size=10), {}
-    for size in (1e-3, 1e-4):
-        state = (size * q, size * qd, pose["orientation"], pose["omega"])
-        moved = np.r_[a[:6], size * a[6:]]
-        exact = nodal_residual(nodes, psi, state, moved, gravity)
-        for name, body in bodies.items():
-            mech = Mechanism(gravity=gravity)
-            mech.add_flexible("body", body, q=size * q, qd=size * qd, **pose)
-            packed, W = prepared(mech)
-            residual_at(packed.system, W, packed.q, packed.v, moved, np.zeros(0))
-            errors[name, size] = np.abs(W.residual - exact).max()
-    assert_allclose(errors["soft", 1e-3] / errors["soft", 1e-4], 10, rtol=0.1)
-    assert_allclose(errors["stiffened", 1e-3] / errors["stiffened", 1e-4], 100, rtol=0.1)
+    return replace(nodal_body(*nodes), K_geo=second.matrices())
+
+
+def distance(body, nodes, psi, state, a, pose):
+    """Largest distance between the residuals of a body and of its nodes."""
+    q, qd = state
+    gravity = np.array([0.3, -9.0, 2.0])
+    mech = Mechanism(gravity=gravity)
+    mech.add_flexible("body", body, q=q, qd=qd, **pose)
+    packed, W = prepared(mech)
+    residual_at(packed.system, W, packed.q, packed.v, a, np.zeros(0))
+    exact = nodal_residual(nodes, psi, (q, qd, pose["orientation"], pose["omega"]), a, gravity)
+    return np.abs(W.residual - exact).max()
+
+
+@pytest.fixture
+def nodes():
+    """Random nodes, whose shapes have no mean motion."""
+    x, Ms, phi, K, D = random_nodes(np.random.default_rng(8))
+    return x, Ms, without_rigid((x, Ms), phi), K, D
+
+
+def test_stiffened_equations_are_those_of_nodes_on_curved_paths(nodes):
+    """Small vibrations of a frame in any motion, strongly accelerated: the rest is second order."""
+    rng = np.random.default_rng(8)
+    psi = rng.normal(size=(4, 4, 7, 3))
+    psi = without_rigid(nodes, psi + psi.transpose(1, 0, 2, 3))
+    bodies, pose = (nodal_body(*nodes), on_curved_paths(nodes, psi)), random_pose(rng)
+    a = rng.normal(size=10)
+    for body, falls in zip(bodies, (10, 100), strict=True):
+        state = rng.normal(size=(2, 4))
+        one, other = (distance(body, nodes, psi, size * state, a, pose) for size in (1e-3, 1e-4))
+        assert_allclose(one / other, falls, rtol=0.1)
+
+
+def test_paths_that_shapes_combine_to_are_followed_to_any_order(nodes):
+    rng = np.random.default_rng(9)
+    psi = np.einsum("klm,mia->klia", rng.normal(size=(4, 4, 4)), nodes[2])
+    psi = psi + psi.transpose(1, 0, 2, 3)
+    body, a = on_curved_paths(nodes, psi), rng.normal(size=10)
+    state = 0.2 * rng.normal(size=(2, 4))
+    assert distance(body, nodes, psi, state, a, random_pose(rng)) < 1e-11
+    assert distance(nodal_body(*nodes), nodes, psi, state, a, random_pose(rng)) > 0.1
 
 
 def test_matrices_and_second_order_say_the_same():
@@ -241,7 +284,5 @@ def test_a_wrong_geometric_stiffness_is_named():
         ({"a_x": np.eye(2)}, "no symmetric matrix of 3 coordinates"),
         ({"a_x": np.tri(3)}, "no symmetric matrix"),
     ):
-        mech = Mechanism()
-        mech.add_flexible("beam", replace(body, K_geo=K_geo))
         with pytest.raises(ConfigError, match=message):
-            simulate(mech, t_end=1e-3, dt=1e-3)
+            Mechanism().add_flexible("beam", replace(body, K_geo=K_geo))
