@@ -12,7 +12,7 @@ from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffe
 from rom.errors import ConfigError, ModelError
 from rom.model import OWN_FRAME, Array
 
-STILL = 1e-9  # momentum of a shape, of the largest that its mass lets it have
+STILL_RTOL = 1e-9  # momentum of a shape, of the largest that its mass lets it have
 
 
 def on_mean_axes(body: Body) -> Body:
@@ -34,7 +34,7 @@ def on_mean_axes(body: Body) -> Body:
 def _moves_around_rest(body: Body) -> bool:
     """Whether neither shapes nor second order have momentum or moment of momentum."""
     psi, r = SecondOrder.of(body), body.n_modes
-    limit = STILL * np.sqrt(np.diag(body.M).max(initial=0.0) * body.mass)
+    limit = STILL_RTOL * np.sqrt(np.diag(body.M).max(initial=0.0) * body.mass)
     for S, X in ((body.S, body.Ibar_kl), (psi.S, psi.Ibar)):
         turning = (X - X.swapaxes(0, 1)) / body.size
         if max(np.abs(S).max(initial=0.0), np.abs(turning).max(initial=0.0)) > limit:

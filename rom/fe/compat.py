@@ -209,9 +209,9 @@ def node_coordinates(space: Any) -> Array:
     if not len(nodes):  # a rank may have no cell
         return np.zeros((0, 3))
     corners = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(len(nodes), -1)
+    mapped = _cell_map(space.mesh).push_forward
     unit = np.eye(corners.shape[1], -(-corners.shape[1] // 3) * 3)
-    push = _cell_map(space.mesh).push_forward
-    table = [push(X, unit[:, k : k + 3].copy()) for k in range(0, unit.shape[1], 3)]
+    table = [mapped(X, unit[:, k : k + 3].copy()) for k in range(0, unit.shape[1], 3)]
     shapes = np.hstack(table)[:, : corners.shape[1]]
     eighths = np.round(8 * shapes) / 8
     shapes = np.where(np.abs(shapes - eighths) < 1e-12, eighths, shapes)

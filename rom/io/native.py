@@ -23,7 +23,7 @@ from rom.names import named
 from rom.units import SYSTEMS
 
 SCHEMA_NAME = "rom-body"
-VERSION = (1, 3)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 4)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
 SURFACE_ARRAYS = ("points", "triangles", "shape")

@@ -16,7 +16,7 @@ import rom
 from cases.beam import gauss_hermite, hermite_beam
 from cases.long import SHARED_BY, few
 from cases.ranks.environment import ENVIRONMENT
-from rom.body.prestress import _turning, centrifugal
+from rom.body.prestress import UnitLoads, _turning, centrifugal
 from rom.body.rotating import rotating_matrices
 from rom.body.stiffening import (
     ANGULAR_LOADS,
@@ -252,6 +252,23 @@ def test_a_twisted_blade_has_the_frequencies_of_the_shape_it_takes_at_speed(degr
     assert_allclose(*found, rtol=1e-6)
     assert_allclose(found[0], large, rtol=rtol)
     assert np.abs(undeformed / large - 1).max() > 1.5e-3
+
+
+def test_unit_loads_are_balanced_and_need_no_support(monkeypatch):
+    """Their stress is the same whichever interface is held meanwhile, with a mass on one, too."""
+    model = rom.fe.model(
+        "meshes/bent_blade.geo", material=rom.Material(E=114e9, nu=0.33, rho=4430.0), degree=1,
+        attachments=[rom.Attachment("tip", 0.05, 1e-5 * np.eye(3))],
+    )  # fmt: skip
+    found = []
+    for six in (slice(6), slice(-6, None)):
+        monkeypatch.setattr(
+            UnitLoads, "_six_dofs", lambda loads, six=six: loads.connection.boundary[six]
+        )
+        found.append(stiffened(model, n_modes=6).K_geo)
+    assert set(elastic_loads(12)) < set(found[0]) == set(found[1])
+    for load, A in found[0].items():
+        assert_allclose(found[1][load], A, atol=1e-8 * np.abs(A).max(), err_msg=load)
 
 
 def on_a_rotor(blade, speed):

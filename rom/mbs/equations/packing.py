@@ -272,9 +272,9 @@ def _second_order(parts: list[Part], n: int, R: int) -> tuple[Index, Array, Arra
         if bent(part):
             body, psi, r = part.moving, part.moving.second_order(), part.r
             share = np.linalg.solve(body.M, psi.N.reshape(r, -1)).reshape(r, r, r)
-            rest = psi.Ibar - np.einsum("abm,mkl->abkl", body.Ibar_kl, share)
-            rest = 0.5 * (rest + rest.swapaxes(0, 1))  # on mean axes nothing turns
-            T1[f, :r, : 9 * r] = np.transpose(rest, (2, 3, 0, 1)).reshape(r, 9 * r)
+            remainder = psi.Ibar - np.einsum("abm,mkl->abkl", body.Ibar_kl, share)
+            remainder = 0.5 * (remainder + remainder.swapaxes(0, 1))  # on mean axes nothing turns
+            T1[f, :r, : 9 * r] = np.transpose(remainder, (2, 3, 0, 1)).reshape(r, 9 * r)
             H.append(np.transpose(share, (2, 0, 1)).ravel())
     return H_at, np.concatenate(H), T1
 
