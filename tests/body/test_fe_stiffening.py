@@ -393,11 +393,14 @@ def test_the_number_of_processes_does_not_matter(tmp_path):
         assert path.exists(), done.stderr
         bodies.append(rom.load(path))
     one = bodies[0]
-    assert len(one.K_geo) == 6 + 6 + 6
+    assert len(one.K_geo) == 6 + 6 + 6 + one.n_modes
+    elastic = elastic_loads(one.n_modes)  # some are round-off: all of one size
+    largest = max(np.abs(one.K_geo[load]).max() for load in elastic)
     for many in bodies[1:]:
         assert set(many.K_geo) == set(one.K_geo)
         for load, A in one.K_geo.items():
-            assert_allclose(many.K_geo[load], A, atol=1e-9 * np.abs(A).max(), err_msg=load)
+            size = largest if load in elastic else np.abs(A).max()
+            assert_allclose(many.K_geo[load], A, atol=1e-9 * size, err_msg=load)
 
 
 @pytest.mark.parametrize("stiffening", few(1, [True, False]))
