@@ -12,6 +12,7 @@ import rom
 from cases.command import rom as run_rom
 from cases.files.cells import solid as solid_mesh
 from cases.solid import STEEL, block
+from rom.body.conversion import Factors
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import known_loads
 from rom.errors import ConfigError, ModelError, RomWarning
@@ -21,6 +22,7 @@ from rom.io.native import body_arrays
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.parts.jumps import Examined
 from rom.plausible import far_doubt, scaled_doubt
+from rom.units import unit_system
 
 
 def said(make):
@@ -492,6 +494,19 @@ def test_the_motion_does_not_depend_on_the_units_of_the_body(part, units):
     for found, wanted in zip(motion(part.in_units(units)), motion(part), strict=True):
         scale = np.abs(np.asarray(wanted)).max()
         assert_allclose(np.asarray(found), np.asarray(wanted), atol=1e-6 * scale)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_amplitudes_of_second_order_move_the_tip_alike_in_any_units(part, units):
+    """phi M^-1 (integral of rho phi psi) q q at q = K^-1 phi^T f, for a force f in newtons."""
+    there = part.in_units(units)
+    f, moved = Factors.between(unit_system("SI"), unit_system(units)), []
+    for body, newton in ((part, 1.0), (there, f.force)):
+        tip = body.marker("tip").translation
+        q = np.linalg.solve(body.K, tip.T @ (newton * np.ones(3)))
+        y = np.linalg.solve(body.M, np.einsum("mkl,k,l", body.second_order().N, q, q))
+        moved.append(tip @ y)
+    assert_allclose(moved[1], moved[0] * f.length, rtol=1e-9)
 
 
 def test_bodies_of_different_units_meet_in_si(part):
