@@ -120,10 +120,9 @@ class FlexibleBody(BodyData):
     def on_mean_axes(self) -> "FlexibleBody":
         """The body as a mechanism integrates it, with the elastic coordinates it has.
 
-        Inertia of second order is kept to the order of the stiffness. On mean axes what that leaves
-        out is small, and the mass matrix stays definite. On an interface the second order contains
-        rigid motion of the whole body, whose missing squares make the mass matrix of a slender beam
-        indefinite at deflections of 0.2 %. The frame of the body is kept as the marker
+        On mean axes displacements of second order have no momentum that shapes do not have, so that
+        inertia is that of linear shapes, see `rom.mbs.kernels.second_order`. On an interface they
+        contain rigid motion of the whole body. The frame of the body is kept as the marker
         `rom.model.OWN_FRAME`; a body without geometric stiffness, or on mean axes, stays as it is.
 
         Raises:
