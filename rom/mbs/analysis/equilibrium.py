@@ -1,6 +1,6 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from rom import rotation
 from rom.arguments import finite, typed, whole
 from rom.errors import ConfigError, ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
-from rom.mbs.analysis.tangent import Tangent, sizes
+from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
+from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, initial_state
 from rom.mbs.kernels.system import ROLL
@@ -18,7 +19,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
 
-MAX_PASSES = 60
+MAX_PASSES = 300
 MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
@@ -76,7 +77,8 @@ def equilibrium(
         -0.5
     """
     whole("steps", steps, 1, MOST_STEPS)
-    now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
+    time = (0.0 if state is None else state.t) if t is None else t
+    now = instant(mechanism, time, sparse=None)
     search = _Search(now, _spinning(now, spin), finite("about", about, (3,)))
     found, done, width = search.start(state), 0.0, 1.0 / steps
     with reached(lambda: found):
@@ -110,6 +112,13 @@ class _Search:
     now: Instant
     spin: Array
     about: Array
+    loan: Loan = field(default_factory=Loan)
+
+    def tangent(self, now: Instant, state: State) -> Tangent | SparseTangent:
+        """The equations of one correction."""
+        if now.pattern is None:
+            return Tangent.of(now, state)
+        return SparseTangent.of(now, state, self.loan)
 
     def start(self, state: State | None) -> State:
         """The state to start from, its joints closed."""
@@ -144,9 +153,9 @@ class _Search:
             SolverError: if Newton's method fails.
         """
         now, last = self.now.scaled(load), np.inf
+        state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
         for _ in range(MAX_PASSES):
-            tangent = Tangent.of(now, state)
-            step, dlam = tangent.correction()
+            step, dlam = self.tangent(now, state).correction()
             size, factor = sizes(now.packed, step)
             if not np.isfinite(size):
                 break
@@ -155,34 +164,38 @@ class _Search:
             now.W.base[: now.W.x.size] = now.W.x
             state = self.steady(replace(state, q=q, lam=state.lam + factor * dlam))
             state = replace(state, base=now.W.base.copy())
+            if factor < 1.0:
+                balance = self.tangent(now, state).reaction()
+                state = replace(state, lam=state.lam + balance)
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
                 return state
             last = size
-        raise _failure(now, state, load)
+        raise _failure(now, self.tangent(now, state), load)
 
     def judge(self, state: State) -> None:
         """Refuse free motions, and warn of unstable ones."""
-        tangent = Tangent.of(self.now.scaled(1.0), state)
-        squares, V = np.linalg.eigh(tangent.curvature)
-        still = np.flatnonzero(np.abs(squares) <= tangent.none(squares))
-        free = [k for k in still if not self.along_spin(tangent, state, V[:, k])]
+        weakest = self.tangent(self.now.scaled(1.0), state).weakest()
+        free = [
+            k
+            for k in np.flatnonzero(weakest.loose)
+            if not self.along_spin(weakest.motions[:, k], state)
+        ]
         if free:
-            motion = tangent.Z @ V[:, free[0]]
             raise ModelError(
-                f"{_described(self.now.packed, motion)} and no force opposes "
+                f"{_described(self.now.packed, weakest.motions[:, free[0]])} and no force opposes "
                 f"({len(free)} free motions): there is no unique equilibrium.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        if squares.size and squares[0] < 0.0 and not self.spin.any():
-            motion = tangent.Z @ V[:, 0]
+        if weakest.squares.size and weakest.squares[0] < 0.0 and not self.spin.any():
+            motion = _described(self.now.packed, weakest.motions[:, 0])
             warn(
-                f"the equilibrium is unstable: {_described(self.now.packed, motion)} and falls "
-                f"away at a rate of {np.sqrt(-squares[0]):.3g} 1/s."
+                f"the equilibrium is unstable: {motion} and falls away at a rate of "
+                f"{np.sqrt(-weakest.squares[0]):.3g} 1/s."
             )
 
-    def along_spin(self, tangent: "Tangent", state: State, y: Array) -> bool:
+    def along_spin(self, motion: Array, state: State) -> bool:
         """Whether a free motion is the steady rotation itself."""
-        motion, v = tangent.T @ tangent.Z @ y / self.now.probe(), state.v / self.now.probe()
+        motion, v = motion / self.now.probe(), state.v / self.now.probe()
         return bool(abs(motion @ v) > (1 - 1e-6) * np.linalg.norm(motion) * np.linalg.norm(v) > 0)
 
 
@@ -206,15 +219,15 @@ def _described(packed: Packed, motion: Array) -> str:
     return f"body {packed.names[b]!r} {verb} ({axis})"
 
 
-def _failure(now: Instant, state: State, load: float) -> RomError:
+def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> RomError:
     """Why Newton's method failed: an open joint, a body that nothing holds, or lack of balance."""
-    packed, tangent = now.packed, Tangent.of(now, state)
+    packed = now.packed
     gap = np.abs(tangent.gap) / packed.row_scale
     if gap.size and gap.max() > 1e-6:
         k = int(np.argmax(gap))
         what = f"joint {packed.row_owner[k]!r} stays open by {gap[k]:.3g} of the size"
     else:
-        loose = tangent.driven()
+        loose = tangent.weakest().driven(faint_force(now, tangent.pull))
         if loose is not None:
             return ModelError(
                 f"{_described(packed, loose)}, pushed by forces that nothing balances.",

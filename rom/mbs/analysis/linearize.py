@@ -8,6 +8,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, warn
+from rom.mbs.analysis.few_modes import Pencil, Wanted
 from rom.mbs.analysis.local_equations import (
     DIFFERENCE_STEP,
     Instant,
@@ -18,6 +19,7 @@ from rom.mbs.analysis.local_equations import (
 )
 from rom.mbs.analysis.moving_axes import chosen, small_motions
 from rom.mbs.analysis.quadratic_eigen import modes, phases
+from rom.mbs.analysis.tangent import load_stiffness
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
 from rom.mbs.kernels.system import ROLL
@@ -30,6 +32,7 @@ PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motion
 STEADY_RTOL = 1e-11  # change of free motions that do not change
 ZERO_FREQUENCY_RTOL = 2e-7  # round-off of a frequency, of the highest one
 DIFFERENCED_ZERO_RTOL = 1e-5  # the same where tangents are differences
+RESTING_RTOL = 1e-6  # accelerations that count as rest, of those that the loads could give
 DRIFT_RTOL = 1e-3  # change of the matrices in a radian from which they count as periodic
 
 
@@ -50,6 +53,8 @@ class Linearization:
         scale: (n,) small motion of each coordinate [m, rad], as many rad as sizes of the mechanism.
         packed: the arrays of the mechanism.
         H: (k, 6, 6 + R) twist of all markers per velocity of their body [1, m, 1/m].
+        known: eigenvalues (k,), vectors (f, k) and all eigenvalues, where the motions y are a
+            part of all that hold k modes; None: computed when asked for.
     """
 
     state: State
@@ -62,10 +67,11 @@ class Linearization:
     scale: Array
     packed: Packed
     H: Array
+    known: Any = None
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array]:
-        roots, V, every = modes(self.C, self.K, self.round_off)
+        roots, V, every = self.known or modes(self.C, self.K, self.round_off)
         return roots, V * phases(self.basis @ V / self.scale[:, None]), every
 
     @property
@@ -145,7 +151,13 @@ class Linearization:
 
 @typed
 def linearize(
-    mechanism: Mechanism, state: State | None = None, *, t: float | None = None, frame: Any = "body"
+    mechanism: Mechanism,
+    state: State | None = None,
+    *,
+    t: float | None = None,
+    frame: Any = "body",
+    n: int | None = None,
+    band: tuple[float, float] | None = None,
 ) -> Linearization:
     """Linearise the equations of motion around a state, at rest or moving.
 
@@ -161,12 +173,20 @@ def linearize(
         t: time at which drives and loads are taken [s]; None for that of the state.
         frame: axes in which small motions of a body are counted: "body" for what turns as a whole
             (blades), "world" for axisymmetric rotors that spin in bearings; or {body: frame}.
+        n: number of modes, the lowest; None for all. Cost and memory are then those of some steps
+            in time, for thousands of bodies too, and M, C, K are those of these modes.
+        band: (2,) modes between two frequencies [Hz] instead.
+
+    Undamped modes asked for by ``n`` or ``band`` are counted by the signature of the stiffness, so
+    that none is missed; damped and gyroscopic ones are those nearest to zero, or to the middle of
+    the band, and are not counted.
 
     Raises:
-        ConfigError: for a state of another mechanism or a wrong frame.
+        ConfigError: for a state of another mechanism, a wrong frame, more modes than there are.
         ModelError: naming the joint that the state does not satisfy, or one that rolls while it
-            moves.
+            moves; or if the band has no mode.
         SolverError: if the equations are singular there.
+        ModesMissedError: if other modes were found than there are.
 
     Warns:
         RomWarning: if the coefficients change with time: frequencies are then those of an instant.
@@ -185,11 +205,62 @@ def linearize(
         1.0
     """
     time = (0.0 if state is None else state.t) if t is None else t
-    now = instant(mechanism, time)
+    wanted = Wanted.of(n, band)
+    now = instant(mechanism, time, sparse=wanted is not None)
     world = chosen(frame, now.packed.names)
     state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
     _refuse_rolling(now.packed, state)
-    return _reduced(now, state, world)
+    if wanted is None:
+        return _reduced(now, state, world)
+    found = _few(now, state, world, wanted)
+    return found or _part(linearize(mechanism, state, t=t, frame=frame), wanted)
+
+
+def _few(
+    now: Instant, state: State, world: tuple[bool, ...], wanted: Wanted
+) -> Linearization | None:
+    """The modes wanted from sparse matrices; None where only whole ones know them.
+
+    These are few motions, reactions that friction depends on, and joints whose directions change
+    in the axes of the bodies.
+    """
+    pencil = Pencil.of(now, state, world)
+    if now.packed.loaded_rows.size or not pencil.affords(wanted):
+        return None
+    path = _Path(now, state, world, np.zeros((state.v.size, 0)))
+    later = pencil if _rests(now, state) else Pencil.of(now, path.later().state, world)
+    if not pencil.allows(later):
+        return None
+    if pencil.symmetric:
+        squares, Q = pencil.wanted(wanted)
+        known = None
+    else:
+        roots, Y, Q = pencil.wanted_damped(wanted)
+        known = roots, Y, np.concatenate([roots, roots.conj()])
+    K, C = pencil.seen_in(Q)
+    if known is None:
+        K, C = np.diag(squares), 0 * C
+    if state.v.any():
+        _warn_of_drift((K, C), later.seen_in(Q), path.rate)
+    now.evaluate(state.q, state.v)
+    basis = pencil.basis @ Q
+    return Linearization(state, np.eye(len(K)), C, K, basis, basis, ZERO_FREQUENCY_RTOL,
+                         now.probe(), now.packed, now.W.H.copy(), known)  # fmt: skip
+
+
+def _rests(now: Instant, state: State) -> bool:
+    """Whether a state has no velocity, and accelerations that are round-off of its loads."""
+    now.residual(state.q, state.v, state.a, state.lam)
+    fastest = (np.abs(state.a) / now.probe()).max(initial=0.0) * DIFFERENCE_STEP
+    return bool(not state.v.any() and fastest <= RESTING_RTOL * load_stiffness(now, state))
+
+
+def _part(around: Linearization, wanted: Wanted) -> Linearization:
+    """Some of all modes."""
+    roots, V, _ = around._modes
+    kept = wanted.among(roots)
+    known = roots[kept], V[:, kept], np.concatenate([roots[kept], roots[kept].conj()])
+    return replace(around, known=known)
 
 
 def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearization:
@@ -199,20 +270,26 @@ def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearizati
     Z = of_unit_mass(free_motions(G @ T, scale, state.rank), T.T @ M @ T)
     path = _Path(now, state, world, Z)
     found = _matrices(now, state, world, path)
-    rate = path.rate
     if state.v.any():
         later = path.later()
         moved_on = _matrices(now, later.state, world, later)
-        size = max(np.abs(found.K).max(initial=0.0), rate * np.abs(found.C).max(initial=0.0))
-        change = max(np.abs(found.K - moved_on.K).max(initial=0.0),
-                     rate * np.abs(found.C - moved_on.C).max(initial=0.0))  # fmt: skip
-        size = max(float(size), rate**2)
-        if change > DRIFT_RTOL * PROBE_ANGLE * size:
-            warn(
-                f"the linear equations change with time, by {change / PROBE_ANGLE / size:.2g} of "
-                "their size per radian: these frequencies are those of one instant."
-            )
+        _warn_of_drift((found.K, found.C), (moved_on.K, moved_on.C), path.rate)
     return found
+
+
+def _warn_of_drift(now: tuple[Array, Array], later: tuple[Array, Array], rate: float) -> None:
+    """Warn if stiffness and damping change within `PROBE_ANGLE`."""
+    weights = (1.0, rate)
+    sizes, changes = (
+        [w * np.abs(A).max(initial=0.0) for w, A in zip(weights, pair, strict=True)]
+        for pair in (now, [b - a for a, b in zip(now, later, strict=True)])
+    )
+    size, change = max(*sizes, rate**2), max(changes)
+    if change > DRIFT_RTOL * PROBE_ANGLE * size:
+        warn(
+            f"the linear equations change with time, by {change / PROBE_ANGLE / size:.2g} of "
+            "their size per radian: these frequencies are those of one instant."
+        )
 
 
 @dataclass(frozen=True)
@@ -231,9 +308,13 @@ class _Path:
         v, a = np.abs(self.state.v) / size, np.abs(self.state.a) / size
         return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
 
+    def ahead(self, h: float) -> Array:
+        """Coordinates a time h later."""
+        return self.now.shifted(self.state.q, h * self.state.v + 0.5 * h * h * self.state.a)
+
     def at(self, h: float) -> tuple[Array, Array]:
         """Coordinates a time h later, and the free motions there nearest to the present ones."""
-        q = self.now.shifted(self.state.q, h * self.state.v + 0.5 * h * h * self.state.a)
+        q = self.ahead(h)
         _, G, M = self.now.gradient(q, self.state.v)
         there = replace(self.state, q=q)
         T = small_motions(self.now.packed.system, there, self.world)[0]
@@ -257,7 +338,7 @@ class _Path:
     def later(self) -> "_Path":
         """The same a little later."""
         h = PROBE_ANGLE / self.rate
-        q, Z = self.at(h)
+        q, Z = self.at(h) if self.Z.size else (self.ahead(h), self.Z)
         v = fitting_velocity(self.now.packed, self.now.W, q, self.state.v + h * self.state.a)
         self.now.evaluate(q, v)
         state = with_accelerations(self.now.packed, self.now.W, replace(self.state, q=q, v=v))

@@ -14,8 +14,9 @@ from rom.mbs.equations.equations import (
     tangents,
 )
 from rom.mbs.equations.packing import Packed, pack
+from rom.mbs.equations.pattern import Pattern
 from rom.mbs.equations.python_laws import Laws, apply_laws
-from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
+from rom.mbs.integrate.consistent_start import fitting_velocity, independent, with_accelerations
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
@@ -27,6 +28,7 @@ from rom.model import Array
 DIFFERENCE_STEP = 1e-5
 DIFFERENCE_SPACING = 1e-6  # of drives [s]
 ELASTIC_TURN = 1e-4  # rotation of a marker by deformation, up to which tangents are exact [rad]
+MAX_DENSE = 200  # coordinates up to which dense matrices are quicker
 GAP_RTOL = 1e-7  # of the mechanism's size
 VELOCITY_RTOL = 1e-3  # a time integration leaves far less
 
@@ -41,6 +43,7 @@ class Instant:
         t: time [s].
         laws: forces of Python functions.
         load: factor of gravity, of loads and of forces of Python functions.
+        pattern: of sparse matrices, in which all matrices are given then; None for dense ones.
     """
 
     packed: Packed
@@ -48,6 +51,7 @@ class Instant:
     t: float
     laws: Laws
     load: float = 1.0
+    pattern: Pattern | None = None
 
     def scaled(self, load: float) -> "Instant":
         """The same with another factor of the loads; the memory is shared."""
@@ -78,31 +82,37 @@ class Instant:
             raise SolverError(what, hint="rom.check_law looks for what is wrong with it.")
         return self.W.residual.copy()
 
-    def gradient(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+    def gradient(self, q: Array, v: Array) -> tuple[Array, Any, Any]:
         """(m,) gaps of the constraints, their gradient (m, n), and the mass matrix (n, n)."""
         linearize_constraints(self.packed.system, self.W, q, v)
-        return self.W.value.copy(), self.W.G.copy(), self.W.S.copy()
+        value, G, M = self.W.value.copy(), self.W.G, self.W.S
+        if self.pattern is None:
+            return value, G.copy(), M.copy()
+        return value, self.pattern.gradient(G), self.pattern.matrix(M)
 
-    def damping(self, state: State) -> Array:
+    def damping(self, state: State) -> Any:
         """(n, n) derivative of the residual by the velocities."""
         q, v, a, lam = state.q, state.v, state.a, state.lam
         if self.laws:
-            step = self.probe()
-            return difference(lambda dv: self.residual(q, v + dv, a, lam), step)
+            return self.difference(lambda dv: self.residual(q, v + dv, a, lam))
         self.residual(q, v, a, lam)
         tangents(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
-        return self.W.S.copy()
+        return self.W.S.copy() if self.pattern is None else self.pattern.matrix(self.W.S)
 
-    def stiffness(self, state: State) -> Array:
+    def stiffness(self, state: State) -> Any:
         """(n, n) derivative of the residual by the coordinates, rotations in the body frame."""
         q, v, a, lam = state.q, state.v, state.a, state.lam
         if not self.exact(state):
-            return difference(
-                lambda dq: self.residual(self.shifted(q, dq), v, a, lam), self.probe()
-            )
+            return self.difference(lambda dq: self.residual(self.shifted(q, dq), v, a, lam))
         self.residual(q, v, a, lam)
         tangents(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
-        return self.W.Kt.copy()
+        return self.W.Kt.copy() if self.pattern is None else self.pattern.matrix(self.W.Kt)
+
+    def difference(self, f: Any) -> Any:
+        """(n, n) central differences of forces f by motions or velocities."""
+        if self.pattern is None:
+            return difference(f, self.probe())
+        return self.pattern.differences(f, self.probe())
 
     def exact(self, state: State) -> bool:
         """Whether the tangents of the time integration are exact enough at this state.
@@ -116,7 +126,7 @@ class Instant:
             not self.laws and rests and np.abs(self.W.theta).max(initial=0.0) < ELASTIC_TURN
         )
 
-    def matrices(self, state: State) -> tuple[Array, Array, Array]:
+    def matrices(self, state: State) -> tuple[Any, Any, Any]:
         """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
         C, K = self.damping(state), self.stiffness(state)
         return self.gradient(state.q, state.v)[2], C, K
@@ -151,8 +161,13 @@ def difference(f: Any, step: Array) -> Array:
     return np.array(columns).reshape(step.size, -1).T
 
 
-def instant(mechanism: Any, t: float) -> Instant:
+def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant:
     """The mechanism with its drives and loads at time t.
+
+    Args:
+        mechanism: a `rom.Mechanism`.
+        t: time [s].
+        sparse: give sparse matrices; None for those of mechanisms with many coordinates.
 
     Raises:
         ConfigError: if it is no Mechanism, or t is not finite.
@@ -162,14 +177,20 @@ def instant(mechanism: Any, t: float) -> Instant:
         raise ConfigError(f"{mechanism!r} is no Mechanism.")
     if not np.isfinite(t):
         raise ConfigError(f"t = {t!r} is no time.")
-    packed = pack(mechanism, whole=True)
+    packed = pack(mechanism, whole=sparse is False)
+    if sparse is None:
+        sparse = packed.v.size > MAX_DENSE
+        packed = packed if sparse else packed.whole()
+    if sparse and packed.by_blocks and not independent(packed):
+        packed = packed.whole()
     W = workspace(packed.system, len(packed.signals))
     table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), DIFFERENCE_SPACING)
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
     W.signal[:] = table[0]
-    return Instant(packed, W, float(t), packed.asked)
+    pattern = Pattern(packed) if sparse else None
+    return Instant(packed, W, float(t), packed.asked, pattern=pattern)
 
 
 def consistent(now: Instant, state: Any) -> State:
@@ -194,7 +215,7 @@ def consistent(now: Instant, state: Any) -> State:
     rolls = packed.system.rows.kind == ROLL
     _check(packed, np.where(rolls, 0.0, value) / packed.row_scale, GAP_RTOL, "stays open by")
     v = fitting_velocity(packed, W, state.q, state.v)
-    size = (np.abs(G) @ np.maximum(np.abs(v), np.abs(state.v))).max(initial=0.0)
+    size = (abs(G) @ np.maximum(np.abs(v), np.abs(state.v))).max(initial=0.0)
     if size > 0.0:
         _check(packed, G @ (v - state.v) / size, VELOCITY_RTOL, "contradicts the velocities by")
     state = replace(state, v=v, t=now.t)

@@ -94,7 +94,7 @@ def steady_motion(
     size = now.probe() / DIFFERENCE_STEP
     rate = _rate(state, size)
     both = np.concatenate([size, size * rate])
-    motions = small_motions(now.packed.system, state, world)
+    motions = tuple(T.toarray() for T in small_motions(now.packed.system, state, world))
     A = _first_order(now, state, motions, rate) * both / both[:, None]
     B = _bound(now, state, motions) * both
     N = _null_space(B)

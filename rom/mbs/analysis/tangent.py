@@ -1,6 +1,7 @@
 """One correction towards equilibrium: linear equations in motions that the joints allow."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -46,14 +47,10 @@ class Tangent:
         M, C, K = now.matrices(state)
         K = K @ T + C @ T1 + M @ T3
         r = T.T @ now.residual(state.q, state.v, state.a, state.lam)
-        force = (
-            np.abs(now.W.wrench[:, :3]).max(initial=0.0) + now.packed.mass * np.abs(state.a).max()
-        )
+        pull = load_stiffness(now, state)
         gap, G, _ = now.gradient(state.q, state.v)
         Z = of_unit_mass(free_motions(G @ T, now.probe(), state.rank), T.T @ M @ T)
-        packed = now.packed
-        force += packed.mass * np.linalg.norm(packed.system.bodies.gravity)
-        return cls(now, T, r, T.T @ K, G @ T, gap, Z, force / packed.mass / packed.length)
+        return cls(now, T, r, T.T @ K, G @ T, gap, Z, pull)
 
     @property
     def curvature(self) -> Array:
@@ -69,27 +66,20 @@ class Tangent:
             1e-300,
         )
 
-    @property
-    def faint(self) -> float:
-        """Force per root of mass, in a free motion, that counts as none."""
-        return (
-            LOAD_STIFFNESS_RTOL * self.pull * self.now.packed.length * np.sqrt(self.now.packed.mass)
-        )
-
-    def driven(self) -> Array | None:
-        """(n,) free motion that forces drive and no stiffness opposes, if there is one."""
+    def weakest(self) -> "Weakest":
+        """All free motions."""
         squares, V = np.linalg.eigh(self.curvature)
         along = np.abs(V.T @ (self.Z.T @ self.r))
-        loose = np.where(np.abs(squares) <= self.none(squares), along, 0.0)
-        if loose.max(initial=0.0) <= self.faint:
-            return None
-        return self.T @ self.Z @ V[:, int(np.argmax(loose))]
+        return Weakest(squares, self.T @ self.Z @ V, self.none(squares), along)
+
+    def reaction(self) -> Array:
+        """(m,) change of the multipliers that balances the forces best."""
+        scale = self.now.probe()
+        return -np.linalg.lstsq((self.G * scale).T, self.r * scale, rcond=1e-9)[0]
 
     def unbalanced(self) -> Array:
         """(n,) forces that the best reactions leave over."""
-        scale = self.now.probe()
-        A, b = (self.G * scale).T, self.r * scale
-        return (b - A @ np.linalg.lstsq(A, b, rcond=1e-9)[0]) / scale
+        return self.r + self.G.T @ self.reaction()
 
     def correction(self) -> tuple[Array, Array]:
         """(n,) variation of the coordinates and (m,) of the multipliers."""
@@ -108,19 +98,59 @@ class Tangent:
         if not squares.size or squares[0] > none:
             return -np.linalg.solve(self.Z.T @ self.K @ self.Z, force)
         along = V.T @ force
-        still = (np.abs(squares) <= none) & (np.abs(along) <= self.faint)
+        still = (np.abs(squares) <= none) & (np.abs(along) <= faint_force(self.now, self.pull))
         return -V @ np.where(still, 0.0, along / np.maximum(np.abs(squares), none))
+
+
+@dataclass(frozen=True)
+class Weakest:
+    """Free motions of unit mass, those of least stiffness first.
+
+    Attributes:
+        squares: (k,) their stiffness [1/s^2].
+        motions: (n, k) variations of the coordinates.
+        none: stiffness that counts as none, for each or for all [1/s^2].
+        along: (k,) forces out of balance in them.
+    """
+
+    squares: Array
+    motions: Array
+    none: Any
+    along: Array
+
+    @property
+    def loose(self) -> Array:
+        """(k,) whether nothing opposes it."""
+        return np.abs(self.squares) <= self.none
+
+    def driven(self, faint: float) -> Array | None:
+        """(n,) the motion that forces drive and no stiffness opposes, if there is one."""
+        pushed = np.where(self.loose, self.along, 0.0)
+        return self.motions[:, int(np.argmax(pushed))] if pushed.max(initial=0.0) > faint else None
+
+
+def load_stiffness(now: Instant, state: State) -> float:
+    """Gravity over length, and what other loads add; residual first [1/s^2]."""
+    packed = now.packed
+    force = np.abs(now.W.wrench[:, :3]).max(initial=0.0) + packed.mass * np.abs(state.a).max()
+    force += packed.mass * np.linalg.norm(packed.system.bodies.gravity)
+    return float(force / packed.mass / packed.length)
+
+
+def faint_force(now: Instant, pull: float) -> float:
+    """Force per root of mass, in a free motion, that counts as none."""
+    return float(LOAD_STIFFNESS_RTOL * pull * now.packed.length * np.sqrt(now.packed.mass))
 
 
 def sizes(packed: Packed, step: Array) -> tuple[float, float]:
     """Size of a correction, in rad or lengths of the mechanism, and the share of it to be taken."""
-    turns, shifts = [0.0], [0.0]
-    for b, at in enumerate(packed.system.bodies.v_at):
-        turns.append(float(np.linalg.norm(step[at + 3 : at + 6])))
-        shifts.append(float(np.linalg.norm(step[at : at + 3])) / packed.length)
-        r, mass = packed.system.bodies.r[b], packed.system.bodies.mass[b]
-        modal = np.diag(packed.system.bodies.M[packed.system.bodies.flex[b]])[:r]
-        bend = step[at + 6 : at + 6 + r] * np.sqrt(modal / mass)
+    bodies, at = packed.system.bodies, packed.system.bodies.v_at[:, None] + np.arange(3)
+    turns = np.linalg.norm(step[at + 3], axis=1)
+    shifts = [float(np.linalg.norm(step[at], axis=1).max()) / packed.length]
+    for b in np.flatnonzero(bodies.r):
+        first, r = bodies.v_at[b] + 6, bodies.r[b]
+        modal = np.diag(bodies.M[bodies.flex[b]])[:r]
+        bend = step[first : first + r] * np.sqrt(modal / bodies.mass[b])
         shifts.append(float(np.linalg.norm(bend)) / packed.length)
     turn, shift = max(turns), max(shifts)
     return float(max(turn, shift)), float(

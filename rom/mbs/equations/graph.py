@@ -153,6 +153,23 @@ def _tables(
     )
 
 
+def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
+    """Unknowns of each body and each joint, rows of constraints after all velocities, in turn."""
+    neighbours, groups = _neighbours(system, coupled), _groups(system)
+    width, v_at = 6 + system.bodies.r, system.bodies.v_at
+    size = [*map(int, width), *(len(group.rows) for group in groups)]
+    ordering = Ordering(size, neighbours, groups, forest(groups, len(width)))
+    ordering.run(np.inf)
+    n, total = len(width), int(width.sum())
+    found = [
+        v_at[node] + np.arange(width[node])
+        if node < n
+        else total + _integers(groups[node - n].rows)
+        for node in ordering.sequence
+    ]
+    return [unknowns for unknowns in found if unknowns.size]
+
+
 def _columns(pairs: list[tuple[int, int]]) -> Any:
     """Two vectors from a list of pairs of numbers."""
     return np.ascontiguousarray(np.array(pairs, dtype=np.int64).reshape(-1, 2).T)

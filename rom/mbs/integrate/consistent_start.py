@@ -67,6 +67,11 @@ def _independent(packed: Packed, W: Work, q: Array) -> bool:
     return factorised(packed.system, W, RANK_TOLERANCE**1.5)
 
 
+def independent(packed: Packed) -> bool:
+    """Whether no joint of a mechanism in blocks repeats others where its bodies were added."""
+    return _independent(packed, workspace(packed.system, len(packed.signals)), packed.q)
+
+
 def with_accelerations(packed: Packed, W: Work, state: State) -> State:
     """The state with consistent accelerations and multipliers.
 

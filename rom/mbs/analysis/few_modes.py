@@ -1,0 +1,361 @@
+"""The lowest modes under constraints, or those in a band, from sparse matrices; none is missed.
+
+Shift-invert Lanczos; undamped modes are counted by the signature of the stiffness at two shifts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, identity
+from scipy.sparse.linalg import LinearOperator, eigs, eigsh
+
+from rom.arguments import finite, whole
+from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
+from rom.mbs.analysis.local_equations import Instant
+from rom.mbs.analysis.moving_axes import small_motions
+from rom.mbs.equations.signature import signature
+from rom.mbs.equations.sparse_solve import Constrained, unit_rows
+from rom.mbs.results.state import State
+from rom.model import Array, Index
+
+SHIFT_SHARE = 1e-6  # of the stiffest square, where the search for the lowest mode begins
+N_SPARE = 3  # modes beyond those asked for, so that a gap for counting is found
+N_PROBES, N_PASSES = 12, 3  # of the inverse iteration that looks for the lowest eigenvalue
+MAX_SHIFTS = 12  # each a thousandth of the last
+RANK_RTOL = 1e-10  # of unit masses and gradients, below which a constraint repeats others
+ROUND_OFF = 32 * np.finfo(float).eps  # of the terms that add up to an eigenvalue
+MIN_GAP = 1e-6  # between neighbouring eigenvalues in which modes are counted, relative
+SYMMETRY_RTOL = 1e-9
+SAME_MOTIONS_RTOL = 1e-8  # share of motions that joints of another instant would stop
+MIN_RATIO = 4  # motions per mode from which Lanczos is quicker than all modes at once
+SPAN_RTOL = 1e-13  # square of a direction, of the largest, that shapes of one space still have
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which modes are wanted: the n lowest, or those between two frequencies.
+
+    Attributes:
+        n: number; 0 with a band.
+        band: (2,) [rad/s].
+    """
+
+    n: int
+    band: tuple[float, float] = (0.0, np.inf)
+
+    @classmethod
+    def of(cls, n: Any, band: Any) -> "Wanted | None":
+        """What the caller says; None for all modes.
+
+        Raises:
+            ConfigError: if it makes no sense.
+        """
+        if n is None and band is None:
+            return None
+        if band is None:
+            return cls(whole("n", n, 1))
+        if n is not None:
+            raise ConfigError("n and band: give one of them.")
+        low, high = finite("band", band, (2,))
+        if not 0 <= low < high:
+            raise ConfigError(f"band = ({low:g}, {high:g}) Hz must be two growing frequencies.")
+        return cls(0, (2 * np.pi * low, 2 * np.pi * high))
+
+    def among(self, roots: Array) -> Index:
+        """Numbers of those wanted among all eigenvalues (f,) in ascending order [rad/s].
+
+        Raises:
+            ConfigError, ModelError: if there are none, or fewer.
+        """
+        if self.n > roots.size:
+            raise ConfigError(
+                f"n = {self.n}, but the joints leave {roots.size} motions and as many modes."
+            )
+        low, high = self.band
+        kept = np.flatnonzero((roots.imag >= low) & (roots.imag < high))
+        if not kept.size:
+            self.refuse(roots.imag)
+        return kept[: self.n] if self.n else kept
+
+    def refuse(self, near: Array) -> None:
+        """Say that the band is empty, and which rates [rad/s] are near.
+
+        Raises:
+            ModelError: always.
+        """
+        low, high = np.array(self.band) / (2 * np.pi)
+        middle = 0.5 * sum(self.band)
+        found = sorted(sorted(np.unique(near), key=lambda w: abs(w - middle))[:2])
+        modes = " and ".join(f"{w / (2 * np.pi):.6g}" for w in found)
+        raise ModelError(f"no mode lies between {low:g} and {high:g} Hz; near are {modes} Hz.")
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """M u'' + C u' + K u + G^T l = 0 with G u = 0, in units that give M a diagonal of ones.
+
+    Attributes:
+        K, C, M: (n, n) stiffness [1/s^2], damping [1/s], mass [1].
+        G: (m, n) constraints, rows of length one.
+        groups: unknowns of u and l in the order of their elimination.
+        scale: square of a rate at which the search for the lowest mode begins [1/s^2].
+        basis: (n, n) variation of the coordinates, as in `State.v`, per u.
+        row: (m,) lengths of the rows as the mechanism has them.
+        independent: whether no constraint is known to repeat others.
+    """
+
+    K: csc_matrix
+    C: csc_matrix
+    M: csc_matrix
+    G: csr_matrix
+    groups: Sequence[Index]
+    scale: float
+    basis: csc_matrix
+    row: Array
+    independent: bool = False
+
+    @classmethod
+    def of(cls, now: Instant, state: State, world: tuple[bool, ...]) -> "Pencil":
+        """Small motions around a state that rests or turns as one, from sparse matrices."""
+        assert now.pattern is not None
+        T, T1, T2, T3 = small_motions(now.packed.system, state, world)
+        M, C, K = now.matrices(state)
+        D = diags(1 / np.sqrt(M.diagonal()))
+        basis = T @ D
+        K2 = basis.T @ (K @ T + C @ T1 + M @ T3) @ D
+        C2 = basis.T @ (C @ T + M @ T2) @ D
+        G, row = unit_rows(now.gradient(state.q, state.v)[1] @ basis)
+        stiffest = abs(K2).max() if K2.nnz else 0.0
+        K2, C2, M2 = (csc_matrix(A) for A in (K2, C2, basis.T @ M @ basis))
+        scale = SHIFT_SHARE * stiffest or 1.0
+        groups, alone = now.pattern.groups, now.packed.by_blocks
+        return cls(K2, C2, M2, G, groups, scale, csc_matrix(basis), row, alone)
+
+    @cached_property
+    def redundant(self) -> int:
+        """Number of constraints that repeat others."""
+        if self.independent or not self.G.shape[0]:
+            return 0
+        A = bmat([[identity(self.M.shape[0]), self.G.T], [self.G, None]], format="csc")
+        return signature(A, self.groups, RANK_RTOL).zero
+
+    @property
+    def n_free(self) -> int:
+        """Number of motions that the constraints leave."""
+        return int(self.M.shape[0] - self.G.shape[0] + self.redundant)
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether there is nothing but masses and springs."""
+        K = self.K
+        odd = abs(K - K.T).max() if K.nnz else 0.0
+        return bool(odd <= SYMMETRY_RTOL * abs(K).max() and not abs(self.C).max() > 0.0)
+
+    @cached_property
+    def even(self) -> csc_matrix:
+        """Symmetric part of the stiffness."""
+        return csc_matrix(0.5 * (self.K + self.K.T))
+
+    def affords(self, wanted: Wanted) -> bool:
+        """Whether the modes are few of many: otherwise all together are cheaper."""
+        n = wanted.n
+        if not n:
+            n = self.count(wanted.band[1] ** 2) - self.count(wanted.band[0] ** 2)
+        return MIN_RATIO * (n + 2 * N_SPARE) < self.n_free
+
+    def wanted(self, wanted: Wanted) -> tuple[Array, Array]:
+        """Squares [1/s^2] and shapes (n, k) of undamped modes; round-off is zero."""
+        low, high = (w**2 for w in wanted.band)
+        squares, X = self.lowest(wanted.n) if wanted.n else self.between(low, high)
+        if not squares.size:
+            near = self.near(0.5 * (low + high) * (1 + 1e-7), 2)[0]
+            wanted.refuse(np.sqrt(np.maximum(near, 0.0)))
+        return np.where(np.abs(squares) <= self.round_off(X), 0.0, squares), X
+
+    def wanted_damped(self, wanted: Wanted) -> tuple[Array, Array, Array]:
+        """Eigenvalues [1/s], vectors (2 k, k) in motions of unit mass (n, 2 k).
+
+        Real eigenvalues come in pairs, of which the larger stands for a mode.
+        """
+        low, high = wanted.band
+        if wanted.n:
+            shift, k = np.sqrt(-self.low_shift()), 2 * wanted.n
+        else:
+            shift = 0.5j * (low + high)
+            k = self.count(high**2) - self.count(low**2)
+        every, Z = self.damped(shift, k + 2 * N_SPARE)
+        zero = self._rate_round_off(Z)
+        every = np.where(np.abs(every) <= zero, 0.0, every)
+        real = np.flatnonzero(np.abs(every.imag) <= zero)
+        real = real[np.argsort(-every[real].real)][: (real.size + 1) // 2]
+        swing = np.flatnonzero(every.imag > zero)
+        order = np.concatenate([real, swing[np.argsort(every[swing].imag)]])
+        roots = every[order]
+        roots[: real.size] = roots[: real.size].real
+        if wanted.n:
+            kept = np.arange(roots.size)[: wanted.n]
+        else:
+            kept = np.flatnonzero((roots.imag >= low) & (roots.imag < high))
+            if not kept.size:
+                wanted.refuse(roots.imag)
+        return self._in_real_motions(roots[kept], Z[:, order[kept]])
+
+    def _rate_round_off(self, Z: Array) -> Array:
+        """(k,) eigenvalues [1/s] that may be round-off."""
+        mass = np.einsum("ik,ik->k", Z.conj(), self.M @ Z).real
+        return np.sqrt(self.round_off(Z / np.sqrt(mass)))
+
+    def _in_real_motions(self, roots: Array, Z: Array) -> tuple[Array, Array, Array]:
+        """Shapes as combinations (2 k, k) of real motions (n, 2 k) of unit mass."""
+        R = np.hstack([Z.real, Z.imag])
+        R = R / np.maximum(np.linalg.norm(R, axis=0), 1e-300)
+        squares, V = eigh(R.T @ (self.M @ R))
+        kept = squares > SPAN_RTOL * squares[-1]
+        Q = R @ (V[:, kept] / np.sqrt(squares[kept]))
+        Y = Q.T @ (self.M @ Z)
+        return roots, Y / np.linalg.norm(Y, axis=0), Q
+
+    def count(self, shift: float) -> int:
+        """Number of undamped modes below a shift [1/s^2]."""
+        A = self.even - shift * self.M
+        if self.G.shape[0]:
+            A = bmat([[A, self._balanced.T], [self._balanced, None]], format="csc")
+        return signature(csc_matrix(A), self.groups).negative - self.G.shape[0] + self.redundant
+
+    @cached_property
+    def _balanced(self) -> csr_matrix:
+        return self.G * (float(abs(self.even).max()) or 1.0)
+
+    def inverse(self, K: Any) -> Constrained:
+        """The factorised equations with K in place of the stiffness."""
+        return Constrained(csc_matrix(K), self.G, redundant=self.redundant > 0)
+
+    def allows(self, other: "Pencil") -> bool:
+        """Whether the joints of another instant allow the same motions."""
+        if other is self or not self.G.shape[0]:
+            return True
+        n = self.M.shape[0]
+        X = np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(N_PASSES)))
+        U = self.inverse(identity(n)).solve(X)[0]
+        return bool(np.abs(other.G @ U).max() <= SAME_MOTIONS_RTOL * np.abs(U).max())
+
+    def seen_in(self, Q: Array) -> tuple[Array, Array]:
+        """Stiffness and damping (k, k) in some motions (n, k)."""
+        return Q.T @ (self.K @ Q), Q.T @ (self.C @ Q)
+
+    def round_off(self, X: Array) -> Array:
+        """(k,) eigenvalues of the shapes X (n, k) of unit mass that may be round-off [1/s^2]."""
+        A = abs(X)
+        return ROUND_OFF * np.einsum("ik,ik->k", A, abs(self.even) @ A)
+
+    def near(self, shift: float, k: int) -> tuple[Array, Array]:
+        """The k undamped modes nearest to a shift: squares (k,) [1/s^2] ascending, X (n, k)."""
+        solve = self.inverse(self.even - shift * self.M).solve
+        n = self.M.shape[0]
+        operator = LinearOperator((n, n), matvec=lambda x: solve(x)[0], dtype=float)
+        start = solve(np.sin(1.0 + np.arange(n)))[0]
+        squares, X = eigsh(self.even, k, self.M, shift, OPinv=operator, v0=start, tol=0.0)
+        order = np.argsort(squares)
+        return squares[order], X[:, order]
+
+    def low_shift(self) -> float:
+        """A shift below all modes, and no further from the lowest elastic one than needed."""
+        shift, n = -abs(self.scale), self.M.shape[0]
+        X = np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(min(N_PROBES, self.n_free))))
+        for _ in range(MAX_SHIFTS):
+            if self._ritz(shift, X) > -shift:
+                break
+            shift *= 1e-3
+        while self.count(shift):
+            shift *= 10.0
+        return shift
+
+    def _ritz(self, shift: float, X: Array) -> float:
+        """Estimate of the lowest eigenvalue that is not round-off."""
+        solve = self.inverse(self.even - shift * self.M).solve
+        for _ in range(N_PASSES):
+            X = np.linalg.qr(solve(self.M @ X)[0])[0]
+        squares, V = eigh(X.T @ (self.even @ X), X.T @ (self.M @ X))
+        noise = self.round_off(X @ V)
+        real = np.abs(squares) > noise
+        return float(np.abs(squares[real]).min()) if real.any() else float(noise.max())
+
+    def lowest(self, n: int) -> tuple[Array, Array]:
+        """The n lowest undamped modes: squares of rates [1/s^2], shapes of unit mass.
+
+        Raises:
+            ModesMissedError: if the signature counts others than were found.
+        """
+        k = min(n + N_SPARE, self.n_free)
+        squares, X = self.near(self.low_shift(), k)
+        if k > n:
+            found, at = _gap(squares, n)
+            self.confirm(found, at, self.count(at))
+        return squares[:n], X[:, :n]
+
+    def between(self, low: float, high: float) -> tuple[Array, Array]:
+        """The undamped modes with squares of rates [1/s^2] between two bounds.
+
+        Raises:
+            ModesMissedError: if the signature counts others than were found.
+        """
+        n = self.count(high) - self.count(low)
+        if n == 0:
+            return np.zeros(0), np.zeros((self.M.shape[0], 0))
+        k, middle = n, 0.5 * (low + high) * (1 + 1e-7)
+        while k < self.n_free:
+            k = min(2 * k + N_SPARE, self.n_free)
+            squares, X = self.near(middle, k)
+            inside = (squares >= low) & (squares < high)
+            if inside.sum() >= n:
+                break
+        self.confirm(int(inside.sum()), high, n)
+        return squares[inside], X[:, inside]
+
+    def confirm(self, found: int, shift: float, count: int) -> None:
+        """Compare what was found with what there is."""
+        if found != count:
+            raise ModesMissedError(
+                f"{found} modes were found up to {np.sqrt(abs(shift)) / (2 * np.pi):.6g} Hz, but "
+                f"there are {count}.",
+                hint="Ask for a few more modes, or for another band.",
+            )
+
+    def damped(self, shift: complex, k: int) -> tuple[Array, Array]:
+        """The k eigenvalues nearest to a shift [1/s], and shapes (n, k), of s^2 M + s C + K.
+
+        Source:
+            Saad, Numerical Methods for Large Eigenvalue Problems, 2011, sections 8.2 and 10.1:
+            shift-invert on u and s u, of which only matrices (n, n) are factorised.
+        """
+        n = self.M.shape[0]
+        solve = self.inverse(shift**2 * self.M + shift * self.C + self.K).solve
+        D = self.C + shift * self.M
+
+        def inverse(z: Array) -> Array:
+            u = solve(-(D @ z[:n] + self.M @ z[n:]))[0]
+            return np.concatenate([u, shift * u + z[:n]])
+
+        kind = complex if np.iscomplexobj(shift) else float
+        operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=kind)
+        start = inverse(inverse(np.sin(1.0 + np.arange(2.0 * n)).astype(kind)))
+        inverses, Z = eigs(operator, k, v0=start, tol=0.0)
+        return shift + 1 / inverses, Z[:n]
+
+
+def _gap(squares: Array, n: int) -> tuple[int, float]:
+    """Number of eigenvalues below the widest gap behind the n-th, and the middle of the gap."""
+    upper, lower = squares[n:], squares[n - 1 : -1]
+    size = np.abs(squares).max()
+    gaps = (upper - lower) / np.maximum(np.abs(upper), 1e-12 * size)
+    j = int(np.argmax(gaps))
+    if gaps[j] < MIN_GAP:
+        raise SolverError(
+            f"modes {n} to {squares.size} have one frequency: they cannot be counted apart.",
+            hint="Ask for a few modes more or less.",
+        )
+    return n + j, float(0.5 * (upper[j] + lower[j]))

@@ -1,0 +1,127 @@
+"""One correction towards equilibrium of a large mechanism, by sparse matrices.
+
+Where the potential curves downwards some stiffness is lent, in proportion to the masses, until it
+curves upwards; what is lent goes back as soon as it does so by itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import identity
+
+from rom.errors import SolverError
+from rom.mbs.analysis.few_modes import Pencil
+from rom.mbs.analysis.local_equations import Instant
+from rom.mbs.analysis.tangent import (
+    LOAD_STIFFNESS_RTOL,
+    MAX_ROTATION,
+    Weakest,
+    load_stiffness,
+    sizes,
+)
+from rom.mbs.equations.sparse_solve import Constrained
+from rom.mbs.results.state import State
+from rom.model import Array
+
+N_WEAKEST = 6  # motions of least stiffness that are looked at
+MAX_LOANS = 40  # each ten times the last
+FIRST_LOAN = 1e-2  # of the stiffness that the loads give
+GROWTH = 3.0
+REPAYMENT = 0.3  # share of a loan that the next correction begins with
+# corrections, in rad or lengths of the mechanism: what a linear equation may say; from which
+# signs of the stiffness are counted; below which forces are round-off
+MAX_CORRECTION, COUNTED_CORRECTION, ROUND_OFF_CORRECTION = 100.0, 1e-2, 1e-9
+
+
+@dataclass
+class Loan:
+    """Stiffness lent to the correction before, in units of the mass matrix [1/s^2]."""
+
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class SparseTangent:
+    """Linear equations of one correction, as `rom.mbs.analysis.tangent.Tangent` has them.
+
+    Attributes:
+        now: the mechanism.
+        pencil: masses and stiffness in motions u that turn with the bodies.
+        r: (n,) forces out of balance per u.
+        gap: (m,) constraints.
+        pull: stiffness that the loads themselves give [1/s^2].
+        loan: what was lent before.
+    """
+
+    now: Instant
+    pencil: Pencil
+    r: Array
+    gap: Array
+    pull: float
+    loan: Loan
+
+    @classmethod
+    def of(cls, now: Instant, state: State, loan: Loan) -> "SparseTangent":
+        """The equations at a state that rests, or turns steadily as a whole."""
+        pencil = Pencil.of(now, state, (False,) * len(now.packed.names))
+        r = pencil.basis.T @ now.residual(state.q, state.v, state.a, state.lam)
+        pull = load_stiffness(now, state)
+        return cls(now, pencil, r, now.gradient(state.q, state.v)[0], pull, loan)
+
+    def correction(self) -> tuple[Array, Array]:
+        """(n,) variation of the coordinates and (m,) of the multipliers."""
+        least = FIRST_LOAN * (self.pull or self.pencil.scale)
+        lent = REPAYMENT * self.loan.value
+        lent = lent if lent >= least else 0.0
+        for _ in range(MAX_LOANS):
+            found = self._solved(lent)
+            if found is not None:
+                self.loan.value = lent
+                return found
+            lent = max(GROWTH * lent, least)
+        raise SolverError("the equations of equilibrium are singular, whatever stiffness is lent.")
+
+    def _solved(self, lent: float) -> tuple[Array, Array] | None:
+        """The correction with some stiffness lent; None where it would lead upwards."""
+        p, gap = self.pencil, self.gap / self.pencil.row
+        try:
+            equations = p.inverse(p.K + lent * p.M)
+        except SolverError:
+            return None
+        forces, gaps = np.zeros((self.r.size, 2)), np.zeros((gap.size, 2))
+        forces[:, 0], gaps[:, 1] = -self.r, -gap
+        u, l = equations.solve(forces, gaps)
+        step = p.basis @ u.sum(axis=1)
+        size = sizes(self.now.packed, step)[0]
+        if not size < MAX_CORRECTION:
+            return None
+        if size > ROUND_OFF_CORRECTION and self.r @ u[:, 0] > 0.0:
+            return None
+        if COUNTED_CORRECTION < size <= MAX_ROTATION and p.count(-lent):
+            return None
+        return step, l.sum(axis=1) / p.row
+
+    def weakest(self) -> Weakest:
+        """The free motions of least stiffness."""
+        p = self.pencil
+        if not p.n_free:
+            return Weakest(np.zeros(0), np.zeros((self.r.size, 0)), np.zeros(0), np.zeros(0))
+        squares, U = p.lowest(min(N_WEAKEST, p.n_free))
+        none = np.maximum(p.round_off(U), LOAD_STIFFNESS_RTOL * self.pull)
+        return Weakest(squares, p.basis @ U, none, np.abs(U.T @ self.r))
+
+    def reaction(self) -> Array:
+        """(m,) change of the multipliers that balances the forces best."""
+        return self._balanced()[1]
+
+    def unbalanced(self) -> Array:
+        """(n,) forces that the best reactions leave over."""
+        basis = self.pencil.basis
+        scale = np.sqrt(np.asarray(basis.multiply(basis).sum(axis=0)).ravel())
+        return self._balanced()[0] / scale
+
+    def _balanced(self) -> tuple[Array, Array]:
+        """(n,) what remains of the forces beside (m,) the best multipliers."""
+        p = self.pencil
+        left, l = Constrained(identity(self.r.size), p.G, redundant=p.redundant > 0).solve(self.r)
+        return left, -l / p.row

@@ -1,0 +1,259 @@
+"""Statics and small motions by sparse matrices: as dense ones, as closed forms, none missed."""
+
+import warnings
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+from scipy.special import ellipj, ellipk, ellipkinc
+
+import rom
+from cases.long import few
+from cases.mbs.mechanisms import random_body, slider_crank
+from rom.components.cosserat import body, straight
+from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning
+from rom.mbs.analysis import few_modes, local_equations
+from rom.mbs.mechanism import Mechanism
+
+X, Y, Z = np.eye(3)
+SECTION = {"stretch": 1e5, "bend": (40.0, 60.0, 30.0), "mass": 1.0, "inertia": (1e-3, 2e-3, 3e-3)}
+
+
+def rod_on(joint, n=20, gravity=(0, 0, -9.81), viscosity=0.0, **more):
+    mech = Mechanism(gravity=gravity)
+    rod = mech.add_nonlinear("rod", body(straight(1.0, n, **SECTION, viscosity=viscosity)))
+    if joint:
+        getattr(mech, joint)("hook", mech.ground.marker((0, 0, 0)), rod.marker("start"), **more)
+    return mech
+
+
+def flexible_pair(seed=3):
+    """Two bodies with modes of their own, hinged to each other and to the ground by springs."""
+    rng = np.random.default_rng(seed)
+    mech = Mechanism(gravity=(0, 0, -1e-3))
+    last = mech.ground.marker((0, 0, 0))
+    for name in ("one", "two"):
+        flexible = random_body(rng, 12, damped=False)
+        part = mech.add_flexible(name, flexible)
+        first, *_, end = flexible.markers
+        mech.bushing(f"to {name}", last, part.marker(first),
+                     stiffness=(1e3, 2e3, 3e3, 50.0, 60.0, 70.0))  # fmt: skip
+        last = part.marker(end)
+    return mech
+
+
+def links(n, *, slopes, ends=True):
+    """A chain of total length and mass one in the x-z plane, hinged by universal joints."""
+    mech, l = Mechanism(gravity=(0, 0, -9.81)), 1.0 / n
+    marks = {"a": (-l / 2, 0, 0), "b": (l / 2, 0, 0)}
+    last, corner = mech.ground.marker((0, 0, 0)), np.zeros(3)
+    for k, slope in enumerate(slopes):
+        way = l * np.array([np.cos(slope), 0, -np.sin(slope)])
+        turned = (np.cos(slope / 2), 0, np.sin(slope / 2), 0)
+        link = mech.add_rigid(f"link {k}", mass=l, inertia=(l**3 / 12,) * 3, markers=marks,
+                              at=corner + way / 2, orientation=turned)  # fmt: skip
+        up = (np.sin(slope), 0, np.cos(slope))
+        mech.universal(f"pin {k}", last, link.marker("a"), axis1=Y, axis2=up)
+        last, corner = link.marker("b"), corner + way
+    if ends:
+        mech.spherical("end", last, mech.ground.marker(tuple(corner)))
+    return mech, corner
+
+
+@pytest.fixture
+def _sparse(monkeypatch):
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
+    monkeypatch.setattr(few_modes, "MIN_RATIO", 0)
+
+
+FEW = {
+    "a clamped rod": partial(rod_on, "fixed"),
+    "a rod on a ball joint": partial(rod_on, "spherical"),
+    "a free rod": partial(rod_on, None, gravity=(0, 0, 0)),
+    "an upright rod that buckles": partial(rod_on, "fixed", 20, (-400, 0, 0)),
+    "two flexible bodies": flexible_pair,
+    "a chain": lambda: links(12, slopes=np.linspace(1.0, -1.0, 12))[0],
+}
+
+
+@pytest.mark.parametrize("name", FEW)
+@pytest.mark.usefixtures("_sparse")
+def test_few_modes_are_those_of_dense_matrices(name):
+    """To 1e-9, and where stiff bodies leave less in dense matrices, to their round-off."""
+    mech = FEW[name]()
+    state = rom.equilibrium(mech) if name in STATICS else None
+    whole, part = rom.linearize(mech, state), rom.linearize(mech, state, n=8)
+    assert part.basis.shape[1] == 8
+    squares, exact = (np.real(x.eigenvalues[:8] ** 2) for x in (part, whole))
+    lost = 1e-14 * np.abs(whole.eigenvalues).max() ** 2
+    assert_allclose(squares, exact, rtol=1e-9, atol=lost)
+    assert part.shapes.shape == (whole.shapes.shape[0], 8)
+    assert part.stable == whole.stable
+    now = local_equations.instant(mech, 0.0)
+    mass = now.gradient(whole.state.q, whole.state.v)[2]
+    assert_allclose(part.basis.T @ mass @ part.basis, np.eye(8), atol=1e-10)
+
+
+@pytest.mark.usefixtures("_sparse")
+def test_damped_modes_are_those_of_dense_matrices_without_the_overdamped():
+    mech = rod_on("fixed", viscosity=1e-3)
+    every, part = rom.linearize(mech).eigenvalues, rom.linearize(mech, n=5)
+    swinging = every[every.imag > 1.0]
+    assert_allclose(part.eigenvalues, swinging[:5], rtol=1e-9)
+    band = swinging[[0, 2]].imag / (2 * np.pi)
+    inside = rom.linearize(mech, band=(0.9 * band[0], 1.001 * band[1])).eigenvalues
+    assert_allclose(inside, swinging[:3], rtol=1e-9)
+
+
+@pytest.mark.usefixtures("_sparse")
+def test_modes_of_a_turning_rod_are_those_of_dense_matrices():
+    """Gyroscopic, with one motion that is thrown outwards and one that is free."""
+    mech = rod_on("revolute", axis=X)
+    state = rom.equilibrium(mech, spin=(9.0, 0, 0))
+    every, part = rom.linearize(mech, state), rom.linearize(mech, state, n=6)
+    assert part.basis.shape[1] < 12 < every.basis.shape[1]
+    assert_allclose(part.eigenvalues, every.eigenvalues[:6], rtol=1e-9, atol=1e-8)
+    common = np.abs(np.sum(part.shapes.conj() * every.shapes[:, :6], axis=0)) ** 2
+    norms = [np.sum(np.abs(x) ** 2, axis=0) for x in (part.shapes, every.shapes[:, :6])]
+    assert_allclose(common / norms[0] / norms[1], 1.0, atol=1e-8)
+
+
+def test_a_band_has_all_its_modes_and_none_beside():
+    mech = rod_on("fixed", 40)
+    f = rom.linearize(mech, n=20).frequencies
+    inside = rom.linearize(mech, band=(0.5 * (f[3] + f[4]), 0.5 * (f[11] + f[12]))).frequencies
+    assert_allclose(inside, f[4:12], rtol=1e-8)
+
+
+def test_a_mode_that_lanczos_leaves_out_is_missed(monkeypatch):
+    mech, near = rod_on("fixed", 40), few_modes.Pencil.near
+
+    def all_but_the_second(self, shift, k):
+        squares, U = near(self, shift, k)
+        return np.delete(squares, 1), np.delete(U, 1, axis=1)
+
+    monkeypatch.setattr(few_modes.Pencil, "near", all_but_the_second)
+    with pytest.raises(ModesMissedError, match="but there are"):
+        rom.linearize(mech, n=6)
+
+
+def test_wrong_wishes_are_refused():
+    mech = rod_on("fixed", 5)
+    for wish, why in (
+        ({"n": 0}, "n = 0"),
+        ({"n": 500}, "the joints leave 33 motions"),
+        ({"n": 3, "band": (1, 2)}, "give one of them"),
+        ({"band": (3.0, 2.0)}, "two growing frequencies"),
+        ({"band": (-3.0, 2.0)}, "two growing frequencies"),
+        ({"band": (1.0, np.nan)}, "band"),
+    ):
+        with pytest.raises(ConfigError, match=why):
+            rom.linearize(mech, **wish)
+    for n in (5, 40):
+        low = rom.linearize(rod_on("fixed", n)).frequencies
+        empty = (low[1] + 0.1, low[2] - 0.1)
+        with pytest.raises(ModelError, match=r"no mode lies between .* near are"):
+            rom.linearize(rod_on("fixed", n), band=empty)
+
+
+STATICS = {
+    "a clamped rod": partial(rod_on, "fixed"),
+    "a rod that hangs": partial(rod_on, "revolute", 20, (3.0, 0, -9.81), axis=Y),
+    "two flexible bodies": flexible_pair,
+    "a chain": lambda: links(12, slopes=np.linspace(0.9, -1.0, 12))[0],
+    "a slider-crank": lambda: with_spring(slider_crank(speed=0.0, gravity=9.81)),
+}
+
+
+def with_spring(mech):
+    end = mech.parts["slider"].marker("b")
+    mech.spring_damper("spring", mech.ground.marker((0.5, 0, 0.2)), end, stiffness=300.0)
+    return mech
+
+
+@pytest.mark.parametrize("name", STATICS)
+def test_large_statics_are_those_of_dense_matrices(name, monkeypatch):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RomWarning)
+        exact = rom.equilibrium(STATICS[name]())
+        monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
+        state = rom.equilibrium(STATICS[name]())
+    assert_allclose(state.q, exact.q, atol=1e-11)
+    assert_allclose(state.lam, exact.lam, atol=1e-8 * max(1.0, np.abs(exact.lam).max(initial=0.0)))
+
+
+def elastica(load):
+    """Deflection, and shortening, over length of a cantilever under P L^2 / EI = load at its tip.
+
+    Bisshopp, Drucker, Large deflection of cantilever beams, Quart. Appl. Math. 3 (1945) 272.
+    """
+
+    def missing(k):
+        return np.sqrt(load) - (ellipk(k * k) - ellipkinc(np.arcsin(1 / (k * np.sqrt(2))), k * k))
+
+    k = brentq(missing, np.sqrt(0.5) + 1e-12, 1 - 1e-12)
+    start = ellipkinc(np.arcsin(1 / (k * np.sqrt(2))), k * k)
+    s = np.linspace(start, ellipk(k * k), 20_001)
+    sn, _, dn, _ = ellipj(s, k * k)
+    across = 2 * k * k * sn**2 - 1  # sine of the slope
+    along = 2 * k * sn * dn  # its cosine
+    h = (s[1] - s[0]) / 3 * np.where(np.arange(s.size) % 2, 4, 2)
+    h[[0, -1]] /= 2
+    return across @ h / np.sqrt(load), 1 - along @ h / np.sqrt(load)
+
+
+@pytest.mark.parametrize(
+    ("load", "deflection", "shortening"),
+    few(1, [(1.0, 0.30172, 0.05643), (2.0, 0.49346, 0.16064), (5.0, 0.71379, 0.38763),
+            (10.0, 0.81061, 0.55500)]),
+)  # fmt: skip
+def test_mattiassons_table_of_the_elastica(load, deflection, shortening):
+    """Mattiasson, Int. J. Numer. Meth. Eng. 17 (1981) 145, and the elliptic integrals."""
+    assert_allclose(elastica(load), (deflection, shortening), atol=6e-6)
+    mech = Mechanism(gravity=(0, 0, 0))
+    stiff = {"stretch": 1e7, "bend": 1.0, "mass": 1.0, "inertia": 1e-4}
+    rod = mech.add_nonlinear("rod", body(straight(1.0, 400, **stiff)))
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech.force("tip", rod.marker("end"), (load, 0, 0))
+    tip = rom.equilibrium(mech).q[-7:-4]
+    assert_allclose((tip[0], 1 - tip[2]), elastica(load), atol=8e-6)
+
+
+def catenary_of(n, slack):
+    """Slopes of n links of weight one in all whose horizontal force is slack times 3 N."""
+    weight = 9.81 / n * (n / 2 - 0.5 - np.arange(n))
+    return np.arctan(weight / (3.0 * slack))
+
+
+@pytest.mark.parametrize("n", [300, pytest.param(10_000, marks=pytest.mark.long)])
+def test_a_chain_of_thousands_hangs_in_the_polygon_of_forces(n):
+    """It starts in another one; span and length say which it has to find."""
+    mech, end = links(n, slopes=catenary_of(n, 0.9))
+    force = 3.0 * brentq(lambda x: np.cos(catenary_of(n, x)).sum() / n - end[0], 0.3, 3.0)
+    assert_allclose(force, 2.7, rtol=1e-12)
+    mech, end = links(n, slopes=0.98 * catenary_of(n, 0.9))
+    x = brentq(lambda x: np.cos(catenary_of(n, x)).sum() / n - end[0], 0.3, 3.0)
+    state, slope = rom.equilibrium(mech), catenary_of(n, x)
+    heights = -np.cumsum(np.sin(slope)) / n + 0.5 * np.sin(slope) / n
+    assert_allclose(state.q[2::7], heights, atol=1e-12)
+    assert_allclose(state.lam[-3:], (3.0 * x, 0.0, 9.81 / 2), atol=1e-8)
+
+
+def test_hanging_links_swing_as_bessels_chain():
+    """2 omega sqrt(L / g) is a zero of J0; so many links are a chain to 1 / n."""
+    n = 200
+    mech, _ = links(n, slopes=np.full(n, np.pi / 2), ends=False)
+    f = rom.linearize(mech, rom.equilibrium(mech), n=6).frequencies
+    zeros = np.array([2.404825557695773, 5.520078110286311, 8.653727912911013])
+    assert_allclose(f[::2], zeros / 2 * np.sqrt(9.81) / (2 * np.pi), rtol=5e-3)
+    assert_allclose(f[1::2], f[::2], rtol=1e-5)  # in both planes
+
+
+def test_a_mechanism_that_nothing_holds_is_refused_and_a_head_that_stands_is_said(monkeypatch):
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
+    with pytest.raises(ModelError, match=r"1 free motions\): there is no unique"):
+        rom.equilibrium(rod_on("spherical"))
+    with pytest.warns(RomWarning, match="unstable"):
+        rom.equilibrium(links(5, slopes=np.full(5, -np.pi / 2), ends=False)[0])
