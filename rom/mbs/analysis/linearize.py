@@ -19,7 +19,7 @@ from rom.mbs.analysis.local_equations import (
 )
 from rom.mbs.analysis.moving_axes import chosen, small_motions
 from rom.mbs.analysis.quadratic_eigen import modes, phases
-from rom.mbs.analysis.tangent import load_stiffness
+from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
 from rom.mbs.kernels.system import ROLL
@@ -32,7 +32,7 @@ PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motion
 STEADY_RTOL = 1e-11  # change of free motions that do not change
 ZERO_FREQUENCY_RTOL = 2e-7  # round-off of a frequency, of the highest one
 DIFFERENCED_ZERO_RTOL = 1e-5  # the same where tangents are differences
-RESTING_RTOL = 1e-6  # accelerations that count as rest, of those that the loads could give
+RESTING_TOL = 1e-6  # distance to balance that counts as rest, in rad or lengths of the mechanism
 DRIFT_RTOL = 1e-3  # change of the matrices in a radian from which they count as periodic
 
 
@@ -228,7 +228,7 @@ def _few(
     if now.packed.loaded_rows.size or not pencil.affords(wanted):
         return None
     path = _Path(now, state, world, np.zeros((state.v.size, 0)))
-    later = pencil if _rests(now, state) else Pencil.of(now, path.later().state, world)
+    later = pencil if _rests(now, state, pencil) else Pencil.of(now, path.later().state, world)
     if not pencil.allows(later):
         return None
     if pencil.symmetric:
@@ -248,11 +248,18 @@ def _few(
                          now.probe(), now.packed, now.W.H.copy(), known)  # fmt: skip
 
 
-def _rests(now: Instant, state: State) -> bool:
-    """Whether a state has no velocity, and accelerations that are round-off of its loads."""
+def _rests(now: Instant, state: State, pencil: Pencil) -> bool:
+    """Whether a state has no velocity, and is so near to balance that its accelerations vanish.
+
+    Light pieces of stiff bodies turn round-off of forces into accelerations of any size.
+    """
+    if state.v.any() or not state.a.any():
+        return not state.v.any()
     now.residual(state.q, state.v, state.a, state.lam)
-    fastest = (np.abs(state.a) / now.probe()).max(initial=0.0) * DIFFERENCE_STEP
-    return bool(not state.v.any() and fastest <= RESTING_RTOL * load_stiffness(now, state))
+    equations = pencil.inverse(pencil.even + load_stiffness(now, state) * pencil.M)
+    force = pencil.basis.T @ (now.gradient(state.q, state.v)[2] @ state.a)
+    way = pencil.basis @ equations.solve(force)[0]
+    return sizes(now.packed, way)[0] <= RESTING_TOL
 
 
 def _part(around: Linearization, wanted: Wanted) -> Linearization:
