@@ -18,7 +18,7 @@ from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.analysis.moving_axes import small_motions
 from rom.mbs.equations.signature import signature
-from rom.mbs.equations.sparse_solve import Constrained, unit_rows
+from rom.mbs.equations.sparse_solve import Constrained, bordered, unit_rows
 from rom.mbs.results.state import State
 from rom.model import Array, Index
 
@@ -221,14 +221,8 @@ class Pencil:
 
     def count(self, shift: float) -> int:
         """Number of undamped modes below a shift [1/s^2]."""
-        A = self.even - shift * self.M
-        if self.G.shape[0]:
-            A = bmat([[A, self._balanced.T], [self._balanced, None]], format="csc")
-        return signature(csc_matrix(A), self.groups).negative - self.G.shape[0] + self.redundant
-
-    @cached_property
-    def _balanced(self) -> csr_matrix:
-        return self.G * (float(abs(self.even).max()) or 1.0)
+        A = bordered(self.even - shift * self.M, self.G, redundant=self.redundant > 0)
+        return signature(A, self.groups).negative - self.G.shape[0]
 
     def inverse(self, K: Any) -> Constrained:
         """The factorised equations with K in place of the stiffness."""

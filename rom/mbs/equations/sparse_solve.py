@@ -30,11 +30,8 @@ class Constrained:
 
     def __init__(self, A: csc_matrix, G: csr_matrix, *, redundant: bool):
         A = csc_matrix(A)
-        self.n, m = G.shape[1], G.shape[0]
-        self.size = float(abs(A).max()) or 1.0
-        G = self.size * G
-        corner = -COMPLIANCE_RTOL * self.size * identity(m) if redundant else None
-        self.A = bmat([[A, G.T], [G, corner]], format="csc") if m else A
+        self.n, self.size = G.shape[1], stiffest(A)
+        self.A = bordered(A, G, redundant=redundant)
         try:
             self.lu = splu(self.A)
         except RuntimeError as error:
@@ -49,6 +46,23 @@ class Constrained:
         for _ in range(N_REFINEMENTS):
             x = x + self.lu.solve(b - self.A @ x)
         return x[: self.n], x[self.n :] * self.size
+
+
+def stiffest(A: csc_matrix) -> float:
+    """The largest entry of a matrix, one if it has none."""
+    return float(abs(A).max()) or 1.0
+
+
+def bordered(A: csc_matrix, G: csr_matrix, *, redundant: bool) -> csc_matrix:
+    """(n + m, n + m) [A G^T; G 0], rows of G as large as A; with m negative eigenvalues more.
+
+    Where constraints repeat others, each of these gives way a little instead of leaving a zero.
+    """
+    m, size = G.shape[0], stiffest(A)
+    if not m:
+        return csc_matrix(A)
+    corner = -COMPLIANCE_RTOL * size * identity(m) if redundant else None
+    return bmat([[A, size * G.T], [size * G, corner]], format="csc")
 
 
 def unit_rows(G: csr_matrix) -> tuple[csr_matrix, Array]:

@@ -1,6 +1,7 @@
 """Statics and small motions by sparse matrices: as dense ones, as closed forms, none missed."""
 
 import warnings
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,6 +16,9 @@ from cases.mbs.mechanisms import random_body, slider_crank
 from rom.components.cosserat import body, straight
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning
 from rom.mbs.analysis import few_modes, local_equations
+from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
+from rom.mbs.analysis.tangent import Tangent
+from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
 
 X, Y, Z = np.eye(3)
@@ -62,6 +66,22 @@ def links(n, *, slopes, ends=True):
     return mech, corner
 
 
+def planar_links(n):
+    """A closed chain of revolute joints, three constraints of which repeat others."""
+    mech, l, slopes = Mechanism(gravity=(0, 0, -9.81)), 1.0 / n, np.linspace(0.9, -0.9, n)
+    marks = {"a": (-l / 2, 0, 0), "b": (l / 2, 0, 0)}
+    last, corner = mech.ground.marker((0, 0, 0)), np.zeros(3)
+    for k, slope in enumerate(slopes):
+        way = l * np.array([np.cos(slope), 0, -np.sin(slope)])
+        turned = (np.cos(slope / 2), 0, np.sin(slope / 2), 0)
+        link = mech.add_rigid(f"link {k}", mass=l, inertia=(l**3 / 12,) * 3, markers=marks,
+                              at=corner + way / 2, orientation=turned)  # fmt: skip
+        mech.revolute(f"pin {k}", last, link.marker("a"), axis=Y)
+        last, corner = link.marker("b"), corner + way
+    mech.revolute("end", last, mech.ground.marker(tuple(corner)), axis=Y)
+    return mech
+
+
 @pytest.fixture
 def _sparse(monkeypatch):
     monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
@@ -75,6 +95,7 @@ FEW = {
     "an upright rod that buckles": partial(rod_on, "fixed", 20, (-400, 0, 0)),
     "two flexible bodies": flexible_pair,
     "a chain": lambda: links(12, slopes=np.linspace(1.0, -1.0, 12))[0],
+    "a chain in a plane": lambda: planar_links(16),
 }
 
 
@@ -163,6 +184,7 @@ STATICS = {
     "a rod that hangs": partial(rod_on, "revolute", 20, (3.0, 0, -9.81), axis=Y),
     "two flexible bodies": flexible_pair,
     "a chain": lambda: links(12, slopes=np.linspace(0.9, -1.0, 12))[0],
+    "a chain in a plane": lambda: planar_links(16),
     "a slider-crank": lambda: with_spring(slider_crank(speed=0.0, gravity=9.81)),
 }
 
@@ -182,6 +204,27 @@ def test_large_statics_are_those_of_dense_matrices(name, monkeypatch):
         state = rom.equilibrium(STATICS[name]())
     assert_allclose(state.q, exact.q, atol=1e-11)
     assert_allclose(state.lam, exact.lam, atol=1e-8 * max(1.0, np.abs(exact.lam).max(initial=0.0)))
+
+
+def test_chains_that_begin_almost_on_their_heads_fall_to_where_they_hang(monkeypatch):
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
+    mech, _ = links(6, slopes=np.full(6, -np.pi / 2 + 0.05), ends=False)
+    state = rom.equilibrium(mech)
+    assert_allclose(state.q[2::7], -(np.arange(6) + 0.5) / 6, atol=1e-12)
+
+
+def test_reactions_balance_best_as_those_of_dense_matrices():
+    mech = links(8, slopes=np.linspace(0.5, -0.8, 8))[0]
+    changes = []
+    for sparse in (False, True):
+        now = local_equations.instant(mech, 0.0, sparse=sparse)
+        state = initial_state(now.packed)
+        state = replace(state, a=0 * state.a, lam=np.cos(np.arange(state.lam.size)))
+        tangent = SparseTangent.of(now, state, Loan()) if sparse else Tangent.of(now, state)
+        changes.append(state.lam + tangent.reaction())
+        assert np.abs(tangent.unbalanced()).max() < 2.0
+    assert np.sign(changes[1][0]) == np.sign(changes[0][0])  # weighed by masses, not by sizes
+    assert_allclose(np.linalg.norm(changes[1]), np.linalg.norm(changes[0]), rtol=0.5)
 
 
 def elastica(load):
