@@ -258,8 +258,8 @@ def _rests(now: Instant, state: State, pencil: Pencil) -> bool:
     now.residual(state.q, state.v, state.a, state.lam)
     equations = pencil.inverse(pencil.even + load_stiffness(now, state) * pencil.M)
     force = pencil.basis.T @ (now.gradient(state.q, state.v)[2] @ state.a)
-    way = pencil.basis @ equations.solve(force)[0]
-    return sizes(now.packed, way)[0] <= RESTING_TOL
+    shift = pencil.basis @ equations.solve(force)[0]
+    return sizes(now.packed, shift)[0] <= RESTING_TOL
 
 
 def _part(around: Linearization, wanted: Wanted) -> Linearization:

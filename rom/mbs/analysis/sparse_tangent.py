@@ -24,10 +24,10 @@ from rom.mbs.results.state import State
 from rom.model import Array
 
 N_WEAKEST = 6  # motions of least stiffness that are looked at
-MAX_LOANS = 40  # each ten times the last
+MAX_LOANS = 40  # each so much larger than the last:
+LOAN_RATIO = 3.0
 FIRST_LOAN = 1e-2  # of the stiffness that the loads give
-GROWTH = 3.0
-REPAYMENT = 0.3  # share of a loan that the next correction begins with
+REPAYMENT_SHARE = 0.3  # share of a loan that the next correction begins with
 # corrections, in rad or lengths of the mechanism: what a linear equation may say; from which
 # signs of the stiffness are counted; below which forces are round-off
 MAX_CORRECTION, COUNTED_CORRECTION, ROUND_OFF_CORRECTION = 100.0, 1e-2, 1e-9
@@ -71,14 +71,14 @@ class SparseTangent:
     def correction(self) -> tuple[Array, Array]:
         """(n,) variation of the coordinates and (m,) of the multipliers."""
         least = FIRST_LOAN * (self.pull or self.pencil.scale)
-        lent = REPAYMENT * self.loan.value
+        lent = REPAYMENT_SHARE * self.loan.value
         lent = lent if lent >= least else 0.0
         for _ in range(MAX_LOANS):
             found = self._solved(lent)
             if found is not None:
                 self.loan.value = lent
                 return found
-            lent = max(GROWTH * lent, least)
+            lent = max(LOAN_RATIO * lent, least)
         raise SolverError("the equations of equilibrium are singular, whatever stiffness is lent.")
 
     def _solved(self, lent: float) -> tuple[Array, Array] | None:

@@ -71,8 +71,8 @@ def signature(A: csc_matrix, groups: Sequence[Index], zero_rtol: float = ZERO_RT
         goes = np.abs(d) * MAX_GROWTH >= (C * C / size[coupled, None]).max(axis=0)
         gone, negative = goes.sum(), (d[goes] < 0).sum()
         found += [negative, 0, gone - negative]
-        rest = _eliminated(F[p:, p:], C, d, goes)
-        left[of_group[coupled[0]]].append(_Remainder(coupled, p - gone, rest))
+        remainder = _eliminated(F[p:, p:], C, d, goes)
+        left[of_group[coupled[0]]].append(_Remainder(coupled, p - gone, remainder))
     return Signature(*map(int, found))
 
 
@@ -115,6 +115,6 @@ def _eliminated(S: Array, C: Array, d: Array, goes: Array) -> Array:
     m = int(d.size - through.shape[1])
     if not m:
         return S
-    rest = np.zeros((m + len(S),) * 2)
-    rest[:m, :m], rest[m:, :m], rest[m:, m:] = np.diag(d[~goes]), C[:, ~goes], S
-    return rest
+    remainder = np.zeros((m + len(S),) * 2)
+    remainder[:m, :m], remainder[m:, :m], remainder[m:, m:] = np.diag(d[~goes]), C[:, ~goes], S
+    return remainder
