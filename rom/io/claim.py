@@ -3,6 +3,7 @@
 import fcntl
 import os
 import platform
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -27,9 +28,10 @@ def claimed(folder: str | Path) -> Iterator[None]:
         ResourceError: naming the process that has claimed it.
     """
     folder = Path(folder)
-    if folder.exists() and not folder.is_dir():
+    kind = _kind(folder)
+    if kind is not None and not stat.S_ISDIR(kind):
         raise ConfigError(f"{folder} is a file; a folder is needed.")
-    missing = not folder.exists()
+    missing = kind is None
     try:
         handle = _locked(folder)
     except OSError as error:
@@ -45,6 +47,14 @@ def claimed(folder: str | Path) -> Iterator[None]:
                 folder.rmdir()
 
 
+def _kind(folder: Path) -> int | None:
+    """Mode of what has this name, asked once as other runs make and remove it; None if none."""
+    try:
+        return folder.stat().st_mode
+    except OSError:
+        return None
+
+
 def _locked(folder: Path) -> int | None:
     """Descriptor of the lock, in a folder that exists then; None where locks do not work."""
     path = folder / LOCK_NAME
@@ -53,7 +63,11 @@ def _locked(folder: Path) -> int | None:
             handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o666)
         except FileNotFoundError:  # not made yet, or removed by a run that has failed
             check_writable(folder.parent / LOCK_NAME)
-            folder.mkdir(exist_ok=True)
+            try:
+                folder.mkdir()
+            except FileExistsError:  # made by another run in between
+                if folder.is_symlink():
+                    raise
             continue
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
