@@ -76,6 +76,7 @@ from rom.io.history import write_history as write_history
 from rom.io.matrices.read_model import read_model as read_model
 from rom.io.sid.dialect import read_sid as read_sid
 from rom.mbs.analysis.campbell import campbell as campbell
+from rom.mbs.analysis.continuation.equilibria import continuation as continuation
 from rom.mbs.analysis.equilibrium import equilibrium as equilibrium
 from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynamics
 from rom.mbs.analysis.law_check import check_law as check_law

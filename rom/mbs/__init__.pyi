@@ -1,5 +1,7 @@
 from rom.mbs.analysis.campbell import Campbell as Campbell
 from rom.mbs.analysis.campbell import campbell as campbell
+from rom.mbs.analysis.continuation.equilibria import EquilibriumPath as EquilibriumPath
+from rom.mbs.analysis.continuation.equilibria import continuation as continuation
 from rom.mbs.analysis.equilibrium import equilibrium as equilibrium
 from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynamics
 from rom.mbs.analysis.law_check import check_law as check_law

@@ -3,6 +3,6 @@
 Rest, tangents and modes: `equilibrium`, `linearize`, `campbell`, `response`, `steady_motion`,
 `sensitivity`, `inverse_dynamics`; `local_equations`, `tangent`, `moving_axes` and
 `quadratic_eigen` are what they are made of, `sparse_tangent` and `few_modes` where there are many
-coordinates. `snapshot` asks one state what motions are asked,
-`law_check` looks for mistakes in laws of the user.
+coordinates. `continuation` follows equilibria past limit points. `snapshot` asks one state what
+motions are asked, `law_check` looks for mistakes in laws of the user.
 """

@@ -159,11 +159,7 @@ class _Search:
             size, factor = sizes(now.packed, step)
             if not np.isfinite(size):
                 break
-            q = now.shifted(state.q, factor * step)
-            now.evaluate(q, state.v)
-            now.W.base[: now.W.x.size] = now.W.x
-            state = self.steady(replace(state, q=q, lam=state.lam + factor * dlam))
-            state = replace(state, base=now.W.base.copy())
+            state = self.steady(now.moved(state, factor * step, factor * dlam))
             if factor < 1.0:
                 balance = self.tangent(now, state).reaction()
                 state = replace(state, lam=state.lam + balance)

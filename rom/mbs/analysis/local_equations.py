@@ -58,6 +58,21 @@ class Instant:
         self.W.load[0] = load
         return replace(self, load=load)
 
+    def at(self, t: float) -> "Instant":
+        """The same at another time; the memory is shared.
+
+        Raises:
+            SolverError: if a drive or load is not finite then.
+        """
+        table = sample_all(
+            self.packed.signals, np.array([t]), (-np.inf, np.inf), DIFFERENCE_SPACING
+        )
+        good, failure = first_failure(self.packed.signals, np.array([t]), table)
+        if not good:
+            raise failure
+        self.W.signal[:] = table[0]
+        return replace(self, t=t)
+
     @property
     def system(self) -> Any:
         """The arrays of the mechanism, gravity times the factor of the loads."""
@@ -143,6 +158,15 @@ class Instant:
         retract(self.packed.system, q, np.ascontiguousarray(delta), out)
         return out
 
+    def moved(self, state: State, step: Array, dlam: Array) -> State:
+        """A state at rest after a small motion (n,), and a change (m,) of the reactions."""
+        q = self.shifted(state.q, step)
+        if state.base is not None:
+            self.W.base[:] = state.base
+        self.evaluate(q, state.v)
+        self.W.base[: self.W.x.size] = self.W.x
+        return replace(state, q=q, lam=state.lam + dlam, base=self.W.base.copy())
+
     def probe(self) -> Array:
         """(n,) small motion of each coordinate for differences."""
         bodies, length = self.packed.system.bodies, self.packed.length
@@ -184,13 +208,8 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
     if sparse and packed.by_blocks and not independent(packed):
         packed = packed.whole()
     W = workspace(packed.system, len(packed.signals))
-    table = sample_all(packed.signals, np.array([t]), (-np.inf, np.inf), DIFFERENCE_SPACING)
-    good, failure = first_failure(packed.signals, np.array([t]), table)
-    if not good:
-        raise failure
-    W.signal[:] = table[0]
     pattern = Pattern(packed) if sparse else None
-    return Instant(packed, W, float(t), packed.asked, pattern=pattern)
+    return Instant(packed, W, float(t), packed.asked, pattern=pattern).at(float(t))
 
 
 def consistent(now: Instant, state: Any) -> State:
