@@ -129,24 +129,32 @@ class Linearization:
         Raises:
             ConfigError: if the marker is not one of the mechanism.
         """
-        packed = self.packed
-        if marker not in packed.markers:
-            raise ConfigError(
-                f"{marker!r} is not a marker of the mechanism.",
-                hint="Name it when the body is added, and take it from the part: part.marker(...).",
-            )
-        k = packed.row(marker)
-        J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
-        if b >= 0:
-            at, r = packed.system.bodies.v_at[b], packed.system.bodies.r[b]
-            J[:, at : at + 6 + r] = self.H[k, :, : 6 + r]
-        return J
+        return jacobian(self.packed, self.H, marker)
 
     def __str__(self) -> str:
         lines = ["mode  frequency [Hz]  damping ratio"]
         for k, (f, d) in enumerate(zip(self.frequencies, self.damping_ratios, strict=True)):
             lines.append(f"{k + 1:4d}  {f:14.6g}  {d:13.4g}")
         return "\n".join(lines)
+
+
+def jacobian(packed: Packed, H: Array, marker: Marker) -> Array:
+    """(6, n) motion of a marker per coordinate, from those of all markers H (k, 6, 6 + R).
+
+    Raises:
+        ConfigError: if the marker is not one of the mechanism.
+    """
+    if marker not in packed.markers:
+        raise ConfigError(
+            f"{marker!r} is not a marker of the mechanism.",
+            hint="Name it when the body is added, and take it from the part: part.marker(...).",
+        )
+    k = packed.row(marker)
+    J, b = np.zeros((6, packed.v.size)), packed.system.markers.body[k]
+    if b >= 0:
+        at, r = packed.system.bodies.v_at[b], packed.system.bodies.r[b]
+        J[:, at : at + 6 + r] = H[k, :, : 6 + r]
+    return J
 
 
 @typed
@@ -209,7 +217,7 @@ def linearize(
     now = instant(mechanism, time, sparse=wanted is not None)
     world = chosen(frame, now.packed.names)
     state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
-    _refuse_rolling(now.packed, state)
+    refuse_rolling(now.packed, state)
     if wanted is None:
         return _reduced(now, state, world)
     found = _few(now, state, world, wanted)
@@ -219,17 +227,9 @@ def linearize(
 def _few(
     now: Instant, state: State, world: tuple[bool, ...], wanted: Wanted
 ) -> Linearization | None:
-    """The modes wanted from sparse matrices; None where only whole ones know them.
-
-    These are few motions, reactions that friction depends on, and joints whose directions change
-    in the axes of the bodies.
-    """
-    pencil = Pencil.of(now, state, world)
-    if now.packed.loaded_rows.size or not pencil.affords(wanted):
-        return None
-    path = _Path(now, state, world, np.zeros((state.v.size, 0)))
-    later = pencil if _rests(now, state, pencil) else Pencil.of(now, path.later().state, world)
-    if not pencil.allows(later):
+    """The modes wanted from sparse matrices; None where whole ones are needed or cheaper."""
+    pencil, later, rate = sparse_equations(now, state, world)
+    if pencil is None or not pencil.affords(wanted):
         return None
     if pencil.symmetric:
         squares, Q = pencil.wanted(wanted)
@@ -241,11 +241,25 @@ def _few(
     if known is None:
         K, C = np.diag(squares), 0 * C
     if state.v.any():
-        _warn_of_drift((K, C), later.seen_in(Q), path.rate)
+        _warn_of_drift((K, C), later.seen_in(Q), rate)
     now.evaluate(state.q, state.v)
     basis = pencil.basis @ Q
     return Linearization(state, np.eye(len(K)), C, K, basis, basis, ZERO_FREQUENCY_RTOL,
                          now.probe(), now.packed, now.W.H.copy(), known)  # fmt: skip
+
+
+def sparse_equations(now: Instant, state: State, world: tuple[bool, ...]) -> Any:
+    """Small motions by sparse matrices: now, a little later, and the speed [rad/s]; else Nones.
+
+    Only whole matrices know reactions that friction depends on, and joints whose directions change
+    in the axes of the bodies.
+    """
+    if now.packed.loaded_rows.size:
+        return None, None, 0.0
+    pencil = Pencil.of(now, state, world)
+    path = _Path(now, state, world, np.zeros((state.v.size, 0)))
+    later = pencil if _rests(now, state, pencil) else Pencil.of(now, path.later().state, world)
+    return (pencil, later, path.rate) if pencil.allows(later) else (None, None, 0.0)
 
 
 def _rests(now: Instant, state: State, pencil: Pencil) -> bool:
@@ -376,7 +390,7 @@ def _virtual(now: Instant, state: State, basis: Array) -> Array:
     return basis - np.linalg.lstsq(R.T, R.T @ basis, rcond=1e-9)[0]
 
 
-def _refuse_rolling(packed: Packed, state: State) -> None:
+def refuse_rolling(packed: Packed, state: State) -> None:
     """At rest, what rolls without sliding is held like by any other joint."""
     rolls = packed.system.rows.kind == ROLL
     if rolls.any() and state.v.any():

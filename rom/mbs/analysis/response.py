@@ -1,15 +1,27 @@
 """Response of a linearised mechanism to harmonic forces and to harmonic motion of a drive."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import identity
 
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.analysis.linearize import Linearization, linearize
-from rom.mbs.analysis.local_equations import instant
+from rom.mbs.analysis.few_modes import Pencil
+from rom.mbs.analysis.linearize import (
+    Linearization,
+    jacobian,
+    linearize,
+    refuse_rolling,
+    sparse_equations,
+)
+from rom.mbs.analysis.local_equations import Instant, consistent, instant
+from rom.mbs.analysis.moving_axes import chosen
+from rom.mbs.equations.sparse_solve import Constrained
+from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
@@ -18,6 +30,8 @@ from rom.names import offered
 
 # reciprocal condition number of the dynamic stiffness from which a response counts as infinite
 RECIPROCAL_CONDITION_TOL = 1e-13
+# what one refinement changes of a solution of sparse equations from which it counts as none
+MAX_SOLUTION_ERROR_RATIO = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,6 +83,10 @@ def frequency_response(
         SolverError: naming the frequency at which the response is infinite.
     """
     f = _checked(frequencies)
+    large = _Large.of(mechanism, state, frame)
+    if large:
+        load = large.motion(force).T
+        return FrequencyResponse(f, large.motions(f, lambda s: load, large.motion(motion)))
     around = linearize(mechanism, state, frame=frame)
     load = (around.jacobian(force) @ around.test).T
     found = around.motion(motion) @ _solved(around, f, np.broadcast_to(load, (f.size, *load.shape)))
@@ -102,13 +120,16 @@ def transmissibility(
         SolverError: naming the frequency at which the response is infinite.
     """
     f = _checked(frequencies)
-    around = linearize(mechanism, state)
     if drive not in mechanism.drives:
         raise ConfigError(
             f"no drive {drive!r}; the mechanism has {offered(mechanism.drives, drive)}."
         )
-    if around.state.v.any():
-        raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
+    large = _Large.of(mechanism, state, "body")
+    if large:
+        _refuse_moving(large.state)
+        return large.shaken(f, drive, motion)
+    around = linearize(mechanism, state)
+    _refuse_moving(around.state)
     now = instant(mechanism, around.state.t)
     now.W.base[:] = around.state.base
     M, C, K = now.matrices(around.state)
@@ -121,13 +142,99 @@ def transmissibility(
     return (y @ around.basis.T + enforced) @ around.jacobian(motion).T
 
 
+def _refuse_moving(state: State) -> None:
+    if state.v.any():
+        raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
+
+
+@dataclass(frozen=True)
+class _Large:
+    """Small motions of a large mechanism by sparse matrices.
+
+    Attributes:
+        now, state: where.
+        pencil: masses, damping, stiffness and constraints.
+        H: (k, 6, 6 + R) motion of all markers.
+    """
+
+    now: Instant
+    state: State
+    pencil: Pencil
+    H: Array
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, state: State | None, frame: Any) -> "_Large | None":
+        """The equations; None where whole matrices are cheaper, or needed."""
+        now = instant(mechanism, 0.0 if state is None else state.t, sparse=None)
+        if now.pattern is None:
+            return None
+        state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
+        refuse_rolling(now.packed, state)
+        pencil = sparse_equations(now, state, chosen(frame, now.packed.names))[0]
+        now.evaluate(state.q, state.v)
+        return pencil and cls(now, state, pencil, now.W.H.copy())
+
+    def motion(self, marker: Marker) -> Array:
+        """(6, n) of a marker per motion of the pencil."""
+        return np.asarray(jacobian(self.now.packed, self.H, marker) @ self.pencil.basis)
+
+    def motions(self, f: Array, load: Callable[[complex], Array], seen: Array) -> Array:
+        """(f, k, l) motions seen (k, n) under loads (n, l), which depend on i omega."""
+        rates = 2j * np.pi * f
+        return np.array([seen @ self.amplitudes(s, load(s)) for s in rates])
+
+    def amplitudes(self, s: complex, load: Array) -> Array:
+        """(n, l) motions under harmonic loads; the error of the solution says if it is one.
+
+        Raises:
+            SolverError: where the response is infinite.
+        """
+        p = self.pencil
+        try:
+            equations = p.inverse(p.K + s * p.C + s * s * p.M)
+            u, l = equations.solve(load.astype(complex))
+            error = equations.error(load, u, l)
+        except SolverError:
+            error = np.inf
+        if not error < MAX_SOLUTION_ERROR_RATIO:
+            raise _infinite(abs(s) / (2 * np.pi))
+        return np.asarray(u)
+
+    def shaken(self, f: Array, drive: str, marker: Marker) -> Array:
+        """(f, 6) motion of a marker per unit of a drive."""
+        p, packed = self.pencil, self.now.packed
+        unit = np.zeros(p.G.shape[0])
+        unit[packed.rows_of(drive)] = 1.0
+        unit /= p.row
+        still = Constrained(identity(p.M.shape[0]), p.G, redundant=p.redundant > 0)
+        enforced = still.solve(np.zeros(p.M.shape[0]), unit)[0]
+        if np.abs(p.G @ enforced - unit).max() > 1e-8 * np.abs(unit).max():
+            raise _blocked(drive)
+        force = np.stack([A @ enforced for A in (p.K, p.C, p.M)])
+        seen = self.motion(marker)
+        found = self.motions(f, lambda s: -(np.array([1, s, s * s]) @ force)[:, None], seen)
+        return found[:, :, 0] + seen @ enforced
+
+
+def _infinite(f: float) -> SolverError:
+    return SolverError(
+        f"the response at {f:.9g} Hz is infinite: a free motion, or a resonance that nothing "
+        "damps.",
+        hint="Leave this frequency out, add damping, or hold the mechanism.",
+    )
+
+
+def _blocked(drive: str) -> ModelError:
+    return ModelError("the other joints do not let this drive move.", where=drive)
+
+
 def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:
     """(n,) smallest motion that moves the drive by one unit and no other joint."""
     unit = np.zeros(G.shape[0])
     unit[packed.rows_of(drive)] = 1.0
     enforced = scale * np.linalg.lstsq(G * scale, unit, rcond=1e-9)[0]
     if np.abs(G @ enforced - unit).max() > 1e-8:
-        raise ModelError("the other joints do not let this drive move.", where=drive)
+        raise _blocked(drive)
     return enforced
 
 
@@ -146,10 +253,5 @@ def _solved(around: Linearization, f: Array, load: Array) -> Array:
     scaled = A / size[:, :, None] / size[:, None, :]
     singular = 1 / np.linalg.cond(scaled) if A.shape[1] else np.ones(f.size)
     if singular.min() < RECIPROCAL_CONDITION_TOL:
-        k = int(np.argmin(singular))
-        raise SolverError(
-            f"the response at {f[k]:.9g} Hz is infinite: a free motion, or a resonance that "
-            "nothing damps.",
-            hint="Leave this frequency out, add damping, or hold the mechanism.",
-        )
+        raise _infinite(f[int(np.argmin(singular))])
     return np.linalg.solve(A, load)

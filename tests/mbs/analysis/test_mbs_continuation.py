@@ -25,6 +25,44 @@ def hinged_column(gravity=(0, 0, 0)):
     return mech, column.marker("top")
 
 
+def test_two_columns_that_buckle_in_one_step_are_told_apart():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    for k, stiffness in enumerate((10.0, 10.02, 12.0)):
+        marks, at = {"foot": (0, 0, -1), "top": (0, 0, 1)}, (k, 0, 1)
+        column = mech.add_rigid(f"{k}", mass=1, inertia=(1, 1, 1), at=at, markers=marks)
+        mech.revolute(f"hinge {k}", mech.ground.marker((k, 0, 0)), column.marker("foot"), axis=Y)
+        mech.rotational_spring(f"spring {k}", f"hinge {k}", stiffness=stiffness)
+        mech.force(f"load {k}", column.marker("top"), lambda t: (0, 0, -t))
+    path = rom.continuation(mech, (0.0, 20.0))
+    assert_allclose(loads(path), [5.0, 5.01, 6.0], rtol=1e-9)
+    for k, critical in enumerate(path.critical):
+        assert np.argmax(np.abs(critical.motion)) // 6 == k
+    assert path.unstable[-1] == 3
+
+
+def test_a_branch_that_crosses_at_an_angle_is_the_closed_form():
+    """A column held by a sloping spring (Koiter): P = k (s0 / s - 1) L cos(a) / sin(a)."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    marks = {"foot": (0, 0, -0.5), "top": (0, 0, 0.5)}
+    column = mech.add_rigid("column", mass=1, inertia=(1, 1, 1), at=(0, 0, 0.5), markers=marks)
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), column.marker("foot"), axis=Y)
+    top = column.marker("top")
+    mech.spring_damper("spring", mech.ground.marker((1, 0, 0)), top, stiffness=10.0)
+    mech.force("load", top, lambda t: (0, 0, -t))
+    start = rom.continuation(mech, (0.0, 20.0)).critical[0]
+    assert_allclose(start.state.t, 5.0, rtol=1e-9)
+    for sign in (1, -1):
+        branch = rom.continuation(
+            mech, (0.0, 8.0), state=start.state, along=sign * start.motion, n=12
+        )
+        x = branch.position(top)[1:]
+        a = np.arctan2(x[:, 0], x[:, 2])
+        load = 10.0 * (np.sqrt(2) / np.sqrt(2 - 2 * np.sin(a)) - 1) / np.tan(a)
+        assert sign * a[-1] > 0.1
+        assert_allclose(branch.t[1:], load, rtol=1e-9)
+        assert np.all(branch.unstable[1:] == (branch.t[1:] < 5.0))
+
+
 def kinds(path):
     return [x.kind for x in path.critical]
 
@@ -80,6 +118,9 @@ def test_a_truss_snaps_through_both_limit_points():
     z = path.position(top)[:, 2]
     assert_allclose(path.t, load(z), atol=1e-10)
     assert z[-1] < -0.3
+    chords = np.diff([np.sqrt(0.5) * z / 0.3, path.t / 100.0], axis=1)
+    chords /= np.linalg.norm(chords, axis=0)
+    assert np.sum(chords[:, 1:] * chords[:, :-1], axis=0).min() > 0.8
     limit = np.sqrt(np.hypot(1, 0.3) ** (2 / 3) - 1)
     assert kinds(path) == ["limit", "limit"]
     assert_allclose(loads(path), [load(limit), load(-limit)], rtol=1e-10)

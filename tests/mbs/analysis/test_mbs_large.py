@@ -14,7 +14,7 @@ import rom
 from cases.long import few
 from cases.mbs.mechanisms import random_body, slider_crank
 from rom.components.cosserat import body, straight
-from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning
+from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import few_modes, local_equations
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent
@@ -315,3 +315,65 @@ def test_a_mechanism_that_nothing_holds_is_refused_and_a_head_that_stands_is_sai
         rom.equilibrium(rod_on("spherical"))
     with pytest.warns(RomWarning, match="unstable"):
         rom.equilibrium(links(5, slopes=np.full(5, -np.pi / 2), ends=False)[0])
+
+
+def shaken_rod(viscosity=1e-3, n=12):
+    """A rod on a table that a drive may shake along x."""
+    mech, ground = Mechanism(gravity=(0, 0, -9.81)), (0, 0, 0)
+    table = mech.add_rigid("table", mass=7.0, inertia=(1, 1, 1), markers={"c": ground}, at=ground)
+    mech.prismatic("slide", mech.ground.marker(ground), table.marker("c"), axis=X)
+    mech.drive("shaker", "slide", lambda t: 0.0 * t)
+    rod = mech.add_nonlinear("rod", body(straight(1.0, n, **SECTION, viscosity=viscosity)))
+    mech.fixed("hook", table.marker("c"), rod.marker("start"))
+    return mech, rod.marker("end")
+
+
+def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
+    f = np.array([0.0, 0.7, 3.1, 25.0])
+    rod, tip = shaken_rod()
+    pair = flexible_pair()
+    marks = [pair.parts[k].marker(list(pair.parts[k].flexible.markers)[-1]) for k in ("one", "two")]
+    answers = []
+    for size in (200, 0):
+        monkeypatch.setattr(local_equations, "MAX_DENSE", size)
+        state, other = rom.equilibrium(rod), rom.equilibrium(pair)
+        answers.append((
+            rom.frequency_response(rod, state, f, force=tip, motion=tip).receptance,
+            rom.frequency_response(pair, other, f, force=marks[0], motion=marks[1]).receptance,
+            rom.transmissibility(rod, state, f, drive="shaker", motion=tip),
+        ))  # fmt: skip
+    for whole, sparse in zip(*answers, strict=True):
+        assert np.abs(whole).max() > 0.0
+        assert_allclose(sparse, whole, rtol=1e-7, atol=1e-9 * np.abs(whole).max())
+
+
+def test_a_rod_of_thousands_of_unknowns_answers_as_its_closed_form():
+    """Tip of a clamped beam under a harmonic force: (sin ch - cos sh) / (EI k^3 (1 + cos ch))."""
+    mech, EI, mass = Mechanism(gravity=(0, 0, 0)), 1.0, 1.0
+    section = {"stretch": 1e6, "bend": EI, "mass": mass, "inertia": 1e-9}
+    rod = mech.add_nonlinear("rod", body(straight(1.0, 150, **section)))
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    tip, k = rod.marker("end"), np.array([1.0, 2.5, 4.0])
+    f = k**2 * np.sqrt(EI / mass) / (2 * np.pi)
+    found = rom.frequency_response(mech, None, f, force=tip, motion=tip).receptance[:, 0, 0]
+    exact = (np.sin(k) * np.cosh(k) - np.cos(k) * np.sinh(k)) / (1 + np.cos(k) * np.cosh(k)) / k**3
+    assert_allclose(found, exact, rtol=2e-5, atol=2e-5)
+
+
+def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
+    mech, tip = shaken_rod(viscosity=0.0)
+    resonance = rom.linearize(mech, n=2).frequencies[1]
+    ends = {"force": tip, "motion": tip}
+    assert np.isfinite(
+        rom.frequency_response(mech, None, 1.01 * resonance, **ends).receptance
+    ).all()
+    with pytest.raises(SolverError, match=f"at {resonance:.9g} Hz"):
+        rom.frequency_response(mech, None, resonance, **ends)
+    free = rod_on(None, gravity=(0, 0, 0))
+    end = free.nonlinear["rod"].marker("end")
+    with pytest.raises(SolverError, match="at 0 Hz is infinite"):
+        rom.frequency_response(free, None, 0.0, force=end, motion=end)
+    mech.fixed("bolt", mech.ground.marker((0, 0, 0)), mech.parts["table"].marker("c"))
+    with pytest.warns(RomWarning), pytest.raises(ModelError, match="do not let this drive move"):
+        rom.transmissibility(mech, None, 1.0, drive="shaker", motion=tip)
