@@ -1,5 +1,7 @@
 """Rods at rest: derivatives, objectivity, order, and beams that others have bent before."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,10 +9,13 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import fsolve
 
+import rom
+from cases.long import few
 from rom import rotation
 from rom.components.cosserat import (
     Shape,
     along,
+    body,
     clamped,
     elastic_energy,
     equilibrium,
@@ -240,26 +245,67 @@ PRINCETON = {  # flapwise and edgewise displacement [mm], twist [deg] by a shoot
 }  # fmt: skip
 
 
-def princeton(force, angle, **options):
+def princeton(force, angle, **section):
+    """The beam, and the force on its tip."""
     b, t, E = 12.3777e-3, 3.2024e-3, 71.7e9
     G, soft, stiff = E / 2.62, b * t**3 / 12, t * b**3 / 12
     one = straight(0.508, 80, stretch=[G * b * t, G * b * t, E * b * t],
-                   bend=[E * stiff, E * soft, 0.198 * G * (soft + stiff)])  # fmt: skip
+                   bend=[E * stiff, E * soft, 0.198 * G * (soft + stiff)], **section)  # fmt: skip
     beta = np.radians(angle)
-    load = loads(one, tip=force * np.array([np.sin(beta), -np.cos(beta), 0]))
-    return equilibrium(one, load, **options)
+    return one, force * np.array([np.sin(beta), -np.cos(beta), 0])
+
+
+def check_princeton(force, angle, tip, A):
+    """Compare place and axes of the tip with the table."""
+    twist = np.degrees(np.arctan2(A[0, 1], A[1, 1]))
+    flap, edge, turned = np.array(PRINCETON[force])[:, ANGLES.index(angle)]
+    assert_allclose(1e3 * tip[:2], (flap, -edge), rtol=2e-3, atol=1e-6)
+    assert_allclose(twist, turned, rtol=2e-3, atol=1e-6)
 
 
 @pytest.mark.parametrize("angle", ANGLES)
 @pytest.mark.parametrize("force", PRINCETON)
 def test_princeton_beam(force, angle):
     """Large displacement in both planes; a wrong state twisted by -156 degrees is near."""
-    shape = princeton(force, angle)
-    A = shape.frame(-1)
-    twist = np.degrees(np.arctan2(A[0, 1], A[1, 1]))
-    flap, edge, turned = np.array(PRINCETON[force])[:, ANGLES.index(angle)]
-    assert_allclose(1e3 * shape.x[-1, :2], (flap, -edge), rtol=2e-3, atol=1e-6)
-    assert_allclose(twist, turned, rtol=2e-3, atol=1e-6)
+    one, load = princeton(force, angle)
+    shape = equilibrium(one, loads(one, tip=load))
+    check_princeton(force, angle, shape.x[-1], shape.frame(-1))
+
+
+@pytest.mark.parametrize(
+    ("force", "angle"), few(2, [(13.345, 45), (13.345, 75), *product(PRINCETON, ANGLES)])
+)
+def test_princeton_beam_in_a_mechanism(force, angle):
+    """In one step of its load."""
+    one, load = princeton(force, angle, mass=0.1, inertia=1e-5)
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    beam = mech.add_nonlinear("beam", body(one))
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("start"))
+    mech.force("tip", beam.marker("end"), load)
+    pose = rom.equilibrium(mech).q[-7:]
+    check_princeton(force, angle, pose[:3], rotation.matrix(pose[3:]))
+
+
+@pytest.mark.parametrize("speed", [30.0, 100.0])
+def test_a_spinning_rim_grows_until_its_tension_holds_it(speed):
+    """EA e = m W^2 R^2 (1 + e), e up to 11 %; the hub guides it and turns with it."""
+    EA, mass, R, n = 1e5, 1.0, 1.0, 24
+
+    def place(s):
+        out, tangent = np.array([np.cos(s), np.sin(s), 0]), np.array([-np.sin(s), np.cos(s), 0])
+        return R * out, np.column_stack([out, np.cross(tangent, out), tangent])
+
+    section = {"stretch": EA, "bend": 1e-4 * EA, "mass": mass, "inertia": 1e-4}
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    rim = mech.add_nonlinear("rim", body(along(place, np.linspace(0, 2 * np.pi, n + 1), **section)))
+    hub = mech.add_rigid("hub", mass=1, inertia=(1, 1, 1), at=(0, 0, 0),
+                         markers={"axle": (0, 0, 0), "spoke": (R, 0, 0)})  # fmt: skip
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), hub.marker("axle"), axis=(0, 0, 1))
+    mech.fixed("seam", rim.marker("start"), rim.marker("end"))
+    mech.prismatic("spoke", hub.marker("spoke"), rim.marker("start"), axis=(1, 0, 0))
+    x = rom.equilibrium(mech, spin=(0, 0, speed)).q[: 7 * (n + 1)].reshape(-1, 7)[:, :3]
+    pull = mass * (speed * R) ** 2 / EA
+    assert_allclose(np.linalg.norm(x, axis=1) / R - 1, pull / (1 - pull), rtol=1e-8)
 
 
 @pytest.mark.parametrize("tip", [(50, 0, 0), (200, 0, 0)])
