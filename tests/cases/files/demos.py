@@ -16,8 +16,8 @@ LONG_DEMOS = {
     "demo_compressor_blade", "demo_exchange", "demo_hand", "demo_large_mesh", "demo_lost_tip",
     "demo_masonry", "demo_mistuning", "demo_parameters", "demo_pendulum_chain",
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
-    "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_spin_up",
-    "demo_transmission", "demo_updating", "demo_whole_turbine", "demo_wind_turbine",
+    "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_snap_through",
+    "demo_spin_up", "demo_transmission", "demo_updating", "demo_whole_turbine", "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
@@ -53,6 +53,7 @@ LEFT_BEHIND = {
         "rod.rom.npz", "rod.vtu", "rod_frequencies.png", "rod_mesh.png", "rod_modes.png",
         "slider_crank.gif",
     },
+    "demo_snap_through": {"snap_through.png"},
     "demo_spin_up": {"spin_up.png"},
     "demo_wind_turbine": {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
