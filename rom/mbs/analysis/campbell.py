@@ -13,9 +13,11 @@ from rom.arguments import typed, unit_vector, whole
 from rom.errors import ConfigError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
+from rom.mbs.analysis.local_equations import MAX_DENSE
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
+N_SPARE = 6  # modes computed beyond twice those followed
 FREQUENCY_WEIGHT = 0.1  # weight of the relative change of frequency beside that of the shape
 
 
@@ -80,7 +82,8 @@ def campbell(
         speeds: (s,) [rad/s], at least two, in order; above zero if the mechanism as a whole
             turns freely, for then nothing holds it at speed zero.
         n: number of modes to keep, lowest at the first speed first; None for all. Motions that
-            are free at all speeds are left out.
+            are free at all speeds are left out. With a state, of a large mechanism only twice as
+            many are computed at each speed; one that leaves these has a small ``mac``.
         axis: (3,) axis of the rotation of a mechanism as a whole, world [1].
         about: (3,) a point on it [m].
         frame: axes for small motions, see `linearize`: "world" for rotors in bearings.
@@ -95,7 +98,7 @@ def campbell(
     axis = unit_vector("axis", axis)
     if n is not None:
         whole("n", n, 1)
-    found = [_at(mechanism, speed, axis, about, frame) for speed in speeds]
+    found = [_at(mechanism, speed, axis, about, frame, n) for speed in speeds]
     orders: list[Any] = [np.arange(found[0].eigenvalues.size)]
     likeness = []
     for one, two in pairwise(found):
@@ -107,13 +110,19 @@ def campbell(
     return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept])
 
 
-def _at(mechanism: Any, speed: float, axis: Array, about: Any, frame: Any) -> Linearization:
+def _at(
+    mechanism: Any, speed: float, axis: Array, about: Any, frame: Any, n: int | None
+) -> Linearization:
+    """Modes at one speed; of large mechanisms some more than n, so that they can be followed."""
     if isinstance(mechanism, Mechanism):
-        state = equilibrium(mechanism, spin=speed * axis, about=about)
-        return linearize(mechanism, state, frame=frame)
-    made = mechanism(float(speed))
-    one, state = made if isinstance(made, tuple) else (made, None)
-    return linearize(one, state, frame=frame)
+        one, state = mechanism, equilibrium(mechanism, spin=speed * axis, about=about)
+    else:
+        made = mechanism(float(speed))
+        one, state = made if isinstance(made, tuple) else (made, None)
+    if n is None or state is None or state.v.size <= MAX_DENSE:
+        return linearize(one, state, frame=frame)
+    motions = state.v.size - state.rank
+    return linearize(one, state, frame=frame, n=min(2 * n + N_SPARE, motions))
 
 
 def _follow(one: Linearization, two: Linearization, order: Array) -> tuple[Array, Array]:

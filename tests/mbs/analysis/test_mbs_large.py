@@ -15,6 +15,7 @@ from cases.long import few
 from cases.mbs.mechanisms import random_body, slider_crank
 from rom.components.cosserat import body, straight
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
+from rom.mbs.analysis import campbell as campbell_module
 from rom.mbs.analysis import few_modes, local_equations
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent
@@ -377,3 +378,20 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
     mech.fixed("bolt", mech.ground.marker((0, 0, 0)), mech.parts["table"].marker("c"))
     with pytest.warns(RomWarning), pytest.raises(ModelError, match="do not let this drive move"):
         rom.transmissibility(mech, None, 1.0, drive="shaker", motion=tip)
+
+
+def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
+    """A rod on a hub that turns as a whole, gyroscopic and stiffened."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), markers={"c": (0, 0, 0)})
+    rod = mech.add_nonlinear("rod", body(straight(1.0, 12, **SECTION)))
+    mech.revolute("axle", mech.ground.marker((0, 0, 0)), hub.marker("c"), axis=X)
+    mech.fixed("root", hub.marker("c"), rod.marker("start"))
+    speeds, found = (2.0, 8.0, 20.0), []
+    for size in (200, 0):
+        monkeypatch.setattr(local_equations, "MAX_DENSE", size)
+        monkeypatch.setattr(campbell_module, "MAX_DENSE", size)
+        found.append(rom.campbell(mech, speeds, n=4, axis=X))
+    assert found[1].frequencies.shape == (3, 4)
+    assert_allclose(found[1].frequencies, found[0].frequencies, rtol=1e-8)
+    assert_allclose(found[1].mac, found[0].mac, rtol=1e-6)
