@@ -24,6 +24,7 @@ from rom.cyclic.sector import CyclicSector
 from rom.deprecated import renamed
 from rom.eigen.attachments import added_mass
 from rom.eigen.scipy import SciPyOperators
+from rom.eigen.supports import Fixed, refuse_loose, supports
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Modes
@@ -100,7 +101,7 @@ def modes(
     model: FEModel,
     n: int,
     *,
-    fixed: tuple[str, ...] = (),
+    fixed: Fixed = (),
     interfaces: dict[str, Any] | None = None,
 ) -> Modes:
     """Lowest natural modes of the full model.
@@ -108,12 +109,15 @@ def modes(
     Args:
         model: the body.
         n: number of modes; without support the six rigid motions come first and count.
-        fixed: names of the interfaces held.
+        fixed: names of the interfaces held, or {name: directions}: {"root": "yz"} slides along x,
+            {"cut": "x"} on a plane normal to x is one of symmetry; "xyz rx" with rotations where
+            the interface is rigid or averaged.
         interfaces: {name: kind} to give interfaces the kind they have in a reduced body, so that
             like is compared with like; an interface that is only held keeps all its dofs.
 
     Raises:
-        InterfaceError: if an interface is unknown.
+        InterfaceError: if an interface is unknown, or has no such coordinates; naming the motion
+            that supports leave to the whole body.
         ConfigError: if n is not a positive number of modes.
         ModesMissedError: if the inertia count says that a mode was skipped.
 
@@ -125,9 +129,11 @@ def modes(
         25
     """
     whole("n", n, 1)
-    kinds = by_name(interfaces or {}) | {f: "full" for f in fixed if f not in (interfaces or {})}
+    kinds = by_name(interfaces or {})
+    kinds |= {f: "full" for f in supports(fixed, model.interfaces) if f not in kinds}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)
+    refuse_loose(connection.ops, held)
     with stages(2, long=connection.ops.n > MANY_DOFS) as begin:
         begin(f"{n} modes of {connection.ops.n} dofs")
         omega, Phi = connection.ops.modes(held, n)

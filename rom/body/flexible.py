@@ -15,6 +15,7 @@ from rom.body.reference import rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
+from rom.eigen.supports import Fixed
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
@@ -146,15 +147,18 @@ class FlexibleBody(BodyData):
         """
         return point_areas(self, where)
 
-    def frequencies(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Array:
+    def frequencies(self, n: int | None = None, *, fixed: Fixed = ()) -> Array:
         """(k,) natural frequencies of the reduced body with some interfaces held [Hz].
 
         Args:
             n: how many, lowest first; None for all.
-            fixed: names of the interfaces held; with none the six zeros of rigid motion come first.
+            fixed: names of the interfaces held, or {name: directions}, e.g. {"root": "yz"} for one
+                that slides along x, or "xyz rx ry" where it is rigid or averaged; rigid motions
+                that stay free come first, as zeros.
 
         Raises:
-            InterfaceError: if an interface is unknown.
+            InterfaceError: if an interface is unknown, or has no such coordinates.
+            ConfigError: for wrong directions.
 
         Example:
             >>> body = rom.load("beam.rom.npz")
@@ -164,7 +168,7 @@ class FlexibleBody(BodyData):
         """
         return self.modes(n, fixed=fixed)[0] / (2 * np.pi * unit_system(self.units).time)
 
-    def modes(self, n: int | None = None, *, fixed: tuple[str, ...] = ()) -> Modes:
+    def modes(self, n: int | None = None, *, fixed: Fixed = ()) -> Modes:
         """Natural modes of the reduced body: omega (m,) [rad/s], shapes (6 + r, m).
 
         Rows of the shapes: translation of the frame, rotation about its origin, elastic part.
@@ -187,7 +191,7 @@ class FlexibleBody(BodyData):
         omega[:n_rigid] = 0.0
         return Modes(omega[:n], (N @ V)[:, :n])
 
-    def effective_mass(self, *, fixed: tuple[str, ...] = ()) -> Array:
+    def effective_mass(self, *, fixed: Fixed = ()) -> Array:
         """(m, 6) share of the rigid body inertia each mode carries when its supports shake.
 
         Squares of phi_j^T M R; masses [kg] for the three translations, moments of inertia about
@@ -209,7 +213,7 @@ class FlexibleBody(BodyData):
         speed: float,
         axis: npt.ArrayLike,
         *,
-        fixed: tuple[str, ...],
+        fixed: Fixed,
         at: npt.ArrayLike = (0.0, 0.0, 0.0),
     ) -> Array:
         """(k,) natural frequencies in a frame that rotates steadily with the supports [Hz].
@@ -252,18 +256,18 @@ class FlexibleBody(BodyData):
         K[6:, 6:] = self.K
         return M, K
 
-    def _supported(self, fixed: tuple[str, ...]) -> Array:
+    def _supported(self, fixed: Fixed) -> Array:
         """(6 + r, m) basis of the motions that keep the interfaces still, rigid ones first."""
         size = self.size
         scale = np.r_[np.ones(3), np.full(3, 1 / size), np.ones(self.n_modes)]
         if not fixed:
             return np.diag(scale)
-        H = np.vstack([self.marker(name).hold for name in fixed]) * scale
+        H = self.held_rows(fixed) * scale
         H = H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300)
         return scale[:, None] * null_space(H, rcond=1e-10)
 
-    def _rigid_rows(self, fixed: tuple[str, ...]) -> Array:
+    def _rigid_rows(self, fixed: Fixed) -> Array:
         if not fixed:
             return np.zeros((1, 6))
-        rows = np.vstack([self.marker(name).hold[:, :6] for name in fixed])
+        rows = self.held_rows(fixed)[:, :6]
         return rows * np.r_[np.ones(3), np.full(3, 1 / self.size)]

@@ -7,6 +7,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.body.recovery import StressRecovery
+from rom.eigen.supports import Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 from rom.names import check_text, named, offered
@@ -113,20 +114,33 @@ class BodyData:
         """False for a basis of free-free modes alone, which no joint may clamp."""
         return bool(self.provenance.get("reduction", {}).get("static shapes", True))
 
-    def check_support(self, fixed: tuple[str, ...]) -> None:
+    def check_support(self, fixed: Fixed) -> None:
         """Refuse to hold interfaces that do not exist, or any of a basis of free-free modes alone.
 
         Raises:
             InterfaceError: if an interface is unknown.
             ModelError: naming the interface.
         """
-        self._refuse_unknown(fixed)
-        if fixed and not self.has_static_shapes:
+        held = supports(fixed, self.markers, f"body {self.name!r}")
+        if held and not self.has_static_shapes:
             raise ModelError(
-                f"body {self.name!r} has free-free modes only; with {named(fixed)} held its "
+                f"body {self.name!r} has free-free modes only; with {named(held)} held its "
                 "frequencies would be tens of per cents too high.",
                 hint="Reduce with CraigBampton or Rubin, which know the interfaces.",
             )
+
+    def held_rows(self, fixed: Fixed) -> Array:
+        """(h, 6 + r) interface coordinates that supports hold, as in `Marker.hold`.
+
+        Raises:
+            ConfigError, InterfaceError: see `rom.eigen.supports`.
+        """
+        rows = [np.zeros((0, 6 + self.n_modes))]
+        for name, directions in supports(fixed, self.markers, f"body {self.name!r}").items():
+            hold = self.markers[name].hold
+            kind = self.markers[name].kind
+            rows.append(hold[held_coordinates(name, kind, len(hold), directions)])
+        return np.vstack(rows)
 
     @property
     def size(self) -> float:

@@ -8,6 +8,7 @@ from rom.arguments import finite, unit_vector
 from rom.body.frame import seen_from
 from rom.body.records import BodyData
 from rom.body.stiffening import SecondOrder
+from rom.eigen.supports import Fixed, held_coordinates, supports
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array
 
@@ -19,7 +20,7 @@ def rotating_frequencies(
     speed: float,
     axis: npt.ArrayLike,
     *,
-    fixed: tuple[str, ...],
+    fixed: Fixed,
     at: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
     """(k,) frequencies [Hz] seen in the rotating frame, see `FlexibleBody.rotating_frequencies`.
@@ -28,11 +29,12 @@ def rotating_frequencies(
         body: the body, in SI.
         speed: angular speed [rad/s].
         axis: (3,) direction of the axis of rotation [1].
-        fixed: names of the interfaces that rotate with the frame; the first holds the body.
+        fixed: interfaces that rotate with the frame, see `FlexibleBody.modes`; the first is held
+            wholly.
         at: (3,) a point of the axis [m].
 
     Raises:
-        ConfigError: if no interface is held, or the axis has no direction.
+        ConfigError: if no interface is held, or the first in part; if the axis has no direction.
         InterfaceError: if an interface is unknown.
         ModelError: if an interface of a basis of free-free modes alone is held.
     """
@@ -40,19 +42,31 @@ def rotating_frequencies(
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
     body.check_support(fixed)
+    (first, directions), *others = supports(fixed, body.markers).items()
+    if len(_rows(body, first, directions)) < len(body.marker(first).hold):
+        raise ConfigError(
+            f"interface {first!r} is held in part; the first support turns the body.",
+            hint="Name first what is held wholly.",
+        )
     if speed and not body.K_geo:
         warn(f"body {body.name!r} has no geometric stiffness: rotation softens it only.")
-    seen = seen_from(body, fixed[0])  # in its frame the first support is at rest
-    H = np.vstack([_held(seen, name) for name in fixed])
+    seen = seen_from(body, first)  # in its frame the first support is at rest
+    held = {name: _rows(seen, name, directions) for name, directions in others}
+    H = np.vstack([_held(seen, rows) for rows in (seen.marker(first).hold, *held.values())])
     N = null_space(H, rcond=1e-10) if H.size else np.eye(seen.n_modes)
-    K, G = rotating_matrices(seen, w, arm, fixed[1:])
+    K, G = rotating_matrices(seen, w, arm, held)
     M, K, G = (N.T @ A @ N for A in (seen.M, K, G))
     return _frequencies(M, K, G, f"body {body.name!r} at {speed:g} rad/s")
 
 
-def _held(body: BodyData, name: str) -> Array:
-    """(h, r) coordinates of an interface, without those that its frame holds to round-off."""
-    rows = body.marker(name).hold
+def _rows(body: BodyData, name: str, directions: tuple[str, ...]) -> Array:
+    """(h, 6 + r) coordinates of an interface that are held."""
+    marker = body.marker(name)
+    return marker.hold[held_coordinates(name, marker.kind, len(marker.hold), directions)]
+
+
+def _held(body: BodyData, rows: Array) -> Array:
+    """(h, r) those of some coordinates (h', 6 + r) that its frame does not hold to round-off."""
     rigid = np.abs(rows[:, :6] * np.r_[np.ones(3), np.full(3, 1 / body.size)]).max()
     size = np.linalg.norm(rows[:, 6:] / np.sqrt(np.diag(body.M) / body.mass), axis=1)
     H: Array = rows[size > 1e-9 * rigid, 6:]
@@ -60,7 +74,7 @@ def _held(body: BodyData, name: str) -> Array:
 
 
 def rotating_matrices(
-    body: BodyData, w: Array, at: Array, supports: tuple[str, ...] = ()
+    body: BodyData, w: Array, at: Array, held: dict[str, Array] | None = None
 ) -> tuple[Array, Array]:
     """Stiffness and gyroscopic matrix (r, r) of small vibrations in a frame that turns steadily.
 
@@ -71,14 +85,15 @@ def rotating_matrices(
         body: the body, its frame turning with the angular velocity w.
         w: (3,) angular velocity, body frame [rad/s].
         at: (3,) a point of the axis, body frame [m].
-        supports: interfaces held besides the frame; they pull with the force they carry at rest.
+        held: {interface: coordinates held (h, 6 + r)} besides the frame; they pull with the force
+            they carry at rest.
     """
     psi = SecondOrder.of(body)
     a_origin = -np.cross(w, np.cross(w, at))  # acceleration of the body origin
     K = body.K + np.einsum("a,akl->kl", a_origin, psi.S)
     K = K + _centrifugal(psi.Ibar, w) + _centrifugal(body.S_kl, w)
     load = a_origin @ body.S + _centrifugal(body.Ibar_kl, w)
-    for name, wrench in _reactions(body, load, supports).items():
+    for name, wrench in _reactions(body, load, held or {}).items():
         K -= np.einsum("p,pkl->kl", wrench, psi.markers[name])
     S = body.S_kl
     dual = np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
@@ -90,20 +105,18 @@ def _centrifugal(S: Array, w: Array) -> Array:
     return np.einsum("a,ab...,b->...", w, S, w) - w @ w * np.einsum("aa...->...", S)
 
 
-def _reactions(body: BodyData, load: Array, supports: tuple[str, ...]) -> dict[str, Array]:
+def _reactions(body: BodyData, load: Array, held: dict[str, Array]) -> dict[str, Array]:
     """{support: (6,) force and moment at its marker} that hold it in place against a load."""
-    if not supports:
+    if not held:
         return {}
-    H = np.vstack([body.marker(name).hold[:, 6:] for name in supports])
+    H = np.vstack([rows[:, 6:] for rows in held.values()])
     compliance = np.linalg.solve(body.K, H.T)
     lam = np.linalg.lstsq(H @ compliance, compliance.T @ load, rcond=1e-10)[0]
     found, first = {}, 0
-    for name in supports:
-        marker = body.marker(name)
-        n = marker.hold.shape[0]
-        force = marker.hold[:, :6].T @ lam[first : first + n]
-        force[3:] -= np.cross(marker.point, force[:3])
-        found[name], first = force, first + n
+    for name, rows in held.items():
+        force = rows[:, :6].T @ lam[first : first + len(rows)]
+        force[3:] -= np.cross(body.marker(name).point, force[:3])
+        found[name], first = force, first + len(rows)
     return found
 
 

@@ -98,8 +98,7 @@ def compared(
 def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
     """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
     ops = connection.ops
-    drop = [connection.parts[name] for name in fixed]
-    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), np.concatenate(drop) if drop else [])
+    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), connection.held_parts(fixed))
     Psi = basis.Psi[:, keep]
     K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
     scale = 1 / np.sqrt(np.diag(M))

@@ -85,7 +85,8 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
         raise ConfigError(f"{odd[0]} is for geometries, and --mass for matrices: give one of them.")
     if args.nodes is None:
         raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
-    names = [*unique(args.interface, "-i"), *getattr(args, "fixed", ())]
+    held = [word.partition(":")[0] for word in getattr(args, "fixed", ())]
+    names = [*unique(args.interface, "-i"), *held]
     return read_model(
         source(str(args.file)),
         source(args.mass),

@@ -152,7 +152,7 @@ TABLE = Table("A component.", (
     )), "Structural damping; none if missing."),
     Key("modes", Table("What `rom modes` computes.", (
         Key("number", Whole(1), "Number of modes, rigid ones too.", 12),
-        Key("fixed", Words(), "Interfaces held.", ()),
+        Key("fixed", Words(), "Interfaces held, wholly or as `name:yz`.", ()),
     )), "What `rom modes` computes.", {}),
     Key("output", Table("What `rom reduce` writes.", (
         Key("file", FilePath(), "The body file, `.rom.npz`.", ...),

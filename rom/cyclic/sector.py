@@ -23,6 +23,7 @@ from scipy.sparse import block_diag, csr_matrix, identity, kron
 from rom.arguments import finite, matrix, typed, whole
 from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen.attachments import added_mass
+from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
@@ -102,7 +103,7 @@ class CyclicSector:
         high: str = "cyclic_high",
         axis: npt.ArrayLike = (0.0, 0.0, 1.0),
         at: npt.ArrayLike = (0.0, 0.0, 0.0),
-        fixed: tuple[str, ...] = (),
+        fixed: Fixed = (),
         regions: tuple[str, ...] = (),
     ) -> "CyclicSector":
         """Sector of a finite element model; the number of sectors follows from its faces.
@@ -128,7 +129,7 @@ class CyclicSector:
                 the circle, they are no images of each other, or the axis runs through the sector.
             ResourceError: on all ranks, if the sector does not fit on each of them.
         """
-        if unknown := [name for name in (low, high, *fixed) if name not in model.interfaces]:
+        if unknown := [name for name in (low, high) if name not in model.interfaces]:
             raise InterfaceError(
                 f"the sector has no interface {named(unknown)}; it has {offered(model.interfaces)}."
             )
@@ -136,7 +137,7 @@ class CyclicSector:
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
         refuse_all_around(model.points, e, at)
         M, dM = all_rows(model, model.M), added_mass(model, 0, model.n_dofs)
-        held = [model.interfaces[name].dofs for name in fixed]
+        held = held_dofs(model.interfaces, fixed)
         return cls(
             n_sectors=pair.n_sectors,
             K=all_rows(model, model.K),
@@ -145,9 +146,9 @@ class CyclicSector:
             master=pair.master.dofs,
             coupling=kron(pair.weights, turned(e, pair.step * 2 * np.pi / pair.n_sectors), "csr"),
             step=pair.step,
-            held=np.unique(np.concatenate(held)) if held else NO_DOFS,
+            held=held,
             points=model.points,
-            motions=None if held else rigid_motions(model.points - at),
+            motions=None if held.size else rigid_motions(model.points - at),
             face=pair.master,
             axis=e,
             at=at,

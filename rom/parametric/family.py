@@ -20,6 +20,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.frame import reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
 from rom.body.recovery import StressRecovery
+from rom.eigen.supports import Fixed
 from rom.model import Array, Report
 from rom.parametric.layers import Stretch, stretched_body
 from rom.parametric.parameters import Parameter, Point, Thickness, centre, complete, factor, factors
@@ -90,7 +91,7 @@ class BodyFamily:
         self,
         n: int | None = None,
         *,
-        fixed: tuple[str, ...] = (),
+        fixed: Fixed = (),
         extrapolate: bool = False,
         **values: float,
     ) -> Array:
@@ -98,7 +99,7 @@ class BodyFamily:
 
         Args:
             n: how many, lowest first; None for all.
-            fixed: names of the interfaces held; with none the six zeros of rigid motion come first.
+            fixed: what is held, see `FlexibleBody.frequencies`.
             extrapolate: see `at`.
             values: see `at` [1].
 

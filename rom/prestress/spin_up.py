@@ -11,12 +11,13 @@ from rom.cyclic.faces import unit_axis
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.rotation import rotation_matrices
 from rom.cyclic.sector import NO_DOFS, CyclicSector
+from rom.eigen.supports import Fixed, held_dofs
 from rom.errors import ConfigError, ModelError, reached
 from rom.model import Array, FEModel
 from rom.prestress.heat import Heat
 from rom.prestress.speed_table import SpinUp, straightened
 from rom.prestress.steady_rotation import SteadyRotation
-from rom.prestress.thermal import finite_solid, held_dofs
+from rom.prestress.thermal import finite_solid
 
 
 @typed
@@ -81,7 +82,7 @@ def spin_up(
 def held_solid(
     model: FEModel,
     *,
-    fixed: tuple[str, ...],
+    fixed: Fixed,
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
     at: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> CyclicSector:
@@ -111,7 +112,7 @@ def held_solid(
         slave=NO_DOFS,
         master=NO_DOFS,
         coupling=csr_matrix((0, 0)),
-        held=held_dofs(model, fixed),
+        held=held_dofs(model.interfaces, fixed),
         points=model.points,
         axis=unit_axis(axis),
         at=np.asarray(at, dtype=float),

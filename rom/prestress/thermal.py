@@ -22,10 +22,10 @@ from rom.cyclic.modes import real_form
 from rom.cyclic.rotation import axial_pins, largest_ratio
 from rom.cyclic.sector import CyclicSector
 from rom.eigen.scipy import SciPyOperators, negative_count
+from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, rigid_motions
-from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
-from rom.names import named, offered
 from rom.prestress.heat import Heat
 
 LARGEST_STRAIN = 0.5  # of heat, far beyond what a linear solid can say
@@ -33,7 +33,7 @@ RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain
 
 
 @typed
-def heated(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> FEModel:
+def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
     """The model with the stiffness of its thermal stress, for `rom.modes` and `rom.reduce`.
 
     Good as long as the supports are those under which it was heated; a body heated without
@@ -97,7 +97,7 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
 
 
 @typed
-def thermal_buckling(model: FEModel, heat: Heat, *, fixed: tuple[str, ...] = ()) -> float:
+def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
     """Factor [1] on the temperature at which the solid buckles; infinite if it never does.
 
     The smallest positive tau with a singular K + tau K_geo; cooling has another one. Where only
@@ -137,20 +137,6 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
     return solid
 
 
-def held_dofs(model: FEModel, fixed: tuple[str, ...]) -> Index:
-    """Dofs of interfaces that are held.
-
-    Raises:
-        InterfaceError: if one is unknown.
-    """
-    if unknown := [name for name in fixed if name not in model.interfaces]:
-        raise InterfaceError(
-            f"there is no interface {named(unknown)} to hold; the model has "
-            f"{offered(model.interfaces)}."
-        )
-    return np.unique(np.concatenate([model.interfaces[name].dofs for name in fixed]))
-
-
 def critical_factor(K: Any, K_geo: Any) -> float:
     """Smallest positive tau with a singular K + tau K_geo; infinite if there is none.
 
@@ -163,11 +149,11 @@ def critical_factor(K: Any, K_geo: Any) -> float:
 
 
 def _stressed(
-    model: FEModel, heat: Heat, fixed: tuple[str, ...]
+    model: FEModel, heat: Heat, fixed: Fixed
 ) -> tuple[Any, csr_matrix, csr_matrix, Index]:
     """The solid, its stiffness, that of its thermal stress, and the dofs held."""
     solid = finite_solid(model, heat)
-    held = held_dofs(model, fixed) if fixed else _six_dofs(model.points)
+    held = held_dofs(model.interfaces, fixed) if fixed else _six_dofs(model.points)
     K, K_geo = _thermal(solid, identity(model.n_dofs, format="csr"), held, model.M)
     return solid, K, K_geo, held
 

@@ -158,7 +158,7 @@ SAID = {
     "true modes": (lambda b: b.frequencies(True), "n = True must be a whole number"),
     "names with numbers": (
         lambda b: b.frequencies(fixed={"root": 3}),
-        "fixed = {'root': 3} must be names",
+        "fixed['root'] = 3 must be a text",
     ),
     "a number among names": (lambda b: b.frequencies(fixed=("root", 3)), "fixed[1] = 3 must be"),
     "a joint of parts": (

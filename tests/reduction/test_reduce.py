@@ -306,7 +306,7 @@ def test_damping_follows_the_frequencies(body):
 
 def test_messages_for_wrong_interfaces(model, body):
     with pytest.raises(
-        InterfaceError, match=r"no interface 'tipp'; the model has \['root', 'tip'\]"
+        InterfaceError, match=r"model has no interface 'tipp'; it has \['root', 'tip'\]"
     ):
         rom.modes(model, 3, fixed="tipp")
     with pytest.raises(ConfigError, match="interfaces = 'rbe2' must be a dictionary"):

@@ -14,6 +14,7 @@ EXAMPLES = """\
   rom modes meshes/beam.geo --E 210e9 --nu 0.3 --rho 7850 -n 6 --fixed root
   mpirun -n 2 rom modes part.msh --E 70e9 --nu 0.33 --rho 2700 --json
   rom modes part.step --face foot=normal:0,0,-1 --fixed foot --E 70e9 --nu 0.33 --rho 2700
+  rom modes meshes/beam.geo --E 210e9 --nu 0.3 --rho 7850 --fixed root,tip:yz   # slides along x
   rom modes meshes/connecting_rod.toml --fixed pin_a   # interfaces as in its body
   rom modes rod.sti --mass rod.mas --nodes rod.inp --fixed pin_a
 """
@@ -29,7 +30,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "-n", "--number", type=count, default=12, help="number of modes; rigid ones count too"
     )
     parser.add_argument(
-        "--fixed", metavar="NAME,...", type=names, default=(), help="interfaces held"
+        "--fixed",
+        metavar="NAME,...",
+        type=names,
+        default=(),
+        help="interfaces held, wholly or as NAME:yz",
     )
 
 

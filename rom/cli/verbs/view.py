@@ -28,7 +28,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz, or .toml file")
     parser.add_argument("-n", "--number", type=count, default=6, help="number of modes (default 6)")
     parser.add_argument(
-        "--fixed", metavar="NAME,...", type=names, default=(), help="interfaces held, for modes"
+        "--fixed",
+        metavar="NAME,...",
+        type=names,
+        default=(),
+        help="interfaces held, wholly or as NAME:yz, for modes",
     )
     parser.add_argument("-o", "--output", type=Path, help="picture, .png, and no window")
     add_meshing(parser)

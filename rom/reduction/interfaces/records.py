@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.eigen.supports import Fixed, held_coordinates, supports
 from rom.eigen.verbs import Operators
 from rom.model import Array, Index
 
@@ -55,7 +56,19 @@ class Connection:
     labels: tuple[str, ...]
     ties: dict[str, Tie]
 
-    def held(self, names: tuple[str, ...]) -> Index:
-        """Dof numbers that are zero when these interfaces are held."""
-        known = [self.parts[name] for name in names]
-        return self.boundary[np.concatenate(known)] if known else np.zeros(0, dtype=np.int64)
+    def held(self, fixed: Fixed) -> Index:
+        """Dof numbers that are zero when these interfaces are held.
+
+        Raises:
+            ConfigError, InterfaceError: see `rom.eigen.supports`.
+        """
+        rows = self.held_parts(fixed)
+        return self.boundary[rows]
+
+    def held_parts(self, fixed: Fixed) -> Index:
+        """The same as positions in ``boundary``."""
+        found = [np.zeros(0, dtype=np.int64)]
+        for name, directions in supports(fixed, self.parts).items():
+            part, tie = self.parts[name], self.ties[name]
+            found.append(part[held_coordinates(name, tie.label, part.size, directions)])
+        return np.concatenate(found)

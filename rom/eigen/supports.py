@@ -1,0 +1,157 @@
+"""Which motions of which interfaces are held, what ``fixed=`` takes everywhere, and what is not."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from rom.arguments import shortened
+from rom.eigen.verbs import Operators
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, Index, Interface
+from rom.names import named, offered
+
+# names of interfaces held wholly or "name:directions"; or {name: directions}
+Fixed = tuple[str, ...] | Mapping[str, str]
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+DIRECTION_PATTERN = re.compile(r"r?[xyz]")
+SIX_KINDS = ("rbe2", "rbe3")  # coordinates: three translations, three rotations
+BY_AXIS = ("full", "polynomial", "fourier")  # coordinates: x, y, z of each node or function
+WHOLE_WORD = "wholly"
+LOOSE_RTOL = 1e-10  # square of a motion of what is held, below which the motion is free
+ROUND_OFF_TOL = 1e-6  # of the rotation in a motion
+Supports = dict[str, tuple[str, ...]]  # {interface: directions held}; none: all its coordinates
+
+
+def supports(fixed: Fixed, known: Iterable[str], owner: str = "the model") -> Supports:
+    """What is held, read from the argument ``fixed``.
+
+    Args:
+        fixed: names of interfaces held wholly, or {name: directions}, e.g. {"root": "yz",
+            "tip": "x rz"}; "root:yz" among names says the same.
+        known: names of all interfaces.
+        owner: whose they are, for messages.
+
+    Raises:
+        ConfigError: for a wrong direction, or an interface held twice.
+        InterfaceError: if an interface is unknown.
+    """
+    known = list(known)
+    if isinstance(fixed, Mapping):
+        pairs = [(str(name), str(words)) for name, words in fixed.items()]
+    else:
+        pairs = [_pair(name, known) for name in fixed]
+    if unknown := [name for name, _ in pairs if name not in known]:
+        raise InterfaceError(
+            f"{owner} has no interface {named(unknown)}; it has {offered(known)}.",
+            hint="Interfaces are the named physical surfaces of the geometry.",
+        )
+    found: Supports = {}
+    for name, words in pairs:
+        if name in found:
+            raise ConfigError(
+                f"fixed: {name!r} is held twice.", hint="Say all its directions once."
+            )
+        found[name] = () if words is WHOLE_WORD else _directions(name, words)
+    return found
+
+
+def _pair(word: str, known: list[str]) -> tuple[str, str]:
+    """Interface and directions of one word; a name may have colons itself."""
+    name, colon, directions = word.rpartition(":")
+    return (name, directions) if colon and word not in known else (word, WHOLE_WORD)
+
+
+def _directions(name: str, words: str) -> tuple[str, ...]:
+    found = DIRECTION_PATTERN.findall(words)
+    if not found or DIRECTION_PATTERN.sub("", words).strip(" ,") or len(set(found)) < len(found):
+        raise ConfigError(
+            f"fixed: {name!r} is held in {shortened(words)}; directions are some of "
+            f"{', '.join(DIRECTIONS)}, each once.",
+            hint='For example {"root": "yz"} for a support that slides along x.',
+        )
+    return tuple(found)
+
+
+def held_coordinates(name: str, kind: str, n: int, directions: tuple[str, ...]) -> Index:
+    """Positions, among the n coordinates of an interface, of those held.
+
+    Args:
+        name: of the interface.
+        kind: of its coordinates, as a marker or a tie has it.
+        n: number of coordinates.
+        directions: what is held, from `supports`.
+
+    Raises:
+        InterfaceError: if such an interface has no such coordinates.
+    """
+    if not directions:
+        return np.arange(n)
+    if kind in SIX_KINDS:
+        return np.array([DIRECTIONS.index(direction) for direction in directions])
+    turns = [direction for direction in directions if direction not in "xyz"]
+    if turns or not kind.startswith(BY_AXIS):
+        what = f"no rotation {turns[0]}" if turns else "coordinates without direction"
+        raise InterfaceError(
+            f"interface {name!r} has the kind {kind!r} and {what} to hold.",
+            hint='Give it six coordinates: interfaces={...: "rbe2"} or "rbe3".',
+        )
+    axis = ["xyz".index(direction) for direction in directions]
+    return np.flatnonzero(np.isin(np.arange(n) % 3, axis))
+
+
+def held_dofs(interfaces: Mapping[str, Interface], fixed: Fixed) -> Index:
+    """Ascending dofs of a model, node by node, that supports hold.
+
+    Raises:
+        ConfigError, InterfaceError: see `supports` and `held_coordinates`.
+    """
+    found = [np.zeros(0, dtype=np.int64)]
+    for name, directions in supports(fixed, interfaces).items():
+        dofs = interfaces[name].dofs
+        found.append(dofs[held_coordinates(name, "full", dofs.size, directions)])
+    return np.unique(np.concatenate(found))
+
+
+def refuse_loose(ops: Operators, held: Index) -> None:
+    """Name the motion that stays free where some dofs are held, but not the body.
+
+    Raises:
+        InterfaceError: if there is one.
+    """
+    if not held.size or ops.rigid is None:
+        return
+    mine = np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
+    size = np.sqrt(np.diag(ops.gram(ops.rigid, ops.rigid)))
+    R = np.where(mine[:, None], ops.rigid / size, 0.0)
+    squares, V = np.linalg.eigh(ops.gram(R, R))
+    V = V[:, squares < LOOSE_RTOL * squares[-1]]
+    if V.shape[1]:
+        raise InterfaceError(
+            f"the supports leave {V.shape[1]} of six motions to the body as a whole: it "
+            f"{_described(_simple(V) / size)}.",
+            hint="Hold more; a reduced body counts such motions as zeros.",
+        )
+
+
+def _simple(V: Array) -> Array:
+    """(6,) of some rigid motions (6, k), three translations first, one that turns least."""
+    _, sizes, W = np.linalg.svd(V[3:])
+    motion: Array = V @ W[-1]
+    if V.shape[1] > 3 or sizes[-1] < ROUND_OFF_TOL:
+        motion[3:] = 0.0
+    return motion
+
+
+def _described(motion: Array) -> str:
+    slide, turn = motion[:3], motion[3:]
+    if not turn.any():
+        return f"slides along ({_words(slide)})"
+    point = np.cross(turn, slide) / (turn @ turn)
+    through = ", ".join(f"{x:.4g}" for x in np.round(point, 9) + 0.0)
+    return f"turns about ({_words(turn)}) through ({through}) m"
+
+
+def _words(direction: Array) -> str:
+    direction = direction / direction[np.argmax(np.abs(direction))]
+    return ", ".join(f"{x:.3g}" for x in np.round(direction, 6) + 0.0)

@@ -1,0 +1,128 @@
+"""Supports that hold some directions: roots of beams, halves of symmetric bodies, loose ones."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.paths import ROOT
+from rom.errors import ConfigError, InterfaceError
+from rom.prestress import held_solid
+
+pytestmark = pytest.mark.fenicsx
+STEEL = rom.Material(E=210e9, nu=0.0, rho=7850.0)
+L, B, H = 1.0, 0.03, 0.02
+UNIT = np.sqrt(210e9 * H**2 / 12 / 7850.0) / L**2 / (2 * np.pi)  # sqrt(EI / m) / L^2, bent along z
+PIN, GUIDE = "rx rz", "rx ry rz"  # rotations held
+ROOTS = {  # at the root, at the tip, (k L)^2 of the lowest bending along z
+    "clamped, pinned": ("xyz" + GUIDE, "yz" + PIN, 3.926602**2),
+    "clamped, guided": ("xyz" + GUIDE, "y" + GUIDE, 2.365020**2),
+    "pinned, pinned": ("xyz" + PIN, "yz" + PIN, np.pi**2),
+    "pinned, guided": ("xyz" + PIN, "y" + GUIDE, np.pi**2 / 4),
+}
+
+
+def beam(length=L, nx=20):
+    return rom.fe.model(
+        ROOT / "meshes" / "beam.geo", material=STEEL, degree=2,
+        parameters={"L": length, "b": B, "h": H, "hex": 1, "nx": nx, "ny": 1, "nz": 1},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model():
+    return beam()
+
+
+@pytest.fixture(scope="module")
+def body(model):
+    return rom.reduce(model, method=rom.CraigBampton(12), certify=False,
+                      interfaces={"root": "rbe2", "tip": "rbe2"})  # fmt: skip
+
+
+def along_z(model, shapes):
+    """Number of the first mode that bends along z."""
+    sizes = np.linalg.norm(shapes.reshape(-1, 3, shapes.shape[1]), axis=0)
+    return int(np.argmax(sizes[2] > 10 * sizes[1]))
+
+
+@pytest.mark.parametrize("name", ROOTS)
+def test_beams_have_the_roots_of_their_ends_whole_and_reduced(name, model, body):
+    root, tip, factor = ROOTS[name]
+    fixed, kinds = {"root": root, "tip": tip}, {"root": "rbe2", "tip": "rbe2"}
+    found = rom.modes(model, 4, fixed=fixed, interfaces=kinds)
+    k = along_z(model, found.shapes)
+    assert_allclose(found.frequencies[k], factor * UNIT, rtol=2e-3)  # and shear of slender beams
+    assert_allclose(body.frequencies(4, fixed=fixed), found.frequencies, rtol=5e-4)
+    words = tuple(f"{end}:{held}" for end, held in fixed.items())
+    assert np.array_equal(body.frequencies(4, fixed=words), body.frequencies(4, fixed=fixed))
+    moved = body.with_reference("root")
+    assert_allclose(moved.frequencies(4, fixed=fixed), body.frequencies(4, fixed=fixed), rtol=1e-9)
+
+
+def test_halves_on_planes_of_symmetry_have_the_modes_of_the_whole(model):
+    """Normal displacement zero for the symmetric half, tangential for the other."""
+    whole = rom.modes(model, 10, fixed=("root", "tip")).frequencies
+    half = beam(L / 2, nx=10)
+    parts = [rom.modes(half, 7, fixed={"root": "xyz", "tip": held}).frequencies
+             for held in ("x", "yz")]  # fmt: skip
+    assert_allclose(np.sort(np.concatenate(parts))[:10], whole, rtol=1e-9)
+
+
+def test_a_body_that_stays_loose_is_refused_whole_and_has_zeros_reduced(model, body):
+    kinds, guides = {"root": "rbe2", "tip": "rbe2"}, {"root": "xy" + GUIDE, "tip": "y" + GUIDE}
+    with pytest.raises(InterfaceError, match=r"leave 1 of six motions .* slides along \(0, 0, 1\)"):
+        rom.modes(model, 3, fixed=guides, interfaces=kinds)
+    f = body.frequencies(3, fixed=guides)
+    assert f[0] == 0.0 < f[1]
+    hinge = {"root": "xyz" + PIN}
+    with pytest.raises(InterfaceError, match=r"turns about \(0, 1, 0\) through"):
+        rom.modes(model, 3, fixed=hinge, interfaces=kinds)
+    assert np.count_nonzero(body.frequencies(8, fixed=hinge) == 0.0) == 1
+    with pytest.raises(InterfaceError, match="leave 4 of six motions"):
+        rom.modes(model, 3, fixed={"tip": "yz"}, interfaces={"tip": "rbe2"})
+
+
+def test_rotating_and_parametric_bodies_take_the_same_supports(model, body):
+    fixed = {"root": "xyz" + GUIDE, "tip": "yz" + PIN}
+    still = body.rotating_frequencies(0.0, (0, 0, 1), fixed=fixed)
+    assert_allclose(still[:6], body.frequencies(6, fixed=fixed), rtol=1e-7)
+    with pytest.raises(ConfigError, match="'root' is held in part"):
+        body.rotating_frequencies(10.0, (0, 0, 1), fixed={"root": "xyz"})
+    family = rom.reduce_parametric(
+        model, parameters={"E": rom.YoungsModulus(None, 0.5, 2.0)}, method=rom.CraigBampton(12),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+    for E in (0.5, 2.0):
+        f = family.frequencies(6, fixed=fixed, E=E)
+        assert_allclose(f, np.sqrt(E) * body.frequencies(6, fixed=fixed), rtol=1e-6)
+
+
+def test_solids_that_turn_or_are_heated_take_them_too(model):
+    held = held_solid(model, fixed={"root": "xyz", "tip": "yz"}).held
+    tip = model.interfaces["tip"].dofs
+    assert set(held) == set(model.interfaces["root"].dofs) | set(tip[tip % 3 != 0])
+    expands = rom.heated(model, rom.Heat(1e-5, 100.0), fixed={"root": "xyz", "tip": "yz"})
+    tight = rom.heated(model, rom.Heat(1e-5, 100.0), fixed=("root", "tip"))
+    free, pressed = (
+        rom.modes(x, 1, fixed=("root", "tip")).frequencies[0] for x in (expands, tight)
+    )
+    assert pressed < 0.97 * free
+
+
+def test_wrong_supports_are_named(model, body):
+    for fixed, error, why in (
+        ({"root": "w"}, ConfigError, "'root' is held in 'w'"),
+        ({"root": ""}, ConfigError, "is held in ''"),
+        ({"root": "xx"}, ConfigError, "each once"),
+        ({"root": "xyz q"}, ConfigError, "directions are some of x, y, z, rx, ry, rz"),
+        (("root", "root:y"), ConfigError, "held twice"),
+        ({"foot": "x"}, InterfaceError, "no interface 'foot'"),
+        (("root:yz", "foot"), InterfaceError, "no interface 'foot'"),
+    ):
+        with pytest.raises(error, match=why):
+            rom.modes(model, 2, fixed=fixed)
+        with pytest.raises(error, match=why):
+            body.frequencies(fixed=fixed)
+    with pytest.raises(InterfaceError, match="kind 'full' and no rotation rx"):
+        rom.modes(model, 2, fixed={"root": "xyz rx"})
