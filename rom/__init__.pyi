@@ -120,6 +120,7 @@ from rom.prestress.spin_up import spin_up as spin_up
 from rom.prestress.thermal import heated as heated
 from rom.prestress.thermal import heated_sector as heated_sector
 from rom.prestress.thermal import thermal_buckling as thermal_buckling
+from rom.reduction.bases.assumed import AssumedModes as AssumedModes
 from rom.reduction.bases.balanced import BalancedTruncation as BalancedTruncation
 from rom.reduction.bases.balanced import (
     second_order_balanced_truncation as second_order_balanced_truncation,

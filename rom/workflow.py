@@ -30,6 +30,7 @@ from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Modes
 from rom.names import check_name
 from rom.process.progress import MANY_DOFS, stages
+from rom.reduction.bases.assumed import AssumedModes, obeying
 from rom.reduction.bases.method import CraigBampton, Method
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect
@@ -194,8 +195,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         model: the full model, free-free; or one sector of a wheel, which gives a reduced sector
             with ``interfaces={"cyclic": Polynomial(4)}`` on its cyclic faces, see `reduce_sector`.
         method: how to reduce, for example ``CraigBampton(n_modes=20)``; also `Guyan`, `Rubin`,
-            `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`. If missing,
-            ``CraigBampton()``, which keeps as many modes as the certificate needs.
+            `Herting`, `EnhancedCraigBampton`, `Characteristic`, `FreeFree`, `AssumedModes`. If
+            missing, ``CraigBampton()``, which keeps as many modes as the certificate needs.
         interfaces: {name: kind} with the kinds "full", "rbe2", "rbe3", `Polynomial`,
             `FourierLegendre` or `Snapshots`; ``Polynomial()`` has its order chosen from the band
             and the tolerance of the method.
@@ -243,6 +244,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         method = method.method
         say("full interfaces follow %d coordinates", connection.boundary.size)
     chosen = judged_in(method, tuple(connection.parts.values()))
+    if isinstance(chosen, AssumedModes):
+        origins = {name: model.interfaces[name].origin for name in connection.parts}
+        chosen = obeying(chosen, connection, origins, reference)
     with _on_interfaces(interfaces), stages(2, long=ops.n > MANY_DOFS) as begin:
         begin(f"shapes of {ops.n} dofs")
         basis = chosen.basis(connection.ops, connection.boundary, connection.labels)

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
@@ -44,7 +44,8 @@ def certify_body(
     comparison = {}
     statics = body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
-    inner = connection.ops.hold(connection.boundary) if statics else None
+    constrained = basis.labels[: len(connection.labels)] == connection.labels
+    inner = connection.ops.hold(connection.boundary) if statics and constrained else None
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
             support = " + ".join(fixed) + " held" if fixed else "free"
@@ -98,8 +99,12 @@ def compared(
 def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
     """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
     ops = connection.ops
-    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), connection.held_parts(fixed))
-    Psi = basis.Psi[:, keep]
+    if basis.labels[: len(connection.labels)] == connection.labels:
+        keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), connection.held_parts(fixed))
+        Psi = basis.Psi[:, keep]
+    else:  # modes alone: the combinations that keep the supports still
+        rows = ops.rows(basis.Psi, connection.held(fixed))
+        Psi = basis.Psi @ null_space(rows, rcond=1e-10) if len(rows) else basis.Psi
     K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
     scale = 1 / np.sqrt(np.diag(M))
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))

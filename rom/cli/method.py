@@ -24,7 +24,8 @@ def add_method(parser: argparse.ArgumentParser) -> None:
         default=CRAIG_BAMPTON,
         help="craig-bampton (default), enhanced (the same, corrected), guyan (statics only), "
         "rubin or herting (free-free modes and statics), moment-matching (exact at --at), "
-        "balanced (what the interfaces know of the modes), free-free (no joint may clamp it)",
+        "balanced (what the interfaces know of the modes), free-free (no joint may clamp it), "
+        "assumed (modes under the --reference alone)",
     )
     kept = parser.add_mutually_exclusive_group()
     kept.add_argument(

@@ -17,6 +17,7 @@ METHODS = {  # name: module, class, and how many modes when nobody says; None fo
     "rubin": ("free_interface", "Rubin", 20),
     "herting": ("free_interface", "Herting", 20),
     "free-free": ("free_interface", "FreeFree", 20),
+    "assumed": ("assumed", "AssumedModes", 20),
     "moment-matching": ("krylov", "MomentMatching", 2),
     "balanced": ("balanced", "BalancedTruncation", 20),
 }

@@ -1,3 +1,4 @@
+from rom.reduction.bases.assumed import AssumedModes as AssumedModes
 from rom.reduction.bases.balanced import BalancedTruncation as BalancedTruncation
 from rom.reduction.bases.balanced import (
     second_order_balanced_truncation as second_order_balanced_truncation,

@@ -1,5 +1,5 @@
 """Bases of shapes, one method each.
 
-`method` has Guyan and Craig-Bampton; `fixed_interface`, `free_interface`, `enhanced`, `krylov`,
-`balanced` and `loads` the others; `selection` says how many modes a band needs.
+`method` has Guyan and Craig-Bampton; `fixed_interface`, `free_interface`, `assumed`, `enhanced`,
+`krylov`, `balanced` and `loads` the others; `selection` says how many modes a band needs.
 """

@@ -126,7 +126,7 @@ class CraigBampton:
                 raise ConfigError(
                     f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
                 )
-            return _lowest(ops, held, int(self.n_modes))
+            return lowest_modes(ops, held, int(self.n_modes))
         limit = 2 * np.pi * (np.inf if self.f_max is None else self.f_max)
         m = min(FIRST_BATCH, held.n_free)
         omega, Phi = ops.modes(held, m)
@@ -137,7 +137,7 @@ class CraigBampton:
         return omega[:keep], Phi[:, :keep]
 
 
-def _lowest(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
+def lowest_modes(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:
     """The lowest fixed-interface modes, and those beyond that share the last frequency.
 
     Which member of a repeated frequency comes first is an accident of round-off; a basis that cut

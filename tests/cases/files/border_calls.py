@@ -426,6 +426,7 @@ OBJECTS = {  # class -> an object of it: legal arguments of the class, and owner
     "FlexibleBody": body,
     "FourierLegendre": lambda: rom.FourierLegendre(1, 1),
     "FreeFree": lambda: rom.FreeFree(1),
+    "AssumedModes": lambda: rom.AssumedModes(1),
     "FreeSubstructure": lambda: free()["a"],
     "Guyan": rom.Guyan,
     "Heat": lambda: rom.Heat(1e-5, 1.0),

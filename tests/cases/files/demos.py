@@ -37,7 +37,9 @@ LEFT_BEHIND = {
     "demo_masonry": {"masonry.gif", "masonry.png"},
     "demo_mistuning": {"mistuning.png"},
     "demo_parameters": {"parameters.png"},
-    "demo_reference_conditions": {"reference_conditions.png"},
+    "demo_reference_conditions": {
+        "reference_conditions.png", "reference_resonance.png", "reference_statics.png",
+    },
     "demo_pendulum_chain": {"pendulum_chain.png"},
     "demo_rockfall": {"rockfall.gif", "rockfall.png"},
     "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
