@@ -415,6 +415,36 @@ def test_modes_prints_the_frequencies_of_the_model(geometry, capsys):
 
 
 @pytest.mark.fenicsx
+def test_supports_in_part_by_option_and_by_file(geometry, tmp_path, capsys):
+    """A beam held at the root that slides at its tip: 3.9266^2 and not 4.7300^2 in bending."""
+    held = ("--fixed", "root,tip:yz")
+    found = answer(capsys, "modes", geometry, *STEEL, "-n", 3, *held)["frequencies"]
+    file = tmp_path / "beam.toml"
+    file.write_text(
+        f'[geometry]\nfile = "{rom.places.FOLDER_ABOVE / geometry}"\n'
+        "[material]\nE = 210e9\nnu = 0.3\nrho = 7850.0\n"
+        '[modes]\nnumber = 3\nfixed = ["root", "tip:yz"]\n'
+    )
+    assert_allclose(answer(capsys, "modes", file)["frequencies"], found, rtol=1e-9)
+    model = rom.fe.model(geometry, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    python = rom.modes(model, 3, fixed={"root": "xyz", "tip": "zy"}).frequencies
+    assert_allclose(found, python, rtol=1e-9)
+    assert main(["modes", geometry, *STEEL, "--fixed", "tip:q"]) == 2
+    assert "'tip' is held in 'q'" in capsys.readouterr().err
+
+
+@pytest.mark.fenicsx
+def test_reduce_by_assumed_modes(geometry, tmp_path, capsys):
+    """Right where they are clamped; the certificate says that they are not elsewhere."""
+    path = tmp_path / "beam.rom.npz"
+    arguments = ("-i", "root=rbe2", "-i", "tip=rbe2", "-m", 3, "--reference", "root", "-o", path)
+    assert main(["reduce", geometry, *STEEL, "--method", "assumed", *map(str, arguments)]) == 5
+    capsys.readouterr()
+    found = answer(capsys, "modes", geometry, *STEEL, "-n", 3, "--fixed", "root")["frequencies"]
+    assert_allclose(rom.load(path).omega / (2 * np.pi), found, rtol=1e-3)
+
+
+@pytest.mark.fenicsx
 def test_reduce_then_check_then_export(geometry, tmp_path, capsys):
     path = tmp_path / "beam.rom.npz"
     found = answer(

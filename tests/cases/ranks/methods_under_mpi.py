@@ -23,6 +23,7 @@ METHODS = {
     "balanced": (rom.BalancedTruncation(6, pool=20), STIFF),
     "loads": (rom.WithLoads(rom.CraigBampton(8)), STIFF),
     "free-free": (rom.FreeFree(8), STIFF),
+    "assumed": (rom.AssumedModes(8, fixed={"root": "xyz rx", "tip": "yz"}), STIFF),
     "characteristic": (
         rom.Characteristic(rom.CraigBampton(8), 14), {"root": "full", "tip": "rbe2"}),
 }  # fmt: skip
@@ -32,6 +33,8 @@ found = {
     name: rom.reduce(model, method=method, interfaces=kinds, certify=False).frequencies()[6:12]
     for name, (method, kinds) in METHODS.items()
 }
+slides = {"root": "xyz", "tip": "yz"}
+found["sliding"] = rom.modes(model, 6, fixed=slides).frequencies
 free = rom.substructure(model, n_modes=8, interfaces=STIFF)
 held = (("bar", "root"),)
 for kind in ("macneal", "rubin", "dual"):
