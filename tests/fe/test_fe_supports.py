@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.paths import ROOT
+from rom.eigen.supports import supports
 from rom.errors import ConfigError, InterfaceError
 from rom.prestress import held_solid
 
@@ -75,10 +76,12 @@ def test_a_body_that_stays_loose_is_refused_whole_and_has_zeros_reduced(model, b
         rom.modes(model, 3, fixed=guides, interfaces=kinds)
     f = body.frequencies(3, fixed=guides)
     assert f[0] == 0.0 < f[1]
-    hinge = {"root": "xyz" + PIN}
-    with pytest.raises(InterfaceError, match=r"turns about \(0, 1, 0\) through"):
+    hinge = {"tip": "xyz" + PIN}
+    with pytest.raises(InterfaceError, match=r"turns about \(0, 1, 0\) through \(1, 0, 0\) m"):
         rom.modes(model, 3, fixed=hinge, interfaces=kinds)
     assert np.count_nonzero(body.frequencies(8, fixed=hinge) == 0.0) == 1
+    with pytest.raises(InterfaceError, match=r"leave 2 of six .* slides along \(0, 0, 1\)"):
+        rom.modes(model, 3, fixed={"root": "xy" + PIN}, interfaces=kinds)
     with pytest.raises(InterfaceError, match="leave 4 of six motions"):
         rom.modes(model, 3, fixed={"tip": "yz"}, interfaces={"tip": "rbe2"})
 
@@ -126,3 +129,10 @@ def test_wrong_supports_are_named(model, body):
             body.frequencies(fixed=fixed)
     with pytest.raises(InterfaceError, match="kind 'full' and no rotation rx"):
         rom.modes(model, 2, fixed={"root": "xyz rx"})
+
+
+def test_a_name_may_have_a_colon_itself():
+    known = ["foot", "foot:x", "a:b"]
+    assert supports(("foot:x", "foot"), known) == {"foot:x": (), "foot": ()}
+    assert supports(("a:b:yz", "foot:z"), known) == {"a:b": ("y", "z"), "foot": ("z",)}
+    assert supports({"foot": "xyz, rx"}, known) == {"foot": ("x", "y", "z", "rx")}

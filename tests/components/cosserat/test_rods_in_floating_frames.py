@@ -49,6 +49,21 @@ def test_the_motion_in_space_is_that_of_the_absolute_form(rod, absolute, motion)
     assert np.abs(instants[-1].xi - rod.x).max() > 5e-3  # it bends
 
 
+def test_absolute_frames_couple_neighbours_alone():
+    """Numbers in the factor of an iteration; a floating frame couples all coordinates."""
+    numbers = []
+    for n in (50, 100):
+        mech = rom.Mechanism(gravity=LOAD["weight"])
+        one = cosserat.straight(1.0, n, stretch=1e5, bend=40.0, mass=1.0, inertia=1e-3)
+        rod = mech.add_nonlinear("rod", cosserat.body(one))
+        mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+        sol = rom.simulate(mech, t_end=2e-3, dt=1e-3)
+        numbers.append(sol.packed.system.graph.plan.memory[0])
+    coordinates = 6 + 6 * 102
+    assert_allclose(numbers[1], 2 * numbers[0], rtol=0.02)
+    assert 15 * numbers[1] < coordinates * (coordinates + 1) / 2
+
+
 def test_the_frames_are_what_they_are_called(rod, motion):
     name, instants = motion
     now = instants[-1]
