@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import eigh
 
 import rom
+from cases.beam import N, gauss_hermite, hermite_beam
 from cases.paths import ROOT
 from rom.eigen.supports import supports
 from rom.errors import ConfigError, InterfaceError
@@ -99,6 +101,23 @@ def test_rotating_and_parametric_bodies_take_the_same_supports(model, body):
     for E in (0.5, 2.0):
         f = family.frequencies(6, fixed=fixed, E=E)
         assert_allclose(f, np.sqrt(E) * body.frequencies(6, fixed=fixed), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("tip", "tension"), [("yz" + GUIDE, 1.0), ("xyz" + GUIDE, 1 / 3)])
+def test_a_beam_between_supports_that_turn_is_pulled_by_what_they_carry(model, tip, tension):
+    """Flapping: N(x) = m W^2 (tension L^2 - x^2) / 2, with a tip that slides or is held."""
+    body = rom.reduce(model, method=rom.CraigBampton(12), certify=False, stiffening=True,
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root")  # fmt: skip
+    square = 200.0  # of W, times m L^4 / EI
+    speed = np.sqrt(square) * 2 * np.pi * UNIT
+    K, M = hermite_beam()
+    x, weight, _, slopes = gauss_hermite(N, 1.0)
+    K = K + square * (slopes.T * (weight * (tension - x**2) / 2)) @ slopes
+    inner = slice(2, -2)
+    exact = np.sqrt(eigh(K[inner, inner], M[inner, inner], eigvals_only=True)[0]) * UNIT
+    fixed = {"root": "xyz" + GUIDE, "tip": tip}
+    found = body.rotating_frequencies(speed, (0, 0, 1), fixed=fixed, at=body.marker("root").point)
+    assert np.abs(found / exact - 1).min() < 3e-3
 
 
 def test_solids_that_turn_or_are_heated_take_them_too(model):

@@ -60,7 +60,7 @@ def test_absolute_frames_couple_neighbours_alone():
         sol = rom.simulate(mech, t_end=2e-3, dt=1e-3)
         numbers.append(sol.packed.system.graph.plan.memory[0])
     coordinates = 6 + 6 * 102
-    assert_allclose(numbers[1], 2 * numbers[0], rtol=0.02)
+    assert_allclose(numbers[1], 2 * numbers[0], rtol=0.05)
     assert 15 * numbers[1] < coordinates * (coordinates + 1) / 2
 
 

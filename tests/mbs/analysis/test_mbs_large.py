@@ -342,7 +342,10 @@ def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
             rom.frequency_response(rod, state, f, force=tip, motion=tip).receptance,
             rom.frequency_response(pair, other, f, force=marks[0], motion=marks[1]).receptance,
             rom.transmissibility(rod, state, f, drive="shaker", motion=tip),
+            rom.transmissibility(rod, state, f, drive="shaker",
+                                 motion=rod.parts["table"].marker("c")),
         ))  # fmt: skip
+    assert_allclose(answers[1][3][:, 0], 1.0, rtol=1e-9)  # the table moves as its drive does
     for whole, sparse in zip(*answers, strict=True):
         assert np.abs(whole).max() > 0.0
         assert_allclose(sparse, whole, rtol=1e-7, atol=1e-9 * np.abs(whole).max())
