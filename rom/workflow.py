@@ -24,7 +24,7 @@ from rom.cyclic.sector import CyclicSector
 from rom.deprecated import renamed
 from rom.eigen.attachments import added_mass
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.supports import Fixed, refuse_loose, supports
+from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Modes
@@ -103,6 +103,7 @@ def modes(
     n: int,
     *,
     fixed: Fixed = (),
+    springs: Springs | None = None,
     interfaces: dict[str, Any] | None = None,
 ) -> Modes:
     """Lowest natural modes of the full model.
@@ -113,6 +114,8 @@ def modes(
         fixed: names of the interfaces held, or {name: directions}: {"root": "yz"} slides along x,
             {"cut": "x"} on a plane normal to x is one of symmetry; "xyz rx" with rotations where
             the interface is rigid or averaged.
+        springs: {interface: (3,) or (6,) stiffness to the ground}, translations, then rotations
+            [N/m, N m/rad], on its mean motion unless it is rigid.
         interfaces: {name: kind} to give interfaces the kind they have in a reduced body, so that
             like is compared with like; an interface that is only held keeps all its dofs.
 
@@ -131,10 +134,15 @@ def modes(
     """
     whole("n", n, 1)
     kinds = by_name(interfaces or {})
+    stiffness = spring_matrices(springs, model.interfaces, "the model")
+    kinds = dict.fromkeys(stiffness, "rbe3") | kinds
     kinds |= {f: "full" for f in supports(fixed, model.interfaces) if f not in kinds}
     connection = connect(operators(model), model, kinds)
     held = connection.held(fixed)
-    refuse_loose(connection.ops, held)
+    if stiffness:
+        connection = connection.on_springs(stiffness)
+    else:
+        refuse_loose(connection.ops, held)
     with stages(2, long=connection.ops.n > MANY_DOFS) as begin:
         begin(f"{n} modes of {connection.ops.n} dofs")
         omega, Phi = connection.ops.modes(held, n)

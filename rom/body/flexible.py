@@ -11,11 +11,11 @@ from rom.arguments import typed, whole
 from rom.body.conversion import converted
 from rom.body.frame import on_mean_axes, seen_from
 from rom.body.records import BodyData, Marker, Patch, Surface
-from rom.body.reference import rigid_elastic, rigid_mass
+from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
-from rom.eigen.supports import Fixed
+from rom.eigen.supports import Fixed, Springs, spring_matrices
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
@@ -147,7 +147,9 @@ class FlexibleBody(BodyData):
         """
         return point_areas(self, where)
 
-    def frequencies(self, n: int | None = None, *, fixed: Fixed = ()) -> Array:
+    def frequencies(
+        self, n: int | None = None, *, fixed: Fixed = (), springs: Springs | None = None
+    ) -> Array:
         """(k,) natural frequencies of the reduced body with some interfaces held [Hz].
 
         Args:
@@ -155,6 +157,8 @@ class FlexibleBody(BodyData):
             fixed: names of the interfaces held, or {name: directions}, e.g. {"root": "yz"} for one
                 that slides along x, or "xyz rx ry" where it is rigid or averaged; rigid motions
                 that stay free come first, as zeros.
+            springs: {interface: (3,) or (6,) stiffness to the ground}, as in `rom.modes`, in units
+                of the body.
 
         Raises:
             InterfaceError: if an interface is unknown, or has no such coordinates.
@@ -166,9 +170,13 @@ class FlexibleBody(BodyData):
             >>> int((free == 0.0).sum()), int((held == 0.0).sum())  # rigid motions
             (6, 0)
         """
-        return self.modes(n, fixed=fixed)[0] / (2 * np.pi * unit_system(self.units).time)
+        return self.modes(n, fixed=fixed, springs=springs)[0] / (
+            2 * np.pi * unit_system(self.units).time
+        )
 
-    def modes(self, n: int | None = None, *, fixed: Fixed = ()) -> Modes:
+    def modes(
+        self, n: int | None = None, *, fixed: Fixed = (), springs: Springs | None = None
+    ) -> Modes:
         """Natural modes of the reduced body: omega (m,) [rad/s], shapes (6 + r, m).
 
         Rows of the shapes: translation of the frame, rotation about its origin, elastic part.
@@ -180,6 +188,8 @@ class FlexibleBody(BodyData):
         """
         self.check_support(fixed)
         M, K = self.full_matrices()
+        pulled = self._on_springs(springs)
+        K = K + sum(H.T @ k @ H for H, k in pulled)
         N = self._supported(fixed)
         if n is not None:
             whole("n", n, 0, 6 + self.n_modes, reason="rigid and elastic coordinates")
@@ -187,7 +197,7 @@ class FlexibleBody(BodyData):
             return Modes(np.zeros(0), N)
         lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
         omega = np.sqrt(np.maximum(lam, 0.0))
-        n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed), tol=1e-9)
+        n_rigid = 6 - np.linalg.matrix_rank(self._rigid_rows(fixed, pulled), tol=1e-9)
         omega[:n_rigid] = 0.0
         return Modes(omega[:n], (N @ V)[:, :n])
 
@@ -266,8 +276,16 @@ class FlexibleBody(BodyData):
         H = H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300)
         return scale[:, None] * null_space(H, rcond=1e-10)
 
-    def _rigid_rows(self, fixed: Fixed) -> Array:
-        if not fixed:
-            return np.zeros((1, 6))
-        rows = self.held_rows(fixed)[:, :6]
+    def _on_springs(self, springs: Springs | None) -> list[tuple[Array, Array]]:
+        """Motions (6, 6 + r) of interfaces, and stiffness (6, 6) to the ground there."""
+        owner = f"body {self.name!r}"
+        return [
+            (np.hstack(marker_motion(self.marker(name), self.n_modes)), k)
+            for name, k in spring_matrices(springs, self.markers, owner).items()
+        ]
+
+    def _rigid_rows(self, fixed: Fixed, pulled: Any = ()) -> Array:
+        """Rigid motions (h, 6) of what is held or pulled."""
+        pulls = [(k @ H[:, :6]) / np.abs(k).max() for H, k in pulled]
+        rows = np.vstack([np.zeros((1, 6)), self.held_rows(fixed)[:, :6], *pulls])
         return rows * np.r_[np.ones(3), np.full(3, 1 / self.size)]

@@ -38,7 +38,7 @@ def reference_motion(body: BodyData, reference: Any) -> Array:
     if isinstance(reference, str) and reference in MEAN_AXES:
         from_rigid, from_shapes = rigid_mass(body), rigid_elastic(body)
     elif isinstance(reference, str):
-        from_rigid, from_shapes = _marker_motion(body.marker(reference), body.n_modes)
+        from_rigid, from_shapes = marker_motion(body.marker(reference), body.n_modes)
     elif isinstance(reference, tuple | list) and len(reference) == 2:
         first, second = map(body.marker, reference)
         from_rigid, from_shapes = _pins(first, second, body.n_modes)
@@ -62,7 +62,7 @@ def reference_motion(body: BodyData, reference: Any) -> Array:
     return np.linalg.solve(from_rigid, from_shapes)
 
 
-def _marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
+def marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
     """The six motions of a marker under rigid motions and under the shapes."""
     rigid = np.block([[np.eye(3), -skew(marker.point)], [np.zeros((3, 3)), np.eye(3)]])
     return rigid, np.vstack([marker.translation, marker.rotation]).reshape(6, r)
@@ -77,7 +77,7 @@ def _pins(first: Marker, second: Marker, r: int) -> tuple[Array, Array]:
     axis = axis / length
     across = np.linalg.svd(axis[None])[2][1:]
     rows = []
-    for one, other in zip(_marker_motion(first, r), _marker_motion(second, r), strict=True):
+    for one, other in zip(marker_motion(first, r), marker_motion(second, r), strict=True):
         rows.append(np.vstack([one[:3], across @ other[:3], axis @ one[3:]]))
     return rows[0], rows[1]
 
@@ -96,7 +96,7 @@ def _three_two_one(points: list[Marker], r: int) -> tuple[Array, Array]:
     axis, normal = axis / np.linalg.norm(axis), normal / np.linalg.norm(normal)
     across = np.array([normal, np.cross(normal, axis)])
     rows = []
-    for motions in zip(*(_marker_motion(point, r) for point in points), strict=True):
+    for motions in zip(*(marker_motion(point, r) for point in points), strict=True):
         one, other, last = (motion[:3] for motion in motions)
         rows.append(np.vstack([one, across @ other, normal @ last]))
     return rows[0], rows[1]

@@ -113,6 +113,10 @@ class SciPyOperators:
         """The same body with the mass M + dM."""
         return SciPyOperators(self.K, self.M + csr_matrix(dM), self.rigid, self.T)
 
+    def on_springs(self, dK: Any) -> "SciPyOperators":
+        """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
+        return SciPyOperators(self.K + csr_matrix(dK), self.M, None, self.T)
+
     def product(self, A: Any, X: Array) -> Array:
         """A X."""
         return A @ X

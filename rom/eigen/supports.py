@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
-from rom.arguments import shortened
+from rom.arguments import finite, shortened
 from rom.eigen.verbs import Operators
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Interface
@@ -98,6 +99,40 @@ def held_coordinates(name: str, kind: str, n: int, directions: tuple[str, ...]) 
         )
     axis = ["xyz".index(direction) for direction in directions]
     return np.flatnonzero(np.isin(np.arange(n) % 3, axis))
+
+
+Springs = Mapping[str, Any]  # {interface: (3,), (6,) or (6, 6) stiffness to the ground}
+
+
+def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -> dict[str, Array]:
+    """{interface: (6, 6)} stiffness of springs to the ground, translations first [N/m, N m/rad].
+
+    Args:
+        springs: (3,) translations, (6,) with rotations, or a symmetric (6, 6), at the origin of
+            each interface, axes of the geometry.
+        known: names of all interfaces.
+        owner: whose they are, for messages.
+
+    Raises:
+        ConfigError: for a wrong shape, a spring that does nothing or one that pushes away.
+        InterfaceError: if an interface is unknown.
+    """
+    supports(tuple(springs or ()), known, owner)
+    found = {}
+    for name, value in (springs or {}).items():
+        k = finite(f"springs[{name!r}]", value, None)
+        if k.shape not in ((3,), (6,), (6, 6)):
+            raise ConfigError(
+                f"springs[{name!r}] has the shape {k.shape}: it takes 3 or 6 numbers, or 6 x 6."
+            )
+        k = np.diag(np.pad(k, (0, 6 - k.size))) if k.ndim == 1 else k
+        lam = np.linalg.eigvalsh(0.5 * (k + k.T))
+        if np.abs(k - k.T).max() > 1e-10 * np.abs(k).max() or lam[0] < -1e-10 * lam[-1]:
+            raise ConfigError(f"springs[{name!r}] has no energy: negative, or not symmetric.")
+        if not k.any():
+            raise ConfigError(f"springs[{name!r}] holds nothing: all of it is zero.")
+        found[name] = 0.5 * (k + k.T)
+    return found
 
 
 def held_dofs(interfaces: Mapping[str, Interface], fixed: Fixed) -> Index:

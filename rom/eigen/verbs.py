@@ -160,6 +160,12 @@ class Operators(Protocol):
     def plus_mass(self, dM: Any) -> "Operators":
         """The same body with more mass: M + dM, dM sparse (n_local, n) with global columns."""
 
+    def on_springs(self, dK: Any) -> "Operators":
+        """The body held by springs to the ground, K + dK, dK like dM of `plus_mass`.
+
+        It has no rigid motions then; those that no spring stops come out with almost no frequency.
+        """
+
     def product(self, A: Any, X: Array) -> Array:
         """A X for a matrix with the layout of K, (n_local, k), in units of A times those of X."""
 

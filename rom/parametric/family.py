@@ -20,7 +20,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.frame import reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
 from rom.body.recovery import StressRecovery
-from rom.eigen.supports import Fixed
+from rom.eigen.supports import Fixed, Springs
 from rom.model import Array, Report
 from rom.parametric.layers import Stretch, stretched_body
 from rom.parametric.parameters import Parameter, Point, Thickness, centre, complete, factor, factors
@@ -92,6 +92,7 @@ class BodyFamily:
         n: int | None = None,
         *,
         fixed: Fixed = (),
+        springs: Springs | None = None,
         extrapolate: bool = False,
         **values: float,
     ) -> Array:
@@ -100,6 +101,7 @@ class BodyFamily:
         Args:
             n: how many, lowest first; None for all.
             fixed: what is held, see `FlexibleBody.frequencies`.
+            springs: {interface: stiffness to the ground}, likewise.
             extrapolate: see `at`.
             values: see `at` [1].
 
@@ -107,7 +109,7 @@ class BodyFamily:
             ParameterError, InterfaceError: see `at` and `FlexibleBody.frequencies`.
         """
         point = complete(self.parameters, values, extrapolate=extrapolate)
-        return self._summed(point, fields=False).frequencies(n, fixed=fixed)
+        return self._summed(point, fields=False).frequencies(n, fixed=fixed, springs=springs)
 
     def with_reference(self, reference: Any) -> "BodyFamily":
         """The same family seen from another floating frame.

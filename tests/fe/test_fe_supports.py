@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 
 import rom
 from cases.beam import N, gauss_hermite, hermite_beam
@@ -12,6 +13,7 @@ from rom.eigen.supports import supports
 from rom.errors import ConfigError, InterfaceError
 from rom.prestress import held_solid
 
+X, _, Z = np.eye(3)
 pytestmark = pytest.mark.fenicsx
 STEEL = rom.Material(E=210e9, nu=0.0, rho=7850.0)
 L, B, H = 1.0, 0.03, 0.02
@@ -130,6 +132,60 @@ def test_solids_that_turn_or_are_heated_take_them_too(model):
         rom.modes(x, 1, fixed=("root", "tip")).frequencies[0] for x in (expands, tight)
     )
     assert pressed < 0.97 * free
+
+
+@pytest.mark.parametrize("stiffness", [0.5, 3.0, 30.0, 1e6])
+def test_a_spring_at_the_tip_of_a_clamped_beam(model, body, stiffness):
+    """b^3 (1 + cos b cosh b) + s (sin b cosh b - cos b sinh b) = 0, s = k L^3 / EI; b cot b = -s."""
+    EI, EA = 210e9 * B * H**3 / 12, 210e9 * B * H
+
+    def bent(b):
+        return b**3 * (1 + np.cos(b) * np.cosh(b)) + stiffness * (
+            np.sin(b) * np.cosh(b) - np.cos(b) * np.sinh(b)
+        )
+
+    across = brentq(bent, 1.8, 3.93) ** 2 * UNIT
+    axial = brentq(lambda b: b * np.cos(b) + stiffness * np.sin(b), np.pi / 2, np.pi - 1e-9)
+    axial *= np.sqrt(210e9 / 7850.0) / L / (2 * np.pi)
+    ends = {"interfaces": {"root": "rbe2", "tip": "rbe2"}, "fixed": ("root",)}
+    for k, exact in ((stiffness * EI / L**3 * Z, across), (stiffness * EA / L * X, axial)):
+        whole = rom.modes(model, 16, springs={"tip": k}, **ends).frequencies
+        assert np.abs(whole / exact - 1).min() < 3e-3
+        reduced = body.frequencies(6, fixed=("root",), springs={"tip": k})
+        assert_allclose(reduced, whole[:6], rtol=2e-3)
+        family_like = body.with_reference("tip").frequencies(6, fixed=("root",), springs={"tip": k})
+        assert_allclose(family_like, reduced, rtol=1e-7)
+
+
+def test_a_body_on_soft_springs_swings_as_a_rigid_one(model, body):
+    """sqrt(k / m) along each axis; motions without a spring stay free."""
+    k = np.array([2.0, 3.0, 5.0]) * 100.0
+    springs = {"root": k / 2, "tip": k / 2}
+    exact = np.sqrt(k / (7850.0 * L * B * H)) / (2 * np.pi)
+    whole = rom.modes(model, 6, springs=springs).frequencies
+    for f in (whole, body.frequencies(6, springs=springs)):
+        for one in exact:
+            assert np.abs(f / one - 1).min() < 2e-3
+    assert np.count_nonzero(body.frequencies(8, springs=springs) == 0.0) == 1  # about its axis
+    assert np.count_nonzero(body.frequencies(8, springs={"root": np.ones(6)}) == 0.0) == 0
+    assert np.count_nonzero(body.frequencies(8, springs={"tip": [0, 0, 1.0]}) == 0.0) == 5
+
+
+def test_wrong_springs_are_named(model, body):
+    for springs, error, why in (
+        ({"tip": [1.0, 2.0]}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
+        ({"tip": [1.0, -2.0, 0.0]}, ConfigError, "no energy"),
+        ({"tip": np.eye(6) + np.eye(6, k=1)}, ConfigError, "not symmetric"),
+        ({"tip": np.zeros(3)}, ConfigError, "holds nothing"),
+        ({"tip": [np.nan, 1.0, 1.0]}, ConfigError, "springs"),
+        ({"foot": np.ones(3)}, InterfaceError, "no interface 'foot'"),
+    ):
+        with pytest.raises(error, match=why):
+            rom.modes(model, 2, springs=springs)
+        with pytest.raises(error, match=why):
+            body.frequencies(springs=springs)
+    with pytest.raises(InterfaceError, match="'tip' has the kind 'full'"):
+        rom.modes(model, 2, springs={"tip": np.ones(3)}, interfaces={"tip": "full"})
 
 
 def test_wrong_supports_are_named(model, body):

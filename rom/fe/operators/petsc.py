@@ -147,6 +147,13 @@ class PETScOperators:
         M.axpy(1.0, aij(csr_matrix(dM), sizes, self.comm))
         return self._like(self.K, M, self.rigid)
 
+    def on_springs(self, dK: Any) -> "PETScOperators":
+        """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
+        sizes = ((self.n_local, self.n), (self.n_local, self.n))
+        K = self.K.copy()
+        K.axpy(1.0, aij(csr_matrix(dK), sizes, self.comm))
+        return self._like(K, self.M, None)
+
     def gathered(self, A: PETSc.Mat) -> csr_matrix:
         """All rows of a matrix with the layout of K, on every rank."""
         return gathered(A)

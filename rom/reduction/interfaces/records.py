@@ -1,12 +1,14 @@
 """What a model in interface coordinates is, and how each interface governs its dofs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
-from rom.eigen.supports import Fixed, held_coordinates, supports
+from rom.eigen.supports import SIX_KINDS, Fixed, held_coordinates, supports
 from rom.eigen.verbs import Operators
+from rom.errors import InterfaceError
 from rom.model import Array, Index
 
 
@@ -64,6 +66,27 @@ class Connection:
         """
         rows = self.held_parts(fixed)
         return self.boundary[rows]
+
+    def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
+        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates.
+
+        Raises:
+            InterfaceError: if one has other coordinates.
+        """
+        ops = self.ops
+        dK = csr_matrix((ops.n_local, ops.n))
+        for name, k in stiffness.items():
+            if self.ties[name].label not in SIX_KINDS:
+                raise InterfaceError(
+                    f"interface {name!r} has the kind {self.ties[name].label!r}; a spring acts on "
+                    "six coordinates.",
+                    hint='Give it the kind "rbe2" or "rbe3".',
+                )
+            dofs = self.boundary[self.parts[name]]
+            mine = np.flatnonzero((dofs >= ops.first) & (dofs < ops.first + ops.n_local))
+            rows, columns = np.repeat(dofs[mine] - ops.first, 6), np.tile(dofs, mine.size)
+            dK = dK + csr_matrix((k[mine].ravel(), (rows, columns)), dK.shape)
+        return replace(self, ops=ops.on_springs(dK))
 
     def held_parts(self, fixed: Fixed) -> Index:
         """The same as positions in ``boundary``."""
