@@ -38,6 +38,7 @@ PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "name": ("name",),
     "number": ("modes", "number"),
     "fixed": ("modes", "fixed"),
+    "spring": ("modes", "spring"),
 }
 MOTION_KEYS: dict[str, tuple[str, ...]] = {
     "gravity": ("gravity",),

@@ -153,6 +153,7 @@ TABLE = Table("A component.", (
     Key("modes", Table("What `rom modes` computes.", (
         Key("number", Whole(1), "Number of modes, rigid ones too.", 12),
         Key("fixed", Words(), "Interfaces held, wholly or as `name:yz`.", ()),
+        Key("spring", Words(), "Stiffness to the ground, `name=kx,ky,kz` or six numbers.", ()),
     )), "What `rom modes` computes.", {}),
     Key("output", Table("What `rom reduce` writes.", (
         Key("file", FilePath(), "The body file, `.rom.npz`.", ...),

@@ -429,6 +429,14 @@ def test_supports_in_part_by_option_and_by_file(geometry, tmp_path, capsys):
     model = rom.fe.model(geometry, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
     python = rom.modes(model, 3, fixed={"root": "xyz", "tip": "zy"}).frequencies
     assert_allclose(found, python, rtol=1e-9)
+    held = ("--fixed", "root", "--spring", "tip=0,0,1e5")
+    found = answer(capsys, "modes", geometry, *STEEL, "-n", 3, *held)["frequencies"]
+    python = rom.modes(model, 3, fixed=("root",), springs={"tip": [0, 0, 1e5]}).frequencies
+    assert_allclose(found, python, rtol=1e-9)
+    file.write_text(file.read_text().replace('"tip:yz"]', ']\nspring = "tip=0,0,1e5"'))
+    assert_allclose(answer(capsys, "modes", file)["frequencies"], found, rtol=1e-9)
+    assert main(["modes", geometry, *STEEL, "--spring", "tip=1,2,x"]) == 2
+    assert "'x' is not a number" in capsys.readouterr().err
     assert main(["modes", geometry, *STEEL, "--fixed", "tip:q"]) == 2
     assert "'tip' is held in 'q'" in capsys.readouterr().err
 

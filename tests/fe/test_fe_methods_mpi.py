@@ -35,7 +35,7 @@ def found(tmp_path_factory):
 @pytest.mark.long
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_every_method_is_blind_to_the_number_of_processes(found, n):
-    assert len(found[1]) == 16
+    assert len(found[1]) == 18
     for name, one in found[1].items():
         many = np.array(found[n][name])
         assert len(one) >= 4, name

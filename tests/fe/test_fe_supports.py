@@ -136,7 +136,7 @@ def test_solids_that_turn_or_are_heated_take_them_too(model):
 
 @pytest.mark.parametrize("stiffness", [0.5, 3.0, 30.0, 1e6])
 def test_a_spring_at_the_tip_of_a_clamped_beam(model, body, stiffness):
-    """b^3 (1 + cos b cosh b) + s (sin b cosh b - cos b sinh b) = 0, s = k L^3 / EI; b cot b = -s."""
+    """b^3 (1 + cos b cosh b) + s (sin b cosh b - cos b sinh b) = 0 across, b cot b + s = 0."""
     EI, EA = 210e9 * B * H**3 / 12, 210e9 * B * H
 
     def bent(b):

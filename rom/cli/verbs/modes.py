@@ -6,7 +6,17 @@ from rom.cli.answer import Answer, table
 from rom.cli.described import component, described
 from rom.cli.matrices import add_matrices
 from rom.cli.model import read_model
-from rom.cli.options import add_geometry, add_interfaces, add_material, count, names, unique
+from rom.cli.options import (
+    add_geometry,
+    add_interfaces,
+    add_material,
+    assignment,
+    count,
+    names,
+    number,
+    unique,
+)
+from rom.errors import ConfigError
 
 SUMMARY = "natural frequencies of the full model"
 EXAMPLES = """\
@@ -36,6 +46,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=(),
         help="interfaces held, wholly or as NAME:yz",
     )
+    parser.add_argument(
+        "--spring",
+        metavar="NAME=KX,KY,KZ,...",
+        type=assignment,
+        action="append",
+        default=[],
+        help="stiffness from an interface to the ground, three translations [N/m] or those and "
+        "three rotations [N m/rad]",
+    )
+
+
+def _numbers(text: str) -> list[float]:
+    """Numbers with commas.
+
+    Raises:
+        ConfigError: naming what is none.
+    """
+    try:
+        return [number(part) for part in text.split(",")]
+    except argparse.ArgumentTypeError as error:
+        raise ConfigError(f"--spring: {error}.") from None
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -45,11 +76,13 @@ def run(args: argparse.Namespace) -> Answer:
     if described(args):
         part = component(args)
         kinds, model = part.kinds, part.model()
-        number, fixed = (part.values["modes"][key] for key in ("number", "fixed"))
+        n, fixed = (part.values["modes"][key] for key in ("number", "fixed"))
+        springs = [assignment(word) for word in part.values["modes"]["spring"]]
     else:
         kinds, model = unique(args.interface, "-i"), read_model(args)
-        number, fixed = args.number, args.fixed
-    found = modes(model, number, fixed=fixed, interfaces=kinds or None)
+        n, fixed, springs = args.number, args.fixed, args.spring
+    stiffness = {name: _numbers(text) for name, text in unique(springs, "--spring").items()}
+    found = modes(model, n, fixed=fixed, springs=stiffness, interfaces=kinds or None)
     data = {
         "file": str(args.file),
         "n_dofs": model.n_dofs,
@@ -62,6 +95,7 @@ def run(args: argparse.Namespace) -> Answer:
         (str(k + 1), f"{f:.6g}", f"{r:.1e}")
         for k, (f, r) in enumerate(zip(found.frequencies, found.residual, strict=True))
     ]
-    support = f"held at {', '.join(fixed)}" if fixed else "free"
+    held = [f"held at {', '.join(fixed)}"] * bool(fixed)
+    support = " and ".join([*held, *(f"on a spring at {name}" for name in stiffness)]) or "free"
     head = f"{args.file}: {model.n_dofs} dofs, {data['mass']:.6g} kg, {support}"
     return Answer(data, head + "\n\n" + table(("mode", "frequency [Hz]", "residual"), rows))

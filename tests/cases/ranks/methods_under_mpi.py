@@ -35,6 +35,10 @@ found = {
 }
 slides = {"root": "xyz", "tip": "yz"}
 found["sliding"] = rom.modes(model, 6, fixed=slides).frequencies
+springs = {"tip": [1e6, 2e6, 3e6]}
+found["sprung"] = rom.modes(model, 6, fixed=("root",), springs=springs).frequencies
+springs = {"tip": [1e9, 2e9, 3e9, 1e6, 2e6, 3e6]}  # stiff, so that round-off of K is small
+found["on springs alone"] = rom.modes(model, 6, springs=springs).frequencies
 free = rom.substructure(model, n_modes=8, interfaces=STIFF)
 held = (("bar", "root"),)
 for kind in ("macneal", "rubin", "dual"):
