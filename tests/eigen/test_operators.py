@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 from scipy.sparse import csr_matrix, random
 
+import rom
 from cases.operators import KINDS
 from cases.solid import block
+from rom.bench.models import bar
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import count_shift, mac, orthonormal
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
@@ -141,8 +144,6 @@ def test_a_hinge_is_not_a_support(make, model):
 def test_two_separate_bodies_are_a_mechanism(make, model):
     from scipy.sparse import block_diag
 
-    import rom
-
     two = rom.FEModel(
         block_diag([model.K, model.K], "csr"),
         block_diag([model.M, model.M], "csr"),
@@ -158,7 +159,6 @@ def test_messages_for_too_many_modes_and_broken_numbers(make, model):
         ops.modes(model.interfaces["root"].dofs, 10**5)
     with pytest.raises(ConfigError, match="boundary dof 9999999 is outside"):
         ops.hold([9999999])
-    import rom
 
     M = model.M.copy()
     M.data[4] = np.nan
@@ -182,3 +182,20 @@ def test_rigid_motions_far_from_the_origin_stay_orthonormal(make):
     ops = make(far)
     R = orthonormal(ops, ops.rigid)
     assert_allclose(R.T @ (far.M @ R), np.eye(6), atol=1e-9)
+
+
+def test_a_bar_on_springs_and_in_guides_as_closed_forms_say():
+    """b cot b = -k L / EA along a clamped bar; sqrt(k / m) of a bar that hangs softly."""
+    E, rho, L = 210e9, 7850.0, 1.0
+    model = bar((L, 0.02, 0.01), (16, 1, 1), rom.Material(E=E, nu=0.0, rho=rho))
+    guides, kind = {"root": "xyz", "tip": "yz rx ry rz"}, {"tip": "rbe2"}
+    for stiffness in (0.5, 20.0):
+        k = stiffness * E * 0.02 * 0.01 / L
+        root = brentq(lambda b, s=stiffness: b * np.cos(b) + s * np.sin(b), np.pi / 2, np.pi)
+        exact = root * np.sqrt(E / rho) / L / (2 * np.pi)
+        found = rom.modes(model, 30, fixed=guides, springs={"tip": (k, 0, 0)}, interfaces=kind)
+        assert np.abs(found.frequencies / exact - 1).min() < 1e-5
+    soft = {end: np.full(3, 50.0) for end in ("root", "tip")}
+    found = rom.modes(model, 6, springs=soft).frequencies
+    exact = np.sqrt(100.0 / (rho * L * 0.02 * 0.01)) / (2 * np.pi)
+    assert np.sum(np.abs(found / exact - 1) < 2e-3) == 3
