@@ -31,6 +31,7 @@ ROUND_OFF = 32 * np.finfo(float).eps  # of the terms that add up to an eigenvalu
 MIN_GAP = 1e-6  # between neighbouring eigenvalues in which modes are counted, relative
 SYMMETRY_RTOL = 1e-9
 SAME_MOTIONS_RTOL = 1e-8  # share of motions that joints of another instant would stop
+MAX_WHOLE = 12  # motions up to which all are computed
 MIN_RATIO = 4  # motions per mode from which Lanczos is quicker than all modes at once
 SPAN_RTOL = 1e-13  # square of a direction, of the largest, that shapes of one space still have
 
@@ -248,6 +249,10 @@ class Pencil:
 
     def near(self, shift: float, k: int) -> tuple[Array, Array]:
         """The k undamped modes nearest to a shift: squares (k,) [1/s^2] ascending, X (n, k)."""
+        if self.n_free <= MAX_WHOLE:
+            squares, X = self._whole
+            kept = np.sort(np.argsort(np.abs(squares - shift))[:k])
+            return squares[kept], X[:, kept]
         solve = self.inverse(self.even - shift * self.M).solve
         n = self.M.shape[0]
         operator = LinearOperator((n, n), matvec=lambda x: solve(x)[0], dtype=float)
@@ -255,6 +260,15 @@ class Pencil:
         squares, X = eigsh(self.even, k, self.M, shift, OPinv=operator, v0=start, tol=0.0)
         order = np.argsort(squares)
         return squares[order], X[:, order]
+
+    @cached_property
+    def _whole(self) -> tuple[Array, Array]:
+        """All undamped modes, where the joints leave too few motions for Lanczos."""
+        n = self.M.shape[0]
+        X = np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(self.n_free)))
+        Z = np.linalg.qr(self.inverse(identity(n)).solve(X)[0])[0]
+        squares, V = eigh(Z.T @ (self.even @ Z), Z.T @ (self.M @ Z))
+        return squares, Z @ V
 
     def low_shift(self) -> float:
         """A shift below all modes, and no further from the lowest elastic one than needed."""

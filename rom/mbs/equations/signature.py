@@ -62,17 +62,18 @@ def signature(A: csc_matrix, groups: Sequence[Index], zero_rtol: float = ZERO_RT
         F, p, coupled = fronts.front(a, b, left[k])
         left[k] = []
         d, V = np.linalg.eigh(F[:p, :p])
-        if not coupled.size:
-            zero = zero_rtol * max(size[a:b].max(), np.abs(F).max())
-            negative, none = (d < -zero).sum(), (np.abs(d) <= zero).sum()
-            found += [negative, none, p - negative - none]
-            continue
         C = F[p:, :p] @ V
-        goes = np.abs(d) * MAX_GROWTH >= (C * C / size[coupled, None]).max(axis=0)
+        zero = zero_rtol * max(size[a:b].max(), np.abs(F).max(initial=0.0))
+        faint = np.abs(d) <= zero
+        none = faint & (np.abs(C).max(axis=0, initial=0.0) <= zero)  # nothing later will hold it
+        growth = (C * C / size[coupled, None]).max(axis=0, initial=0.0)
+        goes = ~faint & (np.abs(d) * MAX_GROWTH >= growth)
         gone, negative = goes.sum(), (d[goes] < 0).sum()
-        found += [negative, 0, gone - negative]
-        remainder = _eliminated(F[p:, p:], C, d, goes)
-        left[of_group[coupled[0]]].append(_Remainder(coupled, p - gone, remainder))
+        found += [negative, none.sum(), gone - negative]
+        if coupled.size:
+            C, d, goes = C[:, ~none], d[~none], goes[~none]
+            remainder = _eliminated(F[p:, p:], C, d, goes)
+            left[of_group[coupled[0]]].append(_Remainder(coupled, d.size - gone, remainder))
     return Signature(*map(int, found))
 
 

@@ -398,3 +398,25 @@ def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
     assert found[1].frequencies.shape == (3, 4)
     assert_allclose(found[1].frequencies, found[0].frequencies, rtol=1e-8)
     assert_allclose(found[1].mac, found[0].mac, rtol=1e-6)
+
+
+def test_a_row_of_cranks_swings_as_one_whose_joints_repeat_each_other():
+    """One motion of 234 coordinates, 19 constraints that repeat others: a compound pendulum."""
+    n, mech = 20, Mechanism(gravity=(0, 0, -9.81))
+    solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
+    before = None
+    for k in range(n):
+        crank = mech.add_rigid(f"crank {k}", **solid, at=(k, 0, -0.5),
+                               markers={"a": Z / 2, "b": -Z / 2})  # fmt: skip
+        mech.revolute(f"hinge {k}", mech.ground.marker((k, 0, 0)), crank.marker("a"), axis=Y)
+        if before:
+            rod = mech.add_rigid(f"rod {k}", **solid, at=(k - 0.5, 0, -1),
+                                 markers={"a": -X / 2, "b": X / 2})  # fmt: skip
+            mech.spherical(f"ball {k}", before, rod.marker("a"))
+            mech.revolute(f"pin {k}", rod.marker("b"), crank.marker("b"), axis=Y)
+        before = crank.marker("b")
+    with pytest.warns(RomWarning, match="19 of 252 constraints repeat others"):
+        state = rom.equilibrium(mech)
+    found = rom.linearize(mech, state, n=1).frequencies
+    square = (0.5 * n + (n - 1)) * 9.81 / (n * (0.1 + 0.25) + (n - 1))
+    assert_allclose(found, np.sqrt(square) / (2 * np.pi), rtol=1e-9)

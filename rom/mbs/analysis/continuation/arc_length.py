@@ -101,8 +101,8 @@ class Curve:
         """
         if not self.problem.size(h * point.step) < MAX_PREDICTION:
             raise SolverError("the path is steeper than its points are close.")
-        at, p = self.problem.moved(point.at, h * point.step, point.p + h * point.rate), point.p
-        p, last, away = p + h * point.rate, np.inf, 0.0
+        p, last, away = point.p + h * point.rate, np.inf, 0.0
+        at = self.problem.moved(point.at, h * point.step, p)
         for k in range(MAX_PASSES):
             newton, slope = self.problem.corrections(at, p)
             across = self.problem.inner(point.step, slope) + point.rate / self.unit**2

@@ -220,7 +220,7 @@ class _Equilibria:
             squares, U = _all(pencil)
             negative = int(np.sum(squares < -none))
         else:
-            squares, U = pencil.near(-none, N_NEAREST)
+            squares, U = _nearest(pencil, -none)
             negative = pencil.count(-none)
         below = negative - int(np.sum(squares < -none))
         squares = np.where(np.abs(squares) <= none, 0.0, squares)
@@ -252,6 +252,12 @@ class _Curvatures:
         """Stiffness nearest to zero, and its motion (n,)."""
         k = np.argmin(np.abs(self.squares))
         return float(self.squares[k]), self.motions[:, k]
+
+
+def _nearest(pencil: Pencil, shift: float) -> tuple[Array, Array]:
+    """Some stiffnesses (k,) [1/s^2] around a shift, and their motions (n, k)."""
+    k = min(N_NEAREST, pencil.n_free)
+    return pencil.near(shift, k) if k else (np.zeros(0), np.zeros((pencil.M.shape[0], 0)))
 
 
 def _all(pencil: Pencil) -> tuple[Array, Array]:
@@ -334,7 +340,8 @@ class _March:
     def add(self, point: Point) -> None:
         """Keep a point."""
         found = self.problem.curvatures(point.at)
-        leaves = point.rate == 0.0 and found.weakest[0] < 0.0  # a branch begins without stiffness
+        # a branch begins at a motion without stiffness, whatever round-off says
+        leaves = point.rate == 0.0 and found.weakest[0] < 0.0
         self.states.append(replace(point.at, t=point.p))
         self.unstable.append(found.negative - leaves)
 
