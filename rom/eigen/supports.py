@@ -157,23 +157,27 @@ def refuse_loose(ops: Operators, held: Index) -> None:
     if not held.size or ops.rigid is None:
         return
     mine = np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
-    size = np.sqrt(np.diag(ops.gram(ops.rigid, ops.rigid)))
-    R = np.where(mine[:, None], ops.rigid / size, 0.0)
+    G, centred = ops.gram(ops.rigid, ops.rigid), np.eye(6)
+    centred[:3, 3:] = -np.linalg.solve(G[:3, :3], G[:3, 3:])  # however far the origin is
+    own = ops.rigid @ centred
+    size, T = np.linalg.eigh(ops.gram(own, own))
+    T = T / np.sqrt(size)  # orthonormal on all dofs
+    R, T = np.where(mine[:, None], own @ T, 0.0), centred @ T
     squares, V = np.linalg.eigh(ops.gram(R, R))
-    V = V[:, squares < LOOSE_RTOL * squares[-1]]
-    if V.shape[1]:
+    free = T @ V[:, squares < LOOSE_RTOL * squares[-1]]
+    if free.shape[1]:
         raise InterfaceError(
-            f"the supports leave {V.shape[1]} of six motions to the body as a whole: it "
-            f"{_described(_simple(V) / size)}.",
+            f"the supports leave {free.shape[1]} of six motions to the body as a whole: it "
+            f"{_described(_simple(free, np.abs(T[3:]).max()))}.",
             hint="Hold more; a reduced body counts such motions as zeros.",
         )
 
 
-def _simple(V: Array) -> Array:
-    """(6,) of some rigid motions (6, k), three translations first, one that turns least."""
-    _, sizes, W = np.linalg.svd(V[3:])
-    motion: Array = V @ W[-1]
-    if V.shape[1] > 3 or sizes[-1] < ROUND_OFF_TOL:
+def _simple(free: Array, turn: float) -> Array:
+    """(6,) of rigid motions (6, k), three translations first, one that turns least of a turn."""
+    _, sizes, W = np.linalg.svd(free[3:])
+    motion: Array = free @ W[-1]
+    if free.shape[1] > 3 or sizes[-1] < ROUND_OFF_TOL * turn:
         motion[3:] = 0.0
     return motion
 

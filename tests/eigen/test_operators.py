@@ -12,7 +12,8 @@ from cases.operators import KINDS
 from cases.solid import block
 from rom.bench.models import bar
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import count_shift, mac, orthonormal
+from rom.eigen.supports import refuse_loose
+from rom.eigen.verbs import count_shift, mac, orthonormal, rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
 
 
@@ -199,3 +200,18 @@ def test_a_bar_on_springs_and_in_guides_as_closed_forms_say():
     found = rom.modes(model, 6, springs=soft).frequencies
     exact = np.sqrt(100.0 / (rho * L * 0.02 * 0.01)) / (2 * np.pi)
     assert np.sum(np.abs(found / exact - 1) < 2e-3) == 3
+
+
+@pytest.mark.parametrize("away", [0.0, 1000.0])
+def test_what_supports_leave_is_named_wherever_the_origin_is(away):
+    model = bar((1.0, 0.02, 0.01), (4, 1, 1))
+    points = model.points + away * np.array([1.0, 1.0, 0.0])
+    R = rigid_motions(points)
+    ops = SciPyOperators(model.K, model.M, R)
+    root = model.interfaces["root"].dofs
+    refuse_loose(ops, root)
+    refuse_loose(ops, root[: 3 * 4])  # four corners of it
+    with pytest.raises(InterfaceError, match=r"leave 3 of six motions .* turns about"):
+        refuse_loose(ops, root[:3])
+    with pytest.raises(InterfaceError, match=r"leave 3 of six .* slides along \(1, 0, 0\)"):
+        refuse_loose(ops, np.append(root[root % 3 == 2], root[1]))

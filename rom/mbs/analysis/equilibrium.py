@@ -131,8 +131,7 @@ class _Search:
                 f"the state has {np.size(state.q)} coordinates and {np.size(state.lam)} "
                 f"constraints; this mechanism has {packed.q.size} and {first.lam.size}."
             )
-        if state.base is not None:
-            W.base[:] = state.base
+        self.now.remember(state)
         q = assembled(packed, W, np.asarray(state.q, dtype=float))
         return self.steady(replace(first, q=q, lam=state.lam.copy()))
 

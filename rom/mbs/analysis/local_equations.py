@@ -158,11 +158,25 @@ class Instant:
         retract(self.packed.system, q, np.ascontiguousarray(delta), out)
         return out
 
+    def remember(self, state: State) -> None:
+        """Count the joint coordinates from those of a state.
+
+        Raises:
+            ConfigError: if the state belongs to another mechanism.
+        """
+        if state.base is None:
+            return
+        if np.size(state.base) != self.W.base.size:
+            raise ConfigError(
+                f"the state has {np.size(state.base)} joint coordinates that forces act on; this "
+                f"mechanism has {self.W.base.size}."
+            )
+        self.W.base[:] = state.base
+
     def moved(self, state: State, step: Array, dlam: Array) -> State:
         """A state at rest after a small motion (n,), and a change (m,) of the reactions."""
         q = self.shifted(state.q, step)
-        if state.base is not None:
-            self.W.base[:] = state.base
+        self.remember(state)
         self.evaluate(q, state.v)
         self.W.base[: self.W.x.size] = self.W.x
         return replace(state, q=q, lam=state.lam + dlam, base=self.W.base.copy())
@@ -228,8 +242,7 @@ def consistent(now: Instant, state: Any) -> State:
             "constraints; this mechanism has {}, {} and {}.".format(*needed),
             hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
         )
-    if state.base is not None:
-        W.base[:] = state.base
+    now.remember(state)
     value, G, _ = now.gradient(state.q, state.v)
     rolls = packed.system.rows.kind == ROLL
     _check(packed, np.where(rolls, 0.0, value) / packed.row_scale, GAP_RTOL, "stays open by")

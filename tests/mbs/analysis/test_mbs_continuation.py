@@ -264,9 +264,16 @@ def test_what_makes_no_path_is_named():
         ({"span": (0.0, 1.0), "along": np.ones(5), "state": state}, "along"),
         ({"span": (0.0, 1.0), "along": np.zeros(6), "state": state}, "no motion"),
         ({"span": (5.0, 6.0), "along": np.ones(6), "state": state}, "outside the span"),
+        (
+            {"span": (0.0, 1.0), "along": np.ones(6), "state": rom.equilibrium(truss()[0])},
+            "joint coordinates that forces act on",
+        ),
     ):
         with pytest.raises(ConfigError, match=why):
             rom.continuation(mech, **wish)
+    for ask in (rom.equilibrium, rom.linearize):
+        with pytest.raises(ConfigError, match="joint coordinates that forces act on"):
+            ask(mech, rom.equilibrium(truss()[0]))
     free = rom.Mechanism(gravity=(0, 0, 0))
     free.add_rigid("stone", mass=1, inertia=(1, 1, 1), at=(0, 0, 0))
     with pytest.raises(ModelError, match="there is no unique equilibrium"):

@@ -295,23 +295,31 @@ class _March:
 
     def begin(self, state: State) -> Point:
         """The first point, from which time runs towards the end of the span."""
-        state = replace(state, a=0 * state.a, algorithmic=None)
-        return self.curve.start(state, state.t, self.forwards)
+        return self.curve.start(self.still(state), state.t, self.forwards)
 
     def branch(self, state: State, along: Array) -> Point:
         """The first point, from which only the bodies move.
 
         Raises:
-            ConfigError: if they do not, or the state lies outside the span.
+            ConfigError: if they do not, or the state lies outside the span, or is of another
+                mechanism.
         """
+        now = self.problem.now
+        now.remember(state)
+        if (np.size(state.q), np.size(state.lam)) != (now.packed.q.size, now.W.value.size):
+            raise ConfigError("the state belongs to another mechanism.")
         step = np.concatenate([along, 0 * state.lam])
         length = self.curve.length(step, 0.0)
         if not length > 0.0:
             raise ConfigError("along is no motion: all of it is zero.")
         if not self.low <= state.t <= self.high:
             raise ConfigError(f"the branch leaves at t = {state.t:g} s, which is outside the span.")
-        state = replace(state, a=0 * state.a, algorithmic=None)
-        return Point(state, state.t, step / length, 0.0)
+        return Point(self.still(state), state.t, step / length, 0.0)
+
+    def still(self, state: State) -> State:
+        """The state at rest, with the joint coordinates that belong to it."""
+        state = replace(state, v=0 * state.v, a=0 * state.a, algorithmic=None)
+        return self.problem.moved(state, np.zeros(state.v.size + state.lam.size), state.t)
 
     def go(self, point: Point, longest: float, n: int) -> None:
         """Follow the path from a point until time leaves the span, or there are n points.
