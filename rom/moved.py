@@ -50,9 +50,10 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
      "exudyn interface_form mbdyn openfast openfast_reading radioss simscape"),
     ("rom.io", "rom.io.sid", "sid_body=body sid_dialect=dialect sid_reading=reading"),
     ("rom.mbs", "rom.mbs.analysis",
-     "campbell equilibrium frames=moving_axes inverse=inverse_dynamics linearize "
-     "modes=quadratic_eigen response sensitivity steady=steady_motion tangent "
-     "variation=local_equations"),
+     "campbell equilibrium inverse=inverse_dynamics linearize modes=quadratic_eigen response "
+     "sensitivity steady=steady_motion tangent variation=local_equations"),
+    ("rom.mbs", "rom.mbs.analysis.rotors", "frames=moving_axes"),
+    ("rom.mbs.analysis", "rom.mbs.analysis.rotors", "moving_axes"),
     ("rom.mbs", "rom.mbs.elements",
      "nonlinear spread=spread_loads"),
     ("rom.mbs", "rom.mbs.elements.contact", "contact=points impact surface_contact=surfaces"),

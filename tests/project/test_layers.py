@@ -189,7 +189,7 @@ ORDER = {
     "mbs.analysis": (
         "quadratic_eigen",
         "local_equations",
-        "moving_axes",
+        "rotors",
         "few_modes",
         "tangent",
         "sparse_tangent",

@@ -2,10 +2,13 @@ from rom.components.wind.blade_element import in_wind as in_wind
 from rom.components.wind.blade_element import strips as strips
 from rom.components.wind.drivetrain import Rotor as Rotor
 from rom.components.wind.drivetrain import rotor as rotor
+from rom.components.wind.whole_turbine import PLACES as PLACES
+from rom.components.wind.whole_turbine import PUBLISHED_FREQUENCIES as PUBLISHED_FREQUENCIES
 from rom.components.wind.whole_turbine import Turbine as Turbine
 from rom.components.wind.whole_turbine import turbine as turbine
 from rom.components.wind.wind_turbine import HUB_RADIUS as HUB_RADIUS
 from rom.components.wind.wind_turbine import RATED_SPEED as RATED_SPEED
+from rom.components.wind.wind_turbine import SHAFT_STIFFNESS as SHAFT_STIFFNESS
 from rom.components.wind.wind_turbine import RunUp as RunUp
 from rom.components.wind.wind_turbine import blade as blade
 from rom.components.wind.wind_turbine import ramp as ramp

@@ -31,10 +31,12 @@ from rom.components.wind.wind_turbine import (
     tower,
 )
 from rom.errors import ConfigError
+from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.elements.nonlinear import Assembly
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
 from rom.model import Array
 
 SHAFT_HEIGHT = 1.96256  # from the top of the tower [m]
@@ -47,6 +49,25 @@ NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
 WHEEL_MASS, GENERATOR_MASS = 1000.0, 1000.0
 WHEEL_INERTIA = 500.0  # kg m^2: of no weight beside the generator's 5e6 on the slow side
 NO_VELOCITY = (0.0, 0.0, 0.0)
+# natural frequencies at standstill, gear locked, of two programs [Hz]: table 9-1 of the definition
+PUBLISHED_FREQUENCIES = {
+    "tower sideways": (0.3120, 0.3164),
+    "tower fore-aft": (0.3240, 0.3195),
+    "shaft twists": (0.6205, 0.6094),
+    "blades flap, yawing": (0.6664, 0.6296),
+    "blades flap, pitching": (0.6675, 0.6686),
+    "blades flap together": (0.6993, 0.7019),
+    "blades edgewise, pitching": (1.0793, 1.0740),
+    "blades edgewise, yawing": (1.0898, 1.0877),
+    "second flap, yawing": (1.9337, 1.6507),
+    "second flap, pitching": (1.9223, 1.8558),
+    "second flap together": (2.0205, 1.9601),
+    "second of the tower fore-aft": (2.9003, 2.8590),
+    "second of the tower sideways": (2.9361, 2.9408),
+}
+# places of these among the modes of the turbine; the table leaves out the one in which all blades
+# swing edgewise against the shaft
+PLACES = (*range(11), 12, 13)
 
 
 @dataclass(frozen=True)
@@ -70,6 +91,18 @@ class Turbine:
     def turn_by(self, angle: Callable[[float], float], speed: Callable[[float], float]) -> None:
         """Prescribe the angle [rad] and the speed [rad/s] of the gear wheel over time."""
         self.mechanism.drive("speed", "slow", angle, rate=speed)
+
+    def turning(self, speed: float) -> State:
+        """The steady motion at a speed [rad/s], which then is prescribed.
+
+        Raises:
+            ConfigError: if gravity pulls at the blades: no motion is steady then.
+        """
+        if np.any(self.mechanism.gravity):
+            raise ConfigError("blades that turn under gravity have no steady motion.",
+                              hint="turbine(gravity=0.0, ...)")  # fmt: skip
+        self.turn_by(lambda t: speed * t, lambda t: speed)
+        return equilibrium(self.mechanism, spin={"slow": speed, "fast": GEAR_RATIO * speed})
 
     def turn_with(self, torque: Callable[[float, float, float], float]) -> None:
         """Let a torque [N m] of (time, angle, speed) on the slow side turn the rotor."""
@@ -103,6 +136,8 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     wind: float | None = None,
     speed: float = 0.0,
     shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
+    shear: float = 1.0,
+    torsion: float = 1.0,
 ) -> Turbine:
     """The turbine, its first blade up.
 
@@ -117,6 +152,9 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
             still.
         speed: with which the rotor starts to turn [rad/s].
         shaft: torsional stiffness [N m/rad] and damping [N m s/rad].
+        shear: factor of this rigidity of blades and tower [1]; with a thousand they are the
+            Euler-Bernoulli beams of other programs.
+        torsion: factor of this rigidity likewise; some programs know no twist.
 
     Raises:
         ConfigError: for less than one segment of a blade.
@@ -126,23 +164,26 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
                           hint="A blade has one or more, a stiff tower none.")  # fmt: skip
     mech = Mechanism(gravity=(0.0, 0.0, -gravity))
-    top, standing = _tower(mech, tower_segments)
+    factors = {"shear": shear, "torsion": torsion}
+    top, standing = _tower(mech, tower_segments, factors)
     lean = rotation.matrix(rotation.exp([0.0, tilt, 0.0]))
     axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER_HEIGHT + SHAFT_HEIGHT])
     hub = hub - HUB_OVERHANG * axis
     nacelle = _nacelle(mech, top)
     turning = _train(mech, nacelle, (lean, hub, axis), shaft, speed)
-    one = body(blade(segments, damped=damped))
+    one = body(blade(segments, damped=damped, **factors))
     one = one if wind is None else in_wind(one, (wind, 0.0, 0.0))
     blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(N_BLADES))
     return Turbine(mech, blades, standing, axis, hub)
 
 
-def _tower(mech: Mechanism, segments: int) -> tuple[Marker, Assembly | None]:
+def _tower(
+    mech: Mechanism, segments: int, factors: dict[str, float]
+) -> tuple[Marker, Assembly | None]:
     """The marker on top of the tower, and the tower."""
     if segments == 0:
         return mech.ground.marker((0.0, 0.0, TOWER_HEIGHT)), None
-    standing = mech.add_nonlinear("tower", body(tower(segments)))
+    standing = mech.add_nonlinear("tower", body(tower(segments, **factors)))
     mech.fixed("foot", mech.ground.marker(NO_VELOCITY), standing.marker("start"))
     return standing.marker("end"), standing
 

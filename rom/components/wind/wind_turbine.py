@@ -45,7 +45,14 @@ def stations() -> dict[str, Array]:
     return dict(zip(COLUMNS, np.loadtxt(STATIONS, delimiter=",").T, strict=True))
 
 
-def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: float = 1.0) -> Rod:
+def blade(
+    n: int = 48,
+    *,
+    azimuth: float = 0.0,
+    damped: bool = False,
+    shear: float = 1.0,
+    torsion: float = 1.0,
+) -> Rod:
     """One blade on a rigid hub whose centre is the origin.
 
     Args:
@@ -53,6 +60,7 @@ def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: flo
         azimuth: turned about the rotor axis from upright [rad].
         damped: with viscosity in proportion to the rigidities.
         shear: factor of the shear rigidity [1]; a thousand makes an Euler-Bernoulli beam.
+        torsion: factor of the torsional rigidity [1]; a thousand keeps sections from turning.
     """
     table = stations()
     eta = np.linspace(0, 1, n + 1)
@@ -74,15 +82,24 @@ def blade(n: int = 48, *, azimuth: float = 0.0, damped: bool = False, shear: flo
         place,
         eta,
         stretch=np.column_stack([shear * at("kGA", middles)] * 2 + [at("EA", middles)]),
-        bend=np.column_stack([at("EI_edge", cells), at("EI_flap", cells), at("GJ", cells)]),
+        bend=np.column_stack(
+            [at("EI_edge", cells), at("EI_flap", cells), torsion * at("GJ", cells)]
+        ),
         mass=MASS_FACTOR * at("mass", middles),
         inertia=np.column_stack([edge, flap, edge + flap]),
         viscosity=VISCOSITY_TIMES if damped else 0.0,
     )
 
 
-def tower(n: int = 40, *, top: float = 0.0) -> Rod:
-    """The tower, a conical tube along the third axis, with a mass on its top [kg]."""
+def tower(n: int = 40, *, top: float = 0.0, shear: float = 1.0, torsion: float = 1.0) -> Rod:
+    """The tower, a conical tube along the third axis.
+
+    Args:
+        n: number of segments, of equal length.
+        top: a mass on its top [kg].
+        shear: factor of the shear rigidity [1], see `blade`.
+        torsion: factor of the torsional rigidity [1].
+    """
     s = np.linspace(0, 1, n + 1)
     middles, cells = (s[1:] + s[:-1]) / 2, np.concatenate(([s[1] / 4], s[1:-1], [1 - s[1] / 4]))
 
@@ -93,12 +110,12 @@ def tower(n: int = 40, *, top: float = 0.0) -> Rod:
         return np.pi / 4 * (D**2 - d**2), np.pi / 64 * (D**4 - d**4)
 
     (A, I), (_, bent) = tube(middles), tube(cells)
-    GA, EI = STEEL["G"] * A / 2, STEEL["E"] * bent
+    GA, EI = shear * STEEL["G"] * A / 2, STEEL["E"] * bent
     rod = along(
         lambda at: (np.array([0, 0, TOWER_HEIGHT * at]), np.eye(3)),
         s,
         stretch=np.column_stack([GA, GA, STEEL["E"] * A]),
-        bend=np.column_stack([EI, EI, 2 * STEEL["G"] * bent]),
+        bend=np.column_stack([EI, EI, 2 * torsion * STEEL["G"] * bent]),
         mass=STEEL["rho"] * A,
         inertia=STEEL["rho"] * np.column_stack([I, I, 2 * I]),
     )

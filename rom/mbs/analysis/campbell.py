@@ -14,6 +14,7 @@ from rom.errors import ConfigError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
 from rom.mbs.analysis.local_equations import MAX_DENSE
+from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
@@ -31,11 +32,14 @@ class Campbell:
         mac: (s - 1, m) likeness of its shapes at neighbouring speeds, 1 for the same shape [1];
             below a half the speeds are too far apart to be sure of it, or two modes share a
             frequency.
+        waves: (s, m, 3) shares of the motion of ``blades`` that all have alike, and that run
+            around the support backward and forward [1]; None without blades.
     """
 
     speeds: Array
     eigenvalues: Array
     mac: Array
+    waves: Array | None = None
 
     @property
     def frequencies(self) -> Array:
@@ -72,6 +76,7 @@ def campbell(
     axis: npt.ArrayLike = (0.0, 0.0, 1.0),
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     frame: Any = "body",
+    blades: Any = None,
 ) -> Campbell:
     """Follow the natural frequencies over the speed of rotation.
 
@@ -87,6 +92,8 @@ def campbell(
         axis: (3,) axis of the rotation of a mechanism as a whole, world [1].
         about: (3,) a point on it [m].
         frame: axes for small motions, see `linearize`: "world" for rotors in bearings.
+        blades: names of the bodies of each blade of a rotor on a support, see `linearize`; the
+            function then returns a state, too, from ``rom.equilibrium(..., spin={joint: speed})``.
 
     Raises:
         ConfigError: for wrong speeds or a wrong mechanism.
@@ -98,7 +105,8 @@ def campbell(
     axis = unit_vector("axis", axis)
     if n is not None:
         whole("n", n, 1)
-    found = [_at(mechanism, speed, axis, about, frame, n) for speed in speeds]
+    counted = {"frame": frame, "blades": blades}
+    found = [_at(mechanism, speed, axis, about, n, counted) for speed in speeds]
     orders: list[Any] = [np.arange(found[0].eigenvalues.size)]
     likeness = []
     for one, two in pairwise(found):
@@ -107,11 +115,21 @@ def campbell(
         likeness.append(mac)
     values = np.array([x.eigenvalues[order] for x, order in zip(found, orders, strict=True)])
     kept = np.flatnonzero(np.abs(values).max(axis=0) > 0)[:n]
-    return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept])
+    waves = None
+    if blades is not None:
+        every = [_waves(x, blades)[order] for x, order in zip(found, orders, strict=True)]
+        waves = np.array(every)[:, kept]
+    return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept], waves)
+
+
+def _waves(found: Linearization, blades: Any) -> Array:
+    """(f, 3) how the blades take part in all modes at one speed."""
+    rotor = Blades.of(blades, found.packed, found.state)
+    return rotor.waves(found.shapes / found.scale[:, None], found.state)
 
 
 def _at(
-    mechanism: Any, speed: float, axis: Array, about: Any, frame: Any, n: int | None
+    mechanism: Any, speed: float, axis: Array, about: Any, n: int | None, axes: dict[str, Any]
 ) -> Linearization:
     """Modes at one speed; of large mechanisms some more than n, so that they can be followed."""
     if isinstance(mechanism, Mechanism):
@@ -120,9 +138,9 @@ def _at(
         made = mechanism(float(speed))
         one, state = made if isinstance(made, tuple) else (made, None)
     if n is None or state is None or state.v.size <= MAX_DENSE:
-        return linearize(one, state, frame=frame)
+        return linearize(one, state, **axes)
     motions = state.v.size - state.rank
-    return linearize(one, state, frame=frame, n=min(2 * n + N_SPARE, motions))
+    return linearize(one, state, **axes, n=min(2 * n + N_SPARE, motions))
 
 
 def _follow(one: Linearization, two: Linearization, order: Array) -> tuple[Array, Array]:

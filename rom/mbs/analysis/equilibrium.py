@@ -1,20 +1,19 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom import rotation
-from rom.arguments import finite, typed, whole
+from rom.arguments import typed, whole
 from rom.errors import ConfigError, ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
+from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, initial_state
-from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
@@ -34,7 +33,7 @@ def equilibrium(
     *,
     t: float | None = None,
     steps: int = 1,
-    spin: npt.ArrayLike | None = None,
+    spin: npt.ArrayLike | Mapping[str, float] | None = None,
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> State:
     """Find where forces, reactions and the inertia of a steady rotation balance.
@@ -48,7 +47,9 @@ def equilibrium(
         state: where the search starts; None for the position in which the bodies were added.
         t: time at which drives and loads are taken [s]; None for that of the state.
         steps: number of load steps.
-        spin: (3,) angular velocity of the whole mechanism, world [rad/s]; None for rest.
+        spin: (3,) angular velocity of the whole mechanism, world [rad/s]; None for rest. Or a
+            speed [rad/s] for some revolute joints, {joint: speed}, about whose axes the bodies
+            behind them turn while the others rest.
         about: (3,) a point on the axis of the spin [m].
 
     Returns:
@@ -79,7 +80,7 @@ def equilibrium(
     whole("steps", steps, 1, MOST_STEPS)
     time = (0.0 if state is None else state.t) if t is None else t
     now = instant(mechanism, time, sparse=None)
-    search = _Search(now, _spinning(now, spin), finite("about", about, (3,)))
+    search = _Search(now, Spins.of(mechanism, now, spin, about))
     found, done, width = search.start(state), 0.0, 1.0 / steps
     with reached(lambda: found):
         while done < 1.0:
@@ -96,36 +97,26 @@ def equilibrium(
     return found
 
 
-def _spinning(now: Instant, spin: Any) -> Array:
-    turn = np.zeros(3) if spin is None else finite("spin", spin, (3,))
-    rolls = now.packed.system.rows.kind == ROLL
-    if turn.any() and rolls.any():
-        name = now.packed.row_owner[int(np.argmax(rolls))]
-        raise ModelError("what rolls has no equilibrium while it spins.", where=name)
-    return turn
-
-
 @dataclass(frozen=True)
 class _Search:
-    """The search at one time, for one spin about a point of its axis."""
+    """The search at one time, for what turns steadily."""
 
     now: Instant
-    spin: Array
-    about: Array
+    spins: Spins
     loan: Loan = field(default_factory=Loan)
 
     def tangent(self, now: Instant, state: State) -> Tangent | SparseTangent:
         """The equations of one correction."""
         if now.pattern is None:
-            return Tangent.of(now, state)
-        return SparseTangent.of(now, state, self.loan)
+            return Tangent.of(now, state, self.spins)
+        return SparseTangent.of(now, state, self.spins, self.loan)
 
     def start(self, state: State | None) -> State:
         """The state to start from, its joints closed."""
         packed, W = self.now.packed, self.now.W
         first = initial_state(packed, self.now.t)
         if state is None:
-            return self.steady(replace(first, lam=0 * first.lam))
+            return self.spins.steady(self.now, replace(first, lam=0 * first.lam))
         if np.size(state.q) != packed.q.size or np.size(state.lam) != first.lam.size:
             raise ConfigError(
                 f"the state has {np.size(state.q)} coordinates and {np.size(state.lam)} "
@@ -133,17 +124,7 @@ class _Search:
             )
         self.now.remember(state)
         q = assembled(packed, W, np.asarray(state.q, dtype=float))
-        return self.steady(replace(first, q=q, lam=state.lam.copy()))
-
-    def steady(self, state: State) -> State:
-        """The state with the velocities and accelerations of the steady rotation."""
-        bodies, v, a = self.now.packed.system.bodies, 0 * state.v, 0 * state.a
-        if self.spin.any():
-            for q_at, at in zip(bodies.q_at, bodies.v_at, strict=True):
-                v[at : at + 3] = np.cross(self.spin, state.q[q_at : q_at + 3] - self.about)
-                a[at : at + 3] = np.cross(self.spin, v[at : at + 3])
-                v[at + 3 : at + 6] = rotation.matrix(state.q[q_at + 3 : q_at + 7]).T @ self.spin
-        return replace(state, t=self.now.t, v=v, a=a, algorithmic=None)
+        return self.spins.steady(self.now, replace(first, q=q, lam=state.lam.copy()))
 
     def settle(self, state: State, load: float) -> State:
         """Equilibrium at a share of the loads.
@@ -158,7 +139,7 @@ class _Search:
             size, factor = sizes(now.packed, step)
             if not np.isfinite(size):
                 break
-            state = self.steady(now.moved(state, factor * step, factor * dlam))
+            state = self.spins.steady(self.now, now.moved(state, factor * step, factor * dlam))
             if factor < 1.0:
                 balance = self.tangent(now, state).reaction()
                 state = replace(state, lam=state.lam + balance)
@@ -181,7 +162,7 @@ class _Search:
                 f"({len(free)} free motions): there is no unique equilibrium.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        if weakest.squares.size and weakest.squares[0] < 0.0 and not self.spin.any():
+        if weakest.squares.size and weakest.squares[0] < 0.0 and not self.spins.any:
             motion = _described(self.now.packed, weakest.motions[:, 0])
             warn(
                 f"the equilibrium is unstable: {motion} and falls away at a rate of "

@@ -16,7 +16,6 @@ from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 from rom.arguments import finite, whole
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
-from rom.mbs.analysis.moving_axes import small_motions
 from rom.mbs.equations.signature import signature
 from rom.mbs.equations.sparse_solve import Constrained, bordered, unit_rows
 from rom.mbs.results.state import State
@@ -120,10 +119,10 @@ class Pencil:
     independent: bool = False
 
     @classmethod
-    def of(cls, now: Instant, state: State, world: tuple[bool, ...]) -> "Pencil":
-        """Small motions around a state that rests or turns as one, from sparse matrices."""
+    def of(cls, now: Instant, state: State, motions: tuple[Any, ...]) -> "Pencil":
+        """Small motions around a state, counted as `small_motions` says, from sparse matrices."""
         assert now.pattern is not None
-        T, T1, T2, T3 = small_motions(now.packed.system, state, world)
+        T, T1, T2, T3 = motions
         M, C, K = now.matrices(state)
         D = diags(1 / np.sqrt(M.diagonal()))
         basis = T @ D

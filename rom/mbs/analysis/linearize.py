@@ -17,8 +17,9 @@ from rom.mbs.analysis.local_equations import (
     instant,
     of_unit_mass,
 )
-from rom.mbs.analysis.moving_axes import chosen, small_motions
 from rom.mbs.analysis.quadratic_eigen import modes, phases
+from rom.mbs.analysis.rotors.blades import Blades
+from rom.mbs.analysis.rotors.moving_axes import Axes, chosen, small_motions
 from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
@@ -166,6 +167,7 @@ def linearize(
     frame: Any = "body",
     n: int | None = None,
     band: tuple[float, float] | None = None,
+    blades: Any = None,
 ) -> Linearization:
     """Linearise the equations of motion around a state, at rest or moving.
 
@@ -184,6 +186,10 @@ def linearize(
         n: number of modes, the lowest; None for all. Cost and memory are then those of some steps
             in time, for thousands of bodies too, and M, C, K are those of these modes.
         band: (2,) modes between two frequencies [Hz] instead.
+        blades: three or more identical blades of a rotor on a support, one after the other around
+            its axis: each a body, a list of bodies or a non-linear body, by name or as added. What
+            they do is counted together, in axes that do not turn (multi-blade coordinates), so
+            that the coefficients are constant; what else turns needs the frame "world".
 
     Undamped modes asked for by ``n`` or ``band`` are counted by the signature of the stiffness, so
     that none is missed; damped and gyroscopic ones are those nearest to zero, or to the middle of
@@ -215,20 +221,20 @@ def linearize(
     time = (0.0 if state is None else state.t) if t is None else t
     wanted = Wanted.of(n, band)
     now = instant(mechanism, time, sparse=wanted is not None)
-    world = chosen(frame, now.packed.names)
+    axes = chosen(frame, now.packed.names)
     state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
     refuse_rolling(now.packed, state)
+    if blades is not None:
+        axes = replace(axes, blades=Blades.of(blades, now.packed, state))
     if wanted is None:
-        return _reduced(now, state, world)
-    found = _few(now, state, world, wanted)
-    return found or _part(linearize(mechanism, state, t=t, frame=frame), wanted)
+        return _reduced(now, state, axes)
+    found = _few(now, state, axes, wanted)
+    return found or _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
 
 
-def _few(
-    now: Instant, state: State, world: tuple[bool, ...], wanted: Wanted
-) -> Linearization | None:
+def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearization | None:
     """The modes wanted from sparse matrices; None where whole ones are needed or cheaper."""
-    pencil, later, rate = sparse_equations(now, state, world)
+    pencil, later, rate = sparse_equations(now, state, axes)
     if pencil is None or not pencil.affords(wanted):
         return None
     if pencil.symmetric:
@@ -248,7 +254,7 @@ def _few(
                          now.probe(), now.packed, now.W.H.copy(), known)  # fmt: skip
 
 
-def sparse_equations(now: Instant, state: State, world: tuple[bool, ...]) -> Any:
+def sparse_equations(now: Instant, state: State, axes: Axes) -> Any:
     """Small motions by sparse matrices: now, a little later, and the speed [rad/s]; else Nones.
 
     Only whole matrices know reactions that friction depends on, and joints whose directions change
@@ -256,10 +262,14 @@ def sparse_equations(now: Instant, state: State, world: tuple[bool, ...]) -> Any
     """
     if now.packed.loaded_rows.size:
         return None, None, 0.0
-    pencil = Pencil.of(now, state, world)
-    path = _Path(now, state, world, np.zeros((state.v.size, 0)))
-    later = pencil if _rests(now, state, pencil) else Pencil.of(now, path.later().state, world)
+    pencil = _pencil(now, state, axes)
+    path = _Path(now, state, axes, np.zeros((state.v.size, 0)))
+    later = pencil if _rests(now, state, pencil) else _pencil(now, path.later().state, axes)
     return (pencil, later, path.rate) if pencil.allows(later) else (None, None, 0.0)
+
+
+def _pencil(now: Instant, state: State, axes: Axes) -> Pencil:
+    return Pencil.of(now, state, small_motions(now.packed.system, state, axes))
 
 
 def _rests(now: Instant, state: State, pencil: Pencil) -> bool:
@@ -284,16 +294,16 @@ def _part(around: Linearization, wanted: Wanted) -> Linearization:
     return replace(around, known=known)
 
 
-def _reduced(now: Instant, state: State, world: tuple[bool, ...]) -> Linearization:
+def _reduced(now: Instant, state: State, axes: Axes) -> Linearization:
     """Matrices for the motions the joints leave, and a warning if they change with time."""
-    T, scale = small_motions(now.packed.system, state, world)[0], now.probe()
+    T, scale = small_motions(now.packed.system, state, axes)[0], now.probe()
     _, G, M = now.gradient(state.q, state.v)
     Z = of_unit_mass(free_motions(G @ T, scale, state.rank), T.T @ M @ T)
-    path = _Path(now, state, world, Z)
-    found = _matrices(now, state, world, path)
+    path = _Path(now, state, axes, Z)
+    found = _matrices(now, state, axes, path)
     if state.v.any():
         later = path.later()
-        moved_on = _matrices(now, later.state, world, later)
+        moved_on = _matrices(now, later.state, axes, later)
         _warn_of_drift((found.K, found.C), (moved_on.K, moved_on.C), path.rate)
     return found
 
@@ -319,7 +329,7 @@ class _Path:
 
     now: Instant
     state: State
-    world: tuple[bool, ...]
+    axes: Axes
     Z: Array
 
     @cached_property
@@ -338,7 +348,7 @@ class _Path:
         q = self.ahead(h)
         _, G, M = self.now.gradient(q, self.state.v)
         there = replace(self.state, q=q)
-        T = small_motions(self.now.packed.system, there, self.world)[0]
+        T = small_motions(self.now.packed.system, there, self.axes)[0]
         mass = T.T @ M @ T
         N = of_unit_mass(free_motions(G @ T, self.now.probe(), self.state.rank), mass)
         U, _, V = np.linalg.svd(N.T @ mass @ self.Z)
@@ -366,8 +376,8 @@ class _Path:
         return replace(self, state=state, Z=Z)
 
 
-def _matrices(now: Instant, state: State, world: tuple[bool, ...], path: _Path) -> Linearization:
-    T, T1, T2, T3 = small_motions(now.packed.system, state, world)
+def _matrices(now: Instant, state: State, axes: Axes, path: _Path) -> Linearization:
+    T, T1, T2, T3 = small_motions(now.packed.system, state, axes)
     Z, (Zd, Zdd) = path.Z, path.rates()
     M, Cv, Kq = now.matrices(state)
     H, basis = now.W.H.copy(), T @ Z

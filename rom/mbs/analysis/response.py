@@ -19,7 +19,7 @@ from rom.mbs.analysis.linearize import (
     sparse_equations,
 )
 from rom.mbs.analysis.local_equations import Instant, consistent, instant
-from rom.mbs.analysis.moving_axes import chosen
+from rom.mbs.analysis.rotors.moving_axes import chosen
 from rom.mbs.equations.sparse_solve import Constrained
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism

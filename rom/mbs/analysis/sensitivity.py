@@ -12,6 +12,7 @@ from rom.errors import ConfigError, ModelError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
 from rom.mbs.analysis.local_equations import Instant, instant
+from rom.mbs.analysis.rotors.spins import AT_REST
 from rom.mbs.analysis.tangent import Tangent
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
@@ -209,7 +210,7 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
             raise ConfigError(f"the mechanism has other bodies or joints for another {name!r}.")
         now.W.base[:] = state.base
         sides.append((sign, mechanism, now))
-    tangent = Tangent.of(instant(build(**values), state.t), state)
+    tangent = Tangent.of(instant(build(**values), state.t), state, AT_REST)
     forces, gaps = ([f(now) for _, _, now in sides] for f in _balance_of(state))
     change = _answer(tangent, (forces[1] - forces[0]) / 2, (gaps[1] - gaps[0]) / 2)
     moved = []

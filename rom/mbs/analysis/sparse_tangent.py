@@ -12,6 +12,7 @@ from scipy.sparse import identity
 from rom.errors import SolverError
 from rom.mbs.analysis.few_modes import Pencil
 from rom.mbs.analysis.local_equations import Instant
+from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.tangent import (
     LOAD_STIFFNESS_RTOL,
     MAX_ROTATION,
@@ -61,9 +62,10 @@ class SparseTangent:
     loan: Loan
 
     @classmethod
-    def of(cls, now: Instant, state: State, loan: Loan) -> "SparseTangent":
-        """The equations at a state that rests, or turns steadily as a whole."""
-        pencil = Pencil.of(now, state, (False,) * len(now.packed.names))
+    def of(cls, now: Instant, state: State, spins: Spins, loan: Loan) -> "SparseTangent":
+        """The equations at a state that rests, or turns steadily."""
+        T, T1, T3 = spins.motions(now, state)
+        pencil = Pencil.of(now, state, (T, T1, 0 * T, T3))
         r = pencil.basis.T @ now.residual(state.q, state.v, state.a, state.lam)
         pull = load_stiffness(now, state)
         return cls(now, pencil, r, now.gradient(state.q, state.v)[0], pull, loan)

@@ -15,7 +15,7 @@ from rom.mbs.analysis.local_equations import (
     difference,
     instant,
 )
-from rom.mbs.analysis.moving_axes import chosen, small_motions
+from rom.mbs.analysis.rotors.moving_axes import chosen, small_motions
 from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
@@ -89,12 +89,12 @@ def steady_motion(
         Neimark and Fufaev, Dynamics of Nonholonomic Systems (1972), chapter VI.
     """
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
-    world = chosen(frame, now.packed.names)
+    axes = chosen(frame, now.packed.names)
     state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
     size = now.probe() / DIFFERENCE_STEP
     rate = _rate(state, size)
     both = np.concatenate([size, size * rate])
-    motions = tuple(T.toarray() for T in small_motions(now.packed.system, state, world))
+    motions = tuple(T.toarray() for T in small_motions(now.packed.system, state, axes))
     A = _first_order(now, state, motions, rate) * both / both[:, None]
     B = _bound(now, state, motions) * both
     N = _null_space(B)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.mbs.analysis.local_equations import Instant, free_motions, of_unit_mass
-from rom.mbs.analysis.moving_axes import small_motions
+from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.equations.packing import Packed
 from rom.mbs.results.state import State
 from rom.model import Array
@@ -41,9 +41,9 @@ class Tangent:
     pull: float
 
     @classmethod
-    def of(cls, now: Instant, state: State) -> "Tangent":
-        """The equations at a state that rests, or turns steadily as a whole."""
-        T, T1, _, T3 = small_motions(now.packed.system, state, (False,) * len(now.packed.names))
+    def of(cls, now: Instant, state: State, spins: Spins) -> "Tangent":
+        """The equations at a state that rests, or turns steadily."""
+        T, T1, T3 = spins.motions(now, state)
         M, C, K = now.matrices(state)
         K = K @ T + C @ T1 + M @ T3
         r = T.T @ now.residual(state.q, state.v, state.a, state.lam)

@@ -85,23 +85,26 @@ class Elements:
         frames: (e, k) frames that each element connects.
         numbers: (e, c) what the law knows of each element, in its own units.
         law: kept so that the compiled code lives as long as the elements.
+        by_rate: whether forces depend on velocities.
     """
 
     address: int
     frames: Index
     numbers: Array
     law: Any = None
+    by_rate: bool = True
 
     @classmethod
-    def of(cls, law: Any, frames: Index, numbers: Array) -> "Elements":
+    def of(cls, law: Any, frames: Index, numbers: Array, *, by_rate: bool = True) -> "Elements":
         """Elements with a law of `compiled_law`.
 
         Args:
             law: the law.
             frames: (e, k) frames that each element connects.
             numbers: (e, c) what the law knows of each element, in its own units.
+            by_rate: whether forces depend on velocities.
         """
-        return cls(law.address, frames, numbers, law)
+        return cls(law.address, frames, numbers, law, by_rate)
 
 
 class NonlinearBody(Protocol):
@@ -260,6 +263,7 @@ class Nonlinear(Table):
         space: (LAW_MEMORY_SIZE,) for the laws to use as they like.
         owner: (e,) which of the bodies an element is part of.
         forces: (n,) sum of all force components of each body: not finite where a law failed.
+        by_rate: (e,) 1 where forces depend on velocities.
     """
 
     address: Address1
@@ -271,6 +275,7 @@ class Nonlinear(Table):
     space: Scratch1
     owner: Index1
     forces: Scratch1
+    by_rate: Index1
 
 
 def pack(bodies: Any, places: Places) -> Nonlinear:
@@ -284,15 +289,17 @@ def pack(bodies: Any, places: Places) -> Nonlinear:
     K = max((rows.shape[1] for *_, rows in groups), default=1)
     c = max((group.numbers.shape[1] for _, group, _ in groups), default=1)
     body, numbers = np.full((e, K), -1, dtype=np.int64), np.zeros((e, c))
-    address, count, owner, at = *(integers([0] * e) for _ in range(3)), 0
+    address, count, owner, by_rate, at = *(integers([0] * e) for _ in range(4)), 0
     for k, group, rows in groups:
         mine = slice(at, at + len(rows))
         address[mine], count[mine], owner[mine] = group.address, rows.shape[1], k
+        by_rate[mine] = group.by_rate
         body[mine, : rows.shape[1]] = rows
         numbers[mine, : group.numbers.shape[1]] = group.numbers
         at += len(rows)
     scratch = np.zeros((e, 13 * K)), np.zeros(2 + 6 * K + 72 * K * K), np.zeros(LAW_MEMORY_SIZE)
-    return Nonlinear(address, count, body, numbers, *scratch, owner, np.zeros(len(bodies)))
+    forces = np.zeros(len(bodies))
+    return Nonlinear(address, count, body, numbers, *scratch, owner, forces, by_rate)
 
 
 @intrinsic
@@ -391,4 +398,5 @@ def _outside(whole: Assembly) -> bool:
 NONLINEAR_FAMILY = Family(
     "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
     ends=on_joint, outside=_outside, couples=_couples, answers=lambda elements: elements.forces,
+    by_rate=lambda elements: bool(elements.by_rate.any()),
 )  # fmt: skip

@@ -48,7 +48,9 @@ LEFT_BEHIND = {
     "demo_satellite": {"satellite.png", "satellite.gif"},
     "demo_rolling_wheel": {"rolling_wheel.png"},
     "demo_updating": {"updating.png"},
-    "demo_whole_turbine": {"whole_turbine.gif", "whole_turbine.png"},
+    "demo_whole_turbine": {
+        "turbine_campbell.png", "whole_turbine.gif", "whole_turbine.png",
+    },
     "demo_sheet": {"sheet.png", "taylor_bar.gif"},
     "demo_slider_crank": {
         "crank_mesh.png", "frames.png", "instants.png", "motion.png", "report.html",

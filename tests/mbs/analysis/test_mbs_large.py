@@ -17,6 +17,7 @@ from rom.components.cosserat import body, straight
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import campbell as campbell_module
 from rom.mbs.analysis import few_modes, local_equations
+from rom.mbs.analysis.rotors.spins import AT_REST
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent
 from rom.mbs.integrate.consistent_start import initial_state
@@ -221,7 +222,8 @@ def test_reactions_balance_best_as_those_of_dense_matrices():
         now = local_equations.instant(mech, 0.0, sparse=sparse)
         state = initial_state(now.packed)
         state = replace(state, a=0 * state.a, lam=np.cos(np.arange(state.lam.size)))
-        tangent = SparseTangent.of(now, state, Loan()) if sparse else Tangent.of(now, state)
+        tangent = (SparseTangent.of(now, state, AT_REST, Loan()) if sparse
+                   else Tangent.of(now, state, AT_REST))  # fmt: skip
         changes.append(state.lam + tangent.reaction())
         assert np.abs(tangent.unbalanced()).max() < 2.0
     assert np.sign(changes[1][0]) == np.sign(changes[0][0])  # weighed by masses, not by sizes

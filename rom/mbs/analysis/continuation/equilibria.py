@@ -14,6 +14,7 @@ from rom.mbs.analysis.continuation.arc_length import Curve, Point
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.few_modes import RANK_RTOL, Pencil
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, MAX_DENSE, Instant, instant
+from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
 from rom.mbs.analysis.tangent import LOAD_STIFFNESS_RTOL, load_stiffness, sizes
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
@@ -182,7 +183,7 @@ class _Equilibria:
         """Masses and stiffness in motions that turn with the bodies."""
         now = self.now.at(state.t)
         now.W.base[:] = state.base
-        return Pencil.of(now, state, (False,) * len(now.packed.names))
+        return Pencil.of(now, state, small_motions(now.packed.system, state, IN_BODIES))
 
     def corrections(self, at: State, p: float) -> tuple[Array, Array]:
         """Newton's correction, and the change per time, of coordinates and multipliers."""

@@ -164,7 +164,11 @@ def body(rod: Rod, start: Shape | None = None) -> RodBody:
     stretch = np.column_stack([rod.h, rod.stretch, rod.viscous_stretch, rod.a0])
     bend = np.column_stack([rod.l, rod.bend, rod.viscous_bend, rod.s, rod.S.reshape(n + 1, 9)])
     by_segment, by_vertex = laws()
-    along = Elements.of(by_segment, pairs[:-1], stretch), Elements.of(by_vertex, pairs, bend)
+    by_rate = bool(rod.viscous_stretch.any() or rod.viscous_bend.any())
+    along = (
+        Elements.of(by_segment, pairs[:-1], stretch, by_rate=by_rate),
+        Elements.of(by_vertex, pairs, bend, by_rate=by_rate),
+    )
     return RodBody(rod, frames, along)
 
 

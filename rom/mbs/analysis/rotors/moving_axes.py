@@ -1,5 +1,6 @@
 """Axes in which small motions of moving bodies are counted."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,13 +9,30 @@ from scipy.sparse import csc_matrix, diags
 from rom import rotation
 from rom.arguments import one_of
 from rom.errors import ConfigError
+from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.results.state import State
 
 FRAMES = ("body", "world")
 
 
-def chosen(frame: Any, names: tuple[str, ...]) -> tuple[bool, ...]:
-    """Whether each body is seen from the world.
+@dataclass(frozen=True)
+class Axes:
+    """Axes in which small motions are counted.
+
+    Attributes:
+        world: whether those of the world, per body; empty: those of each body.
+        blades: bodies that are counted together, in axes that do not turn with them.
+    """
+
+    world: tuple[bool, ...] = ()
+    blades: Blades | None = None
+
+
+IN_BODIES = Axes()
+
+
+def chosen(frame: Any, names: tuple[str, ...]) -> Axes:
+    """The axes that the caller of an analysis names.
 
     Raises:
         ConfigError: for another word, or a body that does not exist.
@@ -24,19 +42,23 @@ def chosen(frame: Any, names: tuple[str, ...]) -> tuple[bool, ...]:
     if unknown:
         raise ConfigError(f"frame: no body {sorted(unknown)}; there are {sorted(names)}.")
     words = (one_of("frame", table.get(name, "body"), FRAMES) for name in names)
-    return tuple(word == "world" for word in words)
+    return Axes(tuple(word == "world" for word in words))
 
 
-def small_motions(system: Any, state: State, world: tuple[bool, ...]) -> tuple[Any, ...]:
+def small_motions(system: Any, state: State, axes: Axes) -> tuple[Any, ...]:
     """Matrices T, T1, T2, T3 (n, n) from small motions p, counted in moving axes, to variations.
 
     The coordinates vary by T p, the velocities by T dp/dt + T1 p, the accelerations by
     T d2p/dt2 + T2 dp/dt + T3 p. In body axes p turns with the body: what is at rest beside a
     rotating blade has constant p. In world axes p stays: what a spinning disc, which looks the
     same from all sides, does in its bearings has constant coefficients. All are sparse.
+    Blades are counted together, see `rom.mbs.analysis.rotors.blades`.
     """
     bodies, n = system.bodies, state.v.size
-    at, seen = bodies.v_at[:, None], np.array(world)
+    at = bodies.v_at[:, None]
+    seen = np.array(axes.world or [False] * len(at))
+    if axes.blades is not None:
+        seen[axes.blades.bodies] = False
     p = state.q[bodies.q_at[:, None] + np.arange(3, 7)]
     A = np.moveaxis(rotation.matrix(p.T), -1, 0)
     w, dw = (np.cross(np.eye(3), x[at + np.arange(3, 6)][:, None]) for x in (state.v, state.a))
@@ -52,4 +74,8 @@ def small_motions(system: Any, state: State, world: tuple[bool, ...]) -> tuple[A
     elastic[rigid] = 0.0
     where = np.repeat(rigid, 6), np.tile(rigid, 6).ravel()
     T, T1, T2, T3 = (csc_matrix((B.ravel(), where), (n, n)) for B in blocks)
-    return T + diags(elastic), T1, T2, T3
+    T = T + diags(elastic)
+    if axes.blades is None:
+        return T, T1, T2, T3
+    B, B1, B2 = axes.blades.motions(state)
+    return T @ B, T1 @ B + T @ B1, T2 @ B + 2 * T @ B1, T3 @ B + T2 @ B1 + T @ B2

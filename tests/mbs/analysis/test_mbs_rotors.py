@@ -1,0 +1,237 @@
+"""Rotors of blades on supports, with constant coefficients: closed forms and motion in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+from numpy.testing import assert_allclose
+
+import rom
+from rom import rotation
+from rom.errors import ConfigError, RomWarning
+
+HUB_RADIUS, ARM = 0.4, 1.5  # of the hinges; from the hinge to the centre of a blade [m]
+BLADE_MASS, BLADE_INERTIA, THIN, HUB_MASS = 3.0, 2.0, 0.1, 40.0
+NACELLE_MASS, SUPPORT, LAG_SPRING = 60.0, 2.0e4, 40.0
+S, I = BLADE_MASS * ARM, BLADE_INERTIA + BLADE_MASS * ARM**2  # about the hinge
+
+
+def helicopter(n, speed, *, hinge, gravity=0.0, support=SUPPORT, azimuth=0.3):
+    """Blades hinged to a hub that a drive turns on a nacelle on springs, its axis upright.
+
+    Lag hinges are upright, too; flap hinges lie in the plane and across the blade.
+    """
+    mech = rom.Mechanism(gravity=(0, 0, -gravity))
+    nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=(0, 0, 0))
+    ground, centre = mech.ground.marker((0, 0, 0)), nacelle.marker((0, 0, 0))
+    mech.planar("table", ground, centre, normal=(0, 0, 1))
+    K = (support, support, 0, 0, 0, 1e6)
+    mech.bushing("support", ground, centre, stiffness=K)
+    hub = mech.add_rigid("hub", mass=HUB_MASS, inertia=(1.0, 1.0, 2.0), at=(0, 0, 0))
+    mech.revolute("bearing", centre, hub.marker((0, 0, 0)), axis=(0, 0, 1))
+    mech.drive("speed", "bearing", lambda t: speed * t, rate=lambda t: speed)
+    for k in range(n):
+        psi = azimuth + 2 * np.pi * k / n
+        A = rotation.matrix(rotation.exp([0, 0, psi]))
+        out, across = A @ [1.0, 0, 0], A @ [0, 1.0, 0]
+        one = mech.add_rigid(
+            f"blade {k}", mass=BLADE_MASS, inertia=(THIN, BLADE_INERTIA, BLADE_INERTIA),
+            at=(HUB_RADIUS + ARM) * out, orientation=A,
+        )  # fmt: skip
+        axis = (0, 0, 1) if hinge == "lag" else across
+        root = one.marker((-ARM, 0, 0))
+        mech.revolute(f"hinge {k}", hub.marker(HUB_RADIUS * out), root, axis=axis)
+        if hinge == "lag":
+            mech.rotational_spring(f"spring {k}", f"hinge {k}", stiffness=LAG_SPRING)
+    return mech
+
+
+def blades(n):
+    return [f"blade {k}" for k in range(n)]
+
+
+def turning(n, speed, **options):
+    """The mechanism and its steady motion."""
+    mech = helicopter(n, speed, **options)
+    return mech, rom.equilibrium(mech, spin={"bearing": speed})
+
+
+def coleman_feingold(n, speed):
+    """Rates s of hub and lagging blades: (K + M s^2)(k - I (w - W)^2) = n S^2 w^4 / 2, s = i w.
+
+    From Lagrange's equations of the hub, x + i y, and of the complex sum of all lag angles.
+    """
+    w = Polynomial([0, 1])
+    mass = NACELLE_MASS + HUB_MASS + n * BLADE_MASS
+    lag = LAG_SPRING + HUB_RADIUS * S * speed**2 - I * (w - speed) ** 2
+    roots = ((SUPPORT - mass * w**2) * lag - 0.5 * n * S**2 * w**4).roots()
+    rates = 1j * np.asarray(roots, dtype=complex)
+    return np.where(rates.imag < 0, rates.conj(), rates)
+
+
+@pytest.mark.parametrize("n", [3, 4, 5])
+@pytest.mark.parametrize("speed", [5.0, 17.0, 26.0, 35.0])
+def test_ground_resonance_has_the_rates_of_coleman_and_feingold(n, speed):
+    """The support sways at 13 rad/s, a blade lags at about half the speed: unstable around 26."""
+    mech, state = turning(n, speed, hinge="lag")
+    small = rom.linearize(mech, state, frame="world", blades=blades(n))
+    expected = coleman_feingold(n, speed)
+    for rate in expected:
+        assert np.abs(small.eigenvalues - rate).min() < 1e-6 * speed
+    assert small.stable == (expected.real.max() < 1e-9)
+
+
+def test_some_speed_of_ground_resonance_is_unstable():
+    assert coleman_feingold(3, 26.0).real.max() > 0.1
+    assert coleman_feingold(3, 5.0).real.max() < 1e-9
+
+
+def test_ground_resonance_grows_as_fast_in_time():
+    """Blades pushed a little in their plane: the nacelle sways more and more."""
+    speed = 26.0
+    mech, state = turning(3, speed, hinge="lag")
+    growth = rom.linearize(mech, state, frame="world", blades=blades(3)).eigenvalues.real.max()
+    push = state.v.copy()
+    push[0] += 1e-6
+    sol = rom.simulate(mech, state=replace(state, v=push), t_end=10.0, dt=1e-3)
+    sway = np.linalg.norm(sol.position("nacelle")[:, :2], axis=1)
+    late = [sway[(sol.t >= a) & (sol.t < a + 2.0)].max() for a in (4.0, 8.0)]
+    assert_allclose(np.log(late[1] / late[0]) / 4.0, growth, rtol=2e-3)
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_flapping_blades_whirl_at_their_own_frequency_more_and_less_than_the_speed(n):
+    """Hinged blades: alike nu W, backward (nu - 1) W, forward (nu + 1) W, +- in turn nu W."""
+    speeds = np.array([6.0, 6.5, 7.0])
+    found = rom.mbs.campbell(
+        lambda w: turning(n, w, hinge="flap"), speeds, frame="world", blades=blades(n)
+    )
+    nu = np.sqrt((BLADE_INERTIA - THIN + BLADE_MASS * ARM**2 + HUB_RADIUS * S) / I)
+    sway = np.sqrt(SUPPORT / (NACELLE_MASS + HUB_MASS + n * BLADE_MASS))
+    rates = {"alike": nu, "backward": nu - 1, "forward": nu + 1}
+    near = {
+        name: np.isclose(found.eigenvalues, 1j * rate * speeds[:, None], rtol=1e-7)
+        for name, rate in rates.items()
+    }
+    for k, name in enumerate(rates):
+        assert near[name].all(axis=0).sum() == (2 if n == 4 and name == "alike" else 1)
+        if n == 3 or name != "alike":  # of four, two motions share the frequency
+            assert_allclose(found.waves[:, near[name].all(axis=0), k], 1.0, atol=1e-9)
+    assert np.isclose(found.eigenvalues, 1j * sway, rtol=1e-7).sum(axis=1).tolist() == [2] * 3
+
+
+def leaning(speed, springs=300.0):
+    """Flapping blades on a nacelle that a force and a moment push out of its place."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    nacelle = mech.add_rigid("nacelle", mass=50.0, inertia=(5.0,) * 3, at=(0.2, 0.1, 0))
+    ground = mech.ground.marker((0, 0, 0))
+    stiff = (3e4, 4e4, 5e4, 2e4, 3e4, 4e4)
+    mech.bushing("support", ground, nacelle.marker((-0.2, -0.1, 0)), stiffness=stiff)
+    mech.force("push", nacelle.marker((0, 0, 0)), (1800.0, -1000.0, 2000.0))
+    hub = mech.add_rigid("hub", mass=20.0, inertia=(1.0, 1.0, 2.0), at=(0.2, 0.1, 0.5))
+    mech.revolute("bearing", nacelle.marker((0, 0, 0.5)), hub.marker((0, 0, 0)), axis=(0, 0, 1))
+    mech.drive("speed", "bearing", lambda t: speed * t, rate=lambda t: speed)
+    for k in range(3):
+        A = rotation.matrix(rotation.exp([0, 0, 2 * np.pi * k / 3]))
+        one = mech.add_rigid(f"blade {k}", mass=3.0, inertia=(0.1, 2.0, 2.0), orientation=A,
+                             at=(0.2, 0.1, 0.5) + A @ [1.9, 0, 0.4])  # fmt: skip
+        root = one.marker((-1.5, 0, -0.4))
+        mech.revolute(f"hinge {k}", hub.marker(A @ [0.4, 0, 0]), root, axis=A @ [0, 1.0, 0])
+        mech.rotational_spring(f"spring {k}", f"hinge {k}", stiffness=springs)
+    return mech
+
+
+@pytest.mark.parametrize("speed", [2.0, 9.0, 60.0])
+def test_a_rotor_turns_steadily_about_an_axis_that_its_support_leans(speed):
+    """Blades take their place against springs; the nacelle stays where it is, below and above its
+    own frequencies of 14 to 30 rad/s."""
+    mech = leaning(speed)
+    state = rom.equilibrium(mech, spin={"bearing": speed})
+    tilt = 2 * np.arccos(abs(state.q[3]))
+    assert tilt > 0.015
+    sol = rom.simulate(mech, state=state, t_end=2 * np.pi / speed, dt=2e-3 / speed)
+    stays = np.abs(sol.position("nacelle") - sol.position("nacelle")[0]).max()
+    angles = np.array([sol.joint(f"hinge {k}").angle for k in range(3)])
+    assert stays < 2e-7
+    assert np.ptp(angles) < 1e-6
+    assert abs(angles[0, 0]) > 1e-3  # centrifugal forces have turned the blades down
+
+
+def test_what_turns_as_a_whole_may_be_told_either_way():
+    """Lagging blades on a bearing of the ground: bodies, reactions and rates are the same."""
+    mech = leaning(0.0)
+    for name in ("support", "push"):
+        del mech.elements[name]
+    mech.fixed(
+        "support", mech.ground.marker((0.2, 0.1, 0)), mech.parts["nacelle"].marker((0, 0, 0))
+    )
+    whole = rom.equilibrium(mech, spin=(0, 0, 7.0), about=(0.2, 0.1, 0))
+    behind = rom.equilibrium(mech, spin={"bearing": 7.0})
+    assert_allclose(behind.q, whole.q, atol=1e-12)
+
+
+def adrift():
+    """A disc that springs alone hold, to a rotor and to its support."""
+    mech = leaning(1.0)
+    disc = mech.add_rigid("disc", mass=1.0, inertia=(0.1,) * 3, at=(0, 0, 2))
+    for name in ("nacelle", "hub"):
+        mech.bushing(f"to {name}", mech.parts[name].marker((0, 0, 0)), disc.marker((0, 0, 0)),
+                     stiffness=(1e3,) * 6)  # fmt: skip
+    return mech
+
+
+@pytest.mark.parametrize(
+    ("build", "spin", "message"),
+    [
+        (lambda: leaning(1.0), {"bearings": 1.0}, "no joint 'bearings'"),
+        (lambda: leaning(1.0), {"bearing": np.nan}, "must be a finite number"),
+        (lambda: leaning(1.0), {"bearing": 1.0, "hinge 0": 1.0}, "held elsewhere, too: .'hub'"),
+        (adrift, {"bearing": 1.0}, "only forces hold body 'disc'"),
+    ],
+)
+def test_spins_that_make_no_sense_are_refused(build, spin, message):
+    with pytest.raises(ConfigError, match=message):
+        rom.equilibrium(build(), spin=spin)
+
+
+@pytest.mark.parametrize(
+    ("named", "message"),
+    [
+        (blades(2), "3 or more"),
+        ("blade", "3 or more"),
+        (["blade 0", "blade 1", "blade 3"], "no body 'blade 3'"),
+        (["blade 0", "blade 1", "blade 1"], "twice"),
+        (["blade 0", "blade 1", "hub"], "alike"),
+        ([["blade 0", "hub"], ["blade 1"], ["blade 2"]], "alike"),
+    ],
+)
+def test_blades_that_are_none_are_refused(named, message):
+    mech, state = turning(3, 5.0, hinge="lag")
+    with pytest.raises(ConfigError, match=message):
+        rom.linearize(mech, state, blades=named)
+
+
+def test_blades_out_of_order_are_refused():
+    """Four named across instead of around stand by half a turn."""
+    mech, state = turning(4, 5.0, hinge="lag")
+    with pytest.raises(ConfigError, match="does not stand"):
+        rom.linearize(mech, state, blades=[f"blade {k}" for k in (0, 2, 1, 3)])
+
+
+def test_the_order_of_blades_may_be_either_sense():
+    mech, state = turning(3, 26.0, hinge="lag")
+    either = [
+        rom.linearize(mech, state, frame="world", blades=[f"blade {k}" for k in order]).eigenvalues
+        for order in ((0, 1, 2), (1, 0, 2))
+    ]
+    assert_allclose(np.sort_complex(either[0]), np.sort_complex(either[1]), rtol=1e-9)
+
+
+def test_coefficients_that_stay_periodic_are_told():
+    """On a support that is stiffer in one direction; blades counted together have constant ones."""
+    mech = leaning(9.0)
+    state = rom.equilibrium(mech, spin={"bearing": 9.0})
+    with pytest.warns(RomWarning, match="change with time"):
+        rom.linearize(mech, state)
+    rom.linearize(mech, state, frame="world", blades=blades(3))
