@@ -320,7 +320,8 @@ FAILURE_COSTS = {
     "Reduce it with stiffening=True.",
     "energy balance": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
     "drift of energy": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
-    "change of ": f"Momentum changes though nothing pushes from outside. {SMALLER_STEPS}",
+    "change of ": "Momentum changes though nothing pushes from outside. Flexible bodies with "
+    f'stiffening=True or reference="mean-axis" lose least. {SMALLER_STEPS}',
     "gap in a joint": f"Joints come apart. {SMALLER_STEPS}",
     "slip of what rolls": f"What rolls slips. {SMALLER_STEPS}",
     "Newton corrections": f"Steps are hard to solve: something is stiff. {SMALLER_STEPS}",
