@@ -381,3 +381,17 @@ def test_bad_bodies_are_named():
     with pytest.raises(ConfigError, match="used twice"):
         mech.add_rigid("pair", mass=1.0, inertia=(1, 1, 1), at=ORIGIN)
     assert part.marker("far") == part.marker(1) == part.marker(-1)
+
+
+def test_all_of_a_shaft_turns_behind_its_bearing():
+    """A spring at its far end holds it to the ground, too; its segments are one body."""
+    mech = rom.Mechanism(gravity=ORIGIN)
+    shaft = mech.add_nonlinear("shaft", body(a_rod(6)))
+    mech.revolute("bearing", mech.ground.marker(ORIGIN), shaft.marker("start"), axis=(1, 0, 0))
+    stiff = (0.0, 1e3, 1e3, 0.0, 0.0, 0.0)
+    mech.bushing("far", mech.ground.marker((10.0, 0, 0)), shaft.marker("end"), stiffness=stiff)
+    state = rom.equilibrium(mech, spin={"bearing": 3.0})
+    turns = rom.snapshot(mech, state)
+    for k in range(len(shaft.parts)):
+        assert_allclose(rotation.matrix(turns.orientation(f"shaft.{k}")[0])
+                        @ turns.omega(f"shaft.{k}")[0], [3.0, 0, 0], atol=1e-9)  # fmt: skip

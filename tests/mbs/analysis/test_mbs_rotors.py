@@ -10,6 +10,8 @@ from numpy.testing import assert_allclose
 import rom
 from rom import rotation
 from rom.errors import ConfigError, RomWarning
+from rom.mbs.analysis.local_equations import instant
+from rom.mbs.analysis.rotors.spins import Spins
 
 HUB_RADIUS, ARM = 0.4, 1.5  # of the hinges; from the hinge to the centre of a blade [m]
 BLADE_MASS, BLADE_INERTIA, THIN, HUB_MASS = 3.0, 2.0, 0.1, 40.0
@@ -17,17 +19,16 @@ NACELLE_MASS, SUPPORT, LAG_SPRING = 60.0, 2.0e4, 40.0
 S, I = BLADE_MASS * ARM, BLADE_INERTIA + BLADE_MASS * ARM**2  # about the hinge
 
 
-def helicopter(n, speed, *, hinge, gravity=0.0, support=SUPPORT, azimuth=0.3):
+def helicopter(n, speed, *, hinge, damping=0.0, azimuth=0.3):
     """Blades hinged to a hub that a drive turns on a nacelle on springs, its axis upright.
 
     Lag hinges are upright, too; flap hinges lie in the plane and across the blade.
     """
-    mech = rom.Mechanism(gravity=(0, 0, -gravity))
+    mech = rom.Mechanism(gravity=(0, 0, 0))
     nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=(0, 0, 0))
     ground, centre = mech.ground.marker((0, 0, 0)), nacelle.marker((0, 0, 0))
     mech.planar("table", ground, centre, normal=(0, 0, 1))
-    K = (support, support, 0, 0, 0, 1e6)
-    mech.bushing("support", ground, centre, stiffness=K)
+    mech.bushing("support", ground, centre, stiffness=(SUPPORT, SUPPORT, 0, 0, 0, 1e6))
     hub = mech.add_rigid("hub", mass=HUB_MASS, inertia=(1.0, 1.0, 2.0), at=(0, 0, 0))
     mech.revolute("bearing", centre, hub.marker((0, 0, 0)), axis=(0, 0, 1))
     mech.drive("speed", "bearing", lambda t: speed * t, rate=lambda t: speed)
@@ -43,7 +44,8 @@ def helicopter(n, speed, *, hinge, gravity=0.0, support=SUPPORT, azimuth=0.3):
         root = one.marker((-ARM, 0, 0))
         mech.revolute(f"hinge {k}", hub.marker(HUB_RADIUS * out), root, axis=axis)
         if hinge == "lag":
-            mech.rotational_spring(f"spring {k}", f"hinge {k}", stiffness=LAG_SPRING)
+            spring = {"stiffness": LAG_SPRING, "damping": damping}
+            mech.rotational_spring(f"spring {k}", f"hinge {k}", **spring)
     return mech
 
 
@@ -57,26 +59,28 @@ def turning(n, speed, **options):
     return mech, rom.equilibrium(mech, spin={"bearing": speed})
 
 
-def coleman_feingold(n, speed):
-    """Rates s of hub and lagging blades: (K + M s^2)(k - I (w - W)^2) = n S^2 w^4 / 2, s = i w.
+def coleman_feingold(n, speed, damping=0.0):
+    """Rates s = i w of hub and lagging blades.
 
-    From Lagrange's equations of the hub, x + i y, and of the complex sum of all lag angles.
+    (K - M w^2)(k + i c (w - W) - I (w - W)^2) = n S^2 w^4 / 2, from Lagrange's equations of the
+    hub, x + i y, and of the complex sum of all lag angles.
     """
     w = Polynomial([0, 1])
     mass = NACELLE_MASS + HUB_MASS + n * BLADE_MASS
-    lag = LAG_SPRING + HUB_RADIUS * S * speed**2 - I * (w - speed) ** 2
+    lag = LAG_SPRING + HUB_RADIUS * S * speed**2 + (1j * damping - I * (w - speed)) * (w - speed)
     roots = ((SUPPORT - mass * w**2) * lag - 0.5 * n * S**2 * w**4).roots()
     rates = 1j * np.asarray(roots, dtype=complex)
     return np.where(rates.imag < 0, rates.conj(), rates)
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])
-@pytest.mark.parametrize("speed", [5.0, 17.0, 26.0, 35.0])
-def test_ground_resonance_has_the_rates_of_coleman_and_feingold(n, speed):
+@pytest.mark.parametrize(("speed", "damping"), [(5.0, 0.0), (17.0, 0.0), (26.0, 0.0), (26.0, 4.0),
+                                                (35.0, 9.0)])  # fmt: skip
+def test_ground_resonance_has_the_rates_of_coleman_and_feingold(n, speed, damping):
     """The support sways at 13 rad/s, a blade lags at about half the speed: unstable around 26."""
-    mech, state = turning(n, speed, hinge="lag")
+    mech, state = turning(n, speed, hinge="lag", damping=damping)
     small = rom.linearize(mech, state, frame="world", blades=blades(n))
-    expected = coleman_feingold(n, speed)
+    expected = coleman_feingold(n, speed, damping)
     for rate in expected:
         assert np.abs(small.eigenvalues - rate).min() < 1e-6 * speed
     assert small.stable == (expected.real.max() < 1e-9)
@@ -220,12 +224,31 @@ def test_blades_out_of_order_are_refused():
 
 
 def test_the_order_of_blades_may_be_either_sense():
-    mech, state = turning(3, 26.0, hinge="lag")
-    either = [
-        rom.linearize(mech, state, frame="world", blades=[f"blade {k}" for k in order]).eigenvalues
+    found = [
+        rom.mbs.campbell(lambda w: turning(3, w, hinge="flap"), [6.0, 6.5], frame="world",
+                         blades=[f"blade {k}" for k in order])
         for order in ((0, 1, 2), (1, 0, 2))
-    ]
-    assert_allclose(np.sort_complex(either[0]), np.sort_complex(either[1]), rtol=1e-9)
+    ]  # fmt: skip
+    assert_allclose(found[0].eigenvalues, found[1].eigenvalues, rtol=1e-9)
+    assert_allclose(found[0].waves, found[1].waves, atol=1e-6)
+
+
+def test_steady_velocities_change_as_small_motions_say():
+    """What moves the nacelle moves the axis, and with it all that turns: central differences."""
+    mech, speed, rng = leaning(9.0), 9.0, np.random.default_rng(3)
+    now = instant(mech, 0.0)
+    spins = Spins.of(mech, now, {"bearing": speed}, (0, 0, 0))
+    state = spins.steady(now, rom.equilibrium(mech, spin={"bearing": speed}))
+    T, T1, T3 = spins.motions(now, state)
+    for _ in range(4):
+        p = 1e-6 * rng.normal(size=state.v.size)
+        sides = [
+            spins.steady(now, replace(state, q=now.shifted(state.q, sign * (T @ p))))
+            for sign in (-1, 1)
+        ]
+        for change, of in ((T1 @ p, "v"), (T3 @ p, "a")):
+            seen = (getattr(sides[1], of) - getattr(sides[0], of)) / 2
+            assert_allclose(change, seen, atol=1e-8 * np.abs(seen).max())
 
 
 def test_coefficients_that_stay_periodic_are_told():
