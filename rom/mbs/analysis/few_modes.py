@@ -25,7 +25,7 @@ SHIFT_SHARE = 1e-6  # of the stiffest square, where the search for the lowest mo
 N_SPARE = 3  # modes beyond those asked for, so that a gap for counting is found
 N_PROBES, N_PASSES = 12, 3  # of the inverse iteration that looks for the lowest eigenvalue
 MAX_SHIFTS = 12  # each a thousandth of the last
-RANK_RTOL = 1e-10  # of unit masses and gradients, below which a constraint repeats others
+RANK_RTOL = 1e-12  # of unit masses and gradients, below which a constraint repeats others
 ROUND_OFF = 32 * np.finfo(float).eps  # of the terms that add up to an eigenvalue
 MIN_GAP = 1e-6  # between neighbouring eigenvalues in which modes are counted, relative
 SYMMETRY_RTOL = 1e-9
@@ -132,7 +132,8 @@ class Pencil:
         stiffest = abs(K2).max() if K2.nnz else 0.0
         K2, C2, M2 = (csc_matrix(A) for A in (K2, C2, basis.T @ M @ basis))
         scale = SHIFT_SHARE * stiffest or 1.0
-        groups, alone = now.pattern.groups, now.packed.by_blocks
+        groups = now.pattern.groups
+        alone = now.packed.by_blocks and not now.packed.shares
         return cls(K2, C2, M2, G, groups, scale, csc_matrix(basis), row, alone)
 
     @cached_property
@@ -221,12 +222,12 @@ class Pencil:
 
     def count(self, shift: float) -> int:
         """Number of undamped modes below a shift [1/s^2]."""
-        A = bordered(self.even - shift * self.M, self.G, redundant=self.redundant > 0)
+        A = bordered(self.even - shift * self.M, self.G, redundant=not self.independent)
         return signature(A, self.groups).negative - self.G.shape[0]
 
     def inverse(self, K: Any) -> Constrained:
         """The factorised equations with K in place of the stiffness."""
-        return Constrained(csc_matrix(K), self.G, redundant=self.redundant > 0)
+        return Constrained(csc_matrix(K), self.G, redundant=not self.independent)
 
     def allows(self, other: "Pencil") -> bool:
         """Whether the joints of another instant allow the same motions."""

@@ -220,7 +220,7 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
         sparse = packed.v.size > MAX_DENSE
         packed = packed if sparse else packed.whole()
     if sparse and packed.by_blocks and not independent(packed):
-        packed = packed.whole()
+        packed = packed.sharing()
     W = workspace(packed.system, len(packed.signals))
     pattern = Pattern(packed) if sparse else None
     return Instant(packed, W, float(t), packed.asked, pattern=pattern).at(float(t))

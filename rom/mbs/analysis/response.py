@@ -206,7 +206,7 @@ class _Large:
         unit = np.zeros(p.G.shape[0])
         unit[packed.rows_of(drive)] = 1.0
         unit /= p.row
-        still = Constrained(identity(p.M.shape[0]), p.G, redundant=p.redundant > 0)
+        still = Constrained(identity(p.M.shape[0]), p.G, redundant=not p.independent)
         enforced = still.solve(np.zeros(p.M.shape[0]), unit)[0]
         if np.abs(p.G @ enforced - unit).max() > 1e-8 * np.abs(unit).max():
             raise _blocked(drive)

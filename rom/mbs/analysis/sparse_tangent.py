@@ -125,5 +125,5 @@ class SparseTangent:
     def _balanced(self) -> tuple[Array, Array]:
         """(n,) what remains of the forces beside (m,) the best multipliers."""
         p = self.pencil
-        left, l = Constrained(identity(self.r.size), p.G, redundant=p.redundant > 0).solve(self.r)
+        left, l = Constrained(identity(self.r.size), p.G, redundant=not p.independent).solve(self.r)
         return left, -l / p.row

@@ -18,7 +18,10 @@ PIVOT_RTOL = 1e-13
 
 @inner
 def fill_blocks(s, W):
-    """Write [S, UG^T; UGT, 0], scaled by W.scaling, into W.factor in the order of the plan."""
+    """Write [S, UG^T; UGT, -soft], scaled by W.scaling, into W.factor in the order of the plan.
+
+    Nothing is soft unless constraints may repeat others.
+    """
     bodies, graph, P, F, d = s.bodies, s.graph, s.graph.plan, W.factor, W.scaling
     n = W.residual.size
     F[:] = 0.0
@@ -36,6 +39,8 @@ def fill_blocks(s, W):
                 c = d[n + k] * d[bodies.v_at[b] + q]
                 F[P.row_to[k, p] + q] = W.UGT[k, graph.at[k, p] + q] * c
                 F[P.row_back[k, p] + q * P.row_stride[k, p]] = W.UG[k, graph.at[k, p] + q] * c
+        if graph.shares != 0:
+            F[P.corner[k]] = -W.soft[k]
 
 
 @inner

@@ -7,6 +7,7 @@ from rom.mbs.equations.linear_solve import (
     constraint_range,
     factorise_bordered,
     may_repeat_constraints,
+    remove_undecided,
     solve_bordered,
 )
 from rom.mbs.kernels.algebra import scale, turned, vec
@@ -122,22 +123,6 @@ def element_energy(s, W, q, v):
     return total
 
 
-@stage(types.void, System, Work, types.int64, REAL_VECTOR, needed=may_repeat_constraints)
-def least_multipliers(s, W, rank, lam):
-    """Replace lam by the multipliers of least norm that give the same forces."""
-    m = lam.size
-    constraint_range(s, W, rank, W.U)
-    for k in range(rank):
-        total = 0.0
-        for p in range(m):
-            total += W.U[k, p] * lam[p]
-        W.part[k] = total
-    for p in range(m):
-        lam[p] = 0.0
-        for k in range(rank):
-            lam[p] += W.U[k, p] * W.part[k]
-
-
 @kernel
 def retract(s, q, psi, out):
     """Coordinates q o exp(psi): positions and elastic add up, rotations turn in the body frame."""
@@ -181,6 +166,29 @@ def factorise_motion(s, W, rank, accepted):
         constraint_range(s, W, rank, W.U_lu)
     border(W, rank)
     return factorise_bordered(s, W, rank)
+
+
+@stage(types.void, System, Work, types.int64, REAL_VECTOR, needed=may_repeat_constraints)
+def least_multipliers(s, W, rank, lam):
+    """Replace lam by the multipliers of least norm that give the same forces.
+
+    In blocks this takes the factors of a step.
+    """
+    m = lam.size
+    if s.graph.shares != 0:
+        if factorise_motion(s, W, rank, False):
+            remove_undecided(s, W, lam)
+        return
+    constraint_range(s, W, rank, W.U)
+    for k in range(rank):
+        total = 0.0
+        for p in range(m):
+            total += W.U[k, p] * lam[p]
+        W.part[k] = total
+    for p in range(m):
+        lam[p] = 0.0
+        for k in range(rank):
+            lam[p] += W.U[k, p] * W.part[k]
 
 
 @stage(types.void, System, Work, *4 * (REAL_VECTOR,), types.int64)

@@ -1,6 +1,6 @@
 """The graph of a mechanism: storage of its blocks, and the choice of how its equations are solved.
 
-Whole matrices are quicker for a few bodies, and needed where constraints repeat others or roll.
+Whole matrices are quicker for a few bodies.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,6 @@ import numpy as np
 
 from rom.mbs.equations.ordering import Group, Ordering, forest
 from rom.mbs.kernels.plan import Graph, Plan
-from rom.mbs.kernels.system import ROLL
 from rom.model import Index
 
 # operations of a whole factorisation over those by blocks, from which blocks are quicker: measured
@@ -27,7 +26,7 @@ def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Gra
         whole: store whole matrices whatever they cost.
     """
     neighbours, groups = _neighbours(system, coupled), _groups(system)
-    plan = None if whole or (system.rows.kind == ROLL).any() else _plan(system, neighbours, groups)
+    plan = None if whole else _plan(system, neighbours, groups)
     compact = plan is not None
     width, bodies = 6 + system.bodies.r, system.bodies
     first = _starts([len(others) for others in neighbours])
@@ -40,7 +39,7 @@ def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Gra
     touched, at = _touched(system, compact)
     rows = [group.rows for group in groups]
     return Graph(
-        int(compact), *(first, other, x, y, own, touched, at),
+        int(compact), 0, *(first, other, x, y, own, touched, at),
         _starts([len(r) for r in rows]), _integers([k for r in rows for k in r]),
         plan or NO_PLAN,
     )  # fmt: skip
@@ -135,10 +134,12 @@ def _tables(
     for b in range(n_bodies):
         position[v_at[b] + np.arange(width[b])] = start[place[b]] + np.arange(width[b])
     row_to, back, stride = (np.zeros((m, 4), dtype=np.int64) for _ in range(3))
+    corner = np.zeros(m, dtype=np.int64)
     for g, group in enumerate(groups):
         mine = place[n_bodies + g] if group.rows else -1
         for i, k in enumerate(group.rows):
             position[n + k] = start[mine] + i
+            corner[k] = pivot[mine] + i * (d[mine] + 1)
             for side, b in enumerate(_bodies_of(system, k)):
                 to, apart = where(mine, place[b])
                 row_to[k, side] = to + i * apart
@@ -149,7 +150,7 @@ def _tables(
         *(_starts([len(o) for o in later]), _integers([q for o in later for q in o])),
         _integers([x for s in shift for x in s[:-1]]),
         *(_starts([len(o) ** 2 for o in later])[:-1], *_columns(pairs), *_columns(blocks)),
-        *(row_to, back, stride, begin[-1:]),
+        *(corner, row_to, back, stride, begin[-1:]),
     )
 
 
@@ -185,7 +186,7 @@ def _integers(values: Any) -> Index:
 
 
 NO_PLAN = Plan(
-    *(np.zeros(0, dtype=np.int64) for _ in range(15)),
+    *(np.zeros(0, dtype=np.int64) for _ in range(16)),
     *(np.zeros((0, 4), dtype=np.int64) for _ in range(3)),
     np.zeros(1, dtype=np.int64),
 )

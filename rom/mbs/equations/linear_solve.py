@@ -16,13 +16,25 @@ from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
 
+# by how much a constraint gives way where some repeat others, in units of mass and gradient: far
+# more than round-off, far less than independent ones resist; and the ratio of least to largest
+SOFTNESS, SOFTNESS_RATIO = 1e-8, 1e-2
+
 
 def may_repeat_constraints(system):
-    """Whether constraints may depend on each other: only whole matrices bear that."""
+    """Whether constraints may depend on each other."""
+    return not system.graph.compact or system.graph.shares
+
+
+def _has_whole_matrices(system):
     return not system.graph.compact
 
 
-@stage(types.void, System, Work, types.int64, REAL_MATRIX, needed=may_repeat_constraints)
+def _shares_in_blocks(system):
+    return system.graph.compact and system.graph.shares
+
+
+@stage(types.void, System, Work, types.int64, REAL_MATRIX, needed=_has_whole_matrices)
 def constraint_range(s, W, rank, U):
     """Set the leading rows of U (rank, m) to an orthonormal basis of the range of W.G."""
     range_basis(W.G, rank, W.remainder, U)
@@ -62,6 +74,18 @@ def set_scaling(s, W, rank):
             for q in range(6 + bodies.r[b] if b >= 0 else 0):
                 total += (W.UG[k, graph.at[k, p] + q] * d[bodies.v_at[b] + q]) ** 2
         d[n + k] = 1.0 / math.sqrt(total) if total > 0.0 else 1.0
+    if graph.shares != 0:
+        set_softness(W, n, rank)
+
+
+@inner
+def set_softness(W, n, rank):
+    """Softness of each constraint: multipliers that nothing decides get the least norm."""
+    most = 0.0
+    for k in range(rank):
+        most = max(most, W.scaling[n + k] ** 2)
+    for k in range(rank):
+        W.soft[k] = SOFTNESS * max(W.scaling[n + k] ** 2 / most, SOFTNESS_RATIO)
 
 
 @inner
@@ -116,6 +140,45 @@ def solve_blocks(s, W):
     substitute(s.graph.plan, W.factor, W.pivot, W.rhs, W.spare)
 
 
+@stage(types.void, System, Work, needed=_shares_in_blocks)
+def solve_sharing(s, W):
+    """The same where constraints may repeat others: exact ones, and multipliers of least norm.
+
+    Constraints gave way by their softness E times their multipliers. Two more solutions for what
+    this left, -E lam, take the motions x to those of constraints that do not; of the multipliers
+    they repeat the part n that nothing decides: lam_1 = r_1 + n, lam_2 = r_2 + n, lam_3 = n, and
+    r_1 + r_2 is wanted.
+    """
+    n = W.residual.size
+    solve_blocks(s, W)
+    for turn in range(2):
+        for i in range(W.rhs.size):
+            W.refined[turn, i] = W.rhs[i]
+            W.rhs[i] = 0.0 if i < n else -W.soft[i - n] * W.rhs[i]
+        solve_blocks(s, W)
+    for i in range(W.rhs.size):
+        third = W.rhs[i] if i < n else -2.0 * W.rhs[i]
+        W.rhs[i] = W.refined[0, i] + W.refined[1, i] + third
+
+
+@stage(types.void, System, Work, REAL_VECTOR, needed=_shares_in_blocks)
+def remove_undecided(s, W, lam):
+    """Take from multipliers lam (m,) what does nothing; `factorise_bordered` before."""
+    n = W.residual.size
+    for i in range(n):
+        W.rhs[i] = 0.0
+    for k in range(lam.size):
+        W.rhs[n + k] = -W.soft[k] * lam[k] / W.scaling[n + k]
+    for turn in range(2):
+        solve_blocks(s, W)
+        for i in range(n if turn == 0 else 0):
+            W.rhs[i] = 0.0
+        for k in range(lam.size if turn == 0 else 0):
+            W.rhs[n + k] *= -W.soft[k]
+    for k in range(lam.size):
+        lam[k] -= W.rhs[n + k] * W.scaling[n + k]
+
+
 @stage(types.boolean, System, Work, types.int64)
 def factorise_bordered(s, W, rank):
     """Factorise [S, UG^T; UGT, 0]; False when it is singular."""
@@ -125,7 +188,7 @@ def factorise_bordered(s, W, rank):
     if s.graph.compact:
         if factorise_blocks(s, W):
             return True
-        if W.lu.shape[0] < n + rank:
+        if W.lu.shape[0] < n + rank or s.graph.shares != 0:
             return False
         W.by_blocks[0] = 0
         fill_from_blocks(s, W)
@@ -147,7 +210,9 @@ def solve_bordered(s, W, rank, x, lam):
             for p in range(m):
                 total += W.U_lu[k, p] * W.part[p]
         W.rhs[n + k] = total * W.scaling[n + k]
-    if W.by_blocks[0]:
+    if W.by_blocks[0] and s.graph.shares != 0:
+        solve_sharing(s, W)
+    elif W.by_blocks[0]:
         solve_blocks(s, W)
     else:
         back_substitute(W.lu, n + rank, W.pivot, W.rhs)

@@ -28,6 +28,11 @@ from rom.model import Array, Index
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
 
 
+MAX_SHARING_WHOLE = (
+    100  # coordinates up to which whole matrices are quicker where constraints repeat
+)
+
+
 @dataclass(frozen=True)
 class Packed:
     """A mechanism ready to run.
@@ -110,10 +115,26 @@ class Packed:
         """Whether the equations are stored and solved body by body, joint by joint."""
         return bool(self.system.graph.compact)
 
+    @property
+    def shares(self) -> bool:
+        """Whether constraints in blocks may repeat others."""
+        return bool(self.system.graph.shares)
+
     def whole(self) -> "Packed":
-        """The same with whole matrices, which constraints that repeat others need."""
+        """The same with whole matrices."""
         graph = graph_of(self.system, self.coupled(), whole=True)
         return replace(self, system=self.system.replace(graph=graph))
+
+    def sharing(self) -> "Packed":
+        """The same where constraints repeat others: of many coordinates still in blocks."""
+        if self.v.size <= MAX_SHARING_WHOLE:
+            return self.whole()
+        graph = self.system.graph.replace(shares=1)
+        return replace(self, system=self.system.replace(graph=graph))
+
+    def rows_solved(self, rank: int) -> int:
+        """Number of constraints in the equations: in blocks all, whole the independent ones."""
+        return int(self.system.rows.kind.size) if self.by_blocks else rank
 
     def coupled(self) -> list[Any]:
         """Groups of bodies that elements couple."""

@@ -124,6 +124,7 @@ class _Run:
             RomError: of a step that cannot be taken, a signal or a law.
         """
         record, now = self.record, self.now
+        rank = record.packed.rows_solved(record.final.rank)
         tables = (self.W, self.beside, now, self.back, self.trial)
         todo = {
             alpha.NEEDS_LAWS: lambda: self.apply_laws(self.W),
@@ -133,7 +134,7 @@ class _Run:
         }
         while True:
             clock = perf_counter()
-            answer = control.take_steps(record.packed.system, *tables, record.final.rank)
+            answer = control.take_steps(record.packed.system, *tables, rank)
             record.compiled += perf_counter() - clock
             if answer == control.PAUSED:
                 return

@@ -1,19 +1,24 @@
 """The start of a motion: positions that fit, velocities that fit, accelerations."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import bmat, csr_matrix, diags, identity
 
 from rom.errors import ModelError, SolverError, warn
 from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
 from rom.mbs.equations.linear_solve import factorise_bordered, gradient_times, solve_bordered
 from rom.mbs.equations.packing import Packed
+from rom.mbs.equations.pattern import Pattern
+from rom.mbs.equations.signature import signature
+from rom.mbs.equations.sparse_solve import Constrained, unit_rows
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.signals import first_failure, sample_all
 from rom.mbs.results.state import Memory, State  # noqa: F401  under its old name
 from rom.model import Array, Integers
+from rom.notebook import listed
 
 # relative singular value below which a constraint counts as a copy of others: assembled
 # mechanisms show 1e-12 and less, independent constraints 1e-4 and more
@@ -22,6 +27,7 @@ RANK_TOLERANCE = 1e-8
 ELASTIC_WEIGHT = 1e8
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60
+N_PROBES = 4  # gaps by which constraints that repeat others are found
 
 
 def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> State:
@@ -49,12 +55,13 @@ def _start(packed: Packed, signal: Array, t: float) -> State:
     """The state at the start, by whole matrices if the rank of the constraints needs them."""
     W = workspace(packed.system, len(packed.signals))
     W.signal[:] = signal
-    if packed.by_blocks and not _independent(packed, W, packed.q):
-        return _start(packed.whole(), signal, t)
+    surely = packed.by_blocks and not packed.shares
+    if surely and not _independent(packed, W, packed.q):
+        return _start(packed.sharing(), signal, t)
     q = assembled(packed, W, packed.q)
-    if packed.by_blocks and not _independent(packed, W, q):
-        return _start(packed.whole(), signal, t)
-    rank = W.value.size if packed.by_blocks else _rank(packed, W, q)
+    if surely and not _independent(packed, W, q):
+        return _start(packed.sharing(), signal, t)
+    rank = W.value.size if surely else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
     v = fitting_velocity(packed, W, q, packed.v)
     return with_accelerations(packed, W, State(t, q, v, v * 0, np.zeros(W.value.size), rank))
@@ -80,7 +87,8 @@ def with_accelerations(packed: Packed, W: Work, state: State) -> State:
     """
     a, lam = np.zeros(state.v.size), np.zeros(state.lam.size)
     y = np.concatenate([state.q, state.v, np.zeros(3)])
-    if not rates(packed.system, W, y, state.rank, True, a, lam, np.zeros_like(y)):
+    rows = packed.rows_solved(state.rank)
+    if not rates(packed.system, W, y, rows, True, a, lam, np.zeros_like(y)):
         where = f"at t = {state.t:.9g} s{packed.broken_laws}"
         raise SolverError(f"the equations of motion are singular {where}.")
     return replace(state, a=a, lam=lam, base=W.base.copy())
@@ -144,7 +152,12 @@ def _weights(packed: Packed, W: Work) -> Array:
 
 
 def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Integers) -> Array:
-    """Solution x of G x = gap in some rows, all by blocks, with the least weighted norm."""
+    """Solution x of G x = gap in some rows, with the least weighted norm."""
+    if packed.by_blocks and rows.size < gap.size:
+        A, size = unit_rows(Pattern(packed).gradient(W.G)[rows] @ diags(weight))
+        closing = Constrained(identity(weight.size), A, redundant=True)
+        found: Array = weight * closing.solve(0 * weight, gap[rows] / size)[0]
+        return found
     if packed.by_blocks:
         _weigh(packed.system, W, weight)
         if not factorised(packed.system, W, 0.0):
@@ -248,15 +261,48 @@ def _prescribed(packed: Packed, W: Work, derivative: int) -> Array:
     return np.where(signal >= 0, W.signal[np.maximum(signal, 0), derivative], 0.0)
 
 
-def _singular(packed: Packed, W: Work, q: Array) -> tuple[Array, Array]:
-    """Left singular vectors (m, m) and relative singular values of the scaled constraints."""
+@dataclass(frozen=True)
+class _Constraints:
+    """Constraints at one position, rows of length one, motions in units that cost the same.
+
+    Attributes:
+        rank: number of independent ones.
+        share: (m,) how much each takes part in what repeats others.
+        step: (n,) a motion along free directions, in units of the coordinates.
+    """
+
+    rank: int
+    share: Array
+    step: Array
+
+
+def _constraints(packed: Packed, W: Work, q: Array) -> _Constraints:
     linearize_constraints(packed.system, W, q, np.zeros(packed.v.size))
-    A = W.G * _weights(packed, W)
+    weight = _weights(packed, W)
+    return _by_blocks(packed, W, weight) if packed.by_blocks else _by_matrix(W.G * weight, weight)
+
+
+def _by_matrix(A: Array, weight: Array) -> _Constraints:
     norms = np.linalg.norm(A, axis=1)
     A = A / np.where(norms > 0, norms, 1.0)[:, None]
-    U, s, _ = np.linalg.svd(A)
-    s = np.concatenate([s, np.zeros(U.shape[1] - s.size)])
-    return U, s / s.max()
+    U, s, V = np.linalg.svd(A)
+    rank = int((s > RANK_TOLERANCE * s.max(initial=0.0)).sum())
+    share = np.abs(U[:, rank:]).max(axis=1, initial=0.0)
+    return _Constraints(rank, share, weight * V[rank:].sum(axis=0))
+
+
+def _by_blocks(packed: Packed, W: Work, weight: Array) -> _Constraints:
+    """The same from sparse matrices; probes take the place of singular vectors."""
+    pattern = Pattern(packed)
+    A, _ = unit_rows(pattern.gradient(W.G) @ diags(weight))
+    m, n = A.shape
+    whole = bmat([[identity(n), A.T], [A, csr_matrix((m, m))]], format="csc")
+    rank = m - signature(whole, pattern.groups, RANK_TOLERANCE**1.5).zero
+    equations = Constrained(identity(n), A, redundant=True)
+    gaps = np.sin(np.outer(1.0 + np.arange(m), 1.0 + np.arange(N_PROBES)))
+    closing = equations.solve(np.zeros((n, N_PROBES)), gaps)[0]
+    share = np.abs(gaps - A @ closing).max(axis=1)
+    return _Constraints(rank, share, weight * equations.solve(np.sin(1.0 + np.arange(n)))[0])
 
 
 def _rank(packed: Packed, W: Work, q: Array) -> int:
@@ -264,14 +310,13 @@ def _rank(packed: Packed, W: Work, q: Array) -> int:
     m = W.value.size
     if not m:
         return 0
-    U, s = _singular(packed, W, q)
-    rank = int((s > RANK_TOLERANCE).sum())
+    found = _constraints(packed, W, q)
+    rank, share = found.rank, found.share
     if rank < m:
-        share = np.abs(U[:, rank:]).max(axis=1)
         names = dict.fromkeys(o for o, x in zip(packed.row_owner, share, strict=True) if x > 1e-6)
         _refuse_shared_friction(packed, names)
         warn(
-            f"{m - rank} of {m} constraints repeat others; joints {', '.join(names)} share loads "
+            f"{m - rank} of {m} constraints repeat others; joints {listed(names)} share loads "
             "that only their deformation could divide. The motion is exact, the reactions are "
             "those of least norm."
         )
@@ -297,12 +342,9 @@ def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
     """
     if rank == W.value.size or rank == 0:
         return
-    _singular(packed, W, q)
-    weight = _weights(packed, W)
-    free = np.linalg.svd(W.G * weight)[2][rank:]
-    if not free.size:
+    if rank == packed.v.size:
         return
-    step = weight * free.sum(axis=0)
+    step = _constraints(packed, W, q).step
     reach = max(_largest_turn(packed, step), 1e-300)
     beside = np.empty_like(q)
     retract(packed.system, q, step * (1e-2 / reach), beside)
@@ -310,7 +352,7 @@ def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
         beside = assembled(packed, W, beside)
     except ModelError:
         return
-    raised = int((_singular(packed, W, beside)[1] > RANK_TOLERANCE).sum())
+    raised = _constraints(packed, W, beside).rank
     if raised > rank:
         raise ModelError(
             f"the mechanism starts in a singular position: {rank} independent constraints there, "

@@ -24,7 +24,8 @@ class Equations:
     """The right-hand side for one run; keeps the last accelerations and multipliers."""
 
     def __init__(self, record: Record, W: Work, state: State):
-        self.record, self.W, self.rank = record, W, state.rank
+        self.record, self.W = record, W
+        self.rank, self.rows = state.rank, record.packed.rows_solved(state.rank)
         self.n_q, self.n = state.q.size, state.v.size
         self.a, self.lam = np.zeros(self.n), np.zeros(state.lam.size)
         self.forces = record.packed.asked
@@ -50,7 +51,7 @@ class Equations:
             apply_laws(self.forces, self.W, t)
         out = np.zeros_like(y)
         clock = perf_counter()
-        solved = rates(packed.system, self.W, y, self.rank, accepted, self.a, self.lam, out)
+        solved = rates(packed.system, self.W, y, self.rows, accepted, self.a, self.lam, out)
         self.record.compiled += perf_counter() - clock
         if not solved or not np.isfinite(out).all():
             where = f"at t = {t:.9g} s{packed.broken_laws}"

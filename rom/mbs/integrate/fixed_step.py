@@ -131,7 +131,8 @@ def _retrace(record: Record, W: Work, mark: Mark, forces: Laws, chunk: tuple[Any
 def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: tuple[Any, ...]) -> int:
     """Run a chunk, calling Python forces whenever they are asked for; says how it ended."""
     times, table, out = chunk
-    settings, rank, system = record.settings, record.final.rank, record.packed.system
+    settings, system = record.settings, record.packed.system
+    rank = record.packed.rows_solved(record.final.rank)
     answer = alpha.NEEDS_LAWS
     while answer == alpha.NEEDS_LAWS:
         clock = perf_counter()

@@ -281,9 +281,10 @@ def accept(s, W, step, rank):
     copy(step.v1, step.v)
     copy(step.vd1, step.vd)
     copy(step.lam1, step.lam)
-    if rank < step.lam.size:
+    if rank < step.lam.size or s.graph.shares != 0:
         constraint_gradient(s, W)
         least_multipliers(s, W, rank, step.lam)
+        step.count[HAS_FACTOR] *= 1 - s.graph.shares
     follow_coordinates(W)
     drive_power(s, W, step.lam)  # the last correction moved the multipliers
     for k in range(3):

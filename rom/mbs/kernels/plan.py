@@ -24,6 +24,7 @@ class Plan(Table):
         pair_first: (k,), target, stride: where a product of two of them is subtracted, and the
             distance of its rows.
         block_to, block_stride: (e,) the same for the blocks of two bodies.
+        corner: (m,) where the entry of a multiplier by itself stands.
         row_to, row_back, row_stride: (m, 4) where the gradient of a constraint row goes, as a row
             and as a column, and the distance of the entries of the column.
         memory: (1,) length of the factor.
@@ -44,6 +45,7 @@ class Plan(Table):
     stride: Index1
     block_to: Index1
     block_stride: Index1
+    corner: Index1
     row_to: Index2
     row_back: Index2
     row_stride: Index2
@@ -56,6 +58,7 @@ class Graph(Table):
 
     Attributes:
         compact: 1 if only blocks are stored and eliminated by the plan, 0 for whole matrices.
+        shares: 1 if constraints in blocks may repeat others: each of them gives way a little.
         first: (b + 1,), other: (e,) bodies that each body is coupled to, itself included,
             ascending; x, y: (e,) first row and column of their block in Work.S and Work.Kt.
         own: (b,) block of each body with itself.
@@ -66,6 +69,7 @@ class Graph(Table):
     """
 
     compact: int
+    shares: int
     first: Index1
     other: Index1
     x: Index1

@@ -40,6 +40,8 @@ STAGE_NAMES = (
     "factorise_blocks",
     "fill_from_blocks",
     "solve_blocks",
+    "solve_sharing",
+    "remove_undecided",
     "constraint_range",
     "least_multipliers",
     "elastic_damping",

@@ -82,6 +82,8 @@ class Work(Table):
     spare: Array1  # (n + m,)
     rhs: Array1  # (n + m,)
     scaling: Array1  # (n + m,)
+    soft: Array1  # (m,) by which each constraint gives way where some repeat others, scaled
+    refined: Array2  # (2, n + m) two solutions before
     weight: Array1  # (n,) mass weights of the norm of increments
     U: Array2  # (m, m) range of the constraints, leading rows
     U_lu: Array2  # (m, m) the range that is built into lu
@@ -187,6 +189,8 @@ def workspace(system: System, n_signals: int) -> Work:
         "lu": (whole, whole),
         "factor": tuple(system.graph.plan.memory),
         **dict.fromkeys(("rhs", "scaling", "spare"), (n + m,)),
+        "soft": (m,),
+        "refined": (2, n + m),
         **dict.fromkeys(("U", "U_lu"), redundant),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}

@@ -143,6 +143,7 @@ KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
 
 STORAGE = {  # whether by blocks -> stages
     True: {"factorise_blocks", "fill_from_blocks", "solve_blocks"},
+    "shares": {"solve_sharing", "remove_undecided"},
     False: {"constraint_range", "least_multipliers"},
 }
 MULTISTEP = {"predict_multistep", "follow_increment", "keep_past"}
