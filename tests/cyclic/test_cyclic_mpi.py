@@ -50,6 +50,6 @@ def test_three_ranks_find_the_waves_of_one_process(every, monkeypatch):
 def test_all_ranks_refuse_alike(every):
     said = [errors for _, errors in every]
     assert said[0] == said[1] == said[2]
-    assert said[0]["interface"].startswith("InterfaceError: the sector has no interface 'rim'")
+    assert said[0]["interface"].startswith("InterfaceError: the model has no interface 'rim'")
     assert said[0]["region"].startswith("ConfigError: the sector has no region 'rim'")
     assert said[0]["memory"].startswith("ResourceError: each of 3 ranks needs all")

@@ -200,7 +200,8 @@ def test_a_shallow_arch_passes_its_limit_points_and_where_it_gives_way_sideways(
         expected["bifurcation"] = [(1 - y) + c * y * (1 - y * y) for y in (x, -x)]
     for kind, values in expected.items():
         found = [x.state.t for x in path.critical if x.kind == kind]
-        assert_allclose(found, values, rtol=4.0 / n**2)  # chords instead of a curve
+        # chords instead of a curve; a higher arch gives way in shorter waves
+        assert_allclose(found, values, rtol=(4.0 if slenderness == 12 else 7.0) / n**2)
     assert path.unstable[0] == path.unstable[-1] == 0
 
 

@@ -134,7 +134,7 @@ def test_joints_that_contradict_each_other_are_named_in_large_mechanisms():
         quietly(rom.simulate, mech, t_end=0.1, dt=1e-3)
 
 
-def train(n, slope=0.2):
+def train(n, slope=0.2, apart=0.0):
     """Wheels of a train that roll down a slope, their axles in a row of bars.
 
     Every third axle carries a wheel on either side, too: what holds all three upright repeats
@@ -146,7 +146,8 @@ def train(n, slope=0.2):
         wheel = mech.add_rigid(f"wheel {k}", mass=2.0, inertia=(0.05, 0.1, 0.05), at=(k, 0, 0.3))
         mech.rolling(f"roll {k}", floor, wheel.marker((0, 0, 0)), normal=(0, 0, 1), radius=0.3,
                      axis=(0, 1, 0))  # fmt: skip
-        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=(0.1,) * 3, at=(k + 0.5, 0, 0.3))
+        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=(0.1,) * 3,
+                             at=(k + 0.5 + apart, 0, 0.3))  # fmt: skip
         mech.revolute(f"axle {k}", bar.marker((-0.5, 0, 0)), wheel.marker((0, 0, 0)),
                       axis=(0, 1, 0))  # fmt: skip
         if behind is not None:
@@ -177,3 +178,13 @@ def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
     mass, rolling = 20 * 2.0 + 12 * 1.0, 20 * 0.1 / 0.3**2
     speed = 9.81 * np.sin(0.2) * mass / (mass + rolling) * 0.2
     assert_allclose(blocks.velocity("bar 11")[-1], [speed, 0, 0], atol=1e-7)
+
+
+def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(whole):
+    """Bars given a centimetre beside their axles: bodies come together, wheels may slip for it."""
+    blocks = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3)
+    whole()
+    other = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3)
+    assert blocks.packed.by_blocks and not other.packed.by_blocks
+    assert np.abs(blocks.position("bar 3")[0] - [3.51, 0, 0.3]).max() > 1e-3
+    assert_allclose(blocks.q[0], other.q[0], atol=1e-9)
