@@ -17,8 +17,8 @@ from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
 
 # by how much a constraint gives way where some repeat others, in units of mass and gradient: far
-# more than round-off, far less than independent ones resist; and the ratio of least to largest
-SOFTNESS, SOFTNESS_RATIO = 1e-8, 1e-2
+# more than round-off, far less than independent ones resist
+MIN_SOFTNESS, MAX_SOFTNESS = 1e-10, 1e-8
 
 
 def may_repeat_constraints(system):
@@ -85,7 +85,7 @@ def set_softness(W, n, rank):
     for k in range(rank):
         most = max(most, W.scaling[n + k] ** 2)
     for k in range(rank):
-        W.soft[k] = SOFTNESS * max(W.scaling[n + k] ** 2 / most, SOFTNESS_RATIO)
+        W.soft[k] = max(MIN_SOFTNESS, MAX_SOFTNESS * W.scaling[n + k] ** 2 / most)
 
 
 @inner
