@@ -5,7 +5,6 @@ them.
 """
 
 import resource
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import pi
@@ -212,12 +211,14 @@ def motion(
 
 
 def rods(lengths: tuple[int, ...] = (100, 1000, 10_000)) -> Iterator[Figure]:
-    """A swinging rod: cost against the number of segments; then a rotor, here and by Exudyn.
+    """A swinging rod: cost against the number of segments; then others, here and by Exudyn.
+
+    A cantilever bent by 60 degrees with ten modes, and a rotor that runs up.
 
     Args:
         lengths: numbers of segments of the one rod, which hangs on a ball joint.
     """
-    from rom.bench.peers.rods import measured
+    from rom.bench.peers.rods import bent, measured
     from rom.components.cosserat import body, straight
     from rom.mbs.integrate.simulation import simulate
     from rom.mbs.mechanism import Mechanism
@@ -236,34 +237,9 @@ def rods(lengths: tuple[int, ...] = (100, 1000, 10_000)) -> Iterator[Figure]:
     case = f"{lengths[-1]} against {lengths[0]} segments"
     grown = per_segment[-1] / per_segment[0]
     yield Figure("rods", case, "time per segment and iteration", grown, "", "below 2")
-    yield from _bent_rods(4 * lengths[0])
-    for case, quantity, value, unit, aim in measured():
-        yield Figure("rods", case, quantity, value, unit, aim)
-
-
-def _bent_rods(n: int) -> Iterator[Figure]:
-    """Processor time of a cantilever bent by 60 degrees and of ten modes about it, n and 4 n."""
-    from rom.components.cosserat import body, straight
-    from rom.mbs.analysis.equilibrium import equilibrium
-    from rom.mbs.analysis.linearize import linearize
-    from rom.mbs.mechanism import Mechanism
-
-    seconds: dict[str, list[float]] = {"equilibrium": [], "ten modes": []}
-    for segments in (n, n, 4 * n):  # the first links what is compiled
-        mechanism = Mechanism(gravity=(0.0, 0.0, 0.0))
-        section = {"stretch": 1e6, "bend": 100.0, "mass": 1.0, "inertia": 1e-3}
-        rod = mechanism.add_nonlinear("rod", body(straight(1.0, segments, **section)))
-        mechanism.fixed("clamp", mechanism.ground.marker((0.0, 0.0, 0.0)), rod.marker("start"))
-        mechanism.force("tip", rod.marker("end"), (200.0, 0.0, 0.0))
-        before = time.process_time()
-        state = equilibrium(mechanism)
-        between = time.process_time()
-        linearize(mechanism, state, n=10)
-        seconds["equilibrium"].append(between - before)
-        seconds["ten modes"].append(time.process_time() - between)
-    for what, (_, few, many) in seconds.items():
-        yield Figure("rods", f"{n} segments, bent", what, few, "s", "both below 1")
-        yield Figure("rods", f"{n} to {4 * n} segments, bent", what, many / few, "", "below 6")
+    for rows in (bent(4 * lengths[0]), measured()):
+        for row in rows:
+            yield Figure("rods", *row)
 
 
 def blade(parameters: dict[str, float] | None = None) -> Iterator[Figure]:

@@ -1,6 +1,7 @@
 """What the comparison of rods with other programs hands over, and its figures."""
 
 import ast
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.bench.peers import rods
-from rom.components.cosserat import body
+from rom.components.cosserat import body, straight
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 
 
@@ -65,3 +66,19 @@ def test_both_programs_turn_the_hub_alike():
         assert_allclose(
             scope["angle"](t, RATED_SPEED, 20.0), ramp(RATED_SPEED, 20.0)[1](t), rtol=1e-14
         )
+
+
+def test_the_cantilever_is_the_elastica_and_the_one_handed_over(monkeypatch):
+    """Mattiasson, Int. J. Numer. Meth. Eng. 17 (1981) 145: P L^2 / EI = 2, less what shear adds."""
+    ours = rods.bent_by_rom(100)
+    assert_allclose(ours["tip"], (1 - 0.16064, 0.0, -0.49346), atol=3e-4)
+    twist = np.sqrt(100.0 / 1e-3) / 4  # Hz, a bar clamped at one end
+    assert np.abs(ours["frequencies"] / twist - 1).min() < 1e-3
+    monkeypatch.setattr(rods, "interpreter", lambda: "python")
+    monkeypatch.setattr(rods, "answer_of", lambda command: json.loads(Path(command[2]).read_text()))
+    given = rods.bent_by_exudyn(100)
+    one = straight(1.0, 100, **rods.CANTILEVER_SECTION)
+    assert_allclose(given["stiffness"], np.concatenate([one.stretch[50], one.bend[50]]))
+    assert_allclose(given["inertia"], one.inertia[50] * 100)
+    assert_allclose((given["mass"], given["length"]), (one.mass.sum(), one.h.sum()))
+    assert given["force"] == [0.0, 0.0, -200.0]

@@ -1,7 +1,7 @@
-"""Run-up of a rotor of three rods, here and by the geometrically exact beams of Exudyn.
+"""A bent cantilever, and the run-up of a rotor of three rods, here and by Exudyn's exact beams.
 
-The same blades, numbers of segments and elements, law of the speed, step and spectral radius.
-Processor time, one thread, without set-up.
+The same sections, numbers of segments and elements; for the rotor the same law of the speed, step
+and spectral radius. Processor time, one thread, without set-up.
 """
 
 import json
@@ -14,7 +14,7 @@ import numpy as np
 
 from rom import rotation
 from rom.bench.peers.compare import answer_of, interpreter
-from rom.components.cosserat import Rod, body
+from rom.components.cosserat import Rod, body, straight
 from rom.components.wind.wind_turbine import (
     N_BLADES,
     RATED_SPEED,
@@ -24,12 +24,17 @@ from rom.components.wind.wind_turbine import (
     run_up,
     stations,
 )
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.linearize import linearize
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 from rom.process.child import scratch
 
 SCRIPT_FILE = Path(__file__).with_name("beams.py")
+CANTILEVER_FILE = Path(__file__).with_name("cantilever.py")
+CANTILEVER_SECTION = {"stretch": 1e6, "bend": 100.0, "mass": 1.0, "inertia": 1e-3}  # one metre
+TIP_FORCE, N_BENT_MODES = 200.0, 10  # bends it by 60 degrees [N]
 RISE_TIME, TIME_STEP, RHO_INF, N_SAMPLES = 20.0, 0.02, 0.9, 200
 N_REFERENCE_SEGMENTS = 192  # of the blade whose lag is the reference
 FROM_SECTION = [2, 0, 1]  # first axis along the beam there, third along the rod here
@@ -145,3 +150,60 @@ def measured(segments: int = 48) -> Iterator[tuple[str, str, float, str, str]]:
         yield case, f"lag of {n} against {N_REFERENCE_SEGMENTS} segments", error, "", aim
     apart = np.abs(tip - beam).max() / np.abs(tip).max()
     yield case, "difference of the tips", apart, "of the deflection", "below 0.01"
+
+
+def bent(segments: int = 400) -> Iterator[tuple[str, str, float, str, str]]:
+    """Case, quantity, value, unit and aim of each figure: statics of a cantilever, modes about it.
+
+    Args:
+        segments: also four times as many, without Exudyn, whose matrices would be full.
+    """
+    bent_by_rom(segments)  # links what is compiled
+    ours, many = bent_by_rom(segments), bent_by_rom(4 * segments)
+    theirs = bent_by_exudyn(segments)
+    case = f"{segments} segments, bent"
+    for what in ("equilibrium", "modes"):
+        yield case, what, ours[what], "s of the processor", "both below 1"
+        yield (
+            case,
+            f"Exudyn {theirs['version']} over rom, {what}",
+            theirs[what] / ours[what],
+            "",
+            "",
+        )
+        yield f"to {4 * segments} segments", what, many[what] / ours[what], "", "below 6"
+    apart = np.abs(np.array(theirs["tip"]) - ours["tip"]).max()
+    yield case, "difference of the tips", float(apart), "of the length", "below 1e-4"
+    gap = np.abs(np.array(theirs["frequencies"]) / ours["frequencies"] - 1).max()
+    yield case, "difference of ten frequencies", float(gap), "", "below 1e-3"
+
+
+def bent_by_rom(segments: int) -> dict[str, Any]:
+    """Processor times [s] of statics and modes, (3,) tip [m] and frequencies [Hz]."""
+    mech = Mechanism(gravity=ORIGIN)
+    along = rotation.matrix(rotation.exp([0.0, np.pi / 2, 0.0]))  # third axis to the first
+    rod = mech.add_nonlinear(
+        "rod", body(straight(1.0, segments, frame=along, **CANTILEVER_SECTION))
+    )
+    mech.fixed("clamp", mech.ground.marker(ORIGIN), rod.marker("start"))
+    mech.force("tip", rod.marker("end"), (0.0, 0.0, -TIP_FORCE))
+    start = process_time()
+    state = equilibrium(mech)
+    between = process_time()
+    f = linearize(mech, state, n=N_BENT_MODES).frequencies
+    return {"equilibrium": between - start, "modes": process_time() - between,
+            "tip": state.q[-7:-4], "frequencies": f}  # fmt: skip
+
+
+def bent_by_exudyn(segments: int) -> dict[str, Any]:
+    """The same by Exudyn, and its version."""
+    section = CANTILEVER_SECTION
+    described = {
+        "length": 1.0, "segments": segments, "force": [0.0, 0.0, -TIP_FORCE],
+        "stiffness": [section["stretch"]] * 3 + [section["bend"]] * 3,
+        "inertia": [section["inertia"]] * 3, "mass": section["mass"],
+    }  # fmt: skip
+    with scratch("peers") as folder:
+        file = folder / "cantilever.json"
+        file.write_text(json.dumps(described))
+        return answer_of([interpreter(), str(CANTILEVER_FILE), str(file)])

@@ -19,6 +19,7 @@ from rom.mbs.results.state import State
 from rom.model import Array
 
 MAX_PASSES = 300
+MAX_TRIALS = 40  # of Newton's corrections where the potential curves downwards
 MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
@@ -97,6 +98,9 @@ def equilibrium(
     return found
 
 
+Equations = Tangent | SparseTangent
+
+
 @dataclass(frozen=True)
 class _Search:
     """The search at one time, for what turns steadily."""
@@ -105,7 +109,7 @@ class _Search:
     spins: Spins
     loan: Loan = field(default_factory=Loan)
 
-    def tangent(self, now: Instant, state: State) -> Tangent | SparseTangent:
+    def tangent(self, now: Instant, state: State) -> Equations:
         """The equations of one correction."""
         if now.pattern is None:
             return Tangent.of(now, state, self.spins)
@@ -132,21 +136,53 @@ class _Search:
         Raises:
             SolverError: if Newton's method fails.
         """
-        now, last = self.now.scaled(load), np.inf
+        now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
         state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
+        beyond: Equations | None = None
         for _ in range(MAX_PASSES):
-            step, dlam = self.tangent(now, state).correction()
-            size, factor = sizes(now.packed, step)
+            equations = beyond or self.tangent(now, state)
+            found = None
+            if trials and not equations.rises:
+                found, trials = self.tried(now, state, equations), trials - 1
+            if found is None:
+                size, state = self.corrected(now, state, equations.correction())
+                beyond = None
+            else:
+                size, state, beyond = found
             if not np.isfinite(size):
                 break
-            state = self.spins.steady(self.now, now.moved(state, factor * step, factor * dlam))
-            if factor < 1.0:
-                balance = self.tangent(now, state).reaction()
-                state = replace(state, lam=state.lam + balance)
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
                 return state
             last = size
         raise _failure(now, self.tangent(now, state), load)
+
+    def corrected(
+        self, now: Instant, state: State, correction: tuple[Array, Array]
+    ) -> tuple[float, State]:
+        """Size of a correction, and the state after as much of it as linear equations allow."""
+        step, dlam = correction
+        size, factor = sizes(now.packed, step)
+        if not np.isfinite(size):
+            return size, state
+        state = self.spins.steady(self.now, now.moved(state, factor * step, factor * dlam))
+        if factor < 1.0:
+            state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
+        return size, state
+
+    def tried(
+        self, now: Instant, state: State, equations: Equations
+    ) -> tuple[float, State, Equations] | None:
+        """Newton's correction although the potential curves downwards, with what is behind it.
+
+        Only one that can be taken whole and leads to where the potential curves upwards: what is
+        stiff has been strained by the square of a finite rotation, which looks like buckling.
+        """
+        newton = equations.newton
+        if newton is None or sizes(now.packed, newton[0])[1] < 1.0:
+            return None
+        size, ahead = self.corrected(now, state, newton)
+        beyond = self.tangent(now, ahead)
+        return (size, ahead, beyond) if beyond.steadier(equations) else None
 
     def judge(self, state: State) -> None:
         """Refuse free motions, and warn of unstable ones."""

@@ -5,6 +5,8 @@ curves upwards; what is lent goes back as soon as it does so by itself.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import identity
@@ -41,6 +43,14 @@ class Loan:
     value: float = 0.0
 
 
+class _Correction(NamedTuple):
+    """Variation of coordinates (n,) and multipliers (m,), and what the forces do along it."""
+
+    step: Array
+    reaction: Array
+    along: float
+
+
 @dataclass(frozen=True)
 class SparseTangent:
     """Linear equations of one correction, as `rom.mbs.analysis.tangent.Tangent` has them.
@@ -71,20 +81,45 @@ class SparseTangent:
         return cls(now, pencil, r, now.gradient(state.q, state.v)[0], pull, loan)
 
     def correction(self) -> tuple[Array, Array]:
-        """(n,) variation of the coordinates and (m,) of the multipliers."""
+        """(n,) variation of the coordinates and (m,) of the multipliers, downhill."""
         least = FIRST_LOAN * (self.pull or self.pencil.scale)
         lent = REPAYMENT_SHARE * self.loan.value
         lent = lent if lent >= least else 0.0
         for _ in range(MAX_LOANS):
-            found = self._solved(lent)
-            if found is not None:
+            found = self._solved(lent) if lent else self._plain
+            if found is not None and (self._downhill(found, lent) if lent else self.rises):
                 self.loan.value = lent
-                return found
+                return found.step, found.reaction
             lent = max(LOAN_RATIO * lent, least)
         raise SolverError("the equations of equilibrium are singular, whatever stiffness is lent.")
 
-    def _solved(self, lent: float) -> tuple[Array, Array] | None:
-        """The correction with some stiffness lent; None where it would lead upwards."""
+    @property
+    def newton(self) -> tuple[Array, Array] | None:
+        """The correction with nothing lent, upwards or downhill; None where there is none."""
+        return None if self._plain is None else (self._plain.step, self._plain.reaction)
+
+    @cached_property
+    def rises(self) -> bool:
+        """Whether this correction leads downhill, as where the potential curves upwards."""
+        return self._plain is not None and self._downhill(self._plain, 0.0)
+
+    def steadier(self, before: Any) -> bool:
+        """Whether the potential curves downwards no more, as far as that is counted."""
+        return self.rises
+
+    @cached_property
+    def _plain(self) -> _Correction | None:
+        return self._solved(0.0)
+
+    def _downhill(self, found: _Correction, lent: float) -> bool:
+        """Whether a correction with some stiffness lent leads downhill."""
+        size = sizes(self.now.packed, found.step)[0]
+        if size > ROUND_OFF_CORRECTION and found.along > 0.0:
+            return False
+        return not (COUNTED_CORRECTION < size <= MAX_ROTATION and self.pencil.count(-lent))
+
+    def _solved(self, lent: float) -> _Correction | None:
+        """The correction with some stiffness lent; None where equations do not say any."""
         p, gap = self.pencil, self.gap / self.pencil.row
         try:
             equations = p.inverse(p.K + lent * p.M)
@@ -94,14 +129,9 @@ class SparseTangent:
         forces[:, 0], gaps[:, 1] = -self.r, -gap
         u, l = equations.solve(forces, gaps)
         step = p.basis @ u.sum(axis=1)
-        size = sizes(self.now.packed, step)[0]
-        if not size < MAX_CORRECTION:
+        if not sizes(self.now.packed, step)[0] < MAX_CORRECTION:
             return None
-        if size > ROUND_OFF_CORRECTION and self.r @ u[:, 0] > 0.0:
-            return None
-        if COUNTED_CORRECTION < size <= MAX_ROTATION and p.count(-lent):
-            return None
-        return step, l.sum(axis=1) / p.row
+        return _Correction(step, l.sum(axis=1) / p.row, float(self.r @ u[:, 0]))
 
     def weakest(self) -> Weakest:
         """The free motions of least stiffness."""

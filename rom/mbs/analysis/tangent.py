@@ -1,6 +1,8 @@
 """One correction towards equilibrium: linear equations in motions that the joints allow."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from rom.model import Array
 
 MAX_ROTATION = 0.3  # of one correction [rad]
 MAX_DISPLACEMENT = 0.3  # of one correction, of the mechanism's size
+MAX_LEFT_CURVATURE = 0.01  # of the one downwards, where finite corrections alone have caused it
 # stiffness that counts as none, relative to the largest one and to that of the loads: differences
 # leave 1e-11 of the latter
 STIFFNESS_RTOL, LOAD_STIFFNESS_RTOL = 1e-13, 1e-9
@@ -68,7 +71,7 @@ class Tangent:
 
     def weakest(self) -> "Weakest":
         """All free motions."""
-        squares, V = np.linalg.eigh(self.curvature)
+        squares, V = self._principal
         along = np.abs(V.T @ (self.Z.T @ self.r))
         return Weakest(squares, self.T @ self.Z @ V, self.none(squares), along)
 
@@ -82,22 +85,51 @@ class Tangent:
         return self.r + self.G.T @ self.reaction()
 
     def correction(self) -> tuple[Array, Array]:
-        """(n,) variation of the coordinates and (m,) of the multipliers."""
+        """(n,) variation of the coordinates and (m,) of the multipliers, downhill."""
+        if self.rises and self.newton is not None:
+            return self.newton
+        return self._answered(self._downhill)
+
+    @cached_property
+    def newton(self) -> tuple[Array, Array] | None:
+        """Newton's correction, upwards or downhill; None where a motion has no stiffness."""
+        squares = self._principal[0]
+        if np.abs(squares).min(initial=np.inf) <= self.none(squares):
+            return None
+        return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+
+    @cached_property
+    def rises(self) -> bool:
+        """Whether the potential curves upwards in all free motions."""
+        squares = self._principal[0]
+        return bool(squares.min(initial=np.inf) > self.none(squares))
+
+    def steadier(self, before: Any) -> bool:
+        """Whether the potential curves downwards no more, or far less than it did before."""
+        return self.rises or bool(
+            self._principal[0][0] > MAX_LEFT_CURVATURE * before._principal[0][0]
+        )
+
+    @cached_property
+    def _principal(self) -> tuple[Array, Array]:
+        """(f,) curvatures and (f, f) their directions."""
+        squares, V = np.linalg.eigh(self.curvature)
+        return squares, V
+
+    def _answered(self, motion: Callable[[Array], Array]) -> tuple[Array, Array]:
+        """The joints closed, and the motion (f,) that answers the forces left over (f,)."""
         scale = self.now.probe()
         A = self.G * scale
         rows = np.maximum(np.linalg.norm(A, axis=1), 1e-300)
         shift = np.linalg.lstsq(A / rows[:, None], -self.gap / rows, rcond=1e-9)[0] * scale
-        shift = shift + self.Z @ self.downhill(self.Z.T @ (self.r + self.K @ shift))
+        shift = shift + self.Z @ motion(self.Z.T @ (self.r + self.K @ shift))
         reaction = np.linalg.lstsq(A.T, -(self.r + self.K @ shift) * scale, rcond=1e-9)[0]
         return self.T @ shift, reaction
 
-    def downhill(self, force: Array) -> Array:
-        """Newton's correction where the potential curves upwards, downhill elsewhere."""
-        squares, V = np.linalg.eigh(self.curvature)
-        none = self.none(squares)
-        if not squares.size or squares[0] > none:
-            return -np.linalg.solve(self.Z.T @ self.K @ self.Z, force)
-        along = V.T @ force
+    def _downhill(self, force: Array) -> Array:
+        """(f,) motion along the force, by the absolute values of the curvatures."""
+        squares, V = self._principal
+        none, along = self.none(squares), V.T @ force
         still = (np.abs(squares) <= none) & (np.abs(along) <= faint_force(self.now, self.pull))
         return -V @ np.where(still, 0.0, along / np.maximum(np.abs(squares), none))
 

@@ -267,6 +267,29 @@ def test_mattiassons_table_of_the_elastica(load, deflection, shortening):
     assert_allclose((tip[0], 1 - tip[2]), elastica(load), atol=8e-6)
 
 
+@pytest.mark.parametrize("many", [False, True])
+def test_slender_rods_need_no_more_corrections_than_stocky_ones(many, monkeypatch):
+    """What they are stretched by finite corrections looks like buckling, and is none."""
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0 if many else 10**6)
+    counted = []
+    moved = local_equations.Instant.moved
+    monkeypatch.setattr(
+        local_equations.Instant, "moved", lambda *given: counted.append(1) or moved(*given)
+    )
+    needed = []
+    for stretch in (1e4, 1e7):
+        mech = Mechanism(gravity=(0, 0, 0))
+        stiff = {"stretch": stretch, "bend": 1.0, "mass": 1.0, "inertia": 1e-4}
+        rod = mech.add_nonlinear("rod", body(straight(1.0, 30, **stiff)))
+        mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+        mech.force("tip", rod.marker("end"), (10.0, 0, 0))
+        counted.clear()
+        tip = rom.equilibrium(mech).q[-7:-4]
+        assert_allclose((tip[0], 1 - tip[2]), elastica(10.0), atol=3e-3)
+        needed.append(len(counted))
+    assert needed[1] < 1.5 * needed[0] < 60
+
+
 def catenary_of(n, slack):
     """Slopes of n links of weight one in all whose horizontal force is slack times 3 N."""
     weight = 9.81 / n * (n / 2 - 0.5 - np.arange(n))
