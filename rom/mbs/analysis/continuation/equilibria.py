@@ -351,7 +351,7 @@ class _March:
         found = self.problem.curvatures(point.at)
         # a branch begins at a motion without stiffness, whatever round-off says
         leaves = point.rate == 0.0 and found.weakest[0] < 0.0
-        self.states.append(replace(point.at, t=point.p))
+        self.states.append(replace(point.at, t=float(point.p)))
         self.unstable.append(found.negative - leaves)
 
     def between(
@@ -377,4 +377,4 @@ class _March:
     def note(self, kind: str, point: Point, motion: Array) -> None:
         """Keep a critical point, the largest part of its motion one."""
         largest = motion[np.argmax(np.abs(motion * np.sqrt(self.problem.weight)))]
-        self.critical.append(Critical(kind, replace(point.at, t=point.p), motion / largest))
+        self.critical.append(Critical(kind, replace(point.at, t=float(point.p)), motion / largest))
