@@ -6,7 +6,7 @@ h = c bore - (ex + z phi_y) cos theta - (ey - z phi_x) sin theta.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -99,6 +99,17 @@ class JournalBearing:
         """(4,) motions that change the film by a clearance [m, m, rad, rad]."""
         c = self.clearance
         return np.array([c, c, c / self.length, c / self.length])
+
+    @property
+    def oiled(self) -> tuple["JournalBearing", ...]:
+        """For one that conserves its oil: with oil everywhere, with its grooves and without.
+
+        These films carry on any way to an equilibrium, and where they rest it is not far.
+        """
+        if self.cavitation != "jfo":
+            return ()
+        grooved = replace(self, cavitation="reynolds")
+        return grooved, replace(grooved, grooves=())
 
     def thinnest(self, motion: npt.ArrayLike) -> float:
         """Smallest film of the cells [m] when the journal is there.

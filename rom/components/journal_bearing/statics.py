@@ -4,6 +4,7 @@ Source:
     Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010).
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,27 +31,42 @@ def equilibrium(
 ) -> Film:
     """The film that carries a load; the journal stays parallel to the bush.
 
-    Newton's method with the derivatives of the film, in steps of at most 0.1 clearances.
+    Newton's method with the derivatives of the film, in steps of at most 0.1 clearances. A film
+    that conserves its oil may run dry on the way; then it starts where one with oil everywhere
+    rests.
 
     Args:
         bearing: the bearing.
         load: (2,) on the journal [N].
         speed: of rotation [rad/s].
         viscosity: of the oil [Pa s].
-        start: (2,) first position of the journal [m]; by default 0.3 clearances along the load,
-            turned by 60 degrees in the direction of rotation.
+        start: (2,) first position of the journal [m], the only one then; by default 0.3 clearances
+            along the load, turned by 60 degrees in the direction of rotation.
 
     Raises:
         ModelError: without a load.
         SolverError: if the film cannot carry it: at this inlet position, or at all.
     """
     W, c = np.asarray(load, dtype=float), bearing.clearance
-    size = float(np.hypot(*W))
-    if not size > 0:
+    if not float(np.hypot(*W)) > 0:
         raise ModelError(f"a load of {W} N presses the journal nowhere; it needs a size.")
+    if start is not None:
+        return _settled(bearing, W, np.array(start, dtype=float), speed, viscosity)
     turn = np.pi / 3 + np.arctan2(W[1], W[0])
-    given = 0.3 * c * np.array([np.cos(turn), np.sin(turn)]) if start is None else start
-    x, warm = np.array(given, dtype=float), None
+    try:
+        first = 0.3 * c * np.array([np.cos(turn), np.sin(turn)])
+        return _settled(bearing, W, first, speed, viscosity)
+    except SolverError:
+        for oiled in bearing.oiled:
+            with suppress(SolverError):
+                near = equilibrium(oiled, W, speed=speed, viscosity=viscosity)
+                return _settled(bearing, W, near.motion[:2], speed, viscosity)
+        raise
+
+
+def _settled(bearing: JournalBearing, W: Array, x: Array, speed: float, viscosity: float) -> Film:
+    """Newton's method from a position x (2,) [m]."""
+    c, size, warm = bearing.clearance, float(np.hypot(*W)), None
     for _ in range(MAX_ITERATIONS):
         now = film(bearing, x, speed=speed, viscosity=viscosity, warm=warm)
         missing, warm = now.force[:2] + W, now.active

@@ -9,8 +9,9 @@ Source:
     135 (2013) 061014.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -255,7 +256,7 @@ class Transmission:
             reach = share * (np.hypot(*d[:2]) + bearing.length / 2 * np.hypot(*d[2:]))
             if reach < 0.5 * here:
                 continue
-            while bearing.thinnest(at + share * d) < 0.5 * here and share > 1e-9:
+            while bearing.thinnest(at + share * d) < 0.5 * here:
                 share /= 2
         return share
 
@@ -300,6 +301,9 @@ def rest(
 ) -> Rest:
     """Static equilibrium, found by raising the load from the unloaded datum.
 
+    A film that conserves its oil may run dry on that way and yet carry the whole load: then the
+    search goes on from where films rest that find oil everywhere.
+
     Args:
         unit: the transmission.
         theta: angle of the pinion [rad].
@@ -310,14 +314,35 @@ def rest(
         SolverError: if films or teeth cannot carry the load; ``error.solution`` is the equilibrium
             at the share of it before, if there was one.
     """
-    K, f = unit.matrices[1], unit.load
-    q = _touching(unit, theta) if start is None else np.array(start, dtype=float)
-    found: list[Rest] = []
+    if start is not None:
+        return _rest(unit, theta, np.array(start, dtype=float), (1.0,))
+    try:
+        return _rest(unit, theta, _touching(unit, theta), loads)
+    except SolverError:
+        for other in _oiled(unit):
+            with suppress(SolverError):
+                return rest(unit, theta, start=rest(other, theta, loads=loads).q)
+        raise
+
+
+def _rest(unit: Transmission, theta: float, q: Array, loads: tuple[float, ...]) -> Rest:
+    """Equilibrium under one share of the load after the other."""
+    K, f, found = unit.matrices[1], unit.load, list[Rest]()
     with reached(lambda: found[-1] if found else None):
-        for share in loads if start is None else (1.0,):
+        for share in loads:
             q, forces, residual = _newton(unit, K, share * f, q, theta)
             found.append(Rest(unit, q, theta, forces, residual))
     return found[-1]
+
+
+def _oiled(unit: Transmission) -> Iterator[Transmission]:
+    """The unit with films that find oil everywhere, with their grooves and without."""
+    for k in range(max(len(bearing.oiled) for _, bearing, _ in unit.journals)):
+        rotors = []
+        for rotor in (unit.pinion, unit.gear):
+            oiled = {node: (one.oiled or (one, one))[k] for node, one in rotor.bearings.items()}
+            rotors.append(replace(rotor, bearings=oiled))
+        yield replace(unit, pinion=rotors[0], gear=rotors[1])
 
 
 def _touching(unit: Transmission, theta: float) -> Array:

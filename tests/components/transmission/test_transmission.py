@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from cases.gear_unit import NODES, journal, unit
 from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
-from rom.components.journal_bearing import equilibrium, stability
+from rom.components.journal_bearing import Groove, equilibrium, stability
 from rom.components.transmission import (
     Disc,
     Shaft,
@@ -100,6 +100,40 @@ def test_both_journals_rest_where_a_journal_alone_would(loaded):
     bent = teeth * 0.2**3 / (48 * E * np.pi * 0.05**4 / 64)
     assert np.hypot(*(own - gear)) == pytest.approx(bent, rel=0.15)  # and is sheared
     assert loaded.forces.films[2].eccentricity > loaded.forces.films[0].eccentricity
+
+
+def with_inlets(at, beyond, **more):
+    """One groove in each bearing, so many degrees beyond the load in the direction of rotation."""
+    u, rotors = unit(**more), []
+    for rotor, turned in ((u.pinion, at), (u.gear, np.pi - at)):
+        inlet = [Groove(turned + np.radians(beyond), np.radians(20))]
+        oiled = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
+        rotors.append(replace(rotor, bearings=oiled))
+    return replace(u, pinion=rotors[0], gear=rotors[1])
+
+
+@pytest.mark.parametrize(
+    ("torque", "beyond"), few(2, [(200.0, 60), (200.0, 90), (20.0, 75), (200.0, 45)])
+)
+def test_films_that_conserve_their_oil_carry_teeth_as_they_carry_a_load(torque, beyond):
+    """On the way there, under less load, they run dry. Other than a lone journal, a shaft tilts."""
+    push = rest(unit(torque)).forces.mesh.force
+    u = with_inlets(np.arctan2(push[1], push[0]), beyond, torque=torque)
+    found = rest(u)
+    assert found.residual < 1e-9
+    F = found.forces.mesh.force
+    for f, bearing in zip(found.forces.films[:2], u.pinion.bearings.values(), strict=True):
+        lone = equilibrium(bearing, F[:2] / 2, speed=u.speed, viscosity=0.02)
+        assert_allclose(f.motion[:2], lone.motion[:2], atol=4e-3 * 50e-6)
+        rich = equilibrium(bearing.oiled[1], F[:2] / 2, speed=u.speed, viscosity=0.02)
+        assert f.eccentricity > rich.eccentricity + 1e-3
+
+
+def test_without_oil_where_it_is_needed_nothing_rests():
+    push = rest(unit()).forces.mesh.force
+    with pytest.raises(SolverError, match="does not come to rest under 1207") as caught:
+        rest(with_inlets(np.arctan2(push[1], push[0]), 0.0))
+    assert "inlets" in caught.value.hint
 
 
 def test_rest_does_not_depend_on_the_way_there(loaded):
