@@ -104,8 +104,13 @@ class SparseTangent:
         return self._plain is not None and self._downhill(self._plain, 0.0)
 
     def steadier(self, before: Any) -> bool:
-        """Whether the potential curves downwards no more, as far as that is counted."""
-        return self.rises
+        """Whether the potential curves downwards in less than half as many motions as before."""
+        return 2 * self._downwards < before._downwards
+
+    @cached_property
+    def _downwards(self) -> int:
+        """In how many motions the potential curves downwards."""
+        return self.pencil.count(0.0)
 
     @cached_property
     def _plain(self) -> _Correction | None:
@@ -116,7 +121,9 @@ class SparseTangent:
         size = sizes(self.now.packed, found.step)[0]
         if size > ROUND_OFF_CORRECTION and found.along > 0.0:
             return False
-        return not (COUNTED_CORRECTION < size <= MAX_ROTATION and self.pencil.count(-lent))
+        if not COUNTED_CORRECTION < size <= MAX_ROTATION:
+            return True
+        return not (self.pencil.count(-lent) if lent else self._downwards)
 
     def _solved(self, lent: float) -> _Correction | None:
         """The correction with some stiffness lent; None where equations do not say any."""

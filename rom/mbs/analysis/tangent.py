@@ -106,9 +106,8 @@ class Tangent:
 
     def steadier(self, before: Any) -> bool:
         """Whether the potential curves downwards no more, or far less than it did before."""
-        return self.rises or bool(
-            self._principal[0][0] > MAX_LEFT_CURVATURE * before._principal[0][0]
-        )
+        lowest = self._principal[0][0], before._principal[0][0]
+        return bool(lowest[0] > MAX_LEFT_CURVATURE * lowest[1])
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:

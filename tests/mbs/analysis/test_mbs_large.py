@@ -215,6 +215,20 @@ def test_chains_that_begin_almost_on_their_heads_fall_to_where_they_hang(monkeyp
     assert_allclose(state.q[2::7], -(np.arange(6) + 0.5) / 6, atol=1e-12)
 
 
+@pytest.mark.parametrize("many", [False, True])
+def test_what_stands_on_its_head_falls_although_what_almost_hangs_weighs_more(many, monkeypatch):
+    """Newton's correction, downhill as a whole, would raise the light one."""
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0 if many else 10**6)
+    mech = Mechanism(gravity=(0, 0, -9.81))
+    for name, mass, slope in (("heavy", 5.0, np.pi / 2 - 0.2), ("light", 0.1, -np.pi / 2 + 0.1)):
+        turned = (np.cos(slope / 2), 0, np.sin(slope / 2), 0)
+        at = (np.cos(slope), 0, -np.sin(slope))
+        link = mech.add_rigid(name, mass=mass, inertia=(mass / 3,) * 3, orientation=turned, at=at,
+                              markers={"a": (-1, 0, 0)})  # fmt: skip
+        mech.revolute(f"pin of {name}", mech.ground.marker((0, 0, 0)), link.marker("a"), axis=Y)
+    assert_allclose(rom.equilibrium(mech).q[2::7], -1.0, atol=1e-12)
+
+
 def test_reactions_balance_best_as_those_of_dense_matrices():
     mech = links(8, slopes=np.linspace(0.5, -0.8, 8))[0]
     changes = []
