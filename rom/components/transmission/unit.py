@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -27,6 +27,8 @@ from rom.model import Array
 
 MIRROR_SIGNS = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
 LOADS = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
+# to the load from heavier ones, under which films find oil more easily
+WAYS_DOWN = ((1.0,), (2.0, 1.4, 1.0), (4.0, 2.8, 2.0, 1.7, 1.4, 1.2, 1.0))
 MAX_ITERATIONS = 80
 RESIDUAL_RTOL = 1e-10
 MAX_STEP = 0.1  # of the clearance
@@ -302,7 +304,7 @@ def rest(
     """Static equilibrium, found by raising the load from the unloaded datum.
 
     A film that conserves its oil may run dry on that way and yet carry the whole load: then the
-    search goes on from where films rest that find oil everywhere.
+    search goes on from where films rest that find oil everywhere, under the load or a heavier one.
 
     Args:
         unit: the transmission.
@@ -319,9 +321,10 @@ def rest(
     try:
         return _rest(unit, theta, _touching(unit, theta), loads)
     except SolverError:
-        for other in _oiled(unit):
+        for way, other in product(WAYS_DOWN, _oiled(unit)):
             with suppress(SolverError):
-                return rest(unit, theta, start=rest(other, theta, loads=loads).q)
+                near = _rest(other, theta, _touching(other, theta), (*loads, way[0]))
+                return _rest(unit, theta, near.q, way)
         raise
 
 
