@@ -5,7 +5,8 @@ Source:
     and Duverger, J. Mech. Des. 126 (2004), for the body; ISO 6336-1 for the whole.
 """
 
-from typing import Literal
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -88,7 +89,7 @@ def contact_compliance(
     Args:
         radii: (2,) of curvature [m].
         depths: (2,) from the flanks to the axes of the teeth [m].
-        force: per width [N/m].
+        force: per length of contact line [N/m].
         E: Young's modulus of both [Pa]; nu is 0.3.
     """
     rho, h, nu = np.asarray(radii, dtype=float), np.asarray(depths, dtype=float), 0.3
@@ -96,23 +97,56 @@ def contact_compliance(
     return float((1 - nu**2) / np.pi * (np.log(4 * h**2 / a2).sum() - 2 * nu / (1 - nu)))
 
 
+def normal_section(pair: GearPair) -> GearPair:
+    """Spur gears with the teeth that a helical pair has in the section normal to them.
+
+    They have z / (cos^2 beta_b cos beta) teeth, which need not be a whole number.
+
+    Source:
+        ISO 6336-1 and ISO 21771: virtual spur gears.
+    """
+    if pair.helix == 0.0:
+        return pair
+    teeth: Any = tuple(z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)
+    return replace(pair, teeth=teeth, helix=0.0, centre_distance=None, thinning=0.0)
+
+
+def in_normal_section(pair: GearPair, s: float) -> tuple[Array, Array]:
+    """Where teeth touch in their normal section: radii on the virtual gears, and of curvature.
+
+    Args:
+        pair: spur or helical gears.
+        s: place on the path of contact, from T1 [m].
+
+    Returns:
+        (2,) radii of equal height over the reference circle [m], (2,) radii of curvature [m].
+    """
+    rho = np.array([s, pair.tangents - s])
+    height, normal = np.hypot(pair.rb, rho) - pair.r, normal_section(pair)
+    return np.maximum(normal.r + height, normal.rb), rho / np.cos(pair.base_helix)
+
+
 def pair_stiffness(
     pair: GearPair, s: float, *, force: float, E: float = 206e9, body: Body = "weber"
 ) -> float:
-    """Stiffness of one pair of spur teeth per width [N/m^2].
+    """Stiffness of one pair of teeth per length of contact line, along its normal [N/m^2].
+
+    Helical teeth bend as those of their normal section. Times the cosine of the base helix it is
+    the stiffness per width in the transverse plane, as ISO 6336 has it.
 
     Args:
-        pair: spur gears.
+        pair: spur or helical gears.
         s: place on the path of contact, from T1 [m].
-        force: per width [N/m].
+        force: normal force per length of contact line [N/m].
         E: Young's modulus [Pa].
         body: see `tooth_compliance`.
 
     Raises:
         ModelError: if the pair does not touch there.
     """
-    rho = np.array([s, pair.tangents - s])
-    parts = [tooth_compliance(pair, g, float(np.hypot(pair.rb[g], rho[g])), body) for g in (0, 1)]
+    radii, rho = in_normal_section(pair, s)
+    teeth = normal_section(pair)
+    parts = [tooth_compliance(teeth, g, float(radii[g]), body) for g in (0, 1)]
     own = sum(bending + foundation for bending, foundation, _ in parts)
     return float(E / (own + contact_compliance(rho, [p[2] for p in parts], force, E)))
 

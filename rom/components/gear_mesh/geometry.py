@@ -70,6 +70,12 @@ class GearPair:
                     "part of their involute to the tool.",
                     hint=f"Shift the profile by at least {least:.3f} modules, or take more teeth.",
                 )
+        for tip, name in zip(self.tip_thickness, ("pinion", "gear"), strict=True):
+            if not tip > 0:
+                raise ModelError(
+                    f"the teeth of the {name} are pointed: their flanks meet below the tip.",
+                    hint="Lower the addendum or the profile shift, or take more teeth.",
+                )
         if self.cos_working >= 1 or self.backlash < -1e-12:
             raise ModelError(
                 f"the backlash is closed: at a centre distance of {self.distance * 1e3:.4f} mm the "
@@ -184,6 +190,12 @@ class GearPair:
         at_r = m * (np.pi / 2 + 2 * x * np.tan(self.pressure_angle) * np.cos(self.helix))
         at_r = at_r - np.array([0.0, self.thinning / np.cos(self.alpha_t)])
         return self.rb * (at_r / self.r + 2 * involute(self.alpha_t))
+
+    @cached_property
+    def tip_thickness(self) -> Array:
+        """(2,) transverse thickness of the teeth at their tips [m]."""
+        at_base = self.base_thickness / (2 * self.rb)
+        return 2 * self.ra * (at_base - involute(np.arccos(self.rb / self.ra)))
 
 
 def path_of_contact(pair: GearPair, alpha: float) -> tuple[float, float]:

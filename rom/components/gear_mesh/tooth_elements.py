@@ -12,7 +12,13 @@ from scipy.interpolate import interp1d
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
-from rom.components.gear_mesh.compliance import contact_compliance, profile, tooth_compliance
+from rom.components.gear_mesh.compliance import (
+    contact_compliance,
+    in_normal_section,
+    normal_section,
+    profile,
+    tooth_compliance,
+)
 from rom.components.gear_mesh.geometry import GearPair
 from rom.errors import ModelError
 from rom.model import Array, Index
@@ -100,13 +106,14 @@ def tooth_model(
 def element_table(
     pair: GearPair, *, force: float, bore: float = 0.35, n: int = 41, E: float = 206e9
 ) -> Array:
-    """(n,) stiffness of one pair of spur teeth from first to last contact [N/m^2].
+    """(n,) stiffness of one pair of teeth per length of contact line, first to last [N/m^2].
 
-    Teeth and bodies of finite elements, contact between them in closed form.
+    Teeth and bodies of finite elements, contact between them in closed form; helical teeth bend as
+    those of their normal section.
 
     Args:
-        pair: spur gears.
-        force: per width [N/m].
+        pair: spur or helical gears.
+        force: normal force per length of contact line [N/m].
         bore: see `tooth_model`.
         n: number of values.
         E: Young's modulus [Pa].
@@ -114,13 +121,13 @@ def element_table(
     Raises:
         ModelError: if the bore leaves no body.
     """
-    models = [tooth_model(pair, gear, bore=bore) for gear in (0, 1)]
+    teeth = normal_section(pair)
+    models = [tooth_model(teeth, gear, bore=bore) for gear in (0, 1)]
     (A, B), table = pair.path, []
     for s in np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n):
-        rho = np.array([s, pair.tangents - s])
-        radii = np.hypot(pair.rb, rho)
+        radii, rho = in_normal_section(pair, s)
         own = sum(model.compliance(r) for model, r in zip(models, radii, strict=True))
-        depths = [tooth_compliance(pair, g, float(radii[g]))[2] for g in (0, 1)]
+        depths = [tooth_compliance(teeth, g, float(radii[g]))[2] for g in (0, 1)]
         table.append(E / (own + contact_compliance(rho, depths, force, E)))
     return np.array(table)
 

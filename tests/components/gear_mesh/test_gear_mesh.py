@@ -18,6 +18,7 @@ from rom.components.gear_mesh import (
     tooth_model,
     transmission_error,
 )
+from rom.components.gear_mesh.compliance import in_normal_section, normal_section, profile
 from rom.components.gear_mesh.contact import Line, contact_lines, structural_vectors
 from rom.errors import ModelError
 
@@ -197,6 +198,47 @@ def test_teeth_are_as_stiff_as_listed(row):
     assert_allclose(np.array(iso_stiffness(p)) / 1e9, row[8:], rtol=4e-4)
 
 
+@pytest.mark.parametrize("degrees", [-30, 8, 15, 25, 30])
+@pytest.mark.parametrize("teeth", [(26, 157), (50, 50), (20, 60), (34, 95)])
+def test_stiffness_falls_with_the_helix_as_in_iso_6336(teeth, degrees):
+    """Per width in the transverse plane: lines are longer by 1 / cos, normals inclined by cos^2."""
+    pairs = [GearPair(teeth, 4e-3, 0.04, float(np.radians(d))) for d in (0, degrees)]
+    spur, helical = (
+        pair_stiffness(p, p.pitch_point, force=3e5) * np.cos(p.base_helix) for p in pairs
+    )
+    norm = [iso_stiffness(p)[1] for p in pairs]
+    assert helical / spur == pytest.approx(norm[1] / norm[0], rel=0.05)
+    assert helical / spur < (0.96 if abs(degrees) == 30 else 1.0)
+
+
+@pytest.mark.parametrize("degrees", [12.5, 25])
+def test_helical_teeth_roll_as_the_spur_teeth_of_their_normal_section(degrees):
+    """Radii of curvature at the pitch point are equal in both; tip and root stay as high."""
+    p = GearPair((26, 57), 3e-3, 0.04, float(np.radians(degrees)), shift=(0.2, 0.1))
+    normal = normal_section(p)
+    radii, rho = in_normal_section(p, p.pitch_point)
+    assert_allclose(rho, normal.rb * np.tan(normal.alpha), rtol=2e-3)
+    assert_allclose(radii - normal.r, np.hypot(p.rb, p.rb * np.tan(p.alpha)) - p.r)
+    assert_allclose(normal.ra - normal.r, p.ra - p.r)
+    assert_allclose(normal.rf - normal.r, p.rf - p.r)
+    assert_allclose(normal.r * np.cos(p.base_helix) ** 2, p.r)
+    assert normal_section(GearPair((26, 57), 3e-3, 0.04)).teeth == (26, 57)
+
+
+def test_tips_are_as_thick_as_their_flanks_are_apart():
+    p = GearPair((26, 57), 3e-3, 0.04, shift=(0.3, 0.1))
+    for gear in (0, 1):
+        half = np.arcsin(profile(p, gear)[1][-1] / (2 * p.ra[gear]))
+        assert p.tip_thickness[gear] == pytest.approx(2 * half * p.ra[gear], rel=1e-9)
+
+
+def test_helical_teeth_of_finite_elements_soften_as_webers():
+    p, spur = (GearPair((50, 50), 3e-3, 0.04, h) for h in (float(np.radians(20)), 0.0))
+    ratio = [element_table(g, force=3e5, bore=0.6, n=3)[1] for g in (p, spur)]
+    weber = [pair_stiffness(g, g.pitch_point, force=3e5) for g in (p, spur)]
+    assert ratio[0] / ratio[1] == pytest.approx(weber[0] / weber[1], rel=0.03)
+
+
 @pytest.mark.parametrize(("z", "bending", "whole"), [(26, 2.09, 4.52), (50, 1.85, 4.60)])
 def test_a_tooth_bends_as_listed(z, bending, whole):
     p = GearPair((z, 100), 4e-3, 0.04)
@@ -305,6 +347,7 @@ def test_damping_takes_power_from_teeth_in_contact():
 
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: GearPair((12, 40), 4e-3, 0.04), "teeth of the pinion are undercut.*|at least 0.298"),
+    (lambda: GearPair((40, 9), 4e-3, 0.04, shift=(0.0, 0.9)), "teeth of the gear are pointed"),
     (lambda: GearPair(TEETH, 4e-3, 0.04, 12.5), "in radians"),
     (lambda: GearPair((2, 40), 4e-3, 0.04), "no gears have"),
     (lambda: pair(centre_distance=0.3659), "backlash is closed"),
