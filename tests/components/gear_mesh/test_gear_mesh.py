@@ -225,6 +225,16 @@ def test_helical_teeth_roll_as_the_spur_teeth_of_their_normal_section(degrees):
     assert normal_section(GearPair((26, 57), 3e-3, 0.04)).teeth == (26, 57)
 
 
+def test_helical_teeth_are_as_stiff_a_little_further_apart_and_down_to_their_base_circle():
+    tight = pair(HELIX)
+    apart = pair(HELIX, centre_distance=tight.distance + 5e-5)
+    stiff = [pair_stiffness(p, p.pitch_point, force=3e5) for p in (tight, apart)]
+    assert stiff[0] == pytest.approx(stiff[1], rel=1e-2)
+    low = GearPair((10, 96), 2e-3, 0.02, -0.5152, pressure_angle=0.3552, shift=(-0.1228, -0.1703),
+                   addendum=0.7409)  # fmt: skip
+    assert 5e9 < stiffness_table(low, force=2e5).min() < 2e10
+
+
 def test_tips_are_as_thick_as_their_flanks_are_apart():
     p = GearPair((26, 57), 3e-3, 0.04, shift=(0.3, 0.1))
     for gear in (0, 1):
