@@ -34,6 +34,7 @@ class Entry:
         made: the mechanism.
         section, name: of the entry.
         ends: markers, or joints.
+        marker_names: "body.marker" of the markers, as they are written.
         values: its other values, in SI.
         place: in the file.
         t_end: until when functions of time are asked for [s].
@@ -44,6 +45,7 @@ class Entry:
     section: str
     name: str
     ends: list[Any]
+    marker_names: list[str]
     values: dict[str, Any]
     place: Place
     t_end: float
@@ -164,6 +166,25 @@ def _contact(entry: Entry) -> None:
     getattr(entry.made, kind)(entry.name, *entry.ends, *body, impact, **entry.values)
 
 
+def _tendon(entry: Entry) -> None:
+    from rom.mbs.elements.tendons.tendons import Pulley
+
+    values, pulleys = entry.values, entry.values.pop("pulleys")
+    for key in ("free_length", "tension"):
+        if isinstance(values.get(key), Mapping):
+            values[key] = entry.law(key).value
+    names = entry.marker_names
+    for name in pulleys:
+        if name not in names:
+            place = entry.place.at("pulleys").at(name)
+            raise place.error(f"{name!r} is no marker of the path.", nearest(name, names))
+    path = [
+        Pulley(marker, **pulleys[name]) if name in pulleys else marker
+        for marker, name in zip(entry.ends, names, strict=True)
+    ]
+    entry.made.tendon(entry.name, path, **values)
+
+
 def _law(entry: Entry) -> None:
     kind = entry.values.pop("kind")
     LAWS[kind](entry)
@@ -231,6 +252,7 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "bushings": _bushing,
     "stops": _stop,
     "contacts": _contact,
+    "tendons": _tendon,
     "laws": _law,
     "events": _event,
 }

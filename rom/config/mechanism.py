@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 GROUND = "ground"
 # of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
 GAP_RTOL = 1e-2
-MARKER_KEYS = ("between", "marker", "markers")
+MARKER_KEYS = ("between", "marker", "markers", "path")
 JOINT_KEYS = ("joint", "joint1", "joint2")
 MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
 
@@ -110,9 +110,9 @@ class MechanismFile:
     def _connect(self, made: "Mechanism", section: str, name: str, values: dict[str, Any]) -> None:
         """Call the method of the mechanism with what the entry says."""
         place = Place(self.document, (section, name))
-        ends: list[Any] = []
-        for key in MARKER_KEYS:
-            ends += [self._marker(made, marker) for marker in _markers(values.pop(key, []))]
+        markers = [marker for key in MARKER_KEYS for marker in _markers(values.pop(key, []))]
+        ends: list[Any] = [self._marker(made, marker) for marker in markers]
+        marker_names = [f"{body}.{where}" for body, where in markers]
         for key in (key for key in JOINT_KEYS if key in values):
             joint = values.pop(key)
             if joint not in made.joints:
@@ -123,7 +123,8 @@ class MechanismFile:
             if isinstance(value, Pending):
                 values[key] = value.of(turns=_turns(made, ends[0], values.get("coordinate")))
         end, trust = self.values["simulation"]["t_end"], self.meshing.get("trust", False)
-        Entry(made, section, name, ends, values, place, end, trust).connect()
+        named = (ends, marker_names)
+        Entry(made, section, name, *named, values, place, end, trust).connect()
 
     def _warn_if_apart(self, made: "Mechanism", name: str) -> None:
         """Two points that are to be one should be near each other at the start."""

@@ -232,6 +232,13 @@ SPREAD_KEYS = (
     Key("frame", Text(("body", "world")), "Axes in which it keeps its direction.", "body"),
 )
 MANY = Key("markers", Several(), "On which it acts.", ...)
+PULLEY = Table("A pulley in place of an eyelet.", (
+    Key("radius", RADIUS, "Of the cable.", ...),
+    Key("axis", DIRECTION, "In the world at the start; the cable goes around it in the positive "
+        "sense.", ...),
+    Key("friction", Quantity(), "Coefficient between cable and pulley.", 0.0),
+    Key("turns", Whole(0), "Whole turns beyond the wrap of less than one.", 0),
+))  # fmt: skip
 LAWS = {
     "line": formula_kind("N", MOTION, "A force along the line between two markers, positive when "
                          "it pushes them apart: x is its length, v its rate.", BETWEEN),
@@ -306,6 +313,19 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("damping", Quantity("N s/m", ((3,),)), "Along them.", [0.0, 0.0, 0.0]),
         Key("turning_damping", Quantity("N m s/rad", ((3,),)), "About them.", [0.0, 0.0, 0.0]),
         Key("axes", Quantity("1", ((4,), (3, 3))), "Axes to world at the start; world if missing."),
+    ))),
+    "tendons": ("cables", Table("A cable through eyelets and over pulleys, which goes slack.", (
+        Key("path", Several(), "Markers in the order in which it passes them.", ...),
+        Key("pulleys", Named(PULLEY, "pulleys"), "Which of these markers are pulleys.", {}),
+        Key("EA", Quantity("N", positive=True), "Force per strain; none if it is pulled."),
+        Key("damping", Quantity("N s"), "Tension per rate of strain.", 0.0),
+        Key("free_length", law_kind("m"), "Length without force, over time for a winch; that at "
+            "the start if missing."),
+        Key("pretension", Quantity("N"), "Tension at the start, in its place.", 0.0),
+        Key("tension", law_kind("N"), "Force that pulls at its first end, in place of EA."),
+        Key("friction", Quantity(), "Coefficient at all eyelets.", 0.0),
+        Key("transition_speed", Quantity("m/s", positive=True),
+            "Of the sliding cable, over which friction turns."),
     ))),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,

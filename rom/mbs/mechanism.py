@@ -27,6 +27,7 @@ from rom.mbs.elements import (
 )
 from rom.mbs.elements.contact import points, surfaces
 from rom.mbs.elements.family import Family, check_family
+from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
 from rom.model import Array
@@ -47,6 +48,7 @@ FAMILIES = (
     points.CONTACTS_FAMILY,
     spread_loads.SPREAD_LOADS_FAMILY,
     nonlinear.NONLINEAR_FAMILY,
+    tendons.TENDONS_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -175,6 +177,7 @@ class Mechanism:
     surface_on_sphere = surfaces.surface_on_sphere
     surface_on_cylinder = surfaces.surface_on_cylinder
     spread_load = spread_loads.spread_load
+    tendon = tendons.tendon
     add_nonlinear = nonlinear.add_nonlinear
 
     springs = Every(springs.Spring)
@@ -188,6 +191,7 @@ class Mechanism:
     bushings = Every(bushings.Bushing)
     contacts = Every(points.Contact)
     spread_loads = Every(spread_loads.Spread)
+    tendons = Every(tendons.Tendon)
     nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:

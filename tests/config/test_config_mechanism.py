@@ -146,6 +146,9 @@ def test_every_section_reaches_the_mechanism(folder):
     assert mech.motors["f"].law(0.5, 0.0, 0.0) == pytest.approx(1000.0)
     assert_array_equal(np.diag(mech.bushings["u"].stiffness), [1e3, 2e3, 3e3, 1, 2, 3])
     assert_array_equal(mech.loads["w"].vector, [0, 0, 1])
+    cable = mech.tendons["rope"]
+    assert cable.numbers == (2e3, 3.0, 0.0, 1e-3) and cable.function(2.0) == pytest.approx(3.8)
+    assert [(one.radius, one.friction) for one in cable.stations[1:]] == [(0.02, 0.1), (0.0, 0.2)]
     assert mech.frictions["d"].numbers[0] == 4 and mech.frictions["d"].numbers[-1] == 1e-3
     assert mech.stops["e"].limits == ((1, np.pi / 4),)
     assert mech.contacts["k"].radius[0] == 0.05 and mech.contacts["k"].law.exponent == 1.5

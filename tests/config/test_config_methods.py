@@ -80,6 +80,8 @@ ENTRIES = {  # method: an entry that calls it
     "spring_damper": f"[springs.new]\n{ENDS}stiffness = 1\n",
     "rotational_spring": '[rotational_springs.new]\njoint = "turn"\nstiffness = 1\n',
     "bushing": f"[bushings.new]\n{ENDS}stiffness = [1, 1, 1]\n",
+    "tendon": '[tendons.new]\npath = ["ground.o", "a.q", "soft.root"]\nEA = "1 kN"\n'
+    'pulleys = { "a.q" = { radius = "5 cm", axis = [0, 1, 0], turns = 1 } }\n',
     "force": '[forces.new]\nmarker = "a.q"\nvector = [1, 0, 0]\n',
     "torque": '[torques.new]\nmarker = "a.q"\nvector = [1, 0, 0]\n',
     "friction": '[frictions.new]\njoint = "turn"\ntransition_speed = 1\ncoulomb = 1\n',

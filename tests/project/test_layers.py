@@ -221,6 +221,7 @@ ORDER = {
         "spread_loads",
         "nonlinear",
         "rods",
+        "tendons",
     ),
     "reduction": (
         "bases",

@@ -16,7 +16,7 @@ from rom.view.canvas.scene import aimed
 from rom.view.scenes.connections import SPRING_COLOUR, connections, stretched
 from rom.view.scenes.film import HEIGHTS, Look, _stage
 from rom.view.scenes.ground import GROUND_COLOUR, JOINT_COLOUR, PLANE_OPACITY
-from rom.view.scenes.places import at_start, different
+from rom.view.scenes.places import at_start, different, moving
 from rom.view.scenes.rigid import bars, block_of, ends_of
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -258,3 +258,25 @@ def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
     monkeypatch.setitem(sys.modules, "dolfinx", ModuleType("dolfinx"))
     with pytest.raises(ConfigError, match="dolfinx is loaded in this process"):
         view.plotter(lattice_bar())
+
+
+def test_a_cable_runs_along_tangents_and_arcs_at_all_instants():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    wheel = rom.mbs.Pulley(mech.ground.marker((0, 0, 0)), 0.2, (0, 1, 0))
+    load = rod(mech, at=(0.2, 0, -1.0), velocity=(0, 0, 1.0))
+    mech.prismatic("slide", mech.ground.marker((0.2, 0, -1.0)), load.marker((0, 0, 0)),
+                   axis=(0, 0, 1))  # fmt: skip
+    mech.tendon("rope", [mech.ground.marker((-0.2, 0, -1.0)), wheel, load.marker((0, 0, 0))], EA=1)
+    moved = rom.simulate(mech, t_end=0.5, dt=0.01, progress=False)
+    places = moving(mech, moved, [0, 50], 1.0)
+    *_, line, circle = connections(
+        places, {"rod": np.array([[-0.5, 0, 0], [0.5, 0, 0]])}, set(), UP
+    )
+    x = line.points
+    for f, end in enumerate((-1.0, -0.5)):
+        np.testing.assert_allclose(x[f, 0], [-0.2, 0, -1.0])
+        np.testing.assert_allclose(x[f, -1], [0.2, 0, end], atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(x[f, 1:-1], axis=1), 0.2)
+        np.testing.assert_allclose(x[f, [1, -2]], [[-0.2, 0, 0], [0.2, 0, 0]], atol=1e-12)
+        np.testing.assert_allclose(x[f, len(x[f]) // 2], [0, 0, 0.2], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(circle.points, axis=2), 0.2)

@@ -19,7 +19,7 @@ from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
-from rom.mbs.parts.signals import Signal, clock_signal, load_signal
+from rom.mbs.parts.signals import Signal, clock_signal, load_signal, motion_signal
 from rom.model import Array, Index
 
 NO_ROWS = np.zeros(0, dtype=np.int64)
@@ -110,7 +110,7 @@ class Places:
         signals: functions of time so far.
         coordinates: markers and row of each joint coordinate that something acts on.
         time: number of the one that tells the time, -1 for none.
-        remembered: (m,) numbers that each law remembers, at the start, in their own units.
+        remembered: {owner: (m,) numbers that it remembers, at the start, in their own units}.
     """
 
     body: Mapping[str, int]
@@ -121,12 +121,12 @@ class Places:
     signals: list[Signal] = field(default_factory=list)
     coordinates: list[tuple[tuple[Marker, Marker], Row]] = field(default_factory=list)
     time: int = -1
-    remembered: list[Array] = field(default_factory=list)
+    remembered: dict[str, Array] = field(default_factory=dict)
 
     def copy(self) -> "Places":
         """The same places, to which more can be added without changing these."""
-        kept = ("owners", "signals", "coordinates", "remembered")
-        return replace(self, **{name: list(getattr(self, name)) for name in kept})
+        kept = {name: list(getattr(self, name)) for name in ("owners", "signals", "coordinates")}
+        return replace(self, **kept, remembered=dict(self.remembered))
 
     def coordinate(self, joint: str, row: Row) -> int:
         """Number of a coordinate of a joint."""
@@ -147,6 +147,13 @@ class Places:
         self.signals.append(load_signal(name, function))
         return len(self.signals) - 1
 
+    def motion(self, name: str, function: Callable[[float], Any] | None) -> int:
+        """Number of a prescribed length and its rate, -1 for none; it must not jump."""
+        if function is None:
+            return -1
+        self.signals.append(motion_signal(name, function))
+        return len(self.signals) - 1
+
     def clock(self) -> int:
         """Number of the function that tells the time."""
         if self.time < 0:
@@ -154,10 +161,11 @@ class Places:
             self.time = len(self.signals) - 1
         return self.time
 
-    def memory(self, start: Array) -> int:
+    def memory(self, owner: str, start: Array) -> int:
         """First of (m,) numbers that are kept from one instant to the next, in their own units."""
-        self.remembered.append(start)
-        return sum(x.size for x in self.remembered[:-1])
+        self.remembered.setdefault(owner, start)
+        before = list(self.remembered).index(owner)
+        return sum(x.size for x in list(self.remembered.values())[:before])
 
     def packed_coordinates(self) -> Coordinates:
         """The joint coordinates as arrays."""
@@ -189,6 +197,7 @@ class Family:
         loaded_rows: table -> constraint rows whose multipliers they depend on.
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
         answers: table -> (e, ...) what each law of a user answered last, None if there is none.
+        lost: what is wrong if an answer is not finite; in place of {}, the names.
     """
 
     name: str
@@ -205,6 +214,7 @@ class Family:
     loaded_rows: Callable[[Any], Index] = no_rows
     asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
     answers: Callable[[Any], Sequence[Any]] = no_answers
+    lost: str = "the law of {} gives no finite number"
 
     @property
     def kernels(self) -> list[ElementKernel]:

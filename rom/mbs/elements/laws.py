@@ -215,7 +215,7 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         marker,
         _starts([law.parameters.size for law in found]),
         _starts(sizes),
-        places.memory(np.concatenate([law.memory for law in found])) + _starts(remembered),
+        places.memory("laws", np.concatenate([law.memory for law in found])) + _starts(remembered),
         np.concatenate([law.parameters for law in found]),
         np.concatenate([law.memory for law in found]),
         integers(law.stores and law.compiled[0] is not None for law in found),

@@ -84,14 +84,13 @@ class Packed:
 
     @property
     def broken_laws(self) -> str:
-        """In words, the laws of users that gave no finite number when asked last."""
-        names = [
-            name
-            for family, table in self.elements.items()
-            for name, answer in zip(self.element_names[family], family.answers(table), strict=False)
-            if not np.isfinite(answer).all()
-        ]
-        return f"; the law of {', '.join(map(repr, names))} gives no finite number" if names else ""
+        """In words, the elements that gave no finite number when asked last."""
+        message = ""
+        for family, table in self.elements.items():
+            answers = zip(self.element_names[family], family.answers(table), strict=False)
+            names = [repr(name) for name, answer in answers if not np.isfinite(answer).all()]
+            message += f"; {family.lost.format(', '.join(names))}" if names else ""
+        return message
 
     @property
     def by_rate(self) -> bool:
@@ -179,7 +178,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         places.packed_coordinates(),
         integers(family.row(table) for family, table in elements.items()).reshape(-1, ROW_WORDS),
         int(any(family.loaded_rows(table).size for family, table in elements.items())),
-        np.concatenate([np.zeros(0), *places.remembered]),
+        np.concatenate([np.zeros(0), *places.remembered.values()]),
     )
     return Packed(
         system.replace(graph=graph_of(system, coupled_by(elements, markers.body), whole=whole)),

@@ -44,6 +44,7 @@ Address1 = Annotated[Index, types.Array(types.int64, 1, "C"), PASSING_MARK]
 Address2 = Annotated[Index, types.Array(types.int64, 2, "C"), PASSING_MARK]
 Scratch1 = Annotated[Array, types.Array(types.float64, 1, "C"), PASSING_MARK]
 Scratch2 = Annotated[Array, types.Array(types.float64, 2, "C"), PASSING_MARK]
+Scratch3 = Annotated[Array, types.Array(types.float64, 3, "C"), PASSING_MARK]
 TABLE_WORD = ir.IntType(64)
 WORD_SIZE = 8  # of all entries, real and whole numbers both [bytes]
 T = TypeVar("T")

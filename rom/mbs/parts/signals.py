@@ -137,6 +137,11 @@ def load_signal(name: str, function: Callable[[float], Any]) -> Signal:
     return Signal(name, function, width=3)
 
 
+def motion_signal(name: str, function: Callable[[float], Any]) -> Signal:
+    """Signal of a prescribed length that is no joint coordinate."""
+    return Signal(name, function)
+
+
 def sample_all(signals: tuple[Signal, ...], t: Array, span: Span, spacing: float) -> Array:
     """(n, s, 3) all signals at all times."""
     out = np.zeros((t.size, len(signals), 3))

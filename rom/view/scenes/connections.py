@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.mbs.elements.contact.points import BORE, CYLINDER, DISC, PLANE
+from rom.mbs.elements.tendons.paths import Place, path_through, points_along
 from rom.mbs.kernels.system import NORMAL
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.model import Array
@@ -65,6 +66,8 @@ def connections(
         actors += _spring(scenery, spring)
     for bushing in mechanism.bushings.values():
         actors += _bushing(scenery, bushing.i, bushing.j)
+    for name, tendon in mechanism.tendons.items():
+        actors += _tendon(places, name, tendon)
     return actors + list(_contacts(scenery))
 
 
@@ -251,6 +254,27 @@ def _bushing(scenery: Scenery, first: Marker, second: Marker) -> Iterator[Actor]
     for marker in (first, second):
         if marker.body == GROUND:
             yield from support(scenery, places.point(marker)[0], None)
+
+
+def _tendon(places: Places, name: str, tendon: Any) -> Iterator[Actor]:
+    """The line of a cable, and the circles of its pulleys."""
+    stations = tendon.stations
+    x = [places.point(one.marker) for one in stations]
+    turned = [places.pose(one.marker.body)[1] for one in stations]
+    drawn = []
+    for f in range(max(map(len, x))):
+        found = [
+            Place(x[k][f % len(x[k])], one.axes @ turned[k][f % len(turned[k])].T, one.radius)
+            for k, one in enumerate(stations)
+        ]
+        drawn.append(points_along(path_through(name, found), found))
+    points = np.array(drawn)
+    n = points.shape[1]
+    cells = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+    yield Actor(points, cells, colour=DAMPER_COLOUR, width=LINE_WIDTH)
+    for one in stations:
+        if one.radius:
+            yield _circle(places, one.marker, one.axes[0], one.radius)
 
 
 def _contacts(scenery: Scenery) -> Iterator[Actor]:

@@ -501,6 +501,8 @@ JOIN_OWN = {
     ("part", "name"): lambda mech: "arm",
     ("add_nonlinear", "body"): lambda mech: None,
     ("bushing", "stiffness"): lambda mech: np.ones(6),
+    ("tendon", "path"): lambda mech: [mech.ground.marker((0, 0, k)) for k in range(2)],
+    ("tendon", "EA"): lambda mech: 1.0,
 }
 
 

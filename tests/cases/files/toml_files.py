@@ -122,6 +122,17 @@ f = { joint = "slide", law = { kind = "ramp", to = "2 kN", duration = "1 s" } }
 between = ["a.root", "b.p"]
 stiffness = ["1 kN/m", "2 kN/m", "3 kN/m"]
 turning_stiffness = ["1 N m/rad", 2, 3]
+[tendons.rope]
+path = ["ground.o", "a.tip", "b.q"]
+EA = "2 kN"
+damping = "3 N s"
+free_length = { kind = "steady", start = "4 m", rate = "-10 cm/s" }
+friction = 0.2
+transition_speed = "1 mm/s"
+[tendons.rope.pulleys."a.tip"]
+radius = "2 cm"
+axis = [0, 0, 1]
+friction = 0.1
 [torques.w]
 marker = "b.q"
 vector = [0, 0, "1 N m"]

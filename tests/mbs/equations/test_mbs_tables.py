@@ -138,6 +138,7 @@ ELEMENTS = {  # family -> what asks for it
     "contacts": lambda m, a, b: m.sphere_on_sphere("e", a, b, LAW, radius1=0.1, radius2=0.1),
     "spread_loads": lambda m, a, b: loaded_body(m),
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
+    "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
 
