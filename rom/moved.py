@@ -28,6 +28,7 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
      "blade_element drivetrain whole_turbine wind_turbine"),
     ("rom.components.cosserat", "rom.mbs.elements.rods",
      "elements=energy multibody=bodies shape=shapes"),
+    ("rom.components.gear_mesh", "rom.mbs.elements.gears", "geometry"),
     ("rom.components.frf_updating", "rom.components.updating", "methods models"),
     ("rom.config", "rom.report", "reporting=pages run"),
     ("rom.cyclic", "rom.cyclic", "springs=supports"),

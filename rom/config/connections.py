@@ -166,6 +166,20 @@ def _contact(entry: Entry) -> None:
     getattr(entry.made, kind)(entry.name, *entry.ends, *body, impact, **entry.values)
 
 
+def _gear_mesh(entry: Entry) -> None:
+    from rom.mbs.elements.gears.corrections import Correction
+    from rom.mbs.elements.gears.geometry import GearPair
+
+    pair = {key: value for key, value in entry.values.pop("pair").items() if value is not None}
+    for key in ("teeth", "shift"):
+        pair[key] = tuple(pair[key])
+    correction = entry.values.pop("correction")
+    for key in ("relief", "extent"):
+        correction[key] = tuple(correction[key]) if key in correction else (0.0, 0.0)
+    entry.values["pair"], entry.values["correction"] = GearPair(**pair), Correction(**correction)
+    entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
+
+
 def _tendon(entry: Entry) -> None:
     from rom.mbs.elements.tendons.tendons import Pulley
 
@@ -252,6 +266,7 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "bushings": _bushing,
     "stops": _stop,
     "contacts": _contact,
+    "gear_meshes": _gear_mesh,
     "tendons": _tendon,
     "laws": _law,
     "events": _event,

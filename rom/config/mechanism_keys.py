@@ -283,6 +283,27 @@ EVENTS = {
         Key("markers", Several(), "It asks for, beyond those with names."), *PYTHON_KEYS, *WHEN,
     )),
 }  # fmt: skip
+TWO = ((2,),)
+GEAR_PAIR = Table("A pair of involute wheels.", (
+    Key("teeth", Quantity("1", TWO), "Of pinion and gear.", ...),
+    Key("module", Quantity("m", positive=True), "Normal module.", ...),
+    Key("width", Quantity("m", positive=True), "Common width of the faces.", ...),
+    Key("helix", Quantity("rad"), "At the reference circle, positive for a right-handed pinion.",
+        0.0),
+    Key("pressure_angle", Quantity("rad"), "Normal one; 20 degrees if missing."),
+    Key("shift", Quantity("1", TWO), "Profile shifts in modules.", [0.0, 0.0]),
+    Key("centre_distance", Quantity("m", positive=True), "None leaves no backlash if missing."),
+    Key("thinning", Quantity("m"), "Transverse backlash from thinner teeth.", 0.0),
+    Key("addendum", Quantity(positive=True), "Height above the reference circle in modules.", 1.0),
+    Key("dedendum", Quantity(positive=True), "Depth below it in modules.", 1.25),
+))  # fmt: skip
+CORRECTION = Table("What is taken off the working flanks.", (
+    Key("relief", Quantity("m", TWO), "Depth at the tips of pinion and gear.", [0.0, 0.0]),
+    Key("extent", Quantity("m", TWO), "Its length along the path of contact.", [0.0, 0.0]),
+    Key("power", Quantity("1", positive=True), "1 for linear, 2 for parabolic relief.", 1.0),
+    Key("crowning", Quantity("m"), "At both ends of the face.", 0.0),
+    Key("slope", Quantity("m"), "Of the lead over the face.", 0.0),
+))  # fmt: skip
 SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how
     "joints": ("joints", Variants(JOINTS)),
     "drives": ("prescribed joint coordinates", Table("A joint coordinate prescribed in time.", (
@@ -326,6 +347,20 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("friction", Quantity(), "Coefficient at all eyelets.", 0.0),
         Key("transition_speed", Quantity("m/s", positive=True),
             "Of the sliding cable, over which friction turns."),
+    ))),
+    "gear_meshes": ("gear meshes", Table("Involute teeth of two wheels in contact.", (
+        Key("between", Two(), "Middle of the faces of pinion and gear.", ...),
+        Key("axis", DIRECTION, "Of the pinion, in the world at the start.", ...),
+        Key("pair", GEAR_PAIR, "The wheels.", ...),
+        Key("stiffness", Quantity("N/m^2", ((), (None,))), "Of one pair of teeth per length of "
+            "contact line; one, or from first to last contact.", ...),
+        Key("correction", CORRECTION, "Of the working flanks.", {}),
+        Key("damping", Quantity("s"), "Force per rate over force per deflection.", 0.0),
+        Key("friction", Quantity(), "Coefficient between the flanks.", 0.0),
+        Key("transition_speed", Quantity("m/s", positive=True),
+            "Of sliding flanks, over which friction turns."),
+        Key("cells", Whole(1), "Slices across the face.", 21),
+        Key("phase", Quantity("rad"), "Turn of the pinion at the start.", 0.0),
     ))),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,

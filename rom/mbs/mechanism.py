@@ -27,6 +27,7 @@ from rom.mbs.elements import (
 )
 from rom.mbs.elements.contact import points, surfaces
 from rom.mbs.elements.family import Family, check_family
+from rom.mbs.elements.gears import meshes
 from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
@@ -49,6 +50,7 @@ FAMILIES = (
     spread_loads.SPREAD_LOADS_FAMILY,
     nonlinear.NONLINEAR_FAMILY,
     tendons.TENDONS_FAMILY,
+    meshes.GEAR_MESHES_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -178,6 +180,7 @@ class Mechanism:
     surface_on_cylinder = surfaces.surface_on_cylinder
     spread_load = spread_loads.spread_load
     tendon = tendons.tendon
+    gear_mesh = meshes.gear_mesh
     add_nonlinear = nonlinear.add_nonlinear
 
     springs = Every(springs.Spring)
@@ -192,6 +195,7 @@ class Mechanism:
     contacts = Every(points.Contact)
     spread_loads = Every(spread_loads.Spread)
     tendons = Every(tendons.Tendon)
+    gear_meshes = Every(meshes.GearMesh)
     nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:

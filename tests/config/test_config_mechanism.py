@@ -154,6 +154,13 @@ def test_every_section_reaches_the_mechanism(folder):
     assert mech.contacts["k"].radius[0] == 0.05 and mech.contacts["k"].law.exponent == 1.5
 
 
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+def test_a_pulley_that_is_not_on_the_path_is_told(folder):
+    (folder / "all.toml").write_text(ALL.replace('pulleys."a.tip"]', 'pulleys."a.tap"]'))
+    with pytest.raises(ConfigError, match=r"'a.tap' is no marker of the path.*a\.tip"):
+        read_mechanism("all.toml").mechanism()
+
+
 def law(text, unit):
     place = Place(parsed(f"law = {text}", "x"))
     return law_of(law_kind(unit).read(place.document.data["law"], place.at("law")), place)

@@ -222,6 +222,7 @@ ORDER = {
         "nonlinear",
         "rods",
         "tendons",
+        "gears",
     ),
     "reduction": (
         "bases",

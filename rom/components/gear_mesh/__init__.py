@@ -1,7 +1,7 @@
 """Gear meshes: involute pairs, compliance of their teeth, contact on the base plane.
 
-`geometry` has the pairs, `compliance` teeth in closed form and `tooth_elements` by finite elements,
-`contact` the forces between them.
+`compliance` has teeth in closed form and `tooth_elements` by finite elements, `contact` the forces
+between them; the pairs are those of `rom.mbs.elements.gears`.
 """
 
 from rom.lazy import front

@@ -3,13 +3,13 @@ from rom.components.gear_mesh.compliance import iso_stiffness as iso_stiffness
 from rom.components.gear_mesh.compliance import pair_stiffness as pair_stiffness
 from rom.components.gear_mesh.compliance import stiffness_table as stiffness_table
 from rom.components.gear_mesh.compliance import tooth_compliance as tooth_compliance
-from rom.components.gear_mesh.contact import Correction as Correction
 from rom.components.gear_mesh.contact import Mesh as Mesh
 from rom.components.gear_mesh.contact import MeshForce as MeshForce
 from rom.components.gear_mesh.contact import Slices as Slices
 from rom.components.gear_mesh.contact import transmission_error as transmission_error
-from rom.components.gear_mesh.geometry import GearPair as GearPair
-from rom.components.gear_mesh.geometry import line_length as line_length
 from rom.components.gear_mesh.tooth_elements import ToothModel as ToothModel
 from rom.components.gear_mesh.tooth_elements import element_table as element_table
 from rom.components.gear_mesh.tooth_elements import tooth_model as tooth_model
+from rom.mbs.elements.gears.corrections import Correction as Correction
+from rom.mbs.elements.gears.geometry import GearPair as GearPair
+from rom.mbs.elements.gears.geometry import line_length as line_length

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import trapezoid
 
-from rom.components.gear_mesh.geometry import GearPair, involute
 from rom.errors import ModelError
+from rom.mbs.elements.gears.geometry import GearPair, involute
 from rom.model import Array
 
 Body = Literal["weber", "sainsot"]

@@ -68,6 +68,9 @@ def connections(
         actors += _bushing(scenery, bushing.i, bushing.j)
     for name, tendon in mechanism.tendons.items():
         actors += _tendon(places, name, tendon)
+    for mesh in mechanism.gear_meshes.values():
+        for marker, axis, radius in zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=True):
+            actors.append(_circle(places, marker, axis, float(radius)))
     return actors + list(_contacts(scenery))
 
 

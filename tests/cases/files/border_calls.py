@@ -25,6 +25,7 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.mbs.elements import springs
 from rom.mbs.elements.contact.impact import Impact
+from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.reduction.interfaces.connection import connect
@@ -501,6 +502,9 @@ JOIN_OWN = {
     ("part", "name"): lambda mech: "arm",
     ("add_nonlinear", "body"): lambda mech: None,
     ("bushing", "stiffness"): lambda mech: np.ones(6),
+    ("gear_mesh", "wheel_a"): lambda mech: mech.ground.marker((0, 0, 0)),
+    ("gear_mesh", "wheel_b"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),
+    ("gear_mesh", "pair"): lambda mech: GearPair((40, 40), 0.0125, 0.1),
     ("tendon", "path"): lambda mech: [mech.ground.marker((0, 0, k)) for k in range(2)],
     ("tendon", "EA"): lambda mech: 1.0,
 }

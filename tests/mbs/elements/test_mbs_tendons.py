@@ -90,6 +90,32 @@ KINDS = {
 }  # fmt: skip
 
 
+def test_a_second_cable_is_like_the_first():
+    """Tangents and forces of two cables are the sum of those of each."""
+    rng = np.random.default_rng(4)
+    mech = strung(rng, "one", **KINDS["friction"])
+    a, b = mech.parts["one"].marker("a"), mech.parts["two"].marker("a")
+    corner = mech.ground.marker((2, -1, 0))
+    mech.tendon("other", [a, corner, b, mech.ground.marker((0, 3, 1))], tension=9.0, friction=0.2,
+                transition_speed=2.0)  # fmt: skip
+    state, K, forces = None, [], []
+    for kept in (("rope", "other"), ("rope",), ("other",), ()):
+        elements = dict(mech.elements)
+        for name in {"rope", "other"} - {*kept}:
+            del mech.elements[name]
+        packed, W = prepared(mech)
+        packed.system.markers.twist[:] *= 1e-3
+        mech.elements.update(elements)
+        state = near(rng, packed) if state is None else state
+        q, v, a_, lam = state
+        tangents_at(packed.system, W, q, v, a_, lam, (0.0, 1.0, 1.0))
+        K.append(W.S + W.Kt)
+        forces.append(_residual(packed, W, q, v, a_, lam))
+    for both, one, two, none in (K, forces):
+        assert_allclose(both - none, one + two - 2 * none, atol=1e-12 * np.abs(both).max())
+        assert np.abs(two - none).max() > 1e-3 * np.abs(both).max()
+
+
 @pytest.mark.parametrize("pulleys", ["none", "one", "pair"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_tangents_are_derivatives_of_the_forces(kind, pulleys):
@@ -204,6 +230,9 @@ def test_friction_at_eyelets_is_that_of_euler_and_eytelwein(way):
     force = sizes(moved, "rope")[-1]
     assert force[0] == pytest.approx(40.0, rel=1e-12)
     assert force[-1] == pytest.approx(40.0 * np.exp(-way * mu * angle), rel=1e-9)
+    # the hand at the first end works against the drive, which takes the rest, and friction
+    assert moved.energy.forces[-1] == pytest.approx(way * 40.0 * 0.01, rel=1e-6)
+    assert np.abs(moved.energy.balance).max() < 1e-6 * 40.0 * 0.01
 
 
 @pytest.mark.parametrize("turns", [0, 2])

@@ -11,6 +11,7 @@ import rom
 from cases.command import environment
 from cases.mbs.mechanisms import random_body
 from rom.components.cosserat import body, straight
+from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate import step_memory
 from rom.mbs.kernels.compiled import kernel
@@ -126,6 +127,7 @@ def geared_body(mech, a, b):
 
 ROD = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0, "inertia": (1e-2,) * 3}
 LAW = rom.mbs.Impact(stiffness=1e5)
+WHEELS = {"pair": GearPair((50, 50), 0.02, 0.01), "axis": (0, 0, 1), "stiffness": 1.0}
 ELEMENTS = {  # family -> what asks for it
     "springs": lambda m, a, b: m.spring_damper("e", a, b, stiffness=1.0),
     "turns": lambda m, a, b: m.rotational_spring("e", hinge(m, b), stiffness=1.0),
@@ -139,6 +141,7 @@ ELEMENTS = {  # family -> what asks for it
     "spread_loads": lambda m, a, b: loaded_body(m),
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
+    "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
 

@@ -1,0 +1,249 @@
+"""Gear meshes between bodies: forces of the plane model, kinematics, energy, loss of contact."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.mechanisms import prepared, residual_at, tangents_at
+from cases.mbs.tangents import difference, shifted
+from rom import rotation
+from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
+from rom.errors import ConfigError, SolverError
+from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
+
+ORIGIN, Z = (0, 0, 0), (0, 0, 1)
+SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
+HELICAL = GearPair((26, 40), 4e-3, 0.05, helix=0.35, thinning=5e-5)
+FLANKS = Correction(relief=(15e-6, 10e-6), extent=(2e-3, 3e-3), power=1.5, crowning=4e-6,
+                    slope=5e-6, pitch=(1e-6 * np.arange(26) % 7, ()))  # fmt: skip
+K = 1.3e10
+
+
+def wheels(pair=SPUR, turned=None, **more):
+    """Two free wheels in mesh, the whole placed anywhere."""
+    A = np.eye(3) if turned is None else rotation.matrix(turned)
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    made = [
+        mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=A @ (x, 0, 0),
+                       orientation=None if turned is None else turned)
+        for name, x in (("pinion", 0.0), ("gear", pair.distance))
+    ]  # fmt: skip
+    ends = [part.marker(ORIGIN) for part in made]
+    mech.gear_mesh("mesh", *ends, axis=A @ Z, pair=pair, **{"stiffness": K} | more)
+    return mech
+
+
+def moved(packed, q):
+    """Coordinates of the wheels that moved by q (12,) from the datum."""
+    delta = np.concatenate([q[:3], q[3:6], q[6:9], q[9:12]])
+    return shifted(packed, packed.q, delta)
+
+
+def wrench(packed, W, q, v):
+    """(12,) forces and moments of the teeth on both wheels."""
+    residual_at(packed.system, W, q, v, 0 * v, np.zeros(0))
+    return np.concatenate([W.wrench[packed.elements[GEAR_MESHES_FAMILY].i[0]],
+                           W.wrench[packed.elements[GEAR_MESHES_FAMILY].j[0]]])  # fmt: skip
+
+
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+@pytest.mark.parametrize("phase", [0.0, 0.13, 0.7, 40.2])
+def test_forces_in_the_plane_are_those_of_the_plane_model(pair, phase):
+    """Wheels that move and turn in their plane: the same physics, in another frame."""
+    table = stiffness_table(pair, force=3e5)
+    mesh = Mesh(pair, table, FLANKS, damping=2e-6)
+    packed, W = prepared(
+        wheels(pair, stiffness=table, correction=FLANKS, damping=2e-6, phase=phase)
+    )
+    rng = np.random.default_rng(1)
+    for side in (1.0, -1.0):
+        q, v = np.zeros(12), np.zeros(12)
+        for at in (0, 1, 6, 7):
+            q[at], v[at] = 2e-5 * rng.normal(), 1e-3 * rng.normal()
+        q[5], q[11], v[5], v[11] = 0.3 + side * 1.2e-3, -0.3 * 26 / 40, 1e-2, 3e-3
+        wanted = mesh.forces(q, phase, v)
+        found = wrench(packed, W, moved(packed, q), v)
+        assert np.abs(wanted.force).max() > 1e3
+        assert_allclose(found, wanted.force, atol=1e-8 * np.abs(wanted.force).max())
+        assert W.power[2] == pytest.approx(wanted.lost, rel=1e-7)
+        tangents_at(packed.system, W, moved(packed, q), v, 0 * v, np.zeros(0), (0.0, 0.0, 1.0))
+        stiffness = packed.elements[GEAR_MESHES_FAMILY].tangent[0]
+        assert_allclose(stiffness, wanted.stiffness, atol=1e-8 * np.abs(wanted.stiffness).max())
+        W.power[:] = 0.0
+
+
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+def test_shifts_along_the_axis_and_tilts_add_what_they_do_in_first_order(pair):
+    mesh = Mesh(pair, K)
+    packed, W = prepared(wheels(pair, phase=0.4))
+    rng = np.random.default_rng(2)
+    q = 1e-9 * rng.normal(size=12)
+    q[5] += 1e-4
+    q[11] += 1e-4
+    wanted = mesh.forces(q, 0.4).force
+    found = wrench(packed, W, moved(packed, q), np.zeros(12))
+    bare = np.zeros(12)
+    bare[[5, 11]] = q[[5, 11]]
+    change = wanted - mesh.forces(bare, 0.4).force
+    assert_allclose(found - wanted, 0.0, atol=1e-3 * np.abs(change).max())
+
+
+def test_forces_turn_with_the_whole():
+    turned = np.array([0.5, -0.3, 0.7, 0.2])
+    turned = turned / np.linalg.norm(turned)
+    A, found = rotation.matrix(turned), []
+    q = np.zeros(12)
+    q[[5, 11, 0, 7]] = 3e-4, 2e-4, 1e-5, -2e-5
+    for how in (None, turned):
+        packed, W = prepared(wheels(HELICAL, how, phase=0.2, correction=FLANKS))
+        part = q.reshape(4, 3).copy()
+        if how is not None:  # translations in the world, rotations in the body
+            part[[0, 2]] = part[[0, 2]] @ A.T
+        found.append(wrench(packed, W, moved(packed, part.ravel()), np.zeros(12)).reshape(4, 3))
+    assert np.abs(found[0]).max() > 100
+    assert_allclose(found[1], found[0] @ A.T, atol=1e-8 * np.abs(found[0]).max())
+
+
+def test_tangents_are_derivatives_but_for_the_turning_of_forces():
+    packed, W = prepared(wheels(HELICAL, damping=1e-5, friction=0.1, transition_speed=0.1))
+    q, v = np.zeros(12), 1e-4 * np.random.default_rng(0).normal(size=12)
+    q[[5, 11]] = 1e-4, 0.0
+    at, none = moved(packed, q), np.zeros(0)
+
+    def force(dq, dv):
+        residual_at(packed.system, W, shifted(packed, at, dq), v + dv, 0 * v, none)
+        return W.residual.copy()
+
+    stiff = difference(lambda x: force(x, 0 * v), 12, 1e-9)
+    loss = difference(lambda x: force(0 * v, x), 12)
+    tangents_at(packed.system, W, at, v, 0 * v, none, (0.0, 0.0, 1.0))
+    assert_allclose(W.Kt, stiff, atol=3e-3 * np.abs(stiff).max())
+    tangents_at(packed.system, W, at, v, 0 * v, none, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, loss, atol=1e-6 * np.abs(loss).max())
+
+
+def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
+    """Two wheels on fixed axles, in mesh."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    ends = []
+    for name, x, J in zip(("pinion", "gear"), (0.0, pair.distance), inertia, strict=True):
+        part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0))
+        mech.revolute(f"{name} axle", mech.ground.marker((x, 0, 0)), part.marker(ORIGIN), axis=Z)
+        ends.append(part.marker(ORIGIN))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **{"stiffness": K} | more)
+    return mech
+
+
+def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
+    """omega^2 = k (r_b1^2 / J_1 + r_b2^2 / J_2), k of all lines that touch under load.
+
+    A soft coil holds the gear, so that the loads have a place to rest.
+    """
+    J, pair = (2e-3, 9e-3), HELICAL
+    mech = geared(pair, J)
+    mech.torque("drive", mech.parts["pinion"].marker(ORIGIN), (0, 0, 50.0))
+    mech.rotational_spring("coil", "gear axle", stiffness=1e5)
+    state = rom.equilibrium(mech)
+    small = Mesh(pair, K).forces(state_motion(mech, state), 0.0).stiffness
+    k = small[5, 5] / pair.rb[0] ** 2
+    A = k * np.outer(pair.rb, pair.rb) + np.diag([0.0, 1e5])
+    wanted = np.sqrt(np.linalg.eigvals(A / np.array(J)[:, None]))
+    found = np.sort(rom.linearize(mech, state).frequencies) * 2 * np.pi
+    assert_allclose(found, np.sort(wanted), rtol=1e-6)
+
+
+def state_motion(mech, state):
+    """(12,) turns of both wheels."""
+    angle = [rom.snapshot(mech, state).joint(f"{n} axle").angle[0] for n in ("pinion", "gear")]
+    q = np.zeros(12)
+    q[[5, 11]] = angle
+    return q
+
+
+def test_many_turns_keep_the_ratio_of_the_teeth_and_the_torque():
+    """Driven at constant speed against a brake: ten turns of the pinion."""
+    mech = geared(damping=2e-5, correction=Correction(relief=(1e-5, 1e-5), extent=(2e-3, 2e-3)))
+    mech.drive("speed", "pinion axle", lambda t: 60.0 * t, rate=lambda t: 60.0 + 0 * t)
+    mech.motor("brake", "gear axle", lambda t, x, v: 80.0 - 2.0 * (v + 60.0 * 26 / 40))
+    moved_ = rom.simulate(mech, t_end=2 * np.pi / 60 * 10, dt=2e-5, progress=False, save_every=20)
+    first, second = (moved_.joint(f"{n} axle").angle for n in ("pinion", "gear"))
+    assert first[-1] == pytest.approx(20 * np.pi)
+    assert second[-1] + first[-1] * 26 / 40 == pytest.approx(0.0, abs=5e-4)
+    late = slice(len(moved_.t) // 2, None)
+    torque = moved_.drive_load("speed")[late].mean()
+    assert abs(torque) == pytest.approx(80.0 * 26 / 40, rel=2e-2)
+
+
+def test_teeth_that_lose_contact_hit_the_other_flank_and_keep_the_energy():
+    """A pinion thrown through the backlash: no force between the flanks, no energy lost."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    part = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, omega=(0, 0, -0.5))
+    gear = mech.add_rigid("gear", mass=1.0, inertia=(9e-3,) * 3, at=(SPUR.distance, 0, 0))
+    for body, x in ((part, 0.0), (gear, SPUR.distance)):
+        mech.revolute(f"{body.name} axle", mech.ground.marker((x, 0, 0)), body.marker(ORIGIN),
+                      axis=Z)  # fmt: skip
+    mech.gear_mesh("mesh", part.marker(ORIGIN), gear.marker(ORIGIN), axis=Z, pair=SPUR, stiffness=K,
+                   phase=0.12)  # fmt: skip
+    sol = rom.simulate(mech, t_end=0.02, dt=1e-5, method="dop853", rtol=1e-10, progress=False)
+    force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
+    across = SPUR.backlash / (0.5 * SPUR.rb[0])  # time through the backlash
+    assert (force[(sol.t > 1e-5) & (sol.t < 0.98 * across)] == 0).all() and force.max() > 100
+    assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.total[0]
+    # after the stroke: elastic impact along the line of action
+    J, rb = np.array([2e-3, 9e-3]), SPUR.rb
+    m = J / rb**2
+    closing = -0.5 * rb[0] * np.array([(m[0] - m[1]) / m.sum(), 2 * m[0] / m.sum()])
+    after = np.argmax((force == 0) & (sol.t > 1.1 * across))
+    found = [sol.omega("pinion")[after, 2] * rb[0], -sol.omega("gear")[after, 2] * rb[1]]
+    assert_allclose(found, closing, rtol=1e-3)
+
+
+def test_free_wheels_keep_their_momentum_and_lose_what_slides():
+    mech = wheels(SPUR, friction=0.1, transition_speed=1e-2, damping=1e-5, phase=0.12)
+    mech.parts["pinion"].omega[:] = 0.0, 0.0, 0.3
+    sol = rom.simulate(mech, t_end=0.005, dt=1e-6, method="dop853", rtol=1e-10, progress=False)
+    for kind in sol.momentum:
+        assert np.ptp(kind, axis=0).max() < 1e-9
+    assert (np.diff(sol.energy.damping) > -1e-12).all() and sol.energy.damping[-1] > 1e-6
+    assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.total[0]
+
+
+def test_wheels_pressed_into_each_other_are_named():
+    mech = wheels()
+    for part in mech.parts.values():
+        mech.prismatic(f"{part.name} slides", mech.ground.marker(part.at), part.marker(ORIGIN),
+                       axis=(1, 0, 0))  # fmt: skip
+    mech.drive("press", "gear slides", lambda t: -t, rate=lambda t: -1.0 + 0 * t)
+    mech.drive("hold", "pinion slides", lambda t: 0.0 * t)
+    with pytest.raises(SolverError, match="wheels of 'mesh' are so close"):
+        rom.simulate(mech, t_end=0.1, dt=1e-3, progress=False)
+
+
+WRONG = [
+    ({"pair": GearPair((26.5, 40), 4e-3, 0.03)}, "26.5, 40. teeth: whole numbers"),
+    ({"pair": GearPair((26, 41), 4e-3, 0.03)}, "stand 132.* mm apart, those of its pair 134"),
+    ({"axis": (0, 0, 0)}, "axis of mesh 'mesh' is zero"),
+    ({"axis": (1, 0, 0)}, "stand 0 mm apart"),
+    ({"stiffness": -1.0}, "stiffness of the teeth of 'mesh'"),
+    ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
+    ({"damping": -1.0}, "damping of mesh 'mesh' is -1"),
+    ({"friction": 0.1}, "friction, but no transition_speed"),
+    ({"cells": 0}, "cells = 0 of mesh 'mesh'"),
+    ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "2 pitch errors of .*'mesh' for 26"),
+]
+
+
+@pytest.mark.parametrize(("more", "message"), WRONG)
+def test_what_is_no_mesh_is_refused(more, message):
+    mech = rom.Mechanism()
+    ends = [mech.add_rigid(n, mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0)).marker(ORIGIN)
+            for n, x in (("a", 0.0), ("b", SPUR.distance))]  # fmt: skip
+    with pytest.raises(ConfigError, match=message):
+        mech.gear_mesh("mesh", *ends, **{"axis": Z, "pair": SPUR, "stiffness": K} | more)
+    with pytest.raises(ConfigError, match="of body 'a' with itself"):
+        mech.gear_mesh("mesh", ends[0], ends[0], axis=Z, pair=SPUR, stiffness=K)
+    beside = mech.add_rigid("c", mass=1.0, inertia=(1e-3,) * 3, at=(SPUR.distance, 0, 0.01))
+    with pytest.raises(ConfigError, match="10 mm beside each other"):
+        mech.gear_mesh("mesh", ends[0], beside.marker(ORIGIN), axis=Z, pair=SPUR, stiffness=K)
+    assert not mech.gear_meshes
