@@ -361,6 +361,7 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
             "Of sliding flanks, over which friction turns."),
         Key("cells", Whole(1), "Slices across the face.", 21),
         Key("phase", Quantity("rad"), "Turn of the pinion at the start.", 0.0),
+        Key("entry", Quantity(), "Share of the base pitch over which teeth take up load.", 0.02),
     ))),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,

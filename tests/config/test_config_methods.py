@@ -81,8 +81,8 @@ ENTRIES = {  # method: an entry that calls it
     "rotational_spring": '[rotational_springs.new]\njoint = "turn"\nstiffness = 1\n',
     "bushing": f"[bushings.new]\n{ENDS}stiffness = [1, 1, 1]\n",
     "gear_mesh": '[gear_meshes.new]\nbetween = ["a.p", { ground = [0.06, 0, 0] }]\n'
-    'axis = [0, 0, 1]\nstiffness = "13 GPa"\n[gear_meshes.new.pair]\nteeth = [30, 30]\nmodule = "2 mm"\n'
-    'width = "10 mm"\n',
+    'axis = [0, 0, 1]\nstiffness = "13 GPa"\n[gear_meshes.new.pair]\nteeth = [30, 30]\n'
+    'module = "2 mm"\nwidth = "10 mm"\n',
     "tendon": '[tendons.new]\npath = ["ground.o", "a.q", "soft.root"]\nEA = "1 kN"\n'
     'pulleys = { "a.q" = { radius = "5 cm", axis = [0, 1, 0], turns = 1 } }\n',
     "force": '[forces.new]\nmarker = "a.q"\nvector = [1, 0, 0]\n',

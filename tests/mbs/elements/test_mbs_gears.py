@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import root
 
 import rom
 from cases.mbs.mechanisms import prepared, residual_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
-from rom.errors import ConfigError, SolverError
+from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
@@ -30,7 +31,7 @@ def wheels(pair=SPUR, turned=None, **more):
         for name, x in (("pinion", 0.0), ("gear", pair.distance))
     ]  # fmt: skip
     ends = [part.marker(ORIGIN) for part in made]
-    mech.gear_mesh("mesh", *ends, axis=A @ Z, pair=pair, **{"stiffness": K} | more)
+    mech.gear_mesh("mesh", *ends, axis=A @ Z, pair=pair, **{"stiffness": K, "entry": 0.0} | more)
     return mech
 
 
@@ -67,6 +68,8 @@ def test_forces_in_the_plane_are_those_of_the_plane_model(pair, phase):
         assert np.abs(wanted.force).max() > 1e3
         assert_allclose(found, wanted.force, atol=1e-8 * np.abs(wanted.force).max())
         assert W.power[2] == pytest.approx(wanted.lost, rel=1e-7)
+        load = packed.elements[GEAR_MESHES_FAMILY].load[0]
+        assert load == pytest.approx(np.maximum(wanted.load, 0).sum(), rel=1e-8)
         tangents_at(packed.system, W, moved(packed, q), v, 0 * v, np.zeros(0), (0.0, 0.0, 1.0))
         stiffness = packed.elements[GEAR_MESHES_FAMILY].tangent[0]
         assert_allclose(stiffness, wanted.stiffness, atol=1e-8 * np.abs(wanted.stiffness).max())
@@ -131,7 +134,7 @@ def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
         part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0))
         mech.revolute(f"{name} axle", mech.ground.marker((x, 0, 0)), part.marker(ORIGIN), axis=Z)
         ends.append(part.marker(ORIGIN))
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **{"stiffness": K} | more)
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **{"stiffness": K, "entry": 0.0} | more)
     return mech
 
 
@@ -229,6 +232,7 @@ WRONG = [
     ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
     ({"damping": -1.0}, "damping of mesh 'mesh' is -1"),
     ({"friction": 0.1}, "friction, but no transition_speed"),
+    ({"entry": 0.6}, "entry = 0.6 of mesh 'mesh' is a share"),
     ({"cells": 0}, "cells = 0 of mesh 'mesh'"),
     ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "2 pitch errors of .*'mesh' for 26"),
 ]
@@ -247,3 +251,141 @@ def test_what_is_no_mesh_is_refused(more, message):
     with pytest.raises(ConfigError, match="10 mm beside each other"):
         mech.gear_mesh("mesh", ends[0], beside.marker(ORIGIN), axis=Z, pair=SPUR, stiffness=K)
     assert not mech.gear_meshes
+
+
+SUN = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
+RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
+
+
+def test_an_internal_gear_is_one_of_negative_radii():
+    """By hand: r_b2 - r_b1 = a cos(alpha), and the path ends at the tips."""
+    rb, ra = 72e-3 * np.cos(np.radians(20)), 70e-3
+    assert RING.distance == pytest.approx(-0.048) and RING.alpha == pytest.approx(np.radians(20))
+    tangents = 0.048 * np.sin(np.radians(20))  # the point of tangency of the ring is behind T1
+    first = np.sqrt(ra**2 - rb**2) - tangents
+    last = np.sqrt(26e-3**2 - (24e-3 * np.cos(np.radians(20))) ** 2)
+    assert_allclose(RING.path, [first, last], rtol=1e-12)
+    assert RING.backlash == pytest.approx(2e-5)
+    with pytest.raises(ModelError, match="not known here"):
+        stiffness_table(RING, force=1e5)
+    with pytest.raises(ModelError, match=r"use Mechanism\.gear_mesh"):
+        Mesh(RING, K)
+
+
+@pytest.mark.parametrize("numbers", [(-20, 40), (40, -40), (40, -30), (3, 40), (20, -3)])
+def test_wheels_that_do_not_turn_in_each_other_are_refused(numbers):
+    with pytest.raises(ModelError, match=r"no pinion of|no gears have"):
+        GearPair(numbers, 2e-3, 0.02)
+
+
+def test_interference_inside_a_ring_is_refused():
+    with pytest.raises(ModelError, match=r"contact is lost: .* from -"):
+        GearPair((20, -62), 2e-3, 0.02)
+
+
+def planetary(planets=3):
+    """Sun driven, ring held by a stiff coil, planets on a carrier that is braked."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    ground = mech.ground.marker(ORIGIN)
+
+    def body(name, J, at=ORIGIN, mass=0.2):
+        return mech.add_rigid(name, mass=mass, inertia=(J, J, J), at=at)
+
+    sun, ring, carrier = (body(n, J) for n, J in (("sun", 1e-4), ("ring", 2e-3), ("carrier", 5e-4)))
+    for part in (sun, ring, carrier):
+        mech.revolute(f"{part.name} axle", ground, part.marker(ORIGIN), axis=Z)
+    mech.rotational_spring("housing", "ring axle", stiffness=1e6, damping=20.0)
+    for k in range(planets):
+        angle = 2 * np.pi * k / planets
+        at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        planet = body(f"planet {k}", 5e-5, at)
+        mech.revolute(f"pin {k}", carrier.marker(at), planet.marker(ORIGIN), axis=Z)
+        law = {"stiffness": 1.3e10, "damping": 2e-5}
+        mech.gear_mesh(f"sun {k}", sun.marker(ORIGIN), planet.marker(ORIGIN), axis=Z, pair=SUN,
+                       phase=24 * angle / 24, **law)  # fmt: skip
+        mech.gear_mesh(f"ring {k}", planet.marker(ORIGIN), ring.marker(ORIGIN), axis=(0, 0, -1),
+                       pair=RING, phase=0.1, **law)  # fmt: skip
+    mech.drive("motor", "sun axle", lambda t: 80.0 * t, rate=lambda t: 80.0 + 0 * t)
+    wanted = 80.0 * 24 / (24 + 72)
+    mech.motor("brake", "carrier axle", lambda t, x, v: -40.0 - 1.0 * (v - wanted))
+    return mech
+
+
+def test_a_planetary_train_turns_by_willis_and_shares_its_torque():
+    """Ring held: carrier / sun = z_s / (z_s + z_r); torques as 1 : 4 : 3."""
+    mech = planetary()
+    sol = rom.simulate(mech, t_end=0.2, dt=1e-5, progress=False, save_every=20)
+    sun, carrier = (sol.joint(f"{n} axle").angle for n in ("sun", "carrier"))
+    assert carrier[-1] == pytest.approx(sun[-1] * 24 / 96, abs=2e-3)
+    turned = sol.joint("pin 0").angle[-1]  # against the carrier: minus that of the sun against it
+    assert turned == pytest.approx(-(sun[-1] - carrier[-1]), abs=5e-3)
+    late = slice(len(sol.t) // 2, None)
+    drive = sol.drive_load("motor")[late].mean()
+    assert abs(drive) == pytest.approx(40.0 / 4, rel=2e-2)
+    held = sol.element("housing").along[late].mean()
+    assert abs(held) == pytest.approx(40.0 * 3 / 4, rel=2e-2)
+    meshes = [sol.element(f"sun {k}").force[late, 0] for k in range(3)]
+    shares = [np.linalg.norm(force, axis=1).mean() for force in meshes]
+    assert np.ptp(shares) < 0.1 * np.mean(shares)
+    assert np.mean(shares) * 3 * SUN.rb[0] == pytest.approx(10.0, rel=2e-2)
+
+
+def flank(centre, radius, start, length, turn):
+    """Points of an involute and its normals by the angle where the string leaves the circle.
+
+    At the angle ``start`` the string is so long; then the wheel turns.
+    """
+
+    def at(psi):
+        e = np.array([np.cos(psi + turn), np.sin(psi + turn)])
+        string = np.array([-e[1], e[0]])
+        return centre + radius * e + (length - radius * (psi - start)) * string, string
+
+    return at
+
+
+def approach_of_curves(pair, s, moved_to, turns):
+    """How far two involutes that touch at s on the path overlap along their common normal [m].
+
+    Args:
+        pair: the wheels.
+        s: place of the contact at the datum, from T1.
+        moved_to: (2,) centre of the gear from where it was.
+        turns: of pinion and gear.
+    """
+    alpha, r1, r2 = pair.alpha, pair.rb[0], abs(pair.rb[1])
+    behind = pair.tangents if not pair.internal else -abs(pair.tangents)
+    start, length = (-alpha, s - behind) if pair.internal else (np.pi - alpha, behind - s)
+    one = flank(np.zeros(2), r1, -alpha, s, turns[0])
+    two = flank(np.array([pair.distance, 0.0]) + moved_to, r2, start, length, turns[1])
+
+    def off(angles):
+        (P1, n1), (P2, n2) = one(angles[0]), two(angles[1])
+        D = P2 - P1
+        return [D[0] * n1[1] - D[1] * n1[0], 1e-3 * (n1[0] * n2[1] - n1[1] * n2[0])]
+
+    angles = root(off, [-alpha - turns[0], start - turns[1]], tol=1e-14).x
+    (P1, n1), (P2, _) = one(angles[0]), two(angles[1])
+    return -float((P2 - P1) @ n1)
+
+
+@pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_approach_is_that_of_two_involute_curves(pair, seed):
+    """Of one pair of teeth, wherever the wheels move in their plane."""
+    rng = np.random.default_rng(seed)
+    A, B = pair.path
+    s = A + (0.45 + 0.1 * rng.random()) * (B - A)
+    packed, W = prepared(wheels(pair, phase=s / pair.rb[0]))
+    q = np.zeros(12)
+    q[6:8] = 2e-4 * rng.normal(size=2)
+    q[6] = abs(q[6])  # back flanks apart
+    q[11] = 1e-3 * rng.normal()
+    q[5] = (1e-5 - approach_of_curves(pair, s, q[6:8], (0.0, q[11]))) / pair.rb[0]
+    overlap = approach_of_curves(pair, s, q[6:8], (q[5], q[11]))
+    assert overlap == pytest.approx(1e-5, rel=0.1)
+    wrench(packed, W, moved(packed, q), np.zeros(12))
+    load = packed.elements[GEAR_MESHES_FAMILY].load[0]
+    lines = round(load / (K * pair.width * overlap))  # all of them overlap alike
+    assert lines in (1, 2)
+    assert load == pytest.approx(lines * K * pair.width * overlap, rel=1e-7)

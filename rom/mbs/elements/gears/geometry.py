@@ -2,6 +2,9 @@
 
 The pinion drives and turns about +Z, the gear lies in the direction of +X. Distances s along the
 path of contact count from the pinion's point of tangency T1 on the base plane.
+
+An internal gear has a negative number of teeth, and with it negative radii and a negative centre
+distance, as in ISO 21771: then all formulas are those of external gears.
 """
 
 from dataclasses import dataclass
@@ -25,13 +28,13 @@ class GearPair:
     """A pair of cylindrical gears.
 
     Attributes:
-        teeth: of pinion and gear.
+        teeth: of pinion and gear; that of an internal gear is negative.
         module: normal module [m].
         width: common face width [m].
         helix: angle at the reference circle [rad]; positive for a right-handed pinion.
         pressure_angle: normal [rad].
         shift: profile shifts in modules [1].
-        centre_distance: [m]; None leaves no backlash.
+        centre_distance: [m], above zero; None leaves no backlash.
         thinning: transverse backlash from thinner teeth, along the line of action [m].
         addendum, dedendum, fillet: height of the teeth above and below the reference circle, and
             radius at their roots, in modules [1].
@@ -53,7 +56,7 @@ class GearPair:
     fillet: float = 0.4
 
     def __post_init__(self) -> None:
-        if min(self.teeth) < 4 or not (self.module > 0 and self.width > 0):
+        if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
             raise ModelError(
                 f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."
             )
@@ -62,7 +65,16 @@ class GearPair:
                 f"helix {self.helix} and pressure angle {self.pressure_angle} are in radians; "
                 "usual are up to 0.6 and 0.35."
             )
-        for z, x, name in zip(self.teeth, self.shift, ("pinion", "gear"), strict=True):
+        if self.teeth[0] < 0 or (self.internal and sum(self.teeth) >= 0):
+            raise ModelError(
+                f"no pinion of {self.teeth[0]} teeth turns in a gear of {self.teeth[1]}.",
+                hint="Of an internal gear the number is negative, and larger than the pinion's.",
+            )
+        if self.centre_distance is not None and not self.centre_distance > 0:
+            raise ModelError(f"a centre distance of {self.centre_distance} m is not above zero.")
+        names = ("pinion",) if self.internal else ("pinion", "gear")
+        cut = zip(self.teeth, self.shift, names, strict=False)
+        for z, x, name in cut:
             least = self.addendum - z * np.sin(self.alpha_t) ** 2 / (2 * np.cos(self.helix))
             if x < least - 1e-9:
                 raise ModelError(
@@ -70,25 +82,32 @@ class GearPair:
                     "part of their involute to the tool.",
                     hint=f"Shift the profile by at least {least:.3f} modules, or take more teeth.",
                 )
-        for tip, name in zip(self.tip_thickness, ("pinion", "gear"), strict=True):
+        for tip, name in zip(self.tip_thickness, names, strict=False):
             if not tip > 0:
                 raise ModelError(
                     f"the teeth of the {name} are pointed: their flanks meet below the tip.",
                     hint="Lower the addendum or the profile shift, or take more teeth.",
                 )
         if self.cos_working >= 1 or self.backlash < -1e-12:
+            limit = "Up to" if self.internal else "From"
             raise ModelError(
-                f"the backlash is closed: at a centre distance of {self.distance * 1e3:.4f} mm the "
-                f"teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
-                hint=f"From {self.tight_distance * 1e3:.4f} mm on there is backlash.",
+                f"the backlash is closed: at a centre distance of {abs(self.distance) * 1e3:.4f} "
+                f"mm the teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
+                hint=f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash.",
             )
-        if self.path[0] < 0 or self.path[1] > self.tangents or self.contact_ratio < 1:
+        beyond = not self.internal and self.path[1] > self.tangents
+        if self.path[0] < 0 or beyond or self.contact_ratio < 1:
             raise ModelError(
                 f"contact is lost: a transverse contact ratio of {self.contact_ratio:.3f}, from "
                 f"{self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm on a base tangent of "
                 f"{self.tangents * 1e3:.3f} mm.",
                 hint="Lower the centre distance or the profile shift, or take more teeth.",
             )
+
+    @property
+    def internal(self) -> bool:
+        """Whether the pinion turns inside the gear."""
+        return self.teeth[1] < 0
 
     @cached_property
     def alpha_t(self) -> float:
@@ -139,8 +158,10 @@ class GearPair:
 
     @cached_property
     def distance(self) -> float:
-        """Centre distance [m]."""
-        return self.tight_distance if self.centre_distance is None else self.centre_distance
+        """Centre distance [m], below zero for internal gears."""
+        if self.centre_distance is None:
+            return self.tight_distance
+        return -self.centre_distance if self.internal else self.centre_distance
 
     @cached_property
     def cos_working(self) -> float:
@@ -200,7 +221,8 @@ class GearPair:
 
 def path_of_contact(pair: GearPair, alpha: float) -> tuple[float, float]:
     """First and last point of contact at a working pressure angle [m]."""
-    first = pair.rb.sum() * np.tan(alpha) - np.sqrt(pair.ra[1] ** 2 - pair.rb[1] ** 2)
+    reach = np.sign(pair.rb[1]) * np.sqrt(pair.ra[1] ** 2 - pair.rb[1] ** 2)
+    first = pair.rb.sum() * np.tan(alpha) - reach
     return float(first), float(np.sqrt(pair.ra[0] ** 2 - pair.rb[0] ** 2))
 
 

@@ -22,6 +22,7 @@ from rom.rotation import matrix
 DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
 FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
 MAX_CELLS = 1000
+MAX_ENTRY = 0.5  # of the base pitch
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,7 @@ class GearMesh:
     start: Array
     offset: float
     phase: float
+    entry: float
 
 
 def gear_mesh(  # noqa: PLR0913  one keyword per property
@@ -56,6 +58,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     transition_speed: float | None = None,
     cells: int = 21,
     phase: float = 0.0,
+    entry: float = 0.02,
 ) -> None:
     """Involute teeth of two wheels in contact, on both flanks, with backlash and loss of contact.
 
@@ -79,6 +82,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         cells: slices across the face.
         phase: angle that the pinion has turned from where a line of contact begins at the tangent
             point of its base circle [rad].
+        entry: share of the base pitch over which a pair of teeth takes up its load as it comes, and
+            gives it off as it goes; with 0 at once, which implicit steps do not like [1].
 
     Raises:
         ConfigError: for a name in use, unknown markers, wheels that do not stand as the pair says,
@@ -95,18 +100,20 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     z = z / np.linalg.norm(z)
     D = self.design_point(wheel_b) - self.design_point(wheel_a)
     _check_place(name, pair, D, z)
-    c = (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
+    c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
     turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
     axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], -c @ turned[1]])
     numbers = _law(name, damping, friction, transition_speed)
     if not 1 <= cells <= MAX_CELLS:
         raise ConfigError(f"cells = {cells} of mesh {name!r}: it has from 1 to {MAX_CELLS}.")
+    if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
+        raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
     table_ = _stiffness(name, stiffness)
     flanks = Correction() if correction is None else correction
     _check_correction(name, pair, flanks)
     mesh = GearMesh(
         wheel_a, wheel_b, pair, table_, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
-        float(D @ z), number("phase", phase),
+        float(D @ z), number("phase", phase), entry * pair.base_pitch,
     )  # fmt: skip
     self.add(name, mesh, GEAR_MESHES_FAMILY)
 
@@ -114,10 +121,10 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
 def _check_place(name: str, pair: GearPair, D: Array, z: Array) -> None:
     """Refuse wheels that do not stand as the pair says."""
     distance = float(np.linalg.norm(D - (D @ z) * z))
-    if not abs(distance - pair.distance) <= DISTANCE_RTOL * pair.module:
+    if not abs(distance - abs(pair.distance)) <= DISTANCE_RTOL * pair.module:
         raise ConfigError(
             f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair "
-            f"{pair.distance * 1e3:.6g} mm.",
+            f"{abs(pair.distance) * 1e3:.6g} mm.",
             hint="Move a body, or give the pair this centre_distance.",
         )
     if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
@@ -156,7 +163,7 @@ def _stiffness(name: str, given: Any) -> Array:
 def _check_correction(name: str, pair: GearPair, correction: Correction) -> None:
     """Refuse pitch errors of another number of teeth."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
-        if len(errors) not in (0, z):
+        if len(errors) not in (0, abs(z)):
             raise ConfigError(
                 f"{len(errors)} pitch errors of {name!r} for {z} teeth: one per tooth."
             )
@@ -171,7 +178,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         integers(places.marker[mesh.i] for mesh in found),
         integers(places.marker[mesh.j] for mesh in found),
         rows_of((mesh.axes.ravel() for mesh in found), 12),
-        rows_of((_sizes(mesh) for mesh in found), 12),
+        rows_of((_sizes(mesh) for mesh in found), 13),
         rows_of((_flanks(mesh.correction) for mesh in found), 7),
         rows_of((mesh.numbers for mesh in found), 3),
         integers(mesh.cells for mesh in found),
@@ -196,7 +203,7 @@ def _sizes(mesh: GearMesh) -> list[float]:
     pair = mesh.pair
     return [
         *pair.rb, *pair.ra, pair.base_helix, pair.base_pitch, pair.base_thickness[0], pair.backlash,
-        pair.alpha, pair.width, mesh.offset, mesh.phase,
+        pair.alpha, pair.width, mesh.offset, mesh.phase, mesh.entry,
     ]  # fmt: skip
 
 

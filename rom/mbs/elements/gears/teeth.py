@@ -1,8 +1,9 @@
 """Contact of gear teeth in thin slices on the base plane, between bodies that move at will.
 
 The axis of the pinion and the line of centres make the frame: c along it, z along the axis, t = z x
-c. Wheels turn by theta_1 and theta_2 about z against this line. With base radii r_b, working
-pressure angle alpha(distance) and the value alpha_0 at the datum flanks approach by
+c. Inside an internal gear, whose radii and distance are negative, c points away from its centre.
+Wheels turn by theta_1 and theta_2 about z against this line. With base radii r_b, working pressure
+angle alpha(distance) and the value alpha_0 at the datum flanks approach by
 
     cos(beta_b) (side (r_b1 theta_1 + r_b2 theta_2) - (r_b1 + r_b2) (inv alpha - inv alpha_0)),
 
@@ -20,7 +21,8 @@ from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array1, Array2, Index1, Scratch1, Scratch3, Table, table
 
 # columns of Meshes.size, Meshes.flank and Meshes.law
-RB_1, RB_2, RA_1, RA_2, HELIX, PITCH, THICKNESS, BACKLASH, ALPHA, WIDTH, OFFSET, PHASE = range(12)
+RB_1, RB_2, RA_1, RA_2, HELIX, PITCH, THICKNESS = range(7)
+BACKLASH, ALPHA, WIDTH, OFFSET, PHASE, ENTRY = range(7, 13)
 RELIEF_1, RELIEF_2, EXTENT_1, EXTENT_2, POWER, CROWNING, SLOPE = range(7)
 DAMPING, FRICTION, SPEED = range(3)
 # what `add_slices` adds up
@@ -35,9 +37,10 @@ class Meshes(Table):
         i, j: (k,) markers of pinion and gear.
         axes: (k, 12) axis of the pinion, a direction across it, the same of the gear, in the axes
             of their markers.
-        size: (k, 12) base radii, tip radii [m], base helix [rad], base pitch, thickness of the
+        size: (k, 13) base radii, tip radii [m], base helix [rad], base pitch, thickness of the
             pinion's teeth on the base circle, backlash [m], working pressure angle at the datum
-            [rad], width, offset of the faces [m], angle of the pinion at the datum [rad].
+            [rad], width, offset of the faces [m], angle of the pinion at the datum [rad], length
+            of entry [m].
         flank: (k, 7) tip relief of pinion and gear, their extents [m], power, crowning, slope [m].
         law: (k, 3) damping [s], coefficient of friction, transition speed [m/s].
         cells: (k,) slices across the face.
@@ -102,11 +105,11 @@ def set_frame(s, W, meshes, k):
     D = sub(row(W.P, meshes.j[k], 0), row(W.P, meshes.i[k], 0))
     offset = dot(D, z)
     flat = sub(D, scale(offset, z))
-    distance = math.sqrt(dot(flat, flat))
+    distance = math.copysign(math.sqrt(dot(flat, flat)), size[RB_2])
     c = scale(1.0 / distance, flat)
     t = cross(z, c)
     both = size[RB_1] + size[RB_2]
-    alpha = math.acos(both / distance) if both < distance else math.nan
+    alpha = math.acos(both / distance) if both / distance < 1.0 else math.nan
     turn_1 = followed_angle(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
     turn_2 = followed_angle(s, W, meshes, k, 1, math.atan2(dot(e2, t), dot(e2, c)))
     rolled = size[RB_1] * turn_1 + size[RB_2] * turn_2
@@ -117,15 +120,16 @@ def set_frame(s, W, meshes, k):
 
 
 @inner
-def stiffness_at(meshes, k, share):
-    """Stiffness of a pair of teeth per length of its line, at a share of the path [N/m^2]."""
+def stiffness_at(meshes, k, x, path):
+    """Stiffness of a pair of teeth per length of its line, at a place of its path [N/m^2]."""
     first, n = meshes.stiffness_at[k], meshes.stiffness_at[k + 1] - meshes.stiffness_at[k]
-    x = min(max(share, 0.0), 1.0) * (n - 1)
-    p = min(int(x), n - 2) if n > 1 else 0
-    if n == 1:
-        return meshes.stiffness[first]
-    low, high = meshes.stiffness[first + p], meshes.stiffness[first + p + 1]
-    return low + (x - p) * (high - low)
+    share = min(max((x - path[0]) / (path[1] - path[0]), 0.0), 1.0) * (n - 1)
+    p = min(int(share), max(n - 2, 0))
+    low, high = meshes.stiffness[first + p], meshes.stiffness[first + min(p + 1, n - 1)]
+    inside = min(x - path[0], path[1] - x)
+    entry = meshes.size[k, ENTRY]
+    taken = min(0.5 + inside / entry, 1.0) if entry > 0.0 else 1.0
+    return taken * (low + (share - p) * (high - low))
 
 
 @inner
@@ -163,21 +167,23 @@ def add_slices(s, W, meshes, k, what):
     meshes.load[k] = 0.0 * alpha
     W.wrench[meshes.i[k], 0] += 0.0 * alpha  # NaN without a common tangent, which ends the motion
     base, slant = size[RB_1], math.tan(size[HELIX])
-    first = (base + size[RB_2]) * math.tan(alpha) - math.sqrt(size[RA_2] ** 2 - size[RB_2] ** 2)
+    reach = math.copysign(math.sqrt(size[RA_2] ** 2 - size[RB_2] ** 2), size[RB_2])
+    first = (base + size[RB_2]) * math.tan(alpha) - reach
     last = math.sqrt(size[RA_1] ** 2 - base**2)
     if not first < last:  # the teeth are too far apart to meet, or there is no common tangent
         return total
     cells, width, reach = meshes.cells[k], size[WIDTH], abs(slant) * size[WIDTH] / 2
+    begin, end = first - 0.5 * size[ENTRY], last + 0.5 * size[ENTRY]
     for flank in range(2):
         side = 1.0 - 2.0 * flank
         start = forward if flank == 0 else size[THICKNESS] + 2.0 * base * alpha - forward
-        lowest = math.floor((first - start - reach) / size[PITCH])
-        lines = int(math.ceil((last - start + reach) / size[PITCH]) - lowest) + 1
+        lowest = math.floor((begin - start - reach) / size[PITCH])
+        lines = int(math.ceil((end - start + reach) / size[PITCH]) - lowest) + 1
         closing = side * rolled - opened
         for one in range(lines):
             line = int(lowest) + one
             at = start + line * size[PITCH]
-            low, high = face_of_line(at, side * slant, first, last, width)
+            low, high = face_of_line(at, side * slant, begin, end, width)
             for cell in range(cells):
                 a = max(low, -0.5 * width + cell * width / cells)
                 b = min(high, -0.5 * width + (cell + 1) * width / cells)
@@ -216,7 +222,7 @@ def press(W, meshes, k, what, place, length, state):
     depth -= flank_gap(meshes, k, place, path)
     if depth <= 0.0:
         return 0.0
-    stiffness = length * stiffness_at(meshes, k, (x - path[0]) / (path[1] - path[0]))
+    stiffness = length * stiffness_at(meshes, k, x, path)
     if what == ENERGY:
         return 0.5 * stiffness * depth * depth
     i, j = meshes.i[k], meshes.j[k]
