@@ -32,6 +32,7 @@ TESTS = {
     "rom/mbs/elements/nonlinear": ["tests/components/cosserat"],
     "rom/mbs/elements/rods": ["tests/components/cosserat"],
     "rom/mbs/elements/gears": ["tests/mbs/elements/test_mbs_gears.py"],
+    "rom/mbs/elements/rolling": ["tests/mbs/elements/test_mbs_rolling.py"],
     "rom/mbs/elements/tendons": ["tests/mbs/elements/test_mbs_tendons.py"],
     "rom/mbs/elements/": ["tests/mbs/elements/test_mbs_joint_forces.py", "tests/mbs"],
     "rom/mbs/kernels/constraints": ["tests/mbs/joints", "tests/mbs"],

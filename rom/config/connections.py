@@ -180,6 +180,17 @@ def _gear_mesh(entry: Entry) -> None:
     entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
 
 
+def _rolling_bearing(entry: Entry) -> None:
+    from rom.mbs.elements.rolling.races import BallBearing, RollerBearing
+
+    values = entry.values
+    how = {key: values.pop(key) for key in ("axis", "damping", "phase")}
+    made = {"balls": BallBearing, "rollers": RollerBearing}[values.pop("kind")]
+    if "conformity" in values:
+        values["conformity"] = tuple(values["conformity"])
+    entry.made.rolling_bearing(entry.name, *entry.ends, bearing=made(**values), **how)
+
+
 def _tendon(entry: Entry) -> None:
     from rom.mbs.elements.tendons.tendons import Pulley
 
@@ -267,6 +278,7 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "stops": _stop,
     "contacts": _contact,
     "gear_meshes": _gear_mesh,
+    "rolling_bearings": _rolling_bearing,
     "tendons": _tendon,
     "laws": _law,
     "events": _event,

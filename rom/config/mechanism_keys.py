@@ -304,6 +304,31 @@ CORRECTION = Table("What is taken off the working flanks.", (
     Key("crowning", Quantity("m"), "At both ends of the face.", 0.0),
     Key("slope", Quantity("m"), "Of the lead over the face.", 0.0),
 ))  # fmt: skip
+ROLLING = {
+    "balls": Table("A row of balls.", (
+        Key("balls", Whole(3), "Number.", ...),
+        Key("ball_diameter", Quantity("m", positive=True), "Of a ball.", ...),
+        Key("pitch_diameter", Quantity("m", positive=True), "Of the circle of balls.", ...),
+        Key("conformity", Quantity("1", TWO), "Radius of the grooves of inner and outer race over "
+            "the diameter of the ball.", [0.52, 0.52]),
+        Key("contact_angle", Quantity("rad"), "Without load.", 0.0),
+        Key("clearance", Quantity("m"), "Radial play; negative for one that is pressed.", 0.0),
+        Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
+        Key("nu", Quantity(), "Poisson's ratio.", 0.3),
+    )),
+    "rollers": Table("A row of cylindrical steel rollers.", (
+        Key("rollers", Whole(3), "Number.", ...),
+        Key("roller_diameter", Quantity("m", positive=True), "Of a roller.", ...),
+        Key("length", Quantity("m", positive=True), "Of a roller.", ...),
+        Key("pitch_diameter", Quantity("m", positive=True), "Of the circle of rollers.", ...),
+        Key("clearance", Quantity("m"), "Radial play; negative for one that is pressed.", 0.0),
+    )),
+}  # fmt: skip
+ROLLING_KEYS = (
+    BETWEEN, AXIS,
+    Key("damping", Quantity("s/m"), "Force on a ball grows by this factor of its speed.", 0.0),
+    Key("phase", Quantity("rad"), "Angle of the first one.", 0.0),
+)  # fmt: skip
 SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how
     "joints": ("joints", Variants(JOINTS)),
     "drives": ("prescribed joint coordinates", Table("A joint coordinate prescribed in time.", (
@@ -363,6 +388,9 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("phase", Quantity("rad"), "Turn of the pinion at the start.", 0.0),
         Key("entry", Quantity(), "Share of the base pitch over which teeth take up load.", 0.02),
     ))),
+    "rolling_bearings": ("rolling bearings", Variants({
+        kind: Table(table.about, (*ROLLING_KEYS, *table.keys)) for kind, table in ROLLING.items()
+    }, {kind: kind for kind in ROLLING})),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,
     ))),

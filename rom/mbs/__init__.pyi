@@ -23,6 +23,8 @@ from rom.mbs.elements.family import Family as Family
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE as LAW_SIGNATURE
 from rom.mbs.elements.nonlinear import Elements as Elements
 from rom.mbs.elements.nonlinear import Frames as Frames
+from rom.mbs.elements.rolling.races import BallBearing as BallBearing
+from rom.mbs.elements.rolling.races import RollerBearing as RollerBearing
 from rom.mbs.elements.tendons.tendons import Pulley as Pulley
 from rom.mbs.integrate.events import Instant as Instant
 from rom.mbs.integrate.keeping import Keeping as Keeping

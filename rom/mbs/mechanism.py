@@ -28,6 +28,7 @@ from rom.mbs.elements import (
 from rom.mbs.elements.contact import points, surfaces
 from rom.mbs.elements.family import Family, check_family
 from rom.mbs.elements.gears import meshes
+from rom.mbs.elements.rolling import bearings
 from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
@@ -51,6 +52,7 @@ FAMILIES = (
     nonlinear.NONLINEAR_FAMILY,
     tendons.TENDONS_FAMILY,
     meshes.GEAR_MESHES_FAMILY,
+    bearings.ROLLING_BEARINGS_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -181,6 +183,7 @@ class Mechanism:
     spread_load = spread_loads.spread_load
     tendon = tendons.tendon
     gear_mesh = meshes.gear_mesh
+    rolling_bearing = bearings.rolling_bearing
     add_nonlinear = nonlinear.add_nonlinear
 
     springs = Every(springs.Spring)
@@ -196,6 +199,7 @@ class Mechanism:
     spread_loads = Every(spread_loads.Spread)
     tendons = Every(tendons.Tendon)
     gear_meshes = Every(meshes.GearMesh)
+    rolling_bearings = Every(bearings.RollingBearing)
     nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:

@@ -80,6 +80,8 @@ ENTRIES = {  # method: an entry that calls it
     "spring_damper": f"[springs.new]\n{ENDS}stiffness = 1\n",
     "rotational_spring": '[rotational_springs.new]\njoint = "turn"\nstiffness = 1\n',
     "bushing": f"[bushings.new]\n{ENDS}stiffness = [1, 1, 1]\n",
+    "rolling_bearing": '[rolling_bearings.new]\nbetween = ["a.p", "ground.o"]\n'
+    'axis = [0, 0, 1]\nballs = 9\nball_diameter = "12.7 mm"\npitch_diameter = "65 mm"\n',
     "gear_mesh": '[gear_meshes.new]\nbetween = ["a.p", { ground = [0.06, 0, 0] }]\n'
     'axis = [0, 0, 1]\nstiffness = "13 GPa"\n[gear_meshes.new.pair]\nteeth = [30, 30]\n'
     'module = "2 mm"\nwidth = "10 mm"\n',

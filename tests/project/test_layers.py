@@ -223,6 +223,7 @@ ORDER = {
         "rods",
         "tendons",
         "gears",
+        "rolling",
     ),
     "reduction": (
         "bases",

@@ -2,7 +2,8 @@
 
 `family` says what a family is. There are `springs`, `rotational_springs`, `loads`, `motors`,
 `frictions`, `stops`, `bushings`, `spread_loads`, `nonlinear` bodies, and `laws` of the user, with
-`law_calls` and `laws_in_python`; `contact`, `rods`, `tendons`, `gears` and `formulas` have folders.
+`law_calls` and `laws_in_python`; `contact`, `rods`, `tendons`, `gears`, `rolling` and `formulas`
+have folders.
 """
 
 from rom.lazy import front

@@ -68,6 +68,8 @@ def connections(
         actors += _bushing(scenery, bushing.i, bushing.j)
     for name, tendon in mechanism.tendons.items():
         actors += _tendon(places, name, tendon)
+    for one in mechanism.rolling_bearings.values():
+        actors.append(_circle(places, one.j, one.axes[2], 0.5 * one.bearing.pitch_diameter))
     for mesh in mechanism.gear_meshes.values():
         for marker, axis, radius in zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=True):
             actors.append(_circle(places, marker, axis, float(radius)))

@@ -505,6 +505,9 @@ JOIN_OWN = {
     ("gear_mesh", "wheel_a"): lambda mech: mech.ground.marker((0, 0, 0)),
     ("gear_mesh", "wheel_b"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),
     ("gear_mesh", "pair"): lambda mech: GearPair((40, 40), 0.0125, 0.1),
+    ("rolling_bearing", "inner"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),
+    ("rolling_bearing", "outer"): lambda mech: mech.ground.marker((0, 0, -0.5)),
+    ("rolling_bearing", "bearing"): lambda mech: rom.mbs.BallBearing(9, 0.0127, 0.065),
     ("tendon", "path"): lambda mech: [mech.ground.marker((0, 0, k)) for k in range(2)],
     ("tendon", "EA"): lambda mech: 1.0,
 }

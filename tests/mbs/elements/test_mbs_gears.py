@@ -12,6 +12,7 @@ from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
+from rom.mbs.elements.gears.teeth import PHASE
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -389,3 +390,119 @@ def test_the_approach_is_that_of_two_involute_curves(pair, seed):
     lines = round(load / (K * pair.width * overlap))  # all of them overlap alike
     assert lines in (1, 2)
     assert load == pytest.approx(lines * K * pair.width * overlap, rel=1e-7)
+
+
+def test_teeth_take_up_their_load_evenly_and_bear_as_much_as_at_once():
+    """Over a pitch the mean force is the same; the largest step of it falls with the entry."""
+    pair, q, phases = SPUR, np.zeros(12), np.linspace(0, 2 * np.pi / 26, 2000, endpoint=False)
+    q[5] = 1e-4
+    loads = {}
+    for entry in (0.0, 0.1):
+        found, (packed, W) = [], prepared(wheels(pair, entry=entry))
+        mesh = packed.elements[GEAR_MESHES_FAMILY]
+        for phase in phases:
+            mesh.size[0, PHASE] = phase
+            wrench(packed, W, moved(packed, q), np.zeros(12))
+            found.append(mesh.load[0])
+        loads[entry] = np.array(found)
+    one = K * pair.width * 1e-4 * pair.rb[0]  # of a line
+    assert loads[0.1].mean() == pytest.approx(loads[0.0].mean(), rel=1e-3)
+    steps = {entry: np.abs(np.diff(load)).max() for entry, load in loads.items()}
+    assert steps[0.0] == pytest.approx(one, rel=1e-9)
+    assert steps[0.1] == pytest.approx(one / (0.1 * 2000), rel=1e-2)
+
+
+# Lin and Parker, Analytical characterization of the unique properties of planetary gear free
+# vibration, J. Vib. Acoust. 121 (1999) 316: masses and inertias over squared radii [kg]
+PUBLISHED = {
+    "sun": (0.4, 0.39), "ring": (2.35, 3.0), "carrier": (5.43, 6.29), "planet": (0.66, 0.61),
+}  # fmt: skip
+FREQUENCIES = {  # number of planets -> [Hz]: rotational modes, then pairs of translational ones
+    3: ((1475.7, 1930.3, 2658.3, 7462.8, 11775.3), (743.2, 1102.4, 1896.0, 2276.4, 6986.3, 9647.9)),
+    4: (
+        (1536.6, 1970.6, 2625.7, 7773.6, 13071.1),
+        (727.0, 1091.0, 1892.8, 2342.5, 7189.9, 10437.6),
+    ),
+}
+BODIES = ("sun", "ring", "carrier")
+
+
+def lumped(planets, alpha, mesh=5e8, support=1e8, held=(0.0, 1e9, 0.0)):
+    """Mass and stiffness of plane bodies with coordinates (x, y, u = r theta), planets last."""
+    n = 3 * (3 + planets)
+    K, rows = np.zeros((n, n)), []
+    for k, hold in enumerate(held):
+        rows += [(support, {3 * k: 1.0}), (support, {3 * k + 1: 1.0}), (hold, {3 * k + 2: 1.0})]
+    sun, ring, carrier = 0, 3, 6
+    for p in range(planets):
+        angle, at = 2 * np.pi * p / planets, 9 + 3 * p
+        c, t = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+        out = np.sin(alpha) * c + np.cos(alpha) * t
+        inn = np.sin(alpha) * c - np.cos(alpha) * t
+        rows.append((mesh, {sun: out[0], sun + 1: out[1], sun + 2: 1.0,
+                            at: -out[0], at + 1: -out[1], at + 2: 1.0}))  # fmt: skip
+        rows.append((mesh, {at: inn[0], at + 1: inn[1], at + 2: -1.0,
+                            ring: -inn[0], ring + 1: -inn[1], ring + 2: 1.0}))  # fmt: skip
+        for d in range(2):
+            rows.append((support, {carrier + d: 1.0, carrier + 2: t[d], at + d: -1.0}))
+    for k, row in rows:
+        v = np.zeros(n)
+        v[list(row)] = list(row.values())
+        K += k * np.outer(v, v)
+    sizes = [PUBLISHED[name] for name in (*BODIES, *planets * ["planet"])]
+    M = np.array([x for mass, inertia in sizes for x in (mass, mass, inertia)])
+    return M, K
+
+
+def frequencies_of(M, K):
+    lam = np.linalg.eigvals(K / M[:, None]).real
+    return np.sqrt(np.maximum(np.sort(lam), 0)) / (2 * np.pi)
+
+
+@pytest.mark.parametrize("planets", [3, 4])
+def test_the_lumped_planetary_train_is_that_of_lin_and_parker(planets):
+    found = frequencies_of(*lumped(planets, np.radians(24.6)))
+    turning, moving = FREQUENCIES[planets]
+    single = [1808.2, 5963.8, 6981.7] * (planets - 3)  # modes of planets alone
+    wanted = np.sort([0.0, *turning, *np.repeat(moving, 2), *single])
+    assert_allclose(found, wanted, rtol=2e-4, atol=1.0)
+
+
+@pytest.mark.parametrize("planets", [3, 4])
+def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
+    """All plane modes under a light load, with the masses and springs of Lin and Parker."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    radius = {"sun": SUN.rb[0], "ring": abs(RING.rb[1]), "carrier": 0.048, "planet": SUN.rb[1]}
+
+    def body(name, at=ORIGIN):
+        mass, inertia = PUBLISHED[name.split()[0]]
+        J = inertia * radius[name.split()[0]] ** 2
+        part = mech.add_rigid(name, mass=mass, inertia=(J, J, J), at=at)
+        mech.planar(f"{name} plane", mech.ground.marker(at), part.marker(ORIGIN), normal=Z)
+        return part
+
+    parts = {name: body(name) for name in BODIES}
+    held = {"sun": 0.0, "ring": 1e9 * radius["ring"] ** 2, "carrier": 1e6 * radius["carrier"] ** 2}
+    for name, part in parts.items():
+        mech.bushing(f"{name} support", mech.ground.marker(ORIGIN), part.marker(ORIGIN),
+                     stiffness=(1e8, 1e8, 0, 0, 0, held[name]))  # fmt: skip
+    for k in range(planets):
+        angle = 2 * np.pi * k / planets
+        at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        planet = body(f"planet {k}", at).marker(ORIGIN)
+        mech.bushing(f"pin {k}", parts["carrier"].marker(at), planet,
+                     stiffness=(1e8, 1e8, 0, 0, 0, 0))  # fmt: skip
+        law = {"stiffness": 5e8 / SUN.width, "entry": 0.0}
+        mech.gear_mesh(f"sun {k}", parts["sun"].marker(ORIGIN), planet, axis=Z, pair=SUN,
+                       phase=one_line(SUN), **law)  # fmt: skip
+        mech.gear_mesh(f"ring {k}", planet, parts["ring"].marker(ORIGIN), axis=(0, 0, -1),
+                       pair=RING, phase=one_line(RING), **law)  # fmt: skip
+    mech.torque("drive", parts["sun"].marker(ORIGIN), (0, 0, 0.1))
+    found = np.sort(rom.linearize(mech, rom.equilibrium(mech)).frequencies)
+    wanted = frequencies_of(*lumped(planets, np.radians(20), held=(0.0, 1e9, 1e6)))
+    assert_allclose(found, wanted, rtol=1e-5)
+
+
+def one_line(pair):
+    """Phase at which one pair of teeth touches, in the middle of its path."""
+    return 0.5 * sum(pair.path) / pair.rb[0]

@@ -93,6 +93,10 @@ def pair():
     return mech, a, b
 
 
+def ground(mech):
+    return mech.ground.marker((0, 0, 0))
+
+
 def chain(n):
     """Pendulums that hang one on the other."""
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
@@ -128,6 +132,7 @@ def geared_body(mech, a, b):
 ROD = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0, "inertia": (1e-2,) * 3}
 LAW = rom.mbs.Impact(stiffness=1e5)
 WHEELS = {"pair": GearPair((50, 50), 0.02, 0.01), "axis": (0, 0, 1), "stiffness": 1.0}
+BALLS = {"axis": (0, 0, 1), "bearing": rom.mbs.BallBearing(9, 0.0127, 0.065)}
 ELEMENTS = {  # family -> what asks for it
     "springs": lambda m, a, b: m.spring_damper("e", a, b, stiffness=1.0),
     "turns": lambda m, a, b: m.rotational_spring("e", hinge(m, b), stiffness=1.0),
@@ -142,6 +147,7 @@ ELEMENTS = {  # family -> what asks for it
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
     "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
+    "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
 
