@@ -5,13 +5,14 @@ import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 
 import rom
 from cases.mbs.mechanisms import prepared, residual_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom.errors import ConfigError, ModelError
 from rom.mbs import BallBearing, RollerBearing
+from rom.mbs.elements.rolling.bearings import ROLLING_BEARINGS_FAMILY
 from rom.mbs.elements.rolling.races import elliptic_stiffness
 from rom.mbs.equations.equations import element_energy, evaluate
 
@@ -146,7 +147,7 @@ def test_the_largest_load_is_that_of_stribeck(kind, number):
 def resting(mech):
     """Equilibrium of a shaft that a soft coil keeps from turning."""
     mech.bushing("soft", mech.ground.marker(ORIGIN), mech.parts["shaft"].marker(ORIGIN),
-                 stiffness=(1e-3, 1e-3, 1e-3, 1.0, 1.0, 1.0))  # fmt: skip
+                 stiffness=(1e-3, 1e-3, 1e-3, 1e6, 1e6, 1e6))  # fmt: skip
     return rom.equilibrium(mech)
 
 
@@ -251,3 +252,29 @@ def test_rings_that_are_not_at_one_place_are_refused():
     with pytest.raises(ModelError, match="rollers of length 0 m"):
         RollerBearing(14, 10e-3, 0.0, 65e-3)
     assert not mech.rolling_bearings
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.2, np.pi / 8])
+def test_eight_balls_bear_a_load_one_by_one(phase):
+    """Under a load along y, from which the phase counts for a bearing about z."""
+    b = BallBearing(8, 12.7e-3, 65e-3, clearance=5e-6)
+    angles, A = phase + 2 * np.pi * np.arange(8) / 8, b.curvature_distance
+
+    def loads(move):
+        r = A - b.clearance / 2 + move[0] * np.sin(-angles) + move[1] * np.cos(angles)
+        return b.stiffness * np.maximum(np.abs(r) - A, 0) ** 1.5
+
+    def missing(move):
+        Q = loads(move)
+        return [Q @ np.sin(-angles), Q @ np.cos(angles) - 2000.0]
+
+    wanted = root(missing, [0.0, 2e-5], tol=1e-14).x
+    mech = bearing(b, (0, 2000.0, 0), phase=phase)
+    state = resting(mech)
+    assert_allclose(
+        rom.snapshot(mech, state).position("shaft")[0, :2], wanted, rtol=1e-5, atol=1e-12
+    )
+    packed, W = prepared(mech)
+    residual_at(packed.system, W, state.q, state.v, 0 * state.v, np.zeros(0))
+    found = packed.elements[ROLLING_BEARINGS_FAMILY].load[0]
+    assert found == pytest.approx(loads(wanted).sum(), rel=1e-5)

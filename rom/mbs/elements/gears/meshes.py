@@ -76,7 +76,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         stiffness: of one pair of teeth per length of contact line [N/m^2]: a number, or (n,) values
             from first to last contact, as `rom.components.gear_mesh.stiffness_table` has them.
         correction: `rom.components.gear_mesh.Correction` of the working flanks.
-        damping: force per rate over force per deflection of a slice [s].
+        damping: force per rate over force per deflection of a slice [s]; its force is never more
+            than the elastic one.
         friction: coefficient between the flanks [1].
         transition_speed: of sliding flanks, over which friction turns [m/s].
         cells: slices across the face.

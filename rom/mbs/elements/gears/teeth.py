@@ -230,7 +230,11 @@ def press(W, meshes, k, what, place, length, state):
     slide = add(row(W.V, i, 0), cross(row(W.V, i, 3), arm_1))
     slide = sub(slide, add(row(W.V, j, 0), cross(row(W.V, j, 3), arm_2)))
     rate, across = dot(n, slide), cross(z, along)
-    load = max(stiffness * (depth + law[DAMPING] * rate), 0.0)  # flanks do not pull
+    loss, by_depth, by_rate = law[DAMPING] * rate, 1.0, law[DAMPING]
+    if abs(loss) > depth:  # flanks do not pull, and their force does not jump as they touch
+        by_depth, by_rate = 1.0 + math.copysign(1.0, loss), 0.0
+        loss = math.copysign(depth, loss)
+    load = stiffness * (depth + loss)
     speed = dot(across, slide)
     grip = law[FRICTION] * math.tanh(speed / law[SPEED])
     force = add(n, scale(grip, across))
@@ -244,8 +248,8 @@ def press(W, meshes, k, what, place, length, state):
             for q in range(12):
                 normal = stiffness * motion_part(n, arm_1, arm_2, q)
                 slip = steep * rub * motion_part(across, arm_1, arm_2, q)
-                meshes.tangent[0, p, q] += gained * normal
-                meshes.tangent[1, p, q] += gained * law[DAMPING] * normal + slip
+                meshes.tangent[0, p, q] += gained * by_depth * normal
+                meshes.tangent[1, p, q] += gained * by_rate * normal + slip
     if what == TANGENTS:
         return 0.0
     meshes.load[k] += load

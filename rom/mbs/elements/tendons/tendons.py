@@ -118,7 +118,7 @@ def tendon(  # noqa: PLR0913  one keyword per property
         name: name of the tendon.
         path: markers in the order in which it passes them, and `rom.mbs.Pulley` between the ends.
         EA: force per strain [N].
-        damping: tension per rate of strain [N s].
+        damping: tension per rate of strain [N s]; it is never more than the elastic tension.
         free_length: length without force [m], or a function of time: a winch before the first
             marker; None for the length at the start.
         pretension: tension at the start, in place of a free length [N].

@@ -65,11 +65,12 @@ def mean_tension(W, tendons, k):
     elastic = law[EA] * (length / free - 1.0)
     if elastic <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    tension = elastic + law[DAMPING] * (rate - length / free * free_rate) / free
-    if tension <= 0.0:
-        return 0.0, elastic, 0.0, 0.0
+    loss = law[DAMPING] * (rate - length / free * free_rate) / free
+    if abs(loss) >= elastic:  # a cable does not push, and its force does not jump as it tightens
+        side = 1.0 + math.copysign(1.0, loss)
+        return side * elastic, elastic, side * law[EA] / free, 0.0
     stiffness = (law[EA] - law[DAMPING] * free_rate / free) / free
-    return tension, elastic, stiffness, law[DAMPING] / free
+    return elastic + loss, elastic, stiffness, law[DAMPING] / free
 
 
 @inner
