@@ -295,6 +295,33 @@ def film(solves: int = 400) -> Iterator[Figure]:
         yield Figure("film", case, "systems solved per film", changes / solves)
 
 
+def geared(steps: int = 20000) -> Iterator[Figure]:
+    """A planetary train of six meshes in time, and what its teeth cost beside the plane model.
+
+    Args:
+        steps: of 1e-5 s.
+    """
+    from rom.bench.models import planetary_train
+    from rom.components.gear_mesh import Mesh
+    from rom.mbs.integrate.simulation import simulate
+
+    mech, pair, stiffness = planetary_train()
+    simulate(mech, t_end=1e-3, dt=1e-5, save_every=100, progress=False)
+    start = process_time()
+    simulate(mech, t_end=1e-5 * steps, dt=1e-5, save_every=100, progress=False)
+    each = (process_time() - start) / steps
+    plane, motion = Mesh(pair, stiffness), np.zeros(12)
+    motion[5] = 1e-4
+    start = process_time()
+    for angle in np.linspace(0, 2 * pi, 200):
+        plane.forces(motion, float(angle))
+    one = (process_time() - start) / 200
+    case = "planetary train, 6 meshes of 21 slices"
+    yield Figure("geared", case, "steps per second of the processor", 1 / each, "1/s", "above 1000")
+    yield Figure("geared", case, "six meshes by the plane model, over a step", 6 * one / each, "",
+                 "above 0.5")  # fmt: skip
+
+
 def transmission(
     speeds: int = 100, cells: tuple[int, int] = (120, 8), ross: bool = True
 ) -> Iterator[Figure]:
@@ -358,6 +385,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
     "transmission": transmission,
+    "geared": geared,
     "integrator": integrator,
     "chain": chain,
     "adaptive": adaptive,

@@ -161,3 +161,35 @@ def geometry(name: str) -> Path:
             f"{path} does not exist: benchmarks need the source tree.", hint="Clone the project."
         )
     return path
+
+
+def planetary_train() -> Any:
+    """Three planets between a driven sun and a ring on springs; a wheel pair and its stiffness.
+
+    The carrier is braked.
+    """
+    from rom.mbs.elements.gears.geometry import GearPair
+    from rom.mbs.mechanism import Mechanism
+
+    sun_pair = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
+    ring_pair = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
+    mech, z, origin = Mechanism(gravity=(0, 0, 0)), (0, 0, 1), (0.0, 0.0, 0.0)
+    law: dict[str, Any] = {"stiffness": 1.3e10, "damping": 2e-5}
+    wheels = {}
+    for name, inertia in (("sun", 1e-4), ("ring", 2e-3), ("carrier", 5e-4)):
+        part = mech.add_rigid(name, mass=0.2, inertia=(inertia,) * 3, at=origin)
+        mech.revolute(f"{name} axle", mech.ground.marker(origin), part.marker(origin), axis=z)
+        wheels[name] = part
+    sun, ring, carrier = (wheels[name] for name in ("sun", "ring", "carrier"))
+    mech.rotational_spring("housing", "ring axle", stiffness=1e6, damping=20.0)
+    mech.drive("motor", "sun axle", lambda t: 80.0 * t, rate=lambda t: 80.0 + 0 * t)
+    mech.torque("brake", carrier.marker(origin), (0, 0, -40.0))
+    for k, angle in enumerate(2 * np.pi * np.arange(3) / 3):
+        at = sun_pair.distance * np.array([np.cos(angle), np.sin(angle), 0.0])
+        planet = mech.add_rigid(f"planet {k}", mass=0.2, inertia=(5e-5,) * 3, at=at)
+        mech.revolute(f"pin {k}", carrier.marker(at), planet.marker(origin), axis=z)
+        middle = planet.marker(origin)
+        mech.gear_mesh(f"sun {k}", sun.marker(origin), middle, axis=z, pair=sun_pair, **law)
+        mech.gear_mesh(f"ring {k}", middle, ring.marker(origin), axis=(0, 0, -1), pair=ring_pair,
+                       **law)  # fmt: skip
+    return mech, sun_pair, law["stiffness"]

@@ -13,6 +13,7 @@ from scipy.linalg import eigh
 import rom
 from cases.paths import ROOT
 from rom.bench import benchmarks, wheel
+from rom.bench.models import planetary_train
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ResourceError
 
@@ -102,6 +103,15 @@ def test_chains_of_all_lengths_are_measured():
     cases = [f"{n} links of 14 modes" for n in (2, 12, 24)] + ["24 against 12 links"]
     assert [figure.case for figure in figures] == cases
     assert all(figure.value > 0.0 for figure in figures)
+
+
+def test_a_planetary_train_is_timed_on_a_motion_that_is_right():
+    mech, pair, _ = planetary_train()
+    moved = rom.simulate(mech, t_end=0.02, dt=1e-5, save_every=100, progress=False)
+    sun, carrier = (moved.joint(f"{name} axle").angle[-1] for name in ("sun", "carrier"))
+    assert carrier == pytest.approx(sun / 4, rel=1e-2) and pair.teeth == (24, 24)
+    speed, ratio = benchmarks.geared(steps=100)
+    assert speed.value > 0 and ratio.value > 0
 
 
 @pytest.mark.long
