@@ -29,13 +29,14 @@ class Equations:
         self.n_q, self.n = state.q.size, state.v.size
         self.a, self.lam = np.zeros(self.n), np.zeros(state.lam.size)
         self.forces = record.packed.asked
+        self.broken: SolverError | None = None  # what was wrong with a trial since the last step
 
     def __call__(self, t: float, y: Array, *, accepted: bool = False) -> Array:
         """Rates at time t; ``accepted`` for a state of the motion, not a trial.
 
         Raises:
-            SolverError: if a prescribed function or force is not finite, or the equations are
-                singular.
+            SolverError: if a prescribed function is not finite, or at an accepted state a force
+                is not, or the equations are singular.
         """
         packed, settings = self.record.packed, self.record.settings
         y = np.ascontiguousarray(y)  # SciPy hands over columns
@@ -55,7 +56,10 @@ class Equations:
         self.record.compiled += perf_counter() - clock
         if not solved or not np.isfinite(out).all():
             where = f"at t = {t:.9g} s{packed.broken_laws}"
-            raise SolverError(f"the equations of motion are singular {where}.")
+            self.broken = SolverError(f"the equations of motion are singular {where}.")
+            if accepted:
+                raise self.broken
+            out[:] = np.nan  # a trial: a shorter step is tried
         return out
 
 
@@ -120,9 +124,11 @@ def _memory(record: Record, equations: Equations, solver: DOP853, due: int) -> M
 
 def _step(record: Record, equations: Equations, solver: DOP853, due: int) -> int:
     """Take one step and save what it has passed, or its end; returns the next output due."""
-    message = solver.step()
+    equations.broken = None
+    with np.errstate(all="ignore"):  # of a trial that went too far
+        message = solver.step()
     if solver.status == "failed":
-        raise SolverError(
+        raise equations.broken or SolverError(
             f"dop853 failed at t = {solver.t:.9g} s: {message}",
             hint="The motion is too stiff for it: use generalized-alpha.",
         )

@@ -215,12 +215,14 @@ def test_free_rings_keep_momentum_and_energy_while_their_balls_roll():
     assert np.abs(sol.energy.balance).max() < 1e-7 * sol.energy.total[0]
 
 
-def test_damping_takes_energy_and_never_gives_any():
-    mech = free_pair(BALLS, np.random.default_rng(3), damping=5.0)
-    sol = rom.simulate(mech, t_end=0.02, dt=1e-6, progress=False)
+@pytest.mark.parametrize("damping", [2.0, 5.0])
+def test_damping_takes_energy_and_never_gives_any(damping):
+    """Steps that are too long for the stiff contact behind a flight are tried again, shorter."""
+    mech = free_pair(BALLS, np.random.default_rng(3), damping=damping)
+    sol = rom.simulate(mech, t_end=0.05, dt=1e-4, method="dop853", rtol=1e-10, progress=False)
     lost = np.diff(sol.energy.damping)
     assert (lost > -1e-12).all() and lost.sum() > 1e-4
-    assert np.abs(sol.energy.balance).max() < 1e-4 * lost.sum()
+    assert np.abs(sol.energy.balance).max() < 1e-7 * sol.energy.total[0]
 
 
 @pytest.mark.parametrize(("numbers", "message"), [
