@@ -2,17 +2,19 @@
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import root
 
 import rom
-from cases.mbs.mechanisms import prepared, residual_at, tangents_at
+from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 from rom.mbs.elements.gears.teeth import PHASE
+from rom.mbs.equations.equations import element_energy, evaluate
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -506,3 +508,40 @@ def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
 def one_line(pair):
     """Phase at which one pair of teeth touches, in the middle of its path."""
     return 0.5 * sum(pair.path) / pair.rb[0]
+
+
+@njit
+def stored_at(s, W, q, v):
+    evaluate(s, W, q, v)
+    return element_energy(s, W, q, v)
+
+
+def test_flexible_wheels_feel_their_teeth_in_all_their_shapes():
+    """Forces are the gradient of the energy, to the first order in which shapes tilt wheels."""
+    rng, pair = np.random.default_rng(6), SPUR
+    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x in (("pinion", 0.0), ("gear", pair.distance)):
+        body = random_body(rng, r=3, damped=False)
+        at = np.array([x, 0.0, 0.0]) - body.marker("a").point
+        ends.append(mech.add_flexible(name, body, at=at).marker("a"))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K, phase=one_line(pair), entry=0.0)
+    packed, W = prepared(mech)
+    q = shifted(packed, packed.q, 1e-7 * rng.normal(size=packed.v.size))
+    none = 0 * packed.v
+    turned = np.zeros(packed.v.size)
+    turned[5] = 1e-4  # working flanks close by the turn of the pinion
+    q = shifted(packed, q, turned)
+
+    def energy(delta):
+        return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
+
+    def force():
+        residual_at(packed.system, W, q, none, none, np.zeros(0))
+        return W.residual.copy()
+
+    gradient = difference(energy, none.size, 1e-8)[0]
+    body = force()
+    packed.elements[GEAR_MESHES_FAMILY].stiffness[:] = 0.0
+    found = body - force()
+    assert np.abs(gradient[6:9]).max() > 1e-2 * np.abs(gradient).max()
+    assert_allclose(found, gradient, atol=1e-4 * np.abs(gradient).max())

@@ -419,3 +419,12 @@ def test_a_marker_of_another_mechanism_is_refused_and_much_friction_is_doubted()
     with pytest.warns(RomWarning, match="coefficient of friction of 'rope' is 30"):
         mech.tendon("rope", route(lambda m: place(m, 0.0, 1.0, 0.0))(mech), EA=1.0, friction=30.0,
                     transition_speed=1.0)  # fmt: skip
+
+
+def test_a_winch_that_takes_in_all_of_its_cable_is_named():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    end = weight(mech, "end", (1.0, 0, 0), axis=(1, 0, 0))
+    mech.drive("hold", "end slides", lambda t: 0.0 * t)
+    mech.tendon("rope", [mech.ground.marker(ORIGIN), end], EA=1e3, free_length=lambda t: 0.35 - t)
+    with pytest.raises(SolverError, match=r"path of 'rope' is lost.*a winch took it all"):
+        rom.simulate(mech, t_end=1.0, dt=1e-1, progress=False)

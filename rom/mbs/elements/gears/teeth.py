@@ -98,7 +98,9 @@ def set_frame(s, W, meshes, k):
     """Frame and state of mesh k.
 
     Returns:
-        Axes c, t, z; pressure angle, NaN without a common tangent; angles rolled, and opening.
+        Axes c, t, z; pressure angle, NaN without a common tangent; what rolled together, what the
+        flanks opened, and where a working line begins [m]; shift along the axis [m] and tilt of the
+        gear; distance [m].
     """
     z, e1, n2, e2 = wheel_axes(W, meshes, k)
     size = meshes.size[k]
@@ -164,8 +166,9 @@ def add_slices(s, W, meshes, k, what):
     """
     size, total = meshes.size[k], 0.0
     axes, alpha, (rolled, opened, forward), lean, distance = set_frame(s, W, meshes, k)
-    meshes.load[k] = 0.0 * alpha
-    W.wrench[meshes.i[k], 0] += 0.0 * alpha  # NaN without a common tangent, which ends the motion
+    if what == FORCES:  # not a number without a common tangent, which ends the motion
+        meshes.load[k] = 0.0 * alpha
+        W.wrench[meshes.i[k], 0] += 0.0 * alpha
     base, slant = size[RB_1], math.tan(size[HELIX])
     reach = math.copysign(math.sqrt(size[RA_2] ** 2 - size[RB_2] ** 2), size[RB_2])
     first = (base + size[RB_2]) * math.tan(alpha) - reach
@@ -239,9 +242,8 @@ def press(W, meshes, k, what, place, length, state):
     grip = law[FRICTION] * math.tanh(speed / law[SPEED])
     force = add(n, scale(grip, across))
     if what == TANGENTS and load > 0.0:
-        steep = (
-            law[FRICTION] / law[SPEED] * load / math.cosh(min(abs(speed / law[SPEED]), 300)) ** 2
-        )
+        slope = (1.0 - math.tanh(speed / law[SPEED]) ** 2) / law[SPEED]
+        steep = law[FRICTION] * load * slope
         for p in range(12):
             gained = motion_part(force, arm_1, arm_2, p)
             rub = motion_part(across, arm_1, arm_2, p)

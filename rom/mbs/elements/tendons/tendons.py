@@ -109,8 +109,8 @@ def tendon(  # noqa: PLR0913  one keyword per property
 ) -> None:
     """Cable that pulls along a path through eyelets and over pulleys, and goes slack.
 
-    It has no mass and is fixed at both ends. Friction is that of a rope at rest or in motion:
-    tensions on both sides of an eyelet differ by up to exp(friction angle); what sticks creeps
+    It has no mass and is fixed at both ends. Tensions on both sides of an eyelet at which it turns
+    differ by the factor exp(friction angle) while it slides (Euler, Eytelwein); what sticks creeps
     with less than the transition speed. Either it stretches, or a force pulls it at its first end,
     from beyond the path.
 
@@ -146,7 +146,10 @@ def tendon(  # noqa: PLR0913  one keyword per property
         numbers = (0.0, 0.0, given, speed)
     else:
         stiffness, loss = positive("EA", EA), _not_negative(name, "damping", damping)
-        function, given = _free(name, length, free_length, (stiffness, pretension))
+        slack = length / (1.0 + _not_negative(name, "pretension", pretension) / stiffness)
+        if pretension and free_length is not None:
+            raise ConfigError(f"tendon {name!r} has both a pretension and a free_length.")
+        function, given = _free(slack, free_length)
         numbers = (stiffness, loss, given, speed)
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
@@ -193,16 +196,11 @@ def _given(name: str, what: str, value: Any) -> tuple[Callable[[float], Any] | N
     return (value, 0.0) if callable(value) else (None, _not_negative(name, what, value))
 
 
-def _free(
-    name: str, length: float, free: Any, pulled: tuple[float, Any]
-) -> tuple[Callable[[float], Any] | None, float]:
-    """Function and number of the free length [m]."""
-    EA, pretension = pulled
-    if free is not None:
-        if pretension:
-            raise ConfigError(f"tendon {name!r} has both a pretension and a free_length.")
-        return (free, 0.0) if callable(free) else (None, positive("free_length", free))
-    return None, length / (1.0 + _not_negative(name, "pretension", pretension) / EA)
+def _free(slack: float, free: Any) -> tuple[Callable[[float], Any] | None, float]:
+    """Function and number of the free length, the latter that of the start if none is given [m]."""
+    if free is None:
+        return None, slack
+    return (free, 0.0) if callable(free) else (None, positive("free_length", free))
 
 
 def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> float:
@@ -439,5 +437,5 @@ def tensions(tendons: Tendons) -> list[Array]:
 TENDONS_FAMILY = Family(
     "tendons", Tendon, pack, tendon_wrenches, tendon_tangents, tendon_energy, ends=ends,
     couples=coupled, by_rate=lambda tendons: tendons.rated.any(), answers=tensions,
-    lost="the path of {} is lost: it has left a pulley, or its places meet",
+    lost="the path of {} is lost: it has left a pulley, its places meet, or a winch took it all",
 )  # fmt: skip

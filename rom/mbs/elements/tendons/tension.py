@@ -62,6 +62,8 @@ def mean_tension(W, tendons, k):
         return W.load[0] * force, 0.0, 0.0, 0.0
     length, rate = whole_length(tendons, k)
     free, free_rate = free_length(W, tendons, k)
+    if not free > 0.0:  # a winch took in all of it
+        return math.nan, math.nan, 0.0, 0.0
     elastic = law[EA] * (length / free - 1.0)
     if elastic <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
