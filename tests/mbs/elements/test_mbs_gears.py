@@ -111,8 +111,9 @@ def test_forces_turn_with_the_whole():
     assert_allclose(found[1], found[0] @ A.T, atol=1e-8 * np.abs(found[0]).max())
 
 
-def test_tangents_are_derivatives_but_for_the_turning_of_forces():
-    packed, W = prepared(wheels(HELICAL, damping=1e-5, friction=0.1, transition_speed=0.1))
+@pytest.mark.parametrize("damping", [1e-5, 1.0], ids=["damped", "saturated"])
+def test_tangents_are_derivatives_but_for_the_turning_of_forces(damping):
+    packed, W = prepared(wheels(HELICAL, damping=damping, friction=0.1, transition_speed=0.1))
     q, v = np.zeros(12), 1e-4 * np.random.default_rng(0).normal(size=12)
     q[[5, 11]] = 1e-4, 0.0
     at, none = moved(packed, q), np.zeros(0)

@@ -84,6 +84,7 @@ KINDS = {
     "elastic": {"EA": 30.0, "pretension": 5.0},
     "friction": {"EA": 30.0, "pretension": 5.0, "friction": 0.3, "transition_speed": 2.0,
                  "rub": 0.2},
+    "saturated": {"EA": 30.0, "pretension": 5.0, "damping": 3000.0},  # more than elastic
     "pulled": {"tension": 7.0, "friction": 0.3, "transition_speed": 2.0, "rub": 0.2},
     "winch": {"EA": 30.0, "free_length": lambda t: 8.0 - 0.5 * t, "damping": 3.0,
               "friction": 0.3, "transition_speed": 2.0, "rub": 0.2},
