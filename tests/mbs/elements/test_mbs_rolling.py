@@ -221,7 +221,7 @@ def test_damping_takes_energy_and_never_gives_any(damping):
     mech = free_pair(BALLS, np.random.default_rng(3), damping=damping)
     sol = rom.simulate(mech, t_end=0.05, dt=1e-4, method="dop853", rtol=1e-10, progress=False)
     lost = np.diff(sol.energy.damping)
-    assert (lost > -1e-12).all() and lost.sum() > 1e-4
+    assert (lost > -1e-8 * lost.sum()).all() and lost.sum() > 1e-4  # interpolated within steps
     assert np.abs(sol.energy.balance).max() < 1e-7 * sol.energy.total[0]
 
 

@@ -343,7 +343,7 @@ def test_free_bodies_on_a_cable_with_friction_keep_their_momentum_and_lose_what_
     for kind in moved.momentum:
         assert np.ptp(kind, axis=0).max() < 1e-9
     lost = np.diff(moved.energy.damping)
-    assert (lost > -1e-12).all() and lost.sum() > 0.1
+    assert (lost > -1e-8 * lost.sum()).all() and lost.sum() > 0.1  # interpolated within steps
     assert np.abs(moved.energy.balance).max() < 1e-7
 
 
