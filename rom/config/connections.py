@@ -174,8 +174,7 @@ def _gear_mesh(entry: Entry) -> None:
     for key in ("teeth", "shift"):
         pair[key] = tuple(pair[key])
     correction = entry.values.pop("correction")
-    for key in ("relief", "extent"):
-        correction[key] = tuple(correction[key]) if key in correction else (0.0, 0.0)
+    correction |= {key: tuple(correction[key]) for key in ("relief", "extent") if key in correction}
     entry.values["pair"], entry.values["correction"] = GearPair(**pair), Correction(**correction)
     entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
 

@@ -206,6 +206,7 @@ ORDER = {
     ),
     "mbs.elements": (
         "family",
+        "pair_motion",
         "springs",
         "rotational_springs",
         "loads",

@@ -12,7 +12,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.stiffening import elastic_loads, known_loads
 from rom.errors import RomWarning
-from rom.mbs.equations.equations import evaluate, residual, tangents
+from rom.mbs.equations.equations import element_energy, evaluate, residual, tangents
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.work import workspace
@@ -30,6 +30,13 @@ def tangents_at(s, W, q, v, a, lam, c):
     evaluate(s, W, q, v)
     residual(s, W, q, v, a, lam)
     tangents(s, W, v, a, lam, c)
+
+
+@njit
+def stored_at(s, W, q, v):
+    """Energy of all elements."""
+    evaluate(s, W, q, v)
+    return element_energy(s, W, q, v)
 
 
 def nodal_body(x, Ms, phi, K=None, D=None, markers=None, name="body"):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 
 from cases.mbs.mechanisms import (
@@ -11,25 +10,19 @@ from cases.mbs.mechanisms import (
     random_pose,
     random_state,
     residual_at,
+    stored_at,
     tangents_at,
 )
 from cases.mbs.tangents import check_tangents, difference, shifted
 from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.elements import bushings
-from rom.mbs.equations.equations import element_energy, evaluate
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 TILT = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])
-
-
-@njit
-def stored_at(s, W, q, v):
-    evaluate(s, W, q, v)
-    return element_energy(s, W, q, v)
 
 
 def full_matrix(rng, size=30.0):

@@ -2,19 +2,17 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import root
 
 import rom
-from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
+from cases.mbs.mechanisms import prepared, random_body, residual_at, stored_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 from rom.mbs.elements.gears.teeth import PHASE
-from rom.mbs.equations.equations import element_energy, evaluate
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -509,12 +507,6 @@ def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
 def one_line(pair):
     """Phase at which one pair of teeth touches, in the middle of its path."""
     return 0.5 * sum(pair.path) / pair.rb[0]
-
-
-@njit
-def stored_at(s, W, q, v):
-    evaluate(s, W, q, v)
-    return element_energy(s, W, q, v)
 
 
 def test_flexible_wheels_feel_their_teeth_in_all_their_shapes():

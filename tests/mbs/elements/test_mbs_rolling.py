@@ -2,30 +2,22 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
 import rom
-from cases.mbs.mechanisms import prepared, residual_at, tangents_at
+from cases.mbs.mechanisms import prepared, residual_at, stored_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom.errors import ConfigError, ModelError
 from rom.mbs import BallBearing, RollerBearing
 from rom.mbs.elements.rolling.bearings import ROLLING_BEARINGS_FAMILY
 from rom.mbs.elements.rolling.races import elliptic_stiffness
-from rom.mbs.equations.equations import element_energy, evaluate
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 BALLS = BallBearing(9, 12.7e-3, 65e-3, clearance=15e-6)  # a 6209
 ANGULAR = BallBearing(13, 12.7e-3, 65e-3, contact_angle=np.radians(25))
 ROLLERS = RollerBearing(14, 10e-3, 10e-3, 65e-3, clearance=-4e-6)
-
-
-@njit
-def stored_at(s, W, q, v):
-    evaluate(s, W, q, v)
-    return element_energy(s, W, q, v)
 
 
 def test_a_ball_on_a_plane_is_as_stiff_as_hertz_says():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 
 import rom
@@ -12,23 +11,17 @@ from cases.mbs.mechanisms import (
     random_pose,
     random_state,
     residual_at,
+    stored_at,
     tangents_at,
 )
 from cases.mbs.tangents import check_tangents, difference, shifted
 from rom.errors import ConfigError, RomWarning, SolverError
 from rom.mbs import Pulley
 from rom.mbs.elements.tendons.tendons import TENDONS_FAMILY
-from rom.mbs.equations.equations import element_energy, evaluate
 
 G = 9.81
 SMALL = (1e-3, 1e-3, 1e-3)
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
-
-
-@njit
-def stored_at(s, W, q, v):
-    evaluate(s, W, q, v)
-    return element_energy(s, W, q, v)
 
 
 def strung(rng, pulleys, **more):

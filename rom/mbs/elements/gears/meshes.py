@@ -109,11 +109,11 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         raise ConfigError(f"cells = {cells} of mesh {name!r}: it has from 1 to {MAX_CELLS}.")
     if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
         raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
-    table_ = _stiffness(name, stiffness)
+    stiffness = _stiffness(name, stiffness)
     flanks = Correction() if correction is None else correction
     _check_correction(name, pair, flanks)
     mesh = GearMesh(
-        wheel_a, wheel_b, pair, table_, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
+        wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
         float(D @ z), number("phase", phase), entry * pair.base_pitch,
     )  # fmt: skip
     self.add(name, mesh, GEAR_MESHES_FAMILY)

@@ -14,9 +14,9 @@ at the same point, so that momentum is kept whatever they do.
 
 import math
 
+from rom.mbs.elements.pair_motion import clear_tangent, followed_angle, place_tangent
 from rom.mbs.kernels.algebra import add, cross, dot, put, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness, wrapped
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array1, Array2, Index1, Scratch1, Scratch3, Table, table
 
@@ -84,13 +84,9 @@ def wheel_axes(W, meshes, k):
 
 
 @inner
-def followed_angle(s, W, meshes, k, side, angle):
+def turned(s, W, meshes, k, side, angle):
     """The angle of a wheel against the line of centres, over whole turns, from its start."""
-    at = meshes.remembered[k] + side
-    before = W.base[s.coordinates.kind.size + at]
-    angle = before + wrapped(angle - before)
-    W.fresh[at] = angle
-    return angle - meshes.start[k, side]
+    return followed_angle(s, W, meshes.remembered[k] + side, angle) - meshes.start[k, side]
 
 
 @inner
@@ -112,8 +108,8 @@ def set_frame(s, W, meshes, k):
     t = cross(z, c)
     both = size[RB_1] + size[RB_2]
     alpha = math.acos(both / distance) if both / distance < 1.0 else math.nan
-    turn_1 = followed_angle(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
-    turn_2 = followed_angle(s, W, meshes, k, 1, math.atan2(dot(e2, t), dot(e2, c)))
+    turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
+    turn_2 = turned(s, W, meshes, k, 1, math.atan2(dot(e2, t), dot(e2, c)))
     rolled = size[RB_1] * turn_1 + size[RB_2] * turn_2
     opened = both * (involute(alpha) - involute(size[ALPHA]))
     forward = size[RB_1] * (size[PHASE] + turn_1 + alpha - size[ALPHA])
@@ -293,20 +289,9 @@ def mesh_tangents(s, W, meshes, _lam, ck, cc):
     their deflection to the radii, and how flank corrections and stiffness move along the path.
     """
     for k in range(meshes.i.size):
-        for kind in range(2):
-            for p in range(12):
-                for q in range(12):
-                    meshes.tangent[kind, p, q] = 0.0
+        clear_tangent(meshes.tangent)
         add_slices(s, W, meshes, k, TANGENTS)
-        for kind in range(2):
-            factor = ck if kind == 0 else cc
-            for p in range(12):
-                for q in range(12):
-                    W.Q[p, q] = factor * meshes.tangent[kind, p, q]
-            if kind == 0:
-                pair_stiffness(s, W, meshes.i[k], meshes.j[k], W.Kt)
-            else:
-                pair_stiffness(s, W, meshes.i[k], meshes.j[k], W.S)
+        place_tangent(s, W, (meshes.i[k], meshes.j[k]), meshes.tangent, ck, cc)
 
 
 @energy.of(Meshes)

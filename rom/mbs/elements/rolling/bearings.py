@@ -10,6 +10,7 @@ from rom.arguments import finite, number
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.rolling.contacts import (
+    DAMPING,
     Bearings,
     bearing_energy,
     bearing_tangents,
@@ -21,7 +22,7 @@ from rom.mbs.parts.whole import Whole
 from rom.model import Array
 from rom.rotation import matrix
 
-PLACE_RTOL = 1e-2  # of the ball: by which rings may be apart where bodies are added
+PLACE_RTOL = 1e-2  # of the pitch diameter: by which rings may be apart at first
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,5 +109,5 @@ def pack(bearings: Mapping[str, RollingBearing], places: Places) -> Bearings:
 
 ROLLING_BEARINGS_FAMILY = Family(
     "rolling_bearings", RollingBearing, pack, bearing_wrenches, bearing_tangents, bearing_energy,
-    by_rate=lambda bearings: bearings.race[:, 7].any(),
+    by_rate=lambda bearings: bearings.race[:, DAMPING].any(),
 )  # fmt: skip

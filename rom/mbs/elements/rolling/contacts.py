@@ -14,9 +14,9 @@ included, so that momentum and energy are kept.
 
 import math
 
+from rom.mbs.elements.pair_motion import clear_tangent, followed_angle, place_tangent
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness, wrapped
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Scratch1, Scratch2, Scratch3, Table, table
 
@@ -62,10 +62,7 @@ def ring_frame(s, W, bearings, k):
     t = cross(z, e)
     x, y = dot(e, f), dot(t, f)
     axis = scale(1.0 / (x * x + y * y), cross(f, sub(scale(x, t), scale(y, e))))
-    at = bearings.remembered[k]
-    before = W.base[s.coordinates.kind.size + at]
-    angle = before + wrapped(math.atan2(y, x) - before)
-    W.fresh[at] = angle
+    angle = followed_angle(s, W, bearings.remembered[k], math.atan2(y, x))
     share = bearings.race[k, CAGE]
     return (z, e, t), n, bearings.race[k, PHASE] + share * angle, scale(share, axis)
 
@@ -137,23 +134,13 @@ def bearing_tangents(s, W, bearings, _lam, ck, cc):
     bearings; that of the whole bearing is left out, as displacements are small against its radius.
     """
     for k in range(bearings.i.size):
-        for kind in range(2):
-            for p in range(12):
-                for q in range(12):
-                    bearings.tangent[kind, p, q] = 0.0
+        clear_tangent(bearings.tangent)
         frame = ring_frame(s, W, bearings, k)
         for ball in range(bearings.count[k]):
             depth, distance = ball_depth(W, bearings, k, ball, frame)
             if depth > 0.0:
                 add_ball_tangents(W, bearings, k, depth, distance)
-        for kind in range(2):
-            for p in range(12):
-                for q in range(12):
-                    W.Q[p, q] = (ck if kind == 0 else cc) * bearings.tangent[kind, p, q]
-            if kind == 0:
-                pair_stiffness(s, W, bearings.i[k], bearings.j[k], W.Kt)
-            else:
-                pair_stiffness(s, W, bearings.i[k], bearings.j[k], W.S)
+        place_tangent(s, W, (bearings.i[k], bearings.j[k]), bearings.tangent, ck, cc)
 
 
 @inner

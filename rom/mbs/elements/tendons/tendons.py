@@ -11,6 +11,7 @@ import numpy as np
 from rom.arguments import finite, number, positive, typed
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.pair_motion import followed_angle
 from rom.mbs.elements.tendons.paths import Place, path_through
 from rom.mbs.elements.tendons.routing import (
     bearing_angle,
@@ -30,7 +31,6 @@ from rom.mbs.elements.tendons.tension import (
 )
 from rom.mbs.kernels.algebra import cross, dot, row, sub, turn
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import wrapped
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
     Array1,
@@ -367,10 +367,7 @@ def wrap_pulley(s, W, tendons, i):
     s_out = -1.0 if dot(n, pulley_axis(W, tendons, i + 1)) < 0.0 else 1.0
     into, out = s_in * R_in - R, R - s_out * R_out
     angle = bearing_angle(D_out, n, e, out) - bearing_angle(D_in, n, e, into)
-    at = tendons.remembered[i]
-    before = W.base[s.coordinates.kind.size + at]
-    angle = before + wrapped(angle - before)
-    W.fresh[at] = angle
+    angle = followed_angle(s, W, tendons.remembered[i], angle)
     if angle < 0.0:  # it has left the pulley
         angle = math.nan
     g_in, g_out = departure(D_in, n, into)[1], departure(D_out, n, out)[1]
