@@ -41,3 +41,5 @@ from rom.mbs.results.solution import Energy as Energy
 from rom.mbs.results.solution import Occurrences as Occurrences
 from rom.mbs.results.solution import Solution as Solution
 from rom.mbs.results.state import State as State
+from rom.mbs.results.tooth_loads import ToothLoads as ToothLoads
+from rom.mbs.results.tooth_loads import tooth_loads as tooth_loads

@@ -207,6 +207,7 @@ ORDER = {
     "mbs.elements": (
         "family",
         "pair_motion",
+        "cylinders",
         "springs",
         "rotational_springs",
         "loads",

@@ -9,11 +9,12 @@ import numpy.typing as npt
 
 from rom.arguments import finite, number, positive
 from rom.errors import ConfigError
+from rom.mbs.elements.cylinders import Cylinder, cylinder_of, pack_cylinders
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.gears.corrections import Correction
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.teeth import Meshes, mesh_energy, mesh_tangents, mesh_wrenches
-from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
 from rom.plausible import FRICTION, warn_outside
@@ -41,6 +42,7 @@ class GearMesh:
     offset: float
     phase: float
     entry: float
+    rims: tuple[tuple[Cylinder, float] | None, ...]
 
 
 def gear_mesh(  # noqa: PLR0913  one keyword per property
@@ -115,8 +117,20 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     mesh = GearMesh(
         wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
         float(D @ z), number("phase", phase), entry * pair.base_pitch,
+        _rims((self.part(wheel_a.body), self.part(wheel_b.body)), (wheel_a, wheel_b), axes, pair),
     )  # fmt: skip
     self.add(name, mesh, GEAR_MESHES_FAMILY)
+
+
+def _rims(
+    parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
+) -> tuple[tuple[Cylinder, float] | None, ...]:
+    """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
+    found = []
+    for side in range(2):
+        rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
+        found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
+    return tuple(found)
 
 
 def _check_place(name: str, pair: GearPair, D: Array, z: Array) -> None:
@@ -190,8 +204,20 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
         rows_of((mesh.start for mesh in found), 2),
         np.zeros(len(found)),
+        np.zeros((len(found), max(map(_most_slices, found)), 5)),
+        np.zeros(len(found)),
+        pack_cylinders([mesh.rims for mesh in found], places.R),
+        np.zeros(2),
         np.zeros((2, 12, 12)),
     )
+
+
+def _most_slices(mesh: GearMesh) -> int:
+    """As many as can bear at once on both flanks, of wheels a little closer than they are cut."""
+    pair = mesh.pair
+    along = 1.5 * (pair.path[1] - pair.path[0]) + mesh.entry
+    lines = (along + pair.width * np.tan(abs(pair.base_helix))) / pair.base_pitch + 3
+    return 2 * mesh.cells * int(np.ceil(lines))
 
 
 def _from_lowest(errors: Any) -> Array:

@@ -14,6 +14,16 @@ at the same point, so that momentum is kept whatever they do.
 
 import math
 
+from rom.mbs.elements.cylinders import (
+    Cylinders,
+    add_gradient_products,
+    at_place,
+    deform,
+    load_surface,
+    set_basis,
+    set_gradient,
+    spread_surface_loads,
+)
 from rom.mbs.elements.pair_motion import clear_tangent, followed_angle, place_tangent
 from rom.mbs.kernels.algebra import add, cross, dot, put, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
@@ -25,6 +35,7 @@ RB_1, RB_2, RA_1, RA_2, HELIX, PITCH, THICKNESS = range(7)
 BACKLASH, ALPHA, WIDTH, OFFSET, PHASE, ENTRY = range(7, 13)
 RELIEF_1, RELIEF_2, EXTENT_1, EXTENT_2, POWER, CROWNING, SLOPE = range(7)
 DAMPING, FRICTION, SPEED = range(3)
+SIDE, PLACE, HEIGHT, LENGTH, LOAD = range(5)  # columns of Meshes.slices
 # what `add_slices` adds up
 FORCES, TANGENTS, ENERGY = range(3)
 
@@ -49,6 +60,11 @@ class Meshes(Table):
         remembered: (k,) first of two angles that are followed.
         start: (k, 2) these angles at the datum [rad].
         load: (k,) sum of the normal forces at the last residual; NaN without a common tangent [N].
+        slices: (k, m, 5) of all that bear at the last residual: side, place on the path of
+            contact, height over the middle of the face, length of the line [m], force [N].
+        n_slices: (k,) how many.
+        rims: how the rims of flexible wheels deform.
+        factor: (2,) of stiffness and damping in the tangents.
         tangent: (2, 12, 12) of one mesh, by motions and velocities.
     """
 
@@ -66,6 +82,10 @@ class Meshes(Table):
     remembered: Index1
     start: Array2
     load: Scratch1
+    slices: Scratch3
+    n_slices: Scratch1
+    rims: Cylinders
+    factor: Scratch1
     tangent: Scratch3
 
 
@@ -94,9 +114,9 @@ def set_frame(s, W, meshes, k):
     """Frame and state of mesh k.
 
     Returns:
-        Axes c, t, z; pressure angle, NaN without a common tangent; what rolled together, what the
-        flanks opened, and where a working line begins [m]; shift along the axis [m] and tilt of the
-        gear; distance [m].
+        Axes c, t, z, and e1, n2, e2 of `wheel_axes`; pressure angle, NaN without a common tangent;
+        what rolled together, what the flanks opened, and where a working line begins [m]; shift
+        along the axis [m] and tilt of the gear; distance [m].
     """
     z, e1, n2, e2 = wheel_axes(W, meshes, k)
     size = meshes.size[k]
@@ -113,8 +133,8 @@ def set_frame(s, W, meshes, k):
     rolled = size[RB_1] * turn_1 + size[RB_2] * turn_2
     opened = both * (involute(alpha) - involute(size[ALPHA]))
     forward = size[RB_1] * (size[PHASE] + turn_1 + alpha - size[ALPHA])
-    tilt = cross(z, n2)
-    return (c, t, z), alpha, (rolled, opened, forward), (offset - size[OFFSET], tilt), distance
+    axes, lean = (c, t, z, e1, n2, e2), (offset - size[OFFSET], cross(z, n2))
+    return axes, alpha, (rolled, opened, forward), lean, distance
 
 
 @inner
@@ -163,7 +183,7 @@ def add_slices(s, W, meshes, k, what):
     size, total = meshes.size[k], 0.0
     axes, alpha, (rolled, opened, forward), lean, distance = set_frame(s, W, meshes, k)
     if what == FORCES:  # not a number without a common tangent, which ends the motion
-        meshes.load[k] = 0.0 * alpha
+        meshes.load[k], meshes.n_slices[k] = 0.0 * alpha, 0.0
         W.wrench[meshes.i[k], 0] += 0.0 * alpha
     base, slant = size[RB_1], math.tan(size[HELIX])
     reach = math.copysign(math.sqrt(size[RA_2] ** 2 - size[RB_2] ** 2), size[RB_2])
@@ -192,7 +212,7 @@ def add_slices(s, W, meshes, k, what):
                     length = (b - a) * math.sqrt(1.0 + slant * slant)
                     place = side, line, x, z
                     state = axes, alpha, closing, lean, distance, (first, last)
-                    total += press(W, meshes, k, what, place, length, state)
+                    total += press(s, W, meshes, k, what, place, length, state)
     return total
 
 
@@ -206,10 +226,10 @@ def face_of_line(at, slant, first, last, width):
 
 
 @inner
-def press(W, meshes, k, what, place, length, state):
+def press(s, W, meshes, k, what, place, length, state):  # noqa: PLR0913
     """Let one slice push both wheels, or add its tangents; its energy."""
     side, _, x, height = place
-    (c, t, z), alpha, closing, (shift, tilt), distance, path = state
+    (c, t, z, e1, n2, e2), alpha, closing, (shift, tilt), distance, path = state
     size, law = meshes.size[k], meshes.law[k]
     cosine, sine, lead = math.cos(alpha), math.sin(alpha), math.cos(size[HELIX])
     along = add(scale(sine, c), scale(side * cosine, t))
@@ -219,6 +239,8 @@ def press(W, meshes, k, what, place, length, state):
     arm_2 = sub(arm_1, scale(distance, c))
     depth = lead * closing - dot(n, z) * shift - dot(cross(arm_2, n), tilt)
     depth -= flank_gap(meshes, k, place, path)
+    place_on_rims(s, W, meshes, k, arm_1, (z, e1, n2, e2))
+    depth += closing_of_rims(s, W, meshes, k, n, meshes.rims.amplitude)
     if depth <= 0.0:
         return 0.0
     stiffness = length * stiffness_at(meshes, k, x, path)
@@ -229,32 +251,128 @@ def press(W, meshes, k, what, place, length, state):
     slide = add(row(W.V, i, 0), cross(row(W.V, i, 3), arm_1))
     slide = sub(slide, add(row(W.V, j, 0), cross(row(W.V, j, 3), arm_2)))
     rate, across = dot(n, slide), cross(z, along)
+    rate += closing_of_rims(s, W, meshes, k, n, meshes.rims.rate)
     loss, by_depth, by_rate = law[DAMPING] * rate, 1.0, law[DAMPING]
     if abs(loss) > depth:  # flanks do not pull, and their force does not jump as they touch
         by_depth, by_rate = 1.0 + math.copysign(1.0, loss), 0.0
         loss = math.copysign(depth, loss)
     load = stiffness * (depth + loss)
-    speed = dot(across, slide)
+    speed = dot(across, slide) + closing_of_rims(s, W, meshes, k, across, meshes.rims.rate)
     grip = law[FRICTION] * math.tanh(speed / law[SPEED])
     force = add(n, scale(grip, across))
     if what == TANGENTS and load > 0.0:
         slope = (1.0 - math.tanh(speed / law[SPEED]) ** 2) / law[SPEED]
-        steep = law[FRICTION] * load * slope
-        for p in range(12):
-            gained = motion_part(force, arm_1, arm_2, p)
-            rub = motion_part(across, arm_1, arm_2, p)
-            for q in range(12):
-                normal = stiffness * motion_part(n, arm_1, arm_2, q)
-                slip = steep * rub * motion_part(across, arm_1, arm_2, q)
-                meshes.tangent[0, p, q] += gained * by_depth * normal
-                meshes.tangent[1, p, q] += gained * by_rate * normal + slip
+        factors = stiffness * by_depth, stiffness * by_rate, law[FRICTION] * load * slope
+        arms, directions = (arm_1, arm_2), (n, force, across)
+        if meshes.rims.of[k, 0] < 0 and meshes.rims.of[k, 1] < 0:
+            add_slice_tangent(meshes, factors, directions, arms)
+        else:
+            add_rim_tangent(s, W, meshes, k, factors, directions, arms)
     if what == TANGENTS:
         return 0.0
     meshes.load[k] += load
+    record_slice(meshes, k, place, length, load)
     add_force(W.wrench[i], arm_1, scale(-load, force))
     add_force(W.wrench[j], arm_2, scale(load, force))
+    load_rims(s, W, meshes, k, scale(load, force))
     W.power[2] += (load - stiffness * depth) * rate + load * grip * speed
     return 0.0
+
+
+@inner
+def add_slice_tangent(meshes, factors, directions, arms):
+    """Add a slice between wheels that are rigid beside their markers to meshes.tangent."""
+    (by_depth, by_rate, by_slip), (n, force, across), (arm_1, arm_2) = factors, directions, arms
+    for p in range(12):
+        gained = motion_part(force, arm_1, arm_2, p)
+        rub = by_slip * motion_part(across, arm_1, arm_2, p)
+        for q in range(12):
+            normal = motion_part(n, arm_1, arm_2, q)
+            slip = rub * motion_part(across, arm_1, arm_2, q)
+            meshes.tangent[0, p, q] += gained * by_depth * normal
+            meshes.tangent[1, p, q] += gained * by_rate * normal + slip
+
+
+@inner
+def add_rim_tangent(s, W, meshes, k, factors, directions, arms):
+    """Add a slice between wheels whose rims deform to W.Kt and W.S."""
+    (by_depth, by_rate, by_slip), (n, force, across) = factors, directions
+    ck, cc = meshes.factor[0], meshes.factor[1]
+    markers = meshes.i[k], meshes.j[k]
+    set_rim_gradients(s, W, meshes, k, 0, force, arms)
+    set_rim_gradients(s, W, meshes, k, 2, n, arms)
+    add_gradient_products(s, meshes.rims.gradient, markers, ck * by_depth, W.Kt)
+    if by_rate > 0.0:
+        add_gradient_products(s, meshes.rims.gradient, markers, cc * by_rate, W.S)
+    if by_slip > 0.0:
+        set_rim_gradients(s, W, meshes, k, 0, across, arms)
+        set_rim_gradients(s, W, meshes, k, 2, across, arms)
+        add_gradient_products(s, meshes.rims.gradient, markers, cc * by_slip, W.S)
+
+
+@inner
+def set_rim_gradients(s, W, meshes, k, first, e, arms):
+    """How a slice closes along e per velocity of the pinion, row ``first``, and of the gear."""
+    rims, i, j = meshes.rims, meshes.i[k], meshes.j[k]
+    back = scale(-1.0, e)
+    set_gradient(s, W, rims, (first, rims.of[k, 0], 0), i, e, cross(arms[0], e))
+    set_gradient(s, W, rims, (first + 1, rims.of[k, 1], 1), j, back, cross(arms[1], back))
+
+
+@inner
+def place_on_rims(s, W, meshes, k, arm, axes):
+    """Find the place of a slice, at an arm from the middle of the pinion, on rims that deform."""
+    z, e1, n2, e2 = axes
+    i, j, rims = meshes.i[k], meshes.j[k], meshes.rims
+    for side in range(2):
+        c, axis, across = rims.of[k, side], (z if side == 0 else n2), (e1 if side == 0 else e2)
+        if c < 0:
+            continue
+        x = arm if side == 0 else sub(arm, sub(row(W.P, j, 0), row(W.P, i, 0)))
+        angle = math.atan2(dot(x, cross(axis, across)), dot(x, across))
+        set_basis(rims, c, side, angle, dot(x, axis))
+
+
+@inner
+def closing_of_rims(s, W, meshes, k, e, amplitude):
+    """How rims that deform by an amplitude close a slice along e, or how fast."""
+    rims, total = meshes.rims, 0.0
+    for side in range(2):
+        c, b = rims.of[k, side], s.markers.body[meshes.i[k] if side == 0 else meshes.j[k]]
+        if c >= 0:
+            total += (1.0 - 2.0 * side) * dot(e, at_place(W, rims, c, side, b, amplitude))
+    return total
+
+
+@inner
+def load_rims(s, W, meshes, k, force):
+    """Let the force of a slice on the gear act on rims that deform."""
+    rims = meshes.rims
+    for side in range(2):
+        c, b = rims.of[k, side], s.markers.body[meshes.i[k] if side == 0 else meshes.j[k]]
+        if c >= 0:
+            load_surface(W, rims, c, side, b, scale(2.0 * side - 1.0, force))
+
+
+@inner
+def deform_rims(s, meshes, k, q, v):
+    """How the rims of mesh k deform."""
+    for side in range(2):
+        c, b = meshes.rims.of[k, side], s.markers.body[meshes.i[k] if side == 0 else meshes.j[k]]
+        if c >= 0:
+            deform(s, meshes.rims, c, b, q, v)
+
+
+@inner
+def record_slice(meshes, k, place, length, load):
+    """Remember a slice that bears, as far as there is room."""
+    n = int(meshes.n_slices[k])
+    if n < meshes.slices.shape[1]:
+        side, _, x, z = place
+        found = meshes.slices[k, n]
+        found[SIDE], found[PLACE], found[HEIGHT], found[LENGTH], found[LOAD] = (
+            side, x, z, length, load)  # fmt: skip
+        meshes.n_slices[k] += 1.0
 
 
 @inner
@@ -275,10 +393,15 @@ def motion_part(e, arm_1, arm_2, p):
 
 
 @residuals.of(Meshes)
-def mesh_wrenches(s, W, meshes, _q, _v, _lam):
-    """Add the teeth to the wrenches on the markers; add up the power lost."""
+def mesh_wrenches(s, W, meshes, q, v, _lam):
+    """Add the teeth to the wrenches on the markers and forces on rims; add up the power lost."""
     for k in range(meshes.i.size):
+        deform_rims(s, meshes, k, q, v)
         add_slices(s, W, meshes, k, FORCES)
+        for side in range(2):
+            c, m = meshes.rims.of[k, side], (meshes.i[k] if side == 0 else meshes.j[k])
+            if c >= 0:
+                spread_surface_loads(s, W, meshes.rims, c, s.markers.body[m])
 
 
 @tangents.of(Meshes)
@@ -288,6 +411,7 @@ def mesh_tangents(s, W, meshes, _lam, ck, cc):
     Left out is how the direction of the forces changes, which is to the stiffness of the teeth as
     their deflection to the radii, and how flank corrections and stiffness move along the path.
     """
+    meshes.factor[0], meshes.factor[1] = ck, cc
     for k in range(meshes.i.size):
         clear_tangent(meshes.tangent)
         add_slices(s, W, meshes, k, TANGENTS)
@@ -295,9 +419,10 @@ def mesh_tangents(s, W, meshes, _lam, ck, cc):
 
 
 @energy.of(Meshes)
-def mesh_energy(s, W, meshes, _q, _v):
+def mesh_energy(s, W, meshes, q, v):
     """Energy stored in teeth."""
     total = 0.0
     for k in range(meshes.i.size):
+        deform_rims(s, meshes, k, q, v)
         total += add_slices(s, W, meshes, k, ENERGY)
     return total
