@@ -71,7 +71,9 @@ def connections(
     for one in mechanism.rolling_bearings.values():
         actors.append(_circle(places, one.j, one.axes[2], 0.5 * one.bearing.pitch_diameter))
     for mesh in mechanism.gear_meshes.values():
-        for marker, axis, radius in zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=True):
+        for marker, axis, radius in zip(
+            (mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=False
+        ):
             actors.append(_circle(places, marker, axis, float(radius)))
     return actors + list(_contacts(scenery))
 

@@ -52,8 +52,8 @@ def wheels(kind, options, **more):
     pair, mech = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0))
     ends = [mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(x, 0, 0)).marker(ORIGIN)
             for name, x in (("pinion", 0.0), ("gear", pair.distance))]  # fmt: skip
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=TABLE, entry=0.1, cells=7,
-                   **OPTIONS[options] | more)  # fmt: skip
+    given = {"stiffness": TABLE, "entry": 0.1, "cells": 7} | OPTIONS[options] | more
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **given)
     return mech
 
 
@@ -94,8 +94,9 @@ def test_forces_are_the_gradient_of_the_energy(kind, options, back):
 @pytest.mark.parametrize(("kind", "options"), [c for c in CASES if c[1] != "measured"])
 @pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
 def test_tangents_are_differences_of_forces(kind, options, losses):
-    """But for how directions of forces turn, and gaps are curved: to the deflection over radii."""
-    packed, W = prepared(wheels(kind, options, **losses))
+    """But for how gaps are curved, and how tilts turn the forces: to the deflection over radii."""
+    fast = {"transition_speed": 1e-3} if losses else {}
+    packed, W = prepared(wheels(kind, options, **losses | fast))
     q, none = placed(packed, PAIRS[kind], False, 1), np.zeros(0)
     v = 1e-3 * np.random.default_rng(5).normal(size=12)
 
@@ -109,6 +110,28 @@ def test_tangents_are_differences_of_forces(kind, options, losses):
     assert_allclose(W.Kt, stiff, atol=1e-3 * np.abs(stiff).max())
     tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 1.0, 0.0))
     assert_allclose(W.S, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
+
+
+STEEP = Hertz(((1e-4, 1e-4), (5e-3, 5e-3), (1e-4, 5e-4)))
+
+
+@pytest.mark.parametrize("kind", ["spur", "helical", "internal"])
+@pytest.mark.parametrize("more", [{}, {"hertz": STEEP}], ids=["linear", "hertz"])
+def test_tangents_without_tilts_know_how_forces_turn(kind, more):
+    """All of them, of ways of the wheels in space and turns about their axes."""
+    packed, W = prepared(wheels(kind, "plain", entry=0.5, **more))
+    q, none = placed(packed, PAIRS[kind], False, 1, tilts=0.0), np.zeros(0)
+    moves = [0, 1, 2, 5, 6, 7, 8, 11]
+
+    def force(dq):
+        residual_at(packed.system, W, shifted(packed, q, dq), 0 * dq, 0 * dq, none)
+        return W.residual.copy()
+
+    stiff = difference(force, 12, 1e-9)[np.ix_(moves, moves)]
+    tangents_at(packed.system, W, q, np.zeros(12), np.zeros(12), none, (0.0, 0.0, 1.0))
+    size = np.where(np.isin(moves, (5, 11)), 1 / PAIRS[kind].rb[0], 1.0)
+    error = np.outer(size, size) * np.abs(W.Kt[np.ix_(moves, moves)] - stiff)
+    assert error.max() < (2e-4 if kind == "helical" else 5e-5) * np.abs(stiff).max()
 
 
 def thrown(kind, spin=(0.5, 0.0), t_end=6e-4, **more):

@@ -65,6 +65,7 @@ from rom.mbs.elements.gears.table import (
     PLACE,
     RA_1,
     RA_2,
+    RACK,
     RB_1,
     RB_2,
     SHIFT,
@@ -78,6 +79,7 @@ from rom.mbs.elements.gears.table import (
     THICKNESS,
     TILT_C,
     TILT_T,
+    TIP,
     TURN_1,
     TURN_2,
     VISCOUS,
@@ -106,11 +108,14 @@ from rom.mbs.kernels.element_calls import energy, residuals, tangents
 
 
 @inner
-def path_of_contact(size, alpha):
+def path_of_contact(size, alpha, distance):
     """First and last place of contact, from T1, and the first at the datum [m]."""
+    last = math.sqrt(size[RA_1] ** 2 - size[RB_1] ** 2)
+    if size[RACK] > 0.0:
+        datum = (size[RACK] - size[TIP] - size[RB_1] * math.cos(alpha)) / math.sin(alpha)
+        return datum + (distance - size[RACK]) / math.sin(alpha), last, datum
     reach = math.copysign(math.sqrt(size[RA_2] ** 2 - size[RB_2] ** 2), size[RB_2])
     both = size[RB_1] + size[RB_2]
-    last = math.sqrt(size[RA_1] ** 2 - size[RB_1] ** 2)
     return both * math.tan(alpha) - reach, last, both * math.tan(size[ALPHA]) - reach
 
 
@@ -126,7 +131,7 @@ def add_lines(s, W, meshes, k, what):
         what: FORCES, TANGENTS or ENERGY.
     """
     state, total = set_frame(s, W, meshes, k), 0.0
-    path = path_of_contact(meshes.size[k], state[1])
+    path = path_of_contact(meshes.size[k], state[1], state[4][0])
     if what == FORCES:  # not a number without a common tangent, which ends the motion
         meshes.load[k], meshes.n_slices[k] = 0.0 * state[1], 0.0
         W.wrench[meshes.i[k], 0] += 0.0 * state[1]
@@ -143,8 +148,8 @@ def add_lines(s, W, meshes, k, what):
         push_wheels(W, meshes, k)
     elif what == TANGENTS:
         stiffen_wheels(meshes)
-        if meshes.law[k, FOLLOWS] > 0.0:
-            turn_forces(meshes, state[0], state[4])
+        if meshes.law[k, FOLLOWS] > 0.0 and meshes.size[k, RACK] == 0.0:
+            turn_forces(meshes, state[0], state[4][0])
     return total
 
 
@@ -184,8 +189,8 @@ def clear_of_each_other(meshes, k, side, state):
     size = meshes.size[k]
     if has_rims(meshes, k):
         return False
-    _, _, (rolled, opened, _), (shift, tilt_c, tilt_t), _ = state
-    arm = 2.0 * abs(size[RA_2]) + size[WIDTH]
+    _, _, (rolled, opened, _), (shift, tilt_c, tilt_t), (_, way) = state
+    arm = 2.0 * (abs(size[RA_2]) + size[RA_1]) + size[WIDTH] + abs(way)
     most = math.cos(size[HELIX]) * (side * rolled - opened) + abs(shift)
     most += arm * (abs(tilt_c) + abs(tilt_t))
     return most < meshes.flank[k, LEAST if side > 0.0 else LEAST_BACK]
@@ -320,10 +325,10 @@ def depth_at(size, place, state):
 def tilt_arms(size, place, state):
     """Moments about c and t of a unit force along the normal, about the middle of the gear."""
     side, x, z = place
-    alpha, distance = state[1], state[4]
+    alpha, (distance, way) = state[1], state[4]
     lead, slope = math.cos(size[HELIX]), math.sin(size[HELIX])
     sine, cosine, base = math.sin(alpha), math.cos(alpha), size[RB_1]
-    about_c = slope * (base * sine - x * cosine) - side * lead * z * cosine
+    about_c = slope * (base * sine - x * cosine + side * way) - side * lead * z * cosine
     about_t = lead * z * sine + side * slope * (base * cosine + x * sine - distance)
     return about_c, about_t
 
@@ -335,7 +340,9 @@ def path_rates(size, side, state, follows):
     With cos alpha = (r_b1 + r_b2) / a the pressure angle goes by 1 / (a tan alpha), the fourth, and
     the depth, which falls by cos beta_b sin alpha, is curved by the last.
     """
-    alpha, distance = state[1], state[4]
+    alpha, (distance, _) = state[1], state[4]
+    if size[RACK] > 0.0:
+        return side * size[RB_1], 0.0, 1.0 / math.sin(alpha), 0.0, 0.0
     by_distance = 1.0 / (distance * math.tan(alpha))
     both, base = size[RB_1] + size[RB_2], size[RB_1]
     begin, curved = both / math.cos(alpha) ** 2, -follows * math.cos(size[HELIX]) * math.cos(alpha)
@@ -356,6 +363,8 @@ def set_gradient(size, one, side, state, rates):
     opened -= side * slope * tilt_t
     one[GRADIENT + TURN_1] = lead * side * base + one[DEPTH_AT] * rates[0]
     one[GRADIENT + TURN_2] = lead * side * size[RB_2]
+    if size[RACK] > 0.0:
+        one[GRADIENT + TURN_2] -= side * slope * tilt_c
     one[GRADIENT + DISTANCE] = one[DEPTH_AT] * rates[1] + one[DEPTH_FIRST] * rates[2] - opened
     one[GRADIENT + SHIFT], one[GRADIENT + TILT_C], one[GRADIENT + TILT_T] = side * slope, -m_c, -m_t
 
