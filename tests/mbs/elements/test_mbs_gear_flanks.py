@@ -88,6 +88,39 @@ def test_slices_bear_over_the_maps_of_both_wheels(phase):
     assert load_at(found, (depth / rb, 0.0)) == pytest.approx(wanted, rel=1e-9)
 
 
+@pytest.mark.parametrize("pair", [SPUR, replace(SPUR, helix=0.35), RING],
+                         ids=["spur", "helical", "internal"])  # fmt: skip
+def test_perfect_wheels_turn_by_their_ratio(pair):
+    """They begin to touch within 1e-12 m of where they do, wherever they have rolled to."""
+    found, (r1, r2) = wheels(pair, phase=0.3), pair.rb
+    for turn in np.linspace(-3.0, 3.0, 13):
+        ends = [load_at(found, (turn + x / r1, -turn * r1 / r2)) for x in (-1e-12, 1e-12)]
+        assert ends[0] == 0.0
+        assert ends[1] > 0.0
+
+
+@pytest.mark.parametrize("phase", [0.13, 40.2])
+def test_without_load_the_error_of_transmission_is_the_least_gap_of_the_map(phase):
+    maps = some_maps(3)
+    found, (A, B), rb = wheels(correction=Correction(maps=tuple(maps))), SPUR.path, SPUR.rb[0]
+    low, high = 0.0, 1e-5
+    while high - low > 1e-15:
+        middle = 0.5 * (low + high)
+        touching = load_at(found, (middle / rb, 0.0), phase - middle / rb) > 0.0
+        low, high = (low, middle) if touching else (middle, high)
+    z, gaps = SPUR.width * ((np.arange(CELLS) + 0.5) / CELLS - 0.5), []
+    middle = -int(np.floor(rb * phase / SPUR.base_pitch))
+    for line in range(middle - 3, middle + 4):
+        x = rb * phase + line * SPUR.base_pitch
+        if A <= x < B:
+            u = (x - A) / (B - A)
+            one, two = (
+                on_grid(m, -line, v, z, SPUR.width) for m, v in zip(maps, (u, 1 - u), strict=True)
+            )
+            gaps.append((one + two).min())
+    assert high == pytest.approx(min(gaps), abs=1e-12)
+
+
 def test_back_flanks_have_maps_of_their_own_and_know_their_teeth():
     """One tooth of each wheel lacks material behind, the pinion's or the one that follows it.
 
@@ -170,8 +203,8 @@ def test_shifts_and_tilts_alone_press_flanks():
         assert 0.9 * length < load / (K * depth) < 2.1 * length  # of one line or two
     z = SPUR.width * ((np.arange(CELLS) + 0.5) / CELLS - 0.5)
     one = K * SPUR.width / CELLS * np.clip(z * lean * np.cos(SPUR.alpha), 0, None).sum()
-    load = load_moved(wheels(phase=0.5 * sum(SPUR.path) / SPUR.rb[0]), {9: lean})
-    assert load == pytest.approx(one, rel=1e-4)
+    found = wheels(phase=0.5 * sum(SPUR.path) / SPUR.rb[0])
+    assert load_moved(found, {9: lean, 5: -1e-9}) == pytest.approx(one, rel=1e-4)
 
 
 def load_moved(found, moves):
@@ -194,7 +227,7 @@ def test_material_beyond_the_involute_presses_at_the_datum(given):
         "run_out": (Correction(run_out=((out, np.pi / 2 - SPUR.alpha), (0, 0))), even),
         "maps": (Correction(maps=(None, np.full((2, 2), -out))), even),
     }[given]
-    load = load_moved(wheels(correction=flanks, phase=phase), {})
+    load = load_moved(wheels(correction=flanks, phase=phase), {5: -1e-10})
     assert load == pytest.approx(K * SPUR.width * wanted.mean(), rel=1e-4)
 
 
