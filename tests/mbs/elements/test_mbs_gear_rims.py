@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.sparse.linalg import splu
 
@@ -13,6 +14,7 @@ from cases.mbs.tangents import difference, shifted
 from cases.mbs.tubes import tube
 from rom.components.gear_mesh import GearPair
 from rom.errors import ConfigError, RomWarning
+from rom.mbs.elements.cylinders import cylinder_of, set_basis
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 PAIR, K, PHASE, TORQUE = GearPair((26, 57), 3e-3, 0.06), 15e9, 0.3, 300.0
@@ -109,6 +111,22 @@ def mean_rotation(rim, n_dofs):
     found[:, (3 * rim.nodes[:, None] + np.arange(3)).ravel()] = np.linalg.solve(
         R.T @ S @ R, R.T @ S)[3:]  # fmt: skip
     return found
+
+
+def test_a_force_is_spread_over_the_angle_of_a_tooth():
+    """Compiled functions are means of those of NumPy over that angle."""
+    packed, _ = prepared(driven(rom.FourierLegendre(3, 2)))
+    rims, width = packed.elements[GEAR_MESHES_FAMILY].rims, np.pi / 26
+    mech = rom.Mechanism()
+    part = mech.add_flexible("pinion", reduced(rom.FourierLegendre(3, 2)), at=(0, 0, 0))
+    rim = cylinder_of(part, part.marker("rim"), np.eye(3)[2], np.eye(3)[0])
+    place = njit(lambda rims, theta, z: set_basis(rims, 0, 0, theta, z))
+    for theta, z in ((0.3, 0.01), (-2.5, -0.02)):
+        place(rims, theta, z)
+        around = theta + width * ((np.arange(500) + 0.5) / 500 - 0.5)
+        wanted = rim.functions(around, np.full(500, z)).mean(axis=0)
+        assert_allclose(rims.basis[0], wanted, atol=1e-6)
+        assert np.abs(wanted - rim.functions(np.array([theta]), np.array([z]))[0]).max() > 1e-3
 
 
 def test_load_across_a_wide_face_converges_to_that_on_a_finite_element_body():
