@@ -225,6 +225,7 @@ ORDER = {
         "tendons",
         "gears",
         "rolling",
+        "films",
     ),
     "reduction": (
         "bases",
