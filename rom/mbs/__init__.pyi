@@ -20,6 +20,10 @@ from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
 from rom.mbs.elements.contact.impact import Impact as Impact
 from rom.mbs.elements.contact.impact import hertz_stiffness as hertz_stiffness
 from rom.mbs.elements.family import Family as Family
+from rom.mbs.elements.films.bearing import Groove as Groove
+from rom.mbs.elements.films.bearing import JournalBearing as JournalBearing
+from rom.mbs.elements.films.oil import Oil as Oil
+from rom.mbs.elements.films.oil import iso_vg as iso_vg
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE as LAW_SIGNATURE
 from rom.mbs.elements.nonlinear import Elements as Elements
 from rom.mbs.elements.nonlinear import Frames as Frames

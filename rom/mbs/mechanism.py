@@ -27,6 +27,7 @@ from rom.mbs.elements import (
 )
 from rom.mbs.elements.contact import points, surfaces
 from rom.mbs.elements.family import Family, check_family
+from rom.mbs.elements.films import journal_bearings
 from rom.mbs.elements.gears import meshes
 from rom.mbs.elements.rolling import bearings
 from rom.mbs.elements.tendons import tendons
@@ -53,6 +54,7 @@ FAMILIES = (
     tendons.TENDONS_FAMILY,
     meshes.GEAR_MESHES_FAMILY,
     bearings.ROLLING_BEARINGS_FAMILY,
+    journal_bearings.JOURNAL_BEARINGS_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -184,6 +186,7 @@ class Mechanism:
     tendon = tendons.tendon
     gear_mesh = meshes.gear_mesh
     rolling_bearing = bearings.rolling_bearing
+    journal_bearing = journal_bearings.journal_bearing
     add_nonlinear = nonlinear.add_nonlinear
 
     springs = Every(springs.Spring)
@@ -200,6 +203,7 @@ class Mechanism:
     tendons = Every(tendons.Tendon)
     gear_meshes = Every(meshes.GearMesh)
     rolling_bearings = Every(bearings.RollingBearing)
+    journal_bearings = Every(journal_bearings.OilFilm)
     nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:

@@ -226,6 +226,7 @@ ORDER = {
         "tendons",
         "gears",
         "rolling",
+        "films",
     ),
     "reduction": (
         "bases",

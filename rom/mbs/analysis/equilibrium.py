@@ -1,6 +1,7 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +25,8 @@ MOST_STEPS = 100_000  # of the load; where thousands do not help, another start 
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
+MAX_HALVINGS = 60  # of a correction that leaves a gap no room
+ROOM_LEFT = 0.5  # of a gap, after one correction
 STALLED_TOL = 1e-7  # below it, corrections that no longer shrink are round-off
 
 
@@ -119,6 +122,8 @@ class _Search:
         """The state to start from, its joints closed."""
         packed, W = self.now.packed, self.now.W
         first = initial_state(packed, self.now.t)
+        if first.base is not None:
+            first = replace(first, base=packed.places.settled(first.base))
         if state is None:
             return self.spins.steady(self.now, replace(first, lam=0 * first.lam))
         if np.size(state.q) != packed.q.size or np.size(state.lam) != first.lam.size:
@@ -164,10 +169,33 @@ class _Search:
         size, factor = sizes(now.packed, step)
         if not np.isfinite(size):
             return size, state
-        state = self.spins.steady(self.now, now.moved(state, factor * step, factor * dlam))
+        factor, state = self.within_room(now, state, (factor * step, factor * dlam), factor)
         if factor < 1.0:
             state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
         return size, state
+
+    def within_room(
+        self, now: Instant, state: State, correction: tuple[Array, Array], factor: float
+    ) -> tuple[float, State]:
+        """The state after a correction, halved until no gap halves or doubles; the share taken."""
+        (step, dlam), before, share = correction, self.room(now, state), 1.0
+        for _ in range(MAX_HALVINGS):
+            ahead = self.spins.steady(self.now, now.moved(state, share * step, share * dlam))
+            if not before.size:
+                break
+            left = self.room(now, ahead) / before
+            if np.all((left > ROOM_LEFT) & (left < 1 / ROOM_LEFT)):
+                break
+            share /= 2
+        return factor * share, ahead
+
+    def room(self, now: Instant, state: State) -> Array:
+        """(e,) gaps that a correction may not change much; NaN where there are no forces."""
+        if not now.packed.room.size:
+            return now.packed.room
+        with suppress(SolverError):
+            now.residual(state.q, state.v, state.a, state.lam)
+        return now.packed.room.copy()
 
     def tried(
         self, now: Instant, state: State, equations: Equations

@@ -3,7 +3,7 @@
 `family` says what a family is, `pair_motion` has kernels that several share. There are `springs`,
 `rotational_springs`, `loads`, `motors`, `frictions`, `stops`, `bushings`, `spread_loads`,
 `nonlinear` bodies, and `laws` of the user, with `law_calls` and `laws_in_python`; `contact`,
-`rods`, `tendons`, `gears`, `rolling` and `formulas` have folders.
+`rods`, `tendons`, `gears`, `rolling`, `films` and `formulas` have folders.
 """
 
 from rom.lazy import front

@@ -94,8 +94,16 @@ class Packed:
 
     @property
     def by_rate(self) -> bool:
-        """Whether any force of an element depends on velocities."""
-        return any(family.by_rate(table) for family, table in self.elements.items())
+        """Whether forces depend on rates in a way that the tangents do not know completely."""
+        return any(
+            not family.complete and family.by_rate(table) for family, table in self.elements.items()
+        )
+
+    @property
+    def room(self) -> Array:
+        """(e,) gaps at the last residual which a correction may not change much."""
+        rooms = [family.room(table) for family, table in self.elements.items()]
+        return np.concatenate([np.zeros(0), *rooms])
 
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""

@@ -7,18 +7,42 @@ h = c bore - (ex + z phi_y) cos theta - (ey - z phi_x) sin theta.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import one_of
-from rom.components.journal_bearing.film_kernel import FULL, JFO, REYNOLDS, Grid
 from rom.errors import ModelError
-from rom.model import Array
+from rom.model import Array, Index
 
+FULL, REYNOLDS, JFO = 0, 1, 2  # no cavitation; oil from nowhere; oil is conserved
 Cavitation = Literal["none", "reynolds", "jfo"]
 LAWS = {"none": FULL, "reynolds": REYNOLDS, "jfo": JFO}
+
+
+class Grid(NamedTuple):
+    """Cells of an unwrapped bearing; column i is centred at angle i dtheta.
+
+    Attributes:
+        angle: (2, nt, 2) cosine and sine at the centres [0] and behind them at the faces [1].
+        bore: (2, nt) film of the centred journal there, in clearances.
+        Z: (nz,) centres of the cells along the width.
+        Z_face: (nz + 1,) their faces.
+        fixed: (nt, nz) 1 where the pressure is that of the inlet.
+        inlet: (nt, nz) pressure there [Pa].
+        slender: (R/L)^2.
+        half: 1.0 if the cells cover half the width, the other half being its image; else 0.0.
+    """
+
+    angle: Array
+    bore: Array
+    Z: Array
+    Z_face: Array
+    fixed: Index
+    inlet: Array
+    slender: float
+    half: float
 
 
 @dataclass(frozen=True, slots=True)
