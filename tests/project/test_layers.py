@@ -226,6 +226,7 @@ ORDER = {
         "tendons",
         "gears",
         "rolling",
+        "round_bodies",
     ),
     "reduction": (
         "bases",
