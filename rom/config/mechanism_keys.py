@@ -84,11 +84,16 @@ POSE = (
     Key("velocity", Quantity("m/s", ((3,),)), "At the start, in the world; at rest if missing."),
     Key("omega", Quantity("rad/s", ((3,),)), "Angular velocity at the start, in the body frame."),
 )  # fmt: skip
+SPIN = Key(
+    "spin", Quantity("rad/s", ((3,),)),
+    "Angular velocity of a round body in its frame, which does not turn with it.",
+)  # fmt: skip
 RIGID = Table("A rigid body by its numbers; its frame sits at the mass centre.", (
     Key("mass", Quantity("kg", positive=True), "Mass.", ...),
     Key("inertia", Quantity("kg m^2", ((3,), (3, 3))), "About the mass centre, body frame.", ...),
     Key("at", POINT, "Mass centre at the start.", ...),
     *POSE,
+    SPIN,
     Key("markers", Named(POINT, "points"), "Points from the mass centre, body frame.", {}),
 ))  # fmt: skip
 FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
@@ -97,6 +102,7 @@ FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
     Key("reference", Words(), "Another floating frame, see the component file."),
     Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
     *POSE,
+    SPIN,
     Key("q", Quantity("1", ((None,),)), "Elastic coordinates at the start; zero if missing."),
     Key("qd", Quantity("1", ((None,),)), "Their rates at the start; zero if missing."),
 ))  # fmt: skip

@@ -227,6 +227,7 @@ ORDER = {
         "gears",
         "rolling",
         "films",
+        "round_bodies",
     ),
     "reduction": (
         "bases",

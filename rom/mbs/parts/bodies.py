@@ -50,6 +50,7 @@ class Part:
         flexible: the ``FlexibleBody``, None for a rigid body.
         moving: the same as it is integrated, see `FlexibleBody.on_mean_axes`.
         q, qd: (r,) elastic coordinates and rates at the start, in the units of the body's shapes.
+        spin: (3,) angular velocity of the material through the frame, body frame [rad/s].
     """
 
     name: str
@@ -65,6 +66,7 @@ class Part:
     moving: Any = None
     q: Array = field(default_factory=lambda: np.zeros(0))
     qd: Array = field(default_factory=lambda: np.zeros(0))
+    spin: Array = field(default_factory=lambda: np.zeros(3))
 
     def __repr__(self) -> str:
         kind = f"flexible, {self.r} elastic coordinates" if self.flexible is not None else "rigid"
