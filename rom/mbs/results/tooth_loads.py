@@ -9,7 +9,7 @@ import numpy.typing as npt
 from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
-from rom.mbs.elements.gears.teeth import HEIGHT, LENGTH, LOAD, PLACE, SIDE
+from rom.mbs.elements.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE
 from rom.mbs.results.interface_loads import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
