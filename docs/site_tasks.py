@@ -51,8 +51,9 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "Results": (
         "What a mechanism answers without moving, and what a motion holds.",
-        """mbs.Solution mbs.Energy mbs.Occurrences mbs.ToothLoads mbs.tooth_loads snapshot equilibrium
-        continuation mbs.EquilibriumPath inverse_dynamics linearize mbs.Linearization campbell mbs.Campbell
+        """mbs.Solution mbs.Energy mbs.Occurrences mbs.ToothLoads mbs.tooth_loads snapshot
+        equilibrium continuation mbs.EquilibriumPath inverse_dynamics linearize mbs.Linearization
+        campbell mbs.Campbell
         frequency_response transmissibility mbs.FrequencyResponse steady_motion SteadyMotion
         equilibrium_sensitivity frequency_sensitivity motion_sensitivity mbs.Sensitivity
         body.von_mises""",
