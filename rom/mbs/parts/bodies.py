@@ -16,6 +16,7 @@ from rom.plausible import GYRATION, SIZE, warn_outside
 GROUND = "ground"
 # smallest over largest eigenvalue of the scaled mass matrix below which a body counts as singular
 SINGULAR_MASS = 1e-11
+SPIN_RTOL = 1e-6  # of an axis, from that about which a body spins
 
 
 SURFACE_PREFIX = "surface point "  # markers that a contact puts on the surface of a flexible body
@@ -126,6 +127,24 @@ class Part:
         if self.flexible is None:
             return self.points[marker.place]
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
+
+    def spin_about(self, name: str, axis: Array) -> float:
+        """Angular velocity of the material through the frame about an axis [rad/s].
+
+        Args:
+            name: of the element that asks.
+            axis: (3,) body frame [1].
+
+        Raises:
+            ConfigError: if the body spins about another axis.
+        """
+        speed = float(axis @ self.spin)
+        if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
+            raise ConfigError(
+                f"body {self.name!r} spins about {self.spin.tolist()} rad/s, and the axis of "
+                f"{name!r} is {axis.round(9).tolist()} in it: both must be one."
+            )
+        return speed
 
     @property
     def own_frame(self) -> Marker | None:
