@@ -27,6 +27,7 @@ CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
 MAX_HALVINGS = 60  # of a correction that leaves a gap no room
 ROOM_LEFT = 0.5  # of a gap, after one correction
+MIN_ROOM = 1e-4  # of a gap, which no film keeps open
 STALLED_TOL = 1e-7  # below it, corrections that no longer shrink are round-off
 
 
@@ -147,10 +148,12 @@ class _Search:
         for _ in range(MAX_PASSES):
             equations = beyond or self.tangent(now, state)
             found = None
-            if trials and not equations.rises:
+            # forces that go around, as those of films, have no potential that curves
+            straight = equations.newton if now.packed.room else None
+            if straight is None and trials and not equations.rises:
                 found, trials = self.tried(now, state, equations), trials - 1
             if found is None:
-                size, state = self.corrected(now, state, equations.correction())
+                size, state = self.corrected(now, state, straight or equations.correction())
                 beyond = None
             else:
                 size, state, beyond = found
@@ -177,25 +180,33 @@ class _Search:
     def within_room(
         self, now: Instant, state: State, correction: tuple[Array, Array], factor: float
     ) -> tuple[float, State]:
-        """The state after a correction, halved until no gap halves or doubles; the share taken."""
+        """The state after a correction, halved until no gap halves or doubles; the share taken.
+
+        Raises:
+            SolverError: naming the element whose gap has closed.
+        """
         (step, dlam), before, share = correction, self.room(now, state), 1.0
+        for name, room in before.items():
+            if not room > MIN_ROOM:
+                raise SolverError(
+                    f"nothing keeps the gap of {name!r} open: {room:.2g} of it is left.",
+                    hint="Lower the load, or start nearer to the equilibrium (state=...).",
+                )
         for _ in range(MAX_HALVINGS):
             ahead = self.spins.steady(self.now, now.moved(state, share * step, share * dlam))
-            if not before.size:
-                break
-            left = self.room(now, ahead) / before
-            if np.all((left > ROOM_LEFT) & (left < 1 / ROOM_LEFT)):
+            left = [room / before[name] for name, room in self.room(now, ahead).items()]
+            if all(ROOM_LEFT < one < 1 / ROOM_LEFT for one in left):
                 break
             share /= 2
         return factor * share, ahead
 
-    def room(self, now: Instant, state: State) -> Array:
-        """(e,) gaps that a correction may not change much; NaN where there are no forces."""
-        if not now.packed.room.size:
-            return now.packed.room
+    def room(self, now: Instant, state: State) -> dict[str, float]:
+        """Gaps of elements that a correction may not change much."""
+        if not now.packed.room:
+            return {}
         with suppress(SolverError):
             now.residual(state.q, state.v, state.a, state.lam)
-        return now.packed.room.copy()
+        return now.packed.room
 
     def tried(
         self, now: Instant, state: State, equations: Equations

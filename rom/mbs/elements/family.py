@@ -182,6 +182,18 @@ class Places:
             self.settling.add(owner)
         return sum(x.size for x in self._until(owner))
 
+    def before(self, base: Array) -> Array:
+        """(n_t, c + p) the same over time, what settles as it was at the instant before.
+
+        Evaluated again with that, it does what it did on the way from there.
+        """
+        base, c = base.copy(), len(self.coordinates)
+        for owner in self.settling:
+            at = c + sum(x.size for x in self._until(owner))
+            mine = slice(at, at + self.remembered[owner].size)
+            base[1:, mine] = base[:-1, mine]
+        return base
+
     def _until(self, owner: str) -> list[Array]:
         """What those before an owner remember."""
         return list(self.remembered.values())[: list(self.remembered).index(owner)]
@@ -227,7 +239,8 @@ class Family:
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
         answers: table -> (e, ...) what each law of a user answered last, None if there is none.
         lost: what is wrong if an answer is not finite; in place of {}, the names.
-        room: table -> (e,) gaps which one correction of an equilibrium may halve or double at most.
+        room: table -> (e,) gaps over those in the middle [1], which one correction of an equilibrium
+            may halve or double at most.
     """
 
     name: str

@@ -100,10 +100,13 @@ class Packed:
         )
 
     @property
-    def room(self) -> Array:
-        """(e,) gaps at the last residual which a correction may not change much."""
-        rooms = [family.room(table) for family, table in self.elements.items()]
-        return np.concatenate([np.zeros(0), *rooms])
+    def room(self) -> dict[str, float]:
+        """Gaps of elements at the last residual, over those in the middle [1]."""
+        return {
+            name: float(left)
+            for family, table in self.elements.items()
+            for name, left in zip(self.element_names[family], family.room(table), strict=False)
+        }
 
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""

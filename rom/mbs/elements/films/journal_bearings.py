@@ -10,7 +10,7 @@ from rom.arguments import finite, number, positive
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.films.bearing import JournalBearing
-from rom.mbs.elements.films.cells import cells_of
+from rom.mbs.elements.films.cells import CLEARANCE, cells_of
 from rom.mbs.elements.films.journals import (
     CONTENT,
     TEMPERATURE,
@@ -35,6 +35,7 @@ class OilFilm:
     j: Marker
     bearing: JournalBearing
     axes: Array
+    liquid: Oil | float
     oil: tuple[float, ...]
 
 
@@ -91,7 +92,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     _check_gap(name, bearing, np.array([D @ x, D @ np.cross(z, x)]), roughness)
     heat = _heat(name, carried, felt, thermal_time)
     numbers = (*_oil(name, oil, inlet), *heat, float(roughness))
-    self.add(name, OilFilm(journal, bush, bearing, axes, numbers), JOURNAL_BEARINGS_FAMILY)
+    self.add(name, OilFilm(journal, bush, bearing, axes, oil, numbers), JOURNAL_BEARINGS_FAMILY)
 
 
 def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None) -> Array:
@@ -185,6 +186,6 @@ def _memory(one: OilFilm) -> Array:
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
     complete=True, answers=lambda journals: journals.largest,
-    room=lambda journals: journals.thinnest,
+    room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
 )  # fmt: skip

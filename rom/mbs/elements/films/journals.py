@@ -33,8 +33,8 @@ from rom.mbs.kernels.tables import Array2, Array3, Index1, Scratch1, Table, tabl
 # columns of Journals.oil
 CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = range(9)
 # what a film remembers, before the content of its cells
-KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW = range(7)
-CONTENT = 7
+KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
+CONTENT = MOTION + N_MOTIONS
 CELSIUS_ZERO = 273.15  # [K]
 MAX_WARMINGS = 50  # of a film whose grooves have pressure
 WARMING_TOL = 1e-10  # of a temperature [K]
@@ -173,16 +173,15 @@ def recall(s, W, journals, k):
     passed = W.signal[journals.clock[0], 0] - W.base[at + TIME]
     known = W.base[at + KNOWN] == 1.0 and passed >= 0.0
     films.state[k, PASSED], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
-    if known and passed > 0.0 and conserves_oil(films, k):
-        for cell in range(films.shape[k, 0] * films.shape[k, 1]):
-            films.content[k, cell] = W.base[at + CONTENT + cell]
+    for cell in range(n_remembered(films, k)):
+        films.content[k, cell] = W.base[at + CONTENT + cell]
     return W.base[at + TEMPERATURE] if known else math.nan
 
 
 @inner
-def conserves_oil(films, k):
-    """Whether a film conserves its oil."""
-    return films.law[k] == JFO
+def n_remembered(films, k):
+    """Cells whose content a film remembers: those of one that conserves its oil."""
+    return films.shape[k, 0] * films.shape[k, 1] if films.law[k] == JFO else 0
 
 
 @inner
@@ -197,8 +196,13 @@ def remember(W, journals, k, celsius):
     W.fresh[at + TEMPERATURE], W.fresh[at + THINNEST] = celsius, journals.thinnest[k]
     W.fresh[at + LARGEST], W.fresh[at + POWER] = journals.largest[k], lost_power(journals, k)
     W.fresh[at + SIDE_FLOW] = side_flow(journals, k)
-    if conserves_oil(films, k):
-        for cell in range(films.shape[k, 0] * films.shape[k, 1]):
+    for m in range(N_MOTIONS):
+        W.fresh[at + MOTION + m] = films.state[k, m] * journals.scale[k, m]
+    stays = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED] == 0.0
+    for cell in range(n_remembered(films, k)):
+        if stays:
+            W.fresh[at + CONTENT + cell] = films.content[k, cell]
+        else:
             W.fresh[at + CONTENT + cell] = films.fill[k, cell] * films.middle[k, cell]
 
 

@@ -34,7 +34,12 @@ from rom.mbs.elements.films.cells import (
 from rom.mbs.kernels.compiled import inner
 
 MAX_ITERATIONS = 100  # changes of the cavitated region
-LEAST_FLOW = 1e-14  # of the drag in a full film, below which the filling of a cell is not decided
+LEAKAGE = 1e-13  # of a void all around the bush, whose oil would not be decided otherwise
+# of the conductance, below which no flow decides how far a cell is filled
+LEAST_FLOW = 1e-14
+# of what the journal drags out of a void that closes, by which the closing counts with its filling
+# where no time has passed: a void does not overtake its oil
+MAX_CLOSING = 0.5
 
 
 @inner
@@ -200,9 +205,9 @@ def add_filling(films, k, cells, drags, w):
     nz = films.shape[k, 1]
     row = films.place[k, cell // nz] * nz + cell % nz
     if films.active[k, cell] == 0:
-        out = away if away > 0.0 else -into
+        out = max(away, -into)
+        own = (1 + LEAKAGE) * out + max(films.store[k, cell], -MAX_CLOSING * out)
         least = LEAST_FLOW * films.conducts[k, cell]
-        own = max(out, 0.0) + films.store[k, cell]
         films.band[k, row, w] += own if own > least else 1.0
     upstream, flow = (west, into) if into > 0.0 else (east, -away)
     if films.fixed[k, upstream] == 0 and films.active[k, upstream] == 0 and flow != 0.0:
