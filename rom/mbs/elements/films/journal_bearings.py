@@ -37,6 +37,7 @@ class OilFilm:
     axes: Array
     liquid: Oil | float
     oil: tuple[float, ...]
+    turning: float
 
 
 def journal_bearing(  # noqa: PLR0913  one keyword per property
@@ -92,7 +93,15 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     _check_gap(name, bearing, np.array([D @ x, D @ np.cross(z, x)]), roughness)
     heat = _heat(name, carried, felt, thermal_time)
     numbers = (*_oil(name, oil, inlet), *heat, float(roughness))
-    self.add(name, OilFilm(journal, bush, bearing, axes, oil, numbers), JOURNAL_BEARINGS_FAMILY)
+    if self.part(bush.body).spin.any():
+        raise ConfigError(
+            f"the bush of bearing {name!r} is of body {bush.body!r}, which spins in its frame: "
+            "grooves would turn in it.",
+            hint="Let its frame turn: give omega instead of spin.",
+        )
+    turning = self.part(journal.body).spin_about(name, axes[0])
+    film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
+    self.add(name, film, JOURNAL_BEARINGS_FAMILY)
 
 
 def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None) -> Array:
@@ -171,6 +180,7 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
         integers(places.memory(name, _memory(one), settles=True) for name, one in found.items()),
         cells_of([one.bearing for one in films]),
         np.array([one.bearing.scale for one in films]),
+        np.array([one.turning for one in films], dtype=float),
         *(np.zeros(k), np.zeros(k), np.zeros(k), np.zeros(5)),
     )
 

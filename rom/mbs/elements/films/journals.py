@@ -28,7 +28,7 @@ from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import residuals, tangents
-from rom.mbs.kernels.tables import Array2, Array3, Index1, Scratch1, Table, table
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Table, table
 
 # columns of Journals.oil
 CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = range(9)
@@ -59,6 +59,8 @@ class Journals(Table):
         remembered: (k,) first of the numbers that each remembers.
         films: their cells.
         scale: (k, 4) motions that change the film by a clearance [m, rad].
+        turning: (k,) spin of the journal against the bush of bodies that spin in their frames
+            [rad/s].
         largest: (k,) pressure [Pa], not finite where there is no film.
         thinnest: (k,) film [m], which is below zero where the journal is beyond the bush.
         viscosity: (k,) at the last residual [Pa s].
@@ -73,6 +75,7 @@ class Journals(Table):
     remembered: Index1
     films: Cells
     scale: Array2
+    turning: Array1
     largest: Scratch1
     thinnest: Scratch1
     viscosity: Scratch1
@@ -215,7 +218,7 @@ def set_state(journals, k, place):
         state[m], state[N_MOTIONS + m] = motion[m] / scale[m], rate[m] / scale[m]
     if journals.films.size[k, IMAGES] > 1.0:  # tilts are not seen
         state[2] = state[3] = state[N_MOTIONS + 2] = state[N_MOTIONS + 3] = 0.0
-    state[SPIN] = spin
+    state[SPIN] = spin + journals.turning[k]
 
 
 @inner
@@ -279,6 +282,7 @@ def film_wrenches(s, W, journals, _q, _v, _lam):
             W.wrench[j, p] -= force[p]
             W.wrench[j, 3 + p] += on_bush[p]
         W.power[2] += lost_power(journals, k)
+        W.power[1] += torque * journals.turning[k]  # of what keeps it spinning
 
 
 @inner

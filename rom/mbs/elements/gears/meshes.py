@@ -24,6 +24,7 @@ from rom.rotation import matrix
 
 DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
 FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
+SPIN_RATIO_RTOL = 1e-6  # by which the speeds of spinning wheels may miss the ratio of the teeth
 MAX_CELLS = 1000
 MAX_ENTRY = 0.5  # of the base pitch
 MAX_RUN_OUT = 0.1  # of the module: by which an involute is what it is to first order
@@ -48,6 +49,7 @@ class GearMesh:
     entry: float
     rims: tuple[tuple[Cylinder, float] | None, ...]
     hertz: Hertz | None = None
+    spins: tuple[float, float] = (0.0, 0.0)
 
 
 def gear_mesh(  # noqa: PLR0913  one keyword per property
@@ -137,11 +139,11 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     _check_correction(name, pair, flanks)
     if hertz:
         hertz.constants(pair)
+    parts = self.part(wheel_a.body), self.part(wheel_b.body)
     mesh = GearMesh(
         wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
         float(D @ z), number("phase", phase), entry * pair.base_pitch,
-        _rims((self.part(wheel_a.body), self.part(wheel_b.body)), (wheel_a, wheel_b), axes, pair),
-        hertz,
+        _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
     )  # fmt: skip
     self.add(name, mesh, GEAR_MESHES_FAMILY)
 
@@ -155,6 +157,20 @@ def _rims(
         rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
         found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
     return tuple(found)
+
+
+def _spins(
+    name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair
+) -> tuple[float, float]:
+    """Of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]."""
+    one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
+    z, w = pair.teeth
+    if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
+        raise ConfigError(
+            f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
+            f"teeth {z} and {w} turn at {one:.9g} and {-one * z / w:.9g}."
+        )
+    return one, two
 
 
 def _follows_energy(name: str, pair: GearPair, entry: Any, conservative: bool | None) -> float:
@@ -264,6 +280,8 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         rows_of((_sizes(mesh) for mesh in found), 13),
         rows_of((_flanks(mesh, maps[4 * k : 4 * k + 4]) for k, mesh in enumerate(found)), 13),
         rows_of((mesh.numbers for mesh in found), 6),
+        rows_of((mesh.spins for mesh in found), 2),
+        integers([places.clock()]),
         integers(mesh.cells for mesh in found),
         *_joined([mesh.stiffness for mesh in found]),
         *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NONE for mesh in found]),

@@ -62,6 +62,8 @@ class Meshes(Table):
         law: (k, 6) damping [s], coefficient of friction, transition speed [m/s], whether forces
             follow the energy along the path, length over which slices carry each other [m],
             compliance of the contact [m^2/N].
+        spin: (k, 2) of both wheels in the frames of their bodies, about the axis of the pinion
+            [rad/s]; clock: (1,) function that tells the time.
         cells: (k,) slices across the face.
         stiffness_at, stiffness: (k + 1,) where the tables begin [N/m^2].
         constant_at, constant: (k + 1,) where those of the contact begin [1].
@@ -92,6 +94,8 @@ class Meshes(Table):
     size: Array2
     flank: Array2
     law: Array2
+    spin: Array2
+    clock: Index1
     cells: Index1
     stiffness_at: Index1
     stiffness: Array1

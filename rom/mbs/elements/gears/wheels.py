@@ -71,8 +71,10 @@ def set_frame(s, W, meshes, k):
     (c, t, z), distance, shift = line_of_centres(W, meshes, k, z)
     both = size[RB_1] + size[RB_2]
     alpha = math.acos(both / distance) if both / distance < 1.0 else math.nan
+    time = W.signal[meshes.clock[0], 0]
     turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
     turn_2 = turned(s, W, meshes, k, 1, math.atan2(dot(e2, t), dot(e2, c)))
+    turn_1, turn_2 = turn_1 + meshes.spin[k, 0] * time, turn_2 + meshes.spin[k, 1] * time
     rolled = size[RB_1] * turn_1 + size[RB_2] * turn_2
     opened = both * (involute(alpha) - involute(size[ALPHA]))
     forward = size[RB_1] * (size[PHASE] + turn_1 + alpha - size[ALPHA])
@@ -120,11 +122,18 @@ def set_speed(W, meshes, k):
         for p in range(6):
             meshes.speed[a] += meshes.rates[a, p] * W.V[meshes.i[k], p]
             meshes.speed[a] += meshes.rates[a, 6 + p] * W.V[meshes.j[k], p]
+    meshes.speed[TURN_1] += meshes.spin[k, 0]
+    meshes.speed[TURN_2] += meshes.spin[k, 1]
 
 
 @inner
 def push_wheels(W, meshes, k):
-    """Add to the wrenches on both markers what lowers the energy, and damps."""
+    """Add to the wrenches on both markers what lowers the energy, and damps.
+
+    What keeps wheels spinning in their frames works against it.
+    """
+    W.power[1] += meshes.gradient[TURN_1] * meshes.spin[k, 0]
+    W.power[1] += meshes.gradient[TURN_2] * meshes.spin[k, 1]
     for a in range(COORDINATES):
         for p in range(6):
             W.wrench[meshes.i[k], p] -= meshes.gradient[a] * meshes.rates[a, p]
