@@ -44,7 +44,7 @@ TASKS: dict[str, tuple[str, str]] = {
     "Move": (
         "Bodies, joints and forces become a mechanism, and the mechanism moves.",
         """read_mechanism Mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
-        mbs.JournalBearing mbs.Groove mbs.Oil mbs.iso_vg
+        mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
         mbs.RollerBearing mbs.hertz_stiffness
         surface_load mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State
         mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",

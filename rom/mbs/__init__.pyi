@@ -22,6 +22,7 @@ from rom.mbs.elements.contact.impact import hertz_stiffness as hertz_stiffness
 from rom.mbs.elements.family import Family as Family
 from rom.mbs.elements.films.bearing import Groove as Groove
 from rom.mbs.elements.films.bearing import JournalBearing as JournalBearing
+from rom.mbs.elements.films.bearing import multilobe as multilobe
 from rom.mbs.elements.films.oil import Oil as Oil
 from rom.mbs.elements.films.oil import iso_vg as iso_vg
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE as LAW_SIGNATURE

@@ -239,8 +239,8 @@ class Family:
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
         answers: table -> (e, ...) what each law of a user answered last, None if there is none.
         lost: what is wrong if an answer is not finite; in place of {}, the names.
-        room: table -> (e,) gaps over those in the middle [1], which one correction of an equilibrium
-            may halve or double at most.
+        room: table -> (e,) gaps over those in the middle [1], which one correction towards an
+            equilibrium may halve or double at most.
     """
 
     name: str

@@ -14,9 +14,8 @@ def held_rotor(bearing, load, *, speed, oil, mass=10.0, moves=None, **more):
     """
     mech = rom.Mechanism(gravity=ORIGIN)
     x, y = (0.0, 0.0) if moves is None else (moves[0](0.0), moves[1](0.0))
-    shaft = mech.add_rigid(
-        "shaft", mass=mass, inertia=(0.1,) * 3, at=(x, y, 0), omega=(0, 0, speed)
-    )
+    solid = {"mass": mass, "inertia": (0.1,) * 3}
+    shaft = mech.add_rigid("shaft", at=(x, y, 0), omega=(0, 0, speed), **solid)
     light = {"mass": 1e-6 * mass, "inertia": (1e-6,) * 3}
     slider = mech.add_rigid("slider", at=(x, 0, 0), **light)
     carriage = mech.add_rigid("carriage", at=(x, y, 0), **light)

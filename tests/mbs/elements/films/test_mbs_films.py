@@ -20,6 +20,7 @@ GROOVES = [Groove(1.2, 0.3, 1e5, share=0.7)]
 VISCOSITY, SPEED = 0.03, 100.0
 MOTION = np.array([0.4e-4, 0.3e-4, 1e-4, -2e-4])
 RATE = np.array([5e-4, 2e-4, -0.3e-2, 0.4e-2])
+STILL = np.zeros(6)
 LAWS = ["none", "reynolds", "jfo"]
 
 
@@ -62,8 +63,8 @@ class Pair:
         self.packed, self.W = prepared(mech)
         (self.table,) = self.packed.elements.values()
 
-    def velocities(self, rate=RATE, spin=SPEED, bush=np.zeros(6)):
-        """(12,) of a bush that moves with (6,) velocity and angular velocity, and of the journal."""
+    def velocities(self, rate=RATE, spin=SPEED, bush=STILL):
+        """(12,) of journal and bush, the latter with (6,) velocity and angular velocity."""
         n, da, db = self.B[:, 2], rate[3], -rate[2]
         slope = np.array([self.motion[3], -self.motion[2], 1.0])
         dn = np.array([da, db, 0.0]) - (slope @ [da, db, 0.0]) / (slope @ slope) * slope
