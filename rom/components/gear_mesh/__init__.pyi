@@ -12,4 +12,5 @@ from rom.components.gear_mesh.tooth_elements import element_table as element_tab
 from rom.components.gear_mesh.tooth_elements import tooth_model as tooth_model
 from rom.mbs.elements.gears.corrections import Correction as Correction
 from rom.mbs.elements.gears.geometry import GearPair as GearPair
+from rom.mbs.elements.gears.hertz import Hertz as Hertz
 from rom.mbs.elements.gears.geometry import line_length as line_length

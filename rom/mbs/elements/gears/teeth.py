@@ -98,6 +98,7 @@ from rom.mbs.elements.gears.wheels import (
     set_rates,
     set_speed,
     stiffen_wheels,
+    turn_forces,
 )
 from rom.mbs.elements.pair_motion import clear_tangent, place_tangent
 from rom.mbs.kernels.compiled import inner
@@ -159,6 +160,8 @@ def add_lines(s, W, meshes, k, what):
         push_wheels(W, meshes, k)
     elif what == TANGENTS:
         stiffen_wheels(meshes)
+        if meshes.law[k, FOLLOWS] > 0.0:
+            turn_forces(meshes, state[0], state[4])
     return total
 
 
@@ -322,15 +325,17 @@ def tilt_arms(size, place, state):
 
 
 @inner
-def path_rates(size, side, state):
-    """How lines go with the turn of the pinion and the distance; the path's begin with the latter.
+def path_rates(size, side, state, follows):
+    """How lines go with the turn of the pinion and the distance, and the path's begin with it.
 
-    With cos alpha = (r_b1 + r_b2) / a the pressure angle goes by 1 / (a tan alpha).
+    With cos alpha = (r_b1 + r_b2) / a the pressure angle goes by 1 / (a tan alpha), the fourth, and
+    the depth, which falls by cos beta_b sin alpha, is curved by the last.
     """
     alpha, distance = state[1], state[4]
     by_distance = 1.0 / (distance * math.tan(alpha))
     both, base = size[RB_1] + size[RB_2], size[RB_1]
-    return side * base, base * by_distance, both / math.cos(alpha) ** 2 * by_distance, by_distance
+    begin, curved = both / math.cos(alpha) ** 2, -follows * math.cos(size[HELIX]) * math.cos(alpha)
+    return side * base, base * by_distance, begin * by_distance, by_distance, curved * by_distance
 
 
 @inner
@@ -355,7 +360,7 @@ def set_gradient(size, one, side, state, rates):
 def push_line(s, W, meshes, k, what, count, place):
     """Add the slices of a line to the derivatives of the energy; let them damp and rub."""
     size, law, line, (side, state) = meshes.size[k], meshes.law[k], meshes.line, place
-    rates, rims = path_rates(size, side, state), has_rims(meshes, k)
+    rates, rims = path_rates(size, side, state, law[FOLLOWS]), has_rims(meshes, k)
     for cell in range(count):
         one = line[cell]
         if one[FORCE] > 0.0:
@@ -369,8 +374,7 @@ def push_line(s, W, meshes, k, what, count, place):
                 add_stiffness(meshes, one, rates, rims, law[COUPLING] > 0.0)
             if rims or law[FRICTION] > 0.0:
                 rub(s, W, meshes, k, what, one, place)
-        if what == FORCES:
-            add_gradient(meshes, one, rates)
+        add_gradient(meshes, one, rates)
     if what == TANGENTS and law[COUPLING] > 0.0 and not rims:
         add_line_stiffness(meshes, k, count)
 
@@ -424,6 +428,7 @@ def add_stiffness(meshes, one, rates, rims, coupled):
     by_turn, by_distance = by_at * rates[0], by_at * rates[1] + by_first * rates[2]
     steep, viscous, stiffness = one[STEEP], one[VISCOUS], meshes.hessian
     steep -= one[BY_DEPTH] if coupled else 0.0
+    stiffness[0, DISTANCE, DISTANCE] += (one[FORCE] + one[LOSS]) * rates[4]
     for a in range(COORDINATES):
         depth = one[GRADIENT + a]
         stiffness[0, a, TURN_1] += by_turn * depth
@@ -449,8 +454,8 @@ def mesh_wrenches(s, W, meshes, q, v, _lam):
 def mesh_tangents(s, W, meshes, _lam, ck, cc):
     """Add ck times the stiffness to W.Kt and cc times the damping to W.S.
 
-    Left out is how the direction of the forces changes, which is to the stiffness of the teeth as
-    their deflection to the radii.
+    Left out is how gaps are curved, and how tilts turn the forces; where these do not follow their
+    energy along the path, all their turning.
     """
     meshes.factor[0], meshes.factor[1] = ck, cc
     for k in range(meshes.i.size):
