@@ -14,7 +14,7 @@ from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.gears.corrections import Correction, checked_map
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.hertz import Hertz
-from rom.mbs.elements.gears.table import COORDINATES, DAMPING, SLICE_COLUMNS, SPEED, Meshes
+from rom.mbs.elements.gears.table import COORDINATES, DAMPING, PITCH, SLICE_COLUMNS, SPEED, Meshes
 from rom.mbs.elements.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
@@ -26,6 +26,7 @@ DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than 
 FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
 SPIN_RATIO_RTOL = 1e-6  # by which the speeds of spinning wheels may miss the ratio of the teeth
 MAX_CELLS = 1000
+MAX_APPROACH = 0.1  # of the base pitch: a hundred times the deflection of loaded teeth
 MAX_ENTRY = 0.5  # of the base pitch
 MAX_RUN_OUT = 0.1  # of the module: by which an involute is what it is to first order
 NONE = np.zeros(0)
@@ -291,6 +292,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
         rows_of((mesh.start for mesh in found), 2),
         np.zeros(len(found)),
+        np.zeros(len(found)),
         np.zeros((len(found), max(map(_most_slices, found)), 5)),
         np.zeros(len(found)),
         pack_cylinders([mesh.rims for mesh in found], places.R),
@@ -344,8 +346,14 @@ def _flanks(mesh: GearMesh, maps: list[Array]) -> list[float]:
     return [*c.relief, *c.extent, c.power, c.crowning, c.slope, *amounts, *towards, *least]
 
 
+def _room(meshes: Meshes) -> Array:
+    """(k,) share of the depth that is left which no teeth reach, and a correction must not."""
+    room: Array = 1.0 - meshes.approach / (MAX_APPROACH * meshes.size[:, PITCH])
+    return room
+
+
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
     by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
-    lost="the wheels of {} are so close that they have no common tangent",
+    lost="the wheels of {} are so close that they have no common tangent", room=_room,
 )  # fmt: skip

@@ -74,6 +74,7 @@ class Meshes(Table):
         remembered: (k,) first of two angles that are followed.
         start: (k, 2) these angles at the datum [rad].
         load: (k,) sum of the normal forces at the last residual; NaN without a common tangent [N].
+        approach: (k,) of the flanks that are deepest in each other, of wheels that are rigid [m].
         slices: (k, m, 5) of all that bear at the last residual: side, place on the path of
             contact, height over the middle of the face, length of the line [m], force [N].
         n_slices: (k,) how many.
@@ -109,6 +110,7 @@ class Meshes(Table):
     remembered: Index1
     start: Array2
     load: Scratch1
+    approach: Scratch1
     slices: Scratch3
     n_slices: Scratch1
     rims: Cylinders

@@ -31,6 +31,7 @@ from rom.mbs.elements.gears.rims import (
 from rom.mbs.elements.gears.sliding import contact_point, damp, rub
 from rom.mbs.elements.gears.table import (
     ALPHA,
+    BACKLASH,
     BY_CONSTANT,
     BY_DEPTH,
     BY_STIFFNESS,
@@ -131,6 +132,8 @@ def add_lines(s, W, meshes, k, what):
     if what == FORCES:  # not a number without a common tangent, which ends the motion
         meshes.load[k], meshes.n_slices[k] = 0.0 * alpha, 0.0
         W.wrench[meshes.i[k], 0] += 0.0 * alpha
+        rolled, opened, _ = state[2]
+        meshes.approach[k] = max(rolled, -rolled - size[BACKLASH]) - opened
     path = path_of_contact(size, alpha)
     if not path[0] < path[1]:  # too far apart to meet, or there is no common tangent
         return total
