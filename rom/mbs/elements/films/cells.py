@@ -128,4 +128,7 @@ def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
 
 def _padded(rows: Sequence[Array | Index], n: int) -> Array | Index:
     """Rows of one length, zeros behind."""
-    return np.array([np.pad(x, [(0, n - len(x)), *[(0, 0)] * (x.ndim - 1)]) for x in rows])
+    padded = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
+    for row, values in zip(padded, rows, strict=True):
+        row[: len(values)] = values
+    return padded

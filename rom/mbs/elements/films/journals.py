@@ -16,6 +16,7 @@ from rom.mbs.elements.films.cells import (
     Cells,
 )
 from rom.mbs.elements.films.kinematics import (
+    carried_stiffness,
     imaginary,
     journal_motion,
     journal_place,
@@ -306,19 +307,27 @@ def changed_answers(journals, k, motion, rate, spin):
 
 
 @inner
-def add_column(s, W, journals, k, p, by_position, c):
-    """Subtract c times the change of the wrenches in unit motion, or velocity, p from W.Q."""
+def set_column(W, journals, k, p, by_position):
+    """Set column p of W.Q to minus the change of the wrenches in unit motion, or velocity, p."""
     i, j = journals.i[k], journals.j[k]
     place = journal_place(W, i, j, journals.axes[k])
-    axes, relative = stepped_place(s, W, (i, j), p, by_position, place)
+    axes, relative = stepped_place(p, by_position, place)
     F, torque = changed_answers(journals, k, *journal_motion(axes, relative))
     force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
     push, turned, back = imaginary(force), imaginary(on_journal), imaginary(on_bush)
     for q in range(3):
-        W.Q[q, p] = -c * push[q]
-        W.Q[3 + q, p] = -c * turned[q]
-        W.Q[6 + q, p] = c * push[q]
-        W.Q[9 + q, p] = -c * back[q]
+        W.Q[q, p] = -push[q]
+        W.Q[3 + q, p] = -turned[q]
+        W.Q[6 + q, p] = push[q]
+        W.Q[9 + q, p] = -back[q]
+
+
+@inner
+def scale_pair(W, c):
+    """Multiply W.Q by a factor."""
+    for p in range(12):
+        for q in range(12):
+            W.Q[p, q] *= c
 
 
 @tangents.of(Journals)
@@ -327,10 +336,14 @@ def film_tangents(s, W, journals, _lam, ck, cc):
     for k in range(journals.i.size):
         if not journals.largest[k] >= 0.0:
             continue
+        pair = journals.i[k], journals.j[k]
         set_slopes(journals.films, k)
         for p in range(12):
-            add_column(s, W, journals, k, p, True, ck)
-        pair_stiffness(s, W, journals.i[k], journals.j[k], W.Kt)
+            set_column(W, journals, k, p, True)
+        scale_pair(W, ck)
+        pair_stiffness(s, W, *pair, W.Kt)
         for p in range(12):
-            add_column(s, W, journals, k, p, False, cc)
-        pair_stiffness(s, W, journals.i[k], journals.j[k], W.S)
+            set_column(W, journals, k, p, False)
+        carried_stiffness(s, W, pair, ck, W.Kt)
+        scale_pair(W, cc)
+        pair_stiffness(s, W, *pair, W.S)

@@ -14,6 +14,7 @@ functions take real or complex numbers, for derivatives by imaginary steps as in
 from rom.mbs.elements.contact.points import COMPLEX_STEP, stepped
 from rom.mbs.kernels.algebra import add, cross, dot, mv, row, scale, sub, turn, unit_twist
 from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import spread_pair
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -62,29 +63,54 @@ def journal_wrench(axes, D, F, torque):
 
 
 @inner
-def carried_twist(s, W, m, turned):
-    """How the twist of a marker changes as its body turns and its own velocities stay."""
-    b, O = s.markers.body[m], row(W.V, m, 3)
-    if b < 0:
-        return ZERO, ZERO
-    return cross(turned, cross(O, mv(W.A[b], row(W.u, m, 0)))), cross(turned, O)
+def stepped_place(p, by_position, place):
+    """The place with an imaginary step along unit motion, or velocity, p of both markers.
+
+    In motions the twists of the markers stay; `carried_stiffness` has what they change by.
+    """
+    (x, y, z, n), (D, slide, Oi, Oj) = place
+    vi, wi, vj, wj = unit_twist(p)
+    if by_position:
+        x, y = stepped(x, cross(wj, x)), stepped(y, cross(wj, y))
+        axes = x, y, stepped(z, cross(wj, z)), stepped(n, cross(wi, n))
+        return axes, (stepped(D, sub(vi, vj)), stepped(slide, ZERO), stepped(Oi, ZERO),
+                      stepped(Oj, ZERO))  # fmt: skip
+    axes = stepped(x, ZERO), stepped(y, ZERO), stepped(z, ZERO), stepped(n, ZERO)
+    return axes, (stepped(D, ZERO), stepped(slide, sub(vi, vj)), stepped(Oi, wi), stepped(Oj, wj))
 
 
 @inner
-def stepped_place(s, W, k, p, by_position, place):
-    """The place with an imaginary step along unit motion, or velocity, p of both markers."""
-    i, j = k
-    (x, y, z, n), (D, slide, Oi, Oj) = place
-    vi, wi, vj, wj = unit_twist(p)
-    if not by_position:
-        moved = (stepped(x, ZERO), stepped(y, ZERO), stepped(z, ZERO), stepped(n, ZERO))
-        rush = stepped(slide, sub(vi, vj)), stepped(Oi, wi), stepped(Oj, wj)
-        return moved, (stepped(D, ZERO), *rush)
-    turned_x, turned_y = stepped(x, cross(wj, x)), stepped(y, cross(wj, y))
-    moved = turned_x, turned_y, stepped(z, cross(wj, z)), stepped(n, cross(wi, n))
-    (dvi, dOi), (dvj, dOj) = carried_twist(s, W, i, wi), carried_twist(s, W, j, wj)
-    rush = stepped(slide, sub(dvi, dvj)), stepped(Oi, dOi), stepped(Oj, dOj)
-    return moved, (stepped(D, sub(vi, vj)), *rush)
+def carried_twist(s, W, m, q):
+    """How the twist of a marker changes with coordinate q of its body while its velocities stay."""
+    b, H, whole = s.markers.body[m], W.H[m], row(W.V, m, 3)
+    if q < 3:
+        return ZERO, ZERO
+    own, slip = whole, ZERO
+    for k in range(s.bodies.r[b]):
+        own = sub(own, scale(W.yd[b, k], (H[3, 6 + k], H[4, 6 + k], H[5, 6 + k])))
+        slip = add(slip, scale(W.yd[b, k], (H[0, 6 + k], H[1, 6 + k], H[2, 6 + k])))
+    if q < 6:
+        axis = H[3, q], H[4, q], H[5, q]
+        arm = mv(W.A[b], row(W.u, m, 0))
+        return cross(axis, add(cross(own, arm), slip)), cross(axis, whole)
+    return cross(own, (H[0, q], H[1, q], H[2, q])), ZERO
+
+
+@inner
+def carried_stiffness(s, W, pair, c, S):
+    """Add c times what W.Q makes of the twists that positions change at given velocities to S."""
+    width = W.H.shape[2]
+    for side in range(2):
+        m = pair[side]
+        b = s.markers.body[m]
+        for q in range(6 + s.bodies.r[b] if b >= 0 else 0):
+            move, spin = carried_twist(s, W, m, q)
+            for p in range(12):
+                total = 0.0
+                for x in range(3):
+                    total += W.Q[p, 6 * side + x] * move[x] + W.Q[p, 6 * side + 3 + x] * spin[x]
+                W.QH[p, width * side + q] = c * total
+    spread_pair(s, W, pair[0], pair[1], S)
 
 
 @inner

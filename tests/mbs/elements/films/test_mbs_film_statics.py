@@ -145,6 +145,40 @@ def test_where_oil_comes_in_matters_when_oil_is_conserved(row):
     assert_allclose(K.ravel() * 1e-4 / W, row[4:8], atol=0.2)
 
 
+# Lund and Thomsen (1978), elliptical, preload 0.5, L/D = 1, numbers on the clearance of an arc: S,
+# Kxx Kxy Kyx Kyy, Cxx Cxy Cyy
+ELLIPTIC = [
+    (.211, 6.65, 4.36, -3.21, .86, 13.09, -2.23, 3.70),
+    (.120, 4.99, 3.54, -1.52, 1.14, 9.04, -.01, 2.49),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", ELLIPTIC, ids=lambda r: str(r[0]))
+def test_an_elliptical_bore_is_one_of_two_lobes(row):
+    b = bearing(1.0, SIDES, (120, 8), bore=rom.mbs.multilobe(2, 0.5))
+    W = load(b, row[0])
+    state, K, C = resting(rotor(b, W), SPEED)
+    assert_allclose(K.ravel() * 1e-4 / W, row[1:5], atol=0.3, rtol=0.05)
+    damping = np.array([C[0, 0], C[0, 1], C[1, 1]])
+    assert_allclose(damping * 1e-4 * SPEED / W, row[5:], atol=0.3, rtol=0.05)
+    halves = bearing(1.0, SIDES, (120, 8), preload=0.5)
+    assert_allclose(b.grid.bore, halves.grid.bore, atol=1e-15)
+    again, *_ = resting(rotor(halves, W), SPEED)
+    assert_allclose(again.q[:2], state.q[:2], rtol=1e-9)
+
+
+def test_three_lobes_are_alike():
+    """Turned by a third of a turn, load and film together, the journal rests alike."""
+    b = bearing(1.0, [Groove(2 * np.pi * (k + 0.5) / 3, 0.2) for k in range(3)], (120, 8),
+                bore=rom.mbs.multilobe(3, 0.4))  # fmt: skip
+    turn = np.array([[-0.5, -np.sqrt(0.75)], [np.sqrt(0.75), -0.5]])
+    loads = np.array([3000.0, 500.0]), turn @ [3000.0, 500.0]
+    found = [rom.equilibrium(held_rotor(b, W, speed=SPEED, oil=VISCOSITY), spin={"turn": SPEED})
+             for W in loads]  # fmt: skip
+    assert_allclose(found[1].q[:2], turn @ found[0].q[:2], rtol=1e-8)
+    assert b.grid.bore.min() == pytest.approx(0.6, abs=1e-12)
+
+
 # --- whirl in time ---
 
 

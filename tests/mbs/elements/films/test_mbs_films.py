@@ -7,12 +7,14 @@ from scipy.integrate import quad
 
 import rom
 from cases.mbs.films import held_rotor
-from cases.mbs.mechanisms import prepared, residual_at, tangents_at
+from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom.components.journal_bearing import film
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
+from rom.mbs.elements.films.cells import SPIN, cells_of
 from rom.mbs.elements.films.journals import CONTENT, KNOWN, TIME
+from rom.mbs.elements.films.slopes import solve_film
 from rom.rotation import matrix
 
 ORIGIN, NONE, UPRIGHT = (0.0, 0.0, 0.0), np.zeros(0), np.eye(3)
@@ -163,6 +165,39 @@ def test_without_spin_and_motion_nothing_happens():
         assert power == 0.0
 
 
+def solved(b, opening=0.0, opening_rate=0.0, **state):
+    """Pressure and answers of the cells of one film, in their units."""
+    films = cells_of([b])
+    films.state[0, SPIN] = 1.0
+    films.opening[0], films.opening_rate[0] = np.ravel(opening), np.ravel(opening_rate)
+    for at, values in state.items():
+        films.state[0, {"motion": slice(4), "rate": slice(4, 8)}[at]] = values
+    assert solve_film(films, 0, 1.0) > 0
+    return films.P[0].copy(), films.answer[0].copy()
+
+
+def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
+    """Openings of cells: all alike as a wider bore; their rates as those of a journal."""
+    motion = [0.4, 0.3, 0.1, -0.2]
+    wider = bearing("jfo", bore=lambda angles: 1.2 + 0 * angles)
+    for found, known in zip(solved(bearing("jfo"), opening=0.2, motion=motion),
+                            solved(wider, motion=motion), strict=True):  # fmt: skip
+        assert_allclose(found, known, rtol=1e-10, atol=1e-10)
+    angle = bearing().grid.angle[0]
+    rate = np.tile(-(0.3 * angle[:, 0] - 0.2 * angle[:, 1])[:, None], 8)
+    moves = solved(bearing(), motion=motion, rate=[0.3, -0.2, 0, 0])
+    for found, known in zip(solved(bearing(), opening_rate=rate, motion=motion), moves,
+                            strict=True):  # fmt: skip
+        assert_allclose(found, known, rtol=1e-10, atol=1e-10)
+    # a bump where the film is thin changes the load, one whose cells have no pressure does not
+    bump = np.zeros((60, 8))
+    bump[6:9] = 0.05
+    assert (
+        solved(bearing(), opening=bump, motion=motion)[1][0]
+        > solved(bearing(), motion=motion)[1][0]
+    )
+
+
 # --- tangents ---
 
 
@@ -193,6 +228,33 @@ def test_tangents_are_the_derivatives(law, spin, passed):
     assert np.abs((W.Kt - stiff) / np.abs(stiff).max(axis=1, keepdims=True)).max() < 1e-5
     tangents_at(packed.system, W, packed.q, v, 0 * v, NONE, (0.0, 1.0, 0.0))
     assert_allclose(W.S, loss, atol=1e-6 * np.abs(loss).max() + 2e-5)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_tangents_of_bodies_that_bend_are_the_derivatives(side):
+    """What turns moves where it bends, too: that is damped."""
+    rng = np.random.default_rng(5)
+    soft = random_body(rng)
+    mech = rom.Mechanism(gravity=ORIGIN)
+    point = np.asarray(soft.markers["a"].point)
+    part = mech.add_flexible("soft", soft, at=-point, omega=rng.normal(size=3))
+    stiff = mech.add_rigid("stiff", mass=1.0, inertia=(0.1,) * 3, at=(2e-5, 1e-5, 0))
+    ends = [part.marker("a"), stiff.marker(ORIGIN)]
+    mech.journal_bearing("film", *ends[:: 1 - 2 * side], axis=(0, 0, 1), bearing=bearing(),
+                         oil=VISCOSITY)  # fmt: skip
+    packed, W = prepared(mech)
+    v = packed.v + 1e-3 * rng.normal(size=packed.v.size)
+    v[:3] = np.cross(v[3:6], -point)  # the marker stands still, but for what bends
+    tangents_at(packed.system, W, packed.q, v, 0 * v, NONE, (0.0, 0.0, 1.0))
+    K = W.Kt.copy()
+
+    def force(dq):
+        residual_at(packed.system, W, shifted(packed, packed.q, dq), v, 0 * v, NONE)
+        return W.residual.copy()
+
+    found = np.array([(force(d) - force(-d)) / 2e-10 for d in 1e-10 * np.eye(v.size)]).T
+    assert_allclose(K, found, atol=2e-6 * np.abs(found).max())
+    assert np.abs(K[:, 6:10]).max() > 1e-2 * np.abs(K).max()
 
 
 # --- motions ---
