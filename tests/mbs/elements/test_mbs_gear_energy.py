@@ -8,7 +8,6 @@ import rom
 from cases.mbs.mechanisms import prepared, residual_at, stored_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
-from rom.errors import ConfigError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
@@ -40,6 +39,7 @@ OPTIONS = {
     "both": {"coupling": 4e-3, "correction": Correction(crowning=2e-5, slope=2e-5),
              "hertz": Hertz((4e-3, 3e-3))},
 }  # fmt: skip
+LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
 TABLE = K * np.array([0.6, 0.9, 1.1, 0.7])
 CASES = [("spur", "plain"), ("spur", "relieved"), ("spur", "measured"), ("helical", "plain"),
          ("helical", "relieved"), ("helical", "measured"), ("helical", "hertz"),
@@ -92,8 +92,7 @@ def test_forces_are_the_gradient_of_the_energy(kind, options, back):
 
 
 @pytest.mark.parametrize(("kind", "options"), [c for c in CASES if c[1] != "measured"])
-@pytest.mark.parametrize("losses", [{}, {"damping": 1e-5, "friction": 0.1, "transition_speed": 0.1}],
-                         ids=["elastic", "lossy"])  # fmt: skip
+@pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
 def test_tangents_are_differences_of_forces(kind, options, losses):
     """But for how directions of forces turn, and gaps are curved: to the deflection over radii."""
     packed, W = prepared(wheels(kind, options, **losses))
@@ -107,26 +106,20 @@ def test_tangents_are_differences_of_forces(kind, options, losses):
     stiff = difference(lambda x: force(x, 0 * v), 12, 1e-9)
     loss = difference(lambda x: force(0 * v, x), 12)
     tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 0.0, 1.0))
-    print("K", kind, options, np.abs(W.Kt - stiff).max() / np.abs(stiff).max())
     assert_allclose(W.Kt, stiff, atol=1e-3 * np.abs(stiff).max())
     tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 1.0, 0.0))
-    if losses:
-        print("D", kind, options, np.abs(W.S - loss).max() / np.abs(loss).max())
     assert_allclose(W.S, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
 
 
-def thrown(kind, spin=(0.5, 0.0), t_end=3e-3, **more):
+def thrown(kind, spin=(0.5, 0.0), t_end=6e-4, **more):
     """Free wheels that hit each other, part and hit again; their motion."""
-    pair, mech = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0))
-    ends = [mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
-                           omega=(0, 0, w)).marker(ORIGIN)
-            for name, x, w in zip(("pinion", "gear"), (0.0, pair.distance), spin, strict=True)]  # fmt: skip
+    pair, mech, ends = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x, w in zip(("pinion", "gear"), (0.0, pair.distance), spin, strict=True):
+        part = mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
+                              omega=(0, 0, w))  # fmt: skip
+        ends.append(part.marker(ORIGIN))
     mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=TABLE, cells=7, **more)
-    return rom.simulate(mech, t_end=t_end, method="dop853", rtol=1e-10, atol=1e-13, dt=2e-6,
-                        progress=False)  # fmt: skip
-
-
-LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.01}
+    return rom.simulate(mech, t_end=t_end, method="dop853", rtol=1e-10, dt=2e-6, progress=False)
 
 
 @pytest.mark.parametrize("kind", PAIRS)
@@ -136,14 +129,14 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
     pitch = (1e-6 * np.arange(PAIRS[kind].teeth[0]) % 7, ())
     flanks = Correction((15e-6, 10e-6), (4e-3, 3e-3), 2.0, 4e-6, 5e-6, pitch,
                         run_out=((2e-6, 0.4), (0.0, 0.0)))  # fmt: skip
-    spin = 40.0, -40.0 * PAIRS[kind].rb[0] / PAIRS[kind].rb[1] + 1.0
+    spin = 40.0, -40.0 * PAIRS[kind].rb[0] / PAIRS[kind].rb[1] + 2.0
     sol = thrown(kind, spin, correction=flanks, phase=0.1, **losses)
     force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
-    assert force.max() > 1e3
+    assert force.max() > 300
     assert (force == 0).any()
     strain = sol.energy.strain.max()
     assert np.abs(sol.energy.balance).max() < 1e-6 * strain
-    for kind_ in sol.momentum:
-        assert np.ptp(kind_, axis=0).max() < 1e-10 * np.abs(kind_).max()
+    for of_all in sol.momentum:  # [N s, N m s]; a blow passes 1e-3 from one wheel to the other
+        assert np.ptp(of_all, axis=0).max() < 1e-13
     report = rom.audit(sol)
     assert report.ok, report

@@ -126,45 +126,49 @@ def add_lines(s, W, meshes, k, what):
         k: which.
         what: FORCES, TANGENTS or ENERGY.
     """
-    size, total = meshes.size[k], 0.0
-    state = set_frame(s, W, meshes, k)
-    alpha = state[1]
+    state, total = set_frame(s, W, meshes, k), 0.0
+    path = path_of_contact(meshes.size[k], state[1])
     if what == FORCES:  # not a number without a common tangent, which ends the motion
-        meshes.load[k], meshes.n_slices[k] = 0.0 * alpha, 0.0
-        W.wrench[meshes.i[k], 0] += 0.0 * alpha
+        meshes.load[k], meshes.n_slices[k] = 0.0 * state[1], 0.0
+        W.wrench[meshes.i[k], 0] += 0.0 * state[1]
         rolled, opened, _ = state[2]
-        meshes.approach[k] = max(rolled, -rolled - size[BACKLASH]) - opened
-    path = path_of_contact(size, alpha)
+        meshes.approach[k] = max(rolled, -rolled - meshes.size[k, BACKLASH]) - opened
     if not path[0] < path[1]:  # too far apart to meet, or there is no common tangent
-        return total
+        return 0.0
     clear_sums(meshes)
     if what != ENERGY:
         set_rates(W, meshes, k)
         set_speed(W, meshes, k)
-    begin, end = path[0] - 0.5 * size[ENTRY], path[1] + 0.5 * size[ENTRY]
-    reach = abs(math.tan(size[HELIX])) * size[WIDTH] / 2
-    for flank in range(2):
-        side = 1.0 - 2.0 * flank
-        if clear_of_each_other(meshes, k, side, state):
-            continue
-        start = line_start(size, side, state)
-        lowest = math.floor((begin - start - reach) / size[PITCH])
-        lines = math.ceil((end - start + reach) / size[PITCH]) - lowest + 1
-        for line in range(lowest, lowest + lines):
-            at = side, line, start + line * size[PITCH]
-            count = set_line(s, W, meshes, k, at, state, path)
-            if count > 0:
-                bear_line(meshes, k, count)
-                for cell in range(count):
-                    total += meshes.line[cell, STORED]
-                if what != ENERGY:
-                    push_line(s, W, meshes, k, what, count, (side, state))
+    for side in (1.0, -1.0):
+        if not clear_of_each_other(meshes, k, side, state):
+            total += add_flank(s, W, meshes, k, what, (side, state), path)
     if what == FORCES:
         push_wheels(W, meshes, k)
     elif what == TANGENTS:
         stiffen_wheels(meshes)
         if meshes.law[k, FOLLOWS] > 0.0:
             turn_forces(meshes, state[0], state[4])
+    return total
+
+
+@inner
+def add_flank(s, W, meshes, k, what, place, path):
+    """Go over the contact lines of working or back flanks; what they store."""
+    (side, state), size, total = place, meshes.size[k], 0.0
+    begin, end = path[0] - 0.5 * size[ENTRY], path[1] + 0.5 * size[ENTRY]
+    reach = abs(math.tan(size[HELIX])) * size[WIDTH] / 2
+    start = line_start(size, side, state)
+    lowest = math.floor((begin - start - reach) / size[PITCH])
+    lines = math.ceil((end - start + reach) / size[PITCH]) - lowest + 1
+    for line in range(lowest, lowest + lines):
+        at = side, line, start + line * size[PITCH]
+        count = set_line(s, W, meshes, k, at, state, path)
+        if count > 0:
+            bear_line(meshes, k, count)
+            for cell in range(count):
+                total += meshes.line[cell, STORED]
+            if what != ENERGY:
+                push_line(s, W, meshes, k, what, count, place)
     return total
 
 

@@ -101,5 +101,5 @@ def spin_tangents(s, W, spins, _lam, ck, cc):
 
 SPINS_FAMILY = Family(
     "spins", Spin, pack, spin_forces, spin_tangents, ends=on_joint, outside=from_outside,
-    couples=apart,
+    couples=apart, complete=True,
 )  # fmt: skip
