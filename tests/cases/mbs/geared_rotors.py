@@ -13,7 +13,7 @@ SIZES = ((9.0, 6e-2, 1.3e-2), (60.0, 1.6, 3.0))  # mass, inertia across and abou
 
 @dataclass(frozen=True)
 class RigidShaft:
-    """A shaft that does not bend, with nodes at 0, SPAN / 2 and SPAN; its wheel is in the middle."""
+    """A shaft that does not bend, with nodes at 0, SPAN / 2 and SPAN; the second has the wheel."""
 
     mass: float
     across: float

@@ -8,8 +8,6 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.geared_rotors import SPAN, as_mechanism, rigid_unit
-from rom.components.gear_mesh import Correction
-from rom.components.journal_bearing import Groove, JournalBearing
 from rom.components.transmission import rest, whirl
 from rom.rotation import log
 

@@ -25,8 +25,9 @@ def geared(way, speed=SPEED, torque=60.0):
         wheel = mech.add_rigid(name, mass=4.0, inertia=(inertia, inertia, inertia), at=(x, 0, 0),
                                markers=ends, **{way: (0, 0, speeds[name])})  # fmt: skip
         for end, place in ends.items():
-            mech.bushing(f"{end} of {name}", mech.ground.marker((x, *place[1:])), wheel.marker(end),
-                         stiffness=(2e7, 3e7, 1e8, 0, 0, 0), damping=(9e3, 9e3, 9e3, 0, 0, 0))  # fmt: skip
+            both = mech.ground.marker((x, *place[1:])), wheel.marker(end)
+            mech.bushing(f"{end} of {name}", *both, stiffness=(2e7, 3e7, 1e8, 0, 0, 0),
+                         damping=(9e3, 9e3, 9e3, 0, 0, 0))  # fmt: skip
         mech.torque(f"torque of {name}", wheel.marker(ORIGIN),
                     (0, 0, torque * (1 if x == 0 else 40 / 26)))  # fmt: skip
     ends = [mech.part(name).marker(ORIGIN) for name in speeds]
@@ -56,9 +57,10 @@ def test_speeds_that_teeth_cannot_have_are_named():
     with pytest.raises(ConfigError, match=r"teeth 26 and 40 turn at 30 and -19.5"):
         mech.gear_mesh("mesh", *(end.marker(ORIGIN) for end in ends), axis=Z, pair=PAIR,
                        stiffness=1e10)  # fmt: skip
+    balls, rings = rom.mbs.BallBearing(9, 0.01, 0.05), (ends[0].marker(ORIGIN), mech.ground)
     with pytest.raises(ConfigError, match="both must be one"):
-        mech.rolling_bearing("bearing", ends[0].marker(ORIGIN), mech.ground.marker(ORIGIN),
-                             axis=(1, 0, 0), bearing=rom.mbs.BallBearing(9, 0.01, 0.05))  # fmt: skip
+        mech.rolling_bearing("bearing", rings[0], rings[1].marker(ORIGIN), axis=(1, 0, 0),
+                             bearing=balls)  # fmt: skip
 
 
 def carried(way, speed):

@@ -160,9 +160,7 @@ def _rims(
     return tuple(found)
 
 
-def _spins(
-    name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair
-) -> tuple[float, float]:
+def _spins(name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair) -> tuple[float, float]:
     """Of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]."""
     one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
     z, w = pair.teeth
