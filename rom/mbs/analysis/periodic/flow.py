@@ -1,13 +1,15 @@
 """One period of a mechanism in compiled steps, from any start, without what a run keeps."""
 
+from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rom import rotation
-from rom.mbs.analysis.local_equations import Instant, instant
+from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, Instant
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.python_laws import apply_laws
@@ -65,15 +67,27 @@ class Flow:
         numbers = (t0, t0 + period, period / steps, steps, rho_inf, STEP_TOLERANCE, 1e-4, 1e-12)
         self.mechanism, self.t0, self.period, self.steps = mechanism, t0, period, steps
         self.settings = Settings(*numbers, progress=False)
-        self.now: Instant = instant(mechanism, t0)
-        self.runs = 0
+        self.runs = [0]
         self._take(pack(mechanism))
+
+    def lasting(self, period: float) -> "Flow":
+        """The same over another period; memory and count of runs are shared."""
+        other, s = copy(self), self.settings
+        other.period, end = period, s.t_start + period
+        other.settings = replace(s, t_end=end, dt=period / self.steps)
+        other._prescribe()
+        return other
 
     def _take(self, packed: Packed) -> None:
         """Move this mechanism, in blocks or whole."""
         self.packed = packed
         self.W: Work = workspace(packed.system, len(packed.signals))
-        self.record = Record(self.mechanism, packed, self.settings, perf_counter())
+        self._prescribe()
+
+    def _prescribe(self) -> None:
+        """Ask drives and loads for all steps."""
+        packed, mechanism = self.packed, self.mechanism
+        self.record = Record(mechanism, packed, self.settings, perf_counter())
         self.t = self.settings.time(np.arange(self.steps + 1))
         span, spacing = self.settings.span, self.settings.spacing
         table, failure = sampled(packed.signals, padded(self.t), span, spacing, self.settings.h)
@@ -81,6 +95,18 @@ class Flow:
             raise failure
         self.table = np.ascontiguousarray(table[: self.t.size])
         self.step: Step | None = None
+
+    @cached_property
+    def now(self) -> Instant:
+        """The equations, by whole matrices."""
+        packed = self.packed.whole()
+        W = workspace(packed.system, len(packed.signals))
+        return Instant(packed, W, self.t0, packed.asked).at(self.t0)
+
+    @cached_property
+    def probe(self) -> Array:
+        """(n,) motion of each coordinate that counts as one: a rad, a length of the mechanism."""
+        return self.now.probe() / DIFFERENCE_STEP
 
     @property
     def law_memory(self) -> slice:
@@ -151,7 +177,7 @@ class Flow:
             taken = int(step.count[alpha.STEPS])
             if answer == alpha.NEEDS_LAWS:
                 apply_laws(self.packed.asked, self.W, float(self.t[1 + taken]))
-        self.runs += 1
+        self.runs[0] += 1
         if answer != alpha.CONVERGED:
             raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))
         q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
@@ -162,7 +188,8 @@ class Flow:
         """The step memory at a start."""
         state = start.state
         if self.step is None:
-            self.begun(state)
+            like = replace(state, algorithmic=state.a)
+            self.step = begin(self.record, self.W, like, self.packed.asked, self.settings.h)[0]
         step: Any = self.step
         for memory in (step.work, step.lost, step.psi, step.drift):
             memory[:] = 0.0
@@ -179,6 +206,12 @@ class Flow:
         """The start as a run takes it."""
         state = start.state
         return replace(state, v=state.v + start.ahead, algorithmic=state.a + start.later)
+
+    def forces(self, state: State) -> Array:
+        """(n,) what acts on the bodies at a state, inertia included and joints left out."""
+        now = self.now.at(state.t)
+        now.W.base[:] = state.base
+        return now.residual(state.q, state.v, state.a, 0 * state.lam)
 
     def apart(self, one: State, two: State) -> Array:
         """(n,) small motion from one position to another."""

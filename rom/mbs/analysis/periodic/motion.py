@@ -12,7 +12,7 @@ from rom.arguments import number, positive, typed, whole
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.repetition import refuse_what_changes
+from rom.mbs.analysis.periodic.repetition import refuse_other_forces, refuse_what_changes
 from rom.mbs.analysis.periodic.shooting import Return, Tangent, energy, moved_by
 from rom.mbs.analysis.periodic.turns import Turns, turns_of
 from rom.mbs.integrate.simulation import simulate
@@ -136,6 +136,7 @@ class Shooting:
                 tangent, last = None, np.inf
                 continue
             if tangent is None or gap > GOOD_RATIO * last:
+                found = replace(found, basis=None)
                 tangent = found.tangent()
             last, found = gap, self._corrected(found, tangent)
         raise self._lost(found)
@@ -149,6 +150,7 @@ class Shooting:
                 "what was found is a state of rest, not a motion.",
                 hint="Begin with start= a state that moves, or nearer to the motion.",
             )
+        refuse_other_forces(found)
         if tangent is not None and tangent.around is found:
             return tangent
         return found.tangent()
@@ -164,8 +166,8 @@ class Shooting:
                 flow, y = found.flow, answer
                 if free:
                     change = np.clip(answer[-1] / (2 * np.pi), *(MAX_PERIOD_CHANGE * _SIDES))
-                    flow, y = self.flow(flow.period * (1 + float(change))), answer[:-1]
-                return Return.of(flow, found.turns, moved_by(found, y))
+                    flow, y = flow.lasting(flow.period * (1 + float(change))), answer[:-1]
+                return Return.of(flow, found.turns, moved_by(found, y), tangent.around.chart)
             except (SolverError, ModelError) as error:
                 answer, cause = answer / 2, error
         raise self._lost(found) from cause
@@ -197,7 +199,7 @@ class Shooting:
         angles = found.turns.angles(found.start.state, found.end)
         return PeriodicMotion(
             self.solution(found), found.flow.period, tangent.multipliers, self.period is None,
-            found.open, passes, angles, found.flow.runs,
+            found.open, passes, angles, found.flow.runs[0],
         )  # fmt: skip
 
 

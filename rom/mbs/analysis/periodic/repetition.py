@@ -1,9 +1,12 @@
 """What cannot repeat is refused by name before any motion is looked for."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rom.errors import ModelError
 from rom.mbs.analysis.periodic.flow import Flow, Start
+from rom.mbs.analysis.periodic.shooting import Return
 from rom.mbs.analysis.periodic.turns import FULL_TURN, Turns
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.parts.signals import Signal
@@ -12,6 +15,7 @@ from rom.model import Array
 REPEAT_RTOL = 1e-6  # of the largest value: by which a function may differ a period later
 SHARES = np.array([0.0, 0.137, 0.291, 0.433, 0.618, 0.809])  # of the period, at which one looks
 FORCE_RTOL = 1e-6  # of all forces
+LATER_RTOL = 1e-2  # the same at the end of a motion whose gap is closed: contact is stiff
 
 
 def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) -> None:
@@ -82,25 +86,50 @@ def _beyond(flow: Flow, turns: Turns, name: str, change: Array) -> Array:
 
 def _refuse_forces(flow: Flow, start: Start, shift: float, driven: bool) -> None:
     """Laws ask for the time by themselves: at one state forces must be the same later."""
-    if not flow.mechanism.elements:
-        return
-    state = start.state
-    for share in SHARES:
-        t = flow.t0 + share * flow.period
-        forces = []
-        for when in (t, t + shift):
-            now = flow.now.at(when)
-            now.W.base[:] = state.base
-            forces.append(now.residual(state.q, state.v, state.a, 0 * state.lam))
-        size = np.abs(forces[0]).max(initial=0.0)
-        worst = int(np.argmax(np.abs(forces[1] - forces[0])))
-        if abs(forces[1][worst] - forces[0][worst]) > FORCE_RTOL * size:
-            bodies = flow.packed.system.bodies
-            name = flow.packed.names[int(np.searchsorted(bodies.v_at, worst, "right")) - 1]
+    for t in flow.t0 + SHARES * flow.period:
+        one, two = (flow.forces(replace(start.state, t=when)) for when in (t, t + shift))
+        k = int(np.argmax(np.abs(two - one)))
+        if abs(two[k] - one[k]) <= FORCE_RTOL * np.abs(one).max():
+            continue
+        name = _body(flow, k)
+        if driven:
             raise ModelError(
-                f"the forces on {name!r} do not repeat with the period {flow.period:.9g} s: a law "
-                f"depends on time." if driven else
-                f"the forces on {name!r} change with time, so that the period is not free.",
+                f"the forces on {name!r} do not repeat with the period {flow.period:.9g} s.",
                 where=name,
-                hint="Give the period of all laws.",
+                hint="Give the period of all laws that depend on time.",
             )
+        raise ModelError(
+            f"the forces on {name!r} change with time, so that the period is not free.",
+            where=name,
+            hint="Give period= that of the laws.",
+        )
+
+
+def refuse_other_forces(found: Return) -> None:
+    """Refuse a motion at whose end other forces act than at its start.
+
+    Elements follow angles over whole turns, and know one tooth from the next.
+
+    Raises:
+        ModelError: naming the body.
+    """
+    flow, end = found.flow, found.end
+    later = replace(end, algorithmic=flow.forces(end))  # forces turn with the frames, as rates do
+    two = found.turns.back(later, found.turns.angles(found.start.state, end)).algorithmic
+    one = flow.forces(replace(found.turned, t=flow.t0, base=found.base))
+    assert two is not None
+    k = int(np.argmax(np.abs(two - one)))
+    if abs(two[k] - one[k]) > LATER_RTOL * max(np.abs(one).max(), np.abs(two).max()):
+        name = _body(flow, k)
+        raise ModelError(
+            f"after the period other forces act on {name!r} in the same place: "
+            f"{two[k]:.4g} for {one[k]:.4g} N or N m.",
+            where=name,
+            hint="An element knows how far it has turned: turns must fit each other, as those of "
+            "two wheels do, and springs about an axis must not be wound up.",
+        )
+
+
+def _body(flow: Flow, k: int) -> str:
+    """Name of the body to which coordinate k belongs."""
+    return flow.packed.names[int(np.searchsorted(flow.packed.system.bodies.v_at, k, "right")) - 1]

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, free_motions
+from rom.mbs.analysis.local_equations import free_motions
 from rom.mbs.analysis.periodic.flow import Flow, Start
 from rom.mbs.analysis.periodic.turns import Turns
 from rom.mbs.analysis.snapshot import snapshot
@@ -51,7 +51,7 @@ class Chart:
         """The chart of a start."""
         now, state = flow.now, start.state
         _, G, _ = now.gradient(state.q, state.v)
-        scale = now.probe() / DIFFERENCE_STEP
+        scale = flow.probe
         rolls = now.packed.system.rows.kind == ROLL
         Zv = free_motions(G, scale, state.rank)
         Zq = free_motions(G[~rolls], scale, _rank(G[~rolls] * scale)) if rolls.any() else Zv
@@ -73,9 +73,9 @@ class Chart:
         return self.Zq @ y[:k], self.Zv @ y[k:] / self.time
 
     def of_state(self, state: State) -> Array:
-        """(f,) coordinates of a state."""
+        """(f,) coordinates of a state as the method has it."""
         here = self.at.state
-        return self.seen(self.flow.apart(here, state), state.v - here.v)
+        return self.seen(self.flow.apart(here, state), state.v - here.v - self.at.ahead)
 
     def moved(self, y: Array) -> Start:
         """The start at some coordinates (f,)."""
@@ -97,34 +97,60 @@ class Return:
         turns: what advances.
         start: the start.
         end: the state a period later.
-        back: the same, turned back, as the next start.
+        turned: the same, turned back.
+        basis: chart whose coordinates count here too; None for one of its own.
     """
 
     flow: Flow
     turns: Turns
     start: Start
     end: State
-    back: Start
+    turned: State
+    basis: Chart | None = None
 
     @classmethod
-    def of(cls, flow: Flow, turns: Turns, start: Start) -> "Return":
+    def of(
+        cls, flow: Flow, turns: Turns, start: Start, basis: Chart | None = None
+    ) -> "Return":
         """Move through one period.
 
         Raises:
             SolverError: if a step fails.
         """
         end = flow.end(start)
-        return cls(flow, turns, start, end, _turned_back(flow, turns, start, end))
+        turned = turns.back(end, turns.angles(start.state, end))
+        return cls(flow, turns, start, end, turned, basis)
+
+    @cached_property
+    def back(self) -> Start:
+        """The end as the start of the next period."""
+        state = replace(self.turned, t=self.start.state.t, base=self.base)
+        fitted = self.flow.at(state.q, state.v, Start(state, state.v, state.a))
+        return replace(fitted, ahead=state.v - fitted.state.v, later=self.later)
+
+    @property
+    def base(self) -> Array:
+        """(c,) angles as at the start, and what laws remember now."""
+        base, laws = self.start.state.base.copy(), self.flow.law_memory
+        base[laws] = self.end.base[laws]
+        return base
+
+    @property
+    def later(self) -> Array:
+        """(n,) acceleration-like variable of the method minus the accelerations, at the end."""
+        return self.turned.algorithmic - self.turned.a
 
     @cached_property
     def chart(self) -> Chart:
         """Coordinates of starts nearby."""
-        return Chart.of(self.flow, self.start)
+        if self.basis is None:
+            return Chart.of(self.flow, self.start)
+        return replace(self.basis, flow=self.flow, at=self.start)
 
     @cached_property
     def gap(self) -> Array:
         """(f,) coordinates of the end."""
-        return self.chart.of_state(self.back.state)
+        return self.chart.of_state(self.turned)
 
     @cached_property
     def memory_gap(self) -> float:
@@ -143,7 +169,7 @@ class Return:
     def rate(self) -> tuple[Array, Array]:
         """(f,) each: change of the coordinates per radian of the period, at start and end."""
         time, found = self.flow.period / (2 * np.pi), []
-        for state in (self.start.state, self.back.state):
+        for state in (self.start.state, self.turned):
             found.append(self.chart.seen(time * state.v, time * state.a))
         return found[0], found[1]
 
@@ -155,17 +181,10 @@ class Return:
         """
         chart, columns = self.chart, []
         for e in np.eye(chart.size) * PROBE:
-            pair = [Return.of(self.flow, self.turns, chart.moved(x)) for x in (e, -e)]
-            columns.append(
-                [
-                    (chart.of_state(one) - chart.of_state(two)) / (2 * PROBE)
-                    for one, two in (
-                        (pair[0].start.state, pair[1].start.state),
-                        (pair[0].back.state, pair[1].back.state),
-                    )
-                ]
-            )
-        both = np.array(columns).reshape(-1, 2, chart.size)
+            one, two = (Return.of(self.flow, self.turns, chart.moved(x)) for x in (e, -e))
+            pairs = (one.start.state, two.start.state), (one.turned, two.turned)
+            columns.append([chart.of_state(x) - chart.of_state(y) for x, y in pairs])
+        both = np.array(columns).reshape(-1, 2, chart.size) / (2 * PROBE)
         return Tangent(self, both[:, 0].T, both[:, 1].T)
 
 
@@ -227,18 +246,6 @@ def energy(mechanism: Mechanism, start: Start) -> float:
     return float(snapshot(mechanism, start.state).energy.total[0])
 
 
-def _turned_back(flow: Flow, turns: Turns, start: Start, end: State) -> Start:
-    """The end of a period as the start of the next one."""
-    before = start.state
-    state = turns.back(end, turns.angles(before, end))
-    base, laws = before.base.copy(), flow.law_memory
-    base[laws] = end.base[laws]
-    state = replace(state, t=before.t, base=base)
-    fitted = flow.at(state.q, state.v, Start(state, state.v, state.a))
-    later = state.algorithmic - state.a
-    return replace(fitted, ahead=state.v - fitted.state.v, later=later)
-
-
 def share(flow: Flow, dq: Array, dv: Array, time: float) -> float:
     """Part of a correction that may be taken at once."""
     return min(sizes(flow.packed, dq)[1], sizes(flow.packed, time * dv)[1])
@@ -249,10 +256,10 @@ def moved_by(found: Return, y: Array) -> Start:
     chart = found.chart
     dq, dv = chart.motion(y)
     part = share(found.flow, dq, dv, chart.time)
-    start = replace(found.start, ahead=found.back.ahead, later=found.back.later)
-    base = found.start.state.base.copy()
-    laws = found.flow.law_memory
-    base[laws] = found.end.base[laws]
-    start = replace(start, state=replace(start.state, base=base))
-    return found.flow.moved(start, part * dq, part * dv)
+    return found.flow.moved(ready(found), part * dq, part * dv)
 
+
+def ready(found: Return) -> Start:
+    """The start with what method and laws had at the end of the period."""
+    state = replace(found.start.state, base=found.base)
+    return Start(state, found.back.ahead, found.later)
