@@ -224,4 +224,3 @@ class Flow:
             out[to + 3 : to + 6] = rotation.log(turn / np.linalg.norm(turn))
             out[to + 6 : to + 6 + r] = two.q[at + 7 : at + 7 + r] - one.q[at + 7 : at + 7 + r]
         return out
-

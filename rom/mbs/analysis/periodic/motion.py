@@ -26,10 +26,12 @@ STEPS = 200  # per period
 # the method forgets what a step does not resolve within a period; motions that keep their energy
 # must not lose it to the method
 RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
-# gap in rad or lengths of the mechanism; that which counts where round-off lets it shrink no more
-GAP_TOL, STALLED_TOL = 1e-10, 1e-7
+# gap in rad or lengths of the mechanism; that which counts where it shrinks no more, of round-off
+# or of the energy that the method itself takes up
+GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 MAX_PASSES = 60
+MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
 MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
 STABLE_TOL = 1e-6  # of the size of a multiplier: differences and round-off
 MAX_PERIOD_CHANGE = 0.2  # of an unknown period in one pass
@@ -111,6 +113,11 @@ class Shooting:
     progress: bool = False
     energy: float | None = None
 
+    @property
+    def stalled(self) -> float:
+        """Gap that counts as closed where it shrinks no more."""
+        return STALLED_TOL if self.energy is None else CONSERVATIVE_STALLED_TOL
+
     def flow(self, period: float) -> Flow:
         """What moves the mechanism through a period."""
         return Flow(self.mechanism, self.t0, period, self.steps, self.rho_inf)
@@ -118,33 +125,44 @@ class Shooting:
     def closed(self, flow: Flow, start: Start, turns: Turns) -> tuple[Tangent, int]:
         """The motion that closes, with its derivatives, and the passes it took.
 
-        Where Newton's method does not come closer, time goes on for a period, as it does in a
-        machine.
+        Where Newton's method does not come closer, time goes on from where it was for a period, as
+        it does in a machine, and for twice as many the next time.
 
         Raises:
             SolverError: if none is found; ``error.solution`` is the last attempt.
         """
-        found, tangent, last = Return.of(flow, turns, start), None, np.inf
+        found, best, tangent, wait = Return.of(flow, turns, start), None, None, 1
         for k in range(1, MAX_PASSES + 1):
-            gap = found.open
-            if self.progress:
-                line(f"pass {k}: gap {gap:.2e}")
-            if gap < self.tolerance or (gap < STALLED_TOL and gap > 0.5 * last):
+            self._say(f"pass {k}: gap {found.open:.2e}")
+            last = np.inf if best is None else best.open
+            if found.open < self.tolerance:
                 return self._done(found, tangent), k
-            if gap > last:
-                found = Return.of(found.flow, turns, found.back)
-                tangent, last = None, np.inf
+            stalled = found.open > 0.5 * last and min(found.open, last) < self.stalled
+            if best is not None and stalled:
+                return self._done(min(found, best, key=lambda x: x.open), tangent), k
+            if best is not None and found.open > last:
+                found, best, tangent = self._gone_on(best, wait), None, None
+                wait = min(2 * wait, MAX_WAIT)
                 continue
-            if tangent is None or gap > GOOD_RATIO * last:
+            if tangent is None or found.open > GOOD_RATIO * last:
                 found = replace(found, basis=None)
                 tangent = found.tangent()
-            last, found = gap, self._corrected(found, tangent)
+            best, found = found, self._corrected(found, tangent)
         raise self._lost(found)
+
+    def _gone_on(self, found: Return, periods: int) -> Return:
+        """What comes of a motion some periods later."""
+        for _ in range(periods):
+            found = Return.of(found.flow, found.turns, found.back)
+        return found
+
+    def _say(self, text: str) -> None:
+        if self.progress:
+            line(text)
 
     def _done(self, found: Return, tangent: Tangent | None) -> Tangent:
         """Derivatives at the motion that was found."""
-        if self.progress:
-            line("")
+        self._say("")
         if self.period is None and not max(map(np.linalg.norm, found.rate)) > REST_TOL:
             raise SolverError(
                 "what was found is a state of rest, not a motion.",
@@ -173,8 +191,7 @@ class Shooting:
         raise self._lost(found) from cause
 
     def _lost(self, found: Return) -> SolverError:
-        if self.progress:
-            line("")
+        self._say("")
         error = SolverError(
             f"no motion repeats with the period {found.flow.period:.9g} s: "
             f"{found.open:.2g} rad, or lengths of the mechanism, are left between its end and its "

@@ -14,6 +14,7 @@ from rom.mbs.analysis.continuation.arc_length import Curve, Point
 from rom.mbs.analysis.periodic.flow import Flow, Start
 from rom.mbs.analysis.periodic.motion import (
     RHO_INF,
+    STABLE_TOL,
     STEPS,
     PeriodicMotion,
     Shooting,
@@ -28,11 +29,12 @@ from rom.model import Array
 from rom.process.progress import line
 
 PARAMETER_STEP = 1e-6  # of differences, of the span
-CLOSED_TOL = 1e-9  # corrections that count as none, of the size of the motion
+CLOSED_TOL = 1e-7  # corrections that count as none, of the size of the motion
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives are asked for
-LOCATION_RTOL = 1e-5  # of a step: multipliers are differences
+LOCATION_RTOL = 1e-4  # of a step: multipliers are differences
 LEAST_SIZE_RATIO = 0.1  # of the largest motion so far, below which steps do not shrink with it
+FEW = 4  # coordinates up to which derivatives are cheaper than passes that do without
 N_LOOKS = 24  # instants of a motion at which its size is measured
 MAX_POINTS = 100_000
 CROSSING_TOL = 1e-2  # of a multiplier from the unit circle at a motion that is critical
@@ -261,7 +263,8 @@ class _Family:
         found = self.returned(at, p, basis)
         self.last = found
         fresh = found.open < FRESH_RATIO * self.unit <= self.gap
-        if self.tangent is None or fresh or not found.open < GOOD_RATIO * self.gap:
+        few = found.chart.size <= FEW
+        if self.tangent is None or few or fresh or not found.open < GOOD_RATIO * self.gap:
             found = self.differentiate(replace(found, basis=None), p)
         self.gap = found.open
         assert self.tangent is not None
@@ -313,9 +316,8 @@ class _Family:
         return float(a @ b) / self.unit**2
 
     def size(self, step: Array) -> float:
-        """Largest part of a step, in sizes of the motion; round-off is none."""
-        found = float(np.abs(step).max(initial=0.0)) / self.unit
-        return found if found > CLOSED_TOL else 0.0
+        """Largest part of a step, in sizes of the motion."""
+        return float(np.abs(step).max(initial=0.0)) / self.unit
 
     def measure(self, motion: PeriodicMotion, flow: Flow, turns: Turns) -> float:
         """How far a motion goes from its start, in rad or lengths of the mechanism."""
@@ -335,7 +337,7 @@ class _March:
     def __init__(self, family: _Family, span: tuple[float, float], progress: bool):
         self.family, self.progress = family, progress
         self.first, self.last = span
-        self.curve = Curve(family, family.span)
+        self.curve = Curve(family, family.span, CLOSED_TOL)
         self.p: list[float] = []
         self.motions: list[PeriodicMotion] = []
         self.critical: list[CriticalMotion] = []
@@ -431,7 +433,8 @@ class _March:
 def _pairs(motion: PeriodicMotion) -> float:
     """Product over pairs of complex multipliers of their size minus one; 1 without any."""
     found = motion.deviations
-    return float(np.prod(np.abs(found[found.imag > REAL_TOL]) - 1.0))
+    beyond = np.abs(found[found.imag > REAL_TOL]) - 1.0
+    return float(np.prod(np.where(np.abs(beyond) < STABLE_TOL, 0.0, beyond)))
 
 
 # what changes its sign where a multiplier crosses the circle, and distances from where it crosses

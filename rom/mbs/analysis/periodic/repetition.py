@@ -37,9 +37,7 @@ def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) ->
     _refuse_forces(flow, start, shift, driven)
 
 
-def _refuse_signal(
-    flow: Flow, turns: Turns, signal: Signal, shift: float, driven: bool
-) -> None:
+def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, driven: bool) -> None:
     t = flow.t0 + SHARES * flow.period
     both = np.concatenate([t, t + shift])
     spacing = flow.settings.spacing

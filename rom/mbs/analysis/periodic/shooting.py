@@ -109,9 +109,7 @@ class Return:
     basis: Chart | None = None
 
     @classmethod
-    def of(
-        cls, flow: Flow, turns: Turns, start: Start, basis: Chart | None = None
-    ) -> "Return":
+    def of(cls, flow: Flow, turns: Turns, start: Start, basis: Chart | None = None) -> "Return":
         """Move through one period.
 
         Raises:
@@ -184,7 +182,7 @@ class Return:
             one, two = (Return.of(self.flow, self.turns, chart.moved(x)) for x in (e, -e))
             pairs = (one.start.state, two.start.state), (one.turned, two.turned)
             columns.append([chart.of_state(x) - chart.of_state(y) for x, y in pairs])
-        both = np.array(columns).reshape(-1, 2, chart.size) / (2 * PROBE)
+        both = np.array(columns).reshape(chart.size, 2, chart.size) / (2 * PROBE)
         return Tangent(self, both[:, 0].T, both[:, 1].T)
 
 

@@ -88,9 +88,7 @@ class Turns:
         return found[0] if found else 0.0
 
 
-def turns_of(
-    mechanism: Mechanism, turns: Mapping[str, float | None] | None, state: State
-) -> Turns:
+def turns_of(mechanism: Mechanism, turns: Mapping[str, float | None] | None, state: State) -> Turns:
     """What the user says advances.
 
     Raises:
@@ -166,9 +164,7 @@ def _own_axis(part: Part, spin: Array) -> Array:
     return axis if axis @ spin > 0.0 else -axis
 
 
-def _refuse_unequal(
-    name: str, part: Part, axis: Array, point: Array, angle: float | None
-) -> None:
+def _refuse_unequal(name: str, part: Part, axis: Array, point: Array, angle: float | None) -> None:
     """Refuse a body that looks different after its turn."""
     how = "any angle" if angle is None else f"{angle:.6g} rad"
     if part.r:
