@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp, trapezoid
 from scipy.optimize import fsolve
 from scipy.special import ellipk, mathieu_a, mathieu_b
 
@@ -263,8 +263,8 @@ def test_what_a_law_remembers_repeats_too():
     memory = found.solution.law("slip").memory[:, 0]
     assert memory[-1] == pytest.approx(memory[0], abs=1e-9) and np.ptp(memory) > 0.05
     x, v = way(found), found.solution.velocity("mass")[:, 0]
-    put_in = np.trapz(np.cos(w * found.solution.t) * v, found.solution.t)
-    lost = 0.1 * np.trapz(v**2, found.solution.t)
+    put_in = trapezoid(np.cos(w * found.solution.t) * v, found.solution.t)
+    lost = 0.1 * trapezoid(v**2, found.solution.t)
     loop = 4 * limit * (np.ptp(x) / 2 - limit / k)
     assert put_in == pytest.approx(lost + loop, rel=1e-4)
 
@@ -289,7 +289,7 @@ def test_wrong_arguments_are_named(more, message):
 
 
 def test_a_load_that_does_not_repeat_is_named():
-    with pytest.raises(ModelError, match="'push' does not repeat with the period 1.2 s"):
+    with pytest.raises(ModelError, match=r"'push' does not repeat with the period 1.2 s"):
         rom.periodic_motion(pushed(2 * np.pi), period=1.2)
     with pytest.raises(ModelError, match="'push' changes with time, so that the period is not"):
         rom.periodic_motion(pushed(2 * np.pi), guess=1.0)
@@ -303,7 +303,7 @@ def test_a_law_that_does_not_repeat_is_named_by_its_body():
     mech, mass = slider()
     mech.law("clock", timed, mass, parameters=(2 * np.pi,))
     assert rom.periodic_motion(mech, period=1.0).stable
-    with pytest.raises(ModelError, match="forces on 'mass' do not repeat with the period 1.2 s"):
+    with pytest.raises(ModelError, match=r"forces on 'mass' do not repeat with the period 1.2 s"):
         rom.periodic_motion(mech, period=1.2)
     with pytest.raises(ModelError, match="forces on 'mass' change with time"):
         rom.periodic_motion(mech, guess=1.0)
@@ -311,7 +311,7 @@ def test_a_law_that_does_not_repeat_is_named_by_its_body():
 
 def test_a_start_of_another_mechanism_is_refused():
     other = rom.equilibrium(double_pendulum())
-    with pytest.raises(ConfigError, match="the start has 14 coordinates.*this mechanism has 7"):
+    with pytest.raises(ConfigError, match=r"the start has 14 coordinates.*this mechanism has 7"):
         rom.periodic_motion(pushed(1.0), period=2 * np.pi, start=other)
 
 

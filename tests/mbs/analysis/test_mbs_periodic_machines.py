@@ -89,7 +89,7 @@ def test_a_flexible_body_takes_whole_turns_only():
     root = part.marker(part.names[0])
     mech.revolute("axle", mech.ground.marker(ORIGIN), root, axis=Z)
     mech.drive("speed", "axle", lambda t: 0.1 * t)
-    with pytest.raises(ModelError, match="turns the flexible body 'blade' by 1.5708 rad"):
+    with pytest.raises(ModelError, match=r"turns the flexible body 'blade' by 1.5708 rad"):
         rom.periodic_motion(mech, period=5 * np.pi, turns={"axle": np.pi / 2})
 
 
@@ -166,5 +166,5 @@ def test_a_shaft_in_a_ball_bearing_vibrates_as_balls_pass():
 def test_a_spring_that_is_wound_up_does_not_repeat():
     mech, _ = rotor(30.0)
     mech.rotational_spring("coil", "plane", stiffness=5.0)
-    with pytest.raises(ModelError, match="other forces act on 'disc' in the same place: 31.4"):
+    with pytest.raises(ModelError, match=r"other forces act on 'disc' in the same place: 31.4"):
         rom.periodic_motion(mech, period=2 * np.pi / 30)

@@ -56,7 +56,7 @@ def balanced_curve():
     phases, found = np.linspace(-0.2, -3.08, 300), []
     u = np.r_[1.0, 0.6, np.zeros(2 * ODD.size - 2)]
     for phase in phases:
-        u, _, ok, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
+        u, _, _, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
         assert np.abs(balance(u, phase)).max() < 1e-10, message
         found.append(u[:2])
     return phases, np.array(found)
@@ -198,7 +198,7 @@ def test_another_number_of_bodies_is_refused_and_what_was_found_is_kept():
             mech.add_rigid("more", mass=1.0, inertia=(1, 1, 1), at=(9, 0, 0))
         return mech
 
-    with pytest.raises(ConfigError, match="other bodies at 0.8") as caught:
+    with pytest.raises(ConfigError, match=r"other bodies at 0.8") as caught:
         rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
     assert caught.value.solution.p.size >= 1
 

@@ -134,7 +134,7 @@ class Flow:
         state = self._fitted(state.q, state.v, state)
         self.step, found = begin(self.record, self.W, state, self.packed.asked, self.settings.h)
         ahead = self.step.v - found.v
-        return Start(found, ahead, found.algorithmic - found.a)
+        return Start(found, ahead, self.step.a - found.a)
 
     def _fitted(self, q: Array, v: Array, like: State) -> State:
         """The nearest state that satisfies the constraints, with its accelerations."""
@@ -147,7 +147,7 @@ class Flow:
         evaluate(packed.system, W, q, v)
         apply_laws(packed.asked, W, self.t0)
         kept = W.base.copy()
-        found = with_accelerations(packed, W, replace(like, t=self.t0, q=q, v=v))
+        found: Any = with_accelerations(packed, W, replace(like, t=self.t0, q=q, v=v))
         joints = packed.system.coordinates.kind.size  # what laws remember is theirs alone
         base = np.concatenate([found.base[:joints], kept[joints:]])
         return replace(found, base=base, algorithmic=None, memory=None)
@@ -168,7 +168,8 @@ class Flow:
         Raises:
             SolverError: if a step fails.
         """
-        step, out = self._reset(start), space(self.W, self.step, 1)
+        step = self._reset(start)
+        out = space(self.W, step, 1)
         rank = self.packed.rows_solved(start.state.rank)
         answer, table = alpha.NEEDS_LAWS, self.table[1:]
         alpha.advance.link()
@@ -210,7 +211,7 @@ class Flow:
     def forces(self, state: State) -> Array:
         """(n,) what acts on the bodies at a state, inertia included and joints left out."""
         now = self.now.at(state.t)
-        now.W.base[:] = state.base
+        now.remember(state)
         return now.residual(state.q, state.v, state.a, 0 * state.lam)
 
     def apart(self, one: State, two: State) -> Array:

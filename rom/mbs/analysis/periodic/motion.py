@@ -19,7 +19,6 @@ from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
-from rom.model import Array
 from rom.process.progress import line
 
 STEPS = 200  # per period

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.integrate import trapezoid
 
 from rom.arguments import finite, positive, typed, whole
 from rom.errors import ConfigError, ModelError, SolverError, reached
@@ -32,6 +33,7 @@ PARAMETER_STEP = 1e-6  # of differences, of the span
 CLOSED_TOL = 1e-7  # corrections that count as none, of the size of the motion
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives are asked for
+FOLD_RTOL = 1e-3  # of a step; the parameter of a fold then errs by its square
 LOCATION_RTOL = 1e-4  # of a step: multipliers are differences
 LEAST_SIZE_RATIO = 0.1  # of the largest motion so far, below which steps do not shrink with it
 FEW = 4  # coordinates up to which derivatives are cheaper than passes that do without
@@ -120,7 +122,12 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
         span: (2,) parameter at which the path begins, and towards which it goes.
         period: [s], or function of the parameter; None for a motion that nothing drives, whose
             period is found.
-        start, turns, steps, rho_inf, guess, settle: of the first motion, as in `periodic_motion`.
+        start: state or motion near the first one; None for where the bodies were added.
+        turns: {joint or body: angle [rad]} by which it advances, as in `periodic_motion`.
+        steps: of generalised-alpha in a period.
+        rho_inf: its spectral radius at infinite frequency [1].
+        guess: of the first period where it is unknown [s].
+        settle: number of periods through which the first mechanism moves before.
         n: largest number of motions.
         step: longest step, in sizes of the motion and spans.
         progress: report on stderr.
@@ -156,12 +163,13 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     whole("n", n, 2, MAX_POINTS)
     longest = positive("step", step)
     T = _period_at(period, first)
-    options = {"turns": turns, "steps": steps, "rho_inf": rho_inf, "progress": progress}
     begin = periodic_motion(
-        build(first), period=T, start=start, guess=guess, settle=settle, **options
-    )
+        build(first), period=T, start=start, turns=turns, steps=steps, rho_inf=rho_inf,
+        guess=guess, settle=settle, progress=progress,
+    )  # fmt: skip
     scale = Flow(begin.solution.mechanism, begin.state.t, begin.period, steps, rho_inf).probe
-    family = _Family(build, period, begin, turns, steps, rho_inf, abs(last - first), scale)
+    family = _Family(build, period, begin, turns, steps, rho_inf, abs(last - first), scale,
+                     0.0 * scale)  # fmt: skip
     march = _March(family, (first, last), progress)
     with reached(lambda: march.path):
         march.go(begin, longest, n)
@@ -194,6 +202,7 @@ class _Family:
         first: the first motion.
         span: change of the parameter that counts as one.
         scale: (n,) motion of each coordinate that counts as one.
+        advance: (n,) mean velocities of the bodies in the last motion.
         unit: size of the motion, in which steps are measured.
         tangent, by_p: derivatives of the last motion that was differentiated, by its coordinates
             and by the parameter.
@@ -207,6 +216,7 @@ class _Family:
     rho_inf: float
     span: float
     scale: Array
+    advance: Array
     unit: float = 1.0
     tangent: Tangent | None = None
     by_p: Array = field(default_factory=lambda: np.zeros(0))
@@ -277,7 +287,7 @@ class _Family:
         d = PARAMETER_STEP * self.span
         T = found.flow.period if self.free else (_period_at(self.period, p + d) or 0.0)
         chart, flow, still = found.chart, self.flow(p + d, T), 0.0 * found.start.state.v
-        start = flow.moved(found.start, still, still)
+        start = flow.moved(found.start, still, self.faster(found.flow.period, T))
         later = self.returned(_Member(start, T), p + d, chart)
         moved = chart.of_state(later.turned) - chart.of_state(start.state) - chart.seen(
             still, found.start.ahead)  # fmt: skip
@@ -306,6 +316,7 @@ class _Family:
         if self.last is not None:
             start = replace(start, ahead=self.last.back.ahead, later=self.last.later)
         dv = step[n : 2 * n] * scale / (at.period / (2 * np.pi))
+        dv = dv + self.faster(at.period, period)
         try:
             return _Member(flow.moved(start, step[:n] * scale, dv), period)
         except ModelError as error:
@@ -318,6 +329,18 @@ class _Family:
     def size(self, step: Array) -> float:
         """Largest part of a step, in sizes of the motion."""
         return float(np.abs(step).max(initial=0.0)) / self.unit
+
+    def mean_speed(self, motion: PeriodicMotion) -> Array:
+        """(n,) mean velocities of bodies that advance by as much in every period."""
+        s, bodies = motion.solution, motion.solution.packed.system.bodies
+        mean, out = trapezoid(s.v, s.t, axis=0) / motion.period, np.zeros_like(self.scale)
+        rigid = (bodies.v_at[:, None] + np.arange(6)).ravel()
+        out[rigid] = 0.0 if self.free else mean[rigid]
+        return out
+
+    def faster(self, before: float, after: float) -> Array:
+        """(n,) change of velocities with which bodies advance by as much in another period."""
+        return (before / after - 1.0) * self.advance
 
     def measure(self, motion: PeriodicMotion, flow: Flow, turns: Turns) -> float:
         """How far a motion goes from its start, in rad or lengths of the mechanism."""
@@ -401,6 +424,7 @@ class _March:
         size = family.measure(motion, flow, family.turning(flow, point.at.start))
         most = LEAST_SIZE_RATIO * (family.unit if len(self.motions) > 1 else 0.0)
         family.unit, family.gap = max(size, most) or 1.0, np.inf
+        family.advance = family.mean_speed(motion)
         if self.progress:
             word = "stable" if motion.stable else "unstable"
             line(f"motion {len(self.p)} at {point.p:.6g}: {word}")
@@ -411,7 +435,7 @@ class _March:
         """Find what happens between two neighbours."""
         turns = one.rate * two.rate < 0.0
         if turns:
-            self.note("fold", self.curve.located(one, h, lambda x: x.rate, LOCATION_RTOL)[1])
+            self.note("fold", self.curve.located(one, h, lambda x: x.rate, FOLD_RTOL)[1])
         for kind, test in TESTS.items():
             values = test(before), test(after)
             if not values[0] * values[1] < 0.0 or (kind == "branch" and turns):
@@ -431,10 +455,14 @@ class _March:
 
 
 def _pairs(motion: PeriodicMotion) -> float:
-    """Product over pairs of complex multipliers of their size minus one; 1 without any."""
+    """Product over pairs of complex multipliers of their size minus one; NaN without any."""
     found = motion.deviations
     beyond = np.abs(found[found.imag > REAL_TOL]) - 1.0
-    return float(np.prod(np.where(np.abs(beyond) < STABLE_TOL, 0.0, beyond)))
+    return (
+        float(np.prod(np.where(np.abs(beyond) < STABLE_TOL, 0.0, beyond)))
+        if beyond.size
+        else np.nan
+    )
 
 
 # what changes its sign where a multiplier crosses the circle, and distances from where it crosses

@@ -7,6 +7,7 @@ Source:
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +22,9 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
 
-# of a start, in rad or lengths of the mechanism: 1e-14 of round-off is 1e-8 of a derivative, and
+# of a start, in rad or lengths of the mechanism: 1e-14 of round-off is 1e-7 of a derivative, and
 # the deflection of teeth and races is still resolved
-PROBE = 1e-6
+PROBE = 1e-7
 SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 
@@ -129,14 +130,16 @@ class Return:
     @property
     def base(self) -> Array:
         """(c,) angles as at the start, and what laws remember now."""
-        base, laws = self.start.state.base.copy(), self.flow.law_memory
-        base[laws] = self.end.base[laws]
-        return base
+        start: Any = self.start.state.base
+        end: Any = self.end.base
+        base, laws = start.copy(), self.flow.law_memory
+        base[laws] = end[laws]
+        return np.asarray(base)
 
     @property
     def later(self) -> Array:
         """(n,) acceleration-like variable of the method minus the accelerations, at the end."""
-        return self.turned.algorithmic - self.turned.a
+        return np.asarray(self.turned.algorithmic) - self.turned.a
 
     @cached_property
     def chart(self) -> Chart:
@@ -154,7 +157,7 @@ class Return:
     def memory_gap(self) -> float:
         """Change of what laws remember, of its size."""
         at = self.flow.law_memory
-        one, two = self.start.state.base[at], self.end.base[at]
+        one, two = (np.asarray(state.base)[at] for state in (self.start.state, self.end))
         size = float(np.abs(two).max(initial=0.0))
         return float(np.abs(two - one).max(initial=0.0)) / size if size else 0.0
 
