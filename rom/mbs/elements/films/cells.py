@@ -1,6 +1,7 @@
 """Films in cells: the arrays of all films of a mechanism, or of one alone."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -128,7 +129,7 @@ def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
 
 def _padded(rows: Sequence[Array | Index], n: int) -> Array | Index:
     """Rows of one length, zeros behind."""
-    padded = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
+    padded: Any = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
     for row, values in zip(padded, rows, strict=True):
         row[: len(values)] = values
     return padded
