@@ -106,7 +106,7 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
         warn(
             f"{100 * missed:.0f} % of the deformation of interface {marker.place!r} of body "
             f"{part.name!r} is in no harmonic up to {harmonics} and no polynomial up to {order}, "
-            f"and stays unloaded: reduce it with rom.FourierLegendre({harmonics}, {order}).",
+            f"and stays unloaded: reduce it with such functions.",
         )
     shapes = C.reshape(len(C), 3, -1)
     return Cylinder(harmonics, order, middle, half, axes, shapes, missed)
@@ -114,13 +114,10 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
 
 def _numbers(kind: str) -> tuple[int, int]:
     """Harmonics and order of the functions that an interface follows, as its kind says."""
-    family, _, numbers = kind.partition(":")
-    given = [int(x) for x in numbers.split(",") if x.strip().isdigit()]
-    if family == "fourier":
-        return max(given[0], 1), max(given[1], 1)
-    if family == "polynomial":
-        return max(given[0], 1), max(given[0], 1)
-    return MOST_HARMONICS, MOST_ORDER
+    numbers = [int(x) for x in kind.partition(":")[2].split(",") if x.strip().isdigit()]
+    if not numbers:
+        return MOST_HARMONICS, MOST_ORDER
+    return max(numbers[0], 1), max(numbers[-1], 1)
 
 
 def _deformation(surface: Any) -> Array:

@@ -279,18 +279,6 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
 
     Source:
         Nayfeh and Balachandran, Applied Nonlinear Dynamics (1995).
-
-    Example:
-        >>> mech = rom.Mechanism(gravity=(0, 0, 0))
-        >>> ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(1, 0, 0))
-        >>> ends = mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0))
-        >>> mech.prismatic("guide", mech.ground.marker((1, 0, 0)), ends[1], axis=(1, 0, 0))
-        >>> mech.spring_damper("spring", *ends, stiffness=4.0, damping=0.4)
-        >>> mech.force("push", ends[1], lambda t: (np.cos(t), 0, 0))
-        >>> motion = rom.periodic_motion(mech, period=2 * np.pi)
-        >>> x = motion.solution.position("ball")[:, 0]
-        >>> round(float(np.ptp(x) / 2), 3)  # 1 / sqrt(3^2 + 0.4^2)
-        0.33
     """
     if rho_inf is None:
         rho_inf = CONSERVATIVE_RHO_INF if conservative else RHO_INF

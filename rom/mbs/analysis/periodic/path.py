@@ -142,20 +142,6 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
 
     Source:
         Seydel, Practical Bifurcation and Stability Analysis (2010), chapters 4 and 7.
-
-    Example:
-        >>> def spring(w):
-        ...     mech = rom.Mechanism(gravity=(0, 0, 0))
-        ...     ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(1, 0, 0))
-        ...     ends = mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0))
-        ...     mech.prismatic("guide", mech.ground.marker((1, 0, 0)), ends[1], axis=(1, 0, 0))
-        ...     mech.spring_damper("spring", *ends, stiffness=1.0, damping=0.2)
-        ...     mech.force("push", ends[1], lambda t: (0.1 * np.cos(w * t), 0, 0))
-        ...     return mech
-        >>> path = rom.periodic_path(spring, (0.5, 1.5), period=lambda w: 2 * np.pi / w, steps=100)
-        >>> amplitude = path.of(lambda s: np.ptp(s.position("ball")[:, 0]) / 2)
-        >>> round(float(amplitude.max()), 2)  # 0.1 / 0.2
-        0.5
     """
     first, last = finite("span", span, (2,))
     if first == last:
