@@ -304,7 +304,8 @@ def _steps_in_films(law: str, steps: int) -> float:
     from rom.bench.models import shaft_in_films
     from rom.mbs.integrate.simulation import simulate
 
-    mech, how = shaft_in_films(law), {"dt": 1e-4, "method": "bdf", "progress": False}
+    mech = shaft_in_films(law)
+    how: dict[str, Any] = {"dt": 1e-4, "method": "bdf", "progress": False}
     warm = simulate(mech, t_end=5e-3, **how)
     start = process_time()
     simulate(mech, t_end=5e-3 + 1e-4 * steps, state=warm.final, **how)
