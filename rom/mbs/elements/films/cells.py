@@ -17,7 +17,6 @@ from rom.mbs.kernels.tables import (
     Table,
     table,
 )
-from rom.model import Array, Index
 
 N_MOTIONS = 4  # journal centre x, y and tilt about x, y
 N_ANSWERS = 5  # what works on them, and the friction torque
@@ -127,7 +126,7 @@ def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
     )
 
 
-def _padded(rows: Sequence[Array | Index], n: int) -> Array | Index:
+def _padded(rows: Sequence[Any], n: int) -> Any:
     """Rows of one length, zeros behind."""
     padded: Any = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
     for row, values in zip(padded, rows, strict=True):

@@ -176,7 +176,7 @@ def recall(s, W, journals, k):
     """Tell the film what it remembers; returns its temperature, NaN if that is to be found."""
     at, films = s.coordinates.kind.size + journals.remembered[k], journals.films
     passed = W.signal[journals.clock[0], 0] - W.base[at + TIME]
-    known = W.base[at + KNOWN] == 1.0 and passed >= 0.0
+    known = W.base[at + KNOWN] == 1.0
     films.state[k, PASSED], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
     for cell in range(n_remembered(films, k)):
         films.content[k, cell] = W.base[at + CONTENT + cell]

@@ -135,6 +135,19 @@ def test_backwards_is_the_mirror_image(law):
     assert lost == pytest.approx(power, rel=1e-9)
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_an_aligned_film_does_not_see_tilts(law):
+    """It has the loads of one that is not tilted, and no moments across."""
+    b = bearing(law, grooves=[Groove(1.2, 0.3, 1e5)], aligned=True)
+    upright = np.array([1.0, 1.0, 0.0, 0.0])
+    f = film(b, MOTION * upright, RATE * upright, speed=SPEED, viscosity=VISCOSITY)
+    (on_journal, _), power = (pair := Pair(b)).loads(pair.velocities())
+    assert_allclose(on_journal[:2], f.force[:2], rtol=1e-7)
+    # that of friction is about the axis of the bush
+    assert_allclose(on_journal[3:], [0, 0, -f.friction_torque], atol=1e-9)
+    assert power == pytest.approx(f.dissipated, rel=1e-7)
+
+
 def test_a_film_that_does_not_turn_is_squeezed():
     """Short bearing: p = 6 mu (dh/dt) / h^3 (z^2 - L^2/4); where it opens there is none."""
     e, speed = 0.5, 2e-3
