@@ -205,7 +205,7 @@ def _journal_bearing(entry: Entry) -> None:
 
     values, sizes, oil = entry.values, entry.values.pop("bearing"), entry.values.pop("oil")
     sizes["grooves"] = [Groove(**groove) for groove in sizes["grooves"].values()]
-    sizes["cells"] = tuple(sizes.pop(f"cells_{way}") for way in ("around", "along"))
+    sizes["cells"] = tuple(sizes.pop(f"cells_{axis}") for axis in ("around", "along"))
     lobes, preload, first = (sizes.pop(key) for key in ("lobes", "preload", "first_lobe"))
     sizes["bore"] = multilobe(lobes, preload, first=first) if preload else None
     oil |= {key: 1e6 * oil[key] for key in ("nu_40", "nu_100") if key in oil}  # [mm^2/s]

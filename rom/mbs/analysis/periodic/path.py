@@ -14,9 +14,9 @@ from rom.errors import ConfigError, ModelError, SolverError, reached
 from rom.mbs.analysis.continuation.arc_length import Curve, Point
 from rom.mbs.analysis.periodic.flow import Flow, Start
 from rom.mbs.analysis.periodic.motion import (
+    N_STEPS,
     RHO_INF,
     STABLE_TOL,
-    STEPS,
     PeriodicMotion,
     Shooting,
     periodic_motion,
@@ -36,7 +36,7 @@ FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives ar
 FOLD_RTOL = 1e-3  # of a step; the parameter of a fold then errs by its square
 LOCATION_RTOL = 1e-4  # of a step: multipliers are differences
 LEAST_SIZE_RATIO = 0.1  # of the largest motion so far, below which steps do not shrink with it
-FEW = 4  # coordinates up to which derivatives are cheaper than passes that do without
+MAX_DIRECT = 4  # coordinates up to which derivatives are cheaper than passes that do without
 N_LOOKS = 24  # instants of a motion at which its size is measured
 MAX_POINTS = 100_000
 CROSSING_TOL = 1e-2  # of a multiplier from the unit circle at a motion that is critical
@@ -103,7 +103,7 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     period: Period = None,
     start: State | PeriodicMotion | None = None,
     turns: Mapping[str, float | None] | None = None,
-    steps: int = STEPS,
+    steps: int = N_STEPS,
     rho_inf: float = RHO_INF,
     guess: float | None = None,
     settle: int = 0,
@@ -259,7 +259,7 @@ class _Family:
         found = self.returned(at, p, basis)
         self.last = found
         fresh = found.open < FRESH_RATIO * self.unit <= self.gap
-        few = found.chart.size <= FEW
+        few = found.chart.size <= MAX_DIRECT
         if self.tangent is None or few or fresh or not found.open < GOOD_RATIO * self.gap:
             found = self.differentiate(replace(found, basis=None), p)
         self.gap = found.open

@@ -29,7 +29,7 @@ class Turn:
         body: its number.
         axis: (3,) in its frame [1].
         angle: by which it advances in a period [rad]; None for whatever it does.
-        first, rest: its places in q and v.
+        first, first_velocity: its places in q and v.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Turn:
     axis: Array
     angle: float | None
     first: int
-    rest: int
+    first_velocity: int
 
     def advanced(self, one: State, two: State) -> float:
         """Angle about the axis from one state to another [rad], within half a turn."""
@@ -51,7 +51,7 @@ class Turn:
         What looks the same after the turn has then moved nowhere: its frame is another one, in
         which the same angular velocity has other components.
         """
-        q, rows = state.q.copy(), slice(self.rest + 3, self.rest + 6)
+        q, rows = state.q.copy(), slice(self.first_velocity + 3, self.first_velocity + 6)
         at = slice(self.first + 3, self.first + 7)
         q[at] = rotation.multiply(q[at], rotation.exp(-angle * self.axis))
         R = rotation.matrix(rotation.exp(angle * self.axis))

@@ -24,9 +24,9 @@ N_ANSWERS = 5  # what works on them, and the friction torque
 RADIUS, LENGTH, CLEARANCE, SLENDER, IMAGES, Z_FIRST = range(6)
 # columns of Cells.circle: cosine, sine and bore at the centre of a column, and at the face behind
 COS, SIN, BORE = range(3)
-BEHIND = 3
+BEHIND_FACE = 3
 # columns of Cells.state: motion, its rate, then
-SPIN, PASSED, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
+SPIN_COLUMN, PASSED_TIME, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
 
 
 @table
@@ -121,7 +121,7 @@ def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
         band=np.zeros((k, n, 4 * nz + 1)),
         answer=np.zeros((k, N_ANSWERS)),
         weight=np.zeros((k, n, N_ANSWERS)),
-        slope=np.zeros((k, N_ANSWERS, SPIN + 1)),
+        slope=np.zeros((k, N_ANSWERS, SPIN_COLUMN + 1)),
         **scratch,
     )
 

@@ -12,10 +12,10 @@ from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.films.bearing import JournalBearing
 from rom.mbs.elements.films.cells import CLEARANCE, cells_of
 from rom.mbs.elements.films.journals import (
-    CONTENT,
+    FIRST_CONTENT,
     INLET,
     KNOWN,
-    SETTLES,
+    SETTLING_MARK,
     TEMPERATURE,
     Journals,
     film_tangents,
@@ -181,7 +181,7 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
         rows_of((one.oil for one in films), 9),
         integers([places.clock()]),
         integers(
-            places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLES))
+            places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLING_MARK))
             for name, one in found.items()
         ),
         cells_of([one.bearing for one in films]),
@@ -194,7 +194,7 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
 def _memory(one: OilFilm, known: float) -> Array:
     """What a film remembers at first: the temperature of its inlet, and whether that is known."""
     conserves = one.bearing.cavitation == "jfo"
-    memory = np.zeros(CONTENT + conserves * int(np.prod(one.bearing.cells)))
+    memory = np.zeros(FIRST_CONTENT + conserves * int(np.prod(one.bearing.cells)))
     memory[KNOWN], memory[TEMPERATURE] = known, one.oil[INLET]
     return memory
 

@@ -8,11 +8,11 @@ serves all motions, rates, the spin and the openings of single cells.
 from rom.mbs.elements.films.band import back_substitute_transposed
 from rom.mbs.elements.films.bearing import JFO
 from rom.mbs.elements.films.cells import (
-    BEHIND,
+    BEHIND_FACE,
     IMAGES,
     N_ANSWERS,
     N_MOTIONS,
-    SPIN,
+    SPIN_COLUMN,
     Z_FIRST,
 )
 from rom.mbs.elements.films.pressure import (
@@ -26,7 +26,7 @@ from rom.mbs.elements.films.pressure import (
 )
 from rom.mbs.kernels.compiled import inner, kernel
 
-TORQUE = N_MOTIONS  # number of the last answer
+TORQUE_ANSWER = N_MOTIONS  # number of the last answer
 
 
 @inner
@@ -50,9 +50,11 @@ def set_answers(films, k):
             for m in range(n_motions(films, k)):
                 opened = per_motion(films, k, 0, i, Z, m)
                 films.answer[k, m] += width * dtheta * P * opened
-            shear = films.state[k, SPIN] * films.fill[k, cell] / films.middle[k, cell] * dtheta
+            shear = (
+                films.state[k, SPIN_COLUMN] * films.fill[k, cell] / films.middle[k, cell] * dtheta
+            )
             rise = films.behind[k, cell] - films.behind[k, west]
-            films.answer[k, TORQUE] += width * (shear - 0.5 * P * rise)
+            films.answer[k, TORQUE_ANSWER] += width * (shear - 0.5 * P * rise)
 
 
 @inner
@@ -62,7 +64,7 @@ def set_slopes(films, k):
     w, n = order(films, k), films.shape[k, 0] * films.shape[k, 1]
     back_substitute_transposed(films.band[k], n, w, films.weight[k])
     for m in range(N_ANSWERS):
-        for q in range(SPIN + 1):
+        for q in range(SPIN_COLUMN + 1):
             films.slope[k, m, q] = 0.0
     nt, nz = films.shape[k]
     for i in range(nt):
@@ -90,10 +92,10 @@ def set_weights(films, k):
                 for m in range(n_motions(films, k)):
                     films.weight[k, row, m] = width * dtheta * per_motion(films, k, 0, i, Z, m)
                 rise = films.behind[k, cell] - films.behind[k, west]
-                films.weight[k, row, TORQUE] = -0.5 * width * rise
+                films.weight[k, row, TORQUE_ANSWER] = -0.5 * width * rise
             elif films.law[k] == JFO:
-                shear = films.state[k, SPIN] * dtheta / films.middle[k, cell]
-                films.weight[k, row, TORQUE] = width * shear
+                shear = films.state[k, SPIN_COLUMN] * dtheta / films.middle[k, cell]
+                films.weight[k, row, TORQUE_ANSWER] = width * shear
 
 
 @inner
@@ -104,18 +106,18 @@ def add_shear_slopes(films, k, i, j):
     cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
     width, h = dZ * films.size[k, IMAGES], films.middle[k, cell]
     shear = width * dtheta * films.fill[k, cell] / h
-    films.slope[k, TORQUE, SPIN] += shear
+    films.slope[k, TORQUE_ANSWER, SPIN_COLUMN] += shear
     for m in range(n_motions(films, k)):
-        rise = per_motion(films, k, BEHIND, i, Z, m)
-        rise -= per_motion(films, k, BEHIND, (i - 1) % nt, Z, m)
-        thinner = shear * films.state[k, SPIN] / h * per_motion(films, k, 0, i, Z, m)
-        films.slope[k, TORQUE, m] -= thinner + 0.5 * width * films.P[k, cell] * rise
+        rise = per_motion(films, k, BEHIND_FACE, i, Z, m)
+        rise -= per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
+        thinner = shear * films.state[k, SPIN_COLUMN] / h * per_motion(films, k, 0, i, Z, m)
+        films.slope[k, TORQUE_ANSWER, m] -= thinner + 0.5 * width * films.P[k, cell] * rise
 
 
 @inner
 def carried(films, k, west, east):
     """Filling of what the journal drags from the cell west of a face to that east of it."""
-    return films.fill[k, west] if films.state[k, SPIN] > 0.0 else films.fill[k, east]
+    return films.fill[k, west] if films.state[k, SPIN_COLUMN] > 0.0 else films.fill[k, east]
 
 
 @inner
@@ -126,7 +128,7 @@ def add_cell_slopes(films, k, i, j):
     row, cell, Z = films.place[k, i] * nz + j, i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
     before, P = (i - 1) % nt, films.P[k, cell]
     east, west = (i + 1) % nt * nz + j, before * nz + j
-    h, h_west, spin = films.behind[k, cell], films.behind[k, west], films.state[k, SPIN]
+    h, h_west, spin = films.behind[k, cell], films.behind[k, west], films.state[k, SPIN_COLUMN]
     away, into = 6 * dZ * carried(films, k, cell, east), 6 * dZ * carried(films, k, west, cell)
     by_east = 3 * films.conducts[k, cell] / h * (P - films.P[k, east]) + spin * away
     by_west = 3 * films.conducts[k, west] / h_west * (P - films.P[k, west]) - spin * into
@@ -137,8 +139,8 @@ def add_cell_slopes(films, k, i, j):
     else:
         by_middle = 0.0
     for m in range(n_motions(films, k)):
-        change = by_east * per_motion(films, k, BEHIND, i, Z, m)
-        change += by_west * per_motion(films, k, BEHIND, before, Z, m)
+        change = by_east * per_motion(films, k, BEHIND_FACE, i, Z, m)
+        change += by_west * per_motion(films, k, BEHIND_FACE, before, Z, m)
         opened = per_motion(films, k, 0, i, Z, m)
         change += by_middle * opened
         for end in range(2):
@@ -148,7 +150,7 @@ def add_cell_slopes(films, k, i, j):
             change += by_side * per_motion(films, k, 0, i, Z + (end - 0.5) * dZ, m)
         add_change(films, k, row, m, change)
         add_change(films, k, row, N_MOTIONS + m, by_rate * opened)
-    add_change(films, k, row, SPIN, h * away - h_west * into)
+    add_change(films, k, row, SPIN_COLUMN, h * away - h_west * into)
 
 
 @inner

@@ -12,8 +12,8 @@ from cases.mbs.tangents import difference, shifted
 from rom.components.journal_bearing import film
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
-from rom.mbs.elements.films.cells import SPIN, cells_of
-from rom.mbs.elements.films.journals import CONTENT, KNOWN, TIME
+from rom.mbs.elements.films.cells import SPIN_COLUMN, cells_of
+from rom.mbs.elements.films.journals import FIRST_CONTENT, KNOWN, TIME
 from rom.mbs.elements.films.slopes import solve_film
 from rom.rotation import matrix
 
@@ -181,7 +181,7 @@ def test_without_spin_and_motion_nothing_happens():
 def solved(b, opening=0.0, opening_rate=0.0, **state):
     """Pressure and answers of the cells of one film, in their units."""
     films = cells_of([b])
-    films.state[0, SPIN] = 1.0
+    films.state[0, SPIN_COLUMN] = 1.0
     films.opening[0], films.opening_rate[0] = np.ravel(opening), np.ravel(opening_rate)
     for at, values in state.items():
         films.state[0, {"motion": slice(4), "rate": slice(4, 8)}[at]] = values
@@ -208,7 +208,7 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
     bump[7] = 0.05
     angle, h = bearing().grid.angle, {}
     films = cells_of([bearing()])
-    films.opening[0], films.state[0, :4], films.state[0, SPIN] = bump.ravel(), motion, 1.0
+    films.opening[0], films.state[0, :4], films.state[0, SPIN_COLUMN] = bump.ravel(), motion, 1.0
     assert solve_film(films, 0, 1.0) > 0
     for face, cells in ((0, films.middle), (1, films.behind)):
         c, s, Z = angle[face, :, :1], angle[face, :, 1:], bearing().grid.Z
@@ -233,7 +233,7 @@ def test_tangents_are_the_derivatives(law, spin, passed):
     first = len(packed.places.coordinates)
     W.base[first:] = W.fresh
     W.base[first + KNOWN], W.base[first + TIME] = float(passed > 0.0), -passed
-    W.base[first + CONTENT :] *= 0.97
+    W.base[first + FIRST_CONTENT :] *= 0.97
 
     def force(dq, dv):
         residual_at(packed.system, W, shifted(packed, packed.q, dq), v + dv, 0 * v, NONE)
