@@ -18,7 +18,8 @@ LONG_DEMOS = {
     "demo_planetary",
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
     "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_snap_through",
-    "demo_spin_up", "demo_transmission", "demo_updating", "demo_whole_turbine", "demo_wind_turbine",
+    "demo_spin_up", "demo_transmission", "demo_two_stage", "demo_updating", "demo_whole_turbine",
+    "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
@@ -65,6 +66,7 @@ LEFT_BEHIND = {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
     },
     "demo_transmission": {"transmission.png", "transmission_fields.png"},
+    "demo_two_stage": {"two_stage.png"},
 }  # fmt: skip
 
 
