@@ -177,7 +177,7 @@ say(rom.audit(motion))
 
 
 def on_path(stage):
-    """Where teeth touch: line by line, places (k, 3), load per length (k,) and its direction."""
+    """Where teeth touch: line by line, places (k, 3) and load per length (k,)."""
     pair, x = PAIRS[stage], teeth[stage]
     z, at = (Y, "input") if stage == "first stage" else (-Y, "middle")
     right = np.array([1.0, 0, 0])
@@ -190,7 +190,7 @@ def on_path(stage):
         use = np.abs(x.place - place) < 1e-8
         order = np.argsort(x.height[use])
         height, load = (v[use][order] for v in (x.height, x.force / x.length))
-        yield start + place * n + height[:, None] * z, load, n * np.sign(n[2])
+        yield start + place * n + height[:, None] * z, load
 
 
 def fence(line, heights, way):
@@ -233,7 +233,8 @@ def solid(name, turned=0.0):
 
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
-    walls = [fence(line, 3e-6 * load, way) for stage in PAIRS for line, load, way in on_path(stage)]
+    walls = [fence(line, 3e-6 * load, np.array([0, 0, 1.0]))
+             for stage in PAIRS for line, load in on_path(stage)]  # fmt: skip
     case = view.meshed(housing_model)["_surface"]
     lower = case.cells[case.points[case.cells, 2].mean(axis=1) < HEIGHT]
     things = {
@@ -241,8 +242,8 @@ if first:
             case.points, lower, "#c9d1da", opacity=0.35, edges=np.zeros((0, 2), dtype=int)
         ),
         **{f"{name} shaft": solid(name) for name in PLACE},
-        "load on the teeth": view.Thing(*view.joined(walls), "#7b2cbf"),
-        "oil pressure": view.Thing(*view.joined([pressure(x) for x in FILMS]), "#e36414"),
+        "load on the teeth": view.Thing(*view.joined(walls), "#edae49"),
+        "oil pressure": view.Thing(*view.joined([pressure(x) for x in FILMS]), "#66a182"),
     }
     scene = view.Scene("The machine at rest in its films", things, view=(-0.8, -0.55, 0.75),
                        up=(0, 0, 1))  # fmt: skip
