@@ -212,7 +212,8 @@ def other(speed, films):
 
 plain, apart = replace(Films(), law="reynolds"), []
 for w in np.array([2500, 4250, 6000]) * np.pi / 30:
-    here, there = run(w, plain, oil=0.02), steady(rest(other(w, plain)), steps=STEPS)
+    here, stands = run(w, plain, oil=0.02), rest(other(w, plain))
+    there = steady(stands, steps=STEPS)
     apart.append(here.load_factor / there.load_factor - 1)
     say(f"{30 * w / np.pi:.0f} turns a minute: load factor {here.load_factor:.4f}, "
         f"by the other program {there.load_factor:.4f}")  # fmt: skip
@@ -371,7 +372,10 @@ drag = sum(films[f"gear {end}"].power[0] for end in SEATS) * TEETH[1] / TEETH[0]
 drag /= RPM[MIDDLE] * np.pi / 30
 hot = films["pinion near"]
 rise = 0.9 * 0.5 * hot.power[0] / (OIL.density * OIL.heat * hot.side_flow[0])
+theirs = stands.forces.films[2].motion[:2]  # of the gear, from the other end
 results = {
+    "journal of the gear, 1 + way to that of the other program / clearance": (
+        1 + np.linalg.norm(here.journal("gear near") - theirs * (1, -1)) / 5e-5, 1.0, 2e-3),
     "load factor over that of the other program, worst": (1 + max(apart, key=abs), 1.0, 0.02),
     "films carry the shafts [N]": (carried, 9.81 * sum(body(z)[0] for z in TEETH), 1e-6),
     "mean force between the teeth [N]": (
