@@ -13,6 +13,7 @@ from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
+from rom.mbs.elements.round_bodies.spins import SPINS_FAMILY
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, initial_state
 from rom.mbs.mechanism import Mechanism
@@ -237,12 +238,18 @@ class _Search:
                 f"({len(free)} free motions): there is no unique equilibrium.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        if weakest.squares.size and weakest.squares[0] < 0.0 and not self.spins.any:
+        if weakest.squares.size and weakest.squares[0] < 0.0 and self.statics_decide:
             motion = _described(self.now.packed, weakest.motions[:, 0])
             warn(
                 f"the equilibrium is unstable: {motion} and falls away at a rate of "
                 f"{np.sqrt(-weakest.squares[0]):.3g} 1/s."
             )
+
+    @property
+    def statics_decide(self) -> bool:
+        """Whether stiffness alone says what is stable: nothing spins, no film pushes around."""
+        packed = self.now.packed
+        return not (self.spins.any or packed.room or SPINS_FAMILY in packed.elements)
 
     def along_spin(self, motion: Array, state: State) -> bool:
         """Whether a free motion is the steady rotation itself."""

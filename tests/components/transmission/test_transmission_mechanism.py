@@ -1,5 +1,6 @@
 """A gear unit as a mechanism, of shafts that spin in frames which do not: as its own program."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.geared_rotors import SPAN, as_mechanism, rigid_unit
+from rom.components.journal_bearing import Groove
 from rom.components.transmission import rest, whirl
 from rom.rotation import log
 
@@ -37,6 +39,24 @@ def test_shafts_rest_on_films_and_teeth_where_they_do_in_the_unit(more):
     found = coordinates(there.unit, state)
     assert_allclose(found[[0, 1, 5, 6, 7, 11]], there.q[[0, 1, 5, 6, 7, 11]], rtol=1e-8)
     assert_allclose(found, there.q, atol=1e-8 * np.abs(there.q).max())
+
+
+@pytest.mark.parametrize("beyond", [-90, 90, 150])
+def test_shafts_rest_on_films_that_conserve_their_oil_wherever_it_comes_in(beyond, recwarn):
+    """From the middle of the bushes, where films begin to fill; they are no unstable springs."""
+    unit = rigid_unit(gravity=(0.0, -9.81))
+    push, rotors = rest(unit).forces.mesh.force, []
+    for rotor, side in ((unit.pinion, 1), (unit.gear, -1)):
+        at = np.arctan2(push[1], side * push[0]) + np.radians(beyond)
+        inlet = [Groove(at, np.radians(20))]
+        oiled = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
+        rotors.append(replace(rotor, bearings=oiled))
+    unit = replace(unit, pinion=rotors[0], gear=rotors[1])
+    mech = as_mechanism(unit)
+    found = coordinates(unit, rom.equilibrium(mech))
+    wanted = rest(unit).q
+    assert_allclose(found, wanted, atol=1e-7 * np.abs(wanted).max())
+    assert not recwarn.list
 
 
 def test_helical_wheels_tilt_as_in_the_unit():
