@@ -30,7 +30,9 @@ from rom.mbs.kernels.tables import Array1, Array4, Index2, Scratch2, Table, tabl
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 
-MIN_FIT = 0.02  # of the deformation, which harmonics and polynomials may miss without a word
+MAX_MISSED_RATIO = (
+    0.02  # of the deformation, which harmonics and polynomials may miss without a word
+)
 MOST_HARMONICS, MOST_ORDER = 12, 8  # of a surface whose functions do not say how many it has
 
 
@@ -102,7 +104,7 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     S = patch.surface_mass
     C = np.linalg.lstsq(B.T @ (S @ B), B.T @ (S @ w), rcond=1e-10)[0]
     missed = _share_missed(S, w, w - B @ C)
-    if missed > MIN_FIT:
+    if missed > MAX_MISSED_RATIO:
         warn(
             f"{100 * missed:.0f} % of the deformation of interface {marker.place!r} of body "
             f"{part.name!r} is in no harmonic up to {harmonics} and no polynomial up to {order}, "

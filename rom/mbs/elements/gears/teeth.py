@@ -360,11 +360,8 @@ def set_gradient(size, one, side, state, rates):
     one[FIRST_GRADIENT + TURN_1] = lead * side * base + one[DEPTH_AT] * rates[0]
     one[FIRST_GRADIENT + TURN_2] = lead * side * size[RB_2]
     one[FIRST_GRADIENT + DISTANCE] = one[DEPTH_AT] * rates[1] + one[DEPTH_FIRST] * rates[2] - opened
-    one[FIRST_GRADIENT + SHIFT], one[FIRST_GRADIENT + TILT_C], one[FIRST_GRADIENT + TILT_T] = (
-        side * slope,
-        -m_c,
-        -m_t,
-    )
+    one[FIRST_GRADIENT + SHIFT] = side * slope
+    one[FIRST_GRADIENT + TILT_C], one[FIRST_GRADIENT + TILT_T] = -m_c, -m_t
 
 
 @inner
