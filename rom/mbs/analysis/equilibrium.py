@@ -13,7 +13,6 @@ from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
-from rom.mbs.elements.round_bodies.spins import SPINS_FAMILY
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, initial_state
 from rom.mbs.mechanism import Mechanism
@@ -150,7 +149,7 @@ class _Search:
             equations = beyond or self.tangent(now, state)
             found = None
             # forces that go around, as those of films, have no potential that curves
-            straight = equations.newton if now.packed.room else None
+            straight = None if now.packed.has_potential else equations.newton
             if straight is None and trials and not equations.rises:
                 found, trials = self.tried(now, state, equations), trials - 1
             if found is None:
@@ -248,8 +247,7 @@ class _Search:
     @property
     def statics_decide(self) -> bool:
         """Whether stiffness alone says what is stable: nothing spins, no film pushes around."""
-        packed = self.now.packed
-        return not (self.spins.any or packed.room or SPINS_FAMILY in packed.elements)
+        return self.now.packed.has_potential and not self.spins.any
 
     def along_spin(self, motion: Array, state: State) -> bool:
         """Whether a free motion is the steady rotation itself."""

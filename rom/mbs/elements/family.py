@@ -235,6 +235,8 @@ class Family:
         by_rate: table -> whether the forces depend on velocities.
         complete: whether its tangents have all of their changes with the position, those of rates
             at given velocities too.
+        potential: whether its forces, dampers aside, follow from a potential; those of films and of
+            what spins go around.
         loaded_rows: table -> constraint rows whose multipliers they depend on.
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
         answers: table -> (e, ...) what each law of a user answered last, None if there is none.
@@ -255,6 +257,7 @@ class Family:
     couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
     by_rate: Callable[[Any], bool] = always
     complete: bool = False
+    potential: bool = True
     loaded_rows: Callable[[Any], Index] = no_rows
     asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
     answers: Callable[[Any], Sequence[Any]] = no_answers

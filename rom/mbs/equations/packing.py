@@ -100,6 +100,11 @@ class Packed:
         )
 
     @property
+    def has_potential(self) -> bool:
+        """Whether forces of elements, dampers aside, follow from a potential."""
+        return all(family.potential for family in self.elements)
+
+    @property
     def room(self) -> dict[str, float]:
         """Gaps of elements at the last residual, over those in the middle [1]."""
         return {

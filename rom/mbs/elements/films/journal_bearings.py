@@ -201,7 +201,7 @@ def _memory(one: OilFilm, known: float) -> Array:
 
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    complete=True, answers=lambda journals: journals.largest,
+    complete=True, potential=False, answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
 )  # fmt: skip

@@ -102,5 +102,5 @@ def spin_tangents(s: Any, W: Any, spins: Any, _lam: Any, ck: Any, cc: Any) -> No
 
 SPINS_FAMILY = Family(
     "spins", Spin, pack, spin_forces, spin_tangents, ends=on_joint, outside=from_outside,
-    couples=apart, complete=True,
+    couples=apart, complete=True, potential=False,
 )  # fmt: skip
