@@ -202,7 +202,7 @@ class _Family:
         first: the first motion.
         span: change of the parameter that counts as one.
         scale: (n,) motion of each coordinate that counts as one.
-        advance: (n,) mean velocities of the bodies in the last motion.
+        advance: (n,) by how much bodies advance in a period.
         unit: size of the motion, in which steps are measured.
         tangent, by_p: derivatives of the last motion that was differentiated, by its coordinates
             and by the parameter.
@@ -330,17 +330,17 @@ class _Family:
         """Largest part of a step, in sizes of the motion."""
         return float(np.abs(step).max(initial=0.0)) / self.unit
 
-    def mean_speed(self, motion: PeriodicMotion) -> Array:
-        """(n,) mean velocities of bodies that advance by as much in every period."""
+    def advanced(self, motion: PeriodicMotion) -> Array:
+        """(n,) by how much bodies advance in a period: by as much at every parameter."""
         s, bodies = motion.solution, motion.solution.packed.system.bodies
-        mean, out = trapezoid(s.v, s.t, axis=0) / motion.period, np.zeros_like(self.scale)
+        mean, out = trapezoid(s.v, s.t, axis=0), np.zeros_like(self.scale)
         rigid = (bodies.v_at[:, None] + np.arange(6)).ravel()
         out[rigid] = 0.0 if self.free else mean[rigid]
         return out
 
     def faster(self, before: float, after: float) -> Array:
         """(n,) change of velocities with which bodies advance by as much in another period."""
-        return (before / after - 1.0) * self.advance
+        return (1.0 / after - 1.0 / before) * self.advance
 
     def measure(self, motion: PeriodicMotion, flow: Flow, turns: Turns) -> float:
         """How far a motion goes from its start, in rad or lengths of the mechanism."""
@@ -424,7 +424,7 @@ class _March:
         size = family.measure(motion, flow, family.turning(flow, point.at.start))
         most = LEAST_SIZE_RATIO * (family.unit if len(self.motions) > 1 else 0.0)
         family.unit, family.gap = max(size, most) or 1.0, np.inf
-        family.advance = family.mean_speed(motion)
+        family.advance = family.advanced(motion)
         if self.progress:
             word = "stable" if motion.stable else "unstable"
             line(f"motion {len(self.p)} at {point.p:.6g}: {word}")
