@@ -34,6 +34,8 @@ CLOSED_TOL = 1e-7  # corrections that count as none, of the size of the motion
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives are asked for
 FOLD_RTOL = 1e-3  # of a step; the parameter of a fold then errs by its square
+END_RTOL = 1e-9  # the same of the end of the span
+END_TOL = 1e-6  # of the span
 LOCATION_RTOL = 1e-4  # of a step: multipliers are differences
 LEAST_SIZE_RATIO = 0.1  # of the largest motion so far, below which steps do not shrink with it
 FEW = 4  # coordinates up to which derivatives are cheaper than passes that do without
@@ -384,15 +386,14 @@ class _March:
         try:
             for one, h, two in self.curve.steps(point, longest):
                 bound = float(np.clip(two.p, low, high))
-                if two.p != bound:
-                    h, two = self.curve.located(
-                        one, h, lambda x: x.p - bound, LOCATION_RTOL)  # noqa: B023  # fmt: skip
-                before = self.motions[-1]
+                leaves = two.p != bound
+                if leaves:
+                    h, two = self.curve.located(one, h, lambda x: x.p - bound, END_RTOL)  # noqa: B023
+                if leaves and abs(two.p - bound) > END_TOL * family.span:
+                    return  # teeth that come or go between hide the way there
                 self.add(two)
-                self.between(one, h, two, before, self.motions[-1])
-                if bound in (low, high) and abs(two.p - bound) < 1e-4 * family.span:
-                    return
-                if len(self.motions) == n:
+                self.between(one, h, two, *self.motions[-2:])
+                if leaves or len(self.motions) == n:
                     return
         except SolverError as error:
             raise SolverError(
