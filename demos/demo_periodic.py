@@ -131,10 +131,9 @@ spring = view.Panel(
 )  # fmt: skip
 teeth = view.Panel(
     "A pair of gears", "speed of the pinion [rad/s]", "error of transmission [micrometre]",
-    curves={f"{name}, {word}": line
-            for name, path, y in (("from above", down, error_down), ("from below", up, error_up))
-            for word, line in branches(path.p, y, path.stable).items()
-            if np.isfinite(line[1]).any()},
+    curves={"from above, stable": branches(down.p, error_down, down.stable)["stable"],
+            "unstable": branches(up.p, error_up, up.stable)["unstable"],
+            "from below, stable": branches(up.p, error_up, up.stable)["stable"]},
     points={"teeth part": (np.r_[down.p[apart_down], up.p[apart_up]],
                            np.r_[error_down[apart_down], error_up[apart_up]])},
 )  # fmt: skip
