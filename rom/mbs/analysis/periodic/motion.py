@@ -30,6 +30,7 @@ RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
 GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 MAX_PASSES = 60
+MAX_WEAK = 1.0  # rad or lengths of the mechanism of a correction in what a period hardly changes
 MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
 MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
 MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
@@ -178,7 +179,7 @@ class Shooting:
         free = self.period is None
         gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
         rate = found.rate if free else None
-        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap)[0], None
+        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap, most=MAX_WEAK)[0], None
         for _ in range(MAX_SHORTENINGS):
             try:
                 flow, y = found.flow, answer
@@ -253,8 +254,9 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         start: state, equilibrium or motion nearby from which it is looked for; None for where the
             bodies were added. A motion that nothing drives begins in a state that moves.
         turns: {joint or body: angle [rad]} by which it has advanced after the period when it looks
-            the same again, as a gear by one tooth pitch; None as the angle for a body that looks
-            the same after any. Whole turns need not be told.
+            the same again, as a gear by one tooth pitch, counted as the angle of the joint is, or
+            along its spin for a body without one; None as the angle for a body that looks the same
+            after any. Whole turns need not be told.
         steps: of generalised-alpha in a period.
         rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
             motion is conservative.
