@@ -215,8 +215,9 @@ def test_a_driven_double_pendulum_has_the_multipliers_of_lagrange_s_equations():
     assert_allclose(fine.solution.joint("hinge 0").angle[0], y[0], rtol=1e-3)
     better = fine.multipliers + (fine.multipliers - coarse.multipliers) / 3
     assert_allclose(better, exact, atol=2e-6)
+    rough = rom.periodic_motion(double_pendulum(), period=T, steps=40).solution
+    assert_allclose(rough.v[-1], rough.v[0], atol=1e-9)  # across the joints, too
     s = fine.solution
-    assert_allclose(s.v[-1], s.v[0], atol=1e-9)  # across the joints, too
     assert_allclose(s.reaction("hinge 0")[-1], s.reaction("hinge 0")[0], atol=1e-4)
     assert np.abs(fine.multipliers - exact).max() < 2e-3
 
@@ -371,11 +372,11 @@ def test_a_ball_that_rolls_has_more_free_positions_than_velocities():
     for name, side in (("west", -X), ("east", X), ("south", -Y), ("north", Y)):
         end = mech.ground.marker(np.array([0, 0, r]) + 1e3 * side)
         mech.spring_damper(name, end, center, stiffness=k / 2, damping=c / 2)
-    mech.force("push", center, lambda t: (np.cos(w * t), 0, 0))
+    mech.force("push", center, lambda t: (0.02 * np.cos(w * t), 0, 0))
     found = rom.periodic_motion(mech, period=2 * np.pi / w, steps=400)
-    amplitude = 1 / abs(k - 1.4 * w**2 + 1j * c * w)
+    amplitude = 0.02 / abs(k - 1.4 * w**2 + 1j * c * w)
     assert np.ptp(way(found)) / 2 == pytest.approx(amplitude, rel=1e-3)
     assert found.multipliers.size == 5 + 3
     decay = np.exp(-c / 2.8 * found.period)
-    assert_allclose(np.sort(np.abs(found.multipliers))[:4], decay, rtol=5e-3)
-    assert_allclose(np.sort(np.abs(found.multipliers))[4:], 1.0, atol=1e-4)
+    assert_allclose(np.sort(np.abs(found.multipliers))[:4], decay, rtol=3e-4)
+    assert_allclose(np.sort(np.abs(found.multipliers))[4:], 1.0, atol=2e-2)
