@@ -139,10 +139,11 @@ teeth = view.Panel(
 )  # fmt: skip
 view.panels(
     [[spring, teeth]], options.out / "periodic.png", title="Motions that repeat",
-    caption="Left: a mass between two springs across its way, pushed harmonically; between the "
-    "folds the motion of middle amplitude is unstable. Right: a spur pair through the resonance of "
-    "its mesh, from high speed and from low: where teeth part the mesh gets softer, so that the "
-    "curve leans to lower speeds and has an unstable part between the two that last.",
+    caption="Left: a mass between two springs across its way, driven by a harmonic force; between "
+    "the folds the motion of middle amplitude is unstable. Right: a spur pair of 26 and 40 teeth "
+    "through the resonance of its mesh, from high speed and from low; error of transmission is the "
+    "vibration of the gear on its base circle, peak to peak. Where teeth part (circles) the mesh "
+    "is softer on average: the curve leans to lower speeds and is unstable between two that last.",
 )  # fmt: skip
 
 # ## What to remember

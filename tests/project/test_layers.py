@@ -208,6 +208,7 @@ ORDER = {
     "mbs.elements": (
         "family",
         "pair_motion",
+        "cylinders",
         "springs",
         "rotational_springs",
         "loads",
@@ -226,6 +227,8 @@ ORDER = {
         "tendons",
         "gears",
         "rolling",
+        "films",
+        "round_bodies",
     ),
     "reduction": (
         "bases",

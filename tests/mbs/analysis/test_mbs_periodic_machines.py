@@ -32,7 +32,7 @@ def geared(speed, inertia=((1e-3, 1e-3, 2e-3), (5e-3, 5e-3, 9e-3)), torque=80.0,
         ends.append(part)
     flanks = Correction(relief=(1e-5, 1e-5), extent=(2e-3, 2e-3))
     mech.gear_mesh("mesh", *ends, axis=Z, pair=PAIR,
-                   **{"stiffness": 1.3e10, "entry": 0.05, "damping": 5e-6,
+                   **{"stiffness": 1.3e10, "entry": 0.05, "damping": 5e-6, "conservative": False,
                       "correction": flanks} | more)  # fmt: skip
     mech.drive("speed", "pinion axle", lambda t: speed * t, rate=lambda t: speed + 0 * t,
                acceleration=lambda t: 0 * t)  # fmt: skip

@@ -19,7 +19,7 @@ from rom.model import Array
 PARAMETER_STEP = 1e-6  # of differences, of the span
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives are asked for
-FEW = 4  # coordinates up to which derivatives are cheaper than passes that do without
+MAX_DIRECT = 4  # coordinates up to which derivatives are cheaper than passes that do without
 N_LOOKS = 24  # instants of a motion at which its size is measured
 Period = float | Callable[[float], float] | None
 
@@ -126,7 +126,7 @@ class Family:
         found = self.returned(at, p, basis)
         self.last = found
         fresh = found.open < FRESH_RATIO * self.unit <= self.gap
-        few = found.chart.size <= FEW
+        few = found.chart.size <= MAX_DIRECT
         if self.tangent is None or few or fresh or not found.open < GOOD_RATIO * self.gap:
             found = self.differentiate(replace(found, basis=None), p)
         self.gap = found.open

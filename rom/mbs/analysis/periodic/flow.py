@@ -31,7 +31,7 @@ from rom.model import Array
 
 # of Newton's method in a step, of what accelerations move: derivatives are differences of ends
 STEP_TOLERANCE = 1e-13
-LAWS = "laws"  # owner of the only numbers that elements remember and that are no angles
+LAWS_OWNER = "laws"  # owner of the only numbers that elements remember and that are no angles
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Flow:
         """Where `State.base` has what laws of the user remember."""
         remembered, at = self.packed.places.remembered, self.packed.system.coordinates.kind.size
         for owner, numbers in remembered.items():
-            if owner == LAWS:
+            if owner == LAWS_OWNER:
                 return slice(at, at + numbers.size)
             at += numbers.size
         return slice(at, at)

@@ -21,7 +21,7 @@ from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.process.progress import line
 
-STEPS, MAX_STEPS = 200, 100_000  # per period
+N_STEPS, MAX_STEPS = 200, 100_000  # per period
 # the method forgets what a step does not resolve within a period; motions that keep their energy
 # must not lose it to the method
 RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
@@ -231,7 +231,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     period: float | None = None,
     start: State | PeriodicMotion | None = None,
     turns: Mapping[str, float | None] | None = None,
-    steps: int = STEPS,
+    steps: int = N_STEPS,
     rho_inf: float | None = None,
     guess: float | None = None,
     conservative: bool = False,

@@ -14,9 +14,9 @@ from rom.mbs.analysis.continuation.arc_length import Curve, Point
 from rom.mbs.analysis.periodic.family import Family, Period, period_at
 from rom.mbs.analysis.periodic.flow import Flow
 from rom.mbs.analysis.periodic.motion import (
+    N_STEPS,
     RHO_INF,
     STABLE_TOL,
-    STEPS,
     PeriodicMotion,
     periodic_motion,
 )
@@ -96,7 +96,7 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     period: Period = None,
     start: State | PeriodicMotion | None = None,
     turns: Mapping[str, float | None] | None = None,
-    steps: int = STEPS,
+    steps: int = N_STEPS,
     rho_inf: float = RHO_INF,
     guess: float | None = None,
     settle: int = 0,

@@ -75,10 +75,10 @@ def _beyond(flow: Flow, turns: Turns, name: str, change: Array) -> Array:
     row = flow.mechanism.joints[drive.joint].coordinate
     if row is None or row.kind != ANGLE:
         return change
-    told = turns.of(drive.joint)
-    if told is None:
+    prescribed = turns.of(drive.joint)
+    if prescribed is None:
         return change - change[0]
-    return np.asarray((change - told + np.pi) % FULL_TURN - np.pi)
+    return np.asarray((change - prescribed + np.pi) % FULL_TURN - np.pi)
 
 
 def _refuse_forces(flow: Flow, start: Start, shift: float, driven: bool) -> None:

@@ -24,7 +24,7 @@ from rom.model import Array
 
 # of a start, in rad or lengths of the mechanism: 1e-14 of round-off is 1e-7 of a derivative, and
 # the deflection of teeth and races is still resolved
-PROBE = 1e-7
+PROBE_RTOL = 1e-7
 SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
 WEAK_RTOL = 1e-2  # singular values of motions that hardly decay or return in a period
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
@@ -182,11 +182,11 @@ class Return:
             SolverError: if a step fails.
         """
         chart, columns = self.chart, []
-        for e in np.eye(chart.size) * PROBE:
+        for e in np.eye(chart.size) * PROBE_RTOL:
             one, two = (Return.of(self.flow, self.turns, chart.moved(x)) for x in (e, -e))
             pairs = (one.start.state, two.start.state), (one.turned, two.turned)
             columns.append([chart.of_state(x) - chart.of_state(y) for x, y in pairs])
-        both = np.array(columns).reshape(chart.size, 2, chart.size) / (2 * PROBE)
+        both = np.array(columns).reshape(chart.size, 2, chart.size) / (2 * PROBE_RTOL)
         return Tangent(self, both[:, 0].T, both[:, 1].T)
 
 
@@ -218,8 +218,8 @@ class Tangent:
         return np.array(
             [
                 (energy(mechanism, chart.moved(e)) - energy(mechanism, chart.moved(-e)))
-                / (2 * PROBE)
-                for e in np.eye(chart.size) * PROBE
+                / (2 * PROBE_RTOL)
+                for e in np.eye(chart.size) * PROBE_RTOL
             ]
         )
 

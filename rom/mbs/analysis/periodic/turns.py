@@ -29,17 +29,17 @@ class Turn:
         body: its number.
         axis: (3,) in its frame [1].
         angle: by which it advances in a period about the axis [rad]; None for whatever it does.
-        told: the same as the angle of the joint counts.
-        first, rest: its places in q and v.
+        prescribed: the same as the angle of the joint counts.
+        first, first_velocity: its places in q and v.
     """
 
     name: str
     body: int
     axis: Array
     angle: float | None
-    told: float | None
+    prescribed: float | None
     first: int
-    rest: int
+    first_velocity: int
 
     def advanced(self, one: State, two: State) -> float:
         """Angle about the axis from one state to another [rad], within half a turn."""
@@ -53,7 +53,7 @@ class Turn:
         What looks the same after the turn has then moved nowhere: its frame is another one, in
         which the same angular velocity has other components.
         """
-        q, rows = state.q.copy(), slice(self.rest + 3, self.rest + 6)
+        q, rows = state.q.copy(), slice(self.first_velocity + 3, self.first_velocity + 6)
         at = slice(self.first + 3, self.first + 7)
         q[at] = rotation.multiply(q[at], rotation.exp(-angle * self.axis))
         R = rotation.matrix(rotation.exp(angle * self.axis))
@@ -86,7 +86,7 @@ class Turns:
 
     def of(self, joint: str) -> float | None:
         """Angle by which the drive of a joint may advance; zero for others, None for any."""
-        found = [turn.told for turn in self.every if turn.name == joint]
+        found = [turn.prescribed for turn in self.every if turn.name == joint]
         return found[0] if found else 0.0
 
 
