@@ -89,8 +89,8 @@ def equilibrium(
     found = search.start(state)
     with reached(lambda: found):
         nearby = search.eased(found, steps) if state is None else None
-        way = search.loaded(found, steps) if nearby is None else iter((nearby,))
-        for at_load in way:
+        loads = search.loaded(found, steps) if nearby is None else iter((nearby,))
+        for at_load in loads:
             found = at_load
         search.judge(found)
     return found
