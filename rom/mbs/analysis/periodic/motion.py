@@ -256,7 +256,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         turns: {joint or body: angle [rad]} by which it has advanced after the period when it looks
             the same again, as a gear by one tooth pitch, counted as the angle of the joint is, or
             along its spin for a body without one; None as the angle for a body that looks the same
-            after any. Whole turns need not be told.
+            after any. Whole turns need no mention.
         steps: of generalised-alpha in a period.
         rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
             motion is conservative.
@@ -276,7 +276,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     Raises:
         ConfigError: for a wrong argument, or a name that is neither a joint nor a body.
         ModelError: naming a drive or load that does not repeat with the period, or a body that
-            looks different after the turn that is told; or if joints contradict each other.
+            looks different after the turn that is given; or if joints contradict each other.
         SolverError: if a step fails, or no such motion is found; ``error.solution`` is then the
             last attempt.
 
