@@ -30,7 +30,6 @@ RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
 GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 MAX_PASSES = 60
-MAX_WEAK = 1.0  # rad or lengths of the mechanism of a correction in what a period hardly changes
 MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
 MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
 MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
@@ -179,7 +178,7 @@ class Shooting:
         free = self.period is None
         gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
         rate = found.rate if free else None
-        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap, most=MAX_WEAK)[0], None
+        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap)[0], None
         for _ in range(MAX_SHORTENINGS):
             try:
                 flow, y = found.flow, answer
