@@ -203,6 +203,21 @@ def _rolling_bearing(entry: Entry) -> None:
     entry.made.rolling_bearing(entry.name, *entry.ends, bearing=made(**values), **how)
 
 
+def _journal_bearing(entry: Entry) -> None:
+    from rom.mbs.elements.films.bearing import Groove, JournalBearing, multilobe
+    from rom.mbs.elements.films.oil import Oil, iso_vg
+
+    values, sizes, oil = entry.values, entry.values.pop("bearing"), entry.values.pop("oil")
+    sizes["grooves"] = [Groove(**groove) for groove in sizes["grooves"].values()]
+    sizes["cells"] = tuple(sizes.pop(f"cells_{axis}") for axis in ("around", "along"))
+    lobes, preload, first = (sizes.pop(key) for key in ("lobes", "preload", "first_lobe"))
+    sizes["bore"] = multilobe(lobes, preload, first=first) if preload else None
+    oil |= {key: 1e6 * oil[key] for key in ("nu_40", "nu_100") if key in oil}  # [mm^2/s]
+    makes: dict[str, Any] = {"constant": lambda viscosity: viscosity, "grade": iso_vg, "oil": Oil}
+    values |= {"bearing": JournalBearing(**sizes), "oil": makes[oil.pop("kind")](**oil)}
+    entry.made.journal_bearing(entry.name, *entry.ends, **values)
+
+
 def _tendon(entry: Entry) -> None:
     from rom.mbs.elements.tendons.tendons import Pulley
 
@@ -291,6 +306,7 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "contacts": _contact,
     "gear_meshes": _gear_mesh,
     "rolling_bearings": _rolling_bearing,
+    "journal_bearings": _journal_bearing,
     "tendons": _tendon,
     "laws": _law,
     "events": _event,

@@ -203,6 +203,7 @@ ORDER = {
         "inverse_dynamics",
         "law_check",
         "continuation",
+        "periodic",
     ),
     "mbs.elements": (
         "family",
@@ -226,6 +227,8 @@ ORDER = {
         "tendons",
         "gears",
         "rolling",
+        "films",
+        "round_bodies",
     ),
     "reduction": (
         "bases",

@@ -1,5 +1,7 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -94,8 +96,30 @@ class Packed:
 
     @property
     def by_rate(self) -> bool:
-        """Whether any force of an element depends on velocities."""
-        return any(family.by_rate(table) for family, table in self.elements.items())
+        """Whether forces depend on rates in a way that the tangents do not know completely."""
+        return any(
+            not family.complete and family.by_rate(table) for family, table in self.elements.items()
+        )
+
+    @property
+    def has_potential(self) -> bool:
+        """Whether forces of elements, dampers aside, follow from a potential."""
+        return all(family.potential for family in self.elements)
+
+    @contextmanager
+    def eased(self) -> Iterator[bool]:
+        """Elements come to rest more easily, as long as this lasts; says whether some do."""
+        with ExitStack() as stack:
+            yield any([stack.enter_context(f.eased(table)) for f, table in self.elements.items()])
+
+    @property
+    def room(self) -> dict[str, float]:
+        """Gaps of elements at the last residual, over those in the middle [1]."""
+        return {
+            name: float(left)
+            for family, table in self.elements.items()
+            for name, left in zip(self.element_names[family], family.room(table), strict=False)
+        }
 
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 
 from cases.solid import CORNERS, GAUSS, STEEL, shape_functions
-from rom.model import FEModel, Interface
+from rom.model import FEModel, Interface, SurfaceMesh
 
 STEPS = ((CORNERS + 1) / 2).astype(int)  # of a corner in radius, angle, height
 QUAD = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -46,7 +46,9 @@ def tube(inner=0.02, outer=0.035, length=0.08, cells=(24, 2, 6), material=STEEL)
     turned = np.concatenate([number, number[:1]])
     faces = {"rim": turned[:, -1, 1:-1], "bore": turned[:, 0, 1:-1], "low": turned[:, :, 0],
              "high": turned[:, :, -1]}  # fmt: skip
-    return FEModel(K, M, points, {name: _interface(name, x, points) for name, x in faces.items()})
+    outside = turned[:, -1], turned[:, ::-1, 0], turned[:, :, -1], turned[::-1, 0]
+    interfaces = {name: _interface(name, x, points) for name, x in faces.items()}
+    return FEModel(K, M, points, interfaces, surface=_surface(outside))
 
 
 def _assembled(dofs, blocks, n):
@@ -54,6 +56,18 @@ def _assembled(dofs, blocks, n):
     rows, columns = np.repeat(dofs, k, axis=1).ravel(), np.tile(dofs, (1, k)).ravel()
     A = coo_matrix((blocks.ravel(), (rows, columns)), shape=(n, n)).tocsr()
     return 0.5 * (A + A.T)
+
+
+def _quads(face):
+    corners = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
+    return np.stack([x.ravel() for x in corners], axis=1)
+
+
+def _surface(faces):
+    quads = np.vstack([_quads(face) for face in faces])
+    nodes = np.unique(quads)
+    local = np.searchsorted(nodes, quads)
+    return SurfaceMesh(nodes, np.vstack([local[:, [0, 1, 2]], local[:, [0, 2, 3]]]))
 
 
 def _interface(name, face, points):

@@ -15,7 +15,7 @@ from rom.mbs.elements.gears.corrections import Correction, checked_map
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.hertz import Hertz
 from rom.mbs.elements.gears.racks import RackPair
-from rom.mbs.elements.gears.table import COORDINATES, DAMPING, SLICE_COLUMNS, SPEED, Meshes
+from rom.mbs.elements.gears.table import COORDINATES, DAMPING, PITCH, SLICE_COLUMNS, SPEED, Meshes
 from rom.mbs.elements.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
@@ -25,10 +25,12 @@ from rom.rotation import matrix
 
 DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
 FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
+SPIN_RATIO_RTOL = 1e-6  # by which the speeds of spinning wheels may miss the ratio of the teeth
 MAX_CELLS = 1000
+MAX_APPROACH = 0.1  # of the base pitch: a hundred times the deflection of loaded teeth
 MAX_ENTRY = 0.5  # of the base pitch
 MAX_RUN_OUT = 0.1  # of the module: by which an involute is what it is to first order
-NONE = np.zeros(0)
+NO_ERRORS = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,7 @@ class GearMesh:
     entry: float
     rims: tuple[tuple[Cylinder, float] | None, ...]
     hertz: Hertz | None = None
+    spins: tuple[float, float] = (0.0, 0.0)
 
 
 def gear_mesh(  # noqa: PLR0913  one keyword per property
@@ -140,11 +143,11 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     _check_correction(name, pair, flanks)
     if hertz:
         hertz.constants(pair)
+    parts = self.part(wheel_a.body), self.part(wheel_b.body)
     mesh = GearMesh(
         wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
         float(D @ z), number("phase", phase), entry * pair.base_pitch,
-        _rims((self.part(wheel_a.body), self.part(wheel_b.body)), (wheel_a, wheel_b), axes, pair),
-        hertz,
+        _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
     )  # fmt: skip
     self.add(name, mesh, GEAR_MESHES_FAMILY)
 
@@ -161,6 +164,22 @@ def _rims(
         rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
         found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
     return tuple(found)
+
+
+def _spins(
+    name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair | RackPair
+) -> tuple[float, float]:
+    """Of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]."""
+    one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
+    z, w = pair.teeth
+    if two and not w:
+        raise ConfigError(f"the rack of {name!r} spins at {two:.9g} rad/s: only wheels do.")
+    if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
+        raise ConfigError(
+            f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
+            f"teeth {z} and {w} turn at {one:.9g} and {-one * z / w:.9g}."
+        )
+    return one, two
 
 
 def _follows_energy(
@@ -274,14 +293,17 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         rows_of((_sizes(mesh) for mesh in found), 15),
         rows_of((_flanks(mesh, maps[4 * k : 4 * k + 4]) for k, mesh in enumerate(found)), 13),
         rows_of((mesh.numbers for mesh in found), 6),
+        rows_of((mesh.spins for mesh in found), 2),
+        integers([places.clock()]),
         integers(mesh.cells for mesh in found),
         *_joined([mesh.stiffness for mesh in found]),
-        *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NONE for mesh in found]),
+        *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NO_ERRORS for mesh in found]),
         *_joined([_from_lowest(errors) for mesh in found for errors in mesh.correction.pitch]),
         *_joined([m.ravel() for m in maps]),
         np.array([m.shape for m in maps], dtype=np.int64).reshape(-1, 3),
         integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
         rows_of((mesh.start for mesh in found), 2),
+        np.zeros(len(found)),
         np.zeros(len(found)),
         np.zeros((len(found), max(map(_most_slices, found)), 5)),
         np.zeros(len(found)),
@@ -298,7 +320,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
 
 def _joined(rows: list[Array]) -> tuple[Array, Array]:
     """Where each row begins, and all of them."""
-    return np.cumsum([0, *(row.size for row in rows)]), np.concatenate([NONE, *rows])
+    return np.cumsum([0, *(row.size for row in rows)]), np.concatenate([NO_ERRORS, *rows])
 
 
 def _most_slices(mesh: GearMesh) -> int:
@@ -338,8 +360,14 @@ def _flanks(mesh: GearMesh, maps: list[Array]) -> list[float]:
     return [*c.relief, *c.extent, c.power, c.crowning, c.slope, *amounts, *towards, *least]
 
 
+def _room(meshes: Meshes) -> Array:
+    """(k,) share of the depth that is left which no teeth reach, and a correction must not."""
+    room: Array = 1.0 - meshes.approach / (MAX_APPROACH * meshes.size[:, PITCH])
+    return room
+
+
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
     by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
-    lost="the wheels of {} are so close that they have no common tangent",
+    lost="the wheels of {} are so close that they have no common tangent", room=_room,
 )  # fmt: skip

@@ -97,7 +97,7 @@ class RackPair:
 
     @property
     def rb(self) -> Array:
-        """(2,) base radius of the pinion [m], and what the rack approaches per way [1]."""
+        """(2,) base radius of the pinion [m], and what the rack approaches per travel [1]."""
         return np.array([self.wheel.rb[0], -np.cos(self.alpha)])
 
     @property

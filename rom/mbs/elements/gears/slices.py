@@ -64,8 +64,8 @@ def clear_of_each_other(meshes, k, side, state):
     size = meshes.size[k]
     if has_rims(meshes, k):
         return False
-    _, _, (rolled, opened, _), (shift, tilt_c, tilt_t), (_, way) = state
-    arm = 2.0 * (abs(size[RA_2]) + size[RA_1]) + size[WIDTH] + abs(way)
+    _, _, (rolled, opened, _), (shift, tilt_c, tilt_t), (_, travel) = state
+    arm = 2.0 * (abs(size[RA_2]) + size[RA_1]) + size[WIDTH] + abs(travel)
     most = math.cos(size[HELIX]) * (side * rolled - opened) + abs(shift)
     most += arm * (abs(tilt_c) + abs(tilt_t))
     return most < meshes.flank[k, LEAST if side > 0.0 else LEAST_BACK]
@@ -200,9 +200,9 @@ def depth_at(size, place, state):
 def tilt_arms(size, place, state):
     """Moments about c and t of a unit force along the normal, about the middle of the gear."""
     side, x, z = place
-    alpha, (distance, way) = state[1], state[4]
+    alpha, (distance, travel) = state[1], state[4]
     lead, slope = math.cos(size[HELIX]), math.sin(size[HELIX])
     sine, cosine, base = math.sin(alpha), math.cos(alpha), size[RB_1]
-    about_c = slope * (base * sine - x * cosine + side * way) - side * lead * z * cosine
+    about_c = slope * (base * sine - x * cosine + side * travel) - side * lead * z * cosine
     about_t = lead * z * sine + side * slope * (base * cosine + x * sine - distance)
     return about_c, about_t

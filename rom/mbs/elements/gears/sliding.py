@@ -13,10 +13,10 @@ from rom.mbs.elements.gears.table import (
     COORDINATES,
     DAMPING,
     DEPTH,
+    FIRST_GRADIENT,
     FORCE,
     FORCES,
     FRICTION,
-    GRADIENT,
     HELIX,
     LOSS,
     RB_1,
@@ -81,7 +81,7 @@ def damp(s, W, meshes, k, one, place):
     if damping == 0.0:
         return 0.0, 0.0
     for a in range(COORDINATES):
-        rate += one[GRADIENT + a] * meshes.speed[a]
+        rate += one[FIRST_GRADIENT + a] * meshes.speed[a]
     if has_rims(meshes, k):
         arms, n, _ = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
         place_on_rims(s, W, meshes, k, arms[0], state[0])
@@ -91,16 +91,18 @@ def damp(s, W, meshes, k, one, place):
 
 @inner
 def sliding_speed(s, W, meshes, k, directions, axes):
-    """Speed at which flanks slide."""
+    """Speed at which flanks slide, and the part of wheels that spin in their frames."""
     arms, _, across = directions
+    spinning = meshes.spin[k, 0] * dot(across, cross(axes[2], arms[0]))
+    spinning -= meshes.spin[k, 1] * dot(across, cross(axes[2], arms[1]))
     i, j = meshes.i[k], meshes.j[k]
     slide = add(row(W.V, i, 0), cross(row(W.V, i, 3), arms[0]))
     slide = sub(slide, add(row(W.V, j, 0), cross(row(W.V, j, 3), arms[1])))
-    speed = dot(across, slide)
+    speed = dot(across, slide) + spinning
     if has_rims(meshes, k):
         place_on_rims(s, W, meshes, k, arms[0], axes)
         speed += closing_of_rims(s, W, meshes, k, across, meshes.rims.rate)
-    return speed
+    return speed, spinning
 
 
 @inner
@@ -108,7 +110,8 @@ def rub(s, W, meshes, k, what, one, place):
     """Let one slice rub, and press rims that deform, or add the tangents of that."""
     law, (side, state) = meshes.law[k], place
     directions = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
-    speed, load = sliding_speed(s, W, meshes, k, directions, state[0]), one[FORCE] + one[LOSS]
+    speed, spinning = sliding_speed(s, W, meshes, k, directions, state[0])
+    load = one[FORCE] + one[LOSS]
     turned = math.tanh(speed / law[SPEED])
     grip = law[FRICTION] * turned
     arms, n, across = directions
@@ -118,6 +121,7 @@ def rub(s, W, meshes, k, what, one, place):
         add_force(W.wrench[meshes.j[k]], arms[1], force)
         load_rims(s, W, meshes, k, add(scale(load, n), force))
         W.power[2] += load * grip * speed
+        W.power[1] += load * grip * spinning
         return
     stick = law[FRICTION] * load * (1.0 - turned * turned) / law[SPEED]
     if has_rims(meshes, k):
@@ -136,7 +140,7 @@ def add_friction(meshes, one, directions, grip, stick):
     for q in range(12):
         lever[CLOSING, q] = 0.0
         for a in range(COORDINATES):
-            lever[CLOSING, q] += one[GRADIENT + a] * meshes.rates[a, q]
+            lever[CLOSING, q] += one[FIRST_GRADIENT + a] * meshes.rates[a, q]
     add_product(tangent[0], grip * one[STEEP], lever[ACROSS], lever[CLOSING])
     add_product(tangent[1], grip * one[VISCOUS], lever[ACROSS], lever[CLOSING])
     add_product(tangent[1], stick, lever[ACROSS], lever[ACROSS])

@@ -40,8 +40,8 @@ FOUNDATION, LINK, TOUCHES, BENT, UPPER, ANSWER, TARGET = range(23, 30)
 # the length of its piece of the line, the force that damping adds, and how the whole follows depth
 # and its rate
 LENGTH_OF_LINE, LOSS, STEEP, VISCOUS = range(30, 34)
-GRADIENT = 34  # first of the derivatives of its depth by the coordinates of the wheels
-SLICE_COLUMNS = GRADIENT + COORDINATES
+FIRST_GRADIENT = 34  # first of the derivatives of its depth by the coordinates of the wheels
+SLICE_COLUMNS = FIRST_GRADIENT + COORDINATES
 
 
 @table
@@ -62,6 +62,8 @@ class Meshes(Table):
         law: (k, 6) damping [s], coefficient of friction, transition speed [m/s], whether forces
             follow the energy along the path, length over which slices carry each other [m],
             compliance of the contact [m^2/N].
+        spin: (k, 2) of both wheels in the frames of their bodies, about the axis of the pinion
+            [rad/s]; clock: (1,) function that tells the time.
         cells: (k,) slices across the face.
         stiffness_at, stiffness: (k + 1,) where the tables begin [N/m^2].
         constant_at, constant: (k + 1,) where those of the contact begin [1].
@@ -72,6 +74,7 @@ class Meshes(Table):
         remembered: (k,) first of two angles that are followed.
         start: (k, 2) these angles at the datum [rad].
         load: (k,) sum of the normal forces at the last residual; NaN without a common tangent [N].
+        approach: (k,) of the flanks that are deepest in each other, of wheels that are rigid [m].
         slices: (k, m, 5) of all that bear at the last residual: side, place on the path of
             contact, height over the middle of the face, length of the line [m], force [N].
         n_slices: (k,) how many.
@@ -92,6 +95,8 @@ class Meshes(Table):
     size: Array2
     flank: Array2
     law: Array2
+    spin: Array2
+    clock: Index1
     cells: Index1
     stiffness_at: Index1
     stiffness: Array1
@@ -105,6 +110,7 @@ class Meshes(Table):
     remembered: Index1
     start: Array2
     load: Scratch1
+    approach: Scratch1
     slices: Scratch3
     n_slices: Scratch1
     rims: Cylinders

@@ -33,6 +33,7 @@ from rom.mbs.elements.gears.slices import (
 )
 from rom.mbs.elements.gears.sliding import damp, rub
 from rom.mbs.elements.gears.table import (
+    BACKLASH,
     BY_CONSTANT,
     BY_DEPTH,
     BY_STIFFNESS,
@@ -48,11 +49,11 @@ from rom.mbs.elements.gears.table import (
     DISTANCE,
     ENERGY,
     ENTRY,
+    FIRST_GRADIENT,
     FOLLOWS,
     FORCE,
     FORCES,
     FRICTION,
-    GRADIENT,
     HEIGHT,
     HELIX,
     LENGTH,
@@ -115,6 +116,8 @@ def add_lines(s, W, meshes, k, what):
     if what == FORCES:  # not a number without a common tangent, which ends the motion
         meshes.load[k], meshes.n_slices[k] = 0.0 * state[1], 0.0
         W.wrench[meshes.i[k], 0] += 0.0 * state[1]
+        rolled, opened, _ = state[2]
+        meshes.approach[k] = max(rolled, -rolled - meshes.size[k, BACKLASH]) - opened
     if not path[0] < path[1]:  # too far apart to meet, or there is no common tangent
         return 0.0
     clear_sums(meshes)
@@ -191,12 +194,13 @@ def set_gradient(size, one, side, state, rates):
     turned_t = lead * z * cosine - side * slope * (base * sine - x * cosine)
     opened = lead * sine + (turned_c * tilt_c + turned_t * tilt_t) * rates[3]
     opened -= side * slope * tilt_t
-    one[GRADIENT + TURN_1] = lead * side * base + one[DEPTH_AT] * rates[0]
-    one[GRADIENT + TURN_2] = lead * side * size[RB_2]
+    one[FIRST_GRADIENT + TURN_1] = lead * side * base + one[DEPTH_AT] * rates[0]
+    one[FIRST_GRADIENT + TURN_2] = lead * side * size[RB_2]
     if size[RACK] > 0.0:
-        one[GRADIENT + TURN_2] -= side * slope * tilt_c
-    one[GRADIENT + DISTANCE] = one[DEPTH_AT] * rates[1] + one[DEPTH_FIRST] * rates[2] - opened
-    one[GRADIENT + SHIFT], one[GRADIENT + TILT_C], one[GRADIENT + TILT_T] = side * slope, -m_c, -m_t
+        one[FIRST_GRADIENT + TURN_2] -= side * slope * tilt_c
+    one[FIRST_GRADIENT + DISTANCE] = one[DEPTH_AT] * rates[1] + one[DEPTH_FIRST] * rates[2] - opened
+    one[FIRST_GRADIENT + SHIFT] = side * slope
+    one[FIRST_GRADIENT + TILT_C], one[FIRST_GRADIENT + TILT_T] = -m_c, -m_t
 
 
 @inner
@@ -253,7 +257,7 @@ def add_gradient(meshes, one, rates):
     by_first += one[WORK_CONSTANT] * one[CONSTANT_FIRST]
     if one[FORCE] > 0.0:
         for a in range(COORDINATES):
-            meshes.gradient[a] += (one[FORCE] + one[LOSS]) * one[GRADIENT + a]
+            meshes.gradient[a] += (one[FORCE] + one[LOSS]) * one[FIRST_GRADIENT + a]
     meshes.gradient[TURN_1] += by_at * rates[0]
     meshes.gradient[DISTANCE] += by_at * rates[1] + by_first * rates[2]
 
@@ -273,15 +277,15 @@ def add_stiffness(meshes, one, rates, rims, coupled):
     steep -= one[BY_DEPTH] if coupled else 0.0
     stiffness[0, DISTANCE, DISTANCE] += (one[FORCE] + one[LOSS]) * rates[4]
     for a in range(COORDINATES):
-        depth = one[GRADIENT + a]
+        depth = one[FIRST_GRADIENT + a]
         stiffness[0, a, TURN_1] += by_turn * depth
         stiffness[0, TURN_1, a] += by_turn * depth
         stiffness[0, a, DISTANCE] += by_distance * depth
         stiffness[0, DISTANCE, a] += by_distance * depth
         if not rims:
             for b in range(COORDINATES):
-                stiffness[0, a, b] += steep * depth * one[GRADIENT + b]
-                stiffness[1, a, b] += viscous * depth * one[GRADIENT + b]
+                stiffness[0, a, b] += steep * depth * one[FIRST_GRADIENT + b]
+                stiffness[1, a, b] += viscous * depth * one[FIRST_GRADIENT + b]
 
 
 @residuals.of(Meshes)

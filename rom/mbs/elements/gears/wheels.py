@@ -3,7 +3,7 @@
 Coordinates are the turns theta_1 and theta_2 of the wheels about the axis z of the pinion, against
 the line of centres c; their distance a; the shift o of the gear along z; and the tilt z x n of its
 axis n, along c and t = z x c. With D from the pinion to the gear, D = a c + o z. A rack has its
-way along t, across which c is, in the place of a turn: D = a c + y t + o z.
+travel along t, across which c is, in the place of a turn: D = a c + y t + o z.
 """
 
 import math
@@ -61,7 +61,7 @@ def line_of_centres(W, meshes, k, z):
 
 @inner
 def rack_frame(W, meshes, k):
-    """Axes c, t, z; distance and way of a rack, and shift along the axis."""
+    """Axes c, t, z; distance and travel of a rack, and shift along the axis."""
     z, _, _, u = wheel_axes(W, meshes, k)
     flat = sub(u, scale(dot(u, z), z))
     t = scale(1.0 / math.sqrt(dot(flat, flat)), flat)
@@ -74,14 +74,15 @@ def set_rack(s, W, meshes, k):
     """Frame and state of mesh k with a rack, as `set_frame` has them."""
     _, e1, n, u = wheel_axes(W, meshes, k)
     size = meshes.size[k]
-    (c, t, z), distance, way, shift = rack_frame(W, meshes, k)
+    (c, t, z), distance, travel, shift = rack_frame(W, meshes, k)
     turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
+    turn_1 += meshes.spin[k, 0] * W.signal[meshes.clock[0], 0]
     W.fresh[meshes.remembered[k] + 1] = meshes.start[k, 1]
-    rolled = size[RB_1] * turn_1 + size[RB_2] * way
+    rolled = size[RB_1] * turn_1 + size[RB_2] * travel
     opened = (distance - size[RACK]) * math.sin(size[ALPHA])
     forward = size[RB_1] * (size[PHASE] + turn_1)
     lean = shift - size[OFFSET], -dot(n, t), dot(n, c)
-    return (c, t, z, e1, n, u), size[ALPHA], (rolled, opened, forward), lean, (distance, way)
+    return (c, t, z, e1, n, u), size[ALPHA], (rolled, opened, forward), lean, (distance, travel)
 
 
 @inner
@@ -91,7 +92,7 @@ def set_frame(s, W, meshes, k):
     Returns:
         Axes c, t, z, and e1, n2, e2 of `wheel_axes`; pressure angle, NaN without a common tangent;
         what rolled together, what the flanks opened, and where a working line begins [m]; shift
-        along the axis [m] and tilt of the gear along c and t; distance and way [m].
+        along the axis [m] and tilt of the gear along c and t; distance and travel [m].
     """
     if meshes.size[k, RACK] > 0.0:
         return set_rack(s, W, meshes, k)
@@ -100,8 +101,10 @@ def set_frame(s, W, meshes, k):
     (c, t, z), distance, shift = line_of_centres(W, meshes, k, z)
     both = size[RB_1] + size[RB_2]
     alpha = math.acos(both / distance) if both / distance < 1.0 else math.nan
+    time = W.signal[meshes.clock[0], 0]
     turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
     turn_2 = turned(s, W, meshes, k, 1, math.atan2(dot(e2, t), dot(e2, c)))
+    turn_1, turn_2 = turn_1 + meshes.spin[k, 0] * time, turn_2 + meshes.spin[k, 1] * time
     rolled = size[RB_1] * turn_1 + size[RB_2] * turn_2
     opened = both * (involute(alpha) - involute(size[ALPHA]))
     forward = size[RB_1] * (size[PHASE] + turn_1 + alpha - size[ALPHA])
@@ -175,11 +178,18 @@ def set_speed(W, meshes, k):
         for p in range(6):
             meshes.speed[a] += meshes.rates[a, p] * W.V[meshes.i[k], p]
             meshes.speed[a] += meshes.rates[a, 6 + p] * W.V[meshes.j[k], p]
+    meshes.speed[TURN_1] += meshes.spin[k, 0]
+    meshes.speed[TURN_2] += meshes.spin[k, 1]
 
 
 @inner
 def push_wheels(W, meshes, k):
-    """Add to the wrenches on both markers what lowers the energy, and damps."""
+    """Add to the wrenches on both markers what lowers the energy, and damps.
+
+    What keeps wheels spinning in their frames works against it.
+    """
+    W.power[1] += meshes.gradient[TURN_1] * meshes.spin[k, 0]
+    W.power[1] += meshes.gradient[TURN_2] * meshes.spin[k, 1]
     for a in range(COORDINATES):
         for p in range(6):
             W.wrench[meshes.i[k], p] -= meshes.gradient[a] * meshes.rates[a, p]
@@ -202,16 +212,22 @@ def stiffen_wheels(meshes):
 
 @inner
 def turn_forces(meshes, axes, distance):
-    """Add how forces turn with the line of centres.
+    """Add how forces turn with the line of centres, and shifts with the axis of the pinion.
 
     With h = dE / d(theta_1 + theta_2) the second derivatives by the way of the gear are
-    h (c t + t c) / a^2 + dE/da t t / a.
+    h (c t + t c) / a^2 + dE/da t t / a; by it and the turn of the pinion dE/do (t c - c t).
     """
     (c, t), gradient, tangent = (axes[0], axes[1]), meshes.gradient, meshes.tangent
     about = (gradient[TURN_1] + gradient[TURN_2]) / (distance * distance)
     for p in range(3):
         for q in range(3):
-            way = about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
+            turning = (
+                about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
+            )
+            lean = gradient[SHIFT] * (t[p] * c[q] - c[p] * t[q])
             for side in range(2):
-                tangent[0, 6 * side + p, 6 * side + q] += way
-                tangent[0, 6 * side + p, 6 - 6 * side + q] -= way
+                sign = 2.0 * side - 1.0
+                tangent[0, 6 * side + p, 6 * side + q] += turning
+                tangent[0, 6 * side + p, 6 - 6 * side + q] -= turning
+                tangent[0, 3 + p, 6 * side + q] += sign * lean
+                tangent[0, 6 * side + q, 3 + p] += sign * lean

@@ -1,9 +1,11 @@
 """Teeth on rims that deform: against a finite element body with springs, energy, tangents."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.sparse.linalg import splu
 
@@ -13,6 +15,7 @@ from cases.mbs.tangents import difference, shifted
 from cases.mbs.tubes import tube
 from rom.components.gear_mesh import GearPair
 from rom.errors import ConfigError, RomWarning
+from rom.mbs.elements.cylinders import cylinder_of, pack_cylinders, set_basis
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 PAIR, K, PHASE, TORQUE = GearPair((26, 57), 3e-3, 0.06), 15e9, 0.3, 300.0
@@ -109,6 +112,22 @@ def mean_rotation(rim, n_dofs):
     found[:, (3 * rim.nodes[:, None] + np.arange(3)).ravel()] = np.linalg.solve(
         R.T @ S @ R, R.T @ S)[3:]  # fmt: skip
     return found
+
+
+def test_a_force_is_spread_over_the_angle_of_a_tooth():
+    """Compiled functions are means of those of NumPy over that angle."""
+    width, mech = np.pi / 26, rom.Mechanism()
+    part = mech.add_flexible("pinion", reduced(rom.FourierLegendre(3, 2)), at=(0, 0, 0))
+    rim = cylinder_of(part, part.marker("rim"), np.eye(3)[2], np.eye(3)[0])
+    rim = replace(rim, middle=0.003)
+    rims = pack_cylinders([((rim, width), None)], part.r)
+    place = njit(lambda rims, theta, z: set_basis(rims, 0, 0, theta, z))
+    for theta, z in ((0.3, 0.01), (-2.5, -0.02)):
+        place(rims, theta, z)
+        around = theta + width * ((np.arange(500) + 0.5) / 500 - 0.5)
+        wanted = rim.functions(around, np.full(500, z)).mean(axis=0)
+        assert_allclose(rims.basis[0], wanted, atol=1e-6)
+        assert np.abs(wanted - rim.functions(np.array([theta]), np.array([z]))[0]).max() > 1e-3
 
 
 def test_load_across_a_wide_face_converges_to_that_on_a_finite_element_body():
@@ -279,3 +298,17 @@ def test_functions_that_miss_the_deformation_are_told():
     with pytest.warns(RomWarning, match=r"of interface 'rim' of body 'pinion' is in no harmonic"):
         mech.gear_mesh("mesh", shaft.marker("rim"), gear.marker("middle"), axis=(0, 0, 1),
                        pair=PAIR, stiffness=K)  # fmt: skip
+
+
+@pytest.mark.fenicsx
+def test_rims_of_meshed_geometries_keep_all_of_their_deformation(recwarn):
+    """The centroid of a meshed rim lies beside the axis, and its functions hold a trace of that."""
+    steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+    sizes = {"L": 0.27, "z_w": 0.105, "z_a": 0.05, "z_b": 0.22, "l_j": 0.03, "D": 0.066, "lc": 0.02}
+    model = rom.fe.model("meshes/gear_shaft.geo", material=steel, parameters=sizes)
+    body = rom.reduce(model, method=rom.Guyan(), reference="mean-axis", certify=False,
+                      interfaces={"wheel": rom.FourierLegendre(1, 2)})  # fmt: skip
+    part = rom.Mechanism().add_flexible("shaft", body, at=(0, 0, 0))
+    rim = cylinder_of(part, part.marker("wheel"), np.eye(3)[2], np.eye(3)[0])
+    assert rim.missed < 1e-5
+    assert not [w for w in recwarn if "harmonic" in str(w.message)]

@@ -90,7 +90,7 @@ def test_tangents_of_a_rack_are_differences(pair):
 
 
 def test_a_rack_is_a_gear_without_end():
-    """Path, backlash and forces as of a gear of 1e5 teeth; loads along the way fall as 1 / z."""
+    """Path, backlash and forces as of a gear of 1e5 teeth; loads along it fall as 1 / z."""
     z = 100_000
     gear = GearPair((26, z), 4e-3, 0.03, thinning=5e-5)
     assert_allclose(SPUR.path, gear.path, rtol=3e-4)
@@ -123,9 +123,9 @@ def test_a_pinion_drives_its_rack_with_its_rolling_circle():
     r = 26 * 4e-3 / np.cos(0.35) / 2  # whatever the distance
     mech.motor("brake", "guide", lambda t, x, v: -2000.0 - 1000.0 * (v - 60.0 * r))
     sol = rom.simulate(mech, t_end=6 * np.pi / 60, dt=5e-5, progress=False, save_every=5)
-    turned, way = sol.joint("axle").angle, sol.joint("guide").displacement
+    turned, travel = sol.joint("axle").angle, sol.joint("guide").displacement
     assert turned[-1] == pytest.approx(6 * np.pi)
-    assert way[-1] == pytest.approx(6 * np.pi * r, abs=2e-5)
+    assert travel[-1] == pytest.approx(6 * np.pi * r, abs=2e-5)
     late = slice(len(sol.t) // 2, None)
     assert sol.velocity("rack")[late, 1].mean() == pytest.approx(60.0 * r, rel=1e-4)
     assert abs(sol.drive_load("speed")[late].mean()) == pytest.approx(2000.0 * r, rel=1e-2)
