@@ -185,11 +185,22 @@ def _gear_mesh(entry: Entry) -> None:
     correction["pitch"] = tuple(() if errors is None else errors for errors in pitch)
     correction |= {key: tuple(correction[key]) for key in ("relief", "extent") if key in correction}
     if pair["teeth"][1] == 0:
-        pair["pinion_teeth"], pair["shift"] = int(pair.pop("teeth")[0]), pair["shift"][0]
+        _make_rack(entry.name, pair)
     made: Any = RackPair if "pinion_teeth" in pair else GearPair
     entry.values["pair"], entry.values["correction"] = made(**pair), Correction(**correction)
     entry.values["hertz"] = None if hertz is None else Hertz(**hertz)
     entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
+
+
+def _make_rack(name: str, pair: dict[str, Any]) -> None:
+    """Let the sizes of a pair be those of a pinion and a rack."""
+    (pinion, _), (shift, of_rack) = pair.pop("teeth"), pair["shift"]
+    if of_rack != 0.0:
+        raise ConfigError(
+            f"the rack of {name!r} has a profile shift of {of_rack:g}: where its reference line is "
+            "says centre_distance."
+        )
+    pair["pinion_teeth"], pair["shift"] = pinion, shift
 
 
 def _rolling_bearing(entry: Entry) -> None:

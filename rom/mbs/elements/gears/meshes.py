@@ -216,7 +216,8 @@ def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> No
         raise ConfigError(
             f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair "
             f"{abs(pair.distance) * 1e3:.6g} mm.",
-            hint="Move a body, or give the pair this centre_distance.",
+            hint="Move a body, or give the pair this centre_distance; the marker of a rack is "
+            "beside the axis of its pinion.",
         )
     if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
         raise ConfigError(

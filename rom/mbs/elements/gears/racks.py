@@ -6,13 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from rom.errors import ModelError
-from rom.mbs.elements.gears.geometry import GearPair
+from rom.mbs.elements.gears.geometry import GearPair, check_numbers
 from rom.model import Array
 
 
 @dataclass(frozen=True)
 class RackPair:
-    """A cylindrical pinion and a rack.
+    """A cylindrical pinion and a rack, without ends: see `rom.Mechanism.stop`.
 
     Attributes:
         pinion_teeth: their number.
@@ -25,6 +25,7 @@ class RackPair:
             backlash.
         thinning: transverse backlash from thinner teeth, along the line of action [m].
         addendum, dedendum, fillet: as of `GearPair`, in modules [1].
+        gear_helix: that of the rack, to check: of the other hand; None for the one that fits [rad].
 
     Raises:
         ModelError: if no such wheel and rack mesh.
@@ -41,8 +42,10 @@ class RackPair:
     addendum: float = 1.0
     dedendum: float = 1.25
     fillet: float = 0.4
+    gear_helix: float | None = None
 
     def __post_init__(self) -> None:
+        self._check_sizes()
         if self.backlash < -1e-12:
             raise ModelError(
                 f"the backlash is closed: {self.distance * 1e3:.4f} mm from the axis to the rack "
@@ -56,11 +59,31 @@ class RackPair:
                 hint="Lower the distance of the rack or the addendum, or take more teeth.",
             )
 
+    def _check_sizes(self) -> None:
+        check_numbers(self)
+        if not (self.pinion_teeth >= 4 and self.module > 0 and self.width > 0):
+            raise ModelError(
+                f"no pinion of {self.pinion_teeth} teeth of module {self.module} m, {self.width} m "
+                "wide, turns on a rack.",
+                hint="The rack is outside: its pinion has at least 4 teeth.",
+            )
+        if self.gear_helix is not None and not abs(self.gear_helix + self.helix) < 1e-9:
+            raise ModelError(
+                f"a rack of helix {np.degrees(self.gear_helix):.4g} degrees does not mesh with a "
+                f"pinion of {np.degrees(self.helix):.4g} degrees.",
+                hint=f"Their hands are opposite: {-np.degrees(self.helix):.4g} degrees.",
+            )
+        if not self.tip_thickness > 0:
+            raise ModelError(
+                "the teeth of the rack are pointed: their flanks meet below the tip.",
+                hint="Lower the addendum or the pressure angle.",
+            )
+
     @cached_property
     def wheel(self) -> GearPair:
         """The pinion, with a wheel that is so large that nothing of it is refused."""
         return GearPair(
-            (self.pinion_teeth, 10 * abs(self.pinion_teeth)), self.module, self.width, self.helix,
+            (self.pinion_teeth, 1000 * self.pinion_teeth), self.module, self.width, self.helix,
             self.pressure_angle, (self.shift, 0.0), addendum=self.addendum,
             dedendum=self.dedendum, fillet=self.fillet,
         )  # fmt: skip
@@ -129,6 +152,12 @@ class RackPair:
     def tip(self) -> float:
         """Height of the teeth of the rack over their reference line [m]."""
         return self.addendum * self.module
+
+    @property
+    def tip_thickness(self) -> float:
+        """Normal thickness of the teeth of the rack at their tips [m]."""
+        slope = np.tan(self.pressure_angle)
+        return float(self.module * (np.pi / 2 - 2 * self.addendum * slope))
 
     @cached_property
     def path(self) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 ORIGIN, X, Y, Z, K = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1.3e10
+LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
 SPUR = RackPair(26, 4e-3, 0.03, thinning=5e-5)
 HELICAL = RackPair(26, 4e-3, 0.04, helix=0.35, shift=0.1, thinning=5e-5)
 
@@ -72,8 +73,7 @@ def test_forces_on_a_rack_are_the_gradient_of_the_energy(pair, back, more):
 
 @pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
 def test_tangents_of_a_rack_are_differences(pair):
-    law = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
-    packed, W = prepared(free(pair, **law))
+    packed, W = prepared(free(pair, **LOSSES))
     q = placed(packed, pair, False, 1)
     v = 1e-3 * np.random.default_rng(5).normal(size=12)
     found, stiff = by_position(packed, W, q, v)
@@ -102,16 +102,22 @@ def test_a_rack_is_a_gear_without_end():
     assert W.wrench[mesh.j[0], 0] == pytest.approx(wanted.forces(q, 0.3).force[6], rel=1e-3)
 
 
-def test_a_pinion_drives_its_rack_with_its_rolling_circle():
-    """v = omega d / 2, over three turns, against a brake."""
-    pair = replace(HELICAL, centre_distance=HELICAL.distance + 1e-4)
+def guided(pair, **more):
+    """A pinion on an axle and a rack in a guide along y."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN)
     rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(pair.distance, 0, 0))
     mech.revolute("axle", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN), axis=Z)
     mech.prismatic("guide", mech.ground.marker((pair.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
     mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=pair,
-                   stiffness=K, damping=2e-5)  # fmt: skip
+                   stiffness=K, **more)  # fmt: skip
+    return mech
+
+
+def test_a_pinion_drives_its_rack_with_its_rolling_circle():
+    """v = omega d / 2, over three turns, against a brake."""
+    pair = replace(HELICAL, centre_distance=HELICAL.distance + 1e-4)
+    mech = guided(pair, damping=2e-5)
     mech.drive("speed", "axle", lambda t: 60.0 * t, rate=lambda t: 60.0 + 0 * t)
     r = 26 * 4e-3 / np.cos(0.35) / 2  # whatever the distance
     mech.motor("brake", "guide", lambda t, x, v: -2000.0 - 1000.0 * (v - 60.0 * r))
@@ -124,19 +130,73 @@ def test_a_pinion_drives_its_rack_with_its_rolling_circle():
     assert abs(sol.drive_load("speed")[late].mean()) == pytest.approx(2000.0 * r, rel=1e-2)
 
 
-def test_racks_that_are_none_are_refused(tmp_path):
-    with pytest.raises(ModelError, match=r"backlash is closed: 51\.9"):
-        replace(SPUR, centre_distance=51.9e-3)
-    with pytest.raises(ModelError, match="contact is lost"):
-        replace(SPUR, centre_distance=57e-3)
-    with pytest.raises(ModelError, match="teeth of the pinion are undercut"):
-        RackPair(12, 4e-3, 0.03)
+@pytest.mark.parametrize("helix", [0.0, 0.35, -0.35])
+@pytest.mark.parametrize("torque", [40.0, -40.0])
+def test_a_torque_rests_on_the_rack_along_the_normal_of_its_teeth(helix, torque):
+    """Along the rack T / r, across it |T| / r tan(alpha_t), along the axis -T / r tan(beta)."""
+    pair = replace(SPUR, helix=helix, thinning=0.0, centre_distance=None)
+    mech = guided(pair, phase=0.2, entry=0.0, conservative=False)
+    mech.torque("motor", mech.parts["pinion"].marker(ORIGIN), (0, 0, torque))
+    mech.spring_damper("brake", mech.ground.marker((pair.distance, -1, 0)),
+                mech.parts["rack"].marker(ORIGIN), stiffness=1e7)  # fmt: skip
+    still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
+    along = torque / (26 * 4e-3 / np.cos(helix) / 2)
+    across, slope = np.tan(np.radians(20)) / np.cos(helix), np.tan(helix)
+    wanted = np.array([abs(along) * across, along, -along * slope])
+    load = still.element("mesh").force
+    assert_allclose(load[0, 1], wanted, atol=1e-6 * abs(along))
+    assert_allclose(load[0, 0], -wanted, atol=1e-6 * abs(along))
+    held = still.reaction("guide")[0, :3]
+    assert_allclose(held, [-wanted[0], 0.0, -wanted[2]], atol=1e-6 * abs(along))
+
+
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+@pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
+def test_a_pinion_and_a_rack_that_hit_and_part_keep_energy_and_momentum(pair, losses):
+    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x, v, w in (("pinion", 0.0, 0.0, 40.0), ("rack", pair.distance, 1.9, 0.0)):
+        part = mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
+                              velocity=(0, v, 0), omega=(0, 0, w))  # fmt: skip
+        ends.append(part.marker(ORIGIN))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K * np.array([0.6, 1.1, 0.7]),
+                   cells=7, phase=0.1, correction=FLANKS, **losses)  # fmt: skip
+    sol = rom.simulate(mech, t_end=6e-4, method="dop853", rtol=1e-10, dt=2e-6, progress=False)
+    force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
+    assert force.max() > 300
+    assert (force == 0).any()
+    assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.strain.max()
+    for of_all in sol.momentum:
+        assert np.ptp(of_all, axis=0).max() < 1e-12
+    report = rom.audit(sol)
+    assert report.ok, report
+
+
+def test_a_pinion_that_spins_in_its_frame_drives_its_rack():
+    """Its frame stands still; the rack follows its material, and what spins it does the work."""
+    mech, r, speed = rom.Mechanism(gravity=(0, 0, 0)), SPUR.r[0], 30.0
+    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, spin=(0, 0, speed))
+    rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(SPUR.distance, 0, 0),
+                          velocity=(0, speed * r, 0))  # fmt: skip
+    mech.fixed("seat", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN))
+    mech.prismatic("guide", mech.ground.marker((SPUR.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
+    mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=SPUR,
+                   stiffness=K, entry=0.2)  # fmt: skip
+    mech.motor("brake", "guide", lambda t, x, v: -500.0 - 1000.0 * (v - speed * r))
+    sol = rom.simulate(mech, t_end=0.1, dt=2e-5, progress=False, save_every=5)
+    assert sol.joint("guide").displacement[-1] == pytest.approx(speed * r * 0.1, abs=2e-5)
+    assert np.abs(sol.energy.balance).max() < 1e-4 * 500.0 * speed * r * 0.1
+
+
+def test_what_a_rack_does_not_have_is_refused():
     with pytest.raises(ConfigError, match="rack of 'mesh' does not turn"):
         free(SPUR, correction=Correction(run_out=((0, 0), (1e-6, 0))))
     with pytest.raises(ModelError, match="racks are elements"):
         Mesh(SPUR, K)
     with pytest.raises(ModelError, match="racks and internal teeth is not known"):
         stiffness_table(SPUR, force=1e5)
+
+
+def test_files_give_a_rack_no_teeth(tmp_path):
     (tmp_path / "m.toml").write_text("""
 [simulation]
 t_end = 1e-3

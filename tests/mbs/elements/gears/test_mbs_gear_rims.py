@@ -13,7 +13,7 @@ import rom
 from cases.mbs.mechanisms import prepared, residual_at, stored_at
 from cases.mbs.tangents import by_position, by_velocity, difference, shifted
 from cases.mbs.tubes import tube
-from rom.components.gear_mesh import GearPair
+from rom.components.gear_mesh import GearPair, RackPair
 from rom.errors import ConfigError, RomWarning
 from rom.mbs.elements.cylinders import cylinder_of, pack_cylinders, set_basis
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
@@ -227,6 +227,27 @@ def test_tangents_of_rims_are_differences_of_their_forces():
     assert teeth > 1e6
     assert_allclose(K, stiff, atol=5e-3 * teeth)
     assert_allclose(D, loss, atol=1e-5 * np.abs(D - D_body).max())
+
+
+def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
+    """Forces and torque on the body of the pinion, as by a gear of 1e5 teeth."""
+    found = []
+    for pair in (RackPair(26, 3e-3, 0.06), GearPair((26, 100_000), 3e-3, 0.06)):
+        mech = rom.Mechanism(gravity=(0, 0, 0))
+        wheel = mech.add_flexible("pinion", reduced(rom.FourierLegendre(2, 2)), at=(0, 0, 0))
+        other = mech.add_rigid("other", mass=1.0, inertia=(1.0,) * 3, at=(pair.distance, 0, 0))
+        mech.gear_mesh("mesh", wheel.marker("rim"), other.marker((0, 0, 0)), axis=(0, 0, 1),
+                       pair=pair, stiffness=K, phase=PHASE, cells=5)  # fmt: skip
+        packed, W = prepared(mech)
+        delta = np.zeros(packed.v.size)
+        r = packed.system.bodies.r[0]
+        delta[5], delta[6 : 6 + r] = 3e-4, 1e-9 * np.random.default_rng(3).normal(size=r)
+        q = shifted(packed, packed.q, delta)
+        residual_at(packed.system, W, q, 0 * delta, 0 * delta, np.zeros(0))
+        found.append(W.residual[: 6 + r].copy())
+    assert np.abs(found[0]).max() > 1e3
+    for part in (slice(0, 6), slice(6, None)):
+        assert_allclose(found[0][part], found[1][part], atol=1e-3 * np.abs(found[1][part]).max())
 
 
 def test_free_wheels_with_soft_rims_keep_momentum_and_energy():

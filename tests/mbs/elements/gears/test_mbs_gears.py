@@ -290,6 +290,44 @@ def test_interference_inside_a_ring_is_refused():
         GearPair((20, -62), 2e-3, 0.02)
 
 
+def gaps_behind(z1, z2, addendum):
+    """Between the corner of a tooth and the ring it leaves, after its last touch [rad]."""
+
+    def involute_at(radius, z):
+        beta = np.arccos(np.clip(z / 2 * np.cos(np.pi / 9) / radius, None, 1.0))
+        return np.tan(beta) - beta - np.tan(np.pi / 9) + np.pi / 9
+
+    tip, inside, a = z1 / 2 + addendum, z2 / 2 - addendum, (z2 - z1) / 2
+    turn = np.linspace(0.0, 1.5, 200_001)
+    corner = tip * np.exp(1j * (turn - involute_at(tip, z1))) + a
+    radius = np.abs(corner)
+    end = np.argmax(radius < inside)
+    flank = turn * z1 / z2 - involute_at(radius, z2)
+    gap = (flank - np.angle(corner))[:end]
+    last = np.tan(np.arccos(z1 / 2 * np.cos(np.pi / 9) / tip)) - np.tan(np.pi / 9)
+    return gap[turn[:end] > last + 1e-3]
+
+
+@pytest.mark.parametrize("addendum", [0.8, 1.0])
+@pytest.mark.parametrize("z1", [30, 40, 60])
+def test_tips_inside_a_ring_pass_each_other_or_are_refused(z1, addendum):
+    """Followed along the path of a corner, in modules."""
+    seen = set()
+    for more in range(6, 13):
+        gaps = gaps_behind(z1, z1 + more, addendum)
+        try:
+            pair = GearPair((z1, -z1 - more), 1.0, 1.0, addendum=addendum)
+        except ModelError as refused:
+            assert "interfere" in str(refused) or "no involute" in str(refused)
+            assert gaps.min() < 0 or "away from the path" not in str(refused)
+            seen.add("away from the path" in str(refused))
+        else:
+            assert gaps.min() > 0
+            assert pair.tip_clearance == pytest.approx(gaps[-1], abs=2e-5)
+            seen.add(None)
+    assert {True, None} <= seen
+
+
 def planetary(planets=3):
     """Sun driven, ring held by a stiff coil, planets on a carrier that is braked."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
