@@ -308,7 +308,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         np.zeros(len(found)),
         np.zeros((len(found), max(map(_most_slices, found)), 5)),
         np.zeros(len(found)),
-        pack_cylinders([mesh.rims for mesh in found], places.R),
+        pack_cylinders([mesh.rims for mesh in found], places.R, max(mesh.cells for mesh in found)),
         np.zeros(2),
         np.zeros((max(mesh.cells for mesh in found), SLICE_COLUMNS)),
         *np.zeros((2, COORDINATES)),

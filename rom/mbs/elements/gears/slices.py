@@ -144,8 +144,8 @@ def set_slice(s, W, meshes, k, cell, line, state):
     depth -= gap
     if has_rims(meshes, k):
         arms, n, _ = contact_point(W, meshes, k, (side, x, z), state)
-        place_on_rims(s, W, meshes, k, arms[0], state[0])
-        depth += closing_of_rims(s, W, meshes, k, n, meshes.rims.amplitude)
+        place_on_rims(W, meshes, k, cell, arms[0], state[0])
+        depth += closing_of_rims(s, W, meshes, (k, cell), n, meshes.rims.amplitude)
     one[X], one[Z], one[DEPTH] = x, z, depth
     if depth <= 0.0 and meshes.law[k, COUPLING] == 0.0:
         return depth

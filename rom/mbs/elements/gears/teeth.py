@@ -212,7 +212,7 @@ def push_line(s, W, meshes, k, what, count, place):
         one = line[cell]
         if one[FORCE] > 0.0:
             set_gradient(size, one, side, state, rates)
-            rate, loss = damp(s, W, meshes, k, one, place)
+            rate, loss = damp(s, W, meshes, k, cell, place)
             set_loss(one, loss, law[DAMPING])
             if what == FORCES:
                 W.power[2] += one[LOSS] * rate
@@ -220,7 +220,7 @@ def push_line(s, W, meshes, k, what, count, place):
             else:
                 add_stiffness(meshes, one, rates, rims, law[COUPLING] > 0.0)
             if rims or law[FRICTION] > 0.0:
-                rub(s, W, meshes, k, what, one, place)
+                rub(s, W, meshes, k, what, cell, place)
         add_gradient(meshes, one, rates)
     if what == TANGENTS and law[COUPLING] > 0.0 and not rims:
         add_line_stiffness(meshes, k, count)
