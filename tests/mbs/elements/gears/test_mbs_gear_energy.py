@@ -8,6 +8,7 @@ import rom
 from cases.mbs.mechanisms import prepared, residual_at, stored_at
 from cases.mbs.tangents import by_position, by_velocity, difference, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
+from rom.mbs.elements.films.bearing import Groove, JournalBearing
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
@@ -147,5 +148,36 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
     assert np.abs(sol.energy.balance).max() < 1e-6 * strain
     for of_all in sol.momentum:  # [N s, N m s]; a blow passes 1e-3 from one wheel to the other
         assert np.ptp(of_all, axis=0).max() < 1e-13
+    report = rom.audit(sol)
+    assert report.ok, report
+
+
+def test_a_pinion_in_oil_films_whose_teeth_rub_hit_and_part_keeps_the_energy():
+    """Works of weight and motor, losses in films and on flanks, energy in teeth, in one balance."""
+    pair, mech = GearPair((26, 40), 4e-3, 0.03, 0.2, thinning=5e-6), rom.Mechanism()
+    pinion = mech.add_rigid("pinion", mass=4.0, inertia=(8e-3, 8e-3, 5e-3), at=ORIGIN,
+                            omega=(0, 0, 100.0))  # fmt: skip
+    gear = mech.add_rigid("gear", mass=9.0, inertia=(0.02,) * 3, at=(pair.distance, 0, 0),
+                          omega=(0, 0, 3.0 - 65.0))  # fmt: skip
+    film = JournalBearing(0.04, 0.02, 8e-5, [Groove(np.pi / 2, 0.3)], cells=(24, 4))
+    for name, z in (("front", -0.03), ("back", 0.03)):
+        ends = pinion.marker((0, 0, z)), mech.ground.marker((0, 0, z))
+        mech.journal_bearing(name, *ends, axis=Z, bearing=film, oil=0.02)
+    ends = pinion.marker(ORIGIN), gear.marker(ORIGIN)
+    mech.bushing("thrust", mech.ground.marker(ORIGIN), ends[0], stiffness=(0, 0, 1e6, 0, 0, 0))
+    mech.revolute("axle", mech.ground.marker((pair.distance, 0, 0)), ends[1], axis=Z)
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K, cells=7, entry=0.1, **LOSSES)
+    mech.torque("motor", ends[0], (0, 0, 20.0))
+    sol = rom.simulate(mech, t_end=8e-4, dt=2e-6, method="dop853", rtol=1e-9, progress=False)
+    load = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
+    touching, energy = load > 0, sol.energy
+    assert np.flatnonzero(np.diff(touching)).size >= 6
+    assert load.max() > 5000
+    assert np.abs(sol.element("front").force[:, 0]).max() > 50
+    lost = np.diff(energy.damping)
+    apart = ~(touching[1:] | touching[:-1])
+    assert lost[~apart].mean() > 1.2 * lost[apart].mean() > 0
+    for part in (energy.strain, energy.damping, energy.forces, energy.kinetic):
+        assert np.abs(energy.balance).max() < 1e-6 * np.ptp(part)
     report = rom.audit(sol)
     assert report.ok, report
