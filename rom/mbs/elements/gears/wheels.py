@@ -212,10 +212,10 @@ def stiffen_wheels(meshes):
 
 @inner
 def turn_forces(meshes, axes, distance):
-    """Add how forces turn with the line of centres, and shifts with the axis of the pinion.
+    """Add how forces turn with the line of centres.
 
     With h = dE / d(theta_1 + theta_2) the second derivatives by the way of the gear are
-    h (c t + t c) / a^2 + dE/da t t / a; by it and the turn of the pinion dE/do (t c - c t).
+    h (c t + t c) / a^2 + dE/da t t / a.
     """
     (c, t), gradient, tangent = (axes[0], axes[1]), meshes.gradient, meshes.tangent
     about = (gradient[TURN_1] + gradient[TURN_2]) / (distance * distance)
@@ -224,10 +224,6 @@ def turn_forces(meshes, axes, distance):
             turning = (
                 about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
             )
-            lean = gradient[SHIFT] * (t[p] * c[q] - c[p] * t[q])
             for side in range(2):
-                sign = 2.0 * side - 1.0
                 tangent[0, 6 * side + p, 6 * side + q] += turning
                 tangent[0, 6 * side + p, 6 - 6 * side + q] -= turning
-                tangent[0, 3 + p, 6 * side + q] += sign * lean
-                tangent[0, 6 * side + q, 3 + p] += sign * lean
