@@ -116,7 +116,7 @@ class Places:
         coordinates: markers and row of each joint coordinate that something acts on.
         time: number of the one that tells the time, -1 for none.
         remembered: {owner: (m,) numbers that it remembers, at the start, in their own units}.
-        settling: owners whose numbers an equilibrium does not start from.
+        settling: {owner: (m,) numbers that an equilibrium starts from in their place}.
     """
 
     body: Mapping[str, int]
@@ -128,12 +128,12 @@ class Places:
     coordinates: list[tuple[tuple[Marker, Marker], Row]] = field(default_factory=list)
     time: int = -1
     remembered: dict[str, Array] = field(default_factory=dict)
-    settling: set[str] = field(default_factory=set)
+    settling: dict[str, Array] = field(default_factory=dict)
 
     def copy(self) -> "Places":
         """The same places, to which more can be added without changing these."""
         kept = {name: list(getattr(self, name)) for name in ("owners", "signals", "coordinates")}
-        memory = {"remembered": dict(self.remembered), "settling": set(self.settling)}
+        memory = {"remembered": dict(self.remembered), "settling": dict(self.settling)}
         return replace(self, **kept, **memory)
 
     def coordinate(self, joint: str, row: Row) -> int:
@@ -169,17 +169,17 @@ class Places:
             self.time = len(self.signals) - 1
         return self.time
 
-    def memory(self, owner: str, start: Array, *, settles: bool = False) -> int:
+    def memory(self, owner: str, start: Array, *, settling: Array | None = None) -> int:
         """First of (m,) numbers that are kept from one instant to the next, in their own units.
 
         Args:
             owner: whose.
             start: (m,) numbers at the start.
-            settles: an equilibrium starts from those, whatever its state remembers.
+            settling: (m,) what an equilibrium starts from, whatever its state remembers.
         """
         self.remembered.setdefault(owner, start)
-        if settles:
-            self.settling.add(owner)
+        if settling is not None:
+            self.settling[owner] = settling
         return sum(x.size for x in self._until(owner))
 
     def before(self, base: Array) -> Array:
@@ -201,9 +201,9 @@ class Places:
     def settled(self, base: Array) -> Array:
         """(c + p,) joint coordinates and memory, the latter as an equilibrium starts from it."""
         base, c = base.copy(), len(self.coordinates)
-        for owner in self.settling:
+        for owner, numbers in self.settling.items():
             at = c + sum(x.size for x in self._until(owner))
-            base[at : at + self.remembered[owner].size] = self.remembered[owner]
+            base[at : at + numbers.size] = numbers
         return base
 
     def packed_coordinates(self) -> Coordinates:

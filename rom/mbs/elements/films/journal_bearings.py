@@ -13,6 +13,9 @@ from rom.mbs.elements.films.bearing import JournalBearing
 from rom.mbs.elements.films.cells import CLEARANCE, cells_of
 from rom.mbs.elements.films.journals import (
     CONTENT,
+    INLET,
+    KNOWN,
+    SETTLES,
     TEMPERATURE,
     Journals,
     film_tangents,
@@ -59,10 +62,10 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     """Oil film between a journal and its bush, by Reynolds' equation.
 
     The film is that of the journal as seen from the bush, which may move, turn and tilt, too. A
-    mass-conserving film ("jfo") remembers how far its cells are filled. With an `Oil` the film has
-    a temperature: of inlet plus what its own power warms it, which it follows with the thermal
-    time. Where no time has passed, in `equilibrium` and at the start, filling and temperature are
-    those that stay.
+    mass-conserving film ("jfo") remembers how far its cells are filled; where no time has passed,
+    in `equilibrium` and at the start, the filling is the one that stays. With an `Oil` the film has
+    a temperature, which follows inlet and own power with the thermal time: in `equilibrium` it is
+    the one that stays, and a run that starts elsewhere begins with oil as it comes in.
 
     Args:
         name: name of the bearing.
@@ -177,7 +180,10 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
         np.array([one.axes for one in films]),
         rows_of((one.oil for one in films), 9),
         integers([places.clock()]),
-        integers(places.memory(name, _memory(one), settles=True) for name, one in found.items()),
+        integers(
+            places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLES))
+            for name, one in found.items()
+        ),
         cells_of([one.bearing for one in films]),
         np.array([one.bearing.scale for one in films]),
         np.array([one.turning for one in films], dtype=float),
@@ -185,11 +191,11 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
     )
 
 
-def _memory(one: OilFilm) -> Array:
-    """What a film remembers at first: nothing but the temperature of its inlet."""
+def _memory(one: OilFilm, known: float) -> Array:
+    """What a film remembers at first: the temperature of its inlet, and whether that is known."""
     conserves = one.bearing.cavitation == "jfo"
     memory = np.zeros(CONTENT + conserves * int(np.prod(one.bearing.cells)))
-    memory[TEMPERATURE] = one.oil[5]
+    memory[KNOWN], memory[TEMPERATURE] = known, one.oil[INLET]
     return memory
 
 

@@ -36,6 +36,7 @@ CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = r
 # what a film remembers, before the content of its cells
 KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
 CONTENT = MOTION + N_MOTIONS
+SETTLES = -1.0  # in place of 1 for a film that is known: its temperature is the one that stays
 CELSIUS_ZERO = 273.15  # [K]
 MAX_WARMINGS = 50  # of a film whose grooves have pressure
 WARMING_TOL = 1e-10  # of a temperature [K]
@@ -172,14 +173,14 @@ def settled_temperature(journals, k):
 
 @inner
 def recall(s, W, journals, k):
-    """Tell the film what it remembers; returns the temperature, NaN if it knows none."""
+    """Tell the film what it remembers; returns its temperature, NaN if that is to be found."""
     at, films = s.coordinates.kind.size + journals.remembered[k], journals.films
     passed = W.signal[journals.clock[0], 0] - W.base[at + TIME]
     known = W.base[at + KNOWN] == 1.0 and passed >= 0.0
     films.state[k, PASSED], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
     for cell in range(n_remembered(films, k)):
         films.content[k, cell] = W.base[at + CONTENT + cell]
-    return W.base[at + TEMPERATURE] if known else math.nan
+    return math.nan if W.base[at + KNOWN] == SETTLES else W.base[at + TEMPERATURE]
 
 
 @inner

@@ -190,12 +190,18 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
                             strict=True):  # fmt: skip
         assert_allclose(found, known, rtol=1e-10, atol=1e-10)
     # a bump where the film is thin changes the load, one whose cells have no pressure does not
+    # of one column: its neighbours see half of it at the faces between
     bump = np.zeros((60, 8))
-    bump[6:9] = 0.05
-    assert (
-        solved(bearing(), opening=bump, motion=motion)[1][0]
-        > solved(bearing(), motion=motion)[1][0]
-    )
+    bump[7] = 0.05
+    angle, h = bearing().grid.angle, {}
+    films = cells_of([bearing()])
+    films.opening[0], films.state[0, :4], films.state[0, SPIN] = bump.ravel(), motion, 1.0
+    assert solve_film(films, 0, 1.0) > 0
+    for face, cells in ((0, films.middle), (1, films.behind)):
+        c, s, Z = angle[face, :, :1], angle[face, :, 1:], bearing().grid.Z
+        h[face] = cells[0].reshape(60, 8) - (1 - (0.4 - 0.2 * Z) * c - (0.3 - 0.1 * Z) * s)
+    assert_allclose(h[0][6:9, 0], [0, 0.05, 0], atol=1e-14)
+    assert_allclose(h[1][5:9, 0], [0, 0.025, 0.025, 0], atol=1e-14)
 
 
 # --- tangents ---
