@@ -55,6 +55,7 @@ TASKS: dict[str, tuple[str, str]] = {
         equilibrium continuation mbs.EquilibriumPath inverse_dynamics linearize mbs.Linearization
         campbell mbs.Campbell
         frequency_response transmissibility mbs.FrequencyResponse steady_motion SteadyMotion
+        periodic_motion mbs.PeriodicMotion periodic_path mbs.PeriodicPath mbs.CriticalMotion
         equilibrium_sensitivity frequency_sensitivity motion_sensitivity mbs.Sensitivity
         body.von_mises""",
     ),

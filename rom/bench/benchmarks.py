@@ -304,10 +304,10 @@ def _steps_in_films(law: str, steps: int) -> float:
     from rom.bench.models import shaft_in_films
     from rom.mbs.integrate.simulation import simulate
 
-    mech, how = shaft_in_films(law), {"dt": 1e-4, "method": "bdf", "progress": False}
-    warm = simulate(mech, t_end=5e-3, **how)
+    mech, dt = shaft_in_films(law), 1e-4
+    warm = simulate(mech, t_end=5e-3, dt=dt, method="bdf")
     start = process_time()
-    simulate(mech, t_end=5e-3 + 1e-4 * steps, state=warm.final, **how)
+    simulate(mech, t_end=5e-3 + dt * steps, state=warm.final, dt=dt, method="bdf")
     return steps / (process_time() - start)
 
 

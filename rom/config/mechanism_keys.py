@@ -296,6 +296,7 @@ GEAR_PAIR = Table("A pair of involute wheels.", (
     Key("width", Quantity("m", positive=True), "Common width of the faces.", ...),
     Key("helix", Quantity("rad"), "At the reference circle, positive for a right-handed pinion.",
         0.0),
+    Key("gear_helix", Quantity("rad"), "That of the gear, to check its hand."),
     Key("pressure_angle", Quantity("rad"), "Normal one; 20 degrees if missing."),
     Key("shift", Quantity("1", TWO), "Profile shifts in modules.", [0.0, 0.0]),
     Key("centre_distance", Quantity("m", positive=True), "None leaves no backlash if missing."),
@@ -303,12 +304,26 @@ GEAR_PAIR = Table("A pair of involute wheels.", (
     Key("addendum", Quantity(positive=True), "Height above the reference circle in modules.", 1.0),
     Key("dedendum", Quantity(positive=True), "Depth below it in modules.", 1.25),
 ))  # fmt: skip
-CORRECTION = Table("What is taken off the working flanks.", (
+CORRECTION = Table("What is taken off the flanks, and what was measured on them.", (
     Key("relief", Quantity("m", TWO), "Depth at the tips of pinion and gear.", [0.0, 0.0]),
     Key("extent", Quantity("m", TWO), "Its length along the path of contact.", [0.0, 0.0]),
     Key("power", Quantity("1", positive=True), "1 for linear, 2 for parabolic relief.", 1.0),
     Key("crowning", Quantity("m"), "At both ends of the face.", 0.0),
     Key("slope", Quantity("m"), "Of the lead over the face.", 0.0),
+    Key("pinion_pitch", Quantity("m", ((None,),)), "Errors of its teeth; positive leaves a gap."),
+    Key("gear_pitch", Quantity("m", ((None,),)), "Those of the gear."),
+    *(Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} [m]: a line of "
+          "numbers with commas for each place of the profile, empty lines between teeth.")
+      for kind, which in (("map", "working"), ("back_map", "back"))
+      for wheel in ("pinion", "gear")),
+    Key("run_out", Quantity("m", TWO), "By which the teeth stand off the axes.", [0.0, 0.0]),
+    Key("run_out_direction", Quantity("rad", TWO), "From where the wheels mesh.", [0.0, 0.0]),
+))  # fmt: skip
+HERTZ = Table("Contact of teeth that gives way by its load.", (
+    Key("depths", Quantity("m", (*TWO, (None, 2))), "From the flanks of pinion and gear to the "
+        "axes of their teeth; one pair, or from first to last contact.", ...),
+    Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
+    Key("nu", Quantity(), "Poisson's ratio.", 0.3),
 ))  # fmt: skip
 ROLLING = {
     "balls": Table("A row of balls.", (
@@ -428,6 +443,9 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("cells", Whole(1), "Slices across the face.", 21),
         Key("phase", Quantity("rad"), "Turn of the pinion at the start.", 0.0),
         Key("entry", Quantity(), "Share of the base pitch over which teeth take up load.", 0.02),
+        Key("conservative", Flag(), "Whether forces follow the energy along the path of contact."),
+        Key("hertz", HERTZ, "Contact that gives way by its load."),
+        Key("coupling", Quantity("m"), "Length over which slices carry each other.", 0.0),
     ))),
     "rolling_bearings": ("rolling bearings", Variants({
         kind: Table(table.about, (*ROLLING_KEYS, *table.keys)) for kind, table in ROLLING.items()

@@ -7,6 +7,11 @@ from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynami
 from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import Linearization as Linearization
 from rom.mbs.analysis.linearize import linearize as linearize
+from rom.mbs.analysis.periodic.motion import PeriodicMotion as PeriodicMotion
+from rom.mbs.analysis.periodic.motion import periodic_motion as periodic_motion
+from rom.mbs.analysis.periodic.path import CriticalMotion as CriticalMotion
+from rom.mbs.analysis.periodic.path import PeriodicPath as PeriodicPath
+from rom.mbs.analysis.periodic.path import periodic_path as periodic_path
 from rom.mbs.analysis.response import FrequencyResponse as FrequencyResponse
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility

@@ -203,6 +203,7 @@ ORDER = {
         "inverse_dynamics",
         "law_check",
         "continuation",
+        "periodic",
     ),
     "mbs.elements": (
         "family",

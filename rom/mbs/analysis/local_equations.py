@@ -137,7 +137,7 @@ class Instant:
         micrometres, and are worse where films are a few of them thick.
         """
         self.evaluate(state.q, state.v)
-        if self.packed.room:
+        if self.packed.room and not self.packed.has_potential:
             return not self.laws
         rests = not state.v.any() or not self.packed.by_rate
         return bool(

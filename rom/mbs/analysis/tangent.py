@@ -96,7 +96,10 @@ class Tangent:
         squares = self._principal[0]
         if np.abs(squares).min(initial=np.inf) <= self.none(squares):
             return None
-        return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+        try:
+            return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+        except np.linalg.LinAlgError:  # films that start to fill: forces without a potential
+            return None
 
     @cached_property
     def rises(self) -> bool:

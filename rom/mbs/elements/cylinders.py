@@ -30,7 +30,9 @@ from rom.mbs.kernels.tables import Array1, Array4, Index2, Scratch2, Table, tabl
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 
-MIN_FIT = 0.02  # of the deformation, which harmonics and polynomials may miss without a word
+MAX_MISSED_RATIO = (
+    0.02  # of the deformation, which harmonics and polynomials may miss without a word
+)
 MOST_HARMONICS, MOST_ORDER = 12, 8  # of a surface whose functions do not say how many it has
 
 
@@ -102,11 +104,11 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     S = patch.surface_mass
     C = np.linalg.lstsq(B.T @ (S @ B), B.T @ (S @ w), rcond=1e-10)[0]
     missed = _share_missed(S, w, w - B @ C)
-    if missed > MIN_FIT:
+    if missed > MAX_MISSED_RATIO:
         warn(
             f"{100 * missed:.0f} % of the deformation of interface {marker.place!r} of body "
             f"{part.name!r} is in no harmonic up to {harmonics} and no polynomial up to {order}, "
-            f"and stays unloaded: reduce it with rom.FourierLegendre({harmonics}, {order}).",
+            f"and stays unloaded: reduce it with such functions.",
         )
     shapes = C.reshape(len(C), 3, -1)
     return Cylinder(harmonics, order, middle, half, axes, shapes, missed)
@@ -114,13 +116,10 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
 
 def _numbers(kind: str) -> tuple[int, int]:
     """Harmonics and order of the functions that an interface follows, as its kind says."""
-    family, _, numbers = kind.partition(":")
-    given = [int(x) for x in numbers.split(",") if x.strip().isdigit()]
-    if family == "fourier":
-        return max(given[0], 1), max(given[1], 1)
-    if family == "polynomial":
-        return max(given[0], 1), max(given[0], 1)
-    return MOST_HARMONICS, MOST_ORDER
+    numbers = [int(x) for x in kind.partition(":")[2].split(",") if x.strip().isdigit()]
+    if not numbers:
+        return MOST_HARMONICS, MOST_ORDER
+    return numbers[0], max(numbers[-1], 1)
 
 
 def _deformation(surface: Any) -> Array:

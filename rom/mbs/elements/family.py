@@ -8,6 +8,7 @@ by ``mechanism.add``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -95,6 +96,11 @@ def rows_of(values: Any, *shape: int) -> Array:
 def no_room(_: Any) -> Array:
     """(0,) no gap that is of the size of corrections."""
     return np.zeros(0)
+
+
+def nothing_eased(_: Table) -> AbstractContextManager[bool]:
+    """Elements that come to rest as they are."""
+    return nullcontext(False)
 
 
 def no_answers(_: Table) -> Sequence[Any]:
@@ -235,12 +241,16 @@ class Family:
         by_rate: table -> whether the forces depend on velocities.
         complete: whether its tangents have all of their changes with the position, those of rates
             at given velocities too.
+        potential: whether its forces, dampers aside, follow from a potential; those of films and of
+            what spins go around.
         loaded_rows: table -> constraint rows whose multipliers they depend on.
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
         answers: table -> (e, ...) what each law of a user answered last, None if there is none.
         lost: what is wrong if an answer is not finite; in place of {}, the names.
         room: table -> (e,) gaps over those in the middle [1], which one correction towards an
             equilibrium may halve or double at most.
+        eased: table -> context within which its elements find their equilibrium more easily, close
+            to the one that is wanted; it says whether that changes anything.
     """
 
     name: str
@@ -255,11 +265,13 @@ class Family:
     couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
     by_rate: Callable[[Any], bool] = always
     complete: bool = False
+    potential: bool = True
     loaded_rows: Callable[[Any], Index] = no_rows
     asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
     answers: Callable[[Any], Sequence[Any]] = no_answers
     lost: str = "the law of {} gives no finite number"
     room: Callable[[Any], Array] = no_room
+    eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
 
     @property
     def kernels(self) -> list[ElementKernel]:

@@ -294,6 +294,13 @@ GIVEN = {  # callable -> legal values of its own
     "held_solid": WHEEL | {"fixed": lambda: ("bore",)},
     "inverse_dynamics": {"mechanism": lambda: driven(free=False), "t": lambda: [0.0, 1e-3]},
     "linearize": {},
+    "periodic_motion": {"period": lambda: 1.0, "steps": lambda: 10},
+    "periodic_path": {
+        "build": lambda: spring,
+        "span": lambda: (1.0, 1.1),
+        "period": lambda: 1.0,
+        "steps": lambda: 10,
+    },
     "load": {"path": lambda: "body.rom.npz"},
     "load_state": {"path": lambda: "state.npz"},
     "mistuned_wheel": {"sector": ring},

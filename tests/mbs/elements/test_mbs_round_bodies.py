@@ -66,6 +66,17 @@ def test_a_rigid_rotor_whirls_as_the_books_say_on_uneven_bearings():
     assert_allclose(found, np.sort([0.0, axial, *wanted]), rtol=1e-6, atol=1e-4)
 
 
+@pytest.mark.parametrize("speed", [0.0, 20.0])
+def test_a_top_that_sleeps_is_not_called_unstable(speed, recwarn):
+    """It falls below sqrt(4 m g l A) / C of its inertias about the tip, 17 rad/s here."""
+    mech, body = rotor("spin", speed)
+    mech.bushing("tip", mech.ground.marker(body.points["low"]), body.marker("low"),
+                 stiffness=(1e7, 1e7, 1e7, 0, 0, 1.0))  # fmt: skip
+    state = rom.equilibrium(mech)
+    assert rom.linearize(mech, state).stable == (speed > 0)
+    assert any("unstable" in str(w.message) for w in recwarn) == (speed == 0)
+
+
 @cache
 def shaft(damping=0.0):
     body = rom.reduce(tube(0.01, 0.02, 0.3, (16, 1, 16)), method=rom.CraigBampton(12),

@@ -1,6 +1,7 @@
 """Films in cells: the arrays of all films of a mechanism, or of one alone."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from rom.mbs.kernels.tables import (
     Table,
     table,
 )
-from rom.model import Array, Index
+from rom.model import Array
 
 N_MOTIONS = 4  # journal centre x, y and tilt about x, y
 N_ANSWERS = 5  # what works on them, and the friction torque
@@ -24,11 +25,11 @@ N_ANSWERS = 5  # what works on them, and the friction torque
 RADIUS, LENGTH, CLEARANCE, SLENDER, IMAGES, Z_FIRST = range(6)
 # columns of Cells.circle: cosine, sine and bore at the centre of a column, and at the face behind
 COS, SIN, BORE = range(3)
-BEHIND = 3
+BEHIND_FACE = 3
 # columns of Cells.state: motion, its rate, then
-SPIN, PASSED, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
+SPIN_COLUMN, PASSED_TIME, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
 # column of Cells.slope from which on openings count, and behind them their rates
-OPENED = SPIN + 1
+OPENED = SPIN_COLUMN + 1
 
 
 @table
@@ -150,9 +151,9 @@ def cells_of(
     )
 
 
-def _padded(rows: Sequence[Array | Index], n: int) -> Array | Index:
+def _padded(rows: Sequence[Any], n: int) -> Any:
     """Rows of one length, zeros behind."""
-    padded = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
+    padded: Any = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
     for row, values in zip(padded, rows, strict=True):
         row[: len(values)] = values
     return padded

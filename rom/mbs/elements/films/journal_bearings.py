@@ -1,6 +1,7 @@
 """Journal bearings as elements: what users describe, and their arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,13 @@ import numpy.typing as npt
 from rom.arguments import finite, number, positive
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
-from rom.mbs.elements.films.bearing import JournalBearing
+from rom.mbs.elements.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.mbs.elements.films.cells import CLEARANCE, cells_of
 from rom.mbs.elements.films.journals import (
-    CONTENT,
+    FIRST_CONTENT,
     INLET,
     KNOWN,
-    SETTLES,
+    SETTLING_MARK,
     TEMPERATURE,
     Journals,
     film_tangents,
@@ -181,7 +182,7 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
         rows_of((one.oil for one in films), 9),
         integers([places.clock()]),
         integers(
-            places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLES))
+            places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLING_MARK))
             for name, one in found.items()
         ),
         cells_of([one.bearing for one in films]),
@@ -194,14 +195,26 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
 def _memory(one: OilFilm, known: float) -> Array:
     """What a film remembers at first: the temperature of its inlet, and whether that is known."""
     conserves = one.bearing.cavitation == "jfo"
-    memory = np.zeros(CONTENT + conserves * int(np.prod(one.bearing.cells)))
+    memory = np.zeros(FIRST_CONTENT + conserves * int(np.prod(one.bearing.cells)))
     memory[KNOWN], memory[TEMPERATURE] = known, one.oil[INLET]
     return memory
 
 
+@contextmanager
+def oil_everywhere(journals: Journals) -> Iterator[bool]:
+    """Films that conserve their oil find it everywhere: on the way to the load they may run dry."""
+    law = journals.films.law.copy()
+    journals.films.law[law == JFO] = REYNOLDS
+    try:
+        yield bool((law == JFO).any())
+    finally:
+        journals.films.law[:] = law
+
+
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    complete=True, answers=lambda journals: journals.largest,
+    complete=True, potential=False, answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
+    eased=oil_everywhere,
 )  # fmt: skip

@@ -10,9 +10,9 @@ from rom.mbs.elements.films.cells import (
     LENGTH,
     N_ANSWERS,
     N_MOTIONS,
-    PASSED,
+    PASSED_TIME,
     RADIUS,
-    SPIN,
+    SPIN_COLUMN,
     Cells,
 )
 from rom.mbs.elements.films.kinematics import (
@@ -24,7 +24,7 @@ from rom.mbs.elements.films.kinematics import (
     stepped_place,
 )
 from rom.mbs.elements.films.pressure import find_pressure, set_heights, set_supply
-from rom.mbs.elements.films.slopes import TORQUE, set_answers, set_slopes
+from rom.mbs.elements.films.slopes import TORQUE_ANSWER, set_answers, set_slopes
 from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
@@ -35,12 +35,14 @@ from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Tab
 CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = range(9)
 # what a film remembers, before the content of its cells
 KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
-CONTENT = MOTION + N_MOTIONS
-SETTLES = -1.0  # in place of 1 for a film that is known: its temperature is the one that stays
+FIRST_CONTENT = MOTION + N_MOTIONS
+SETTLING_MARK = (
+    -1.0
+)  # in place of 1 for a film that is known: its temperature is the one that stays
 CELSIUS_ZERO = 273.15  # [K]
 MAX_WARMINGS = 50  # of a film whose grooves have pressure
 WARMING_TOL = 1e-10  # of a temperature [K]
-BISECTIONS = 60  # of a temperature: all digits
+MAX_BISECTIONS = 60  # of a temperature: all digits
 # share of the oil that the journal drags around which is renewed in any case: a centred journal
 # does not pump
 LEAST_RENEWED = 1e-2
@@ -97,7 +99,7 @@ def oil_viscosity(oil, celsius):
 def answer_unit(journals, k, m):
     """Answer m of film k over the dimensionless one [N s, N m s]."""
     R, L, c = row(journals.films.size, k, RADIUS)
-    if m == TORQUE:
+    if m == TORQUE_ANSWER:
         return journals.viscosity[k] * R**3 * L / c
     return journals.viscosity[k] * R * L * (R / c) ** 2 * c / journals.scale[k, m]
 
@@ -120,7 +122,11 @@ def side_flow(journals, k):
 def lost_power(journals, k):
     """Power that turns into heat [W]."""
     films = journals.films
-    total = answer_unit(journals, k, TORQUE) * films.answer[k, TORQUE] * films.state[k, SPIN]
+    total = (
+        answer_unit(journals, k, TORQUE_ANSWER)
+        * films.answer[k, TORQUE_ANSWER]
+        * films.state[k, SPIN_COLUMN]
+    )
     for m in range(N_MOTIONS):
         force = answer_unit(journals, k, m) * films.answer[k, m]
         total -= force * journals.scale[k, m] * films.state[k, N_MOTIONS + m]
@@ -131,7 +137,13 @@ def lost_power(journals, k):
 def warming(journals, k):
     """Rise of the temperature of the film over inlet that its power would keep up [K]."""
     oil, size = journals.oil[k], journals.films.size[k]
-    drag = 0.5 * abs(journals.films.state[k, SPIN]) * size[CLEARANCE] * size[RADIUS] * size[LENGTH]
+    drag = (
+        0.5
+        * abs(journals.films.state[k, SPIN_COLUMN])
+        * size[CLEARANCE]
+        * size[RADIUS]
+        * size[LENGTH]
+    )
     flow = max(side_flow(journals, k), LEAST_RENEWED * drag)
     if oil[CONSTANT] > 0.0 or not flow > 0.0:
         return 0.0
@@ -159,7 +171,7 @@ def settled_temperature(journals, k):
             return math.nan
         by_viscosity = warming(journals, k) / journals.viscosity[k]
         low, high = oil[INLET], oil[INLET] + by_viscosity * oil_viscosity(oil, oil[INLET])
-        for _ in range(BISECTIONS):
+        for _ in range(MAX_BISECTIONS):
             middle = 0.5 * (low + high)
             if middle - oil[INLET] < by_viscosity * oil_viscosity(oil, middle):
                 low = middle
@@ -176,11 +188,11 @@ def recall(s, W, journals, k):
     """Tell the film what it remembers; returns its temperature, NaN if that is to be found."""
     at, films = s.coordinates.kind.size + journals.remembered[k], journals.films
     passed = W.signal[journals.clock[0], 0] - W.base[at + TIME]
-    known = W.base[at + KNOWN] == 1.0 and passed >= 0.0
-    films.state[k, PASSED], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
+    known = W.base[at + KNOWN] == 1.0
+    films.state[k, PASSED_TIME], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
     for cell in range(n_remembered(films, k)):
-        films.content[k, cell] = W.base[at + CONTENT + cell]
-    return math.nan if W.base[at + KNOWN] == SETTLES else W.base[at + TEMPERATURE]
+        films.content[k, cell] = W.base[at + FIRST_CONTENT + cell]
+    return math.nan if W.base[at + KNOWN] == SETTLING_MARK else W.base[at + TEMPERATURE]
 
 
 @inner
@@ -195,20 +207,20 @@ def remember(W, journals, k, celsius):
     films, oil = journals.films, journals.oil[k]
     at = journals.remembered[k]
     aim = oil[INLET] + warming(journals, k)
-    if films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED] > 0.0:
-        celsius = aim + (celsius - aim) * math.exp(-films.state[k, PASSED] / oil[LAG])
+    if films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] > 0.0:
+        celsius = aim + (celsius - aim) * math.exp(-films.state[k, PASSED_TIME] / oil[LAG])
     W.fresh[at + KNOWN], W.fresh[at + TIME] = 1.0, W.signal[journals.clock[0], 0]
     W.fresh[at + TEMPERATURE], W.fresh[at + THINNEST] = celsius, journals.thinnest[k]
     W.fresh[at + LARGEST], W.fresh[at + POWER] = journals.largest[k], lost_power(journals, k)
     W.fresh[at + SIDE_FLOW] = side_flow(journals, k)
     for m in range(N_MOTIONS):
         W.fresh[at + MOTION + m] = films.state[k, m] * journals.scale[k, m]
-    stays = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED] == 0.0
+    stays = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] == 0.0
     for cell in range(n_remembered(films, k)):
         if stays:
-            W.fresh[at + CONTENT + cell] = films.content[k, cell]
+            W.fresh[at + FIRST_CONTENT + cell] = films.content[k, cell]
         else:
-            W.fresh[at + CONTENT + cell] = films.fill[k, cell] * films.middle[k, cell]
+            W.fresh[at + FIRST_CONTENT + cell] = films.fill[k, cell] * films.middle[k, cell]
 
 
 @inner
@@ -220,7 +232,7 @@ def set_state(journals, k, place):
         state[m], state[N_MOTIONS + m] = motion[m] / scale[m], rate[m] / scale[m]
     if journals.films.size[k, IMAGES] > 1.0:  # tilts are not seen
         state[2] = state[3] = state[N_MOTIONS + 2] = state[N_MOTIONS + 3] = 0.0
-    state[SPIN] = spin + journals.turning[k]
+    state[SPIN_COLUMN] = spin + journals.turning[k]
 
 
 @inner
@@ -262,7 +274,7 @@ def film_forces(journals, k):
         answer_unit(journals, k, 2) * answer[2],
         answer_unit(journals, k, 3) * answer[3],
     )
-    return F, answer_unit(journals, k, TORQUE) * answer[TORQUE]
+    return F, answer_unit(journals, k, TORQUE_ANSWER) * answer[TORQUE_ANSWER]
 
 
 @residuals.of(Journals)
@@ -297,14 +309,14 @@ def changed_answers(journals, k, motion, rate, spin):
         for q in range(N_MOTIONS):
             change[m] += slope[m, q] * motion[q].imag / journals.scale[k, q]
             change[m] += slope[m, N_MOTIONS + q] * rate[q].imag / journals.scale[k, q]
-        change[m] = answer_unit(journals, k, m) * (change[m] + slope[m, SPIN] * spin.imag)
+        change[m] = answer_unit(journals, k, m) * (change[m] + slope[m, SPIN_COLUMN] * spin.imag)
     F = (
         complex(F[0], change[0]),
         complex(F[1], change[1]),
         complex(F[2], change[2]),
         complex(F[3], change[3]),
     )
-    return F, complex(torque, change[TORQUE])
+    return F, complex(torque, change[TORQUE_ANSWER])
 
 
 @inner
@@ -315,11 +327,11 @@ def set_column(W, journals, k, p, by_position):
     axes, relative = stepped_place(p, by_position, place)
     F, torque = changed_answers(journals, k, *journal_motion(axes, relative))
     force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
-    push, turned, back = imaginary(force), imaginary(on_journal), imaginary(on_bush)
+    shove, turned, back = imaginary(force), imaginary(on_journal), imaginary(on_bush)
     for q in range(3):
-        W.Q[q, p] = -push[q]
+        W.Q[q, p] = -shove[q]
         W.Q[3 + q, p] = -turned[q]
-        W.Q[6 + q, p] = push[q]
+        W.Q[6 + q, p] = shove[q]
         W.Q[9 + q, p] = -back[q]
 
 

@@ -17,24 +17,24 @@ import math
 from rom.mbs.elements.films.band import back_substitute, factor
 from rom.mbs.elements.films.bearing import FULL, JFO
 from rom.mbs.elements.films.cells import (
-    BEHIND,
+    BEHIND_FACE,
     BORE,
     CLEARANCE,
     CONTENT_KNOWN,
     COS,
     IMAGES,
     N_MOTIONS,
-    PASSED,
+    PASSED_TIME,
     RADIUS,
     SIN,
     SLENDER,
-    SPIN,
+    SPIN_COLUMN,
     Z_FIRST,
 )
 from rom.mbs.kernels.compiled import inner
 
 MAX_ITERATIONS = 100  # changes of the cavitated region
-LEAKAGE = 1e-13  # of a void all around the bush, whose oil would not be decided otherwise
+LEAKAGE_RTOL = 1e-13  # of a void all around the bush, whose oil would not be decided otherwise
 # of the conductance, below which no flow decides how far a cell is filled
 LEAST_FLOW = 1e-14
 # of what the journal drags out of a void that closes, by which the closing counts with its filling
@@ -75,8 +75,8 @@ def set_heights(films, k):
     ratio, low = films.size[k, SLENDER] * dtheta / dZ, math.inf
     for i in range(nt):
         a, b = line_of(films, k, 0, i, 0)
-        c, d = line_of(films, k, BEHIND, i, 0)
-        a, c = a + films.circle[k, i, BORE], c + films.circle[k, i, BEHIND + BORE]
+        c, d = line_of(films, k, BEHIND_FACE, i, 0)
+        a, c = a + films.circle[k, i, BORE], c + films.circle[k, i, BEHIND_FACE + BORE]
         after = (i + 1) % nt
         for j in range(nz):
             cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
@@ -103,7 +103,7 @@ def set_storage(films, k):
     """Set what cells take up."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    size, passed = 12 * dtheta * dZ, films.state[k, PASSED]
+    size, passed = 12 * dtheta * dZ, films.state[k, PASSED_TIME]
     remembers = has_memory(films, k)
     for i in range(nt):
         a, b = line_of(films, k, 0, i, N_MOTIONS)
@@ -120,7 +120,7 @@ def set_storage(films, k):
 @inner
 def has_memory(films, k):
     """Whether the filling follows from that of the last accepted instant."""
-    known = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED] > 0.0
+    known = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] > 0.0
     return known and films.law[k] == JFO
 
 
@@ -171,7 +171,7 @@ def assemble(films, k, w):
     for row in range(nt * nz):
         for m in range(2 * w + 1):
             films.band[k, row, m] = 0.0
-    drag = 6 * cell_size(films, k)[1] * films.state[k, SPIN]
+    drag = 6 * cell_size(films, k)[1] * films.state[k, SPIN_COLUMN]
     for i in range(nt):
         before, after = (i - 1) % nt, (i + 1) % nt
         for j in range(nz):
@@ -206,7 +206,7 @@ def add_filling(films, k, cells, drags, w):
     row = films.place[k, cell // nz] * nz + cell % nz
     if films.active[k, cell] == 0:
         out = max(away, -into)
-        own = (1 + LEAKAGE) * out + max(films.store[k, cell], -MAX_CLOSING * out)
+        own = (1 + LEAKAGE_RTOL) * out + max(films.store[k, cell], -MAX_CLOSING * out)
         least = LEAST_FLOW * films.conducts[k, cell]
         films.band[k, row, w] += own if own > least else 1.0
     upstream, flow = (west, into) if into > 0.0 else (east, -away)

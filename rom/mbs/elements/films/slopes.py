@@ -8,12 +8,12 @@ serves all motions, rates, the spin and the openings of single cells.
 from rom.mbs.elements.films.band import back_substitute_transposed
 from rom.mbs.elements.films.bearing import JFO
 from rom.mbs.elements.films.cells import (
-    BEHIND,
+    BEHIND_FACE,
     IMAGES,
     N_ANSWERS,
     N_MOTIONS,
     OPENED,
-    SPIN,
+    SPIN_COLUMN,
     Z_FIRST,
 )
 from rom.mbs.elements.films.pressure import (
@@ -27,7 +27,7 @@ from rom.mbs.elements.films.pressure import (
 )
 from rom.mbs.kernels.compiled import inner, kernel
 
-TORQUE = N_MOTIONS  # number of the last answer
+TORQUE_ANSWER = N_MOTIONS  # number of the last answer
 
 
 @inner
@@ -52,9 +52,11 @@ def set_answers(films, k):
                 films.answer[k, m] += width * dtheta * P * opened
             for f in range(films.n_functions[k]):
                 films.answer[k, N_ANSWERS + f] += width * dtheta * P * films.functions[k, cell, f]
-            shear = films.state[k, SPIN] * films.fill[k, cell] / films.middle[k, cell] * dtheta
+            shear = (
+                films.state[k, SPIN_COLUMN] * films.fill[k, cell] / films.middle[k, cell] * dtheta
+            )
             rise = films.behind[k, cell] - films.behind[k, west]
-            films.answer[k, TORQUE] += width * (shear - 0.5 * P * rise)
+            films.answer[k, TORQUE_ANSWER] += width * (shear - 0.5 * P * rise)
 
 
 @inner
@@ -92,10 +94,10 @@ def set_weights(films, k):
                     opened = films.functions[k, cell, f]
                     films.weight[k, row, N_ANSWERS + f] = width * dtheta * opened
                 rise = films.behind[k, cell] - films.behind[k, west]
-                films.weight[k, row, TORQUE] = -0.5 * width * rise
+                films.weight[k, row, TORQUE_ANSWER] = -0.5 * width * rise
             elif films.law[k] == JFO:
-                shear = films.state[k, SPIN] * dtheta / films.middle[k, cell]
-                films.weight[k, row, TORQUE] = width * shear
+                shear = films.state[k, SPIN_COLUMN] * dtheta / films.middle[k, cell]
+                films.weight[k, row, TORQUE_ANSWER] = width * shear
 
 
 @inner
@@ -106,24 +108,24 @@ def add_shear_slopes(films, k, i, j):
     cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
     width, h = dZ * films.size[k, IMAGES], films.middle[k, cell]
     shear = width * dtheta * films.fill[k, cell] / h
-    films.slope[k, TORQUE, SPIN] += shear
-    thinner, slanted = shear * films.state[k, SPIN] / h, 0.5 * width * films.P[k, cell]
+    films.slope[k, TORQUE_ANSWER, SPIN_COLUMN] += shear
+    thinner, slanted = shear * films.state[k, SPIN_COLUMN] / h, 0.5 * width * films.P[k, cell]
     for m in range(n_motions(films, k)):
-        rise = per_motion(films, k, BEHIND, i, Z, m)
-        rise -= per_motion(films, k, BEHIND, (i - 1) % nt, Z, m)
+        rise = per_motion(films, k, BEHIND_FACE, i, Z, m)
+        rise -= per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
         opened = per_motion(films, k, 0, i, Z, m)
-        films.slope[k, TORQUE, m] -= thinner * opened + slanted * rise
+        films.slope[k, TORQUE_ANSWER, m] -= thinner * opened + slanted * rise
     east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
     for f in range(films.n_functions[k]):
         opened, g = films.functions[k, :, f], OPENED + f
         rise = 0.5 * (opened[east] - opened[west])
-        films.slope[k, TORQUE, g] -= thinner * opened[cell] + slanted * rise
+        films.slope[k, TORQUE_ANSWER, g] -= thinner * opened[cell] + slanted * rise
 
 
 @inner
 def carried(films, k, west, east):
     """Filling of what the journal drags from the cell west of a face to that east of it."""
-    return films.fill[k, west] if films.state[k, SPIN] > 0.0 else films.fill[k, east]
+    return films.fill[k, west] if films.state[k, SPIN_COLUMN] > 0.0 else films.fill[k, east]
 
 
 @inner
@@ -136,7 +138,7 @@ def balance_slopes(films, k, i, j):
     """
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    cell, P, spin = i * nz + j, films.P[k, i * nz + j], films.state[k, SPIN]
+    cell, P, spin = i * nz + j, films.P[k, i * nz + j], films.state[k, SPIN_COLUMN]
     east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
     h, h_west = films.behind[k, cell], films.behind[k, west]
     away, into = 6 * dZ * carried(films, k, cell, east), 6 * dZ * carried(films, k, west, cell)
@@ -171,8 +173,8 @@ def add_cell_slopes(films, k, i, j):
     by_east, by_west, by_middle, low, high = by_film
     for m in range(n_motions(films, k)):
         opened = per_motion(films, k, 0, i, Z, m)
-        change = by_east * per_motion(films, k, BEHIND, i, Z, m) + by_middle * opened
-        change += by_west * per_motion(films, k, BEHIND, (i - 1) % nt, Z, m)
+        change = by_east * per_motion(films, k, BEHIND_FACE, i, Z, m) + by_middle * opened
+        change += by_west * per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
         change += low * per_motion(films, k, 0, i, Z - 0.5 * dZ, m)
         change += high * per_motion(films, k, 0, i, Z + 0.5 * dZ, m)
         add_change(films, k, row, m, change)
@@ -186,7 +188,7 @@ def add_cell_slopes(films, k, i, j):
         change += 0.5 * (low * (opened + g[below]) + high * (opened + g[above]))
         add_change(films, k, row, OPENED + f, change)
         add_change(films, k, row, OPENED + films.functions.shape[2] + f, by_rate * opened)
-    add_change(films, k, row, SPIN, by_spin)
+    add_change(films, k, row, SPIN_COLUMN, by_spin)
 
 
 @inner

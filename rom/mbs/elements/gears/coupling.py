@@ -19,9 +19,9 @@ from rom.mbs.elements.gears.table import (
     COORDINATES,
     COUPLING,
     DEPTH,
+    FIRST_GRADIENT,
     FORCE,
     FOUNDATION,
-    GRADIENT,
     HERTZ,
     LINK,
     STIFFNESS,
@@ -39,7 +39,7 @@ from rom.mbs.kernels.compiled import inner
 
 MAX_PASSES = 60  # of sets that shrink monotonically, and of a Newton method that doubles its digits
 BENT_RTOL = 1e-14  # of the deepest slice: the last digit of deflections
-STIFF = 1e30  # stiffness of teeth that do not bend beside their contact [N/m^2]
+RIGID_STIFFNESS = 1e30  # stiffness of teeth that do not bend beside their contact [N/m^2]
 
 
 @inner
@@ -144,7 +144,7 @@ def press_soft_contact(slices, count, c):
             one[FORCE], one[TOUCHES], one[TARGET] = 0.0, 0.0, 0.0
             into = one[DEPTH] - one[BENT]
             if into > 0.0:
-                load, slope = load_of_depth(into, STIFF, one[CONSTANT], c)
+                load, slope = load_of_depth(into, RIGID_STIFFNESS, one[CONSTANT], c)
                 one[FORCE], one[TOUCHES] = one[WEIGHT] * load, one[WEIGHT] * slope
                 one[TARGET] = one[BENT] + load / slope
             one[STORED] = one[BENT]
@@ -168,7 +168,7 @@ def share_energy(slices, count, c):
             one[BY_STIFFNESS] = one[FORCE] / one[STIFFNESS]
         if one[FORCE] > 0.0 and c > 0.0:
             load = one[FORCE] / one[WEIGHT]
-            stored = energy_of_load(load, STIFF, one[CONSTANT], c)
+            stored = energy_of_load(load, RIGID_STIFFNESS, one[CONSTANT], c)
             one[STORED], one[WORK_WEIGHT] = one[WEIGHT] * stored, stored
             one[WORK_CONSTANT] = -0.5 * c * one[WEIGHT] * load * load
 
@@ -195,10 +195,10 @@ def add_line_stiffness(meshes, k, count):
     """Add to the second derivatives of the energy what the depths of coupled slices do."""
     slices, stiff = meshes.line, meshes.law[k, HERTZ] == 0.0
     for a in range(COORDINATES):
-        bend(slices, count, GRADIENT + a, stiff)
+        bend(slices, count, FIRST_GRADIENT + a, stiff)
         for cell in range(count):
             one = slices[cell]
             if one[TOUCHES] > 0.0:
                 change = pressure(slices, count, cell)
                 for b in range(COORDINATES):
-                    meshes.hessian[0, a, b] += change * one[GRADIENT + b]
+                    meshes.hessian[0, a, b] += change * one[FIRST_GRADIENT + b]

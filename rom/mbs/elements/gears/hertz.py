@@ -9,8 +9,10 @@ from rom.errors import ModelError
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.model import Array
 
-SHARPEST = 1e-6  # curvature radius over the distance of the tangent points: at these it is zero
-PLACES = 41  # of the table along the path: its constant is a logarithm and changes slowly
+MIN_CURVATURE_RTOL = (
+    1e-6  # curvature radius over the distance of the tangent points: at these it is zero
+)
+N_PLACES = 41  # of the table along the path: its constant is a logarithm and changes slowly
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +55,10 @@ class Hertz:
             raise ModelError(f"depths {self.depths} of Hertz's contact are (2,) or (n, 2) above 0.")
         if not (self.E > 0 and 0 <= self.nu < 0.5):
             raise ModelError(f"no material has E = {self.E} Pa and nu = {self.nu}.")
-        share = np.linspace(0, 1, PLACES)
+        share = np.linspace(0, 1, N_PLACES)
         h = np.stack([np.interp(share, np.linspace(0, 1, len(h)), column) for column in h.T])
         s = pair.path[0] + share * (pair.path[1] - pair.path[0])
-        least = SHARPEST * abs(pair.tangents)
+        least = MIN_CURVATURE_RTOL * abs(pair.tangents)
         one = np.maximum(s, least) / np.cos(pair.base_helix)
         two = pair.tangents - s
         two = np.where(np.abs(two) < least, least, two) / np.cos(pair.base_helix)

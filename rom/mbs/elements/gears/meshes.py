@@ -29,7 +29,7 @@ MAX_CELLS = 1000
 MAX_APPROACH = 0.1  # of the base pitch: a hundred times the deflection of loaded teeth
 MAX_ENTRY = 0.5  # of the base pitch
 MAX_RUN_OUT = 0.1  # of the module: by which an involute is what it is to first order
-NONE = np.zeros(0)
+NO_ERRORS = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,7 +283,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         integers([places.clock()]),
         integers(mesh.cells for mesh in found),
         *_joined([mesh.stiffness for mesh in found]),
-        *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NONE for mesh in found]),
+        *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NO_ERRORS for mesh in found]),
         *_joined([_from_lowest(errors) for mesh in found for errors in mesh.correction.pitch]),
         *_joined([m.ravel() for m in maps]),
         np.array([m.shape for m in maps], dtype=np.int64).reshape(-1, 3),
@@ -306,7 +306,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
 
 def _joined(rows: list[Array]) -> tuple[Array, Array]:
     """Where each row begins, and all of them."""
-    return np.cumsum([0, *(row.size for row in rows)]), np.concatenate([NONE, *rows])
+    return np.cumsum([0, *(row.size for row in rows)]), np.concatenate([NO_ERRORS, *rows])
 
 
 def _most_slices(mesh: GearMesh) -> int:

@@ -13,10 +13,10 @@ from rom.mbs.elements.gears.table import (
     COORDINATES,
     DAMPING,
     DEPTH,
+    FIRST_GRADIENT,
     FORCE,
     FORCES,
     FRICTION,
-    GRADIENT,
     HELIX,
     LOSS,
     RB_1,
@@ -81,7 +81,7 @@ def damp(s, W, meshes, k, one, place):
     if damping == 0.0:
         return 0.0, 0.0
     for a in range(COORDINATES):
-        rate += one[GRADIENT + a] * meshes.speed[a]
+        rate += one[FIRST_GRADIENT + a] * meshes.speed[a]
     if has_rims(meshes, k):
         arms, n, _ = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
         place_on_rims(s, W, meshes, k, arms[0], state[0])
@@ -140,7 +140,7 @@ def add_friction(meshes, one, directions, grip, stick):
     for q in range(12):
         lever[CLOSING, q] = 0.0
         for a in range(COORDINATES):
-            lever[CLOSING, q] += one[GRADIENT + a] * meshes.rates[a, q]
+            lever[CLOSING, q] += one[FIRST_GRADIENT + a] * meshes.rates[a, q]
     add_product(tangent[0], grip * one[STEEP], lever[ACROSS], lever[CLOSING])
     add_product(tangent[1], grip * one[VISCOUS], lever[ACROSS], lever[CLOSING])
     add_product(tangent[1], stick, lever[ACROSS], lever[ACROSS])

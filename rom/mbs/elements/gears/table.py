@@ -40,8 +40,8 @@ FOUNDATION, LINK, TOUCHES, BENT, UPPER, ANSWER, TARGET = range(23, 30)
 # the length of its piece of the line, the force that damping adds, and how the whole follows depth
 # and its rate
 LENGTH_OF_LINE, LOSS, STEEP, VISCOUS = range(30, 34)
-GRADIENT = 34  # first of the derivatives of its depth by the coordinates of the wheels
-SLICE_COLUMNS = GRADIENT + COORDINATES
+FIRST_GRADIENT = 34  # first of the derivatives of its depth by the coordinates of the wheels
+SLICE_COLUMNS = FIRST_GRADIENT + COORDINATES
 
 
 @table

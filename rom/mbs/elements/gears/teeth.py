@@ -48,11 +48,11 @@ from rom.mbs.elements.gears.table import (
     DISTANCE,
     ENERGY,
     ENTRY,
+    FIRST_GRADIENT,
     FOLLOWS,
     FORCE,
     FORCES,
     FRICTION,
-    GRADIENT,
     HEIGHT,
     HELIX,
     HERTZ,
@@ -357,10 +357,11 @@ def set_gradient(size, one, side, state, rates):
     turned_t = lead * z * cosine - side * slope * (base * sine - x * cosine)
     opened = lead * sine + (turned_c * tilt_c + turned_t * tilt_t) * rates[3]
     opened -= side * slope * tilt_t
-    one[GRADIENT + TURN_1] = lead * side * base + one[DEPTH_AT] * rates[0]
-    one[GRADIENT + TURN_2] = lead * side * size[RB_2]
-    one[GRADIENT + DISTANCE] = one[DEPTH_AT] * rates[1] + one[DEPTH_FIRST] * rates[2] - opened
-    one[GRADIENT + SHIFT], one[GRADIENT + TILT_C], one[GRADIENT + TILT_T] = side * slope, -m_c, -m_t
+    one[FIRST_GRADIENT + TURN_1] = lead * side * base + one[DEPTH_AT] * rates[0]
+    one[FIRST_GRADIENT + TURN_2] = lead * side * size[RB_2]
+    one[FIRST_GRADIENT + DISTANCE] = one[DEPTH_AT] * rates[1] + one[DEPTH_FIRST] * rates[2] - opened
+    one[FIRST_GRADIENT + SHIFT] = side * slope
+    one[FIRST_GRADIENT + TILT_C], one[FIRST_GRADIENT + TILT_T] = -m_c, -m_t
 
 
 @inner
@@ -417,7 +418,7 @@ def add_gradient(meshes, one, rates):
     by_first += one[WORK_CONSTANT] * one[CONSTANT_FIRST]
     if one[FORCE] > 0.0:
         for a in range(COORDINATES):
-            meshes.gradient[a] += (one[FORCE] + one[LOSS]) * one[GRADIENT + a]
+            meshes.gradient[a] += (one[FORCE] + one[LOSS]) * one[FIRST_GRADIENT + a]
     meshes.gradient[TURN_1] += by_at * rates[0]
     meshes.gradient[DISTANCE] += by_at * rates[1] + by_first * rates[2]
 
@@ -437,15 +438,15 @@ def add_stiffness(meshes, one, rates, rims, coupled):
     steep -= one[BY_DEPTH] if coupled else 0.0
     stiffness[0, DISTANCE, DISTANCE] += (one[FORCE] + one[LOSS]) * rates[4]
     for a in range(COORDINATES):
-        depth = one[GRADIENT + a]
+        depth = one[FIRST_GRADIENT + a]
         stiffness[0, a, TURN_1] += by_turn * depth
         stiffness[0, TURN_1, a] += by_turn * depth
         stiffness[0, a, DISTANCE] += by_distance * depth
         stiffness[0, DISTANCE, a] += by_distance * depth
         if not rims:
             for b in range(COORDINATES):
-                stiffness[0, a, b] += steep * depth * one[GRADIENT + b]
-                stiffness[1, a, b] += viscous * depth * one[GRADIENT + b]
+                stiffness[0, a, b] += steep * depth * one[FIRST_GRADIENT + b]
+                stiffness[1, a, b] += viscous * depth * one[FIRST_GRADIENT + b]
 
 
 @residuals.of(Meshes)

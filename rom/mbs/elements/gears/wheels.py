@@ -165,11 +165,13 @@ def turn_forces(meshes, axes, distance):
     about = (gradient[TURN_1] + gradient[TURN_2]) / (distance * distance)
     for p in range(3):
         for q in range(3):
-            way = about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
+            turning = (
+                about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
+            )
             lean = gradient[SHIFT] * (t[p] * c[q] - c[p] * t[q])
             for side in range(2):
                 sign = 2.0 * side - 1.0
-                tangent[0, 6 * side + p, 6 * side + q] += way
-                tangent[0, 6 * side + p, 6 - 6 * side + q] -= way
+                tangent[0, 6 * side + p, 6 * side + q] += turning
+                tangent[0, 6 * side + p, 6 - 6 * side + q] -= turning
                 tangent[0, 3 + p, 6 * side + q] += sign * lean
                 tangent[0, 6 * side + q, 3 + p] += sign * lean

@@ -53,7 +53,7 @@ def spin_matrices(body: Any, axis: Array) -> tuple[Array, Array]:
     M, K = body.full_matrices()
     lam, V = eigh(K, M)
     turning = V @ _generator(body, axis, lam, V) @ V.T @ M  # of coordinates
-    whole = 2.0 * (M @ turning - _cross_mass(body, axis))
+    whole = 2.0 * (M @ turning - directed_mass(body, skew(axis)))
     return 0.5 * (whole - whole.T)[3:, 3:], body.D @ turning[6:, 6:]
 
 
@@ -161,9 +161,13 @@ def _places(X: Array, triangles: Any, points: Array) -> tuple[Any, Array]:
     return triangles[near[rows, best]], kept / kept.sum(axis=1, keepdims=True)
 
 
-def _cross_mass(body: Any, axis: Array) -> Array:
-    """(6 + r, 6 + r) integrals of rho phi_a . (z x phi_b), rigid motions first."""
-    E = skew(axis)
+def directed_mass(body: Any, E: Array) -> Array:
+    """(6 + r, 6 + r) integrals of rho phi_a . E phi_b, rigid motions first.
+
+    Args:
+        body: a ``FlexibleBody``.
+        E: (3, 3) in the body frame: z x of a spin, or z z^T for the mass of motions along z [1].
+    """
     r, second = body.n_modes, 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
     turns = np.array([skew(np.eye(3)[p]) for p in range(3)])  # rotation p moves X by turns[p] X
     found = np.zeros((6 + r, 6 + r))
@@ -172,7 +176,7 @@ def _cross_mass(body: Any, axis: Array) -> Array:
     found[:3, 3:6], found[3:6, :3] = E @ arms, arms.T @ E
     found[3:6, 3:6] = np.einsum("pab,ac,qcd,bd->pq", turns, E, turns, second)
     found[:3, 6:], found[6:, :3] = E @ body.S, body.S.T @ E
-    across = np.einsum("pab,ac,bck->pk", turns, E, body.Ibar_kl)
-    found[3:6, 6:], found[6:, 3:6] = across, -across.T
+    found[3:6, 6:] = np.einsum("pab,ac,bck->pk", turns, E, body.Ibar_kl)
+    found[6:, 3:6] = np.einsum("pab,ca,bck->kp", turns, E, body.Ibar_kl)
     found[6:, 6:] = np.einsum("abkl,ab->kl", body.S_kl, E)
     return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +70,7 @@ def pack(spins: Mapping[str, Spin], places: Places) -> Spins:
 
 
 @residuals.of(Spins)
-def spin_forces(s, W, spins, q, v, _lam):
+def spin_forces(s: Any, W: Any, spins: Any, q: Any, v: Any, _lam: Any) -> None:
     """Subtract the forces from W.residual; what turns the body drives those of damping."""
     for k in range(spins.body.size):
         b = spins.body[k]
@@ -86,7 +87,7 @@ def spin_forces(s, W, spins, q, v, _lam):
 
 
 @tangents.of(Spins)
-def spin_tangents(s, W, spins, _lam, ck, cc):
+def spin_tangents(s: Any, W: Any, spins: Any, _lam: Any, ck: Any, cc: Any) -> None:
     """Subtract ck times the derivative by coordinates from W.Kt, cc times that by velocities."""
     for k in range(spins.body.size):
         b = spins.body[k]
@@ -101,5 +102,5 @@ def spin_tangents(s, W, spins, _lam, ck, cc):
 
 SPINS_FAMILY = Family(
     "spins", Spin, pack, spin_forces, spin_tangents, ends=on_joint, outside=from_outside,
-    couples=apart, complete=True,
+    couples=apart, complete=True, potential=False,
 )  # fmt: skip

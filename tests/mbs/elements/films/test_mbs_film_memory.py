@@ -10,7 +10,7 @@ import rom
 from cases.mbs.films import held_rotor
 from cases.mbs.mechanisms import prepared, residual_at
 from rom.mbs import Groove, JournalBearing
-from rom.mbs.elements.films.journals import CONTENT
+from rom.mbs.elements.films.journals import FIRST_CONTENT
 
 SPEED, VISCOSITY, C = 100.0, 0.03, 1e-4
 
@@ -22,7 +22,7 @@ def bearing(grooves, cells=(60, 6), **more):
 def contents(sol):
     """(n_t, nt, nz) film times filling over the clearance that is remembered."""
     packed, b = sol.packed, sol.mechanism.journal_bearings["film"].bearing
-    first = len(packed.places.coordinates) + CONTENT
+    first = len(packed.places.coordinates) + FIRST_CONTENT
     return sol.base[:, first : first + np.prod(b.cells)].reshape(-1, *b.cells)
 
 
@@ -59,7 +59,7 @@ def driven_film(b, speed, t, x, y):
         q[:2], v[:2] = (x[k], y[k]), (np.gradient(x, t)[k], np.gradient(y, t)[k])
         residual_at(packed.system, W, q, v, 0 * v, np.zeros(0))
         W.base[first:] = W.fresh
-        content.append(W.fresh[CONTENT:].reshape(b.cells).copy())
+        content.append(W.fresh[FIRST_CONTENT:].reshape(b.cells).copy())
         P, fill = (a[0].reshape(b.cells) for a in (table.films.P, table.films.fill))
         into.append(flows(b, np.array([x[k], y[k], 0, 0]), P, fill, speed))
     return np.array(content), np.array(into[1:])
@@ -97,7 +97,7 @@ def test_a_simulated_motion_keeps_the_same_oil():
 
 def emptied(sol):
     """The last state of a motion, its film without oil."""
-    base, at = sol.final.base.copy(), len(sol.packed.places.coordinates) + CONTENT
+    base, at = sol.final.base.copy(), len(sol.packed.places.coordinates) + FIRST_CONTENT
     base[at:] = 0.0
     return replace(sol.final, base=base, memory=None, algorithmic=None)
 

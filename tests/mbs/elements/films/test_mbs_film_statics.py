@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.films import held_rotor, resting
 from rom.components import journal_bearing as component
+from rom.errors import ModelError
 from rom.mbs import Groove, JournalBearing, iso_vg
 
 SPEED, VISCOSITY = 100.0, 0.03
@@ -164,6 +165,20 @@ def test_an_elliptical_bore_is_one_of_two_lobes(row):
     assert_allclose(b.grid.bore, halves.grid.bore, atol=1e-15)
     again, *_ = resting(rotor(halves, W), SPEED)
     assert_allclose(again.q[:2], state.q[:2], rtol=1e-9)
+
+
+def test_lobes_begin_where_they_are_told():
+    """Narrow in the middle of each arc, as wide as the clearance where the arcs meet at two."""
+    bore = rom.mbs.multilobe(3, 0.4, first=0.3)
+    middles = 0.3 + 2 * np.pi * np.arange(3) / 3
+    assert_allclose(bore(middles), 0.6, rtol=1e-12)
+    assert_allclose(bore(middles + np.pi / 3), 1 - 0.4 * np.cos(np.pi / 3), rtol=1e-12)
+    with pytest.raises(ModelError, match="are no bore"):
+        rom.mbs.multilobe(0, 0.4)
+    with pytest.raises(ModelError, match="leaves a centred journal no room"):
+        bearing(bore=lambda angles: 0 * angles)
+    with pytest.raises(ModelError, match="a bore of its own"):
+        bearing(bore=bore, preload=0.5)
 
 
 def test_three_lobes_are_alike():

@@ -12,8 +12,8 @@ from cases.mbs.tangents import difference, shifted
 from rom.components.journal_bearing import film
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
-from rom.mbs.elements.films.cells import SPIN, cells_of
-from rom.mbs.elements.films.journals import CONTENT, KNOWN, TIME
+from rom.mbs.elements.films.cells import SPIN_COLUMN, cells_of
+from rom.mbs.elements.films.journals import FIRST_CONTENT, KNOWN, TIME
 from rom.mbs.elements.films.slopes import solve_film
 from rom.rotation import matrix
 
@@ -135,6 +135,19 @@ def test_backwards_is_the_mirror_image(law):
     assert lost == pytest.approx(power, rel=1e-9)
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_an_aligned_film_does_not_see_tilts(law):
+    """It has the loads of one that is not tilted, and no moments across."""
+    b = bearing(law, grooves=[Groove(1.2, 0.3, 1e5)], aligned=True)
+    upright = np.array([1.0, 1.0, 0.0, 0.0])
+    f = film(b, MOTION * upright, RATE * upright, speed=SPEED, viscosity=VISCOSITY)
+    (on_journal, _), power = (pair := Pair(b)).loads(pair.velocities())
+    assert_allclose(on_journal[:2], f.force[:2], rtol=1e-7)
+    # that of friction is about the axis of the bush
+    assert_allclose(on_journal[3:], [0, 0, -f.friction_torque], atol=1e-9)
+    assert power == pytest.approx(f.dissipated, rel=1e-7)
+
+
 def test_a_film_that_does_not_turn_is_squeezed():
     """Short bearing: p = 6 mu (dh/dt) / h^3 (z^2 - L^2/4); where it opens there is none."""
     e, speed = 0.5, 2e-3
@@ -168,7 +181,7 @@ def test_without_spin_and_motion_nothing_happens():
 def solved(b, opening=0.0, opening_rate=0.0, **state):
     """Pressure and answers of the cells of one film, in their units."""
     films = cells_of([b])
-    films.state[0, SPIN] = 1.0
+    films.state[0, SPIN_COLUMN] = 1.0
     films.opening[0], films.opening_rate[0] = np.ravel(opening), np.ravel(opening_rate)
     for at, values in state.items():
         films.state[0, {"motion": slice(4), "rate": slice(4, 8)}[at]] = values
@@ -195,7 +208,7 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
     bump[7] = 0.05
     angle, h = bearing().grid.angle, {}
     films = cells_of([bearing()])
-    films.opening[0], films.state[0, :4], films.state[0, SPIN] = bump.ravel(), motion, 1.0
+    films.opening[0], films.state[0, :4], films.state[0, SPIN_COLUMN] = bump.ravel(), motion, 1.0
     assert solve_film(films, 0, 1.0) > 0
     for face, cells in ((0, films.middle), (1, films.behind)):
         c, s, Z = angle[face, :, :1], angle[face, :, 1:], bearing().grid.Z
@@ -220,7 +233,7 @@ def test_tangents_are_the_derivatives(law, spin, passed):
     first = len(packed.places.coordinates)
     W.base[first:] = W.fresh
     W.base[first + KNOWN], W.base[first + TIME] = float(passed > 0.0), -passed
-    W.base[first + CONTENT :] *= 0.97
+    W.base[first + FIRST_CONTENT :] *= 0.97
 
     def force(dq, dv):
         residual_at(packed.system, W, shifted(packed, packed.q, dq), v + dv, 0 * v, NONE)

@@ -22,6 +22,7 @@ from rom.components.gear_mesh import (
     pair_stiffness,
     tooth_compliance,
 )
+from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 from rom.mbs.elements.gears.table import PHASE
@@ -285,3 +286,51 @@ def test_depths_of_teeth_are_those_of_the_compliance():
     middle = 0.5 * sum(SPUR.path)
     radius = float(np.hypot(SPUR.rb[0], middle))
     assert hertz.depths[1, 0] == pytest.approx(tooth_compliance(SPUR, 0, radius)[2])
+
+
+FILE = """
+[simulation]
+t_end = 1e-3
+dt = 1e-4
+[bodies.a]
+mass = 1
+inertia = [1, 1, 1]
+at = [0, 0, 0]
+markers = { p = [0, 0, 0] }
+[gear_meshes.m]
+between = ["a.p", { ground = ["132 mm", 0, 0] }]
+axis = [0, 0, 1]
+stiffness = ["12 GPa", "13 GPa"]
+coupling = "4 mm"
+conservative = true
+hertz = { depths = ["4 mm", "3 mm"], nu = 0.28 }
+[gear_meshes.m.pair]
+teeth = [26, 40]
+module = "4 mm"
+width = "30 mm"
+helix = 0.0
+gear_helix = 0.0
+[gear_meshes.m.correction]
+pinion_map = "pinion.csv"
+gear_back_map = "gear.csv"
+gear_pitch = [PITCH]
+run_out = ["2 um", "3 um"]
+run_out_direction = [0.1, 0.2]
+"""
+
+
+def test_files_have_all_that_teeth_may_be(tmp_path):
+    (tmp_path / "pinion.csv").write_text("1e-6,2e-6\n3e-6,4e-6\n")
+    (tmp_path / "gear.csv").write_text("1e-6\n\n" * 40)
+    pitch = ", ".join(f'"{k % 5} um"' for k in range(40))
+    (tmp_path / "m.toml").write_text(FILE.replace("PITCH", pitch))
+    mesh = read_mechanism(tmp_path / "m.toml").mechanism().gear_meshes["m"]
+    assert mesh.numbers[3:] == pytest.approx((1.0, 4e-3, (1 - 0.28**2) / (np.pi * 206e9)))
+    assert_allclose(mesh.stiffness, (12e9, 13e9))
+    assert_allclose(mesh.hertz.depths, (4e-3, 3e-3))
+    flanks = mesh.correction
+    assert_allclose(flanks.maps[0], [[[1e-6, 2e-6], [3e-6, 4e-6]]])
+    assert_allclose(flanks.back_maps[1], np.full((40, 1, 1), 1e-6))
+    assert flanks.maps[1] is None and flanks.back_maps[0] is None
+    assert_allclose(flanks.pitch[1], 1e-6 * (np.arange(40) % 5))
+    assert_allclose(flanks.run_out, ((2e-6, 0.1), (3e-6, 0.2)))

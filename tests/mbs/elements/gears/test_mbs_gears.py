@@ -559,3 +559,15 @@ def test_flexible_wheels_feel_their_teeth_in_all_their_shapes():
     found = body - force()
     assert np.abs(gradient[6:9]).max() > 1e-2 * np.abs(gradient).max()
     assert_allclose(found, gradient, atol=1e-4 * np.abs(gradient).max())
+
+
+def test_what_falls_beside_gears_is_called_unstable():
+    """Teeth have a potential: statics say what stands on its head."""
+    mech = geared()
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(0.01,) * 3, at=(1, 1, 0))
+    mech.gravity = (0, -9.81, 0)
+    mech.revolute("hinge", mech.ground.marker((1, 0, 0)), rod.marker((0, -1, 0)), axis=Z)
+    for name in ("pinion", "gear"):
+        mech.rotational_spring(f"spring of {name}", f"{name} axle", stiffness=10.0)
+    with pytest.warns(rom.RomWarning, match="the equilibrium is unstable: body 'rod'"):
+        rom.equilibrium(mech)
