@@ -13,7 +13,7 @@ before anything was solved.
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.mbs.elements.cylinders import Cylinder, cylinder_of
+from rom.mbs.elements.cylinders import cylinder_of, deformable
 from rom.mbs.elements.films.bearing import JournalBearing
 from rom.mbs.elements.films.cells import CLEARANCE, N_ANSWERS
 from rom.mbs.elements.films.kinematics import (
@@ -52,8 +52,8 @@ def bore_of(
         ConfigError: for a bush that has no such functions, or is not the bore of this bearing.
     """
     where = f"the bush of bearing {name!r}, {bush.place!r} of body {bush.body!r},"
-    bore = cylinder_of(part, bush, *axes)
-    if bore is None:
+    surface = deformable(part, bush)
+    if surface is None:
         raise ConfigError(
             f"{where} has no functions by which it could deform.",
             hint="Reduce that interface with rom.FourierLegendre(4, 2), or leave out elastic_bush.",
@@ -63,7 +63,11 @@ def bore_of(
             f"{where} deforms, and the film of an aligned bearing is half of one that does not.",
             hint="Give the bearing aligned=False.",
         )
-    _check_bore(where, part, bush, bore, bearing)
+    axis, across = axes
+    frame = np.array([across, np.cross(axis, across), axis])
+    _check_bore(where, (surface.patch.points - surface.point) @ frame.T, bearing)
+    bore = cylinder_of(part, bush, axis, across)
+    assert bore is not None  # it deforms
     grid = bearing.grid
     theta = np.repeat(np.arctan2(grid.angle[0, :, 1], grid.angle[0, :, 0]), grid.Z.size)
     z = np.tile(grid.Z, len(grid.angle[0])) * bearing.length
@@ -74,12 +78,8 @@ def bore_of(
     return U[:, keep], size[keep, None] * V[keep]
 
 
-def _check_bore(
-    where: str, part: Part, bush: Marker, bore: Cylinder, bearing: JournalBearing
-) -> None:
-    """Refuse a surface that is not the bore of the bearing."""
-    surface = part.moving.markers[bush.place]
-    local = (surface.patch.points - surface.point) @ bore.axes.T
+def _check_bore(where: str, local: Array, bearing: JournalBearing) -> None:
+    """Refuse a surface with nodes (n, 3) in the axes of the bearing that is not its bore."""
     radii, R = np.hypot(local[:, 0], local[:, 1]), bearing.radius
     if np.abs(radii - R).max() > BORE_RTOL * R:
         raise ConfigError(
@@ -88,11 +88,12 @@ def _check_bore(
             f"{1e3 * R:.5g} mm.",
             hint="Compare diameter and axis of the bearing with the bore that was meshed.",
         )
-    reach = abs(bore.middle) + 0.5 * bearing.length
-    if reach > bore.half_length + LENGTH_RTOL * bearing.length:
+    L = bearing.length
+    beyond = 0.5 * L - min(local[:, 2].max(), -local[:, 2].min())
+    if beyond > LENGTH_RTOL * L:
         raise ConfigError(
-            f"{where} ends {1e3 * (reach - bore.half_length):.4g} mm before the bearing does, "
-            f"which is {1e3 * bearing.length:.5g} mm long.",
+            f"{where} ends {1e3 * beyond:.4g} mm before the bearing does, which is "
+            f"{1e3 * L:.5g} mm long.",
             hint="Its functions say nothing of what lies beyond: mesh a longer bore.",
         )
 

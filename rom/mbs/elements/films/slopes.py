@@ -17,6 +17,7 @@ from rom.mbs.elements.films.cells import (
     Z_FIRST,
 )
 from rom.mbs.elements.films.pressure import (
+    at_side,
     cell_size,
     find_pressure,
     has_memory,
@@ -180,12 +181,12 @@ def add_cell_slopes(films, k, i, j):
         add_change(films, k, row, m, change)
         add_change(films, k, row, N_MOTIONS + m, by_rate * opened)
     east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
-    below, above = cell - (1 if j > 0 else 0), cell + (1 if j < nz - 1 else 0)
+    column = films.functions[k, i * nz : (i + 1) * nz]
     for f in range(films.n_functions[k]):
         g, opened = films.functions[k, :, f], films.functions[k, cell, f]
         change = 0.5 * (by_east * (opened + g[east]) + by_west * (opened + g[west]))
         change += by_middle * opened
-        change += 0.5 * (low * (opened + g[below]) + high * (opened + g[above]))
+        change += low * at_side(nz, j, column[:, f]) + high * at_side(nz, j + 1, column[:, f])
         add_change(films, k, row, OPENED + f, change)
         add_change(films, k, row, OPENED + films.functions.shape[2] + f, by_rate * opened)
     add_change(films, k, row, SPIN_COLUMN, by_spin)
