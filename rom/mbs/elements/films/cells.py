@@ -28,8 +28,8 @@ COS, SIN, BORE = range(3)
 BEHIND_FACE = 3
 # columns of Cells.state: motion, its rate, then
 SPIN_COLUMN, PASSED_TIME, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
-# column of Cells.slope from which on openings count, and behind them their rates
-OPENED = SPIN_COLUMN + 1
+# column of Cells.slope where openings begin, and behind them their rates
+FIRST_OPENED = SPIN_COLUMN + 1
 
 
 @table
@@ -65,8 +65,9 @@ class Cells(Table):
         answer: (k, 5 + m) forces that work on the motions, friction torque, forces that work on
             the functions.
         weight: (k, n, 5 + m) of the balances in each answer.
-        slope: (k, 5 + m, 9 + 2 m) derivatives of the answers by motions, rates, spin, openings and
-            their rates.
+        change: (k, 9 + 2 m) derivatives of the balance of one cell by motions, rates, spin,
+            openings and their rates.
+        slope: (k, 5 + m, 9 + 2 m) the same of the answers.
     """
 
     shape: Index2
@@ -97,6 +98,7 @@ class Cells(Table):
     fill: Scratch2
     answer: Scratch2
     weight: Scratch3
+    change: Scratch2
     slope: Scratch3
 
 
@@ -146,7 +148,8 @@ def cells_of(
         band=np.zeros((k, n, 4 * nz + 1)),
         answer=np.zeros((k, N_ANSWERS + most)),
         weight=np.zeros((k, n, N_ANSWERS + most)),
-        slope=np.zeros((k, N_ANSWERS + most, OPENED + 2 * most)),
+        change=np.zeros((k, FIRST_OPENED + 2 * most)),
+        slope=np.zeros((k, N_ANSWERS + most, FIRST_OPENED + 2 * most)),
         **scratch,
     )
 

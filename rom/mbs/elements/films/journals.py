@@ -14,11 +14,11 @@ from rom.mbs.elements.films.bores import (
 from rom.mbs.elements.films.cells import (
     CLEARANCE,
     CONTENT_KNOWN,
+    FIRST_OPENED,
     IMAGES,
     LENGTH,
     N_ANSWERS,
     N_MOTIONS,
-    OPENED,
     PASSED_TIME,
     RADIUS,
     SPIN_COLUMN,
@@ -351,16 +351,17 @@ def film_tangents(s, W, journals, _lam, ck, cc):
         if not journals.largest[k] >= 0.0:
             continue
         pair = journals.i[k], journals.j[k]
+        by_rate = FIRST_OPENED + journals.films.functions.shape[2]
         set_slopes(journals.films, k)
         for p in range(12):
             set_column(W, journals, k, p, True)
         scale_pair(W, ck)
         pair_stiffness(s, W, *pair, W.Kt)
-        add_bore_tangents(s, W, journals, k, OPENED, ck, W.Kt)
+        add_bore_tangents(s, W, journals, k, FIRST_OPENED, ck, W.Kt)
         for p in range(12):
             set_column(W, journals, k, p, False)
         carried_stiffness(s, W, pair, ck, W.Kt)
         add_bore_rows(s, W, journals, k, -1, ck, W.Kt)
         scale_pair(W, cc)
         pair_stiffness(s, W, *pair, W.S)
-        add_bore_tangents(s, W, journals, k, OPENED + journals.films.functions.shape[2], cc, W.S)
+        add_bore_tangents(s, W, journals, k, by_rate, cc, W.S)

@@ -9,10 +9,10 @@ from rom.mbs.elements.films.band import back_substitute_transposed
 from rom.mbs.elements.films.bearing import JFO
 from rom.mbs.elements.films.cells import (
     BEHIND_FACE,
+    FIRST_OPENED,
     IMAGES,
     N_ANSWERS,
     N_MOTIONS,
-    OPENED,
     SPIN_COLUMN,
     Z_FIRST,
 )
@@ -118,7 +118,7 @@ def add_shear_slopes(films, k, i, j):
         films.slope[k, TORQUE_ANSWER, m] -= thinner * opened + slanted * rise
     east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
     for f in range(films.n_functions[k]):
-        opened, g = films.functions[k, :, f], OPENED + f
+        opened, g = films.functions[k, :, f], FIRST_OPENED + f
         rise = 0.5 * (opened[east] - opened[west])
         films.slope[k, TORQUE_ANSWER, g] -= thinner * opened[cell] + slanted * rise
 
@@ -178,8 +178,7 @@ def add_cell_slopes(films, k, i, j):
         change += by_west * per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
         change += low * per_motion(films, k, 0, i, Z - 0.5 * dZ, m)
         change += high * per_motion(films, k, 0, i, Z + 0.5 * dZ, m)
-        add_change(films, k, row, m, change)
-        add_change(films, k, row, N_MOTIONS + m, by_rate * opened)
+        films.change[k, m], films.change[k, N_MOTIONS + m] = change, by_rate * opened
     east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
     column = films.functions[k, i * nz : (i + 1) * nz]
     for f in range(films.n_functions[k]):
@@ -187,16 +186,20 @@ def add_cell_slopes(films, k, i, j):
         change = 0.5 * (by_east * (opened + g[east]) + by_west * (opened + g[west]))
         change += by_middle * opened
         change += low * at_side(nz, j, column[:, f]) + high * at_side(nz, j + 1, column[:, f])
-        add_change(films, k, row, OPENED + f, change)
-        add_change(films, k, row, OPENED + films.functions.shape[2] + f, by_rate * opened)
-    add_change(films, k, row, SPIN_COLUMN, by_spin)
+        films.change[k, FIRST_OPENED + f] = change
+        films.change[k, FIRST_OPENED + films.functions.shape[2] + f] = by_rate * opened
+    films.change[k, SPIN_COLUMN] = by_spin
+    add_change(films, k, row)
 
 
 @inner
-def add_change(films, k, row, by, change):
-    """Subtract the weights of a row times a change of its balance."""
+def add_change(films, k, row):
+    """Subtract the weights of a row times the changes of its balance."""
     for m in range(N_ANSWERS + films.n_functions[k]):
-        films.slope[k, m, by] -= films.weight[k, row, m] * change
+        weight, slope, change = films.weight[k, row, m], films.slope[k, m], films.change[k]
+        if weight != 0.0:
+            for q in range(change.size):
+                slope[q] -= weight * change[q]
 
 
 @kernel
