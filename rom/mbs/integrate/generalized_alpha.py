@@ -28,6 +28,7 @@ from rom.mbs.equations.linear_solve import (
     factorise_bordered,
     solve_bordered,
 )
+from rom.mbs.equations.renewal import add_renewed, keep_rates, renew_rates
 from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
 from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
@@ -38,6 +39,7 @@ from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, stage
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
 from rom.mbs.kernels.work import BOTH_LEVELS as BOTH_LEVELS
+from rom.mbs.kernels.work import FACTOR_USES as FACTOR_USES
 from rom.mbs.kernels.work import FACTORISATIONS as FACTORISATIONS
 from rom.mbs.kernels.work import HAS_FACTOR as HAS_FACTOR
 from rom.mbs.kernels.work import ITERATIONS as ITERATIONS
@@ -159,7 +161,7 @@ def factorise_step(s, W, step, rank):
     turn_columns(s, W, step, rank)
     load_columns(s, W, step.lam1, rank)
     step.count[FACTORISATIONS] += 1
-    step.count[HAS_FACTOR] = 1
+    step.count[HAS_FACTOR], step.count[FACTOR_USES] = 1, 0
     return factorise_bordered(s, W, rank)
 
 
@@ -213,6 +215,9 @@ def correct(s, W, step, rank):
         else:
             W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
+    if step.count[FACTOR_USES] > 0:
+        add_renewed(s, W, W.delta, W.dlam)
+    step.count[FACTOR_USES] += 1
     for i in range(n):
         step.vd1[i] += mass_factor(step) / bh2 * W.delta[i]
         step.v1[i] += gamma / (beta * h) * W.delta[i]
@@ -261,7 +266,7 @@ def verdict(W, step, size, gap):
         return CONVERGED
     if step.count[STEP_PASSES] >= MAX_PASSES:
         return FAILED
-    if last > 0.0 and shrink > 0.2:
+    if last > 0.0 and shrink > 0.2 and step.count[FACTOR_USES] > 1:
         step.count[HAS_FACTOR] = 0
     return UNFINISHED
 
@@ -319,11 +324,14 @@ def advance(s, W, step, rank, signals, every, out):
                 return NEEDS_LAWS
         step.count[LAWS_ASKED] = 0
         residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
+        if step.count[HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
+            step.count[HAS_FACTOR] = 1 if renew_rates(s, W, c[1], rank) else 0
         if step.count[HAS_FACTOR] == 0:
             tangents(s, W, step.v1, step.vd1, step.lam1, c)
             constraint_gradient(s, W)
             if not factorise_step(s, W, step, rank):
                 return SINGULAR
+            keep_rates(s, W, c[1])
         answer = correct(s, W, step, rank)
         if answer > CONVERGED:
             return answer

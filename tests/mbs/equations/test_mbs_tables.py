@@ -153,7 +153,7 @@ ELEMENTS = {  # family -> what asks for it
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
 }
-KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
+KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "rate_tangents")
 
 STORAGE = {  # whether by blocks -> stages
     True: {"factorise_blocks", "fill_from_blocks", "solve_blocks"},
@@ -181,7 +181,7 @@ def hinge(mech, b):
 def test_a_mechanism_has_the_kernels_of_its_elements_and_no_others(name):
     """Without them it would move as if the elements were not there."""
     mech, a, b = pair()
-    assert pack(mech).system.elements.shape == (0, 5)
+    assert pack(mech).system.elements.shape == (0, 6)
     ELEMENTS[name](mech, a, b)
     packed = pack(mech)
     ((family, table),) = packed.elements.items()

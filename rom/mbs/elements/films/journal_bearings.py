@@ -18,6 +18,7 @@ from rom.mbs.elements.films.journals import (
     SETTLING_MARK,
     TEMPERATURE,
     Journals,
+    film_rates,
     film_tangents,
     film_wrenches,
 )
@@ -201,7 +202,7 @@ def _memory(one: OilFilm, known: float) -> Array:
 
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    complete=True, potential=False, answers=lambda journals: journals.largest,
+    rate_tangents=film_rates, complete=True, potential=False, answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
 )  # fmt: skip
