@@ -53,6 +53,9 @@ from rom.mbs.kernels.work import Step as Step
 from rom.mbs.kernels.work import Work
 from rom.model import Array
 
+# corrections in which a step ends with a fresh factorisation; a stale one of a large whole matrix is
+# worth some more, as a correction costs in proportion to a smaller power of its size
+FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
 MAX_PASSES = 25
@@ -110,9 +113,16 @@ def predict(s, step):
         predict_multistep(s, step)
     copy(step.lam, step.lam1)
     step.size[0] = step.size[4] = 0.0
-    if step.count[LAST_ITERATIONS] > 4:
+    if step.count[LAST_ITERATIONS] > most_corrections(s, step):
         step.count[HAS_FACTOR] = 0
     retract(s, step.q, step.psi, step.q1)
+
+
+@inner
+def most_corrections(s, step):
+    """Corrections of a step behind which the next one begins with a new factorisation."""
+    whole = 0 if s.graph.compact else step.v.size
+    return FEW_CORRECTIONS + whole // CORRECTION_SIZE
 
 
 @inner
