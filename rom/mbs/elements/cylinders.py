@@ -115,15 +115,11 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
 
 
 def _numbers(kind: str) -> tuple[int, int]:
-    """Harmonics and order of the functions that an interface follows, as its kind says.
-
-    One harmonic more: angles of the kind count about the centroid of the meshed surface, which lies
-    a little beside the axis.
-    """
+    """Harmonics and order of the functions that an interface follows, as its kind says."""
     numbers = [int(x) for x in kind.partition(":")[2].split(",") if x.strip().isdigit()]
     if not numbers:
         return MOST_HARMONICS, MOST_ORDER
-    return numbers[0] + 1, max(numbers[-1], 1)
+    return numbers[0], max(numbers[-1], 1)
 
 
 def _deformation(surface: Any) -> Array:

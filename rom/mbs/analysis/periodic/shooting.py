@@ -228,7 +228,7 @@ class Tangent:
         """(f,) or (f + 1,) answers of (E - B) y + dT rate = -side; dT in radians of the period.
 
         Where the period is unknown the start moves across the motion, and by a gap of its energy
-        if that is told. A motion that a period does not change is not touched.
+        if that is given. A motion that a period does not change is not touched.
         """
         A, right = self.E - self.B, -np.array(sides).T
         if rate is not None:
