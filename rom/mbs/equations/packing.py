@@ -227,11 +227,11 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
 
 
 def _renewed(elements: dict[Family, Table]) -> Index:
-    """(k, 2) markers of elements with tangents by rates alone; none where they are too many."""
+    """(k, 2) markers of elements with tangents renewed in a step; none where they are too many."""
     pairs = [
         np.column_stack([table.i, table.j])
         for family, table in elements.items()
-        if family.rate_tangents
+        if family.pair_tangents
     ]
     found = np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs])
     return found if len(found) <= MAX_RENEWED else found[:0]

@@ -1,8 +1,8 @@
-"""Damping that changes within a step, renewed without another factorisation.
+"""Elements whose tangents change within a step, renewed without another factorisation.
 
-A film that begins to carry, or ceases to, damps otherwise from one correction to the next, while
-all the rest of the iteration matrix stays for many steps. With d = B v the motions of markers
-against each other and D the change of their damping since A was factorised,
+A film that begins to carry, or ceases to, holds its journal otherwise from one correction to the
+next, while all the rest of the iteration matrix stays for many steps. With d = B v the motions of
+markers against each other and D the change of their part since A was factorised,
 
     (A + B^T D B)^-1 r = y - Z (1 + D G)^-1 D B y,    y = A^-1 r,  Z = A^-1 B^T,  G = B Z.
 
@@ -15,7 +15,7 @@ from numba import types
 from rom.mbs.equations.linear_solve import solve_bordered
 from rom.mbs.kernels.algebra import back_substitute, factorise
 from rom.mbs.kernels.compiled import copy, inner
-from rom.mbs.kernels.element_calls import rate_tangents
+from rom.mbs.kernels.element_calls import pair_tangents
 from rom.mbs.kernels.stages import REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
@@ -28,18 +28,18 @@ def _is_renewed(system):
 
 
 @inner
-def set_rates(s, W, cc):
-    """Set W.rates to cc times the damping of all elements that are renewed."""
+def set_pair_tangents(s, W, ck, cc):
+    """Set W.pairs to ck times stiffness and cc times damping of all elements that are renewed."""
     first = 0
     for k in range(s.elements.shape[0]):
-        first += rate_tangents(s, k, W, cc, first)
+        first += pair_tangents(s, k, W, ck, cc, first)
 
 
-@stage(types.void, System, Work, types.float64, needed=_is_renewed)
-def keep_rates(s, W, cc):
-    """Keep the damping that is in the matrix factorised now, and the motions it belongs to."""
-    set_rates(s, W, cc)
-    copy(W.rates, W.rates_lu)
+@stage(types.void, System, Work, types.float64, types.float64, needed=_is_renewed)
+def keep_pair_tangents(s, W, ck, cc):
+    """Keep what is in the matrix factorised now, and the motions it belongs to."""
+    set_pair_tangents(s, W, ck, cc)
+    copy(W.pairs, W.pairs_lu)
     W.has_response[0] = 0
     W.approach[:] = 0.0
     for e in range(s.renewed.shape[0]):
@@ -69,12 +69,12 @@ def set_response(s, W, rank):
     W.has_response[0] = 1
 
 
-@stage(types.boolean, System, Work, types.float64, types.int64, needed=_is_renewed)
-def renew_rates(s, W, cc, rank):
-    """Factorise 1 + D G for the damping now; False when it is singular."""
+@stage(types.boolean, System, Work, types.float64, types.float64, types.int64, needed=_is_renewed)
+def renew_pair_tangents(s, W, ck, cc, rank):
+    """Factorise 1 + D G for the tangents now; False when it is singular."""
     if W.has_response[0] == 0:
         set_response(s, W, rank)
-    set_rates(s, W, cc)
+    set_pair_tangents(s, W, ck, cc)
     size = W.yielding.shape[0]
     for e in range(s.renewed.shape[0]):
         for p in range(6):
@@ -82,7 +82,7 @@ def renew_rates(s, W, cc, rank):
             for d in range(size):
                 W.renewal[row, d] = 1.0 if d == row else 0.0
             for q in range(6):
-                change = W.rates[e, p, q] - W.rates_lu[e, p, q]
+                change = W.pairs[e, p, q] - W.pairs_lu[e, p, q]
                 for d in range(size):
                     W.renewal[row, d] += change * W.yielding[6 * e + q, d]
     return factorise(W.renewal, size, W.renewal_pivot)
@@ -90,7 +90,7 @@ def renew_rates(s, W, cc, rank):
 
 @stage(types.void, System, Work, REAL_VECTOR, REAL_VECTOR, needed=_is_renewed)
 def add_renewed(s, W, x, lam):
-    """Take a solution x, lam with the old damping to the one with that of `renew_rates`."""
+    """Take a solution x, lam of the old tangents to the one of those of `renew_pair_tangents`."""
     n, size, part = x.size, W.yielding.shape[0], W.renewal_part
     for e in range(s.renewed.shape[0]):
         for p in range(6):
@@ -100,7 +100,7 @@ def add_renewed(s, W, x, lam):
             for i in range(n):
                 speed += W.approach[6 * e + q, i] * x[i]
             for p in range(6):
-                part[6 * e + p] += (W.rates[e, p, q] - W.rates_lu[e, p, q]) * speed
+                part[6 * e + p] += (W.pairs[e, p, q] - W.pairs_lu[e, p, q]) * speed
     back_substitute(W.renewal, size, W.renewal_pivot, part)
     for c in range(size):
         for i in range(n):

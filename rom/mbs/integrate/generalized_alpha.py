@@ -28,7 +28,7 @@ from rom.mbs.equations.linear_solve import (
     factorise_bordered,
     solve_bordered,
 )
-from rom.mbs.equations.renewal import add_renewed, keep_rates, renew_rates
+from rom.mbs.equations.renewal import add_renewed, keep_pair_tangents, renew_pair_tangents
 from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
 from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
@@ -53,8 +53,8 @@ from rom.mbs.kernels.work import Step as Step
 from rom.mbs.kernels.work import Work
 from rom.model import Array
 
-# corrections in which a step ends with a fresh factorisation; a stale one of a large whole matrix is
-# worth some more, as a correction costs in proportion to a smaller power of its size
+# corrections in which a step ends with a fresh factorisation; an old one of a large whole matrix is
+# worth some more, as a correction costs in proportion to a lower power of its size
 FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
@@ -276,7 +276,7 @@ def verdict(W, step, size, gap):
         return CONVERGED
     if step.count[STEP_PASSES] >= MAX_PASSES:
         return FAILED
-    if last > 0.0 and shrink > 0.2 and step.count[FACTOR_USES] > 1:
+    if last > 0.0 and shrink > 0.2:
         step.count[HAS_FACTOR] = 0
     return UNFINISHED
 
@@ -335,13 +335,13 @@ def advance(s, W, step, rank, signals, every, out):
         step.count[LAWS_ASKED] = 0
         residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
         if step.count[HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
-            step.count[HAS_FACTOR] = 1 if renew_rates(s, W, c[1], rank) else 0
+            step.count[HAS_FACTOR] = 1 if renew_pair_tangents(s, W, c[2], c[1], rank) else 0
         if step.count[HAS_FACTOR] == 0:
             tangents(s, W, step.v1, step.vd1, step.lam1, c)
             constraint_gradient(s, W)
             if not factorise_step(s, W, step, rank):
                 return SINGULAR
-            keep_rates(s, W, c[1])
+            keep_pair_tangents(s, W, c[2], c[1])
         answer = correct(s, W, step, rank)
         if answer > CONVERGED:
             return answer

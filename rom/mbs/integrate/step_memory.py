@@ -22,7 +22,7 @@ from rom.model import Array
 # what belongs to the factorised iteration matrix, by blocks or whole
 FACTOR_FIELDS = (
     *("by_blocks", "pivot", "scaling", "U_lu", "weight"),
-    *("rates_lu", "approach", "response", "yielding", "has_response"),
+    *("pairs_lu", "approach", "response", "yielding", "has_response"),
 )
 # counts that say whether it goes on to be used
 FACTOR_COUNTS = (alpha.LAST_ITERATIONS, alpha.HAS_FACTOR, alpha.FACTOR_USES)

@@ -101,9 +101,10 @@ tangents = Role(2, types.void, REAL_VECTOR, types.float64, types.float64)
 energy = Role(3, types.float64, REAL_VECTOR, REAL_VECTOR)
 # (s, k, W, lam, rank): add to W.UG how the forces change with the multipliers
 multiplier_columns = Role(4, types.void, REAL_VECTOR, types.int64)
-# (s, k, W, cc, first): write cc times what the velocity of marker i against j changes of its wrench
-# to W.rates, element by element from place ``first``, right after the residuals; how many they are
-rate_tangents = Role(5, types.int64, types.float64, types.int64)
+# (s, k, W, ck, cc, first): write ck times the stiffness and cc times the damping that the motion of
+# marker i against j meets to W.pairs, element by element from place ``first``, right after the
+# residuals; how many they are
+pair_tangents = Role(5, types.int64, types.float64, types.float64, types.int64)
 
 
 def row_of(table: Table, kernels: tuple[ElementKernel | None, ...]) -> list[int]:

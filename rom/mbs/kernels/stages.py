@@ -64,8 +64,8 @@ STAGE_NAMES = (
     "keep_past",
     "rolling_row",
     "rolling_stiffness",
-    "keep_rates",
-    "renew_rates",
+    "keep_pair_tangents",
+    "renew_pair_tangents",
     "add_renewed",
 )
 STAGE_KERNELS: dict[str, "Stage"] = {}

@@ -92,12 +92,12 @@ class Work(Table):
     UGT: Array2  # (m, n) the same in increments of the rotation vectors of a step
     remainder: Array2  # (n, m)
     part: Array1  # (m,)
-    rates: Array3  # (e, 6, 6) damping of renewed elements by the motion of i against j
-    rates_lu: Array3  # (e, 6, 6) the same as it is in lu
+    pairs: Array3  # (e, 6, 6) renewed tangents of elements by the motion of i against j
+    pairs_lu: Array3  # (e, 6, 6) the same as it is in lu
     approach: Array2  # (6 e, n) that motion per velocity, at the factorisation
     response: Array2  # (6 e, n + m) solutions for its rows
     yielding: Array2  # (6 e, 6 e) approach times response
-    renewal: Array2  # (6 e, 6 e) factors of 1 + (rates - rates_lu) yielding
+    renewal: Array2  # (6 e, 6 e) factors of 1 + (pairs - pairs_lu) yielding
     renewal_pivot: Index1  # (6 e,)
     renewal_part: Array1  # (6 e,)
     has_response: Index1  # (1,) whether `response` belongs to the factor at hand
@@ -203,7 +203,7 @@ def workspace(system: System, n_signals: int) -> Work:
         "soft": (m,),
         "refined": (2, n + m),
         **dict.fromkeys(("U", "U_lu"), redundant),
-        **dict.fromkeys(("rates", "rates_lu"), (e, 6, 6)),
+        **dict.fromkeys(("pairs", "pairs_lu"), (e, 6, 6)),
         "approach": (6 * e, n),
         "response": (6 * e, n + m),
         **dict.fromkeys(("yielding", "renewal"), (6 * e, 6 * e)),

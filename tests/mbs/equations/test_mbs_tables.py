@@ -153,7 +153,7 @@ ELEMENTS = {  # family -> what asks for it
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
 }
-KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "rate_tangents")
+KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
 
 STORAGE = {  # whether by blocks -> stages
     True: {"factorise_blocks", "fill_from_blocks", "solve_blocks"},
