@@ -20,7 +20,9 @@ from rom.mbs.kernels.stages import REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
 
-MAX_RENEWED = 16  # elements: the dense equations of more would cost as much as a factorisation
+# elements: the dense equations of more would cost as much as a factorisation; velocities: with
+# fewer, slopes of films in every correction cost more than factorisations now and then
+MAX_RENEWED, MIN_VELOCITIES = 16, 100
 
 
 def _is_renewed(system):

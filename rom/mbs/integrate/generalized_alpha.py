@@ -53,8 +53,8 @@ from rom.mbs.kernels.work import Step as Step
 from rom.mbs.kernels.work import Work
 from rom.model import Array
 
-# corrections in which a step ends with a fresh factorisation; an old one of a large whole matrix is
-# worth some more, as a correction costs in proportion to a lower power of its size
+# corrections in which a step ends with a fresh factorisation; where films are renewed in a large
+# matrix an old one is worth some more, as a correction grows with a lower power of the size
 FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
@@ -121,8 +121,7 @@ def predict(s, step):
 @inner
 def most_corrections(s, step):
     """Corrections of a step behind which the next one begins with a new factorisation."""
-    whole = 0 if s.graph.compact else step.v.size
-    return FEW_CORRECTIONS + whole // CORRECTION_SIZE
+    return FEW_CORRECTIONS + (step.v.size // CORRECTION_SIZE if s.renewed.shape[0] > 0 else 0)
 
 
 @inner
@@ -225,7 +224,7 @@ def correct(s, W, step, rank):
         else:
             W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
-    if step.count[FACTOR_USES] > 0:
+    if s.renewed.shape[0] > 0 and step.count[FACTOR_USES] > 0:
         add_renewed(s, W, W.delta, W.dlam)
     step.count[FACTOR_USES] += 1
     for i in range(n):
@@ -341,7 +340,8 @@ def advance(s, W, step, rank, signals, every, out):
             constraint_gradient(s, W)
             if not factorise_step(s, W, step, rank):
                 return SINGULAR
-            keep_pair_tangents(s, W, c[2], c[1])
+            if s.renewed.shape[0] > 0:
+                keep_pair_tangents(s, W, c[2], c[1])
         answer = correct(s, W, step, rank)
         if answer > CONVERGED:
             return answer
