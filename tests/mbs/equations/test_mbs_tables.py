@@ -239,7 +239,7 @@ def test_a_run_asks_for_the_stages_of_its_method(options, stages, monkeypatch):
 def test_every_stage_is_asked_for_by_all_mechanisms_or_by_some_part_or_a_method():
     mech, *_ = pair()
     sometimes = set().union(*map(str.split, ASKED), *STORAGE.values(), MULTISTEP, STABILISED)
-    sometimes |= {"advance"}
+    sometimes |= {"advance", "keep_pair_tangents", "renew_pair_tangents", "add_renewed"}  # of films
     assert set(STAGE_KERNELS) == set(STAGE_NAMES) == needed_by(pack(mech).system) | sometimes
 
 
