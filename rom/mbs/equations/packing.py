@@ -1,6 +1,6 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -226,7 +226,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     )
 
 
-def _renewed(elements: dict[Family, Table], n: int) -> Index:
+def _renewed(elements: Mapping[Family, Any], n: int) -> Index:
     """(k, 2) markers of elements with tangents renewed in a step; none where it does not pay."""
     pairs = [
         np.column_stack([table.i, table.j])
