@@ -20,6 +20,7 @@ from rom.mbs.elements.films.journals import (
     SETTLING_MARK,
     TEMPERATURE,
     Journals,
+    film_pair_tangents,
     film_tangents,
     film_wrenches,
 )
@@ -231,7 +232,8 @@ def oil_everywhere(journals: Journals) -> Iterator[bool]:
 
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    complete=True, potential=False, answers=lambda journals: journals.largest,
+    pair_tangents=film_pair_tangents, complete=True, potential=False,
+    answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
     eased=oil_everywhere,

@@ -38,7 +38,7 @@ from rom.mbs.elements.films.pressure import find_pressure, set_heights, set_supp
 from rom.mbs.elements.films.slopes import TORQUE_ANSWER, set_answers, set_slopes
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
-from rom.mbs.kernels.element_calls import residuals, tangents
+from rom.mbs.kernels.element_calls import pair_tangents, residuals, tangents
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scratch2, Table, table
 
 # columns of Journals.oil
@@ -365,3 +365,22 @@ def film_tangents(s, W, journals, _lam, ck, cc):
         scale_pair(W, cc)
         pair_stiffness(s, W, *pair, W.S)
         add_bore_tangents(s, W, journals, k, by_rate, cc, W.S)
+
+
+@pair_tangents.of(Journals)
+def film_pair_tangents(_s, W, journals, ck, cc, first):
+    """Write what the motion of the journal against its bush changes to W.pairs.
+
+    Nothing of a film that bends its bore, which is more than that motion.
+    """
+    for k in range(journals.i.size):
+        W.pairs[first + k] = 0.0
+        if not journals.largest[k] >= 0.0 or journals.films.n_functions[k] > 0:
+            continue
+        set_slopes(journals.films, k)
+        for by_position in range(2):
+            for q in range(6):
+                set_column(W, journals, k, q, by_position == 1)
+                for p in range(6):
+                    W.pairs[first + k, p, q] += (ck if by_position == 1 else cc) * W.Q[p, q]
+    return journals.i.size
