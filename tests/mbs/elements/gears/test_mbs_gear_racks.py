@@ -82,6 +82,23 @@ def test_tangents_of_a_rack_are_differences(pair):
     assert_allclose(found, loss, atol=1e-6 * np.abs(loss).max())
 
 
+def test_a_rack_that_leans_is_felt_however_far_it_has_travelled():
+    """Turned by 1e-4 about the line of centres, 2 m from its middle; not by its other end."""
+    packed, W = prepared(free(replace(HELICAL, thinning=2e-4)))
+    mesh, none, loads, y = packed.elements[GEAR_MESHES_FAMILY], np.zeros(12), [], 2.0
+    gap = 0.5e-4 * y * np.tan(HELICAL.base_helix)  # half of what it closes, in the plane
+    mesh.start[0, 0] = (gap - y * np.cos(HELICAL.alpha)) / HELICAL.rb[0]  # turns before
+    for lean in (1e-4, -1e-4):
+        delta = np.zeros(12)
+        delta[7], delta[9] = y, lean
+        residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
+        loads.append(mesh.load[0])
+    depth = gap * np.cos(HELICAL.base_helix)
+    assert min(loads) == 0.0
+    line = max(loads) / (K * HELICAL.width * depth)  # of the lines together, over the width
+    assert 0.8 < line < 2.2
+
+
 def test_a_rack_is_a_gear_without_end():
     """Path, backlash and forces as of a gear of 1e5 teeth; loads along it fall as 1 / z."""
     z = 100_000
