@@ -70,6 +70,32 @@ def test_a_bush_that_is_stiff_enough_is_a_rigid_one():
     assert film.opening is None
 
 
+def test_a_film_opens_by_what_nodes_under_its_cells_move_outwards():
+    """Angles count from Y, heights upwards; what the bore does on the whole is no opening."""
+    body, b = (
+        bush(rom.FourierLegendre(2, 1)),
+        JournalBearing(DIAMETER, 0.03, CLEARANCE, cells=(24, 3)),
+    )
+    mech = rom.Mechanism(gravity=ORIGIN)
+    part = mech.add_flexible("bush", body, at=ORIGIN)
+    mech.journal_bearing("film", mech.ground.marker(ORIGIN), part.marker("bore"), axis=(0, 0, 1),
+                         reference=(0, 1, 0), bearing=b, oil=OIL, elastic_bush=True)  # fmt: skip
+    bore, functions = body.markers["bore"], mech.journal_bearings["film"].bore
+    q = np.random.default_rng(1).normal(size=part.r)
+    x, moved = bore.patch.points, (bore.patch.shapes @ bore.hold[:, 6:] @ q).reshape(-1, 3)
+    moved -= bore.translation @ q + np.cross(bore.rotation @ q, x - bore.point)
+    theta = np.pi / 2 + 2 * np.pi / 24 * np.arange(24)
+    at = np.stack([DIAMETER / 2 * np.cos(theta), DIAMETER / 2 * np.sin(theta)], axis=1)
+    places = np.array([[*xy, z] for xy in at for z in (-0.01, 0.0, 0.01)])
+    apart = np.linalg.norm(places[:, None] - x, axis=2)
+    assert apart.min(axis=1).max() < 0.01 * DIAMETER
+    near = apart.argmin(axis=1)
+    outwards = np.einsum("na,na->n", moved[near, :2], np.repeat(at, 3, axis=0)) / (DIAMETER / 2)
+    opened = functions[0] @ functions[1] @ q
+    assert_allclose(opened, outwards, atol=1e-6 * np.abs(outwards).max())
+    assert np.ptp(outwards.reshape(24, 3), axis=1).max() > 0.1 * np.abs(outwards).max()
+
+
 # --- tangents and energy ---
 
 
