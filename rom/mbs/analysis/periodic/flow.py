@@ -214,6 +214,11 @@ class Flow:
         now.remember(state)
         return now.residual(state.q, state.v, state.a, 0 * state.lam)
 
+    @property
+    def pressed(self) -> float:
+        """Largest force on a marker in what `forces` has looked at; they may all balance."""
+        return float(np.abs(self.now.W.wrench).max(initial=0.0))
+
     def apart(self, one: State, two: State) -> Array:
         """(n,) small motion from one position to another."""
         bodies = self.packed.system.bodies

@@ -1,7 +1,7 @@
 """A motion that repeats, with its multipliers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +13,13 @@ from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.analysis.periodic.flow import Flow, Start
 from rom.mbs.analysis.periodic.repetition import refuse_other_forces, refuse_what_changes
-from rom.mbs.analysis.periodic.shooting import Return, Tangent, energy, moved_by
+from rom.mbs.analysis.periodic.shooting import (
+    Derivatives,
+    Return,
+    Tangent,
+    energy,
+    moved_by,
+)
 from rom.mbs.analysis.periodic.turns import Turns, turns_of
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -28,7 +34,7 @@ RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
 # gap in rad or lengths of the mechanism; that which counts where it shrinks no more, of round-off
 # or of the energy that the method itself takes up
 GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
-GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
+GOOD_RATIO, MANY_RATIO = 0.1, 0.5  # of gaps, up to which derivatives serve again: of few, of many
 MAX_PASSES = 60
 MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
 MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
@@ -53,6 +59,7 @@ class PeriodicMotion:
         passes: through the period until it closed, those for derivatives not counted.
         turns: (k,) angles by which what advances was turned back [rad].
         runs: all passes through the period.
+        derivatives: with which motions nearby are looked for.
     """
 
     solution: Solution
@@ -63,6 +70,7 @@ class PeriodicMotion:
     passes: int
     turns: tuple[float, ...] = ()
     runs: int = 0
+    derivatives: Derivatives | None = field(default=None, repr=False, compare=False)
 
     @property
     def state(self) -> State:
@@ -122,7 +130,9 @@ class Shooting:
         """What moves the mechanism through a period."""
         return Flow(self.mechanism, self.t0, period, self.steps, self.rho_inf)
 
-    def closed(self, flow: Flow, start: Start, turns: Turns) -> tuple[Tangent, int]:
+    def closed(
+        self, flow: Flow, start: Start, turns: Turns, known: Derivatives | None = None
+    ) -> tuple[Tangent, int]:
         """The motion that closes, with its derivatives, and the passes it took.
 
         Where Newton's method does not come closer, time goes on from where it was for a period, as
@@ -131,24 +141,36 @@ class Shooting:
         Raises:
             SolverError: if none is found; ``error.solution`` is the last attempt.
         """
-        found, best, tangent, wait = Return.of(flow, turns, start), None, None, 1
+        found, best, wait = Return.of(flow, turns, start), None, 1
+        tangent = None if known is None else known.around(found)
         for k in range(1, MAX_PASSES + 1):
             self._say(f"pass {k}: gap {found.open:.2e}")
-            last = np.inf if best is None else best.open
-            if found.open < self.tolerance:
-                return self._done(found, tangent), k
-            stalled = found.open > 0.5 * last and min(found.open, last) < self.stalled
-            if best is not None and stalled:
-                return self._done(min(found, best, key=lambda x: x.open), tangent), k
-            if best is not None and found.open > last:
-                found, best, tangent = self._gone_on(best, wait), None, None
-                wait = min(2 * wait, MAX_WAIT)
-                continue
-            if tangent is None or found.open > GOOD_RATIO * last:
+            if self._closes(found, best):
+                return self._done(min(found, best or found, key=lambda x: x.open), tangent), k
+            if best is not None and found.open > best.open:
+                if tangent is not None and tangent.of(best):
+                    best, wait = self._gone_on(best, wait), min(2 * wait, MAX_WAIT)
+                found, best, tangent = best, None, None
+            elif tangent is not None and best is not None and self.period is not None:
+                tangent = tangent.followed(best, found)
+            if tangent is None or (best is not None and found.open > self._enough(best)):
                 found = replace(found, basis=None)
                 tangent = found.tangent()
-            best, found = found, self._corrected(found, tangent)
+            after = self._corrected(found, tangent)
+            best, found, tangent = (found, after, tangent) if after else (None, found, None)
         raise self._lost(found)
+
+    def _closes(self, found: Return, best: Return | None) -> bool:
+        """Whether the gap is closed, or shrinks no more where little of it is left."""
+        if found.open < self.tolerance or best is None:
+            return found.open < self.tolerance
+        return found.open > 0.5 * best.open and min(found.open, best.open) < self.stalled
+
+    def _enough(self, best: Return) -> float:
+        """Gap up to which derivatives serve again: new ones take two passes per coordinate."""
+        passes = 2 * max(best.chart.size, 1)
+        ratio = (self.tolerance / max(best.open, self.tolerance)) ** (1 / passes)
+        return float(np.clip(ratio, GOOD_RATIO, MANY_RATIO)) * best.open
 
     def _gone_on(self, found: Return, periods: int) -> Return:
         """What comes of a motion some periods later."""
@@ -169,12 +191,15 @@ class Shooting:
                 hint="Begin with start= a state that moves, or nearer to the motion.",
             )
         refuse_other_forces(found)
-        if tangent is not None and tangent.around is found:
+        if tangent is not None and tangent.of(found):
             return tangent
         return found.tangent()
 
-    def _corrected(self, found: Return, tangent: Tangent) -> Return:
-        """The next motion of Newton's method; shorter steps where one cannot be moved."""
+    def _corrected(self, found: Return, tangent: Tangent) -> Return | None:
+        """The next motion of Newton's method; shorter steps where one cannot be moved.
+
+        None where derivatives of another motion lead to none.
+        """
         free = self.period is None
         gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
         rate = found.rate if free else None
@@ -188,6 +213,8 @@ class Shooting:
                 return Return.of(flow, found.turns, moved_by(found, y), tangent.around.chart)
             except (SolverError, ModelError) as error:
                 answer, cause = answer / 2, error
+        if not tangent.of(found):
+            return None
         raise self._lost(found) from cause
 
     def _lost(self, found: Return) -> SolverError:
@@ -216,7 +243,7 @@ class Shooting:
         angles = found.turns.angles(found.start.state, found.end)
         return PeriodicMotion(
             self.solution(found), found.flow.period, tangent.multipliers, self.period is None,
-            found.open, passes, angles, found.flow.runs[0],
+            found.open, passes, angles, found.flow.runs[0], tangent.kept,
         )  # fmt: skip
 
 
@@ -300,13 +327,14 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     if conservative and period is not None:
         raise ConfigError("conservative is for motions that nothing drives; here period is given.")
     turning = turns_of(mechanism, turns, begin)
-    at = flow.begun(begin)
+    known = start.derivatives if isinstance(start, PeriodicMotion) else None
+    at = flow.begun(begin) if known is None else known.ready(flow.begun(begin))
     refuse_what_changes(flow, turning, at, period is not None)
     for _ in range(settle):
         at = Return.of(flow, turning, at).back
     if conservative:
         shooting = replace(shooting, energy=energy(mechanism, at))
-    return shooting.record(*shooting.closed(flow, at, turning))
+    return shooting.record(*shooting.closed(flow, at, turning, known))
 
 
 def prepared(  # noqa: PLR0913  the arguments of the verb

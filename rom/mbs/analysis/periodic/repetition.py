@@ -86,7 +86,7 @@ def _refuse_forces(flow: Flow, start: Start, shift: float, driven: bool) -> None
     for t in flow.t0 + SHARES * flow.period:
         one, two = (flow.forces(replace(start.state, t=when)) for when in (t, t + shift))
         k = int(np.argmax(np.abs(two - one)))
-        if abs(two[k] - one[k]) <= FORCE_RTOL * np.abs(one).max():
+        if abs(two[k] - one[k]) <= FORCE_RTOL * max(np.abs(one).max(), flow.pressed):
             continue
         name = _body(flow, k)
         if driven:
@@ -116,7 +116,8 @@ def refuse_other_forces(found: Return) -> None:
     one = flow.forces(replace(found.turned, t=flow.t0, base=found.base))
     assert two is not None
     k = int(np.argmax(np.abs(two - one)))
-    if abs(two[k] - one[k]) > LATER_RTOL * max(np.abs(one).max(), np.abs(two).max()):
+    size = max(np.abs(one).max(), np.abs(two).max(), flow.pressed)
+    if abs(two[k] - one[k]) > LATER_RTOL * size:
         name = _body(flow, k)
         raise ModelError(
             f"after the period other forces act on {name!r} in the same place: "
