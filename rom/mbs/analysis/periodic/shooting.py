@@ -2,7 +2,7 @@
 
 Source:
     Nayfeh and Balachandran, Applied Nonlinear Dynamics (1995), chapter 6; Seydel, Practical
-    Bifurcation and Stability Analysis (2010), chapter 7; Broyden, Math. Comp. 19 (1965) 577.
+    Bifurcation and Stability Analysis (2010), chapter 7.
 """
 
 from dataclasses import dataclass, replace
@@ -10,8 +10,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from scipy.linalg import block_diag
 
 from rom.mbs.analysis.local_equations import free_motions
 from rom.mbs.analysis.periodic.flow import Flow, Start
@@ -28,6 +26,7 @@ from rom.model import Array
 PROBE_RTOL = 1e-7
 SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
 NEAR_RTOL = 0.9  # least cosine between free motions of neighbours
+MAX_VARIED = 8  # coordinates up to which differences take no longer than tangents of steps
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 
 
@@ -175,129 +174,6 @@ class Return:
         for state in (self.start.state, self.turned):
             found.append(self.chart.seen(time * state.v, time * state.a))
         return found[0], found[1]
-
-    def tangent(self) -> "Tangent":
-        """How the coordinates of starts and ends change, by central differences.
-
-        Raises:
-            SolverError: if a step fails.
-        """
-        chart, columns = self.chart, []
-        for e in np.eye(chart.size) * PROBE_RTOL:
-            one, two = (Return.of(self.flow, self.turns, chart.moved(x)) for x in (e, -e))
-            pairs = (one.start.state, two.start.state), (one.turned, two.turned)
-            columns.append([chart.of_state(x) - chart.of_state(y) for x, y in pairs])
-        both = np.array(columns).reshape(chart.size, 2, chart.size) / (2 * PROBE_RTOL)
-        return Tangent(self, both[:, 0].T, both[:, 1].T)
-
-
-@dataclass(frozen=True)
-class Tangent:
-    """Derivatives of the coordinates of start and end by what was varied.
-
-    Attributes:
-        around: the motion.
-        B, E: (f, f) of starts and of ends.
-        exact: whether they are those of this motion, not of others nearby.
-    """
-
-    around: Return
-    B: Array
-    E: Array
-    exact: bool = True
-
-    def of(self, found: Return) -> bool:
-        """Whether they are those of this motion."""
-        return self.exact and self.around is found
-
-    def followed(self, one: Return, two: Return) -> "Tangent":
-        """The same with what a correction from one motion to another has done, after Broyden."""
-        dq = self.around.flow.apart(one.start.state, two.start.state)
-        y = self.around.chart.seen(dq, two.start.state.v - one.start.state.v)
-        size = float(y @ y)
-        if not size > 0.0:
-            return self
-        missed = two.gap - one.gap - (self.E - self.B) @ y
-        return replace(self, E=self.E + np.outer(missed, y) / size, exact=False)
-
-    @property
-    def kept(self) -> "Derivatives":
-        """What motions nearby begin with."""
-        chart, start = self.around.chart, self.around.start
-        return Derivatives(chart.Zq, chart.Zv, self.B, self.E, start.ahead, start.later)
-
-    @cached_property
-    def multipliers(self) -> npt.NDArray[np.complex128]:
-        """(f,) of Floquet, largest first."""
-        if not self.B.size:
-            return np.zeros(0, dtype=complex)
-        found = np.linalg.eigvals(np.linalg.solve(self.B.T, self.E.T).T).astype(complex)
-        return found[np.lexsort((-found.imag, -np.round(np.abs(found), 12)))]
-
-    @cached_property
-    def energy_slope(self) -> Array:
-        """(f,) derivative of the energy by the coordinates of the start [J]."""
-        chart, mechanism = self.around.chart, self.around.flow.mechanism
-        return np.array(
-            [
-                (energy(mechanism, chart.moved(e)) - energy(mechanism, chart.moved(-e)))
-                / (2 * PROBE_RTOL)
-                for e in np.eye(chart.size) * PROBE_RTOL
-            ]
-        )
-
-    def solved(
-        self, rate: tuple[Array, Array] | None, *sides: Array, energy_gap: float | None = None
-    ) -> list[Array]:
-        """(f,) or (f + 1,) answers of (E - B) y + dT rate = -side; dT in radians of the period.
-
-        Where the period is unknown the start moves across the motion, and by a gap of its energy
-        if that is given. A motion that a period does not change is not touched.
-        """
-        A, right = self.E - self.B, -np.array(sides).T
-        if rate is not None:
-            A = np.vstack([np.column_stack([A, rate[1]]), np.append(rate[0], 0.0)])
-            right = np.vstack([right, np.zeros((1, right.shape[1]))])
-        if energy_gap is not None:
-            slope = self.energy_slope / np.linalg.norm(self.energy_slope)
-            miss = -energy_gap / np.linalg.norm(self.energy_slope)
-            A = np.vstack([A, np.append(slope, 0.0)])
-            right = np.vstack([right, np.full((1, right.shape[1]), miss)])
-        return list(np.linalg.lstsq(A, right, rcond=SINGULAR_RTOL)[0].T)
-
-
-@dataclass(frozen=True)
-class Derivatives:
-    """Those of a motion, with which motions nearby are looked for.
-
-    Attributes:
-        Zq, Zv: (n, f_q), (n, f_v) free motions and velocities.
-        B, E: (f, f) derivatives of starts and of ends.
-        ahead, later: (n,) as a `Start` has them.
-    """
-
-    Zq: Array
-    Zv: Array
-    B: Array
-    E: Array
-    ahead: Array
-    later: Array
-
-    def ready(self, start: Start) -> Start:
-        """A start with what the method had there."""
-        return replace(start, ahead=self.ahead, later=self.later)
-
-    def around(self, found: Return) -> "Tangent | None":
-        """The derivatives in the coordinates of a motion; None where it moves otherwise."""
-        chart = found.chart
-        if self.Zq.shape != chart.Zq.shape or self.Zv.shape != chart.Zv.shape:
-            return None
-        w = 1 / chart.scale[:, None] ** 2
-        P = block_diag(chart.Zq.T @ (w * self.Zq), chart.Zv.T @ (w * self.Zv))
-        if P.size and np.linalg.svd(P, compute_uv=False)[-1] < NEAR_RTOL:
-            return None
-        B, E = (np.linalg.solve(P.T, (P @ A).T).T for A in (self.B, self.E))
-        return Tangent(found, B, E, exact=False)
 
 
 def energy(mechanism: Mechanism, start: Start) -> float:
