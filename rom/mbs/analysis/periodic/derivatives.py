@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
+from rom import rotation
 from rom.mbs.analysis.local_equations import MAX_DENSE
 from rom.mbs.analysis.periodic.beside import Beside
 from rom.mbs.analysis.periodic.flow import Start
@@ -234,8 +235,12 @@ def by_steps(found: Return) -> Tangent:
     beside = Beside(flow.now, q, v, vd, vd.copy())
     flow.end(found.start, beside)
     angles = found.turns.angles(found.start.state, found.end)
-    later = (found.turns.turned(x, angles) for x in (beside.q, beside.v))
-    return Tangent(found, _seen(found, q, v), _seen(found, *later), carried=True)
+    later, rates = (found.turns.turned(x, angles) for x in (beside.q, beside.v))
+    away = flow.apart(found.start.state, found.turned)
+    for first in flow.packed.system.bodies.v_at + 3:
+        turn = rotation.spatial_tangent(-away[first : first + 3])
+        later[first : first + 3] = np.linalg.solve(turn, later[first : first + 3])
+    return Tangent(found, _seen(found, q, v), _seen(found, later, rates), carried=True)
 
 
 def _seen(found: Return, q: Array, v: Array) -> Array:

@@ -68,11 +68,11 @@ class Flow:
         numbers = (t0, t0 + period, period / steps, steps, rho_inf, STEP_TOLERANCE, 1e-4, 1e-12)
         self.mechanism, self.t0, self.period, self.steps = mechanism, t0, period, steps
         self.settings = Settings(*numbers, progress=False)
-        self.runs = [0]
+        self.runs, self.failed = [0], [0]
         self._take(pack(mechanism))
 
     def lasting(self, period: float) -> "Flow":
-        """The same over another period; memory and count of runs are shared."""
+        """The same over another period; memory and counts are shared."""
         other, s = copy(self), self.settings
         other.period, end = period, s.t_start + period
         other.settings = replace(s, t_end=end, dt=period / self.steps)
@@ -193,6 +193,7 @@ class Flow:
             if answer == alpha.NEEDS_LAWS:
                 apply_laws(self.packed.asked, self.W, float(self.t[1 + taken]))
         if answer != alpha.CONVERGED:
+            self.failed[0] += 1
             raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))
 
     def _reset(self, start: Start) -> Step:

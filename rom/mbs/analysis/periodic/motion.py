@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import number, positive, typed, whole
-from rom.errors import ConfigError
+from rom.errors import ConfigError, SolverError
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.analysis.periodic.derivatives import Derivatives, Tangent
 from rom.mbs.analysis.periodic.flow import Flow
@@ -25,6 +25,7 @@ N_STEPS, MAX_STEPS = 200, 100_000  # per period
 # the method forgets what a step does not resolve within a period; motions that keep their energy
 # must not lose it to the method
 RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
+MAX_TRIALS = 3  # with one step more each time
 GAP_TOL = 1e-10  # in rad or lengths of the mechanism
 MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
 STABLE_TOL = 1e-6  # of the size of a multiplier: differences and round-off
@@ -129,7 +130,8 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
             the same again, as a gear by one tooth pitch, counted as the angle of the joint is, or
             along its spin for a body without one; None as the angle for a body that looks the same
             after any. Whole turns need no mention.
-        steps: of generalised-alpha in a period.
+        steps: of generalised-alpha in a period; one or two more where one of them fails, as the one
+            at whose end a tooth leaves may.
         rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
             motion is conservative.
         guess: of an unknown period [s]; None for that of the fastest growing small motion about
@@ -166,20 +168,39 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     """
     if rho_inf is None:
         rho_inf = CONSERVATIVE_RHO_INF if conservative else RHO_INF
-    shooting, flow, begin = prepared(
-        mechanism, period, start, turns, steps, rho_inf, guess, t_start, tolerance, progress
-    )
     whole("settle", settle, 0, MAX_SETTLE)
     if conservative and period is not None:
         raise ConfigError("conservative is for motions that nothing drives; here period is given.")
-    turning = turns_of(mechanism, turns, begin)
-    known = start.derivatives if isinstance(start, PeriodicMotion) else None
+    for more in range(MAX_TRIALS):
+        shooting, flow, begin = prepared(
+            mechanism, period, start, turns, steps + more, rho_inf, guess, t_start, tolerance,
+            progress,
+        )  # fmt: skip
+        known = start.derivatives if isinstance(start, PeriodicMotion) else None
+        try:
+            return _near(shooting, flow, begin, known, settle, conservative)
+        except SolverError:
+            if not flow.failed[0] or more == MAX_TRIALS - 1:
+                raise
+    raise AssertionError
+
+
+def _near(
+    shooting: Shooting,
+    flow: Flow,
+    begin: State,
+    known: Derivatives | None,
+    settle: int,
+    conservative: bool,
+) -> PeriodicMotion:
+    """The motion near a state."""
+    turning = turns_of(shooting.mechanism, shooting.turns, begin)
     at = flow.begun(begin) if known is None else known.ready(flow.begun(begin))
-    refuse_what_changes(flow, turning, at, period is not None)
+    refuse_what_changes(flow, turning, at, shooting.period is not None)
     for _ in range(settle):
         at = Return.of(flow, turning, at).back
     if conservative:
-        shooting = replace(shooting, energy=energy(mechanism, at))
+        shooting = replace(shooting, energy=energy(shooting.mechanism, at))
     return recorded(shooting, *shooting.closed(flow, at, turning, known))
 
 
