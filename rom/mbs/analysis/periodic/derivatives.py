@@ -25,14 +25,16 @@ from rom.mbs.kernels.system import ROLL
 from rom.model import Array
 
 # of a start, in rad or lengths of the mechanism: 1e-14 of round-off is 1e-7 of a derivative, and
-# the deflection of teeth and races is still resolved; films of a few micrometres need less
-PROBE_RTOL, FILM_PROBE_RTOL = 1e-7, 1e-8
+# the deflection of teeth and races is still resolved; where teeth come and go in between, or films
+# change, motions have to begin nearer
+PROBE_RTOL, NEAR_PROBE_RTOL = 1e-7, 1e-8
+SMOOTH_TOL = 2e-4  # by which a nearer motion may end elsewhere, of its start: its round-off is 4e-5
 SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
 MAX_VARIED = 8  # coordinates up to which differences take no longer than tangents of steps
 PASSES_CARRIED = 3  # through the period, in the time of which derivatives come with the steps
-# by which a motion beside may end elsewhere than they say, of its start; it may be that of teeth
-# whose tangents leave out how forces turn
-CARRIED_TOL = 5e-3
+# by which a motion beside may end elsewhere than they say, of its start: in films what fades at
+# once does so in thousandths, and multipliers differ by a tenth of it
+CARRIED_TOL = 0.02
 MAX_NEAR = 4  # shapes next to growing; of more all derivatives are differences
 NEAR_RTOL = 0.9  # least cosine between free motions of neighbours
 
@@ -77,7 +79,7 @@ class Tangent:
         if not Y.size:
             return self, 0.0
         X = np.linalg.solve(self.B, Y)
-        ends = np.array([varied(self.around, x, FILM_PROBE_RTOL)[1] for x in X.T]).T
+        ends = np.array([varied(self.around, x, NEAR_PROBE_RTOL)[1] for x in X.T]).T
         missed = ends - self.E @ X
         return replace(self, E=self.E + missed @ np.linalg.pinv(X)), float(np.abs(missed).max())
 
@@ -175,43 +177,52 @@ def follows(found: Return) -> bool:
     return bool(many and simple and not rolls and found.turns.prescribed)
 
 
-def confirmed(found: Return) -> Tangent:
-    """Derivatives that differences do not contradict.
+def confirmed(found: Return, known: Tangent | None = None) -> Tangent:
+    """Derivatives that nearer motions beside do not contradict.
 
-    Those that come with the steps are compared with one pair of motions beside, in all shapes at
-    once; shapes that may be next to growing are then moved through the period themselves.
+    One pair of them moves in all shapes at once. If it ends elsewhere, derivatives are differences
+    of such motions: teeth come or go between others, or tangents of steps leave something out.
+    With these, shapes that may be next to growing are moved through the period themselves.
+
+    Args:
+        found: the motion.
+        known: its derivatives as far as they are known.
 
     Raises:
         SolverError: if a step fails.
     """
-    if not follows(found):
-        return by_differences(found)
-    tangent = by_steps(found)
-    values, shapes = np.linalg.eig(np.linalg.solve(tangent.B.T, tangent.E.T).T)
+    carried = follows(found)
+    if known is None or not known.of(found) or known.carried != carried:
+        known = by_steps(found) if carried else by_differences(found)
+    if not known.B.size:
+        return known
+    values, shapes = np.linalg.eig(np.linalg.solve(known.B.T, known.E.T).T)
     shapes = shapes / np.abs(shapes).max(axis=0)
     y = (shapes @ np.exp(1j * np.arange(len(shapes)))).real
-    tangent, missed = tangent.measured((y / np.abs(y).max())[:, None])
-    near = (np.abs(values) > 1.0 - 2 * missed) & (values.imag >= 0.0)
-    if missed > CARRIED_TOL or near.sum() > MAX_NEAR:
-        return by_differences(found)
+    tangent, missed = known.measured((y / np.abs(y).max())[:, None])
+    near = (np.abs(values) > 1.0 - missed) & (values.imag >= 0.0)
+    if missed > (CARRIED_TOL if carried else SMOOTH_TOL) or (carried and near.sum() > MAX_NEAR):
+        return by_differences(found, NEAR_PROBE_RTOL)
+    if not carried:
+        return known
     slow = shapes[:, near]
     return tangent.measured(np.hstack([slow.real, slow.imag[:, values[near].imag > 0.0]]))[0]
 
 
-def by_differences(found: Return) -> Tangent:
-    """Central differences in each coordinate.
+def by_differences(found: Return, d: float = PROBE_RTOL) -> Tangent:
+    """Central differences in each coordinate, of motions that begin at a distance d.
 
     Raises:
         SolverError: if a step fails.
     """
     f = found.chart.size
-    columns = [varied(found, e, PROBE_RTOL) for e in np.eye(f)]
+    columns = [varied(found, e, d) for e in np.eye(f)]
     both = np.array(columns).reshape(f, 2, f)
     return Tangent(found, both[:, 0].T, both[:, 1].T)
 
 
 def varied(found: Return, y: Array, d: float) -> tuple[Array, Array]:
-    """(f,) derivatives of start and end in a direction (f,), by two motions at distance d."""
+    """(f,) derivatives of start and end in a direction (f,), by two motions beside."""
     chart, starts, ends = found.chart, [], []
     for x in (d * y, -d * y):
         beside = Return.of(found.flow, found.turns, chart.moved(x))

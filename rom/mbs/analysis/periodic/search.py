@@ -132,9 +132,7 @@ class Shooting:
                 hint="Begin with start= a state that moves, or nearer to the motion.",
             )
         refuse_other_forces(found)
-        if tangent is not None and tangent.of(found) and not tangent.carried:
-            return tangent
-        return confirmed(found)
+        return confirmed(found, tangent)
 
     def _corrected(self, found: Return, tangent: Tangent) -> Return | None:
         """The next motion of Newton's method; shorter steps where one cannot be moved.

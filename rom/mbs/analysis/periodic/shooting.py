@@ -21,12 +21,6 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
 
-# of a start, in rad or lengths of the mechanism: 1e-14 of round-off is 1e-7 of a derivative, and
-# the deflection of teeth and races is still resolved
-PROBE_RTOL = 1e-7
-SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
-NEAR_RTOL = 0.9  # least cosine between free motions of neighbours
-MAX_VARIED = 8  # coordinates up to which differences take no longer than tangents of steps
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 
 
