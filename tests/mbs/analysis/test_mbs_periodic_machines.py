@@ -99,6 +99,13 @@ def test_angles_that_do_not_fit_the_teeth_are_refused():
         rom.periodic_motion(geared(speed), period=2 * np.pi / 26 / speed)
 
 
+def test_turns_of_parts_of_teeth_are_refused():
+    speed, part = 300.0, 0.7
+    turns = {"pinion axle": part * 2 * np.pi / 26, "gear axle": -part * 2 * np.pi / 40}
+    with pytest.raises(ModelError, match=r"mesh 'mesh' has gone on by 0\.7 teeth"):
+        rom.periodic_motion(geared(speed), turns=turns, period=part * 2 * np.pi / 26 / speed)
+
+
 def test_a_wheel_that_looks_different_after_a_tooth_is_refused_and_takes_whole_turns():
     uneven = ((1e-3, 2e-3, 2e-3), (5e-3, 5e-3, 9e-3))
     T = 2 * np.pi / 26 / 300.0

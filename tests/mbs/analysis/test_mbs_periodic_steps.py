@@ -1,5 +1,7 @@
 """Derivatives that come with the tangents of time steps, against differences of whole motions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,6 +9,8 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.geared_rotors import rigid_unit
 from rom.bench.units import as_mechanism
+from rom.components.journal_bearing import iso_vg
+from rom.errors import ModelError
 from rom.mbs.analysis.periodic.derivatives import by_differences, by_steps, confirmed, follows
 from rom.mbs.analysis.periodic.flow import Flow
 from rom.mbs.analysis.periodic.shooting import Return
@@ -102,3 +106,32 @@ def test_what_steps_do_not_know_is_noticed():
     assert np.abs(by_steps(found).E - exact.E).max() > 0.03 * np.abs(exact.E).max()
     assert not confirmed(found).carried
     assert_allclose(confirmed(found).E, exact.E, atol=1e-5)
+
+
+def unit_with(**films):
+    """The unit with other films, and its rest."""
+    unit = rigid_unit(speed=500.0)
+    shafts = [
+        replace(rotor, bearings={k: replace(b, **films) for k, b in rotor.bearings.items()})
+        for rotor in (unit.pinion, unit.gear)
+    ]
+    return replace(unit, pinion=shafts[0], gear=shafts[1])
+
+
+def test_films_that_remember_are_refused_by_name():
+    """Their filling goes around with the oil, over revolutions; heat takes longer still."""
+    unit = rigid_unit(speed=500.0)
+    for mech in (as_mechanism(unit_with(cavitation="jfo")),
+                 as_mechanism(unit, oil=iso_vg(46), inlet=50.0)):  # fmt: skip
+        with pytest.raises(ModelError, match="'pinion low' remembers its oil, or its heat"):
+            rom.periodic_motion(mech, period=unit.mesh_period, start=rom.equilibrium(mech))
+
+
+@pytest.mark.parametrize("teeth", [1.1, 0.5])
+def test_a_period_of_parts_of_teeth_is_refused(teeth):
+    """Contact may be the same by chance wherever one looks."""
+    unit = rigid_unit(speed=600.0, torque=30.0)
+    mech = as_mechanism(unit)
+    begin = {"period": teeth * unit.mesh_period, "start": rom.equilibrium(mech)}
+    with pytest.raises(ModelError, match=r"do not repeat|has gone on by 1\.1 teeth"):
+        rom.periodic_motion(mech, **begin)

@@ -10,11 +10,13 @@ from rom.mbs.analysis.periodic.shooting import Return
 from rom.mbs.analysis.periodic.turns import FULL_TURN, Turns
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.parts.signals import Signal
+from rom.mbs.results.state import State
 from rom.model import Array
 
 REPEAT_RTOL = 1e-6  # of the largest value: by which a function may differ a period later
 SHARES = np.array([0.0, 0.137, 0.291, 0.433, 0.618, 0.809])  # of the period, at which one looks
 FORCE_RTOL = 1e-6  # of all forces
+PHASE_TOL = 1e-5  # of a tooth
 MAX_POWER = 12  # of ten: so many periods later, what hardly changes in one must be the same
 LATER_RTOL = 1e-2  # the same at the end of a motion whose gap is closed: contact is stiff
 
@@ -31,11 +33,43 @@ def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) ->
     Raises:
         ModelError: naming the drive, load or law.
     """
+    _refuse_memory(flow)
     shift = flow.period if driven else flow.period * np.sqrt(2)  # no period of anything
     for signal in flow.packed.signals:
         if signal.name != "clock":
             _refuse_signal(flow, turns, signal, shift, driven)
     _refuse_forces(flow, start, shift, driven)
+    if driven:
+        later = replace(start.state, t=flow.t0 + shift)
+        _refuse_parts(_phases(flow, start.state), _phases(flow, later))
+
+
+def _refuse_memory(flow: Flow) -> None:
+    """Oil that is conserved fills films over revolutions, and heat slower: no unknowns here."""
+    for name in flow.packed.remembering:
+        raise ModelError(
+            f"{name!r} remembers its oil, or its heat, over more than a period.",
+            where=name,
+            hint="Give a film cavitation='reynolds' and a viscosity as its oil, or simulate.",
+        )
+
+
+def _phases(flow: Flow, state: State) -> dict[str, float]:
+    flow.forces(state)
+    return flow.now.packed.phases(flow.now.W)
+
+
+def _refuse_parts(one: dict[str, float], two: dict[str, float]) -> None:
+    """Refuse parts of a tooth: contact may be the same by chance at the instants that are seen."""
+    for name, phase in one.items():
+        passed = two[name] - phase
+        if abs(passed - round(passed)) > PHASE_TOL:
+            raise ModelError(
+                f"mesh {name!r} has gone on by {passed:.6g} teeth after the period: "
+                "no whole number.",
+                where=name,
+                hint="Give the period of the teeth, or a multiple; turns= of whole teeth.",
+            )
 
 
 def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, driven: bool) -> None:
@@ -132,7 +166,9 @@ def refuse_other_forces(found: Return) -> None:
     flow, end = found.flow, found.end
     later = replace(end, algorithmic=flow.forces(end))  # forces turn with the frames, as rates do
     two = found.turns.back(later, found.turns.angles(found.start.state, end)).algorithmic
+    passed = flow.now.packed.phases(flow.now.W)
     one = flow.forces(replace(found.turned, t=flow.t0, base=found.base))
+    _refuse_parts(flow.now.packed.phases(flow.now.W), passed)
     assert two is not None
     k = int(np.argmax(np.abs(two - one)))
     size = max(np.abs(one).max(), np.abs(two).max(), flow.pressed)

@@ -13,6 +13,7 @@ from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.mbs.elements.films.cells import CLEARANCE, cells_of
 from rom.mbs.elements.films.journals import (
+    CONSTANT,
     FIRST_CONTENT,
     INLET,
     KNOWN,
@@ -217,4 +218,5 @@ JOURNAL_BEARINGS_FAMILY = Family(
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
     eased=oil_everywhere,
+    remembers=lambda journals: (journals.films.law == JFO) | (journals.oil[:, CONSTANT] == 0.0),
 )  # fmt: skip
