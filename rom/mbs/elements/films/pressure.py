@@ -68,6 +68,13 @@ def line_of(films, k, face, i, at):
 
 
 @inner
+def at_side(nz, j, values):
+    """Value at side j of a column of cells: the mean of its neighbours, at the ends along them."""
+    near = min(max(j - 1, 0), nz - 2)
+    return values[near] + (j - near - 0.5) * (values[near + 1] - values[near])
+
+
+@inner
 def set_heights(films, k):
     """Set the film and the conductance of all faces; returns the thinnest film."""
     nt, nz = films.shape[k]
@@ -86,8 +93,7 @@ def set_heights(films, k):
             films.conducts[k, cell] = h * h * h * dZ / dtheta
             low = min(low, min(h, films.middle[k, cell]))
         for j in range(nz + 1):
-            left, right = i * nz + max(j - 1, 0), i * nz + min(j, nz - 1)
-            gap = 0.5 * (films.opening[k, left] + films.opening[k, right])
+            gap = at_side(nz, j, films.opening[k, i * nz : (i + 1) * nz])
             face, h = i * (nz + 1) + j, a + (films.size[k, Z_FIRST] + j * dZ) * b + gap
             open_end = 2.0 if j in (0, nz) else 1.0
             if j == 0 and films.size[k, IMAGES] > 1.0:
