@@ -97,6 +97,7 @@ ORDER = {
     ),
     "bench": (
         "models",
+        "units",
         "peers",
         "loops",
         "first_use",
