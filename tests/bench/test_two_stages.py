@@ -10,7 +10,7 @@ pytestmark = [pytest.mark.fenicsx, pytest.mark.long]
 
 
 def test_two_stages_carry_the_torque_and_the_weight():
-    """Moments about the shafts are as the ratios of teeth, but for what the films take on the way."""
+    """Moments about the shafts are as the numbers of teeth, but for what the films take."""
     mech = two_stages.machine(two_stages.bodies("rbe3"), (60, 4))
     still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
     films = sum(still.journal_bearing(name).power[0] for name in mech.journal_bearings)
