@@ -359,17 +359,28 @@ def transmission(
 ) -> Iterator[Figure]:
     """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
 
+    Then the unit of rigid shafts, by the program of its own and as a mechanism, and steps of two
+    stages of solids in their housing.
+
     Args:
         speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
         cells: of each film.
         ross: compare with ROSS, which is installed from the package index.
     """
-    from rom.bench.peers.films import coefficients_compared, speeds_run_through
+    from rom.bench.peers.films import (
+        coefficients_compared,
+        programs_compared,
+        speeds_run_through,
+    )
+    from rom.bench.two_stages import stages_run
 
     if ross:
         for row in coefficients_compared():
             yield Figure("transmission", *row)
-    for row in speeds_run_through(speeds, cells):
+    for rows in (speeds_run_through, programs_compared):
+        for row in rows(speeds, cells):
+            yield Figure("transmission", *row)
+    for row in stages_run():
         yield Figure("transmission", *row)
 
 

@@ -15,7 +15,15 @@ from rom.mbs.elements.gears.corrections import Correction, checked_map
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.hertz import Hertz
 from rom.mbs.elements.gears.racks import RackPair
-from rom.mbs.elements.gears.table import COORDINATES, DAMPING, PITCH, SLICE_COLUMNS, SPEED, Meshes
+from rom.mbs.elements.gears.table import (
+    COORDINATES,
+    DAMPING,
+    PITCH,
+    RB_1,
+    SLICE_COLUMNS,
+    SPEED,
+    Meshes,
+)
 from rom.mbs.elements.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
@@ -367,8 +375,16 @@ def _room(meshes: Meshes) -> Array:
     return room
 
 
+def _passed(meshes: Meshes, W: Any) -> Array:
+    """(k,) teeth of the pinions that have gone by."""
+    turned = W.fresh[meshes.remembered] + meshes.spin[:, 0] * W.signal[meshes.clock[0], 0]
+    teeth: Array = meshes.size[:, RB_1] / meshes.size[:, PITCH] * turned
+    return teeth
+
+
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
     by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
     lost="the wheels of {} are so close that they have no common tangent", room=_room,
+    phases=_passed,
 )  # fmt: skip
