@@ -207,6 +207,20 @@ def test_shifts_and_tilts_alone_press_flanks():
     assert load_moved(found, {9: lean, 5: -1e-9}) == pytest.approx(one, rel=1e-4)
 
 
+@pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
+def test_a_narrow_wheel_that_tilts_presses_by_its_radius(back):
+    """About the direction across the line of centres; its teeth go along the axis, by hand."""
+    narrow, side = replace(SPUR, helix=0.35, width=5e-3, thinning=4e-4), -1.0 if back else 1.0
+    found, lean = wheels(narrow, phase=0.5 * sum(narrow.path) / narrow.rb[0]), 2e-3
+    r = 40 * 4e-3 / np.cos(0.35) / 2  # of the gear, which rolls on it here
+    apart = 0.5 * lean * r * np.tan(narrow.base_helix)  # half of what the tilt closes
+    turn = -side * apart - (narrow.backlash if back else 0.0)
+    loads = [load_moved(found, {5: turn / narrow.rb[0], 10: sign * lean}) for sign in (-1, 1)]
+    depth = apart * np.cos(narrow.base_helix)
+    assert min(loads) == 0.0
+    assert 0.7 < max(loads) / (K * narrow.width * depth) < 2.4  # of one line or two
+
+
 def load_moved(found, moves):
     """Sum of the normal forces after motions of both wheels {number: way or turn} [N]."""
     packed, W = found
@@ -262,6 +276,17 @@ def test_bending_with_hertz_is_that_of_weber_and_banaschek_at_one_load(teeth, mo
     assert force / depth * 1e-9 == pytest.approx(wanted, rel=0.015)
     secant = pair_stiffness(pair, pair.pitch_point, force=force)
     assert force / depth == pytest.approx(secant, rel=3e-4)
+
+
+def test_helical_teeth_are_rounder_in_their_normal_section():
+    """Radii of curvature are those of the transverse section over the cosine of the base helix."""
+    pair, h, F = replace(SPUR, helix=0.5), (4e-3, 3e-3), 2e5
+    hertz = Hertz(h)
+    found = hertz.constants(pair)
+    s = np.linspace(*pair.path, len(found))
+    normal = np.array([s, pair.tangents - s]) / np.cos(pair.base_helix)
+    wanted = [contact_compliance(radii, h, F, hertz.E) / hertz.E for radii in normal.T]
+    assert_allclose(hertz.compliance * (found - 2 * np.log(F)), wanted, rtol=1e-12)
 
 
 def pressed(gaps, depth, **more):

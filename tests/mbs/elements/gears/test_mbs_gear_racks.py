@@ -82,6 +82,33 @@ def test_tangents_of_a_rack_are_differences(pair):
     assert_allclose(found, loss, atol=1e-6 * np.abs(loss).max())
 
 
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+def test_a_rack_farther_away_has_the_backlash_of_a_gear_without_end(pair):
+    gear = GearPair((26, 100_000), 4e-3, 0.03, pair.helix, shift=(pair.shift, 0.0), thinning=5e-5)
+    away = replace(pair, centre_distance=pair.distance + 1e-3)
+    apart = replace(gear, centre_distance=gear.distance + 1e-3)
+    assert away.backlash == pytest.approx(apart.backlash, rel=1e-3)
+
+
+@pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
+def test_lines_of_a_shifted_pinion_are_where_a_gear_without_end_has_them(back):
+    """Path and places of lines on the flanks, by the load that a stiffness along the path gives."""
+    pair = replace(SPUR, shift=0.3)
+    gear = GearPair((26, 100_000), 4e-3, 0.03, shift=(0.3, 0.0), thinning=5e-5)
+    assert_allclose(pair.path, gear.path, rtol=3e-4)
+    turn = (-pair.backlash - 1e-5 if back else 1e-5) / pair.rb[0]
+    for phase in (0.0, 0.07, 0.14, 0.21):
+        loads = []
+        for one in (pair, gear):
+            packed, W = prepared(free(one, phase=phase))
+            delta, none = np.zeros(12), np.zeros(12)
+            delta[5] = turn
+            residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
+            loads.append(packed.elements[GEAR_MESHES_FAMILY].load[0])
+        assert loads[0] == pytest.approx(loads[1], rel=1e-3)
+        assert loads[0] > 1e3
+
+
 def test_a_rack_that_leans_is_felt_however_far_it_has_travelled():
     """Turned by 1e-4 about the line of centres, 2 m from its middle; not by its other end."""
     packed, W = prepared(free(replace(HELICAL, thinning=2e-4)))
@@ -105,9 +132,6 @@ def test_a_rack_is_a_gear_without_end():
     gear = GearPair((26, z), 4e-3, 0.03, thinning=5e-5)
     assert_allclose(SPUR.path, gear.path, rtol=3e-4)
     assert SPUR.contact_ratio == pytest.approx(gear.contact_ratio, rel=1e-4)
-    away = replace(SPUR, centre_distance=SPUR.distance + 1e-4)
-    apart = replace(gear, centre_distance=gear.distance + 1e-4)
-    assert away.backlash == pytest.approx(apart.backlash, rel=2e-3)  # by inv alpha, of 2nd order
     packed, W = prepared(free(SPUR, phase=0.3))
     table = K * np.array([0.6, 1.1, 0.7])
     wanted = Mesh(gear, table, cells=7)
