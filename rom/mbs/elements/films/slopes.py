@@ -19,6 +19,8 @@ from rom.mbs.elements.films.cells import (
 from rom.mbs.elements.films.pressure import (
     at_side,
     cell_size,
+    column_after,
+    column_before,
     find_pressure,
     has_memory,
     order,
@@ -47,7 +49,7 @@ def set_answers(films, k):
     for i in range(nt):
         for j in range(nz):
             cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
-            P, west = films.P[k, cell], (i - 1) % nt * nz + j
+            P, west = films.P[k, cell], column_before(i, nt) * nz + j
             for m in range(n_motions(films, k)):
                 opened = per_motion(films, k, 0, i, Z, m)
                 films.answer[k, m] += width * dtheta * P * opened
@@ -88,7 +90,7 @@ def set_weights(films, k):
             if films.fixed[k, cell] == 1:
                 continue
             if films.active[k, cell] == 1:
-                Z, west = films.size[k, Z_FIRST] + (j + 0.5) * dZ, (i - 1) % nt * nz + j
+                Z, west = films.size[k, Z_FIRST] + (j + 0.5) * dZ, column_before(i, nt) * nz + j
                 for m in range(n_motions(films, k)):
                     films.weight[k, row, m] = width * dtheta * per_motion(films, k, 0, i, Z, m)
                 for f in range(films.n_functions[k]):
@@ -113,10 +115,10 @@ def add_shear_slopes(films, k, i, j):
     thinner, slanted = shear * films.state[k, SPIN_COLUMN] / h, 0.5 * width * films.P[k, cell]
     for m in range(n_motions(films, k)):
         rise = per_motion(films, k, BEHIND_FACE, i, Z, m)
-        rise -= per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
+        rise -= per_motion(films, k, BEHIND_FACE, column_before(i, nt), Z, m)
         opened = per_motion(films, k, 0, i, Z, m)
         films.slope[k, TORQUE_ANSWER, m] -= thinner * opened + slanted * rise
-    east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
+    east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
     for f in range(films.n_functions[k]):
         opened, g = films.functions[k, :, f], FIRST_OPENED + f
         rise = 0.5 * (opened[east] - opened[west])
@@ -140,7 +142,7 @@ def balance_slopes(films, k, i, j):
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
     cell, P, spin = i * nz + j, films.P[k, i * nz + j], films.state[k, SPIN_COLUMN]
-    east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
+    east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
     h, h_west = films.behind[k, cell], films.behind[k, west]
     away, into = 6 * dZ * carried(films, k, cell, east), 6 * dZ * carried(films, k, west, cell)
     by_east = 3 * films.conducts[k, cell] / h * (P - films.P[k, east]) + spin * away
@@ -175,11 +177,11 @@ def add_cell_slopes(films, k, i, j):
     for m in range(n_motions(films, k)):
         opened = per_motion(films, k, 0, i, Z, m)
         change = by_east * per_motion(films, k, BEHIND_FACE, i, Z, m) + by_middle * opened
-        change += by_west * per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
+        change += by_west * per_motion(films, k, BEHIND_FACE, column_before(i, nt), Z, m)
         change += low * per_motion(films, k, 0, i, Z - 0.5 * dZ, m)
         change += high * per_motion(films, k, 0, i, Z + 0.5 * dZ, m)
         films.change[k, m], films.change[k, N_MOTIONS + m] = change, by_rate * opened
-    east, west = (i + 1) % nt * nz + j, (i - 1) % nt * nz + j
+    east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
     column = films.functions[k, i * nz : (i + 1) * nz]
     for f in range(films.n_functions[k]):
         g, opened = films.functions[k, :, f], films.functions[k, cell, f]
