@@ -359,7 +359,8 @@ def transmission(
 ) -> Iterator[Figure]:
     """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
 
-    Then the unit of rigid shafts, by the program of its own and as a mechanism.
+    Then the unit of rigid shafts, by the program of its own and as a mechanism, and steps of two
+    stages of solids in their housing.
 
     Args:
         speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
@@ -371,6 +372,7 @@ def transmission(
         programs_compared,
         speeds_run_through,
     )
+    from rom.bench.two_stages import stages_run
 
     if ross:
         for row in coefficients_compared():
@@ -378,6 +380,8 @@ def transmission(
     for rows in (speeds_run_through, programs_compared):
         for row in rows(speeds, cells):
             yield Figure("transmission", *row)
+    for row in stages_run():
+        yield Figure("transmission", *row)
 
 
 def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Iterator[Figure]:

@@ -98,6 +98,7 @@ ORDER = {
     "bench": (
         "models",
         "units",
+        "two_stages",
         "peers",
         "loops",
         "first_use",
