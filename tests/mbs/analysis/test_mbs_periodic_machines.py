@@ -132,6 +132,8 @@ def test_a_wheel_beside_its_axis_is_refused():
     with pytest.raises(ModelError, match="its mass centre is beside the axis"):
         rom.periodic_motion(mech, period=1.0, turns={"axle": 1.0})
     assert rom.periodic_motion(mech, period=2 * np.pi).gap < 1e-9  # a whole turn
+    whole = rom.periodic_motion(mech, period=2 * np.pi, turns={"axle": -2 * np.pi})
+    assert whole.gap < 1e-9 and whole.turns == ()
 
 
 def rotor(spin, mass=2.0, stiffness=800.0, damping=3.0, away=0.0):

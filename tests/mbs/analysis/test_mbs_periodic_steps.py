@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import block_diag
 
 import rom
 from cases.mbs.geared_rotors import rigid_unit
@@ -135,3 +136,41 @@ def test_a_period_of_parts_of_teeth_is_refused(teeth):
     begin = {"period": teeth * unit.mesh_period, "start": rom.equilibrium(mech)}
     with pytest.raises(ModelError, match=r"do not repeat|has gone on by 1\.1 teeth"):
         rom.periodic_motion(mech, **begin)
+
+
+def test_corrections_and_motions_beside_say_what_derivatives_have_to_do():
+    """The equation of the secant, after Broyden, and what was measured in its own directions."""
+    one = swung(chain(2), 0.5)
+    wrong = by_steps(one)
+    wrong = replace(wrong, E=wrong.E + np.random.default_rng(3).normal(size=wrong.E.shape))
+    y = 1e-6 * np.arange(1.0, len(wrong.B) + 1)
+    two = Return.of(one.flow, one.turns, one.chart.moved(y), one.chart)
+    better = wrong.followed(one, two)
+    assert_allclose((better.E - better.B) @ y, two.gap - one.gap, atol=1e-9)
+    assert not better.own and wrong.own
+    Y = np.linalg.qr(np.random.default_rng(4).normal(size=(len(wrong.B), 2)))[0]
+    measured, missed = wrong.measured(Y)
+    right = by_differences(one)
+    X = np.linalg.solve(right.B, Y)
+    assert_allclose(measured.E @ X, right.E @ X, atol=1e-5 * np.abs(right.E).max())
+    assert missed == pytest.approx(np.abs((right.E - wrong.E) @ X).max(), rel=1e-3)
+
+
+def test_derivatives_of_a_neighbour_count_in_the_coordinates_of_a_motion():
+    """Free motions may be given in any combination; those of other joints are of no use."""
+    found = swung(chain(2), 0.5)
+    right = by_steps(found)
+    kept, k = right.kept, found.chart.Zq.shape[1]
+    mixed = block_diag(
+        *(np.linalg.qr(np.random.default_rng(s).normal(size=(k, k)))[0] for s in (1, 2))
+    )
+    other = replace(kept, Zq=kept.Zq @ mixed[:k, :k], Zv=kept.Zv @ mixed[k:, k:],
+                    B=mixed.T @ kept.B @ mixed, E=mixed.T @ kept.E @ mixed)  # fmt: skip
+    again = other.around(found)
+    assert_allclose(again.E, right.E, atol=1e-9 * np.abs(right.E).max())
+    assert_allclose(again.B, right.B, atol=1e-9)
+    assert not again.own
+    stranger = swung(chain(2, joint="revolute", again=False), 0.5)
+    assert kept.around(stranger) is None
+    turned = replace(kept, Zq=np.roll(kept.Zq, 1, axis=0), Zv=np.roll(kept.Zv, 1, axis=0))
+    assert turned.around(found) is None

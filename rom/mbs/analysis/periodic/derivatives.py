@@ -63,7 +63,8 @@ class Tangent:
     def followed(self, one: Return, two: Return) -> "Tangent":
         """The same with what a correction from one motion to another has done, after Broyden."""
         dq = self.around.flow.apart(one.start.state, two.start.state)
-        y = self.around.chart.seen(dq, two.start.state.v - one.start.state.v)
+        moved = self.around.chart.seen(dq, two.start.state.v - one.start.state.v)
+        y = np.linalg.lstsq(self.B, moved, rcond=None)[0]
         size = float(y @ y)
         if not size > 0.0:
             return self
