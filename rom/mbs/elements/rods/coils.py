@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from rom.arguments import positive
+from rom.arguments import number, positive
+from rom.errors import ConfigError
 from rom.mbs.elements.nonlinear import Elements, compiled_law
 from rom.mbs.elements.rods.bodies import POSE_SIZE, RodBody
 from rom.mbs.elements.rods.energy import product
@@ -138,14 +139,15 @@ def with_coils(body: RodBody, *, radius: float, solid: float, stiffness: float) 
     Args:
         body: what `rom.mbs.elements.rods.bodies.body` made of the rod of a spring.
         radius: from the centre line to the outside of the coils [m].
-        solid: length of the coils when all touch [m].
+        solid: length of the coils when all touch, zero where they pass each other [m].
         stiffness: of coils that touch [N/m].
 
     Raises:
-        ConfigError: for numbers that are not positive.
+        ConfigError: for numbers that no spring has.
     """
     n = len(body.frames.x)
-    numbers = [float(n), *map(positive, ("radius", "solid", "stiffness"),
-                              (radius, solid, stiffness))]  # fmt: skip
-    stop = Elements.of(_law(), np.arange(n)[None], np.array([numbers]), by_rate=False)
+    if number("solid", solid) < 0.0:
+        raise ConfigError(f"coils that touch are {solid:g} m long: no length is below zero.")
+    numbers = [n, positive("radius", radius), solid, positive("stiffness", stiffness)]
+    stop = Elements.of(_law(), np.arange(n)[None], np.array([numbers], dtype=float), by_rate=False)
     return replace(body, elements=(*body.elements, stop))

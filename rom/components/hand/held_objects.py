@@ -1,0 +1,216 @@
+"""Bars and balls that a moving hand holds: contacts with all phalanges and the palm, a table below.
+
+An object is free in space. Every phalanx is a round bar with round ends; the palm is a plane.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import finite, positive, unit_vector
+from rom.errors import ConfigError
+from rom.mbs.elements.contact.impact import Impact
+from rom.mbs.elements.contact.segments import distance
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Part
+from rom.model import Array
+from rom.rotation import matrix
+
+SKIN = Impact(5e3, exponent=1.0, damping=5.0, mu=0.8, transition_speed=1e-3)  # of a fingertip
+FOOT_RADIUS = 1e-3  # of the feet on which a bar stands [m]
+FEET_SHARE = 0.8  # of its radius, at which they are
+UPRIGHT_COSINE = 0.9  # between axis and gravity of a bar that stands
+MIN_TABLE_MASS = 0.1  # [kg]; its motion is given
+
+
+@dataclass(frozen=True)
+class Held:
+    """A ball, or a round bar with round ends.
+
+    Attributes:
+        centre: (3,) at the start [m].
+        radius: [m].
+        mass: [kg].
+        axis: (3,) of a bar [1]; None for a ball.
+        length: of a bar between the middles of its ends [m].
+    """
+
+    centre: tuple[float, float, float]
+    radius: float
+    mass: float
+    axis: tuple[float, float, float] | None = None
+    length: float = 0.0
+
+    @property
+    def inertia(self) -> Array:
+        """(3, 3) of an even ball, or of an even cylinder as long as the bar with its ends."""
+        if self.axis is None:
+            return 0.4 * self.mass * self.radius**2 * np.eye(3)
+        e = unit_vector("axis", self.axis)
+        along = 0.5 * self.mass * self.radius**2
+        across = 0.5 * along + self.mass * (self.length + 2 * self.radius) ** 2 / 12
+        return across * np.eye(3) + (along - across) * np.outer(e, e)
+
+    @property
+    def ends(self) -> Array:
+        """(1 or 2, 3) middles of the ends from the centre [m]."""
+        if self.axis is None:
+            return np.zeros((1, 3))
+        half = 0.5 * self.length * unit_vector("axis", self.axis)
+        return np.array([-half, half])
+
+
+def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN,
+         thickness: float = 5e-3) -> Part:  # fmt: skip
+    """Put an object into a hand, with contacts named "index phalanx 1 on bar" and "palm on bar 1".
+
+    Args:
+        mech: such as `rom.components.hand.moving_hand` makes.
+        name: of the object.
+        held: the object.
+        law: of its contacts.
+        thickness: half that of the phalanges [m].
+
+    Raises:
+        ConfigError: for an object that reaches into the hand, or a hand without phalanges.
+    """
+    positive("mass", held.mass)
+    positive("radius", held.radius)
+    phalanges = [part for part in mech.parts.values() if "distal" in part.points]
+    if not phalanges:
+        raise ConfigError(f"nothing can hold {name!r}: the mechanism has no phalanx.")
+    made = mech.add_rigid(name, mass=held.mass, inertia=held.inertia, at=held.centre)
+    middle = made.marker((0.0, 0.0, 0.0))
+    for bone in phalanges:
+        axis = matrix(bone.p)[:, 2]
+        length = 2.0 * float(np.linalg.norm(bone.points["distal"]))
+        _check_apart(bone, axis, 0.5 * length, thickness, name, held)
+        mech.capsule_on_capsule(
+            f"{bone.name} on {name}", bone.marker((0.0, 0.0, 0.0)), middle, law,
+            radius1=thickness, axis1=axis, length1=length, radius2=held.radius, axis2=held.axis,
+            length2=held.length,
+        )  # fmt: skip
+    if "palm" in mech.parts:
+        _on_palm(mech, name, held, made, law)
+    return made
+
+
+def _check_apart(bone: Part, axis: Array, half: float, thickness: float, name: str,
+                 held: Held) -> None:  # fmt: skip
+    """Refuse an object that reaches into a phalanx."""
+    e = np.array([0.0, 0.0, 1.0]) if held.axis is None else unit_vector("axis", held.axis)
+    gap = distance(np.asarray(held.centre) - bone.at, axis, e, half, 0.5 * held.length)
+    depth = thickness + held.radius - gap
+    if depth > 0.0:
+        raise ConfigError(f"{name!r} reaches {depth * 1e3:.3g} mm into {bone.name!r} at the start.",
+                          hint="Move its centre away.")  # fmt: skip
+
+
+def _on_palm(mech: Mechanism, name: str, held: Held, made: Part, law: Impact) -> None:
+    """Ends of the object against the plane through the first plates."""
+    first = [joint.markers for key, joint in mech.joints.items() if key.endswith(" joint 1")]
+    points = np.array([mech.design_point(pair[0]) for pair in first])
+    axes = [matrix(mech.part(pair[1].body).p)[:, 2] for pair in first]
+    normal, palm = unit_vector("palm", np.mean(axes, axis=0)), mech.parts["palm"]
+    face = palm.marker(points.mean(axis=0) - palm.at)
+    for k, end in enumerate(held.ends, start=1):
+        depth = held.radius - float((np.asarray(held.centre) + end - mech.design_point(face)) @
+                                    normal)  # fmt: skip
+        if depth > 0.0:
+            raise ConfigError(f"{name!r} reaches {depth * 1e3:.3g} mm into the palm at the start.",
+                              hint="Move its centre away.")  # fmt: skip
+        mech.sphere_on_plane(f"palm on {name} {k}", face, made.marker(end), law, normal=normal,
+                             radius=held.radius)  # fmt: skip
+
+
+def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float = 0.1,
+          law: Impact = SKIN) -> Part:  # fmt: skip
+    """A table below an object, that goes down from a time on.
+
+    Args:
+        mech: with the object, and gravity.
+        name: of the object.
+        held: the object.
+        leaves: when it begins to go [s].
+        speed: that it reaches within 0.1 s [m/s].
+        law: of the contact.
+
+    Raises:
+        ConfigError: if there is no gravity.
+    """
+    gravity = finite("gravity", mech.gravity, (3,))
+    if not np.linalg.norm(gravity) > 0.0:
+        raise ConfigError(f"without gravity nothing keeps {name!r} on a table.")
+    up = -gravity / np.linalg.norm(gravity)
+    feet, radius = _feet(held, up)
+    low = min(float(foot @ up) for foot in feet) - radius
+    top = np.asarray(held.centre) + low * up
+    made = mech.add_rigid("table", mass=MIN_TABLE_MASS, inertia=(1e-4,) * 3, at=top)
+    mech.prismatic("table guide", mech.ground.marker(top), made.marker((0.0, 0.0, 0.0)), axis=up)
+    mech.drive("table motor", "table guide", lambda t: -_way(t - leaves, speed),
+               rate=lambda t: -_rate(t - leaves, speed))  # fmt: skip
+    for k, foot in enumerate(feet, start=1):
+        mech.sphere_on_plane(f"table on {name} {k}", made.marker((0.0, 0.0, 0.0)),
+                             mech.parts[name].marker(foot), law, normal=up,
+                             radius=radius)  # fmt: skip
+    return made
+
+
+RAMP = 0.1  # over which the table gathers speed [s]
+
+
+def _way(t: float, speed: float) -> float:
+    """Way after a start at zero with a smooth ramp of the speed."""
+    s = min(max(t / RAMP, 0.0), 1.0)
+    return speed * (RAMP * (s**3 - 0.5 * s**4) + max(t - RAMP, 0.0))
+
+
+def _rate(t: float, speed: float) -> float:
+    s = min(max(t / RAMP, 0.0), 1.0)
+    return speed * s * s * (3.0 - 2.0 * s)
+
+
+def _feet(held: Held, up: Array) -> tuple[list[Array], float]:
+    """Middles of the balls on which an object rests, from its centre, and their radius [m]."""
+    if held.axis is None or abs(unit_vector("axis", held.axis) @ up) < UPRIGHT_COSINE:
+        return list(held.ends), held.radius
+    e = unit_vector("axis", held.axis)
+    e = e if e @ up > 0.0 else -e
+    x = np.cross(e, np.eye(3)[np.argmin(np.abs(e))])
+    x /= np.linalg.norm(x)
+    turns = 2 * np.pi / 3 * np.arange(3)
+    bottom = -(0.5 * held.length + held.radius - FOOT_RADIUS) * e
+    return [bottom + FEET_SHARE * held.radius * (np.cos(a) * x + np.sin(a) * np.cross(e, x))
+            for a in turns], FOOT_RADIUS  # fmt: skip
+
+
+def contacts_of(mech: Mechanism, name: str) -> list[str]:
+    """Names of the contacts of an object."""
+    return [key for key, one in mech.contacts.items() if one.j.body == name]
+
+
+def contact_forces(solution: Any, name: str) -> dict[str, Array]:
+    """{contact: (n_t, 3) force on the object, world [N]}."""
+    return {key: solution.element(key).force[:, 1] for key in contacts_of(solution.mechanism, name)}
+
+
+def unbalanced(solution: Any, name: str) -> Array:
+    """(n_t, 3) contact forces and weight of an object less mass times acceleration [N]."""
+    mech: Mechanism = solution.mechanism
+    part = mech.part(name)
+    at = solution.packed.system.bodies.v_at[solution.packed.names.index(name)]
+    total = sum(contact_forces(solution, name).values(), np.zeros((solution.t.size, 3)))
+    return total + part.mass * (np.asarray(mech.gravity) - solution.a[:, at : at + 3])
+
+
+def grip(solution: Any, name: str, fingers: Iterable[str]) -> dict[str, Array]:
+    """{finger: (n_t,) sizes of the forces of its phalanges on an object, added up [N]}."""
+    forces = contact_forces(solution, name)
+    return {
+        finger: sum((np.linalg.norm(f, axis=1) for key, f in forces.items()
+                     if key.startswith(f"{finger} phalanx")), np.zeros(solution.t.size))
+        for finger in fingers
+    }  # fmt: skip
