@@ -44,15 +44,18 @@ TASKS: dict[str, tuple[str, str]] = {
     "Move": (
         "Bodies, joints and forces become a mechanism, and the mechanism moves.",
         """read_mechanism Mechanism mbs.Part mbs.Marker mbs.Impact mbs.Pulley mbs.BallBearing
+        mbs.JournalBearing mbs.Groove mbs.multilobe mbs.Oil mbs.iso_vg
         mbs.RollerBearing mbs.hertz_stiffness
         surface_load mass_load SpreadLoad simulate release Keeping save_state load_state mbs.State
         mbs.Instant mbs.Family mbs.Signal mbs.Elements mbs.Frames""",
     ),
     "Results": (
         "What a mechanism answers without moving, and what a motion holds.",
-        """mbs.Solution mbs.Energy mbs.Occurrences snapshot equilibrium continuation
-        mbs.EquilibriumPath inverse_dynamics linearize mbs.Linearization campbell mbs.Campbell
+        """mbs.Solution mbs.Energy mbs.Occurrences mbs.ToothLoads mbs.tooth_loads snapshot
+        equilibrium continuation mbs.EquilibriumPath inverse_dynamics linearize mbs.Linearization
+        campbell mbs.Campbell
         frequency_response transmissibility mbs.FrequencyResponse steady_motion SteadyMotion
+        periodic_motion mbs.PeriodicMotion periodic_path mbs.PeriodicPath mbs.CriticalMotion
         equilibrium_sensitivity frequency_sensitivity motion_sensitivity mbs.Sensitivity
         body.von_mises""",
     ),

@@ -81,6 +81,8 @@ from rom.mbs.analysis.equilibrium import equilibrium as equilibrium
 from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynamics
 from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import linearize as linearize
+from rom.mbs.analysis.periodic.motion import periodic_motion as periodic_motion
+from rom.mbs.analysis.periodic.path import periodic_path as periodic_path
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility
 from rom.mbs.analysis.sensitivity import equilibrium_sensitivity as equilibrium_sensitivity

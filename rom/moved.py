@@ -29,6 +29,8 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom.components.cosserat", "rom.mbs.elements.rods",
      "elements=energy multibody=bodies shape=shapes"),
     ("rom.components.gear_mesh", "rom.mbs.elements.gears", "geometry"),
+    ("rom.components.journal_bearing", "rom.mbs.elements.films",
+     "band bearing film_kernel=pressure"),
     ("rom.components.frf_updating", "rom.components.updating", "methods models"),
     ("rom.config", "rom.report", "reporting=pages run"),
     ("rom.cyclic", "rom.cyclic", "springs=supports"),

@@ -163,6 +163,21 @@ def geometry(name: str) -> Path:
     return path
 
 
+def shaft_in_films(cavitation: Any) -> Any:
+    """A free shaft with an unbalance in two oil films of 120 x 8 cells."""
+    from rom.mbs.elements.films.bearing import Groove, JournalBearing
+    from rom.mbs.mechanism import Mechanism
+
+    mech, z = Mechanism(gravity=(0, -9.81, 0)), (0, 0, 1)
+    shaft = mech.add_rigid("shaft", mass=40.0, inertia=(1.0, 1.0, 0.1), at=(0, 0, 0),
+                           omega=(0, 0, 300.0))  # fmt: skip
+    film = JournalBearing(0.1, 0.05, 1e-4, [Groove(np.pi / 2, 0.35)], cavitation=cavitation)
+    for k, side in enumerate((-0.3, 0.3)):
+        ends = shaft.marker((2e-5, 0, side)), mech.ground.marker((0, 0, side))
+        mech.journal_bearing(f"film {k}", *ends, axis=z, bearing=film, oil=0.03)
+    return mech
+
+
 def planetary_train() -> Any:
     """Three planets between a driven sun and a ring on springs; a wheel pair and its stiffness.
 

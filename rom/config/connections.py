@@ -167,15 +167,24 @@ def _contact(entry: Entry) -> None:
 
 
 def _gear_mesh(entry: Entry) -> None:
-    from rom.mbs.elements.gears.corrections import Correction
+    from rom.mbs.elements.gears.corrections import Correction, flank_map
     from rom.mbs.elements.gears.geometry import GearPair
+    from rom.mbs.elements.gears.hertz import Hertz
 
     pair = {key: value for key, value in entry.values.pop("pair").items() if value is not None}
     for key in ("teeth", "shift"):
         pair[key] = tuple(pair[key])
-    correction = entry.values.pop("correction")
+    correction, hertz = entry.values.pop("correction"), entry.values.pop("hertz", None)
+    for kind in ("maps", "back_maps"):
+        files = [correction.pop(f"{wheel}_{kind[:-1]}", None) for wheel in ("pinion", "gear")]
+        correction[kind] = tuple(None if path is None else flank_map(path) for path in files)
+    amounts, turns = (correction.pop(key, [0.0, 0.0]) for key in ("run_out", "run_out_direction"))
+    correction["run_out"] = tuple(zip(amounts, turns, strict=True))
+    pitch = [correction.pop(f"{wheel}_pitch", None) for wheel in ("pinion", "gear")]
+    correction["pitch"] = tuple(() if errors is None else errors for errors in pitch)
     correction |= {key: tuple(correction[key]) for key in ("relief", "extent") if key in correction}
     entry.values["pair"], entry.values["correction"] = GearPair(**pair), Correction(**correction)
+    entry.values["hertz"] = None if hertz is None else Hertz(**hertz)
     entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
 
 
@@ -188,6 +197,21 @@ def _rolling_bearing(entry: Entry) -> None:
     if "conformity" in values:
         values["conformity"] = tuple(values["conformity"])
     entry.made.rolling_bearing(entry.name, *entry.ends, bearing=made(**values), **how)
+
+
+def _journal_bearing(entry: Entry) -> None:
+    from rom.mbs.elements.films.bearing import Groove, JournalBearing, multilobe
+    from rom.mbs.elements.films.oil import Oil, iso_vg
+
+    values, sizes, oil = entry.values, entry.values.pop("bearing"), entry.values.pop("oil")
+    sizes["grooves"] = [Groove(**groove) for groove in sizes["grooves"].values()]
+    sizes["cells"] = tuple(sizes.pop(f"cells_{axis}") for axis in ("around", "along"))
+    lobes, preload, first = (sizes.pop(key) for key in ("lobes", "preload", "first_lobe"))
+    sizes["bore"] = multilobe(lobes, preload, first=first) if preload else None
+    oil |= {key: 1e6 * oil[key] for key in ("nu_40", "nu_100") if key in oil}  # [mm^2/s]
+    makes: dict[str, Any] = {"constant": lambda viscosity: viscosity, "grade": iso_vg, "oil": Oil}
+    values |= {"bearing": JournalBearing(**sizes), "oil": makes[oil.pop("kind")](**oil)}
+    entry.made.journal_bearing(entry.name, *entry.ends, **values)
 
 
 def _tendon(entry: Entry) -> None:
@@ -278,6 +302,7 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "contacts": _contact,
     "gear_meshes": _gear_mesh,
     "rolling_bearings": _rolling_bearing,
+    "journal_bearings": _journal_bearing,
     "tendons": _tendon,
     "laws": _law,
     "events": _event,

@@ -271,6 +271,7 @@ def _add_rigid_from(
         markers={key: x - centre for key, x in points.items()},
         velocity=velocity + A @ np.cross(omega, centre),
         omega=omega,
+        spin=values.get("spin"),
     )
 
 

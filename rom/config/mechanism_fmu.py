@@ -142,6 +142,7 @@ def _numbers(part: Part) -> dict[str, Any]:
         "orientation": part.p,
         "velocity": part.velocity,
         "omega": part.omega,
+        "spin": part.spin,
     }
     points = {name: np.asarray(x).tolist() for name, x in part.points.items()}
     return {

@@ -84,11 +84,16 @@ POSE = (
     Key("velocity", Quantity("m/s", ((3,),)), "At the start, in the world; at rest if missing."),
     Key("omega", Quantity("rad/s", ((3,),)), "Angular velocity at the start, in the body frame."),
 )  # fmt: skip
+SPIN = Key(
+    "spin", Quantity("rad/s", ((3,),)),
+    "Angular velocity of a round body in its frame, which does not turn with it.",
+)  # fmt: skip
 RIGID = Table("A rigid body by its numbers; its frame sits at the mass centre.", (
     Key("mass", Quantity("kg", positive=True), "Mass.", ...),
     Key("inertia", Quantity("kg m^2", ((3,), (3, 3))), "About the mass centre, body frame.", ...),
     Key("at", POINT, "Mass centre at the start.", ...),
     *POSE,
+    SPIN,
     Key("markers", Named(POINT, "points"), "Points from the mass centre, body frame.", {}),
 ))  # fmt: skip
 FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
@@ -97,6 +102,7 @@ FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
     Key("reference", Words(), "Another floating frame, see the component file."),
     Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
     *POSE,
+    SPIN,
     Key("q", Quantity("1", ((None,),)), "Elastic coordinates at the start; zero if missing."),
     Key("qd", Quantity("1", ((None,),)), "Their rates at the start; zero if missing."),
 ))  # fmt: skip
@@ -298,6 +304,7 @@ GEAR_PAIR = Table("A pair of involute wheels.", (
     Key("width", Quantity("m", positive=True), "Common width of the faces.", ...),
     Key("helix", Quantity("rad"), "At the reference circle, positive for a right-handed pinion.",
         0.0),
+    Key("gear_helix", Quantity("rad"), "That of the gear, to check its hand."),
     Key("pressure_angle", Quantity("rad"), "Normal one; 20 degrees if missing."),
     Key("shift", Quantity("1", TWO), "Profile shifts in modules.", [0.0, 0.0]),
     Key("centre_distance", Quantity("m", positive=True), "None leaves no backlash if missing."),
@@ -305,12 +312,26 @@ GEAR_PAIR = Table("A pair of involute wheels.", (
     Key("addendum", Quantity(positive=True), "Height above the reference circle in modules.", 1.0),
     Key("dedendum", Quantity(positive=True), "Depth below it in modules.", 1.25),
 ))  # fmt: skip
-CORRECTION = Table("What is taken off the working flanks.", (
+CORRECTION = Table("What is taken off the flanks, and what was measured on them.", (
     Key("relief", Quantity("m", TWO), "Depth at the tips of pinion and gear.", [0.0, 0.0]),
     Key("extent", Quantity("m", TWO), "Its length along the path of contact.", [0.0, 0.0]),
     Key("power", Quantity("1", positive=True), "1 for linear, 2 for parabolic relief.", 1.0),
     Key("crowning", Quantity("m"), "At both ends of the face.", 0.0),
     Key("slope", Quantity("m"), "Of the lead over the face.", 0.0),
+    Key("pinion_pitch", Quantity("m", ((None,),)), "Errors of its teeth; positive leaves a gap."),
+    Key("gear_pitch", Quantity("m", ((None,),)), "Those of the gear."),
+    *(Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} [m]: a line of "
+          "numbers with commas for each place of the profile, empty lines between teeth.")
+      for kind, which in (("map", "working"), ("back_map", "back"))
+      for wheel in ("pinion", "gear")),
+    Key("run_out", Quantity("m", TWO), "By which the teeth stand off the axes.", [0.0, 0.0]),
+    Key("run_out_direction", Quantity("rad", TWO), "From where the wheels mesh.", [0.0, 0.0]),
+))  # fmt: skip
+HERTZ = Table("Contact of teeth that gives way by its load.", (
+    Key("depths", Quantity("m", (*TWO, (None, 2))), "From the flanks of pinion and gear to the "
+        "axes of their teeth; one pair, or from first to last contact.", ...),
+    Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
+    Key("nu", Quantity(), "Poisson's ratio.", 0.3),
 ))  # fmt: skip
 ROLLING = {
     "balls": Table("A row of balls.", (
@@ -332,6 +353,41 @@ ROLLING = {
         Key("clearance", Quantity("m"), "Radial play; negative for one that is pressed.", 0.0),
     )),
 }  # fmt: skip
+OILS = {
+    "constant": Table("A viscosity that stays.", (
+        Key("viscosity", Quantity("Pa s", positive=True), "Dynamic.", ...),
+    )),
+    "grade": Table("A usual mineral oil.", (
+        Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...),
+    )),
+    "oil": Table("Any mineral oil.", (
+        Key("nu_40", Quantity("m^2/s", positive=True), "Kinematic at 40 degrees Celsius.", ...),
+        Key("nu_100", Quantity("m^2/s", positive=True), "At 100 degrees Celsius.", ...),
+        Key("density", Quantity("kg/m^3", positive=True), "Density.", 870.0),
+        Key("heat", Quantity("J/(kg K)", positive=True), "Specific heat.", 2000.0),
+    )),
+}  # fmt: skip
+GROOVE = Table("An axial groove full of oil.", (
+    Key("angle", Quantity("rad"), "Of its middle.", ...),
+    Key("width", Quantity("rad"), "How far it extends around the bush.", 0.0),
+    Key("pressure", Quantity("Pa"), "Of its oil.", 0.0),
+    Key("share", Quantity("1", positive=True), "Of the width of the bearing.", 1.0),
+))  # fmt: skip
+JOURNAL_BEARING = Table("An oil film.", (
+    Key("diameter", Quantity("m", positive=True), "Of the journal.", ...),
+    Key("length", Quantity("m", positive=True), "Of the bush.", ...),
+    Key("clearance", Quantity("m", positive=True), "Radius of the bush less that of the journal.",
+        ...),
+    Key("grooves", Named(GROOVE, "grooves"), "Inlets of oil.", {}),
+    Key("cavitation", Text(("none", "reynolds", "jfo")), "What happens where oil would have to "
+        "pull: it does, it ends, it is conserved.", "reynolds"),
+    Key("preload", Quantity(), "Of a lobed bore, in clearances.", 0.0),
+    Key("lobes", Whole(2), "Number of arcs of such a bore.", 2),
+    Key("first_lobe", Quantity("rad"), "Middle of one of them.", 0.0),
+    Key("cells_around", Whole(12), "Of the film.", 120),
+    Key("cells_along", Whole(2), "Of its width, or of half of it.", 8),
+    Key("aligned", Flag(), "The journal never tilts: cells on half the width.", False),
+))  # fmt: skip
 ROLLING_KEYS = (
     BETWEEN, AXIS,
     Key("damping", Quantity("s/m"), "Force on a ball grows by this factor of its speed.", 0.0),
@@ -395,10 +451,27 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("cells", Whole(1), "Slices across the face.", 21),
         Key("phase", Quantity("rad"), "Turn of the pinion at the start.", 0.0),
         Key("entry", Quantity(), "Share of the base pitch over which teeth take up load.", 0.02),
+        Key("conservative", Flag(), "Whether forces follow the energy along the path of contact."),
+        Key("hertz", HERTZ, "Contact that gives way by its load."),
+        Key("coupling", Quantity("m"), "Length over which slices carry each other.", 0.0),
     ))),
     "rolling_bearings": ("rolling bearings", Variants({
         kind: Table(table.about, (*ROLLING_KEYS, *table.keys)) for kind, table in ROLLING.items()
     }, {kind: kind for kind in ROLLING})),
+    "journal_bearings": ("journal bearings", Table("An oil film between journal and bush.", (
+        Key("between", Two(), "On the axis of the journal, and the middle of the bush.", ...),
+        Key("axis", DIRECTION, "Of both, in the world at the start.", ...),
+        Key("reference", DIRECTION, "From where angles count, across the axis; X if missing."),
+        Key("bearing", JOURNAL_BEARING, "Its sizes.", ...),
+        Key("oil", Variants(OILS, {"viscosity": "constant", "grade": "grade", "nu_40": "oil"}),
+            "In it.", ...),
+        Key("inlet", Quantity(), "Temperature of the oil that comes in [degrees Celsius]."),
+        Key("roughness", Quantity("m"), "Height at which journal and bush touch.", 0.0),
+        Key("carried", Quantity(), "Share of the heat that leaves with the oil.", 0.9),
+        Key("felt", Quantity(), "Share of the rise that the film feels.", 0.5),
+        Key("thermal_time", Quantity("s", positive=True), "Over which its temperature follows.",
+            1.0),
+    ))),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,
     ))),

@@ -7,6 +7,11 @@ from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynami
 from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import Linearization as Linearization
 from rom.mbs.analysis.linearize import linearize as linearize
+from rom.mbs.analysis.periodic.motion import PeriodicMotion as PeriodicMotion
+from rom.mbs.analysis.periodic.motion import periodic_motion as periodic_motion
+from rom.mbs.analysis.periodic.path import CriticalMotion as CriticalMotion
+from rom.mbs.analysis.periodic.path import PeriodicPath as PeriodicPath
+from rom.mbs.analysis.periodic.path import periodic_path as periodic_path
 from rom.mbs.analysis.response import FrequencyResponse as FrequencyResponse
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility
@@ -20,6 +25,11 @@ from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
 from rom.mbs.elements.contact.impact import Impact as Impact
 from rom.mbs.elements.contact.impact import hertz_stiffness as hertz_stiffness
 from rom.mbs.elements.family import Family as Family
+from rom.mbs.elements.films.bearing import Groove as Groove
+from rom.mbs.elements.films.bearing import JournalBearing as JournalBearing
+from rom.mbs.elements.films.bearing import multilobe as multilobe
+from rom.mbs.elements.films.oil import Oil as Oil
+from rom.mbs.elements.films.oil import iso_vg as iso_vg
 from rom.mbs.elements.nonlinear import LAW_SIGNATURE as LAW_SIGNATURE
 from rom.mbs.elements.nonlinear import Elements as Elements
 from rom.mbs.elements.nonlinear import Frames as Frames
@@ -41,3 +51,5 @@ from rom.mbs.results.solution import Energy as Energy
 from rom.mbs.results.solution import Occurrences as Occurrences
 from rom.mbs.results.solution import Solution as Solution
 from rom.mbs.results.state import State as State
+from rom.mbs.results.tooth_loads import ToothLoads as ToothLoads
+from rom.mbs.results.tooth_loads import tooth_loads as tooth_loads

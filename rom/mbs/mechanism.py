@@ -1,7 +1,7 @@
 """The mechanism as the user describes it: bodies, joints, drives and forces, by name."""
 
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -27,8 +27,10 @@ from rom.mbs.elements import (
 )
 from rom.mbs.elements.contact import capsules, points, surfaces
 from rom.mbs.elements.family import Family, check_family
+from rom.mbs.elements.films import journal_bearings
 from rom.mbs.elements.gears import meshes
 from rom.mbs.elements.rolling import bearings
+from rom.mbs.elements.round_bodies import spins
 from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
@@ -53,6 +55,8 @@ FAMILIES = (
     tendons.TENDONS_FAMILY,
     meshes.GEAR_MESHES_FAMILY,
     bearings.ROLLING_BEARINGS_FAMILY,
+    journal_bearings.JOURNAL_BEARINGS_FAMILY,
+    spins.SPINS_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -185,6 +189,7 @@ class Mechanism:
     tendon = tendons.tendon
     gear_mesh = meshes.gear_mesh
     rolling_bearing = bearings.rolling_bearing
+    journal_bearing = journal_bearings.journal_bearing
     add_nonlinear = nonlinear.add_nonlinear
 
     springs = Every(springs.Spring)
@@ -201,6 +206,7 @@ class Mechanism:
     tendons = Every(tendons.Tendon)
     gear_meshes = Every(meshes.GearMesh)
     rolling_bearings = Every(bearings.RollingBearing)
+    journal_bearings = Every(journal_bearings.OilFilm)
     nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:
@@ -230,6 +236,7 @@ class Mechanism:
         markers: dict[str, npt.ArrayLike] | None = None,
         velocity: npt.ArrayLike | None = None,
         omega: npt.ArrayLike | None = None,
+        spin: npt.ArrayLike | None = None,
     ) -> Part:
         """Add a rigid body; its frame sits at the mass centre.
 
@@ -242,10 +249,13 @@ class Mechanism:
             markers: {name: (3,) point from the mass centre, body frame [m]}.
             velocity: (3,) of the mass centre, world [m/s].
             omega: (3,) angular velocity, body frame [rad/s].
+            spin: (3,) angular velocity of the body in its frame, which does not turn with it, as
+                in `add_flexible` [rad/s].
 
         Raises:
             ConfigError: for a name in use, a wrong shape or a number that is not finite.
-            ModelError: if mass or inertia are not those of a real body.
+            ModelError: if mass or inertia are not those of a real body, or a body that spins is
+                not round.
 
         Example:
             >>> mech = rom.Mechanism()
@@ -261,7 +271,7 @@ class Mechanism:
             for key, x in (markers or {}).items()
         }
         part = rigid_part(name, positive("mass", mass), matrix33("inertia", inertia), pose, points)
-        return self._enter(part)
+        return self._enter(part, spin)
 
     def add_flexible(  # noqa: PLR0913  one keyword per property of a body
         self,
@@ -274,6 +284,7 @@ class Mechanism:
         omega: npt.ArrayLike | None = None,
         q: npt.ArrayLike | None = None,
         qd: npt.ArrayLike | None = None,
+        spin: npt.ArrayLike | None = None,
     ) -> Part:
         """Add a flexible body.
 
@@ -288,10 +299,15 @@ class Mechanism:
             q: (r,) elastic coordinates at the start, in the units of the body's shapes; None for
                 undeformed.
             qd: (r,) their rates, in the units of q per second.
+            spin: (3,) angular velocity [rad/s] with which the material of a round body turns
+                through the frame, which does not: shafts that bend under a load rest, whirl and
+                vibrate in it as in space. Something outside keeps that speed. Gyroscopic forces
+                are those of small displacements; films, teeth and rolling bearings know of it.
 
         Raises:
             ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
-            ModelError: if the mass matrix of the body is singular: rigid motions left in it.
+            ModelError: if the mass matrix of the body is singular: rigid motions left in it; or a
+                body that spins is not round.
 
         Example:
             >>> mech = rom.Mechanism()
@@ -306,7 +322,7 @@ class Mechanism:
             finite("qd", np.zeros(r) if qd is None else qd, (r,)),
         )
         pose = start_pose(at, orientation, velocity, omega)
-        return self._enter(flexible_part(name, body, self._moving(body), pose, elastic))
+        return self._enter(flexible_part(name, body, self._moving(body), pose, elastic), spin)
 
     def _moving(self, body: Any) -> Any:
         """The body as it is integrated, one for all parts that are the same body."""
@@ -394,10 +410,14 @@ class Mechanism:
             raise ConfigError(f"no body {name!r}; the mechanism has {offered(self.parts, name)}.")
         return self.parts[name]
 
-    def _enter(self, part: Part) -> Part:
+    def _enter(self, part: Part, spin: npt.ArrayLike | None) -> Part:
         self.check_new(part.name)
         warn_outside(SPEED, float(np.linalg.norm(part.velocity)), f"body {part.name!r}")
+        part = part if spin is None else replace(part, spin=finite("spin", spin, (3,)))
+        turns = spins.spin_of(part) if part.spin.any() else None
         self.parts[part.name] = part
+        if turns is not None:
+            self.add(f"spin of {part.name}", turns, spins.SPINS_FAMILY)
         return part
 
     def check_new(self, name: str) -> None:

@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 import rom
 from cases.paths import ROOT
 from rom.bench import benchmarks, wheel
-from rom.bench.models import planetary_train
+from rom.bench.models import planetary_train, shaft_in_films
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ResourceError
 
@@ -112,6 +112,15 @@ def test_a_planetary_train_is_timed_on_a_motion_that_is_right():
     assert carrier == pytest.approx(sun / 4, rel=1e-2) and pair.teeth == (24, 24)
     speed, ratio = benchmarks.geared(steps=100)
     assert speed.value > 0 and ratio.value > 0
+
+
+def test_a_shaft_in_films_is_timed_on_a_motion_that_is_right():
+    """It is carried: its weight, on both films alike."""
+    mech = shaft_in_films("reynolds")
+    moved = rom.simulate(mech, t_end=0.02, dt=1e-4, method="bdf", progress=False)
+    both = [moved.journal_bearing(f"film {k}").motion[-1] for k in range(2)]
+    assert both[0][:2] == pytest.approx(both[1][:2], abs=1e-9)
+    assert rom.audit(moved).ok
 
 
 @pytest.mark.long

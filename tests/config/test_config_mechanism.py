@@ -154,6 +154,24 @@ def test_every_section_reaches_the_mechanism(folder):
     assert mech.contacts["k"].radius[0] == 0.05 and mech.contacts["k"].law.exponent == 1.5
 
 
+def test_round_bodies_turn_in_their_frames(tmp_path):
+    text = """
+[bodies.top]
+mass = 3.0
+inertia = [0.03, 0.03, 0.05]
+at = [0, 0, 0.1]
+spin = [0, 0, 500]
+markers = { low = [0, 0, -0.1] }
+[simulation]
+t_end = 0.1
+dt = 0.01
+"""
+    (tmp_path / "top.toml").write_text(text)
+    mech = read_mechanism(tmp_path / "top.toml").mechanism()
+    assert_array_equal(mech.parts["top"].spin, [0, 0, 500])
+    assert "spin of top" in mech.elements
+
+
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 def test_a_pulley_that_is_not_on_the_path_is_told(folder):
     (folder / "all.toml").write_text(ALL.replace('pulleys."a.tip"]', 'pulleys."a.tap"]'))

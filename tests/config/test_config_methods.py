@@ -82,6 +82,10 @@ ENTRIES = {  # method: an entry that calls it
     "bushing": f"[bushings.new]\n{ENDS}stiffness = [1, 1, 1]\n",
     "rolling_bearing": '[rolling_bearings.new]\nbetween = ["a.p", "ground.o"]\n'
     'axis = [0, 0, 1]\nballs = 9\nball_diameter = "12.7 mm"\npitch_diameter = "65 mm"\n',
+    "journal_bearing": '[journal_bearings.new]\nbetween = ["a.p", "ground.o"]\n'
+    'axis = [0, 0, 1]\noil = { grade = 46 }\ninlet = 40\n[journal_bearings.new.bearing]\n'
+    'diameter = "100 mm"\nlength = "50 mm"\nclearance = "0.1 mm"\ncells_around = 40\n'
+    'grooves = { top = { angle = "90 deg", width = "20 deg" } }\n',
     "gear_mesh": '[gear_meshes.new]\nbetween = ["a.p", { ground = [0.06, 0, 0] }]\n'
     'axis = [0, 0, 1]\nstiffness = "13 GPa"\n[gear_meshes.new.pair]\nteeth = [30, 30]\n'
     'module = "2 mm"\nwidth = "10 mm"\n',

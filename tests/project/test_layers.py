@@ -203,10 +203,12 @@ ORDER = {
         "inverse_dynamics",
         "law_check",
         "continuation",
+        "periodic",
     ),
     "mbs.elements": (
         "family",
         "pair_motion",
+        "cylinders",
         "springs",
         "rotational_springs",
         "loads",
@@ -225,6 +227,8 @@ ORDER = {
         "tendons",
         "gears",
         "rolling",
+        "films",
+        "round_bodies",
     ),
     "reduction": (
         "bases",

@@ -66,6 +66,20 @@ def test_the_angle_runs_around_the_axis_of_a_bore():
     assert_allclose(np.abs(zeta), np.abs(2 * height.ravel() / 0.3 - 1), atol=1e-9)
 
 
+def test_functions_around_a_known_axis_hold_no_product_twice():
+    """Nodes crowd on one side: their centroid lies beside the axis."""
+    t, height = np.meshgrid(2 * np.pi * np.arange(24) / 24, [0.0, 0.1, 0.2, 0.3])
+    angle = t.ravel() + 0.2 * np.cos(t.ravel())
+    x = TURN @ np.array([0.1 * np.cos(angle), 0.1 * np.sin(angle), height.ravel()])
+    centre = np.array([0.0, 0.0, 0.15])
+    S = diags(np.ones(96)).tocsr()
+    bore = Interface("bore", np.arange(96), x.T, S, TURN @ centre, axis=TURN @ [0.0, 0.0, 1.0])
+    Q = interface_functions(rom.FourierLegendre(3, 2), bore)
+    assert Q.shape == (96, (2 * 3 + 1) * (2 + 1))
+    wave = np.cos(3 * angle) * height.ravel()
+    assert_allclose(Q @ (Q.T @ wave), wave, atol=1e-12)
+
+
 def test_two_bodies_around_one_bore_choose_the_same_functions():
     """Where two directions lie equally far from the axis, round-off must not choose."""
     angle, height = np.meshgrid(2 * np.pi * (np.arange(24) + 0.3) / 24, [0.0, 0.1, 0.2, 0.3])

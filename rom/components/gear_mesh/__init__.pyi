@@ -1,3 +1,4 @@
+from rom.components.gear_mesh.compliance import bending_table as bending_table
 from rom.components.gear_mesh.compliance import contact_compliance as contact_compliance
 from rom.components.gear_mesh.compliance import iso_stiffness as iso_stiffness
 from rom.components.gear_mesh.compliance import pair_stiffness as pair_stiffness
@@ -11,5 +12,7 @@ from rom.components.gear_mesh.tooth_elements import ToothModel as ToothModel
 from rom.components.gear_mesh.tooth_elements import element_table as element_table
 from rom.components.gear_mesh.tooth_elements import tooth_model as tooth_model
 from rom.mbs.elements.gears.corrections import Correction as Correction
+from rom.mbs.elements.gears.corrections import flank_map as flank_map
 from rom.mbs.elements.gears.geometry import GearPair as GearPair
 from rom.mbs.elements.gears.geometry import line_length as line_length
+from rom.mbs.elements.gears.hertz import Hertz as Hertz

@@ -14,6 +14,7 @@ from scipy.integrate import trapezoid
 
 from rom.errors import ModelError
 from rom.mbs.elements.gears.geometry import GearPair, involute
+from rom.mbs.elements.gears.hertz import Hertz
 from rom.model import Array
 
 Body = Literal["weber", "sainsot"]
@@ -167,6 +168,36 @@ def stiffness_table(
     A, B = pair.path
     inside = np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n)
     return np.array([pair_stiffness(pair, s, force=force, E=E, body=body) for s in inside])
+
+
+def bending_table(
+    pair: GearPair, *, n: int = 41, E: float = 206e9, nu: float = 0.3, body: Body = "weber"
+) -> tuple[Array, Hertz]:
+    """Stiffness of one pair without its contact, and the contact, which follows the load.
+
+    For `rom.Mechanism.gear_mesh`, as ``stiffness`` and ``hertz``.
+
+    Args:
+        pair: spur or helical gears.
+        n: places from first to last contact.
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio of the contact; bending has 0.3.
+        body: see `tooth_compliance`.
+
+    Returns:
+        (n,) stiffness per length of contact line [N/m^2], and the contact.
+
+    Raises:
+        ModelError: as `pair_stiffness`.
+    """
+    A, B = pair.path
+    k, depths, teeth = np.zeros(n), np.zeros((n, 2)), normal_section(pair)
+    for at, s in enumerate(np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n)):
+        radii, _ = in_normal_section(pair, s)
+        parts = [tooth_compliance(teeth, g, float(radii[g]), body) for g in (0, 1)]
+        k[at] = E / sum(bending + foundation for bending, foundation, _ in parts)
+        depths[at] = [part[2] for part in parts]
+    return k, Hertz(depths, E, nu)
 
 
 def iso_stiffness(pair: GearPair) -> tuple[float, float, float]:

@@ -89,6 +89,8 @@ class Mesh:
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if self.pair.internal:
             raise ModelError("meshes of internal gears are elements: use Mechanism.gear_mesh.")
+        if self.correction.measured:
+            raise ModelError("maps and run-out are for elements: use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
             raise ModelError(f"stiffness {self.stiffness} of the teeth must be positive [N/m^2].")
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):

@@ -1,5 +1,3 @@
-from rom.components.journal_bearing.bearing import Groove as Groove
-from rom.components.journal_bearing.bearing import JournalBearing as JournalBearing
 from rom.components.journal_bearing.closed_forms import long_force as long_force
 from rom.components.journal_bearing.closed_forms import long_pressure as long_pressure
 from rom.components.journal_bearing.closed_forms import short_attitude as short_attitude
@@ -7,9 +5,7 @@ from rom.components.journal_bearing.closed_forms import short_coefficients as sh
 from rom.components.journal_bearing.closed_forms import short_eccentricity as short_eccentricity
 from rom.components.journal_bearing.closed_forms import short_force as short_force
 from rom.components.journal_bearing.closed_forms import short_sommerfeld as short_sommerfeld
-from rom.components.journal_bearing.oil import Oil as Oil
 from rom.components.journal_bearing.oil import Warm as Warm
-from rom.components.journal_bearing.oil import iso_vg as iso_vg
 from rom.components.journal_bearing.oil import warm_bearing as warm_bearing
 from rom.components.journal_bearing.oil import warm_equilibrium as warm_equilibrium
 from rom.components.journal_bearing.oil_film import Film as Film
@@ -19,3 +15,7 @@ from rom.components.journal_bearing.statics import coefficients as coefficients
 from rom.components.journal_bearing.statics import equilibrium as equilibrium
 from rom.components.journal_bearing.statics import stability as stability
 from rom.components.journal_bearing.statics import threshold_speed as threshold_speed
+from rom.mbs.elements.films.bearing import Groove as Groove
+from rom.mbs.elements.films.bearing import JournalBearing as JournalBearing
+from rom.mbs.elements.films.oil import Oil as Oil
+from rom.mbs.elements.films.oil import iso_vg as iso_vg

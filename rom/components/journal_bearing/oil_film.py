@@ -11,10 +11,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from rom.components.journal_bearing.bearing import LAWS, JournalBearing, four
-from rom.components.journal_bearing.bearing import thickness as gap
-from rom.components.journal_bearing.film_kernel import solve_film
 from rom.errors import ModelError, SolverError
+from rom.mbs.elements.films.bearing import JournalBearing, four
+from rom.mbs.elements.films.bearing import thickness as gap
+from rom.mbs.elements.films.cells import N_MOTIONS, cells_of
+from rom.mbs.elements.films.slopes import solve_film
 from rom.model import Array, Index
 
 
@@ -56,11 +57,13 @@ def film(
             f"microradians); the clearance is {bearing.clearance * 1e6:.3g} micrometres."
         )
     shape = bearing.grid.fixed.shape
-    active = np.ones(shape, dtype=np.int64) if warm is None else warm.copy()
-    P, fill = np.empty(shape), np.empty(shape)
-    pressure = viscosity * speed * (bearing.radius / bearing.clearance) ** 2
-    grid = bearing.grid._replace(inlet=bearing.grid.inlet / pressure)
-    F, dF, n = solve_film(grid, m, v, LAWS[bearing.cavitation], active, P, fill)
+    films = cells_of([bearing])
+    films.state[0, : 2 * N_MOTIONS + 1] = *m, *v, 1.0
+    if warm is not None:
+        films.active[0] = warm.ravel()
+    n = solve_film(films, 0, viscosity * speed)
+    P, fill, active = (x[0].reshape(shape) for x in (films.P, films.fill, films.active))
+    F, dF = films.answer[0, :N_MOTIONS], films.slope[0, :N_MOTIONS, : 2 * N_MOTIONS]
     if n < 0 or not np.isfinite(F).all():
         raise SolverError(
             f"the cavitated region of the film does not settle at {m[:2]} clearances.",

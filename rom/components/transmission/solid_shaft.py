@@ -19,6 +19,7 @@ from rom.body.flexible import FlexibleBody
 from rom.components.transmission.housing import motion_of
 from rom.components.transmission.shaft import Disc
 from rom.errors import ModelError
+from rom.mbs.elements.round_bodies.gyroscopic import directed_mass
 from rom.model import Array
 
 MAX_MODES = 8  # of each kind, next to the static shapes under loads on the seats
@@ -105,7 +106,7 @@ class SolidShaft:
         parts = np.split(np.arange(n), [b, 2 * b, 2 * b + Z.shape[1]])
         for at, V in zip(parts, (X, X, Z, T), strict=True):
             whole_M[np.ix_(at, at)], whole_K[np.ix_(at, at)] = V.T @ M @ V, V.T @ K @ V
-        spin = 2 * X.T @ _axial_mass(self.body) @ X
+        spin = 2 * X.T @ directed_mass(self.body, np.diag([0.0, 0.0, 1.0])) @ X
         G[:b, b : 2 * b], G[b : 2 * b, :b] = spin, -spin
         for disc in self.discs:
             R = self.rows(disc.node)
@@ -165,19 +166,3 @@ def _normalised(M: Array, rigid: Array, elastic: Array, mass: float) -> Array:
     size, V = np.linalg.eigh(elastic.T @ M @ elastic)
     keep = size > DEPENDENT_RTOL
     return np.hstack([found, elastic @ V[:, keep] * np.sqrt(mass / size[keep])])
-
-
-def _axial_mass(body: FlexibleBody) -> Array:
-    """(6 + r, 6 + r) mass of motions along Z."""
-    d, X = body.first_moment, body.Ibar_kl
-    second = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia  # integral of rho x x^T
-    A = np.zeros((6 + body.n_modes, 6 + body.n_modes))
-    rigid = np.array([
-        [body.mass, d[1], -d[0]], [d[1], second[1, 1], -second[0, 1]],
-        [-d[0], -second[0, 1], second[0, 0]],
-    ])  # fmt: skip
-    A[2:5, 2:5] = rigid
-    A[2:5, 6:] = np.stack([body.S[2], X[1, 2], -X[0, 2]])
-    A[6:, 2:5] = A[2:5, 6:].T
-    A[6:, 6:] = body.S_kl[2, 2]
-    return A

@@ -1,6 +1,7 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +25,9 @@ MOST_STEPS = 100_000  # of the load; where thousands do not help, another start 
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
+MAX_HALVINGS = 60  # of a correction that leaves a gap no room
+ROOM_LEFT = 0.5  # of a gap, after one correction
+MIN_ROOM = 1e-4  # of a gap, which no film keeps open
 STALLED_TOL = 1e-7  # below it, corrections that no longer shrink are round-off
 
 
@@ -119,6 +123,8 @@ class _Search:
         """The state to start from, its joints closed."""
         packed, W = self.now.packed, self.now.W
         first = initial_state(packed, self.now.t)
+        if first.base is not None:
+            first = replace(first, base=packed.places.settled(first.base))
         if state is None:
             return self.spins.steady(self.now, replace(first, lam=0 * first.lam))
         if np.size(state.q) != packed.q.size or np.size(state.lam) != first.lam.size:
@@ -142,10 +148,12 @@ class _Search:
         for _ in range(MAX_PASSES):
             equations = beyond or self.tangent(now, state)
             found = None
-            if trials and not equations.rises:
+            # forces that go around, as those of films, have no potential that curves
+            straight = None if now.packed.has_potential else equations.newton
+            if straight is None and trials and not equations.rises:
                 found, trials = self.tried(now, state, equations), trials - 1
             if found is None:
-                size, state = self.corrected(now, state, equations.correction())
+                size, state = self.corrected(now, state, straight or equations.correction())
                 beyond = None
             else:
                 size, state, beyond = found
@@ -164,10 +172,41 @@ class _Search:
         size, factor = sizes(now.packed, step)
         if not np.isfinite(size):
             return size, state
-        state = self.spins.steady(self.now, now.moved(state, factor * step, factor * dlam))
+        factor, state = self.within_room(now, state, (factor * step, factor * dlam), factor)
         if factor < 1.0:
             state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
         return size, state
+
+    def within_room(
+        self, now: Instant, state: State, correction: tuple[Array, Array], factor: float
+    ) -> tuple[float, State]:
+        """The state after a correction, halved until no gap halves or doubles; the share taken.
+
+        Raises:
+            SolverError: naming the element whose gap has closed.
+        """
+        (step, dlam), before, share = correction, self.room(now, state), 1.0
+        for name, room in before.items():
+            if not room > MIN_ROOM:
+                raise SolverError(
+                    f"nothing keeps the gap of {name!r} open: {room:.2g} of it is left.",
+                    hint="Lower the load, or start nearer to the equilibrium (state=...).",
+                )
+        for _ in range(MAX_HALVINGS):
+            ahead = self.spins.steady(self.now, now.moved(state, share * step, share * dlam))
+            left = [room / before[name] for name, room in self.room(now, ahead).items()]
+            if all(ROOM_LEFT < one < 1 / ROOM_LEFT for one in left):
+                break
+            share /= 2
+        return factor * share, ahead
+
+    def room(self, now: Instant, state: State) -> dict[str, float]:
+        """Gaps of elements that a correction may not change much."""
+        if not now.packed.room:
+            return {}
+        with suppress(SolverError):
+            now.residual(state.q, state.v, state.a, state.lam)
+        return now.packed.room
 
     def tried(
         self, now: Instant, state: State, equations: Equations
@@ -198,12 +237,17 @@ class _Search:
                 f"({len(free)} free motions): there is no unique equilibrium.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        if weakest.squares.size and weakest.squares[0] < 0.0 and not self.spins.any:
+        if weakest.squares.size and weakest.squares[0] < 0.0 and self.statics_decide:
             motion = _described(self.now.packed, weakest.motions[:, 0])
             warn(
                 f"the equilibrium is unstable: {motion} and falls away at a rate of "
                 f"{np.sqrt(-weakest.squares[0]):.3g} 1/s."
             )
+
+    @property
+    def statics_decide(self) -> bool:
+        """Whether stiffness alone says what is stable: nothing spins, no film pushes around."""
+        return self.now.packed.has_potential and not self.spins.any
 
     def along_spin(self, motion: Array, state: State) -> bool:
         """Whether a free motion is the steady rotation itself."""

@@ -96,7 +96,10 @@ class Tangent:
         squares = self._principal[0]
         if np.abs(squares).min(initial=np.inf) <= self.none(squares):
             return None
-        return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+        try:
+            return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+        except np.linalg.LinAlgError:  # films that start to fill: forces without a potential
+            return None
 
     @cached_property
     def rises(self) -> bool:
@@ -163,7 +166,8 @@ class Weakest:
 def load_stiffness(now: Instant, state: State) -> float:
     """Gravity over length, and what other loads add; residual first [1/s^2]."""
     packed = now.packed
-    force = np.abs(now.W.wrench[:, :3]).max(initial=0.0) + packed.mass * np.abs(state.a).max()
+    force, moment = (np.abs(x).max(initial=0.0) for x in np.split(now.W.wrench, 2, axis=1))
+    force += moment / packed.length + packed.mass * np.abs(state.a).max()
     force += packed.mass * np.linalg.norm(packed.system.bodies.gravity)
     return float(force / packed.mass / packed.length)
 

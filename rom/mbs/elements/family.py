@@ -92,6 +92,11 @@ def rows_of(values: Any, *shape: int) -> Array:
     return np.array(list(values), dtype=float).reshape(-1, *shape)
 
 
+def no_room(_: Any) -> Array:
+    """(0,) no gap that is of the size of corrections."""
+    return np.zeros(0)
+
+
 def no_answers(_: Table) -> Sequence[Any]:
     """None of the laws is the user's."""
     return ()
@@ -111,6 +116,7 @@ class Places:
         coordinates: markers and row of each joint coordinate that something acts on.
         time: number of the one that tells the time, -1 for none.
         remembered: {owner: (m,) numbers that it remembers, at the start, in their own units}.
+        settling: {owner: (m,) numbers that an equilibrium starts from in their place}.
     """
 
     body: Mapping[str, int]
@@ -122,11 +128,13 @@ class Places:
     coordinates: list[tuple[tuple[Marker, Marker], Row]] = field(default_factory=list)
     time: int = -1
     remembered: dict[str, Array] = field(default_factory=dict)
+    settling: dict[str, Array] = field(default_factory=dict)
 
     def copy(self) -> "Places":
         """The same places, to which more can be added without changing these."""
         kept = {name: list(getattr(self, name)) for name in ("owners", "signals", "coordinates")}
-        return replace(self, **kept, remembered=dict(self.remembered))
+        memory = {"remembered": dict(self.remembered), "settling": dict(self.settling)}
+        return replace(self, **kept, **memory)
 
     def coordinate(self, joint: str, row: Row) -> int:
         """Number of a coordinate of a joint."""
@@ -161,11 +169,42 @@ class Places:
             self.time = len(self.signals) - 1
         return self.time
 
-    def memory(self, owner: str, start: Array) -> int:
-        """First of (m,) numbers that are kept from one instant to the next, in their own units."""
+    def memory(self, owner: str, start: Array, *, settling: Array | None = None) -> int:
+        """First of (m,) numbers that are kept from one instant to the next, in their own units.
+
+        Args:
+            owner: whose.
+            start: (m,) numbers at the start.
+            settling: (m,) what an equilibrium starts from, whatever its state remembers.
+        """
         self.remembered.setdefault(owner, start)
-        before = list(self.remembered).index(owner)
-        return sum(x.size for x in list(self.remembered.values())[:before])
+        if settling is not None:
+            self.settling[owner] = settling
+        return sum(x.size for x in self._until(owner))
+
+    def before(self, base: Array) -> Array:
+        """(n_t, c + p) the same over time, what settles as it was at the instant before.
+
+        Evaluated again with that, it does what it did on the way from there.
+        """
+        base, c = base.copy(), len(self.coordinates)
+        for owner in self.settling:
+            at = c + sum(x.size for x in self._until(owner))
+            mine = slice(at, at + self.remembered[owner].size)
+            base[1:, mine] = base[:-1, mine]
+        return base
+
+    def _until(self, owner: str) -> list[Array]:
+        """What those before an owner remember."""
+        return list(self.remembered.values())[: list(self.remembered).index(owner)]
+
+    def settled(self, base: Array) -> Array:
+        """(c + p,) joint coordinates and memory, the latter as an equilibrium starts from it."""
+        base, c = base.copy(), len(self.coordinates)
+        for owner, numbers in self.settling.items():
+            at = c + sum(x.size for x in self._until(owner))
+            base[at : at + numbers.size] = numbers
+        return base
 
     def packed_coordinates(self) -> Coordinates:
         """The joint coordinates as arrays."""
@@ -194,10 +233,16 @@ class Family:
         couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
             the ground.
         by_rate: table -> whether the forces depend on velocities.
+        complete: whether its tangents have all of their changes with the position, those of rates
+            at given velocities too.
+        potential: whether its forces, dampers aside, follow from a potential; those of films and of
+            what spins go around.
         loaded_rows: table -> constraint rows whose multipliers they depend on.
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
         answers: table -> (e, ...) what each law of a user answered last, None if there is none.
         lost: what is wrong if an answer is not finite; in place of {}, the names.
+        room: table -> (e,) gaps over those in the middle [1], which one correction towards an
+            equilibrium may halve or double at most.
     """
 
     name: str
@@ -211,10 +256,13 @@ class Family:
     outside: Callable[[Any], bool] = from_ground
     couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
     by_rate: Callable[[Any], bool] = always
+    complete: bool = False
+    potential: bool = True
     loaded_rows: Callable[[Any], Index] = no_rows
     asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
     answers: Callable[[Any], Sequence[Any]] = no_answers
     lost: str = "the law of {} gives no finite number"
+    room: Callable[[Any], Array] = no_room
 
     @property
     def kernels(self) -> list[ElementKernel]:

@@ -94,8 +94,24 @@ class Packed:
 
     @property
     def by_rate(self) -> bool:
-        """Whether any force of an element depends on velocities."""
-        return any(family.by_rate(table) for family, table in self.elements.items())
+        """Whether forces depend on rates in a way that the tangents do not know completely."""
+        return any(
+            not family.complete and family.by_rate(table) for family, table in self.elements.items()
+        )
+
+    @property
+    def has_potential(self) -> bool:
+        """Whether forces of elements, dampers aside, follow from a potential."""
+        return all(family.potential for family in self.elements)
+
+    @property
+    def room(self) -> dict[str, float]:
+        """Gaps of elements at the last residual, over those in the middle [1]."""
+        return {
+            name: float(left)
+            for family, table in self.elements.items()
+            for name, left in zip(self.element_names[family], family.room(table), strict=False)
+        }
 
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""

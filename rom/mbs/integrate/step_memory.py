@@ -201,7 +201,7 @@ def measured(
     jerk = (accelerated(record, W, state, forces, probe, at_rest).a - state.a) / probe
     ahead = accelerated(record, W, state, forces, h, jerk)
     # vibrations that the step does not resolve have no Taylor series over it
-    if np.linalg.norm(ahead.a - state.a - h * jerk) > np.linalg.norm(h * jerk):
+    if not np.linalg.norm(ahead.a - state.a - h * jerk) <= np.linalg.norm(h * jerk):
         return state, None
     return state, jerk
 
@@ -209,7 +209,10 @@ def measured(
 def accelerated(
     record: Record, W: Work, state: State, forces: Laws, shift: float, jerk: Array
 ) -> State:
-    """The state with its accelerations, some time later by its Taylor series."""
+    """The state with its accelerations, some time later by its Taylor series.
+
+    What is remembered stays that of the state: it does not get there.
+    """
     system = record.packed.system
     signals_at(record, W, state.t + shift)
     q = np.empty_like(state.q)
@@ -217,4 +220,8 @@ def accelerated(
     later = replace(state, q=q, v=state.v + shift * (state.a + shift * jerk / 2))
     evaluate(system, W, later.q, later.v)
     apply_laws(forces, W, state.t + shift)
-    return with_accelerations(record.packed, W, later)
+    base = W.base.copy()
+    found = with_accelerations(record.packed, W, later)
+    if shift:
+        W.base[:] = base
+    return found

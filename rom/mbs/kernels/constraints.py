@@ -266,6 +266,14 @@ def pair_stiffness(s, W, i, j, S):
                 for x in range(6):
                     total += Q[p, 6 * side + x] * W.H[m, x, q]
                 QH[p, width * side + q] = total
+    spread_pair(s, W, i, j, S)
+
+
+@inner
+def spread_pair(s, W, i, j, S):
+    """Add H^T QH of a pair of markers to S, whose columns are coordinates already."""
+    bodies, markers, QH = s.bodies, s.markers, W.QH
+    width = W.H.shape[2]
     for block in range(4):
         row, column = block // 2, block % 2
         mr, mc = (i if row == 0 else j), (i if column == 0 else j)

@@ -16,6 +16,7 @@ from rom.plausible import GYRATION, SIZE, warn_outside
 GROUND = "ground"
 # smallest over largest eigenvalue of the scaled mass matrix below which a body counts as singular
 SINGULAR_MASS = 1e-11
+SPIN_RTOL = 1e-6  # of an axis, from that about which a body spins
 
 
 SURFACE_PREFIX = "surface point "  # markers that a contact puts on the surface of a flexible body
@@ -50,6 +51,7 @@ class Part:
         flexible: the ``FlexibleBody``, None for a rigid body.
         moving: the same as it is integrated, see `FlexibleBody.on_mean_axes`.
         q, qd: (r,) elastic coordinates and rates at the start, in the units of the body's shapes.
+        spin: (3,) angular velocity of the material through the frame, body frame [rad/s].
     """
 
     name: str
@@ -65,6 +67,7 @@ class Part:
     moving: Any = None
     q: Array = field(default_factory=lambda: np.zeros(0))
     qd: Array = field(default_factory=lambda: np.zeros(0))
+    spin: Array = field(default_factory=lambda: np.zeros(3))
 
     def __repr__(self) -> str:
         kind = f"flexible, {self.r} elastic coordinates" if self.flexible is not None else "rigid"
@@ -124,6 +127,24 @@ class Part:
         if self.flexible is None:
             return self.points[marker.place]
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
+
+    def spin_about(self, name: str, axis: Array) -> float:
+        """Angular velocity of the material through the frame about an axis [rad/s].
+
+        Args:
+            name: of the element that asks.
+            axis: (3,) body frame [1].
+
+        Raises:
+            ConfigError: if the body spins about another axis.
+        """
+        speed = float(axis @ self.spin)
+        if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
+            raise ConfigError(
+                f"body {self.name!r} spins about {self.spin.tolist()} rad/s, and the axis of "
+                f"{name!r} is {axis.round(9).tolist()} in it: both must be one."
+            )
+        return speed
 
     @property
     def own_frame(self) -> Marker | None:

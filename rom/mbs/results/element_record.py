@@ -96,10 +96,11 @@ def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -
     c = -1 if row is None else places.coordinate(element.joint, row)
     n = solution.t.size
     found = ElementTracks(*(np.zeros(x) for x in ((n, rows.size, 6), (n, rows.size, 3), (n, 3))))
-    motion = (solution.q, solution.v, solution.lam, solution.base, signals)
+    base = places.before(solution.base)
+    motion = (solution.q, solution.v, solution.lam, base, signals)
     for k in range(n) if asked else ():
         answered = tuple(x[k : k + 1] for x in motion)
-        evaluate_at(system, W, solution.q[k], solution.v[k], solution.base[k], signals[k])
+        evaluate_at(system, W, solution.q[k], solution.v[k], base[k], signals[k])
         apply_laws(asked, W, float(solution.t[k]))
         track_element(system, W, answered, rows, c, ElementTracks(*(x[k : k + 1] for x in found)))
     if not asked:

@@ -34,7 +34,7 @@ def at_instants(solution: Any) -> Iterator[Work]:
     W, forces = workspace(system, len(packed.signals)), packed.asked
     rows = zip(
         *(solution.t, solution.q, solution.v, solution.a, solution.lam),
-        *(solution.signals, solution.base),
+        *(solution.signals, packed.places.before(solution.base)),
         strict=True,
     )
     for t, q, v, a, lam, signals, base in rows:

@@ -144,22 +144,18 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
 
     On the axis itself the angle is NaN, and harmonics are zero.
 
-    The axis is the principal direction of the area whose moment differs from the two others; for
-    a bore or a journal that is its axis. The angle counts from the ambient axis farthest from it.
+    The axis is that of the geometry where it is known; else the principal direction of the area
+    whose moment differs from the two others, through the centroid. The angle counts from the
+    ambient axis farthest from it.
 
     Raises:
         InterfaceError: if no direction stands out.
     """
-    x = interface.points - _centroid(interface)
-    moments, axes = np.linalg.eigh((interface.surface_mass @ x).T @ x)
-    gaps = np.diff(moments)
-    if gaps.max() < 1e-3 * moments[-1]:
-        raise InterfaceError(
-            f"interface {interface.name!r} has no axis: its area is spread alike in all "
-            "directions.",
-            hint="Use `Polynomial` on it.",
-        )
-    axis = axes[:, 2] if gaps[1] > gaps[0] else axes[:, 0]
+    if interface.axis is None:
+        x = interface.points - _centroid(interface)
+        axis = _principal_axis(interface, x)
+    else:
+        x, axis = interface.points - interface.origin, interface.axis
     size = np.round(np.abs(axis), 6)  # bodies that share the surface must choose alike
     axis = axis * np.sign(axis[np.argmax(size)])
     e = np.eye(3)[np.argmin(size)]
@@ -171,6 +167,19 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
     theta = np.arctan2(across[1], across[0])
     theta[np.hypot(*across) < ON_AXIS * np.ptp(interface.points, axis=0).max()] = np.nan
     return theta, along * 0.0 if flat else along / reach
+
+
+def _principal_axis(interface: Interface, x: Array) -> Array:
+    """(3,) direction of the area of nodes at x (k, 3) from the centroid that stands out."""
+    moments, axes = np.linalg.eigh((interface.surface_mass @ x).T @ x)
+    gaps = np.diff(moments)
+    if gaps.max() < 1e-3 * moments[-1]:
+        raise InterfaceError(
+            f"interface {interface.name!r} has no axis: its area is spread alike in all "
+            "directions.",
+            hint="Use `Polynomial` on it.",
+        )
+    return axes[:, 2] if gaps[1] > gaps[0] else axes[:, 0]
 
 
 def _centroid(interface: Interface) -> Array:

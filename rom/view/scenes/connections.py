@@ -70,6 +70,9 @@ def connections(
         actors += _tendon(places, name, tendon)
     for one in mechanism.rolling_bearings.values():
         actors.append(_circle(places, one.j, one.axes[2], 0.5 * one.bearing.pitch_diameter))
+    for film in mechanism.journal_bearings.values():
+        for marker, axis in zip((film.i, film.j), film.axes[:2], strict=True):
+            actors.append(_circle(places, marker, axis, film.bearing.radius))
     for mesh in mechanism.gear_meshes.values():
         for marker, axis, radius in zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=True):
             actors.append(_circle(places, marker, axis, float(radius)))

@@ -51,6 +51,10 @@ SKIPPED = {
     ("equilibrium", "steps"): {"million"},
     ("spin_up", "n_states"): {"million"},
     ("spin_up", "speed"): {"million"},
+    ("periodic_motion", "steps"): {"million"},
+    ("periodic_motion", "settle"): {"million"},
+    ("periodic_path", "steps"): {"million"},
+    ("periodic_path", "settle"): {"million"},
     ("simulate", "t_end"): {"million", "1e300", "1.5"},
 }
 
@@ -277,6 +281,7 @@ GIVEN = {  # callable -> legal values of its own
     "craig_bampton": {"K": lambda: model().K, "M": lambda: model().M},
     "cyclic_modes": {"sector": ring, "diameter": lambda: 1},
     "continuation": {"span": lambda: (0.0, 1e-3)},
+    "periodic_path": {"build": lambda: spring, "span": lambda: (1.0, 1.1)},
     "equilibrium_sensitivity": {
         "build": lambda: spring,
         "parameters": lambda: {"stiffness": 2.0},
@@ -508,6 +513,10 @@ JOIN_OWN = {
     ("rolling_bearing", "inner"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),
     ("rolling_bearing", "outer"): lambda mech: mech.ground.marker((0, 0, -0.5)),
     ("rolling_bearing", "bearing"): lambda mech: rom.mbs.BallBearing(9, 0.0127, 0.065),
+    ("journal_bearing", "journal"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),
+    ("journal_bearing", "bush"): lambda mech: mech.ground.marker((0, 0, -0.5)),
+    ("journal_bearing", "bearing"): lambda mech: rom.mbs.JournalBearing(0.1, 0.05, 1e-4),
+    ("journal_bearing", "oil"): lambda mech: 0.03,
     ("tendon", "path"): lambda mech: [mech.ground.marker((0, 0, k)) for k in range(2)],
     ("tendon", "EA"): lambda mech: 1.0,
 }

@@ -14,11 +14,12 @@ MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 LONG_DEMOS = {
     "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
     "demo_compressor_blade", "demo_exchange", "demo_hand", "demo_large_mesh", "demo_lost_tip",
-    "demo_masonry", "demo_mistuning", "demo_parameters", "demo_pendulum_chain",
+    "demo_masonry", "demo_mistuning", "demo_oil_inlet", "demo_parameters", "demo_pendulum_chain",
     "demo_planetary",
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
     "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_snap_through",
-    "demo_spin_up", "demo_transmission", "demo_updating", "demo_whole_turbine", "demo_wind_turbine",
+    "demo_spin_up", "demo_transmission", "demo_two_stage", "demo_updating", "demo_whole_turbine",
+    "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
@@ -37,6 +38,7 @@ LEFT_BEHIND = {
     "demo_lost_tip": {"lost_tip.png"},
     "demo_masonry": {"masonry.gif", "masonry.png"},
     "demo_mistuning": {"mistuning.png"},
+    "demo_oil_inlet": {"oil_inlet.gif", "oil_inlet.png", "oil_inlet_static.png"},
     "demo_parameters": {"parameters.png"},
     "demo_reference_conditions": {
         "reference_conditions.png", "reference_resonance.png", "reference_statics.png",
@@ -65,6 +67,7 @@ LEFT_BEHIND = {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
     },
     "demo_transmission": {"transmission.png", "transmission_fields.png"},
+    "demo_two_stage": {"two_stage.png"},
 }  # fmt: skip
 
 

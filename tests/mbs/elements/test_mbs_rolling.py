@@ -184,6 +184,25 @@ def test_balls_that_pass_below_the_load_shake_the_shaft_with_their_frequency():
     assert np.ptp(x) == pytest.approx(abs(depths[0] - depths[1]), rel=0.3)
 
 
+def test_balls_pass_alike_under_a_shaft_that_spins_in_its_frame():
+    """Also the energy is booked: what keeps it spinning does the work of the passing balls."""
+    found = []
+    for way in ("omega", "spin"):
+        mech = rom.Mechanism(gravity=(0, 0, 0))
+        shaft = mech.add_rigid("shaft", mass=2.0, inertia=(0.01, 0.01, 0.008), at=ORIGIN,
+                               **{way: (0, 0, 150.0)}).marker(ORIGIN)  # fmt: skip
+        mech.rolling_bearing("bearing", shaft, mech.ground.marker(ORIGIN), axis=Z, bearing=BALLS,
+                             damping=2.0)  # fmt: skip
+        mech.bushing("mount", mech.ground.marker(ORIGIN), shaft, damping=(2e3, 2e3, 2e3, 20, 20, 0),
+                     stiffness=(1e3, 1e3, 1e6, 1e3, 1e3, 0))  # fmt: skip
+        mech.force("load", shaft, (-3000.0, 0, 0))
+        sol = rom.simulate(mech, t_end=0.02, dt=1e-5, save_every=10)
+        found.append(sol.position("shaft"))
+        assert rom.audit(sol).ok, rom.audit(sol)
+    assert np.ptp(found[0][100:], axis=0).max() > 1e-7
+    assert_allclose(found[1], found[0], atol=1e-10)
+
+
 def statics(load, phase):
     """Radial displacement under a load towards angle 0, ball by ball."""
     angles = phase + 2 * np.pi * np.arange(9) / 9

@@ -133,6 +133,8 @@ ROD = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0, "iner
 LAW = rom.mbs.Impact(stiffness=1e5)
 WHEELS = {"pair": GearPair((50, 50), 0.02, 0.01), "axis": (0, 0, 1), "stiffness": 1.0}
 BALLS = {"axis": (0, 0, 1), "bearing": rom.mbs.BallBearing(9, 0.0127, 0.065)}
+FILM = {"axis": (0, 0, 1), "bearing": rom.mbs.JournalBearing(0.1, 0.05, 1e-4), "oil": 0.03}
+WHEEL = {"mass": 1.0, "inertia": (1, 1, 1), "at": (0, 0, 0), "spin": (0, 0, 1)}
 ELEMENTS = {  # family -> what asks for it
     "springs": lambda m, a, b: m.spring_damper("e", a, b, stiffness=1.0),
     "turns": lambda m, a, b: m.rotational_spring("e", hinge(m, b), stiffness=1.0),
@@ -148,6 +150,8 @@ ELEMENTS = {  # family -> what asks for it
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
     "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
     "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),
+    "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
+    "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
 

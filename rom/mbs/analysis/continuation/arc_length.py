@@ -72,10 +72,12 @@ class Curve:
     Attributes:
         problem: its equations.
         unit: change of the parameter that counts like a change of size one of the solution.
+        tol: size of a correction that no longer matters.
     """
 
     problem: Problem
     unit: float
+    tol: float = CORRECTION_TOL
 
     def length(self, step: Array, rate: float) -> float:
         """Arc length of a change of solution and parameter."""
@@ -113,7 +115,7 @@ class Curve:
             if not away < MAX_DEVIATION_RATIO * abs(h):
                 break
             at, p = self.problem.moved(at, step, p + dp), p + dp
-            if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
+            if size < self.tol or (size < STALLED_TOL and size > 0.5 * last):
                 found = self.point(at, p, slope, (point.step, point.rate))
                 return Point(at, p, found.step, found.rate, k + 1)
             last = size

@@ -1,12 +1,21 @@
-"""Corrections and errors of tooth flanks."""
+"""Corrections, errors and measured shapes of tooth flanks."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+
+from rom.errors import ModelError
+from rom.model import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Correction:
     """What is taken off the flanks of a pair.
+
+    Tooth 0 of both wheels are those that touch along line 0, which begins at the tangent point of
+    the pinion when it has turned by no phase; teeth count against the sense in which it drives.
 
     Attributes:
         relief: (2,) depth at the tips of pinion and gear [m].
@@ -15,6 +24,13 @@ class Correction:
         crowning: at both ends of the face [m].
         slope: of the lead, gap at z = +width/2 less gap at -width/2 [m].
         pitch: errors of the teeth of pinion and gear [m]; positive leaves a gap.
+        maps: of the working flanks of pinion and gear, (n_profile, n_lead) for all teeth or (teeth,
+            n_profile, n_lead): material that is missing along the normal [m], at places even in
+            roll length from where flanks begin to touch to their tips, and from z = -width/2 to
+            +width/2. Between them it is bilinear; None for a perfect flank.
+        back_maps: those of the back flanks.
+        run_out: (amount [m], direction [rad]) by which the teeth of pinion and gear stand off the
+            axis, from where the wheels mesh at the start, in the sense of the axis.
     """
 
     relief: tuple[float, float] = (0.0, 0.0)
@@ -23,3 +39,66 @@ class Correction:
     crowning: float = 0.0
     slope: float = 0.0
     pitch: tuple[Any, Any] = ((), ())
+    maps: tuple[Any, Any] = (None, None)
+    back_maps: tuple[Any, Any] = (None, None)
+    run_out: tuple[Any, Any] = ((0.0, 0.0), (0.0, 0.0))
+
+    @property
+    def measured(self) -> bool:
+        """Whether there are maps or run-out."""
+        given = any(m is not None for m in (*self.maps, *self.back_maps))
+        return given or any(float(amount) != 0.0 for amount, _ in self.run_out)
+
+
+def flank_map(path: str | Path) -> Array:
+    """(teeth, n_profile, n_lead) map of flanks from a file of numbers with commas [m].
+
+    A line has the places along the lead at one place of the profile, from the root to the tip;
+    empty lines are between teeth. A file without them is one map for all teeth.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        ModelError: for what is no number, and teeth that are not of one size.
+    """
+    text = Path(path).read_text(encoding="utf-8").strip()
+    blocks = [block for block in text.replace("\r", "").split("\n\n") if block.strip()]
+    try:
+        found = [[[float(x) for x in line.split(",")] for line in block.strip().split("\n")]
+                 for block in blocks]  # fmt: skip
+        return np.array(found, dtype=float)
+    except ValueError as error:
+        raise ModelError(
+            f"{path} is no map of flanks: {error}.",
+            hint="A line has the numbers of one place of the profile, with commas; all teeth, "
+            "with empty lines between them, have as many.",
+        ) from error
+
+
+def checked_map(given: Any, teeth: int, what: str) -> Array:
+    """(teeth or 1, n_profile, n_lead) map, empty for none [m].
+
+    Args:
+        given: what the user gave.
+        teeth: of the wheel.
+        what: to name in messages.
+
+    Raises:
+        ModelError: for another shape, and numbers that are none.
+    """
+    if given is None:
+        return np.zeros((0, 0, 0))
+    found = np.asarray(given, dtype=float)
+    found = found[None] if found.ndim == 2 else found
+    if found.ndim != 3 or not found.size or found.shape[0] not in (1, abs(teeth)):
+        raise ModelError(
+            f"{what} has shape {np.shape(given)}: it is (n_profile, n_lead) or ({abs(teeth)}, "
+            "n_profile, n_lead)."
+        )
+    if not np.isfinite(found).all():
+        raise ModelError(
+            f"{what} has {int((~np.isfinite(found)).sum())} values that are no finite numbers.",
+            hint="Fill places that were not measured from their neighbours.",
+        )
+    return found

@@ -38,6 +38,8 @@ class GearPair:
         thinning: transverse backlash from thinner teeth, along the line of action [m].
         addendum, dedendum, fillet: height of the teeth above and below the reference circle, and
             radius at their roots, in modules [1].
+        gear_helix: that of the gear, to check: of the other hand outside, of the same inside a
+            ring; None for the one that fits [rad].
 
     Raises:
         ModelError: if no such gears mesh.
@@ -54,6 +56,7 @@ class GearPair:
     addendum: float = 1.0
     dedendum: float = 1.25
     fillet: float = 0.4
+    gear_helix: float | None = None
 
     def __post_init__(self) -> None:
         if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
@@ -64,6 +67,14 @@ class GearPair:
             raise ModelError(
                 f"helix {self.helix} and pressure angle {self.pressure_angle} are in radians; "
                 "usual are up to 0.6 and 0.35."
+            )
+        fits = self.helix if self.internal else -self.helix
+        if self.gear_helix is not None and not abs(self.gear_helix - fits) < 1e-9:
+            raise ModelError(
+                f"a gear of helix {np.degrees(self.gear_helix):.4g} degrees does not mesh with a "
+                f"pinion of {np.degrees(self.helix):.4g} degrees.",
+                hint="Outside, hands are opposite; in a ring gear they are the same. The gear here "
+                f"needs {np.degrees(fits):.4g} degrees.",
             )
         if self.teeth[0] < 0 or (self.internal and sum(self.teeth) >= 0):
             raise ModelError(
@@ -95,12 +106,24 @@ class GearPair:
                 f"mm the teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
                 hint=f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash.",
             )
+        self._check_contact()
+
+    def _check_contact(self) -> None:
+        """Refuse tips that reach below the involutes, and pairs that part before the next touch."""
         beyond = not self.internal and self.path[1] > self.tangents
-        if self.path[0] < 0 or beyond or self.contact_ratio < 1:
+        if self.path[0] < 0 or beyond:
+            tip, flank = ("gear", "pinion") if self.path[0] < 0 else ("pinion", "gear")
+            raise ModelError(
+                f"the teeth interfere: tips of the {tip} reach below the base circle of the "
+                f"{flank}; they would touch from {self.path[0] * 1e3:.3f} to "
+                f"{self.path[1] * 1e3:.3f} mm on a base tangent of {self.tangents * 1e3:.3f} mm.",
+                hint=f"Lower the addendum of the {tip}, or take more teeth for the {flank}.",
+            )
+        if self.contact_ratio < 1:
             raise ModelError(
                 f"contact is lost: a transverse contact ratio of {self.contact_ratio:.3f}, from "
-                f"{self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm on a base tangent of "
-                f"{self.tangents * 1e3:.3f} mm.",
+                f"{self.path[0] * 1e3:.3f} to {self.path[1] * 1e3:.3f} mm at a base pitch of "
+                f"{self.base_pitch * 1e3:.3f} mm.",
                 hint="Lower the centre distance or the profile shift, or take more teeth.",
             )
 

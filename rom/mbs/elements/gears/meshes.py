@@ -9,11 +9,14 @@ import numpy.typing as npt
 
 from rom.arguments import finite, number, positive
 from rom.errors import ConfigError
+from rom.mbs.elements.cylinders import Cylinder, cylinder_of, pack_cylinders
 from rom.mbs.elements.family import Family, Places, integers, rows_of
-from rom.mbs.elements.gears.corrections import Correction
+from rom.mbs.elements.gears.corrections import Correction, checked_map
 from rom.mbs.elements.gears.geometry import GearPair
-from rom.mbs.elements.gears.teeth import Meshes, mesh_energy, mesh_tangents, mesh_wrenches
-from rom.mbs.parts.bodies import Marker
+from rom.mbs.elements.gears.hertz import Hertz
+from rom.mbs.elements.gears.table import COORDINATES, DAMPING, PITCH, SLICE_COLUMNS, SPEED, Meshes
+from rom.mbs.elements.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
+from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
 from rom.plausible import FRICTION, warn_outside
@@ -21,8 +24,12 @@ from rom.rotation import matrix
 
 DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
 FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
+SPIN_RATIO_RTOL = 1e-6  # by which the speeds of spinning wheels may miss the ratio of the teeth
 MAX_CELLS = 1000
+MAX_APPROACH = 0.1  # of the base pitch: a hundred times the deflection of loaded teeth
 MAX_ENTRY = 0.5  # of the base pitch
+MAX_RUN_OUT = 0.1  # of the module: by which an involute is what it is to first order
+NO_ERRORS = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +48,9 @@ class GearMesh:
     offset: float
     phase: float
     entry: float
+    rims: tuple[tuple[Cylinder, float] | None, ...]
+    hertz: Hertz | None = None
+    spins: tuple[float, float] = (0.0, 0.0)
 
 
 def gear_mesh(  # noqa: PLR0913  one keyword per property
@@ -59,6 +69,9 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     cells: int = 21,
     phase: float = 0.0,
     entry: float = 0.02,
+    conservative: bool | None = None,
+    hertz: Hertz | None = None,
+    coupling: float = 0.0,
 ) -> None:
     """Involute teeth of two wheels in contact, on both flanks, with backlash and loss of contact.
 
@@ -85,10 +98,21 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
             point of its base circle [rad].
         entry: share of the base pitch over which a pair of teeth takes up its load as it comes, and
             gives it off as it goes; with 0 at once, which implicit steps do not like [1].
+        conservative: whether forces are the gradient of the energy also where lines move along
+            the path and over the face: relieved flanks press along their own normal, and what
+            lines bring and take as they come and go is work of the wheels. Else they follow the
+            normal of the involutes, and the balance of energy lacks that work. None for yes, unless
+            spur teeth take up their load at once, which is a jump of energy.
+        hertz: `rom.components.gear_mesh.Hertz`, contact that gives way by its load; then
+            `stiffness` is that of the teeth without it, see
+            `rom.components.gear_mesh.bending_table`.
+        coupling: length over which slices of a line carry each other, by a foundation after
+            Pasternak that shears [m].
 
     Raises:
         ConfigError: for a name in use, unknown markers, wheels that do not stand as the pair says,
             or numbers no mesh has.
+        ModelError: for maps and contact that the wheels cannot have.
     """
     if not all(float(z).is_integer() for z in pair.teeth):
         raise ConfigError(f"the wheels of mesh {name!r} have {pair.teeth} teeth: whole numbers.")
@@ -104,19 +128,73 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
     turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
     axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], -c @ turned[1]])
-    numbers = _law(name, damping, friction, transition_speed)
     if not 1 <= cells <= MAX_CELLS:
         raise ConfigError(f"cells = {cells} of mesh {name!r}: it has from 1 to {MAX_CELLS}.")
-    if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
-        raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
+    follows = _follows_energy(name, pair, entry, conservative)
+    numbers = (
+        *_law(name, damping, friction, transition_speed), follows,
+        _coupling(name, coupling, pair), hertz.compliance if hertz else 0.0,
+    )  # fmt: skip
     stiffness = _stiffness(name, stiffness)
     flanks = Correction() if correction is None else correction
     _check_correction(name, pair, flanks)
+    if hertz:
+        hertz.constants(pair)
+    parts = self.part(wheel_a.body), self.part(wheel_b.body)
     mesh = GearMesh(
         wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
         float(D @ z), number("phase", phase), entry * pair.base_pitch,
+        _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
     )  # fmt: skip
     self.add(name, mesh, GEAR_MESHES_FAMILY)
+
+
+def _rims(
+    parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
+) -> tuple[tuple[Cylinder, float] | None, ...]:
+    """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
+    found = []
+    for side in range(2):
+        rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
+        found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
+    return tuple(found)
+
+
+def _spins(name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair) -> tuple[float, float]:
+    """Of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]."""
+    one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
+    z, w = pair.teeth
+    if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
+        raise ConfigError(
+            f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
+            f"teeth {z} and {w} turn at {one:.9g} and {-one * z / w:.9g}."
+        )
+    return one, two
+
+
+def _follows_energy(name: str, pair: GearPair, entry: Any, conservative: bool | None) -> float:
+    """1 for forces that follow the energy along the path, 0 for those along involutes."""
+    if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
+        raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
+    jumps = entry == 0.0 and pair.helix == 0.0
+    if conservative and jumps:
+        raise ConfigError(
+            f"the energy of mesh {name!r} would jump: its lines come with their whole width at "
+            "once, for entry = 0.",
+            hint="Let teeth take up their load over an entry of 0.02, or give conservative=False.",
+        )
+    return float(not jumps if conservative is None else conservative)
+
+
+def _coupling(name: str, length: Any, pair: GearPair) -> float:
+    """Length over which slices carry each other [m]."""
+    if not 0.0 <= number("coupling", length) <= pair.width:
+        raise ConfigError(
+            f"coupling = {length:g} m of mesh {name!r} is a length from 0 to the width, "
+            f"{pair.width:g} m.",
+            hint="Teeth carry their neighbours over about a module.",
+        )
+    return float(length)
 
 
 def _check_place(name: str, pair: GearPair, D: Array, z: Array) -> None:
@@ -162,36 +240,81 @@ def _stiffness(name: str, given: Any) -> Array:
 
 
 def _check_correction(name: str, pair: GearPair, correction: Correction) -> None:
-    """Refuse pitch errors of another number of teeth."""
+    """Refuse errors and maps of other wheels."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
         if len(errors) not in (0, abs(z)):
             raise ConfigError(
                 f"{len(errors)} pitch errors of {name!r} for {z} teeth: one per tooth."
             )
+        if not np.isfinite(np.asarray(errors, dtype=float)).all():
+            raise ConfigError(f"pitch errors of {name!r} are not all finite numbers.")
+    for amount, direction in correction.run_out:
+        ends = finite("run_out", (amount, direction), (2,))
+        if not abs(ends[0]) <= MAX_RUN_OUT * pair.module:
+            raise ConfigError(
+                f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules.",
+                hint="Flanks with so much are no involutes about their axis: move the marker.",
+            )
+    _maps(pair, correction, name)
+
+
+def _maps(pair: GearPair, correction: Correction, name: str) -> list[Array]:
+    """Maps of the working flanks of pinion and gear, and of their back flanks."""
+    kinds = ("working", correction.maps), ("back", correction.back_maps)
+    return [
+        checked_map(given, z, f"the map of the {kind} flanks of the {wheel} of {name!r}")
+        for kind, both in kinds
+        for given, z, wheel in zip(both, pair.teeth, ("pinion", "gear"), strict=True)
+    ]
 
 
 def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
     """The meshes as arrays."""
     found = list(meshes.values())
-    tables = [mesh.stiffness for mesh in found]
-    pitches = [_from_lowest(errors) for mesh in found for errors in mesh.correction.pitch]
+    maps = [m for name, mesh in meshes.items() for m in _maps(mesh.pair, mesh.correction, name)]
+    markers = ([places.marker[getattr(mesh, side)] for mesh in found] for side in "ij")
     return Meshes(
-        integers(places.marker[mesh.i] for mesh in found),
-        integers(places.marker[mesh.j] for mesh in found),
+        *map(integers, markers),
         rows_of((mesh.axes.ravel() for mesh in found), 12),
         rows_of((_sizes(mesh) for mesh in found), 13),
-        rows_of((_flanks(mesh.correction) for mesh in found), 7),
-        rows_of((mesh.numbers for mesh in found), 3),
+        rows_of((_flanks(mesh, maps[4 * k : 4 * k + 4]) for k, mesh in enumerate(found)), 13),
+        rows_of((mesh.numbers for mesh in found), 6),
+        rows_of((mesh.spins for mesh in found), 2),
+        integers([places.clock()]),
         integers(mesh.cells for mesh in found),
-        np.cumsum([0, *(table.size for table in tables)]),
-        np.concatenate(tables),
-        np.cumsum([0, *(errors.size for errors in pitches)]),
-        np.concatenate(pitches),
+        *_joined([mesh.stiffness for mesh in found]),
+        *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NO_ERRORS for mesh in found]),
+        *_joined([_from_lowest(errors) for mesh in found for errors in mesh.correction.pitch]),
+        *_joined([m.ravel() for m in maps]),
+        np.array([m.shape for m in maps], dtype=np.int64).reshape(-1, 3),
         integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
         rows_of((mesh.start for mesh in found), 2),
         np.zeros(len(found)),
+        np.zeros(len(found)),
+        np.zeros((len(found), max(map(_most_slices, found)), 5)),
+        np.zeros(len(found)),
+        pack_cylinders([mesh.rims for mesh in found], places.R),
+        np.zeros(2),
+        np.zeros((max(mesh.cells for mesh in found), SLICE_COLUMNS)),
+        *np.zeros((2, COORDINATES)),
+        np.zeros((2, COORDINATES, COORDINATES)),
+        np.zeros((COORDINATES, 12)),
+        np.zeros((2, 12)),
         np.zeros((2, 12, 12)),
     )
+
+
+def _joined(rows: list[Array]) -> tuple[Array, Array]:
+    """Where each row begins, and all of them."""
+    return np.cumsum([0, *(row.size for row in rows)]), np.concatenate([NO_ERRORS, *rows])
+
+
+def _most_slices(mesh: GearMesh) -> int:
+    """As many as can bear at once on both flanks, of wheels a little closer than they are cut."""
+    pair = mesh.pair
+    along = 1.5 * (pair.path[1] - pair.path[0]) + mesh.entry
+    lines = (along + pair.width * np.tan(abs(pair.base_helix))) / pair.base_pitch + 3
+    return 2 * mesh.cells * int(np.ceil(lines))
 
 
 def _from_lowest(errors: Any) -> Array:
@@ -208,13 +331,27 @@ def _sizes(mesh: GearMesh) -> list[float]:
     ]  # fmt: skip
 
 
-def _flanks(correction: Correction) -> list[float]:
-    c = correction
-    return [*c.relief, *c.extent, c.power, c.crowning, c.slope]
+def _flanks(mesh: GearMesh, maps: list[Array]) -> list[float]:
+    """Corrections, eccentricities and the least gaps of working and back flanks."""
+    c, pair, lead = mesh.correction, mesh.pair, np.cos(mesh.pair.base_helix)
+    amounts, towards = zip(*((float(e), float(angle)) for e, angle in c.run_out), strict=True)
+    if pair.internal:  # wheels mesh on one side of both centres
+        towards = (towards[0], towards[1] + np.pi)
+    off = lead * float(np.abs(amounts).sum())
+    least = [sum(float(m.min(initial=0.0)) for m in two) - off for two in (maps[:2], maps[2:])]
+    least[0] += sum(min(x, 0.0) for x in (*c.relief, c.crowning))
+    least[1] += lead * pair.backlash
+    return [*c.relief, *c.extent, c.power, c.crowning, c.slope, *amounts, *towards, *least]
+
+
+def _room(meshes: Meshes) -> Array:
+    """(k,) share of the depth that is left which no teeth reach, and a correction must not."""
+    room: Array = 1.0 - meshes.approach / (MAX_APPROACH * meshes.size[:, PITCH])
+    return room
 
 
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
-    by_rate=lambda meshes: meshes.law[:, :2].any(), answers=lambda meshes: meshes.load,
-    lost="the wheels of {} are so close that they have no common tangent",
+    by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
+    lost="the wheels of {} are so close that they have no common tangent", room=_room,
 )  # fmt: skip

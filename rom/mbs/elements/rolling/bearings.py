@@ -27,7 +27,7 @@ PLACE_RTOL = 1e-2  # of the pitch diameter: by which rings may be apart at first
 
 @dataclass(frozen=True, slots=True)
 class RollingBearing:
-    """A bearing between two rings; axes (4, 3) and race (9,) as in `Bearings`."""
+    """A bearing between two rings; axes (4, 3) and race (10,) as in `Bearings`."""
 
     i: Marker
     j: Marker
@@ -85,9 +85,11 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     e /= np.linalg.norm(e)
     turned = [matrix(self.part(ring.body).p) for ring in (inner, outer)]
     axes = np.array([x @ A for A in turned for x in (z, e)])
-    b = bearing
+    b, parts = bearing, (self.part(inner.body), self.part(outer.body))
+    spins = [part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts)]
+    spin = spins[1] + b.cage * (spins[0] - spins[1])
     race = (b.stiffness, b.exponent, b.curvature_distance, *b.offset, b.radius, b.cage,
-            float(damping), number("phase", phase))  # fmt: skip
+            float(damping), number("phase", phase), spin)  # fmt: skip
     self.add(name, RollingBearing(inner, outer, bearing, axes, race), ROLLING_BEARINGS_FAMILY)
 
 
@@ -99,7 +101,8 @@ def pack(bearings: Mapping[str, RollingBearing], places: Places) -> Bearings:
         integers(places.marker[one.j] for one in found),
         rows_of((one.axes.ravel() for one in found), 12),
         integers(one.bearing.count for one in found),
-        rows_of((one.race for one in found), 9),
+        rows_of((one.race for one in found), 10),
+        integers([places.clock()]),
         integers(places.memory(name, np.zeros(1)) for name in bearings),
         np.zeros(len(found)),
         np.zeros((2, 12)),

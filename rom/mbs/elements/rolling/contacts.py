@@ -21,7 +21,7 @@ from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Scratch1, Scratch2, Scratch3, Table, table
 
 # columns of Bearings.race
-STIFFNESS, EXPONENT, CURVATURE, RADIAL, AXIAL, RADIUS, CAGE, DAMPING, PHASE = range(9)
+STIFFNESS, EXPONENT, CURVATURE, RADIAL, AXIAL, RADIUS, CAGE, DAMPING, PHASE, SPIN = range(10)
 
 
 @table
@@ -33,9 +33,11 @@ class Bearings(Table):
         axes: (k, 12) axis of the inner ring, a direction across it, the same of the outer one, in
             the axes of their markers.
         count: (k,) balls or rollers.
-        race: (k, 9) stiffness [N/m^n], exponent n, distance of the centres of the grooves [m], 0 of
-            rollers, its radial and axial part in the middle of the play [m], radius of the inner
-            centres [m], share of the cage, damping [s/m], angle of the first ball [rad].
+        race: (k, 10) stiffness [N/m^n], exponent n, distance of the centres of the grooves [m], 0
+            of rollers, its radial and axial part in the middle of the play [m], radius of the inner
+            centres [m], share of the cage, damping [s/m], angle of the first ball [rad], speed at
+            which rings that spin in their frames turn the cage [rad/s].
+        clock: (1,) function that tells the time.
         remembered: (k,) angle that is followed.
         load: (k,) sum of all normal forces at the last residual [N].
         gradient: (2, 12) of the depth of one ball along its normal, and across it.
@@ -47,6 +49,7 @@ class Bearings(Table):
     axes: Array2
     count: Index1
     race: Array2
+    clock: Index1
     remembered: Index1
     load: Scratch1
     gradient: Scratch2
@@ -64,12 +67,17 @@ def ring_frame(s, W, bearings, k):
     axis = scale(1.0 / (x * x + y * y), cross(f, sub(scale(x, t), scale(y, e))))
     angle = followed_angle(s, W, bearings.remembered[k], math.atan2(y, x))
     share = bearings.race[k, CAGE]
-    return (z, e, t), n, bearings.race[k, PHASE] + share * angle, scale(share, axis)
+    cage = bearings.race[k, PHASE] + share * angle
+    cage += bearings.race[k, SPIN] * W.signal[bearings.clock[0], 0]
+    return (z, e, t), n, cage, scale(share, axis)
 
 
 @inner
 def ball_depth(W, bearings, k, ball, frame):
-    """Depth of a ball, and the distance of the centres of its grooves; sets bearings.gradient."""
+    """Depth of a ball, the distance of the centres of its grooves, and the rate by their spin.
+
+    Sets bearings.gradient.
+    """
     (z, e, t), n, cage, axis = frame
     race = bearings.race[k]
     angle = cage + 2.0 * math.pi * ball / bearings.count[k]
@@ -83,6 +91,7 @@ def ball_depth(W, bearings, k, ball, frame):
         depth = distance - race[CURVATURE]
     else:
         distance, cosine, sine, depth = 1.0, 1.0, 0.0, r
+    passing = race[SPIN] * (cosine * dot(D, tau) - sine * R * dot(n, tau))
     for kind in range(2):
         c, q = (cosine, sine) if kind == 0 else (-sine, cosine)
         force = add(scale(c, u), scale(q, z))
@@ -93,13 +102,13 @@ def ball_depth(W, bearings, k, ball, frame):
         for p in range(3):
             bearings.gradient[kind, p], bearings.gradient[kind, 3 + p] = force[p], one[p]
             bearings.gradient[kind, 6 + p], bearings.gradient[kind, 9 + p] = -force[p], two[p]
-    return depth, distance
+    return depth, distance, passing
 
 
 @inner
-def ball_force(W, bearings, k, depth):
+def ball_force(W, bearings, k, depth, passing):
     """Rate of the depth and force of a ball, its elastic part, derivatives by depth and rate."""
-    race, i, j, rate = bearings.race[k], bearings.i[k], bearings.j[k], 0.0
+    race, i, j, rate = bearings.race[k], bearings.i[k], bearings.j[k], passing
     for p in range(6):
         rate += bearings.gradient[0, p] * W.V[i, p] + bearings.gradient[0, 6 + p] * W.V[j, p]
     elastic = race[STIFFNESS] * depth ** race[EXPONENT]
@@ -115,11 +124,12 @@ def bearing_wrenches(s, W, bearings, _q, _v, _lam):
         bearings.load[k] = 0.0
         frame = ring_frame(s, W, bearings, k)
         for ball in range(bearings.count[k]):
-            depth, _ = ball_depth(W, bearings, k, ball, frame)
+            depth, _, passing = ball_depth(W, bearings, k, ball, frame)
             if not depth > 0.0:
                 continue
-            rate, force, elastic, _, _ = ball_force(W, bearings, k, depth)
+            rate, force, elastic, _, _ = ball_force(W, bearings, k, depth, passing)
             bearings.load[k] += force
+            W.power[1] += force * passing  # of what keeps the rings spinning
             W.power[2] += (force - elastic) * rate
             for p in range(6):
                 W.wrench[bearings.i[k], p] -= force * bearings.gradient[0, p]
@@ -137,16 +147,17 @@ def bearing_tangents(s, W, bearings, _lam, ck, cc):
         clear_tangent(bearings.tangent)
         frame = ring_frame(s, W, bearings, k)
         for ball in range(bearings.count[k]):
-            depth, distance = ball_depth(W, bearings, k, ball, frame)
-            if depth > 0.0:
-                add_ball_tangents(W, bearings, k, depth, distance)
+            place = ball_depth(W, bearings, k, ball, frame)
+            if place[0] > 0.0:
+                add_ball_tangents(W, bearings, k, place)
         place_tangent(s, W, (bearings.i[k], bearings.j[k]), bearings.tangent, ck, cc)
 
 
 @inner
-def add_ball_tangents(W, bearings, k, depth, distance):
+def add_ball_tangents(W, bearings, k, place):
     """Add those of the ball at hand to bearings.tangent."""
-    _, force, _, by_depth, by_rate = ball_force(W, bearings, k, depth)
+    depth, distance, passing = place
+    _, force, _, by_depth, by_rate = ball_force(W, bearings, k, depth, passing)
     bend = force / distance if bearings.race[k, CURVATURE] > 0.0 else 0.0
     g = bearings.gradient
     for p in range(12):
@@ -163,7 +174,7 @@ def bearing_energy(s, W, bearings, _q, _v):
     for k in range(bearings.i.size):
         frame, n = ring_frame(s, W, bearings, k), bearings.race[k, EXPONENT]
         for ball in range(bearings.count[k]):
-            depth, _ = ball_depth(W, bearings, k, ball, frame)
+            depth = ball_depth(W, bearings, k, ball, frame)[0]
             if depth > 0.0:
                 total += bearings.race[k, STIFFNESS] * depth ** (n + 1.0) / (n + 1.0)
     return total

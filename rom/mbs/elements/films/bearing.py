@@ -5,20 +5,44 @@ ex, ey [m] and the tilt phi_x, phi_y [rad]; the film is
 h = c bore - (ex + z phi_y) cos theta - (ey - z phi_x) sin theta.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import one_of
-from rom.components.journal_bearing.film_kernel import FULL, JFO, REYNOLDS, Grid
 from rom.errors import ModelError
-from rom.model import Array
+from rom.model import Array, Index
 
+FULL, REYNOLDS, JFO = 0, 1, 2  # no cavitation; oil from nowhere; oil is conserved
 Cavitation = Literal["none", "reynolds", "jfo"]
 LAWS = {"none": FULL, "reynolds": REYNOLDS, "jfo": JFO}
+
+
+class Grid(NamedTuple):
+    """Cells of an unwrapped bearing; column i is centred at angle i dtheta.
+
+    Attributes:
+        angle: (2, nt, 2) cosine and sine at the centres [0] and behind them at the faces [1].
+        bore: (2, nt) film of the centred journal there, in clearances.
+        Z: (nz,) centres of the cells along the width.
+        Z_face: (nz + 1,) their faces.
+        fixed: (nt, nz) 1 where the pressure is that of the inlet.
+        inlet: (nt, nz) pressure there [Pa].
+        slender: (R/L)^2.
+        half: 1.0 if the cells cover half the width, the other half being its image; else 0.0.
+    """
+
+    angle: Array
+    bore: Array
+    Z: Array
+    Z_face: Array
+    fixed: Index
+    inlet: Array
+    slender: float
+    half: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +74,12 @@ class JournalBearing:
         clearance: radius of the bush less radius of the journal [m]; of a lobe, if preloaded.
         grooves: inlets of oil.
         cavitation: what happens where oil would have to pull.
-        preload: of a two-lobed bore; its halves are moved together by so many clearances [1].
-        lobes: angle of the line along which they are moved [rad].
+        preload: of a lobed bore; its arcs are moved together by so many clearances [1].
+        lobes: angle of the line along which two arcs are moved [rad].
         cells: around the bearing, along its width.
         aligned: the journal never tilts, and the cells cover half the width.
+        bore: film of the centred journal over the clearance [1] as a function of angles (n,) [rad],
+            in place of lobes, as `multilobe` makes one.
 
     Raises:
         ModelError: for numbers that no bearing has, or grooves that its cavitation needs and lacks.
@@ -68,6 +94,7 @@ class JournalBearing:
     lobes: float = 0.0
     cells: tuple[int, int] = (120, 8)
     aligned: bool = False
+    bore: Callable[[Array], Array] | None = None
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -80,6 +107,8 @@ class JournalBearing:
             )
         if not 0 <= self.preload < 1:
             raise ModelError(f"preload {self.preload} leaves no room; it is from 0 to below 1.")
+        if self.bore is not None and self.preload:
+            raise ModelError("a bearing has a preload of two lobes, or a bore of its own.")
         one_of("cavitation", self.cavitation, LAWS, error=ModelError)
         if self.cavitation == "jfo" and not self.grooves:
             raise ModelError(
@@ -88,6 +117,8 @@ class JournalBearing:
         if min(self.cells) < 2 or self.cells[0] < 12:
             raise ModelError(f"{self.cells} cells are too few; at least 12 around and 2 along.")
         object.__setattr__(self, "grid", _grid(self))
+        if not (np.isfinite(self.grid.bore).all() and self.grid.bore.min() > 0.0):
+            raise ModelError("the bore leaves a centred journal no room; it is above zero.")
 
     @property
     def radius(self) -> float:
@@ -122,6 +153,27 @@ class JournalBearing:
         return self.clearance * float(np.min(thickness(self.grid, m, edges)))
 
 
+def multilobe(lobes: int, preload: float, *, first: float = 0.0) -> Callable[[Array], Array]:
+    """A bore of several equal arcs, each moved towards the middle along its own middle.
+
+    Args:
+        lobes: number of arcs.
+        preload: clearances by which they are moved [1].
+        first: angle of the middle of one of them [rad].
+
+    Raises:
+        ModelError: for no arcs, or a preload that leaves no room.
+    """
+    if lobes < 1 or not 0 <= preload < 1:
+        raise ModelError(f"{lobes} lobes with preload {preload} are no bore.")
+    half = np.pi / lobes
+
+    def bore(angles: Array) -> Array:
+        return 1 - preload * np.cos((angles - first + half) % (2 * half) - half)
+
+    return bore
+
+
 def four(values: npt.ArrayLike) -> Array:
     """A motion or rate of two or four components as one of four."""
     given = np.asarray(values, dtype=float)
@@ -147,7 +199,10 @@ def _grid(bearing: JournalBearing) -> Grid:
         wet = (apart <= max(groove.width / 2, apart.min()) + 1e-9)[:, None]
         wet = wet & (np.abs(Z) <= max(groove.share / 2, np.abs(Z).min()) + 1e-9)
         fixed[wet], inlet[wet] = 1, groove.pressure
-    bore = 1 - bearing.preload * np.abs(np.cos(both - bearing.lobes))
+    if bearing.bore is None:
+        bore = 1 - bearing.preload * np.abs(np.cos(both - bearing.lobes))
+    else:
+        bore = np.array([bearing.bore(angles) for angles in both], dtype=float).reshape(2, nt)
     angle = np.stack([np.cos(both), np.sin(both)], axis=-1)
     slender = (bearing.radius / bearing.length) ** 2
     return Grid(angle, bore, Z, Z_face, fixed, inlet, slender, float(bearing.aligned))

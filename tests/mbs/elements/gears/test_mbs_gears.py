@@ -12,7 +12,7 @@ from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
-from rom.mbs.elements.gears.teeth import PHASE
+from rom.mbs.elements.gears.table import PHASE
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -32,7 +32,13 @@ def wheels(pair=SPUR, turned=None, **more):
         for name, x in (("pinion", 0.0), ("gear", pair.distance))
     ]  # fmt: skip
     ends = [part.marker(ORIGIN) for part in made]
-    mech.gear_mesh("mesh", *ends, axis=A @ Z, pair=pair, **{"stiffness": K, "entry": 0.0} | more)
+    mech.gear_mesh(
+        "mesh",
+        *ends,
+        axis=A @ Z,
+        pair=pair,
+        **{"stiffness": K, "entry": 0.0, "conservative": False} | more,
+    )
     return mech
 
 
@@ -136,7 +142,13 @@ def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
         part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0))
         mech.revolute(f"{name} axle", mech.ground.marker((x, 0, 0)), part.marker(ORIGIN), axis=Z)
         ends.append(part.marker(ORIGIN))
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **{"stiffness": K, "entry": 0.0} | more)
+    mech.gear_mesh(
+        "mesh",
+        *ends,
+        axis=Z,
+        pair=pair,
+        **{"stiffness": K, "entry": 0.0, "conservative": False} | more,
+    )
     return mech
 
 
@@ -281,7 +293,7 @@ def test_wheels_that_do_not_turn_in_each_other_are_refused(numbers):
 
 
 def test_interference_inside_a_ring_is_refused():
-    with pytest.raises(ModelError, match=r"contact is lost: .* from -"):
+    with pytest.raises(ModelError, match=r"teeth interfere: tips of the gear .* from -"):
         GearPair((20, -62), 2e-3, 0.02)
 
 
@@ -493,7 +505,7 @@ def test_a_planetary_train_vibrates_as_its_lumped_model(planets):
         planet = body(f"planet {k}", at).marker(ORIGIN)
         mech.bushing(f"pin {k}", parts["carrier"].marker(at), planet,
                      stiffness=(1e8, 1e8, 0, 0, 0, 0))  # fmt: skip
-        law = {"stiffness": 5e8 / SUN.width, "entry": 0.0}
+        law = {"stiffness": 5e8 / SUN.width, "entry": 0.0, "conservative": False}
         mech.gear_mesh(f"sun {k}", parts["sun"].marker(ORIGIN), planet, axis=Z, pair=SUN,
                        phase=one_line(SUN), **law)  # fmt: skip
         mech.gear_mesh(f"ring {k}", planet, parts["ring"].marker(ORIGIN), axis=(0, 0, -1),
@@ -517,7 +529,16 @@ def test_flexible_wheels_feel_their_teeth_in_all_their_shapes():
         body = random_body(rng, r=3, damped=False)
         at = np.array([x, 0.0, 0.0]) - body.marker("a").point
         ends.append(mech.add_flexible(name, body, at=at).marker("a"))
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K, phase=one_line(pair), entry=0.0)
+    mech.gear_mesh(
+        "mesh",
+        *ends,
+        axis=Z,
+        pair=pair,
+        stiffness=K,
+        phase=one_line(pair),
+        entry=0.0,
+        conservative=False,
+    )
     packed, W = prepared(mech)
     q = shifted(packed, packed.q, 1e-7 * rng.normal(size=packed.v.size))
     none = 0 * packed.v
@@ -538,3 +559,15 @@ def test_flexible_wheels_feel_their_teeth_in_all_their_shapes():
     found = body - force()
     assert np.abs(gradient[6:9]).max() > 1e-2 * np.abs(gradient).max()
     assert_allclose(found, gradient, atol=1e-4 * np.abs(gradient).max())
+
+
+def test_what_falls_beside_gears_is_called_unstable():
+    """Teeth have a potential: statics say what stands on its head."""
+    mech = geared()
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(0.01,) * 3, at=(1, 1, 0))
+    mech.gravity = (0, -9.81, 0)
+    mech.revolute("hinge", mech.ground.marker((1, 0, 0)), rod.marker((0, -1, 0)), axis=Z)
+    for name in ("pinion", "gear"):
+        mech.rotational_spring(f"spring of {name}", f"{name} axle", stiffness=10.0)
+    with pytest.warns(rom.RomWarning, match="the equilibrium is unstable: body 'rod'"):
+        rom.equilibrium(mech)

@@ -1,0 +1,357 @@
+"""A motion that repeats, with its multipliers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import number, positive, typed, whole
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.analysis.linearize import linearize
+from rom.mbs.analysis.periodic.flow import Flow, Start
+from rom.mbs.analysis.periodic.repetition import refuse_other_forces, refuse_what_changes
+from rom.mbs.analysis.periodic.shooting import Return, Tangent, energy, moved_by
+from rom.mbs.analysis.periodic.turns import Turns, turns_of
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
+from rom.process.progress import line
+
+N_STEPS = 200  # per period
+# the method forgets what a step does not resolve within a period; motions that keep their energy
+# must not lose it to the method
+RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
+# gap in rad or lengths of the mechanism; that which counts where it shrinks no more, of round-off
+# or of the energy that the method itself takes up
+GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
+GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
+MAX_PASSES = 60
+MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
+MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
+STABLE_TOL = 1e-6  # of the size of a multiplier: differences and round-off
+MAX_PERIOD_CHANGE = 0.2  # of an unknown period in one pass
+REST_TOL = 1e-8  # rad or lengths of the mechanism that a motion moves per rad of its period
+
+
+@typed
+@dataclass(frozen=True)
+class PeriodicMotion:
+    """A motion that ends as it began.
+
+    Attributes:
+        solution: the motion over one period, start and end included.
+        period: [s].
+        multipliers: (f,) of Floquet [1], largest first: small deviations grow by them in a period;
+            f counts the free positions and the free velocities.
+        free: whether no clock drives the motion, so that one of them belongs to a shift in time.
+        gap: what is left between start and end, in rad or lengths of the mechanism.
+        passes: through the period until it closed, those for derivatives not counted.
+        turns: (k,) angles by which what advances was turned back [rad].
+        runs: all passes through the period.
+    """
+
+    solution: Solution
+    period: float
+    multipliers: npt.NDArray[np.complex128]
+    free: bool
+    gap: float
+    passes: int
+    turns: tuple[float, ...] = ()
+    runs: int = 0
+
+    @property
+    def state(self) -> State:
+        """The state in which it begins; simulations and motions nearby start from it."""
+        s = self.solution
+        first = {"q": s.q[0], "v": s.v[0], "a": s.a[0], "lam": s.lam[0], "base": s.base[0]}
+        return replace(s.final, t=float(s.t[0]), algorithmic=None, memory=None, **first)
+
+    @cached_property
+    def deviations(self) -> npt.NDArray[np.complex128]:
+        """Multipliers of what is not a shift in time, largest first [1]."""
+        if not self.free or not self.multipliers.size:
+            return self.multipliers
+        return np.delete(self.multipliers, np.argmin(np.abs(self.multipliers - 1.0)))
+
+    @property
+    def stable(self) -> bool:
+        """Whether small deviations do not grow."""
+        return bool(np.abs(self.deviations).max(initial=0.0) <= 1.0 + STABLE_TOL)
+
+    def __repr__(self) -> str:
+        largest = np.abs(self.deviations).max(initial=0.0)
+        word = "stable" if self.stable else "unstable"
+        return (
+            f"PeriodicMotion(period {self.period:.9g} s, {word}, largest multiplier "
+            f"{largest:.4g}, gap {self.gap:.2g} after {self.passes} passes)"
+        )
+
+
+@dataclass(frozen=True)
+class Shooting:
+    """How a motion is looked for.
+
+    Attributes:
+        mechanism, turns, steps, rho_inf, tolerance, progress: as the user has them.
+        period: None where it is unknown.
+        t0: time of the start [s].
+        energy: that the motion shall have; None where it is not free [J].
+    """
+
+    mechanism: Mechanism
+    period: float | None
+    t0: float
+    steps: int
+    rho_inf: float
+    tolerance: float
+    turns: Mapping[str, float | None] | None
+    progress: bool = False
+    energy: float | None = None
+
+    @property
+    def stalled(self) -> float:
+        """Gap that counts as closed where it shrinks no more."""
+        return STALLED_TOL if self.energy is None else CONSERVATIVE_STALLED_TOL
+
+    def flow(self, period: float) -> Flow:
+        """What moves the mechanism through a period."""
+        return Flow(self.mechanism, self.t0, period, self.steps, self.rho_inf)
+
+    def closed(self, flow: Flow, start: Start, turns: Turns) -> tuple[Tangent, int]:
+        """The motion that closes, with its derivatives, and the passes it took.
+
+        Where Newton's method does not come closer, time goes on from where it was for a period, as
+        it does in a machine, and for twice as many the next time.
+
+        Raises:
+            SolverError: if none is found; ``error.solution`` is the last attempt.
+        """
+        found, best, tangent, wait = Return.of(flow, turns, start), None, None, 1
+        for k in range(1, MAX_PASSES + 1):
+            self._say(f"pass {k}: gap {found.open:.2e}")
+            last = np.inf if best is None else best.open
+            if found.open < self.tolerance:
+                return self._done(found, tangent), k
+            stalled = found.open > 0.5 * last and min(found.open, last) < self.stalled
+            if best is not None and stalled:
+                return self._done(min(found, best, key=lambda x: x.open), tangent), k
+            if best is not None and found.open > last:
+                found, best, tangent = self._gone_on(best, wait), None, None
+                wait = min(2 * wait, MAX_WAIT)
+                continue
+            if tangent is None or found.open > GOOD_RATIO * last:
+                found = replace(found, basis=None)
+                tangent = found.tangent()
+            best, found = found, self._corrected(found, tangent)
+        raise self._lost(found)
+
+    def _gone_on(self, found: Return, periods: int) -> Return:
+        """What comes of a motion some periods later."""
+        for _ in range(periods):
+            found = Return.of(found.flow, found.turns, found.back)
+        return found
+
+    def _say(self, text: str) -> None:
+        if self.progress:
+            line(text)
+
+    def _done(self, found: Return, tangent: Tangent | None) -> Tangent:
+        """Derivatives at the motion that was found."""
+        self._say("")
+        if self.period is None and not max(map(np.linalg.norm, found.rate)) > REST_TOL:
+            raise SolverError(
+                "what was found is a state of rest, not a motion.",
+                hint="Begin with start= a state that moves, or nearer to the motion.",
+            )
+        refuse_other_forces(found)
+        if tangent is not None and tangent.around is found:
+            return tangent
+        return found.tangent()
+
+    def _corrected(self, found: Return, tangent: Tangent) -> Return:
+        """The next motion of Newton's method; shorter steps where one cannot be moved."""
+        free = self.period is None
+        gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
+        rate = found.rate if free else None
+        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap)[0], None
+        for _ in range(MAX_SHORTENINGS):
+            try:
+                flow, y = found.flow, answer
+                if free:
+                    change = np.clip(answer[-1] / (2 * np.pi), *(MAX_PERIOD_CHANGE * _SIDES))
+                    flow, y = flow.lasting(flow.period * (1 + float(change))), answer[:-1]
+                return Return.of(flow, found.turns, moved_by(found, y), tangent.around.chart)
+            except (SolverError, ModelError) as error:
+                answer, cause = answer / 2, error
+        raise self._lost(found) from cause
+
+    def _lost(self, found: Return) -> SolverError:
+        self._say("")
+        error = SolverError(
+            f"no motion repeats with the period {found.flow.period:.9g} s: "
+            f"{found.open:.2g} rad, or lengths of the mechanism, are left between its end and its "
+            "start.",
+            hint="Begin nearer to it (start=, settle=), take more steps per period, or simulate.",
+        )
+        error.solution = self.solution(found)
+        return error
+
+    def solution(self, found: Return) -> Solution:
+        """The motion over one period."""
+        flow, state = found.flow, found.flow.given(found.start)
+        h = flow.settings.h
+        return simulate(
+            self.mechanism, t_start=self.t0, t_end=self.t0 + flow.period, dt=h, state=state,
+            rho_inf=self.rho_inf, tolerance=1e-12,
+        )  # fmt: skip
+
+    def record(self, tangent: Tangent, passes: int) -> PeriodicMotion:
+        """What is handed to the user."""
+        found = tangent.around
+        angles = found.turns.angles(found.start.state, found.end)
+        return PeriodicMotion(
+            self.solution(found), found.flow.period, tangent.multipliers, self.period is None,
+            found.open, passes, angles, found.flow.runs[0],
+        )  # fmt: skip
+
+
+_SIDES = np.array([-1.0, 1.0])
+
+
+@typed
+def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have defaults
+    mechanism: Mechanism,
+    *,
+    period: float | None = None,
+    start: State | PeriodicMotion | None = None,
+    turns: Mapping[str, float | None] | None = None,
+    steps: int = N_STEPS,
+    rho_inf: float | None = None,
+    guess: float | None = None,
+    conservative: bool = False,
+    settle: int = 0,
+    t_start: float | None = None,
+    tolerance: float = GAP_TOL,
+    progress: bool = False,
+) -> PeriodicMotion:
+    """The motion that ends after a period as it began, stable or not, and its multipliers.
+
+    The state after one period is a function of the state before it; Newton's method makes both
+    equal (shooting). Its derivatives are differences of motions that start beside it, in every
+    free position and velocity. Their eigenvalues, the multipliers of Floquet, say by how much
+    small deviations grow in a period.
+
+    Args:
+        mechanism: bodies, joints, forces.
+        period: of drives, loads and laws, or a multiple of it [s]; None for a motion that nothing
+            drives, as a limit cycle, whose period is looked for.
+        start: state, equilibrium or motion nearby from which it is looked for; None for where the
+            bodies were added. A motion that nothing drives begins in a state that moves.
+        turns: {joint or body: angle [rad]} by which it has advanced after the period when it looks
+            the same again, as a gear by one tooth pitch; None as the angle for a body that looks
+            the same after any. Whole turns need not be told.
+        steps: of generalised-alpha in a period.
+        rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
+            motion is conservative.
+        guess: of an unknown period [s]; None for that of the fastest growing small motion about
+            the start.
+        conservative: the motion that nothing drives loses no energy either, so that there is one
+            for every energy; the one with that of the start is looked for.
+        settle: number of periods through which the mechanism moves before.
+        t_start: time at which the period begins [s]; None for 0, or that of ``start``.
+        tolerance: of the gap that may remain, in rad or lengths of the mechanism, of velocities
+            per rad of the period.
+        progress: report on stderr.
+
+    Returns:
+        The motion over one period. It begins somewhere on the cycle where nothing drives it.
+
+    Raises:
+        ConfigError: for a wrong argument, or a name that is neither a joint nor a body.
+        ModelError: naming a drive or load that does not repeat with the period, or a body that
+            looks different after the turn that is told; or if joints contradict each other.
+        SolverError: if a step fails, or no such motion is found; ``error.solution`` is then the
+            last attempt.
+
+    Source:
+        Nayfeh and Balachandran, Applied Nonlinear Dynamics (1995).
+    """
+    if rho_inf is None:
+        rho_inf = CONSERVATIVE_RHO_INF if conservative else RHO_INF
+    shooting, flow, begin = prepared(
+        mechanism, period, start, turns, steps, rho_inf, guess, t_start, tolerance, progress
+    )
+    whole("settle", settle, 0, 10**6)
+    if conservative and period is not None:
+        raise ConfigError("conservative is for motions that nothing drives; here period is given.")
+    turning = turns_of(mechanism, turns, begin)
+    at = flow.begun(begin)
+    refuse_what_changes(flow, turning, at, period is not None)
+    for _ in range(settle):
+        at = Return.of(flow, turning, at).back
+    if conservative:
+        shooting = replace(shooting, energy=energy(mechanism, at))
+    return shooting.record(*shooting.closed(flow, at, turning))
+
+
+def prepared(  # noqa: PLR0913  the arguments of the verb
+    mechanism: Any,
+    period: float | None,
+    start: Any,
+    turns: Any,
+    steps: int,
+    rho_inf: float,
+    guess: float | None,
+    t_start: float | None,
+    tolerance: float,
+    progress: bool,
+) -> tuple[Shooting, Flow, State]:
+    """Checked arguments: how to look for the motion, what moves, and the state to begin with."""
+    state = start.state if isinstance(start, PeriodicMotion) else start
+    if t_start is None:
+        t_start = 0.0 if state is None else state.t
+    whole("steps", steps, 4, 10**7)
+    positive("tolerance", tolerance)
+    if not 0.0 <= number("rho_inf", rho_inf) <= 1.0:
+        raise ConfigError(f"rho_inf = {rho_inf:g} is outside [0, 1].")
+    if period is not None:
+        positive("period", period)
+    if guess is not None:
+        positive("guess", guess)
+    if guess is None and isinstance(start, PeriodicMotion):
+        guess = start.period
+    numbers = (float(t_start), steps, rho_inf, tolerance)
+    shooting = Shooting(mechanism, period, *numbers, turns, progress)
+    first = period or guess or _guessed(mechanism, state)
+    flow = shooting.flow(first)
+    if state is None:
+        state = flow.initial()
+    _check_fit(flow, state)
+    return shooting, flow, state
+
+
+def _guessed(mechanism: Mechanism, state: State | None) -> float:
+    """Period of the small motion about a state that grows fastest, or decays slowest [s]."""
+    linear = linearize(mechanism, state)
+    turning = linear.eigenvalues[linear.eigenvalues.imag > 0.0]
+    if not turning.size:
+        raise ConfigError(
+            "no small motion about the start oscillates: its period cannot be guessed.",
+            hint="Give guess= a period near the one looked for, or period= that of the drives.",
+        )
+    return float(2 * np.pi / turning[np.argmax(turning.real)].imag)
+
+
+def _check_fit(flow: Flow, state: State) -> None:
+    needed = flow.packed.q.size, flow.packed.v.size, flow.packed.system.rows.kind.size
+    sizes = np.size(state.q), np.size(state.v), np.size(state.lam)
+    if sizes != needed:
+        raise ConfigError(
+            f"the start has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
+            "constraints; this mechanism has {}, {} and {}.".format(*needed),
+            hint="Take a state or motion of the same mechanism.",
+        )

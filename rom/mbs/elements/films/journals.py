@@ -1,0 +1,362 @@
+"""Oil films as elements: their tables and kernels."""
+
+import math
+
+from rom.mbs.elements.films.bearing import JFO
+from rom.mbs.elements.films.cells import (
+    CLEARANCE,
+    CONTENT_KNOWN,
+    IMAGES,
+    LENGTH,
+    N_ANSWERS,
+    N_MOTIONS,
+    PASSED_TIME,
+    RADIUS,
+    SPIN_COLUMN,
+    Cells,
+)
+from rom.mbs.elements.films.kinematics import (
+    carried_stiffness,
+    imaginary,
+    journal_motion,
+    journal_place,
+    journal_wrench,
+    stepped_place,
+)
+from rom.mbs.elements.films.pressure import find_pressure, set_heights, set_supply
+from rom.mbs.elements.films.slopes import TORQUE_ANSWER, set_answers, set_slopes
+from rom.mbs.kernels.algebra import row
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.element_calls import residuals, tangents
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Table, table
+
+# columns of Journals.oil
+CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = range(9)
+# what a film remembers, before the content of its cells
+KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
+FIRST_CONTENT = MOTION + N_MOTIONS
+SETTLING_MARK = (
+    -1.0
+)  # in place of 1 for a film that is known: its temperature is the one that stays
+CELSIUS_ZERO = 273.15  # [K]
+MAX_WARMINGS = 50  # of a film whose grooves have pressure
+WARMING_TOL = 1e-10  # of a temperature [K]
+MAX_BISECTIONS = 60  # of a temperature: all digits
+# share of the oil that the journal drags around which is renewed in any case: a centred journal
+# does not pump
+LEAST_RENEWED = 1e-2
+
+
+@table
+class Journals(Table):
+    """All films between journals and bushes.
+
+    Attributes:
+        i, j: (k,) markers of journal and bush.
+        axes: (k, 3, 3) axis of the journal in the axes of its marker; axis of the bush and the
+            direction from which angles count, in those of the other.
+        oil: (k, 9) viscosity if it is constant, else 0 [Pa s]; A, B of Walther's law; density
+            [kg/m^3]; specific heat [J/(kg K)]; inlet temperature [degrees Celsius]; share of the
+            heat that the temperature of the film feels; lag of it [s]; height of roughness [m].
+        clock: (1,) function that tells the time.
+        remembered: (k,) first of the numbers that each remembers.
+        films: their cells.
+        scale: (k, 4) motions that change the film by a clearance [m, rad].
+        turning: (k,) spin of the journal against the bush of bodies that spin in their frames
+            [rad/s].
+        largest: (k,) pressure [Pa], not finite where there is no film.
+        thinnest: (k,) film [m], which is below zero where the journal is beyond the bush.
+        viscosity: (k,) at the last residual [Pa s].
+        change: (5,) imaginary steps of the answers.
+    """
+
+    i: Index1
+    j: Index1
+    axes: Array3
+    oil: Array2
+    clock: Index1
+    remembered: Index1
+    films: Cells
+    scale: Array2
+    turning: Array1
+    largest: Scratch1
+    thinnest: Scratch1
+    viscosity: Scratch1
+    change: Scratch1
+
+
+@inner
+def oil_viscosity(oil, celsius):
+    """Viscosity of the oil of one film [Pa s]."""
+    if oil[CONSTANT] > 0.0:
+        return oil[CONSTANT]
+    powers = oil[WALTHER_A] - oil[WALTHER_B] * math.log10(celsius + CELSIUS_ZERO)
+    return 1e-6 * oil[DENSITY] * (10.0 ** (10.0**powers) - 0.7)
+
+
+@inner
+def answer_unit(journals, k, m):
+    """Answer m of film k over the dimensionless one [N s, N m s]."""
+    R, L, c = row(journals.films.size, k, RADIUS)
+    if m == TORQUE_ANSWER:
+        return journals.viscosity[k] * R**3 * L / c
+    return journals.viscosity[k] * R * L * (R / c) ** 2 * c / journals.scale[k, m]
+
+
+@inner
+def side_flow(journals, k):
+    """Oil that leaves at the ends [m^3/s]."""
+    films = journals.films
+    nt, nz = films.shape[k]
+    total = 0.0
+    for i in range(nt):
+        face = i * (nz + 1)
+        total += films.leaks[k, face] * films.P[k, i * nz]
+        total += films.leaks[k, face + nz] * films.P[k, i * nz + nz - 1]
+    size = films.size[k]
+    return total * size[IMAGES] * size[CLEARANCE] * size[RADIUS] * size[LENGTH] / 12
+
+
+@inner
+def lost_power(journals, k):
+    """Power that turns into heat [W]."""
+    films = journals.films
+    total = (
+        answer_unit(journals, k, TORQUE_ANSWER)
+        * films.answer[k, TORQUE_ANSWER]
+        * films.state[k, SPIN_COLUMN]
+    )
+    for m in range(N_MOTIONS):
+        force = answer_unit(journals, k, m) * films.answer[k, m]
+        total -= force * journals.scale[k, m] * films.state[k, N_MOTIONS + m]
+    return total
+
+
+@inner
+def warming(journals, k):
+    """Rise of the temperature of the film over inlet that its power would keep up [K]."""
+    oil, size = journals.oil[k], journals.films.size[k]
+    drag = (
+        0.5
+        * abs(journals.films.state[k, SPIN_COLUMN])
+        * size[CLEARANCE]
+        * size[RADIUS]
+        * size[LENGTH]
+    )
+    flow = max(side_flow(journals, k), LEAST_RENEWED * drag)
+    if oil[CONSTANT] > 0.0 or not flow > 0.0:
+        return 0.0
+    return oil[HEATED] * lost_power(journals, k) / (oil[DENSITY] * oil[HEAT] * flow)
+
+
+@inner
+def solved(journals, k, celsius):
+    """Solve film k at a temperature; says whether there is one."""
+    journals.viscosity[k] = oil_viscosity(journals.oil[k], celsius)
+    set_supply(journals.films, k, journals.viscosity[k])
+    if find_pressure(journals.films, k) < 0:
+        return False
+    set_answers(journals.films, k)
+    return True
+
+
+@inner
+def settled_temperature(journals, k):
+    """Solve film k at the temperature that it keeps up itself, which is returned; or NaN."""
+    oil = journals.oil[k]
+    celsius = oil[INLET]
+    for _ in range(MAX_WARMINGS):
+        if not solved(journals, k, celsius):
+            return math.nan
+        by_viscosity = warming(journals, k) / journals.viscosity[k]
+        low, high = oil[INLET], oil[INLET] + by_viscosity * oil_viscosity(oil, oil[INLET])
+        for _ in range(MAX_BISECTIONS):
+            middle = 0.5 * (low + high)
+            if middle - oil[INLET] < by_viscosity * oil_viscosity(oil, middle):
+                low = middle
+            else:
+                high = middle
+        change, celsius = abs(high - celsius), high
+        if change <= WARMING_TOL:
+            break
+    return celsius
+
+
+@inner
+def recall(s, W, journals, k):
+    """Tell the film what it remembers; returns its temperature, NaN if that is to be found."""
+    at, films = s.coordinates.kind.size + journals.remembered[k], journals.films
+    passed = W.signal[journals.clock[0], 0] - W.base[at + TIME]
+    known = W.base[at + KNOWN] == 1.0
+    films.state[k, PASSED_TIME], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
+    for cell in range(n_remembered(films, k)):
+        films.content[k, cell] = W.base[at + FIRST_CONTENT + cell]
+    return math.nan if W.base[at + KNOWN] == SETTLING_MARK else W.base[at + TEMPERATURE]
+
+
+@inner
+def n_remembered(films, k):
+    """Cells whose content a film remembers: those of one that conserves its oil."""
+    return films.shape[k, 0] * films.shape[k, 1] if films.law[k] == JFO else 0
+
+
+@inner
+def remember(W, journals, k, celsius):
+    """Keep what the film is like, and its temperature when the present time is over."""
+    films, oil = journals.films, journals.oil[k]
+    at = journals.remembered[k]
+    aim = oil[INLET] + warming(journals, k)
+    if films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] > 0.0:
+        celsius = aim + (celsius - aim) * math.exp(-films.state[k, PASSED_TIME] / oil[LAG])
+    W.fresh[at + KNOWN], W.fresh[at + TIME] = 1.0, W.signal[journals.clock[0], 0]
+    W.fresh[at + TEMPERATURE], W.fresh[at + THINNEST] = celsius, journals.thinnest[k]
+    W.fresh[at + LARGEST], W.fresh[at + POWER] = journals.largest[k], lost_power(journals, k)
+    W.fresh[at + SIDE_FLOW] = side_flow(journals, k)
+    for m in range(N_MOTIONS):
+        W.fresh[at + MOTION + m] = films.state[k, m] * journals.scale[k, m]
+    stays = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] == 0.0
+    for cell in range(n_remembered(films, k)):
+        if stays:
+            W.fresh[at + FIRST_CONTENT + cell] = films.content[k, cell]
+        else:
+            W.fresh[at + FIRST_CONTENT + cell] = films.fill[k, cell] * films.middle[k, cell]
+
+
+@inner
+def set_state(journals, k, place):
+    """Tell the film how the journal moves."""
+    motion, rate, spin = journal_motion(*place)
+    state, scale = journals.films.state[k], journals.scale[k]
+    for m in range(N_MOTIONS):
+        state[m], state[N_MOTIONS + m] = motion[m] / scale[m], rate[m] / scale[m]
+    if journals.films.size[k, IMAGES] > 1.0:  # tilts are not seen
+        state[2] = state[3] = state[N_MOTIONS + 2] = state[N_MOTIONS + 3] = 0.0
+    state[SPIN_COLUMN] = spin + journals.turning[k]
+
+
+@inner
+def largest_pressure(journals, k):
+    """Largest pressure of film k [Pa]."""
+    films, top = journals.films, 0.0
+    for cell in range(films.shape[k, 0] * films.shape[k, 1]):
+        top = max(top, films.P[k, cell])
+    return top * journals.viscosity[k] * (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
+
+
+@inner
+def film_of(s, W, journals, k):
+    """Solve film k where its journal is now; says whether there is one."""
+    celsius = recall(s, W, journals, k)
+    thinnest = journals.films.size[k, CLEARANCE] * set_heights(journals.films, k)
+    journals.thinnest[k] = thinnest
+    if not thinnest > journals.oil[k, ROUGHNESS]:
+        return False
+    if celsius == celsius:  # it remembers one
+        found = solved(journals, k, celsius)
+    else:
+        celsius = settled_temperature(journals, k)
+        found = celsius == celsius
+    if not found:
+        return False
+    journals.largest[k] = largest_pressure(journals, k)
+    remember(W, journals, k, celsius)
+    return True
+
+
+@inner
+def film_forces(journals, k):
+    """Forces that work on the motion, and the torque that brakes the spin."""
+    answer = journals.films.answer[k]
+    F = (
+        answer_unit(journals, k, 0) * answer[0],
+        answer_unit(journals, k, 1) * answer[1],
+        answer_unit(journals, k, 2) * answer[2],
+        answer_unit(journals, k, 3) * answer[3],
+    )
+    return F, answer_unit(journals, k, TORQUE_ANSWER) * answer[TORQUE_ANSWER]
+
+
+@residuals.of(Journals)
+def film_wrenches(s, W, journals, _q, _v, _lam):
+    """Add the films to the wrenches on the markers; add up the power lost."""
+    for k in range(journals.i.size):
+        i, j = journals.i[k], journals.j[k]
+        axes, relative = journal_place(W, i, j, journals.axes[k])
+        set_state(journals, k, (axes, relative))
+        if not film_of(s, W, journals, k):
+            journals.largest[k] = math.nan
+            W.wrench[i, 0] = math.nan
+            continue
+        F, torque = film_forces(journals, k)
+        force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
+        for p in range(3):
+            W.wrench[i, p] += force[p]
+            W.wrench[i, 3 + p] += on_journal[p]
+            W.wrench[j, p] -= force[p]
+            W.wrench[j, 3 + p] += on_bush[p]
+        W.power[2] += lost_power(journals, k)
+        W.power[1] += torque * journals.turning[k]  # of what keeps it spinning
+
+
+@inner
+def changed_answers(journals, k, motion, rate, spin):
+    """Forces and torque with the imaginary step that motion, rate and spin have."""
+    F, torque = film_forces(journals, k)
+    change, slope = journals.change, journals.films.slope[k]
+    for m in range(N_ANSWERS):
+        change[m] = 0.0
+        for q in range(N_MOTIONS):
+            change[m] += slope[m, q] * motion[q].imag / journals.scale[k, q]
+            change[m] += slope[m, N_MOTIONS + q] * rate[q].imag / journals.scale[k, q]
+        change[m] = answer_unit(journals, k, m) * (change[m] + slope[m, SPIN_COLUMN] * spin.imag)
+    F = (
+        complex(F[0], change[0]),
+        complex(F[1], change[1]),
+        complex(F[2], change[2]),
+        complex(F[3], change[3]),
+    )
+    return F, complex(torque, change[TORQUE_ANSWER])
+
+
+@inner
+def set_column(W, journals, k, p, by_position):
+    """Set column p of W.Q to minus the change of the wrenches in unit motion, or velocity, p."""
+    i, j = journals.i[k], journals.j[k]
+    place = journal_place(W, i, j, journals.axes[k])
+    axes, relative = stepped_place(p, by_position, place)
+    F, torque = changed_answers(journals, k, *journal_motion(axes, relative))
+    force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
+    shove, turned, back = imaginary(force), imaginary(on_journal), imaginary(on_bush)
+    for q in range(3):
+        W.Q[q, p] = -shove[q]
+        W.Q[3 + q, p] = -turned[q]
+        W.Q[6 + q, p] = shove[q]
+        W.Q[9 + q, p] = -back[q]
+
+
+@inner
+def scale_pair(W, c):
+    """Multiply W.Q by a factor."""
+    for p in range(12):
+        for q in range(12):
+            W.Q[p, q] *= c
+
+
+@tangents.of(Journals)
+def film_tangents(s, W, journals, _lam, ck, cc):
+    """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
+    for k in range(journals.i.size):
+        if not journals.largest[k] >= 0.0:
+            continue
+        pair = journals.i[k], journals.j[k]
+        set_slopes(journals.films, k)
+        for p in range(12):
+            set_column(W, journals, k, p, True)
+        scale_pair(W, ck)
+        pair_stiffness(s, W, *pair, W.Kt)
+        for p in range(12):
+            set_column(W, journals, k, p, False)
+        carried_stiffness(s, W, pair, ck, W.Kt)
+        scale_pair(W, cc)
+        pair_stiffness(s, W, *pair, W.S)

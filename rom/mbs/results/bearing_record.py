@@ -1,0 +1,58 @@
+"""What the oil film of a journal bearing was like along a motion."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.mbs.elements.films.cells import N_MOTIONS
+from rom.mbs.elements.films.journals import (
+    LARGEST,
+    MOTION,
+    POWER,
+    SIDE_FLOW,
+    TEMPERATURE,
+    THINNEST,
+)
+from rom.mbs.elements.films.oil import Oil
+from rom.model import Array
+
+
+@dataclass(frozen=True)
+class BearingRecord:
+    """One journal bearing over time.
+
+    Attributes:
+        t: (n_t,) times [s].
+        motion: (n_t, 4) of the journal in the bush: ex, ey [m], and tilts about X, Y [rad].
+        thinnest: (n_t,) smallest film [m].
+        pressure: (n_t,) largest pressure [Pa].
+        temperature: (n_t,) of the film [degrees Celsius]; NaN where its viscosity stays.
+        power: (n_t,) that turns into heat [W].
+        side_flow: (n_t,) oil that leaves at both ends [m^3/s].
+    """
+
+    t: Array
+    motion: Array
+    thinnest: Array
+    pressure: Array
+    temperature: Array
+    power: Array
+    side_flow: Array
+
+
+def bearing_record(solution: Any, name: str) -> BearingRecord:
+    """Numbers that the film remembered at the instants of a motion."""
+    packed, element = solution.packed, solution.mechanism.journal_bearings[name]
+    first = len(packed.places.coordinates) + packed.places.memory(name, np.zeros(0))
+    found = solution.base[:, first:]
+    temperature = found[:, TEMPERATURE] if isinstance(element.liquid, Oil) else np.nan * solution.t
+    return BearingRecord(
+        solution.t,
+        found[:, MOTION : MOTION + N_MOTIONS],
+        found[:, THINNEST],
+        found[:, LARGEST],
+        temperature,
+        found[:, POWER],
+        found[:, SIDE_FLOW],
+    )

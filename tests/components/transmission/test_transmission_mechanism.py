@@ -1,0 +1,90 @@
+"""A gear unit as a mechanism, of shafts that spin in frames which do not: as its own program."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.geared_rotors import SPAN, as_mechanism, rigid_unit
+from rom.components.journal_bearing import Groove
+from rom.components.transmission import rest, whirl
+from rom.rotation import log
+
+HELIX = float(np.radians(12.5))
+
+
+@cache
+def both(theta=0.4, **more):
+    """The unit at rest by its own program, and as a mechanism with its state."""
+    unit = rigid_unit(**more)
+    mech = as_mechanism(unit)
+    return rest(unit, theta), mech, rom.equilibrium(mech, t=theta / unit.speed)
+
+
+def coordinates(unit, state):
+    """(12,) motions and rotations of both shafts in the axes of the unit."""
+    parts = []
+    for k in range(2):
+        q = state.q[7 * k : 7 * k + 7]
+        parts += [*(q[:3] - [k * unit.mesh.pair.distance, 0, SPAN / 2]), *log(q[3:])]
+    return np.array(parts)
+
+
+@pytest.mark.parametrize("more", [{}, {"torque": 40.0, "speed": 500.0}, {"torque": 450.0}], ids=str)
+def test_shafts_rest_on_films_and_teeth_where_they_do_in_the_unit(more):
+    there, _, state = both(**more)
+    found = coordinates(there.unit, state)
+    assert_allclose(found[[0, 1, 5, 6, 7, 11]], there.q[[0, 1, 5, 6, 7, 11]], rtol=1e-8)
+    assert_allclose(found, there.q, atol=1e-8 * np.abs(there.q).max())
+
+
+@pytest.mark.parametrize("beyond", [-90, 90, 150])
+def test_shafts_rest_on_films_that_conserve_their_oil_wherever_it_comes_in(beyond, recwarn):
+    """From the middle of the bushes, where films begin to fill; they are no unstable springs."""
+    unit = rigid_unit(gravity=(0.0, -9.81))
+    push, rotors = rest(unit).forces.mesh.force, []
+    for rotor, side in ((unit.pinion, 1), (unit.gear, -1)):
+        at = np.arctan2(push[1], side * push[0]) + np.radians(beyond)
+        inlet = [Groove(at, np.radians(20))]
+        oiled = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
+        rotors.append(replace(rotor, bearings=oiled))
+    unit = replace(unit, pinion=rotors[0], gear=rotors[1])
+    mech = as_mechanism(unit)
+    found = coordinates(unit, rom.equilibrium(mech))
+    wanted = rest(unit).q
+    assert_allclose(found, wanted, atol=1e-7 * np.abs(wanted).max())
+    assert not recwarn.list
+
+
+def test_helical_wheels_tilt_as_in_the_unit():
+    """But for the arms of axial forces, which the unit takes at the datum."""
+    there, _, state = both(helix=HELIX)
+    found, wanted = coordinates(there.unit, state), there.q
+    assert np.abs(wanted[[3, 4, 9, 10]]).min() > 1e-6
+    assert_allclose(found, wanted, rtol=5e-3, atol=1e-9)
+
+
+def test_films_and_teeth_of_the_mechanism_say_what_they_bear():
+    there, mech, state = both()
+    still = rom.mbs.snapshot(mech, state)
+    load = rom.mbs.tooth_loads(still, "mesh")[0].force.sum()
+    assert load == pytest.approx(there.forces.mesh.load.sum(), rel=1e-8)
+    for name, film in zip(("pinion low", "gear high"), there.forces.films[::3], strict=True):
+        found = still.journal_bearing(name)
+        assert found.power[0] == pytest.approx(film.dissipated, rel=1e-7)
+        assert found.pressure[0] == pytest.approx(film.pressure.max(), rel=1e-7)
+
+
+@pytest.mark.parametrize(("more", "rtol"), [({}, 3e-4), ({"helix": HELIX}, 2e-3)], ids=str)
+def test_it_whirls_and_vibrates_as_the_unit(more, rtol):
+    """But for forces that turn with the line of centres, which the unit leaves out."""
+    there, mech, state = both(**more)
+    wanted = whirl(there).values
+    found = rom.linearize(mech, state).eigenvalues
+    wanted = wanted[wanted.imag > 1e-6 * np.abs(wanted).max()]
+    found = found[found.imag > 1e-6 * np.abs(found).max()]
+    order = np.argsort(found.imag), np.argsort(wanted.imag)
+    assert_allclose(found[order[0]], wanted[order[1]], rtol=rtol)

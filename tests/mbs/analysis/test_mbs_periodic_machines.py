@@ -1,0 +1,170 @@
+"""Motions of machines that repeat while shafts advance, against equations of their own."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import rom
+from cases.beam import stiffened_beam
+from rom.components.gear_mesh import Correction, GearPair
+from rom.errors import ModelError
+from rom.mbs import BallBearing
+
+X, Y, Z = np.eye(3)
+ORIGIN = (0, 0, 0)
+EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
+PAIR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
+TURNS = {"pinion axle": 2 * np.pi / 26, "gear axle": -2 * np.pi / 40}
+BALLS = BallBearing(9, 12.7e-3, 65e-3, clearance=20e-6)
+
+
+def geared(speed, inertia=((1e-3, 1e-3, 2e-3), (5e-3, 5e-3, 9e-3)), torque=80.0, **more):
+    """A pinion that runs at constant speed and drives a gear against a torque."""
+    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x, J in zip(("pinion", "gear"), (0.0, PAIR.distance), inertia, strict=True):
+        part = mech.add_rigid(name, mass=1.0, inertia=J, at=(x, 0, 0)).marker(ORIGIN)
+        mech.revolute(f"{name} axle", mech.ground.marker((x, 0, 0)), part, axis=Z)
+        ends.append(part)
+    flanks = Correction(relief=(1e-5, 1e-5), extent=(2e-3, 2e-3))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=PAIR,
+                   **{"stiffness": 1.3e10, "entry": 0.05, "damping": 5e-6, "conservative": False,
+                      "correction": flanks} | more)  # fmt: skip
+    mech.drive("speed", "pinion axle", lambda t: speed * t, rate=lambda t: speed + 0 * t,
+               acceleration=lambda t: 0 * t)  # fmt: skip
+    mech.torque("brake", ends[1], (0, 0, torque))
+    return mech
+
+
+def meshing(speed, **more):
+    """The motion that repeats with every tooth."""
+    options = {"turns": TURNS, "steps": 120, "settle": 4}
+    mech = geared(speed)
+    return rom.periodic_motion(mech, period=2 * np.pi / 26 / speed, **options | more)
+
+
+def deviation(motion, speed):
+    """Angle of the gear against that of ideal teeth."""
+    s = motion.solution
+    return s.joint("gear axle").angle + speed * 26 / 40 * (s.t - s.t[0])
+
+
+def test_a_gear_pair_repeats_with_every_tooth():
+    """The same as a run over many teeth, and as the motion over three of them."""
+    speed = 300.0
+    one = meshing(speed, settle=60)
+    assert one.stable and one.gap < 1e-9
+    assert_allclose(one.turns, list(TURNS.values()))
+    long = rom.simulate(one.solution.mechanism, state=one.solution.final, dt=one.period / 120,
+                        t_end=6 * one.period, rho_inf=0.8)  # fmt: skip
+    angle = long.joint("gear axle").angle + speed * 26 / 40 * (long.t - one.solution.t[0])
+    for k in range(4):
+        part = angle[120 * k : 120 * k + 121]
+        assert_allclose(part, deviation(one, speed), atol=1e-3 * np.ptp(deviation(one, speed)))
+    three = rom.periodic_motion(one.solution.mechanism, period=3 * one.period, steps=360, start=one,
+                                turns={k: 3 * x for k, x in TURNS.items()})  # fmt: skip
+    assert_allclose(np.ptp(deviation(three, speed)), np.ptp(deviation(one, speed)), rtol=1e-3)
+    assert_allclose(np.sort(np.abs(three.multipliers)), np.sort(np.abs(one.multipliers)) ** 3,
+                    atol=1e-4)  # fmt: skip
+
+
+def test_angles_that_do_not_fit_the_teeth_are_refused():
+    speed, turns = 300.0, {"pinion axle": 2 * np.pi / 26}
+    with pytest.raises(ModelError, match="other forces act on"):
+        rom.periodic_motion(geared(speed, damping=2e-5), period=2 * np.pi / 26 / speed, turns=turns)
+    with pytest.raises(ModelError, match="'speed' does not repeat with the period"):
+        rom.periodic_motion(geared(speed), period=2 * np.pi / 26 / speed)
+
+
+def test_a_wheel_that_looks_different_after_a_tooth_is_refused_and_takes_whole_turns():
+    uneven = ((1e-3, 2e-3, 2e-3), (5e-3, 5e-3, 9e-3))
+    T = 2 * np.pi / 26 / 300.0
+    with pytest.raises(ModelError, match="the body 'pinion' is another one: its inertia"):
+        rom.periodic_motion(geared(300.0, uneven), period=T, turns=TURNS)
+
+
+def test_a_flexible_body_takes_whole_turns_only():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("blade", stiffened_beam(n_modes=2, stiffened=False))
+    root = part.marker(part.names[0])
+    mech.revolute("axle", mech.ground.marker(ORIGIN), root, axis=Z)
+    mech.drive("speed", "axle", lambda t: 0.1 * t)
+    with pytest.raises(ModelError, match=r"turns the flexible body 'blade' by 1.5708 rad"):
+        rom.periodic_motion(mech, period=5 * np.pi, turns={"axle": np.pi / 2})
+
+
+def test_a_wheel_beside_its_axis_is_refused():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 2), at=(0.1, 0, 0),
+                           markers={"pin": (-0.1, 0, 0)})  # fmt: skip
+    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker("pin"), axis=Z)
+    mech.drive("speed", "axle", lambda t: t)
+    with pytest.raises(ModelError, match="its mass centre is beside the axis"):
+        rom.periodic_motion(mech, period=1.0, turns={"axle": 1.0})
+    assert rom.periodic_motion(mech, period=2 * np.pi).gap < 1e-9  # a whole turn
+
+
+def rotor(spin, mass=2.0, stiffness=800.0, damping=3.0, away=0.0):
+    """A disc in the plane z = 0, driven about z, its mass centre beside the axis."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    disc = mech.add_rigid("disc", mass=mass, inertia=(0.5, 0.5, 1.0), at=(away, 0, 0),
+                          markers={"axis": (-away, 0, 0)})  # fmt: skip
+    mech.planar("plane", mech.ground.marker(ORIGIN), disc.marker("axis"), normal=Z)
+    mech.drive("spin", "plane", lambda t: spin * t, rate=lambda t: spin + 0 * t,
+               acceleration=lambda t: 0 * t)  # fmt: skip
+    if stiffness:
+        mech.bushing("shaft", mech.ground.marker(ORIGIN), disc.marker("axis"),
+                     stiffness=(stiffness, stiffness, 0, 0, 0, 0),
+                     damping=(damping, damping, 0, 0, 0, 0))  # fmt: skip
+    return mech, disc
+
+
+@pytest.mark.parametrize("spin", [12.0, 30.0])
+def test_jeffcott_s_rotor_whirls_on_its_circle(spin):
+    """e w^2 / (k/m - w^2 + i c w / m), below and above its critical speed of 20 rad/s."""
+    away = 1e-3
+    mech, _ = rotor(spin, away=away)
+    found = rom.periodic_motion(mech, period=2 * np.pi / spin, steps=400)
+    s = found.solution
+    axis = s.position("disc", "axis")
+    exact = away * spin**2 / (400 - spin**2 + 1.5j * spin) * np.exp(1j * spin * s.t)
+    assert_allclose(axis[:, 0] + 1j * axis[:, 1], exact, atol=2e-3 * abs(exact[0]))
+    decay = np.exp(-0.75 * found.period)
+    assert found.stable
+    assert_allclose(np.abs(found.multipliers), decay, rtol=1e-4)
+
+
+def test_a_shaft_in_a_ball_bearing_vibrates_as_balls_pass():
+    """Against equations of two coordinates with the balls where the cage has them."""
+    spin, mass, load, damping = 200.0, 2.0, 400.0, 900.0
+    mech, disc = rotor(spin, mass=mass, stiffness=0.0)
+    center = disc.marker("axis")
+    mech.rolling_bearing("bearing", center, mech.ground.marker(ORIGIN), axis=Z, bearing=BALLS)
+    six = damping, damping, 0, 0, 0, 0
+    mech.bushing("damper", mech.ground.marker(ORIGIN), center, stiffness=np.zeros(6), damping=six)
+    mech.force("load", center, (load, 0, 0))
+    passing = 2 * np.pi / BALLS.balls / BALLS.cage
+    T = passing / spin
+    found = rom.periodic_motion(mech, period=T, turns={"plane": passing}, steps=400)
+    assert found.stable and found.gap < 1e-9
+    s = found.solution
+
+    def rates(t, y):
+        angles = BALLS.cage * spin * t + 2 * np.pi / BALLS.balls * np.arange(BALLS.balls)
+        depth = y[0] * np.cos(angles) + y[1] * np.sin(angles) - 0.5 * BALLS.clearance
+        push = BALLS.stiffness * np.maximum(depth, 0) ** 1.5
+        a = load - damping * y[2] - push @ np.cos(angles), -damping * y[3] - push @ np.sin(angles)
+        return [y[2], y[3], a[0] / mass, a[1] / mass]
+
+    start = np.concatenate([s.position("disc")[0, :2], s.velocity("disc")[0, :2]])
+    run = solve_ivp(rates, (0, 11 * T), start, max_step=T / 50, dense_output=True, **EXACT)
+    quarters = (run.sol((9 + x) * T + s.t)[:2].T for x in (0.0, 0.25, 0.5, 0.75))
+    apart = [np.abs(x - s.position("disc")[:, :2]).max() for x in quarters]  # of the first ball
+    assert min(apart) < 2e-3 * np.ptp(s.position("disc")[:, 1])
+
+
+def test_a_spring_that_is_wound_up_does_not_repeat():
+    mech, _ = rotor(30.0)
+    mech.rotational_spring("coil", "plane", stiffness=5.0)
+    with pytest.raises(ModelError, match=r"other forces act on 'disc' in the same place: 31.4"):
+        rom.periodic_motion(mech, period=2 * np.pi / 30)

@@ -1,0 +1,214 @@
+"""Paths of motions that repeat, against harmonic balance and the borders of stability."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.optimize import fsolve
+from scipy.special import mathieu_a, mathieu_b
+
+import rom
+from rom.errors import ConfigError, SolverError
+
+X, Y, Z = np.eye(3)
+ORIGIN = (0, 0, 0)
+FORCE, DAMPING, SPRING, FREE = 0.3, 0.1, 2.5, 0.8
+
+
+def across(w):
+    """A mass of 1 kg along x between two springs across: F = -2 k x (1 - l / sqrt(1 + x^2))."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
+    base = mech.ground.marker(ORIGIN)
+    mech.prismatic("guide", base, mass, axis=X)
+    for side in (1, -1):
+        end = mech.ground.marker((0, side, 0))
+        mech.spring_damper(f"spring {side}", end, mass, stiffness=SPRING, free_length=FREE)
+    mech.bushing("damper", base, mass, stiffness=np.zeros(6), damping=(DAMPING, 0, 0, 0, 0, 0))
+    mech.force("push", mass, lambda t: (FORCE * np.cos(w * t), 0, 0))
+    return mech
+
+
+def amplitude(solution):
+    return np.abs(solution.position("mass")[:, 0]).max()
+
+
+ODD, N = np.array([1, 3, 5, 7, 9]), 256
+E = np.exp(2j * np.pi / N * np.outer(np.arange(N), ODD))
+
+
+def balance(u, phase):
+    """Residual of harmonic balance for a frequency and a motion (6 coefficients, first at a phase).
+
+    The unknowns are frequency, amplitude of the first harmonic, and the others.
+    """
+    w, c = u[0], np.r_[u[1] * np.exp(1j * phase), u[2::2] + 1j * u[3::2]]
+    x = (E @ c).real
+    f = 2 * SPRING * x * (1 - FREE / np.sqrt(1 + x**2))
+    r = (-((w * ODD) ** 2) + 1j * DAMPING * w * ODD) * c + 2 / N * (E.conj().T @ f)
+    r[0] -= FORCE
+    return np.ravel([r.real, r.imag], order="F")
+
+
+def balanced_curve():
+    """(k, 2) frequency and amplitude of the first harmonic by its phase (k,), which falls."""
+    phases, found = np.linspace(-0.2, -3.08, 300), []
+    u = np.r_[1.0, 0.6, np.zeros(2 * ODD.size - 2)]
+    for phase in phases:
+        u, _, _, message = fsolve(balance, u, (phase,), full_output=True, xtol=1e-13)
+        assert np.abs(balance(u, phase)).max() < 1e-10, message
+        found.append(u[:2])
+    return phases, np.array(found)
+
+
+@pytest.fixture(scope="module")
+def curve():
+    return rom.periodic_path(across, (1.1, 1.9), period=lambda w: 2 * np.pi / w, steps=150)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    phases, found = balanced_curve()
+    return CubicSpline(-phases, found)
+
+
+def test_the_folds_of_a_hardening_spring_are_those_of_harmonic_balance(curve, exact):
+    folds = exact(exact.derivative().roots(extrapolate=False)[0])[:, 0]
+    folds = [w for w in folds if 1.1 < w < 1.9]
+    assert [x.kind for x in curve.critical] == ["fold", "fold"] and len(folds) == 2
+    assert_allclose([x.p for x in curve.critical], folds, rtol=2e-3)
+    for x in curve.critical:
+        assert np.abs(x.motion.multipliers[0] - 1.0) < 2e-2
+
+
+def test_all_motions_of_the_path_are_those_of_harmonic_balance(curve, exact):
+    for motion in curve.motions[::3]:
+        s = motion.solution
+        turning = np.exp(-2j * np.pi * s.t[:-1] / motion.period)
+        c = 2 * np.mean(s.position("mass")[:-1, 0] * turning)
+        w, a = exact(-np.angle(c))
+        assert 2 * np.pi / motion.period == pytest.approx(w, rel=3e-3)
+        assert abs(c) == pytest.approx(a, rel=3e-3)
+
+
+def test_the_branch_between_the_folds_is_unstable_and_alone_so(curve):
+    changes = np.flatnonzero(np.diff(curve.stable.astype(int)))
+    assert len(changes) == 2 and curve.stable[0] and curve.stable[-1]
+    high, low = curve.p[changes]
+    assert_allclose([high, low], [x.p for x in curve.critical], rtol=0.02)
+    a = curve.of(amplitude)
+    assert np.all(np.diff(a[changes[0] + 1 : changes[1]]) < 0.0)
+
+
+def test_the_way_back_meets_the_same_folds(curve):
+    back = rom.periodic_path(across, (1.5, 1.1), period=lambda w: 2 * np.pi / w, steps=150,
+                             n=30)  # fmt: skip
+    assert back.critical[0].kind == "fold"
+    assert back.critical[0].p == pytest.approx(curve.critical[1].p, rel=1e-5)
+    assert back.p[0] == 1.5 and back.stable[0] and not back.stable[-1]
+
+
+def shaken(border):
+    """A pendulum shaken along z, upright or hanging, by its gravity over that at the border."""
+    w, q = 20.0, 0.6
+    squared = {"branch": -mathieu_a(0, q), "flip": mathieu_b(1, q)}[border]
+    side = {"branch": 1.0, "flip": -1.0}[border]
+
+    def build(factor):
+        mech = rom.Mechanism(gravity=(0, 0, -factor * squared * w**2 / 4))
+        cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
+        bob = mech.add_rigid("bob", mass=1.0, inertia=(1e-9,) * 3, at=(0, 0, side),
+                             markers={"pin": (0, 0, -side)})  # fmt: skip
+        mech.prismatic("lift", mech.ground.marker(ORIGIN), cart, axis=Z)
+        a = 0.5 * q
+        mech.drive("shaker", "lift", lambda t: a * np.cos(w * t),
+                   rate=lambda t: -a * w * np.sin(w * t),
+                   acceleration=lambda t: -a * w**2 * np.cos(w * t))  # fmt: skip
+        mech.revolute("hinge", cart, bob.marker("pin"), axis=Y)
+        return mech
+
+    return build, 2 * np.pi / w
+
+
+@pytest.mark.parametrize("border", ["branch", "flip"])
+def test_where_a_shaken_pendulum_loses_its_stability_it_is_at_the_border_of_mathieu(border):
+    build, T = shaken(border)
+    path = rom.periodic_path(build, (0.95, 1.06), period=T, steps=400)
+    assert [x.kind for x in path.critical] == [border]
+    assert path.critical[0].p == pytest.approx(1.0, abs=1e-3)
+    assert path.stable[0] and not path.stable[-1]
+
+
+def fed(c):
+    """An oscillator that is pushed, with damping that may feed it."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
+    mech.prismatic("guide", mech.ground.marker(ORIGIN), mass, axis=X)
+    mech.motor("law", "guide", lambda t, x, v: -4.0 * x - c * v, compiled=False)
+    mech.force("push", mass, lambda t: (np.cos(1.3 * t), 0, 0))
+    return mech
+
+
+def test_a_second_frequency_comes_in_where_damping_vanishes():
+    path = rom.periodic_path(fed, (0.3, -0.2), period=2 * np.pi / 1.3, steps=60)
+    assert [x.kind for x in path.critical] == ["Neimark-Sacker"]
+    assert path.critical[0].p == pytest.approx(0.0, abs=2e-3)
+
+
+def self_excited(mu):
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=(2.0, 0, 0)).marker(ORIGIN)
+    base = mech.ground.marker((2.0, 0, 0))
+    mech.prismatic("guide", base, mass, axis=X)
+    mech.motor("law", "guide", lambda t, x, v: mu * (1 - (x + 2) ** 2) * v - x - 2, compiled=False)
+    return mech
+
+
+def test_limit_cycles_are_followed_with_their_periods():
+    """Van der Pol's period grows with mu, as an independent integration has it."""
+    path = rom.periodic_path(self_excited, (1.0, 1.5), guess=6.6, steps=100, step=0.5)
+
+    def rates(t, y):
+        return [y[1], path.p[-1] * (1 - y[0] ** 2) * y[1] - y[0]]
+
+    run = solve_ivp(rates, (0, 60), [2.0, 0.0], rtol=1e-10, atol=1e-12,
+                    events=lambda t, y: y[1])  # fmt: skip
+    period = run.t_events[0][-1] - run.t_events[0][-3]
+    assert path.p[-1] == pytest.approx(1.5)
+    assert path.period[-1] == pytest.approx(period, rel=2e-3)
+    assert path.stable.all() and all(x.free for x in path.motions) and not path.critical
+
+
+@pytest.mark.parametrize(("span", "more", "message"), [
+    ((1.0, 1.0), {}, "has no length"),
+    ((1.0, 2.0), {"n": 1}, "n = 1"),
+    ((1.0, 2.0), {"step": 0.0}, "step"),
+    ((1.0, 2.0), {"period": lambda w: -w}, "period"),
+])  # fmt: skip
+def test_wrong_arguments_of_a_path_are_named(span, more, message):
+    with pytest.raises(ConfigError, match=message):
+        rom.periodic_path(across, span, **{"period": lambda w: 2 * np.pi / w} | more)
+
+
+def test_another_number_of_bodies_is_refused_and_what_was_found_is_kept():
+    def build(w):
+        mech = across(w)
+        if w > 0.85:
+            mech.add_rigid("more", mass=1.0, inertia=(1, 1, 1), at=(9, 0, 0))
+        return mech
+
+    with pytest.raises(ConfigError, match=r"other bodies at 0.8") as caught:
+        rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
+    assert caught.value.solution.p.size >= 1
+
+
+def test_the_error_of_a_lost_path_holds_it():
+    def build(w):
+        if w > 1.0:
+            raise SolverError("no such mechanism.")
+        return across(w)
+
+    with pytest.raises(SolverError, match=r"lost behind 1: no such mechanism") as caught:
+        rom.periodic_path(build, (0.8, 1.2), period=lambda w: 2 * np.pi / w, steps=60)
+    assert caught.value.solution.p[-1] <= 1.0

@@ -1,0 +1,354 @@
+"""Oil films between bodies: in the frame of the bush, with momentum, power and tangents."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+import rom
+from cases.mbs.films import held_rotor
+from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
+from cases.mbs.tangents import difference, shifted
+from rom.components.journal_bearing import film
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs import Groove, JournalBearing, iso_vg
+from rom.mbs.elements.films.cells import SPIN_COLUMN, cells_of
+from rom.mbs.elements.films.journals import FIRST_CONTENT, KNOWN, TIME
+from rom.mbs.elements.films.slopes import solve_film
+from rom.rotation import matrix
+
+ORIGIN, NONE, UPRIGHT = (0.0, 0.0, 0.0), np.zeros(0), np.eye(3)
+GROOVES = [Groove(1.2, 0.3, 1e5, share=0.7)]
+VISCOSITY, SPEED = 0.03, 100.0
+MOTION = np.array([0.4e-4, 0.3e-4, 1e-4, -2e-4])
+RATE = np.array([5e-4, 2e-4, -0.3e-2, 0.4e-2])
+STILL = np.zeros(6)
+LAWS = ["none", "reynolds", "jfo"]
+
+
+def bearing(law="reynolds", cells=(60, 8), grooves=GROOVES, slender=1.0, **more):
+    return JournalBearing(0.1, 0.1 * slender, 1e-4, grooves, cells=cells, cavitation=law, **more)
+
+
+def turned_by(vector):
+    """(3, 3) rotation by a vector."""
+    angle = np.linalg.norm(vector)
+    axis = np.asarray(vector) / angle if angle else np.array([0.0, 0.0, 1.0])
+    return matrix([np.cos(angle / 2), *np.sin(angle / 2) * axis])
+
+
+def leaning(motion):
+    """(3, 3) axes of a journal, with the slopes that the motion says."""
+    a, b = motion[3], -motion[2]
+    n = np.array([a, b, 1.0]) / np.linalg.norm([a, b, 1.0])
+    x = np.array([1.0, 0.0, 0.0]) - n[0] * n
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(n, x), n])
+
+
+class Pair:
+    """Journal and bush free in space; the journal moves in the bush as told."""
+
+    def __init__(self, b, A=UPRIGHT, at=ORIGIN, motion=MOTION, along=0.0, **more):
+        mech = rom.Mechanism(gravity=ORIGIN)
+        own = {"mass": 2.0, "inertia": (0.01, 0.02, 0.03)}
+        self.A, self.at, self.B = A, np.asarray(at), A @ leaning(motion)
+        self.arm = A @ [*motion[:2] + along * motion[[3, 2]] * [1, -1], along]
+        journal = mech.add_rigid("journal", at=at + self.arm, orientation=self.B, **own)
+        bush = mech.add_rigid("bush", at=at, orientation=A, **own)
+        given = {"axis": A[:, 2], "reference": A[:, 0], "bearing": b, "oil": VISCOSITY} | more
+        mech.journal_bearing("film", journal.marker(ORIGIN), bush.marker(ORIGIN), **given)
+        # the axis of the journal is not that of the bush: as if the bodies had come there later
+        element = mech.journal_bearings["film"]
+        element.axes[0] = [0.0, 0.0, 1.0]
+        self.mech, self.motion, self.along = mech, motion, along
+        self.packed, self.W = prepared(mech)
+        (self.table,) = self.packed.elements.values()
+
+    def velocities(self, rate=RATE, spin=SPEED, bush=STILL):
+        """(12,) of journal and bush, the latter with (6,) velocity and angular velocity."""
+        n, da, db = self.B[:, 2], rate[3], -rate[2]
+        slope = np.array([self.motion[3], -self.motion[2], 1.0])
+        dn = np.array([da, db, 0.0]) - (slope @ [da, db, 0.0]) / (slope @ slope) * slope
+        omega = np.cross(n, self.A @ dn / np.linalg.norm(slope))
+        omega += (spin - omega @ self.A[:, 2]) / (n @ self.A[:, 2]) * n
+        move = self.A @ [*rate[:2] + self.along * np.array([da, db]), 0.0]
+        v, w = bush[:3], bush[3:]
+        move, omega = v + np.cross(w, self.arm) + move, w + omega
+        return np.concatenate([move, self.B.T @ omega, v, self.A.T @ w])
+
+    def loads(self, v):
+        """(2, 6) loads on journal and bush, world, and the power lost."""
+        residual_at(self.packed.system, self.W, self.packed.q, v, 0 * v, NONE)
+        return self.W.wrench[[self.table.i[0], self.table.j[0]]].copy(), self.W.power[2]
+
+
+# --- the film of the component, seen from anywhere ---
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("along", [0.0, 0.02])
+def test_loads_are_those_of_the_film_in_the_bush(law, along):
+    """Turned, moved, with another point of the axis of the journal."""
+    b = bearing(law)
+    f = film(b, MOTION, RATE, speed=SPEED, viscosity=VISCOSITY)
+    A = turned_by([0.3, -0.5, 0.8])
+    pair = Pair(b, A, (0.3, -0.2, 0.1), along=along)
+    (on_journal, on_bush), power = pair.loads(pair.velocities())
+    force, moment = A.T @ on_journal[:3], A.T @ on_journal[3:]
+    n = A.T @ pair.B[:, 2]
+    # the force on an axis that leans has a part along the bush, so that it does no work along it
+    slopes = MOTION[[3, 2]] * [1, -1]
+    assert_allclose(force, [*f.force[:2], -f.force[:2] @ slopes], rtol=1e-8)
+    middle = moment + np.cross(along * n / n[2], force)
+    assert_allclose(middle[:2], f.force[2:], rtol=1e-6)
+    # pressure has no moment about the axis of the journal, and friction one about that of the bush
+    about = middle[2] + f.force[2:] @ (MOTION[[3, 2]] * [1, -1])
+    assert about == pytest.approx(-f.friction_torque, rel=1e-7)
+    assert power == pytest.approx(f.dissipated, rel=1e-8)
+    assert_allclose(on_journal[:3] + on_bush[:3], 0, atol=1e-9 * np.abs(on_journal).max())
+    total = on_journal[3:] + on_bush[3:] + np.cross(pair.arm, on_journal[:3])
+    assert_allclose(total, 0, atol=1e-12 * np.abs(on_journal).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_bush_that_moves_and_turns_feels_its_film_alike(law):
+    pair = Pair(bearing(law), turned_by([0.3, -0.5, 0.8]))
+    still, power = pair.loads(pair.velocities())
+    carried = np.array([3.0, -2.0, 1.0, 20.0, -30.0, 50.0])
+    moved, same = pair.loads(pair.velocities(bush=carried))
+    assert_allclose(moved, still, rtol=1e-7, atol=1e-9 * np.abs(still).max())
+    assert same == pytest.approx(power, rel=1e-7)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_backwards_is_the_mirror_image(law):
+    """Y mirrored: the spin, tilts about X and angles of grooves change their signs."""
+    mirror = np.array([1.0, -1.0, -1.0, 1.0])
+    b = bearing(law)
+    other = bearing(law, grooves=[Groove(-g.angle, g.width, g.pressure, g.share) for g in GROOVES])
+    (on_journal, _), power = (pair := Pair(b)).loads(pair.velocities())
+    back = Pair(other, motion=MOTION * mirror)
+    (mirrored, _), lost = back.loads(back.velocities(RATE * mirror, -SPEED))
+    signs = [1, -1, 1, -1, 1, -1]
+    assert_allclose(mirrored, on_journal * signs, rtol=1e-8, atol=1e-8)
+    assert lost == pytest.approx(power, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_an_aligned_film_does_not_see_tilts(law):
+    """It has the loads of one that is not tilted, and no moments across."""
+    b = bearing(law, grooves=[Groove(1.2, 0.3, 1e5)], aligned=True)
+    upright = np.array([1.0, 1.0, 0.0, 0.0])
+    f = film(b, MOTION * upright, RATE * upright, speed=SPEED, viscosity=VISCOSITY)
+    (on_journal, _), power = (pair := Pair(b)).loads(pair.velocities())
+    assert_allclose(on_journal[:2], f.force[:2], rtol=1e-7)
+    # that of friction is about the axis of the bush
+    assert_allclose(on_journal[3:], [0, 0, -f.friction_torque], atol=1e-9)
+    assert power == pytest.approx(f.dissipated, rel=1e-7)
+
+
+def test_a_film_that_does_not_turn_is_squeezed():
+    """Short bearing: p = 6 mu (dh/dt) / h^3 (z^2 - L^2/4); where it opens there is none."""
+    e, speed = 0.5, 2e-3
+    b = bearing(slender=0.01, cells=(180, 40), grooves=(), aligned=True)
+    pair = Pair(b, motion=np.array([e * 1e-4, 0, 0, 0]))
+    (on_journal, _), power = pair.loads(pair.velocities(np.array([speed, 0, 0, 0]), 0.0))
+    half = quad(lambda t: np.cos(t) ** 2 / (1 - e * np.cos(t)) ** 3, -np.pi / 2, np.pi / 2)[0]
+    C = VISCOSITY * b.radius * b.length**3 / b.clearance**3 * half
+    assert_allclose(on_journal[:2], [-C * speed, 0.0], rtol=1e-3, atol=1e-6 * C * speed)
+    assert power == pytest.approx(-on_journal[0] * speed, rel=1e-12)
+
+
+def test_a_long_film_that_does_not_turn_is_squeezed():
+    """12 pi mu L (R/c)^3 / (1 - e^2)^1.5 of a full film."""
+    e, speed = 0.5, 2e-3
+    b = bearing("none", (360, 8), (), 40.0, aligned=True)
+    pair = Pair(b, motion=np.array([e * 1e-4, 0, 0, 0]))
+    (on_journal, _), _ = pair.loads(pair.velocities(np.array([speed, 0, 0, 0]), 0.0))
+    C = 12 * np.pi * VISCOSITY * b.length * (b.radius / b.clearance) ** 3 / (1 - e**2) ** 1.5
+    assert on_journal[0] == pytest.approx(-C * speed, rel=2e-2)  # its ends leak
+
+
+def test_without_spin_and_motion_nothing_happens():
+    for law in LAWS:
+        pair = Pair(bearing(law, grooves=[Groove(1.0)]))
+        found, power = pair.loads(pair.velocities(0 * RATE, 0.0))
+        assert_allclose(found, 0.0, atol=1e-9)
+        assert power == 0.0
+
+
+def solved(b, opening=0.0, opening_rate=0.0, **state):
+    """Pressure and answers of the cells of one film, in their units."""
+    films = cells_of([b])
+    films.state[0, SPIN_COLUMN] = 1.0
+    films.opening[0], films.opening_rate[0] = np.ravel(opening), np.ravel(opening_rate)
+    for at, values in state.items():
+        films.state[0, {"motion": slice(4), "rate": slice(4, 8)}[at]] = values
+    assert solve_film(films, 0, 1.0) > 0
+    return films.P[0].copy(), films.answer[0].copy()
+
+
+def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
+    """Openings of cells: all alike as a wider bore; their rates as those of a journal."""
+    motion = [0.4, 0.3, 0.1, -0.2]
+    wider = bearing("jfo", bore=lambda angles: 1.2 + 0 * angles)
+    for found, known in zip(solved(bearing("jfo"), opening=0.2, motion=motion),
+                            solved(wider, motion=motion), strict=True):  # fmt: skip
+        assert_allclose(found, known, rtol=1e-10, atol=1e-10)
+    angle = bearing().grid.angle[0]
+    rate = np.tile(-(0.3 * angle[:, 0] - 0.2 * angle[:, 1])[:, None], 8)
+    moves = solved(bearing(), motion=motion, rate=[0.3, -0.2, 0, 0])
+    for found, known in zip(solved(bearing(), opening_rate=rate, motion=motion), moves,
+                            strict=True):  # fmt: skip
+        assert_allclose(found, known, rtol=1e-10, atol=1e-10)
+    # a bump where the film is thin changes the load, one whose cells have no pressure does not
+    # of one column: its neighbours see half of it at the faces between
+    bump = np.zeros((60, 8))
+    bump[7] = 0.05
+    angle, h = bearing().grid.angle, {}
+    films = cells_of([bearing()])
+    films.opening[0], films.state[0, :4], films.state[0, SPIN_COLUMN] = bump.ravel(), motion, 1.0
+    assert solve_film(films, 0, 1.0) > 0
+    for face, cells in ((0, films.middle), (1, films.behind)):
+        c, s, Z = angle[face, :, :1], angle[face, :, 1:], bearing().grid.Z
+        h[face] = cells[0].reshape(60, 8) - (1 - (0.4 - 0.2 * Z) * c - (0.3 - 0.1 * Z) * s)
+    assert_allclose(h[0][6:9, 0], [0, 0.05, 0], atol=1e-14)
+    assert_allclose(h[1][5:9, 0], [0, 0.025, 0.025, 0], atol=1e-14)
+
+
+# --- tangents ---
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("spin", [SPEED, -SPEED])
+@pytest.mark.parametrize("passed", [0.0, 1e-3])
+def test_tangents_are_the_derivatives(law, spin, passed):
+    """Of positions and velocities, for a bush that moves and turns, with and without memory."""
+    rng = np.random.default_rng(3)
+    pair = Pair(bearing(law), turned_by(rng.normal(size=3)), (0.3, -0.2, 0.1), along=0.01)
+    v = pair.velocities(spin=spin, bush=0.2 * rng.normal(size=6))
+    packed, W = pair.packed, pair.W
+    pair.loads(v)
+    first = len(packed.places.coordinates)
+    W.base[first:] = W.fresh
+    W.base[first + KNOWN], W.base[first + TIME] = float(passed > 0.0), -passed
+    W.base[first + FIRST_CONTENT :] *= 0.97
+
+    def force(dq, dv):
+        residual_at(packed.system, W, shifted(packed, packed.q, dq), v + dv, 0 * v, NONE)
+        return W.residual.copy()
+
+    step = np.tile([1e-10, 1e-10, 1e-10, 1e-9, 1e-9, 1e-9], 2)
+    stiff = np.array([(force(e, 0 * v) - force(-e, 0 * v)) / (2 * d)
+                      for e, d in zip(np.diag(step), step, strict=True)]).T  # fmt: skip
+    loss = difference(lambda x: force(0 * v, x), 12, 1e-8)
+    tangents_at(packed.system, W, packed.q, v, 0 * v, NONE, (0.0, 0.0, 1.0))
+    assert np.abs((W.Kt - stiff) / np.abs(stiff).max(axis=1, keepdims=True)).max() < 1e-5
+    tangents_at(packed.system, W, packed.q, v, 0 * v, NONE, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, loss, atol=1e-6 * np.abs(loss).max() + 2e-5)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_tangents_of_bodies_that_bend_are_the_derivatives(side):
+    """What turns moves where it bends, too: that is damped."""
+    rng = np.random.default_rng(5)
+    soft = random_body(rng)
+    mech = rom.Mechanism(gravity=ORIGIN)
+    point = np.asarray(soft.markers["a"].point)
+    part = mech.add_flexible("soft", soft, at=-point, omega=rng.normal(size=3))
+    stiff = mech.add_rigid("stiff", mass=1.0, inertia=(0.1,) * 3, at=(2e-5, 1e-5, 0))
+    ends = [part.marker("a"), stiff.marker(ORIGIN)]
+    mech.journal_bearing("film", *ends[:: 1 - 2 * side], axis=(0, 0, 1), bearing=bearing(),
+                         oil=VISCOSITY)  # fmt: skip
+    packed, W = prepared(mech)
+    v = packed.v + 1e-3 * rng.normal(size=packed.v.size)
+    v[:3] = np.cross(v[3:6], -point)  # the marker stands still, but for what bends
+    tangents_at(packed.system, W, packed.q, v, 0 * v, NONE, (0.0, 0.0, 1.0))
+    K = W.Kt.copy()
+
+    def force(dq):
+        residual_at(packed.system, W, shifted(packed, packed.q, dq), v, 0 * v, NONE)
+        return W.residual.copy()
+
+    found = np.array([(force(d) - force(-d)) / 2e-10 for d in 1e-10 * np.eye(v.size)]).T
+    assert_allclose(K, found, atol=2e-6 * np.abs(found).max())
+    assert np.abs(K[:, 6:10]).max() > 1e-2 * np.abs(K).max()
+
+
+# --- motions ---
+
+
+def test_two_bodies_on_a_film_keep_momentum_and_energy():
+    b = bearing(cells=(40, 4), grooves=[Groove(2.0, 0.2)])
+    mech = rom.Mechanism(gravity=ORIGIN)
+    own = {"mass": 2.0, "inertia": (0.01, 0.02, 0.03)}
+    journal = mech.add_rigid("journal", at=(0.3e-4, 0, 0), omega=(0.1, 0.05, 100.0), **own)
+    bush = mech.add_rigid("bush", at=ORIGIN, omega=(0.1, 0.05, -20.0), velocity=(0.4, 0, 0), **own)
+    # the journal goes along with what its bush does
+    journal.velocity[:] = [0.4, 0.0, 0.0]
+    mech.journal_bearing("film", journal.marker(ORIGIN), bush.marker(ORIGIN), axis=(0, 0, 1),
+                         bearing=b, oil=0.01)  # fmt: skip
+    sol = rom.simulate(mech, t_end=0.02, dt=5e-6, method="bdf", save_every=20, progress=False)
+    p, L = sol.momentum
+    assert_allclose(p, np.tile([1.6, 0, 0], (len(p), 1)), atol=1e-10)
+    assert_allclose(L, np.tile(L[0], (len(L), 1)), atol=1e-6 * np.abs(L[0]).max())
+    lost = sol.energy.damping[-1]
+    assert lost > 1.0
+    E = sol.energy.kinetic + sol.energy.damping
+    assert_allclose(E, E[0], rtol=1e-6)
+    assert rom.audit(sol).ok
+
+
+# --- what is refused ---
+
+GIVEN = {"axis": (0, 0, 1), "bearing": bearing(), "oil": 0.03}
+
+
+def shaft_on_ground(at=ORIGIN, **given):
+    mech = rom.Mechanism(gravity=ORIGIN)
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=at, omega=(0, 0, 100.0))
+    ends = shaft.marker(ORIGIN), mech.ground.marker(ORIGIN)
+    mech.journal_bearing("mainbearing", *ends, **GIVEN | given)
+    return mech
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    ({"at": (1.1e-4, 0, 0)}, "journal .*'mainbearing' touches its bush at the start"),
+    ({"at": (0.98e-4, 0, 0), "roughness": 5e-6}, "touches its bush at the start"),
+    ({"roughness": 2e-4}, "roughness of bearing 'mainbearing'"),
+    ({"roughness": -1e-6}, "roughness of bearing 'mainbearing'"),
+    ({"axis": ORIGIN}, "axis of bearing 'mainbearing' is zero"),
+    ({"reference": (0, 0, 2)}, "reference of bearing 'mainbearing'"),
+    ({"oil": 0.0}, "oil of bearing 'mainbearing' is 0"),
+    ({"oil": -0.03}, "oil of bearing 'mainbearing' is -0.03"),
+    ({"oil": iso_vg(46)}, "'mainbearing' has an oil, but no inlet"),
+    ({"inlet": 40.0}, "'mainbearing' has an inlet temperature, but"),
+    ({"oil": iso_vg(46), "inlet": 40.0, "carried": 1.5}, "carried = 1.5 of bearing 'mainbearing'"),
+    ({"thermal_time": 0.0}, "thermal_time"),
+])  # fmt: skip
+def test_what_no_bearing_is_is_refused_by_name(given, words):
+    with pytest.raises(ConfigError, match=words):
+        shaft_on_ground(**given)
+
+
+def test_a_body_is_no_bearing_of_itself_and_oil_needs_a_groove():
+    mech = rom.Mechanism()
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
+    with pytest.raises(ConfigError, match="'b' is of body 'shaft' with itself"):
+        mech.journal_bearing("b", *2 * [shaft.marker(ORIGIN)], **GIVEN)
+    with pytest.raises(ModelError, match="without a groove has no oil"):
+        bearing("jfo", grooves=())
+
+
+def test_a_journal_that_hits_its_bush_is_named_with_the_time():
+    mech = shaft_on_ground(oil=1e-6)
+    mech.force("blow", mech.parts["shaft"].marker(ORIGIN), (5e3, 0, 0))
+    with pytest.raises(SolverError, match=r"at t = 0\.00.*touches its bush in 'mainbearing'"):
+        rom.simulate(mech, t_end=0.01, dt=1e-4, progress=False)
+
+
+def test_no_film_carries_more_than_there_is_room_for():
+    with pytest.raises((SolverError, ModelError), match="gap of 'film' open"):
+        rom.equilibrium(held_rotor(bearing(grooves=()), (-1e12, 0), speed=SPEED, oil=1e-6),
+                        spin={"turn": SPEED})  # fmt: skip

@@ -1,0 +1,142 @@
+"""Teeth whose forces follow their energy: gradients, momentum, balance, tangents."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.mechanisms import prepared, residual_at, stored_at, tangents_at
+from cases.mbs.tangents import difference, shifted
+from rom.components.gear_mesh import Correction, GearPair, Hertz
+from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
+
+ORIGIN, Z = (0, 0, 0), (0, 0, 1)
+K = 1.3e10
+PAIRS = {
+    "spur": GearPair((26, 40), 4e-3, 0.03, thinning=5e-5),
+    "helical": GearPair((26, 40), 4e-3, 0.05, helix=0.35, thinning=5e-5),
+    "left": GearPair((26, 40), 4e-3, 0.03, helix=-0.2, thinning=5e-5),
+    "internal": GearPair((24, -72), 2e-3, 0.02, thinning=2e-5),
+}
+
+
+def waves(seed, *shape):
+    """Smooth map of micrometres."""
+    rng = np.random.default_rng(seed)
+    return 1e-6 * rng.random(shape)
+
+
+RELIEVED = Correction(relief=(15e-6, 10e-6), extent=(4e-3, 3e-3), power=1.5, crowning=4e-6,
+                      slope=5e-6, pitch=(1e-6 * np.arange(26) % 7, ()))  # fmt: skip
+OPTIONS = {
+    "plain": {},
+    "relieved": {"correction": RELIEVED},
+    "measured": {"correction": Correction(
+        maps=(waves(0, 4, 3), waves(1, 40, 5, 2)), back_maps=(waves(2, 26, 3, 3), waves(3, 2, 1)),
+        run_out=((2e-6, 0.4), (3e-6, -1.1)))},
+    "hertz": {"hertz": Hertz(((2e-3, 5e-3), (4e-3, 3e-3), (5e-3, 2e-3)))},
+    "coupled": {"coupling": 4e-3, "correction": Correction(crowning=2e-5, slope=2e-5)},
+    "both": {"coupling": 4e-3, "correction": Correction(crowning=2e-5, slope=2e-5),
+             "hertz": Hertz((4e-3, 3e-3))},
+}  # fmt: skip
+LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
+TABLE = K * np.array([0.6, 0.9, 1.1, 0.7])
+CASES = [("spur", "plain"), ("spur", "relieved"), ("spur", "measured"), ("helical", "plain"),
+         ("helical", "relieved"), ("helical", "measured"), ("helical", "hertz"),
+         ("helical", "coupled"), ("helical", "both"), ("left", "relieved"), ("left", "coupled"),
+         ("internal", "plain"), ("internal", "hertz")]  # fmt: skip
+
+
+def wheels(kind, options, **more):
+    """Two free wheels in mesh."""
+    pair, mech = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0))
+    ends = [mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(x, 0, 0)).marker(ORIGIN)
+            for name, x in (("pinion", 0.0), ("gear", pair.distance))]  # fmt: skip
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=TABLE, entry=0.1, cells=7,
+                   **OPTIONS[options] | more)  # fmt: skip
+    return mech
+
+
+def placed(packed, pair, back, seed, tilts=3e-4):
+    """Coordinates of wheels that were turned, shifted and tilted, working or back flanks loaded."""
+    rng, delta = np.random.default_rng(seed), np.zeros(12)
+    delta[[0, 1, 2, 6, 7, 8]] = 2e-5 * rng.normal(size=6)
+    delta[[3, 4, 9, 10]] = tilts * rng.normal(size=4)
+    turn = 0.3 * rng.random()
+    delta[5], delta[11] = turn, -turn * pair.rb[0] / pair.rb[1]
+    delta[5] += -1e-3 - pair.backlash / pair.rb[0] if back else 1e-3
+    return shifted(packed, packed.q, delta)
+
+
+@pytest.mark.parametrize(("kind", "options"), CASES)
+@pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
+def test_forces_are_the_gradient_of_the_energy(kind, options, back):
+    """Wherever the wheels are, whatever lies between them; no force or moment is left over."""
+    packed, W = prepared(wheels(kind, options))
+    none, pair, mesh = np.zeros(12), PAIRS[kind], packed.elements[GEAR_MESHES_FAMILY]
+    for seed in range(3):
+        q = placed(packed, pair, back, seed)
+
+        def energy(delta, q=q):
+            return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
+
+        gradient = difference(energy, 12, 1e-8)[0]
+        residual_at(packed.system, W, q, none, none, np.zeros(0))
+        assert mesh.load[0] > 1e3
+        assert_allclose(W.residual, gradient, atol=1e-6 * np.abs(gradient).max())
+        one, two = W.wrench[mesh.i[0]], W.wrench[mesh.j[0]]
+        apart = W.P[mesh.j[0]] - W.P[mesh.i[0]]
+        assert_allclose(one[:3] + two[:3], 0.0, atol=1e-12 * np.abs(one[:3]).max())
+        moment = one[3:] + two[3:] + np.cross(apart, two[:3])
+        assert_allclose(moment, 0.0, atol=1e-11 * np.abs(one[3:]).max())
+
+
+@pytest.mark.parametrize(("kind", "options"), [c for c in CASES if c[1] != "measured"])
+@pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
+def test_tangents_are_differences_of_forces(kind, options, losses):
+    """But for how directions of forces turn, and gaps are curved: to the deflection over radii."""
+    packed, W = prepared(wheels(kind, options, **losses))
+    q, none = placed(packed, PAIRS[kind], False, 1), np.zeros(0)
+    v = 1e-3 * np.random.default_rng(5).normal(size=12)
+
+    def force(dq, dv):
+        residual_at(packed.system, W, shifted(packed, q, dq), v + dv, 0 * v, none)
+        return W.residual.copy()
+
+    stiff = difference(lambda x: force(x, 0 * v), 12, 1e-9)
+    loss = difference(lambda x: force(0 * v, x), 12)
+    tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 0.0, 1.0))
+    assert_allclose(W.Kt, stiff, atol=1e-3 * np.abs(stiff).max())
+    tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 1.0, 0.0))
+    assert_allclose(W.S, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
+
+
+def thrown(kind, spin=(0.5, 0.0), t_end=6e-4, **more):
+    """Free wheels that hit each other, part and hit again; their motion."""
+    pair, mech, ends = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x, w in zip(("pinion", "gear"), (0.0, pair.distance), spin, strict=True):
+        part = mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
+                              omega=(0, 0, w))  # fmt: skip
+        ends.append(part.marker(ORIGIN))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=TABLE, cells=7, **more)
+    return rom.simulate(mech, t_end=t_end, method="dop853", rtol=1e-10, dt=2e-6, progress=False)
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+@pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
+def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
+    """Fast wheels whose lines come and go under load, with relief, pitch errors and run-out."""
+    pitch = (1e-6 * np.arange(PAIRS[kind].teeth[0]) % 7, ())
+    flanks = Correction((15e-6, 10e-6), (4e-3, 3e-3), 2.0, 4e-6, 5e-6, pitch,
+                        run_out=((2e-6, 0.4), (0.0, 0.0)))  # fmt: skip
+    spin = 40.0, -40.0 * PAIRS[kind].rb[0] / PAIRS[kind].rb[1] + 2.0
+    sol = thrown(kind, spin, correction=flanks, phase=0.1, **losses)
+    force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
+    assert force.max() > 300
+    assert (force == 0).any()
+    strain = sol.energy.strain.max()
+    assert np.abs(sol.energy.balance).max() < 1e-6 * strain
+    for of_all in sol.momentum:  # [N s, N m s]; a blow passes 1e-3 from one wheel to the other
+        assert np.ptp(of_all, axis=0).max() < 1e-13
+    report = rom.audit(sol)
+    assert report.ok, report

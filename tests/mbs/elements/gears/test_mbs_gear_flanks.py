@@ -1,0 +1,336 @@
+"""Measured flanks, run-out, contact by Hertz, and slices that carry each other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.interpolate import RegularGridInterpolator
+from scipy.optimize import brentq
+
+import rom
+from cases.mbs.mechanisms import prepared, residual_at
+from cases.mbs.tangents import shifted
+from rom.components.gear_mesh import (
+    Correction,
+    GearPair,
+    Hertz,
+    Mesh,
+    bending_table,
+    contact_compliance,
+    flank_map,
+    pair_stiffness,
+    tooth_compliance,
+)
+from rom.config.mechanism import read_mechanism
+from rom.errors import ConfigError, ModelError
+from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
+from rom.mbs.elements.gears.table import PHASE
+
+ORIGIN, Z, K = (0, 0, 0), (0, 0, 1), 1.3e10
+SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
+RING = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
+CELLS = 6
+
+
+def wheels(pair=SPUR, at=(ORIGIN, ORIGIN), **more):
+    """Two wheels in mesh, whose markers may be off their axes; packed, and its memory."""
+    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x, place in zip(("a", "b"), (0.0, pair.distance), at, strict=True):
+        part = mech.add_rigid(name, mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0))
+        ends.append(part.marker(place))
+    given = {"stiffness": K, "cells": CELLS, "entry": 0.0, "conservative": False} | more
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **given)
+    return prepared(mech)
+
+
+def load_at(found, turns, phase=None):
+    """Sum of the normal forces when the wheels have turned [N]."""
+    packed, W = found
+    mesh, delta = packed.elements[GEAR_MESHES_FAMILY], np.zeros(12)
+    if phase is not None:
+        mesh.size[0, PHASE] = phase
+    delta[[5, 11]] = turns
+    residual_at(packed.system, W, shifted(packed, packed.q, delta), np.zeros(12), np.zeros(12),
+                np.zeros(0))  # fmt: skip
+    return mesh.load[0]
+
+
+def on_grid(values, tooth, u, z, width):
+    """A map by SciPy."""
+    one = values[tooth % len(values)]
+    axes = np.linspace(0, 1, one.shape[0]), np.linspace(-width / 2, width / 2, one.shape[1])
+    return RegularGridInterpolator(axes, one)(np.column_stack([np.full(z.shape, u), z]))
+
+
+def some_maps(seed=0):
+    rng = np.random.default_rng(seed)
+    return [1e-6 * rng.random(shape) for shape in ((26, 4, 3), (40, 5, 2))]
+
+
+@pytest.mark.parametrize("phase", [0.13, 0.3, 40.2, -3.1])
+def test_slices_bear_over_the_maps_of_both_wheels(phase):
+    """Load of every slice by hand, of the right tooth, also after many turns."""
+    maps = some_maps()
+    found = wheels(correction=Correction(maps=tuple(maps)), phase=phase)
+    (A, B), rb, depth = SPUR.path, SPUR.rb[0], 2.5e-6
+    at, z, wanted = rb * phase + depth, SPUR.width * ((np.arange(CELLS) + 0.5) / CELLS - 0.5), 0.0
+    middle = -int(np.floor(at / SPUR.base_pitch))
+    for line in range(middle - 3, middle + 4):
+        x = at + line * SPUR.base_pitch
+        if A <= x < B:
+            u = (x - A) / (B - A)
+            gap = on_grid(maps[0], -line, u, z, SPUR.width)
+            gap = gap + on_grid(maps[1], -line, 1 - u, z, SPUR.width)
+            wanted += K * SPUR.width / CELLS * np.clip(depth - gap, 0, None).sum()
+    assert wanted > 10
+    assert load_at(found, (depth / rb, 0.0)) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_back_flanks_have_maps_of_their_own_and_know_their_teeth():
+    """One tooth of each wheel lacks material behind; teeth ahead and behind bear."""
+    rb, b = SPUR.rb[0], SPUR.width
+    lacking = [np.zeros((z, 1, 1)) for z in SPUR.teeth]
+    found, depth = wheels(), 1e-6
+    back = -(SPUR.backlash + depth) / rb
+    whole = load_at(found, (back, 0.0), 0.1)
+    lines = round(whole / (K * b * depth))
+    assert lines in (1, 2)
+    for wheel in range(2):
+        fewer = []
+        for tooth in range(SPUR.teeth[wheel]):
+            maps = [x.copy() for x in lacking]
+            maps[wheel][tooth] = 1e-3
+            now = wheels(correction=Correction(back_maps=tuple(maps)))
+            fewer.append(round((whole - load_at(now, (back, 0.0), 0.1)) / (K * b * depth)))
+        assert sorted(fewer)[-lines:] == [1] * lines
+        assert sum(fewer) == lines
+
+
+def test_a_file_of_numbers_is_a_map(tmp_path):
+    maps = some_maps()[0]
+    path = tmp_path / "pinion.csv"
+    path.write_text("\n\n".join("\n".join(",".join(map(repr, map(float, line))) for line in tooth)
+                                for tooth in maps))  # fmt: skip
+    assert_allclose(flank_map(path), maps)
+    path.write_text("1,2\n3\n")
+    with pytest.raises(ModelError, match=r"pinion\.csv is no map of flanks"):
+        flank_map(path)
+    path.write_text("1,2\n3,x\n")
+    with pytest.raises(ModelError, match=r"is no map of flanks: .*'x'"):
+        flank_map(path)
+
+
+@pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
+@pytest.mark.parametrize("wheel", [0, 1])
+@pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
+def test_run_out_is_what_a_wheel_off_its_axis_does(pair, wheel, back):
+    """To first order in how far: 1 micrometre against the centre of the involutes elsewhere."""
+    amount, towards, (r1, r2) = 1e-6, 0.7, pair.rb
+    phase = 0.5 * sum(pair.path) / r1  # one line touches in the middle of its path
+    if back:
+        phase = (float(pair.base_thickness[0]) + 2 * r1 * pair.alpha) / r1 - phase
+    mesh_side = 0.0 if wheel == 0 or pair.internal else np.pi  # of this wheel, where they mesh
+    place, angle = [ORIGIN, ORIGIN], mesh_side + towards
+    place[wheel] = (amount * np.cos(angle), amount * np.sin(angle), 0.0)
+    given = [(0.0, 0.0), (0.0, 0.0)]
+    given[wheel] = (amount, towards)
+    moved = wheels(pair, tuple(place))
+    thought = wheels(pair, correction=Correction(run_out=tuple(given)))
+    depth, depths = 1e-5, []
+    for step in range(-10, 11, 3):  # less than half a turn: angles are followed
+        turn = 2 * np.pi / pair.teeth[0] * step
+        close = (-pair.backlash - depth if back else depth) / r1
+        turns = turn + close, -turn * r1 / r2
+        depths.append([load_at(x, turns, phase) / (K * pair.width) for x in (moved, thought)])
+    one, two = np.array(depths).T
+    assert np.ptp(one) > 5e-7
+    assert_allclose(two - two[0], one - one[0], atol=3e-3 * amount)
+
+
+def test_a_slice_solves_bending_and_hertz_for_its_load():
+    """One line at the pitch point, against a root by SciPy; the whole of the path by the energy."""
+    k, h, E = 2e10, (4e-3, 3e-3), 206e9
+    found = wheels(hertz=Hertz(h, E), stiffness=k)
+    radii = SPUR.pitch_point, SPUR.tangents - SPUR.pitch_point
+    phase = SPUR.pitch_point / SPUR.rb[0]
+    for depth in (1e-9, 1e-7, 1e-5, 3e-5):
+        wanted = brentq(lambda F, d=depth: F / k + F * contact_compliance(radii, h, F, E) / E - d,
+                        1e-9, 1e8, xtol=1e-12, rtol=1e-14)  # fmt: skip
+        turn = depth / SPUR.rb[0]
+        load = load_at(found, (turn, 0.0), phase - turn) / SPUR.width
+        assert load == pytest.approx(wanted, rel=2e-3)  # the table of the constant is linear
+
+
+@pytest.mark.parametrize(("teeth", "module", "wanted"), [
+    ((26, 157), 4e-3, 16.91), ((50, 50), 3e-3, 16.39), ((25, 25), 4e-3, 15.77)])  # fmt: skip
+def test_bending_with_hertz_is_that_of_weber_and_banaschek_at_one_load(teeth, module, wanted):
+    """By another program at 300 N/mm with slightly other fillets, N/(mm um) at the pitch point."""
+    pair = GearPair(teeth, module, 0.04)
+    stiffness, hertz = bending_table(pair, n=401)
+    found, force = wheels(pair, stiffness=stiffness, hertz=hertz), 3e5
+    phase = pair.pitch_point / pair.rb[0]
+
+    def off(depth):
+        turn = depth / pair.rb[0]
+        return load_at(found, (turn, 0.0), phase - turn) / pair.width - force
+
+    depth = brentq(off, 1e-7, 1e-4, xtol=1e-16)
+    assert force / depth * 1e-9 == pytest.approx(wanted, rel=0.015)
+    secant = pair_stiffness(pair, pair.pitch_point, force=force)
+    assert force / depth == pytest.approx(secant, rel=3e-4)
+
+
+def pressed(gaps, depth, **more):
+    """Load of one line over its stiffness [m^2], the gaps given at ends and middles of slices."""
+    n = (len(gaps) - 1) // 2
+    lead = Correction(maps=(np.tile(gaps, (2, 1)), None))
+    phase = 0.5 * sum(SPUR.path) / SPUR.rb[0]
+    found = wheels(cells=n, correction=lead, **more)
+    return load_at(found, (depth / SPUR.rb[0], 0.0), phase) / K
+
+
+def steps(touching):
+    """Gaps at ends and middles of slices, none where they touch."""
+    middle = np.where(touching, 0.0, 1e-3)
+    return np.concatenate([[middle[0]], np.repeat(middle, 2)])[: 2 * middle.size + 1]
+
+
+@pytest.mark.parametrize("n", [2, 21])
+def test_coupling_does_nothing_to_an_even_load(n):
+    for more in ({}, {"hertz": Hertz((4e-3, 3e-3))}):
+        even = pressed(np.zeros(2 * n + 1), 1e-5, **more)
+        assert pressed(np.zeros(2 * n + 1), 1e-5, coupling=6e-3, **more) == pytest.approx(
+            even, rel=1e-9
+        )
+
+
+@pytest.mark.parametrize("length", [2e-3, 8e-3, 0.03])
+def test_a_punch_on_the_foundation_is_that_of_pasternak(length):
+    """Over its width c at one end it bears k w (c + l tanh((b - c) / l)); at both sides twice."""
+    b, w, n = SPUR.width, 1e-5, 600
+    share = np.arange(n) / n
+    for touching, sides in ((share < 0.2, (0.8,)), ((share >= 0.4) & (share < 0.6), (0.4, 0.4))):
+        edge = sum(length * np.tanh(side * b / length) for side in sides)
+        found = pressed(steps(touching), w, coupling=length)
+        assert found == pytest.approx(w * (0.2 * b + edge), rel=5e-3)
+
+
+def test_a_load_at_the_end_of_the_foundation():
+    """k l w tanh(b / l), as slices become thin; slices that are not coupled carry none of it."""
+    b, w, errors = SPUR.width, 1e-5, []
+    wanted = 4e-3 * w * np.tanh(b / 4e-3)
+    for n in (100, 200, 400):
+        errors.append(pressed(steps(np.arange(n) < 1), w, coupling=4e-3) / wanted - 1)
+    assert abs(errors[-1]) < 1.5e-2
+    assert_allclose(np.array(errors[:-1]) / errors[1:], 2.0, rtol=0.1)
+    alone = pressed(steps(np.arange(100) < 1), w)
+    assert pressed(steps(np.arange(100) < 1), w, coupling=1e-7) == pytest.approx(alone)
+    assert alone == pytest.approx(w * b / 100)
+
+
+def test_slices_beside_a_ridge_lift_off():
+    """What a foundation bears under a crowned flank, against its quadratic programme."""
+    from scipy.optimize import lsq_linear
+
+    n, length, depth = 40, 6e-3, 1e-5
+    z = (np.arange(n) + 0.5) / n - 0.5
+    gap = 4e-5 * (2 * z) ** 2
+    found = wheels(cells=n, correction=Correction(crowning=4e-5), coupling=length)
+    phase = 0.5 * sum(SPUR.path) / SPUR.rb[0]
+    load = load_at(found, (depth / SPUR.rb[0], 0.0), phase)
+    k, h = K * SPUR.width / n, SPUR.width / n
+    D = np.diff(np.eye(n), axis=0) * np.sqrt(k) * length / h
+    A = np.vstack([np.sqrt(k) * np.eye(n), D])
+    w = lsq_linear(A, np.zeros(len(A)), (depth - gap, np.full(n, 1.0)), tol=1e-15).x
+    assert (w > depth - gap + 1e-9).sum() > 10
+    assert load == pytest.approx((A.T @ A @ w).sum(), rel=1e-6)
+
+
+NAN = np.full((4, 3), np.nan)
+BAD = [
+    ({"correction": Correction(maps=(np.zeros((25, 4, 3)), None))}, r"\(25, 4, 3\).*or \(26"),
+    ({"correction": Correction(maps=(None, np.zeros(4)))}, r"working flanks of the gear .*\(4,\)"),
+    ({"correction": Correction(back_maps=(NAN, None))}, "back flanks of the pinion .* 12 values"),
+    ({"correction": Correction(pitch=(np.full(26, np.nan), ()))}, "not all finite"),
+    ({"correction": Correction(run_out=((1e-3, 0.0), (0, 0)))}, "run-out 0.001 m of 'mesh'"),
+    ({"coupling": -1e-3}, "coupling = -0.001 m of mesh 'mesh'"),
+    ({"coupling": 1.0}, "from 0 to the width, 0.03"),
+    ({"conservative": True}, "energy of mesh 'mesh' would jump"),
+    ({"hertz": Hertz((1e-3, -1e-3))}, "depths .* above 0"),
+    ({"hertz": Hertz((1e-3, 1e-3), E=-1.0)}, "no material has E = -1"),
+]
+
+
+@pytest.mark.parametrize(("more", "message"), BAD)
+def test_what_no_flank_is_like_is_refused(more, message):
+    with pytest.raises((ConfigError, ModelError), match=message):
+        wheels(**more)
+
+
+def test_hands_that_do_not_mesh_are_named():
+    helical = replace(SPUR, helix=0.3)
+    assert replace(helical, gear_helix=-0.3).gear_helix == -0.3
+    with pytest.raises(ModelError, match=r"gear of helix 17\.19 degrees does not mesh"):
+        replace(helical, gear_helix=0.3)
+    with pytest.raises(ModelError, match=r"needs 17\.19 degrees"):
+        replace(RING, helix=0.3, gear_helix=-0.3)
+    with pytest.raises(ModelError, match="contact is lost"):
+        GearPair((26, 40), 2e-3, 0.02, addendum=0.3)
+    with pytest.raises(ModelError, match="maps and run-out are for elements"):
+        Mesh(SPUR, K, Correction(maps=(np.zeros((2, 2)), None)))
+
+
+def test_depths_of_teeth_are_those_of_the_compliance():
+    _, hertz = bending_table(SPUR, n=3)
+    middle = 0.5 * sum(SPUR.path)
+    radius = float(np.hypot(SPUR.rb[0], middle))
+    assert hertz.depths[1, 0] == pytest.approx(tooth_compliance(SPUR, 0, radius)[2])
+
+
+FILE = """
+[simulation]
+t_end = 1e-3
+dt = 1e-4
+[bodies.a]
+mass = 1
+inertia = [1, 1, 1]
+at = [0, 0, 0]
+markers = { p = [0, 0, 0] }
+[gear_meshes.m]
+between = ["a.p", { ground = ["132 mm", 0, 0] }]
+axis = [0, 0, 1]
+stiffness = ["12 GPa", "13 GPa"]
+coupling = "4 mm"
+conservative = true
+hertz = { depths = ["4 mm", "3 mm"], nu = 0.28 }
+[gear_meshes.m.pair]
+teeth = [26, 40]
+module = "4 mm"
+width = "30 mm"
+helix = 0.0
+gear_helix = 0.0
+[gear_meshes.m.correction]
+pinion_map = "pinion.csv"
+gear_back_map = "gear.csv"
+gear_pitch = [PITCH]
+run_out = ["2 um", "3 um"]
+run_out_direction = [0.1, 0.2]
+"""
+
+
+def test_files_have_all_that_teeth_may_be(tmp_path):
+    (tmp_path / "pinion.csv").write_text("1e-6,2e-6\n3e-6,4e-6\n")
+    (tmp_path / "gear.csv").write_text("1e-6\n\n" * 40)
+    pitch = ", ".join(f'"{k % 5} um"' for k in range(40))
+    (tmp_path / "m.toml").write_text(FILE.replace("PITCH", pitch))
+    mesh = read_mechanism(tmp_path / "m.toml").mechanism().gear_meshes["m"]
+    assert mesh.numbers[3:] == pytest.approx((1.0, 4e-3, (1 - 0.28**2) / (np.pi * 206e9)))
+    assert_allclose(mesh.stiffness, (12e9, 13e9))
+    assert_allclose(mesh.hertz.depths, (4e-3, 3e-3))
+    flanks = mesh.correction
+    assert_allclose(flanks.maps[0], [[[1e-6, 2e-6], [3e-6, 4e-6]]])
+    assert_allclose(flanks.back_maps[1], np.full((40, 1, 1), 1e-6))
+    assert flanks.maps[1] is None and flanks.back_maps[0] is None
+    assert_allclose(flanks.pitch[1], 1e-6 * (np.arange(40) % 5))
+    assert_allclose(flanks.run_out, ((2e-6, 0.1), (3e-6, 0.2)))

@@ -1,0 +1,103 @@
+"""Teeth and films of bodies that spin in their frames: as of those whose frames turn."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from rom.components.gear_mesh import Correction, GearPair
+from rom.errors import ConfigError
+from rom.mbs import Groove, JournalBearing
+
+ORIGIN, Z = (0, 0, 0), (0, 0, 1)
+PAIR = GearPair((26, 40), 4e-3, 0.03, helix=0.2, thinning=5e-5)
+FLANKS = Correction(relief=(15e-6, 10e-6), extent=(2e-3, 3e-3),
+                    pitch=(2e-6 * (np.arange(26) % 5), 1e-6 * (np.arange(40) % 7)))  # fmt: skip
+SPEED = 120.0
+
+
+def geared(way, speed=SPEED, torque=60.0):
+    """Two wheels on soft bearings with pitch errors, relief, damping and friction."""
+    mech = rom.Mechanism(gravity=ORIGIN)
+    speeds = {"pinion": speed, "gear": -speed * 26 / 40}
+    for name, x, inertia in (("pinion", 0.0, 4e-3), ("gear", PAIR.distance, 1.5e-2)):
+        ends = {"low": (0, 0, -0.06), "high": (0, 0, 0.05)}
+        wheel = mech.add_rigid(name, mass=4.0, inertia=(inertia, inertia, inertia), at=(x, 0, 0),
+                               markers=ends, **{way: (0, 0, speeds[name])})  # fmt: skip
+        for end, place in ends.items():
+            both = mech.ground.marker((x, *place[1:])), wheel.marker(end)
+            mech.bushing(f"{end} of {name}", *both, stiffness=(2e7, 3e7, 1e8, 0, 0, 0),
+                         damping=(9e3, 9e3, 9e3, 0, 0, 0))  # fmt: skip
+        mech.torque(f"torque of {name}", wheel.marker(ORIGIN),
+                    (0, 0, torque * (1 if x == 0 else 40 / 26)))  # fmt: skip
+    ends = [mech.part(name).marker(ORIGIN) for name in speeds]
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=PAIR, stiffness=1.3e10, correction=FLANKS, cells=9,
+                   damping=1e-5, friction=0.06, transition_speed=0.05)  # fmt: skip
+    return mech
+
+
+def test_teeth_of_spinning_wheels_bear_as_those_of_turning_frames():
+    """Through pitch errors and friction that reverses; both balances of energy close."""
+    found = []
+    for way in ("omega", "spin"):
+        sol = rom.simulate(geared(way), t_end=0.012, dt=4e-6, save_every=20)
+        report = rom.audit(sol)
+        assert report.ok, report
+        loads = [one.force.sum() for one in rom.mbs.tooth_loads(sol, "mesh")]
+        found.append((sol.position("pinion"), sol.position("gear"), np.array(loads)))
+    assert np.ptp(found[0][2][20:]) > 0.05 * found[0][2][20:].mean()
+    for one, other in zip(*found, strict=True):
+        assert_allclose(other, one, atol=3e-5 * np.abs(one).max())
+
+
+def test_speeds_that_teeth_cannot_have_are_named():
+    mech = rom.Mechanism()
+    ends = [mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, 0), spin=(0, 0, speed))
+            for name, x, speed in (("a", 0, 30.0), ("b", PAIR.distance, 19.5))]  # fmt: skip
+    with pytest.raises(ConfigError, match=r"teeth 26 and 40 turn at 30 and -19.5"):
+        mech.gear_mesh("mesh", *(end.marker(ORIGIN) for end in ends), axis=Z, pair=PAIR,
+                       stiffness=1e10)  # fmt: skip
+    balls, rings = rom.mbs.BallBearing(9, 0.01, 0.05), (ends[0].marker(ORIGIN), mech.ground)
+    with pytest.raises(ConfigError, match="both must be one"):
+        mech.rolling_bearing("bearing", rings[0], rings[1].marker(ORIGIN), axis=(1, 0, 0),
+                             bearing=balls)  # fmt: skip
+
+
+def carried(way, speed):
+    """A rotor in two films under its weight."""
+    bearing = JournalBearing(0.05, 0.03, 5e-5, [Groove(0.0, 0.3), Groove(np.pi, 0.3)],
+                             cells=(40, 4))  # fmt: skip
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    rotor = mech.add_rigid("rotor", mass=30.0, inertia=(0.4, 0.4, 0.1), at=ORIGIN,
+                           markers={"a": (0, 0, -0.1), "b": (0, 0, 0.1)},
+                           **{way: (0, 0, speed)})  # fmt: skip
+    for name, z in (("a", -0.1), ("b", 0.1)):
+        mech.journal_bearing(name, rotor.marker(name), mech.ground.marker((0, 0, z)), axis=Z,
+                             bearing=bearing, oil=0.02)  # fmt: skip
+    mech.bushing("thrust", mech.ground.marker(ORIGIN), rotor.marker(ORIGIN),
+                 stiffness=(0, 0, 1e6, 0, 0, 0))  # fmt: skip
+    return mech
+
+
+@pytest.mark.parametrize("speed", [200.0, -200.0])
+def test_films_of_a_spinning_rotor_carry_as_those_of_a_turning_frame(speed):
+    """Both fall into their films from the middle of the bush; friction slows the turning one."""
+    found = []
+    for way in ("omega", "spin"):
+        mech = carried(way, speed)
+        if way == "omega":  # kept at its speed, as what spins is
+            hub = mech.add_rigid("hub", mass=1e-3, inertia=(1e-6,) * 3, at=ORIGIN,
+                                 omega=(0, 0, speed))  # fmt: skip
+            mech.revolute("motor", mech.ground.marker(ORIGIN), hub.marker(ORIGIN), axis=Z)
+            mech.drive("speed", "motor", lambda t: speed * t, rate=lambda t: speed)
+            mech.bushing("coupling", hub.marker(ORIGIN), mech.part("rotor").marker(ORIGIN),
+                         stiffness=(0, 0, 0, 0, 0, 1e4))  # fmt: skip
+        else:
+            mech.bushing("coupling", mech.ground.marker(ORIGIN), mech.part("rotor").marker(ORIGIN),
+                         stiffness=(0, 0, 0, 0, 0, 1e4))  # fmt: skip
+        sol = rom.simulate(mech, t_end=0.02, dt=2e-5, save_every=10)
+        report = rom.audit(sol)
+        assert report.ok, report
+        found.append(sol.position("rotor"))
+    assert np.abs(found[0]).max() > 1e-6
+    assert_allclose(found[1], found[0], atol=1e-6 * np.abs(found[0]).max())
