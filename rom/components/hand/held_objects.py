@@ -19,11 +19,13 @@ from rom.mbs.parts.bodies import Part
 from rom.model import Array
 from rom.rotation import matrix
 
-SKIN = Impact(5e3, exponent=1.0, damping=5.0, mu=0.8, transition_speed=1e-3)  # of a fingertip
+# silicone of 0.6 MPa on round bars of 5 mm and 15 mm, after Hertz
+SKIN = Impact(5e4, damping=5.0, mu=0.8, transition_speed=2e-3)
 FOOT_RADIUS = 1e-3  # of the feet on which a bar stands [m]
 FEET_SHARE = 0.8  # of its radius, at which they are
 UPRIGHT_COSINE = 0.9  # between axis and gravity of a bar that stands
-MIN_TABLE_MASS = 0.1  # [kg]; its motion is given
+TABLE_MASS = 0.1  # [kg]; its motion is given
+RAMP_TIME = 0.1  # over which the table gathers speed [s]
 
 
 @dataclass(frozen=True)
@@ -148,9 +150,9 @@ def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float
     feet, radius = _feet(held, up)
     low = min(float(foot @ up) for foot in feet) - radius
     top = np.asarray(held.centre) + low * up
-    made = mech.add_rigid("table", mass=MIN_TABLE_MASS, inertia=(1e-4,) * 3, at=top)
+    made = mech.add_rigid("table", mass=TABLE_MASS, inertia=(1e-4,) * 3, at=top)
     mech.prismatic("table guide", mech.ground.marker(top), made.marker((0.0, 0.0, 0.0)), axis=up)
-    mech.drive("table motor", "table guide", lambda t: -_way(t - leaves, speed),
+    mech.drive("table motor", "table guide", lambda t: -_descent(t - leaves, speed),
                rate=lambda t: -_rate(t - leaves, speed))  # fmt: skip
     for k, foot in enumerate(feet, start=1):
         mech.sphere_on_plane(f"table on {name} {k}", made.marker((0.0, 0.0, 0.0)),
@@ -159,17 +161,14 @@ def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float
     return made
 
 
-RAMP = 0.1  # over which the table gathers speed [s]
-
-
-def _way(t: float, speed: float) -> float:
-    """Way after a start at zero with a smooth ramp of the speed."""
-    s = min(max(t / RAMP, 0.0), 1.0)
-    return speed * (RAMP * (s**3 - 0.5 * s**4) + max(t - RAMP, 0.0))
+def _descent(t: float, speed: float) -> float:
+    """Length gone after a start at zero with a smooth ramp of the speed."""
+    s = min(max(t / RAMP_TIME, 0.0), 1.0)
+    return speed * (RAMP_TIME * (s**3 - 0.5 * s**4) + max(t - RAMP_TIME, 0.0))
 
 
 def _rate(t: float, speed: float) -> float:
-    s = min(max(t / RAMP, 0.0), 1.0)
+    s = min(max(t / RAMP_TIME, 0.0), 1.0)
     return speed * s * s * (3.0 - 2.0 * s)
 
 

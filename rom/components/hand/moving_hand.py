@@ -3,7 +3,9 @@
 A finger of `rom.components.hand.compliant_hand` gets a seat on the palm, a drive for its cable,
 masses, and losses in its springs. Bodies are named "palm", "index spring 1" and "index phalanx 1",
 markers of a phalanx "proximal" and "distal", cables "index cable", joints "index joint 1" (palm or
-phalanx to spring) and "index plate 1" (spring to phalanx).
+phalanx to spring) and "index plate 1" (spring to phalanx). A drive named "index" closes the whole
+finger; one named "index joint 2" bends that joint alone, by a cable in a sleeve that ends at its
+first plate.
 """
 
 from collections.abc import Callable, Mapping
@@ -77,7 +79,9 @@ class Drive:
         tension: force at the first end [N], or a function of time; or give the next.
         pull: length that the winch takes in [m], or a function of time.
         EA: force per strain of the cable of a winch [N].
-        damping: of that cable [N s].
+        damping: of that cable [N s]; a cable that it keeps taut tightens with a jump of the force.
+        sleeve: length of the cable of a winch in a sleeve before its first place, which bends
+            freely and does not give way [m].
         conduit: places on the palm that the cable passes before the first hole, the first one that
             of the motor, in the world at the start [m].
         transition_speed: of the cable in its holes, over which friction turns [m/s].
@@ -86,7 +90,8 @@ class Drive:
     tension: Any = None
     pull: Any = None
     EA: float = 2e3
-    damping: float = 2.0
+    damping: float = 0.0
+    sleeve: float = 0.0
     conduit: tuple[tuple[float, float, float], ...] = ()
     transition_speed: float = TRANSITION_SPEED
 
@@ -113,7 +118,7 @@ class Build:
 
 
 @dataclass(frozen=True)
-class Limits:
+class _Winch:
     """A pull that a winch can do, as a function of time."""
 
     name: str
@@ -157,7 +162,7 @@ def moving_hand(
 
     Args:
         fingers: {name: finger}; None for the five of `hand` with four segments a spring.
-        drives: {name: drive} of cables; without one a finger has no cable.
+        drives: {name: drive} of cables, of fingers or of joints; without one there is no cable.
         seats: {name: seat}; None for `SEATS`, a row of four and the thumb across.
         build: masses and losses; None for `Build()`.
         gravity: (3,) [m/s^2].
@@ -168,8 +173,12 @@ def moving_hand(
     """
     fingers = hand(n=4) if fingers is None else fingers
     drives, seats = drives or {}, SEATS if seats is None else seats
-    for kind, names in (("drive", drives), ("seat", fingers)):
-        known = fingers if kind == "drive" else seats
+    joints = {f"{name} joint {k}" for name, one in fingers.items()
+              for k in range(1, len(one.springs) + 1)}  # fmt: skip
+    for kind, names, known in (
+        ("drive", drives, {*fingers, *joints}),
+        ("seat", fingers, seats),
+    ):
         for name in names:
             if name not in known:
                 raise ConfigError(f"{kind} of {name!r}: there are {offered(known, name)}.")
@@ -180,8 +189,7 @@ def moving_hand(
                         palm.marker(-palm.at))  # fmt: skip
     for name, finger in fingers.items():
         _finger(made, name, finger, seats[name], palm)
-        if name in drives:
-            _cable(made, name, finger, drives[name], palm)
+        _cables(made, name, finger, drives, palm)
     return made.mech
 
 
@@ -209,10 +217,10 @@ def _finger(made: _Assembly, name: str, finger: Finger, seat: Seat, palm: Part) 
     for k, (spring, link) in enumerate(pairs, start=1):
         joint = mech.add_nonlinear(f"{name} spring {k}", spring_body(finger, spring, made.build),
                                    at=at, orientation=A)  # fmt: skip
-        _weld(mech, f"{name} joint {k}", before, joint.marker("start"))
+        mech.fixed(f"{name} joint {k}", before, joint.marker("start"))
         at = at + spring.length * A[:, 2]
         bone = _phalanx(made, f"{name} phalanx {k}", link, at, A)
-        _weld(mech, f"{name} plate {k}", joint.marker("end"), bone.marker("proximal"))
+        mech.fixed(f"{name} plate {k}", joint.marker("end"), bone.marker("proximal"))
         half = np.array([0.0, 0.0, 0.5 * link])
         path += [bone.marker(hole - half), bone.marker(hole + half)]
         at, before = at + link * A[:, 2], bone.marker("distal")
@@ -221,10 +229,6 @@ def _finger(made: _Assembly, name: str, finger: Finger, seat: Seat, palm: Part) 
 
 def _on_palm(palm: Part, point: Array) -> Marker:
     return palm.marker(point - palm.at)
-
-
-def _weld(mech: Mechanism, name: str, one: Marker, two: Marker) -> None:
-    mech.fixed(name, one, two)
 
 
 def spring_body(finger: Finger, spring: HelicalSpring, build: Build) -> Any:
@@ -256,26 +260,47 @@ def _phalanx(made: _Assembly, name: str, link: float, at: Array, A: Array) -> Pa
     )  # fmt: skip
 
 
-def _cable(made: _Assembly, name: str, finger: Finger, drive: Drive, palm: Part) -> None:
-    """The tendon of a finger."""
+def _cables(
+    made: _Assembly, name: str, finger: Finger, drives: Mapping[str, Drive], palm: Part
+) -> None:
+    """The tendon of a finger, and those of its joints."""
+    holes, lengths = made.paths[name], [spring.length for spring in finger.springs]
+    if name in drives:
+        conduit = [_on_palm(palm, finite("conduit", x, (3,))) for x in drives[name].conduit]
+        _cable(made.mech, name, drives[name], [*conduit, *holes],
+               (finger.friction, sum(lengths)))  # fmt: skip
+    for k, length in enumerate(lengths, start=1):
+        joint = f"{name} joint {k}"
+        if joint in drives:
+            if drives[joint].conduit:
+                raise ConfigError(f"the cable of {joint!r} alone runs in a sleeve: it has no "
+                                  "conduit on the palm.", hint="Give its sleeve a length.")  # fmt: skip
+            _cable(made.mech, joint, drives[joint], holes[2 * k - 2 : 2 * k], (0.0, length))
+
+
+def _cable(
+    mech: Mechanism, name: str, drive: Drive, path: list[Marker], limits: tuple[float, float]
+) -> None:
+    """One tendon; limits are the friction in its holes [1] and the length of its springs [m]."""
     if (drive.tension is None) == (drive.pull is None):
         raise ConfigError(f"the drive of {name!r} needs either a tension or a pull.")
-    path = [*(_on_palm(palm, finite("conduit", x, (3,))) for x in drive.conduit),
-            *made.paths[name]]  # fmt: skip
-    how: dict[str, Any] = {"friction": finger.friction}
-    if finger.friction:
+    friction, springs = limits
+    how: dict[str, Any] = {"friction": friction}
+    if friction:
         how["transition_speed"] = drive.transition_speed
     if drive.pull is None:
-        made.mech.tendon(f"{name} cable", path, tension=drive.tension, **how)
+        mech.tendon(f"{name} cable", path, tension=drive.tension, **how)
         return
     pull = drive.pull if callable(drive.pull) else _constant(number("pull", drive.pull))
-    most = PULL_SHARE * sum(spring.length for spring in finger.springs)
-    pull = Limits(name, pull, most)
-    points = np.array([made.mech.design_point(marker) for marker in path])
+    pull = _Winch(name, pull, PULL_SHARE * springs)
+    points = np.array([mech.design_point(marker) for marker in path])
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     pull(0.0)
-    made.mech.tendon(f"{name} cable", path, EA=drive.EA, damping=drive.damping,
-                     free_length=lambda t: length - pull(t), **how)  # fmt: skip
+    if number("sleeve", drive.sleeve) < 0.0:
+        raise ConfigError(f"the sleeve of {name!r} is {drive.sleeve:g} m long: not below zero.")
+    EA = positive("EA", drive.EA) * length / (length + drive.sleeve)
+    mech.tendon(f"{name} cable", path, EA=EA, damping=drive.damping,
+                free_length=lambda t: length - pull(t), **how)  # fmt: skip
 
 
 def _constant(value: float) -> Callable[[float], float]:

@@ -1,7 +1,11 @@
-"""From commands of the control chart to winches: motors that follow at a limited speed."""
+"""From commands of the control chart to winches: motors that follow at a limited speed.
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+Either each cable has a motor, or the drums of one shaft draw in several.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +21,7 @@ FINGERS = ("thumb", "index", "middle", "ring", "little")  # columns of `Commands
 
 @dataclass(frozen=True)
 class Motor:
-    """A winch that goes to where it is told, never faster than it can.
+    """A winch that follows a command, never faster than it can.
 
     Attributes:
         rate: fastest change of the pull [m/s].
@@ -28,7 +32,7 @@ class Motor:
     lag: float = 0.02
 
     def follow(self, pulls: npt.ArrayLike, dt: float) -> Array:
-        """Pull that the winch reaches, from what it is told.
+        """Pull that the winch reaches.
 
         The speed is that of a first-order lag, cut off at the rate: s' = (command - s) / lag.
 
@@ -83,10 +87,65 @@ def winches(
     t = dt * np.arange(len(reached))
     base = drive or Drive()
     return {
-        name: Drive(None, _Held(PchipInterpolator(t, y), t[-1]), base.EA, base.damping,
-                    base.conduit, base.transition_speed)
+        name: replace(base, tension=None, pull=_Held(PchipInterpolator(t, y), t[-1]))
         for name, y in zip(names, reached.T, strict=True)
-    }  # fmt: skip
+    }
+
+
+def shaft(
+    angle: Callable[[float], float],
+    radii: Mapping[str, float],
+    *,
+    drive: Drive | None = None,
+) -> Mapping[str, Drive]:
+    """Drives of fingers whose cables run onto drums of one shaft.
+
+    Args:
+        angle: of the shaft as a function of time [rad].
+        radii: {finger: radius of its drum} [m].
+        drive: cable, conduit and the rest; None for `Drive()`.
+
+    Raises:
+        ConfigError: for a radius that is none.
+    """
+    base = drive or Drive()
+    return {
+        name: replace(base, tension=None, pull=_Drum(angle, positive(f"radius of {name}", r)))
+        for name, r in radii.items()
+    }
+
+
+def shaft_moment(solution: Any, radii: Mapping[str, float]) -> Array:
+    """(n_t,) moment with which a motor holds the shaft of drums, sum of radius times tension [N m].
+
+    Args:
+        solution: motion of a moving hand with drives of `shaft`.
+        radii: as there.
+    """
+    return sum((r * tension(solution, name) for name, r in radii.items()),
+               np.zeros(solution.t.size))  # fmt: skip
+
+
+def tension(solution: Any, name: str) -> Array:
+    """(n_t,) tension of a cable at its first end, where the motor is [N].
+
+    Args:
+        solution: motion of a moving hand.
+        name: of the finger, or of the joint, whose cable it is.
+    """
+    first: Array = solution.element(f"{name} cable").force[:, 0]
+    return np.linalg.norm(first, axis=1)
+
+
+@dataclass(frozen=True)
+class _Drum:
+    """What runs onto a drum of a shaft."""
+
+    angle: Callable[[float], float]
+    radius: float
+
+    def __call__(self, t: float) -> float:
+        return self.radius * self.angle(t)
 
 
 @dataclass(frozen=True)
