@@ -131,15 +131,10 @@ class Run:
 
 
 def run(speed, films, **oil):
-    """The unit at rest, and through some mesh periods.
-
-    It is looked for where films would rest that fill themselves: others may run dry on the way.
-    """
-    oil = oil or {"inlet": films.inlet}
-    mech, full = (unit(speed, x, **oil) for x in (films, replace(films, law="reynolds")))
+    """The unit at rest, and through some mesh periods."""
+    mech = unit(speed, films, **(oil or {"inlet": films.inlet}))
     period = 2 * np.pi / (speed * TEETH[0])
-    nearby = replace(rom.equilibrium(full), base=None)  # without what its films remember
-    at_rest = rom.equilibrium(mech, state=nearby)
+    at_rest = rom.equilibrium(mech)
     motion = rom.simulate(mech, state=at_rest, t_end=PERIODS * period, dt=period / STEPS,
                           rho_inf=0.6)  # fmt: skip
     F = np.array([x.force.sum() for x in rom.mbs.tooth_loads(motion, "teeth")])

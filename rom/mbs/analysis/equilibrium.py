@@ -1,6 +1,6 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -86,18 +86,12 @@ def equilibrium(
     time = (0.0 if state is None else state.t) if t is None else t
     now = instant(mechanism, time, sparse=None)
     search = _Search(now, Spins.of(mechanism, now, spin, about))
-    found, done, width = search.start(state), 0.0, 1.0 / steps
+    found = search.start(state)
     with reached(lambda: found):
-        while done < 1.0:
-            load = min(done + width, 1.0)
-            try:
-                found = search.settle(found, load if load < 1.0 - 1e-9 else 1.0)
-            except SolverError:
-                width /= 2
-                if width < MIN_LOAD_STEP / steps:
-                    raise
-                continue
-            done = load if load < 1.0 - 1e-9 else 1.0
+        nearby = search.eased(found, steps) if state is None else None
+        way = search.loaded(found, steps) if nearby is None else iter((nearby,))
+        for at_load in way:
+            found = at_load
         search.judge(found)
     return found
 
@@ -135,6 +129,49 @@ class _Search:
         self.now.remember(state)
         q = assembled(packed, W, np.asarray(state.q, dtype=float))
         return self.spins.steady(self.now, replace(first, q=q, lam=state.lam.copy()))
+
+    def eased(self, state: State, steps: int) -> State | None:
+        """Equilibrium where some elements come to rest more easily in another form.
+
+        As they are at first, without smaller steps of the load; then from where they rest in that
+        other form. None if there is no such element, or neither way leads there.
+        """
+        with self.now.packed.eased() as changed:
+            pass
+        if not changed:
+            return None
+        with suppress(SolverError):
+            return [*self.loaded(state, steps, least=1.0)][-1]
+        with suppress(SolverError):
+            with self.now.packed.eased():
+                nearby = [*self.loaded(state, steps)][-1]
+            return [*self.loaded(self.start(nearby), 1)][-1]
+        return None
+
+    def loaded(self, state: State, steps: int, *, least: float = MIN_LOAD_STEP) -> Iterator[State]:
+        """Equilibria at growing shares of the loads, the last at all of them.
+
+        Args:
+            state: where the search starts.
+            steps: number of load steps.
+            least: part of a step which is not halved any more.
+
+        Raises:
+            SolverError: if Newton's method fails, even after small steps.
+        """
+        done, width = 0.0, 1.0 / steps
+        while done < 1.0:
+            load = min(done + width, 1.0)
+            load = load if load < 1.0 - 1e-9 else 1.0
+            try:
+                state = self.settle(state, load)
+            except SolverError:
+                width /= 2
+                if width < least / steps:
+                    raise
+                continue
+            done = load
+            yield state
 
     def settle(self, state: State, load: float) -> State:
         """Equilibrium at a share of the loads.

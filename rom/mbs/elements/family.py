@@ -8,6 +8,7 @@ by ``mechanism.add``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -95,6 +96,11 @@ def rows_of(values: Any, *shape: int) -> Array:
 def no_room(_: Any) -> Array:
     """(0,) no gap that is of the size of corrections."""
     return np.zeros(0)
+
+
+def nothing_eased(_: Table) -> AbstractContextManager[bool]:
+    """Elements that come to rest as they are."""
+    return nullcontext(False)
 
 
 def no_answers(_: Table) -> Sequence[Any]:
@@ -243,6 +249,8 @@ class Family:
         lost: what is wrong if an answer is not finite; in place of {}, the names.
         room: table -> (e,) gaps over those in the middle [1], which one correction towards an
             equilibrium may halve or double at most.
+        eased: table -> context within which its elements find their equilibrium more easily, close
+            to the one that is wanted; it says whether that changes anything.
     """
 
     name: str
@@ -263,6 +271,7 @@ class Family:
     answers: Callable[[Any], Sequence[Any]] = no_answers
     lost: str = "the law of {} gives no finite number"
     room: Callable[[Any], Array] = no_room
+    eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
 
     @property
     def kernels(self) -> list[ElementKernel]:

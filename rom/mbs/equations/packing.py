@@ -1,5 +1,7 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -103,6 +105,12 @@ class Packed:
     def has_potential(self) -> bool:
         """Whether forces of elements, dampers aside, follow from a potential."""
         return all(family.potential for family in self.elements)
+
+    @contextmanager
+    def eased(self) -> Iterator[bool]:
+        """Elements come to rest more easily, as long as this lasts; says whether some do."""
+        with ExitStack() as stack:
+            yield any([stack.enter_context(f.eased(table)) for f, table in self.elements.items()])
 
     @property
     def room(self) -> dict[str, float]:

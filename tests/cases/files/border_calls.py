@@ -281,7 +281,6 @@ GIVEN = {  # callable -> legal values of its own
     "craig_bampton": {"K": lambda: model().K, "M": lambda: model().M},
     "cyclic_modes": {"sector": ring, "diameter": lambda: 1},
     "continuation": {"span": lambda: (0.0, 1e-3)},
-    "periodic_path": {"build": lambda: spring, "span": lambda: (1.0, 1.1)},
     "equilibrium_sensitivity": {
         "build": lambda: spring,
         "parameters": lambda: {"stiffness": 2.0},
@@ -299,6 +298,13 @@ GIVEN = {  # callable -> legal values of its own
     "held_solid": WHEEL | {"fixed": lambda: ("bore",)},
     "inverse_dynamics": {"mechanism": lambda: driven(free=False), "t": lambda: [0.0, 1e-3]},
     "linearize": {},
+    "periodic_motion": {"period": lambda: 1.0, "steps": lambda: 10},
+    "periodic_path": {
+        "build": lambda: spring,
+        "span": lambda: (1.0, 1.1),
+        "period": lambda: 1.0,
+        "steps": lambda: 10,
+    },
     "load": {"path": lambda: "body.rom.npz"},
     "load_state": {"path": lambda: "state.npz"},
     "mistuned_wheel": {"sector": ring},

@@ -51,12 +51,15 @@ def rigid_unit(**more):
     return replace(soft, pinion=rotors[0], gear=rotors[1])
 
 
-def as_mechanism(unit, oil=None, **more):
-    """The same unit as a mechanism: shafts that spin in frames which do not turn."""
+def as_mechanism(unit, oil=None, seats=(-SPAN / 2, SPAN / 2), **more):
+    """The same unit as a mechanism: shafts that spin in frames which do not turn.
+
+    The program knows only wheels in the middle; here seats may be elsewhere along the shafts.
+    """
     mech, mesh = rom.Mechanism(gravity=(*unit.gravity, 0.0)), unit.mesh
     for k, (name, rotor) in enumerate((("pinion", unit.pinion), ("gear", unit.gear))):
         shaft, x = rotor.shaft, k * mesh.pair.distance
-        ends = {"low": (0, 0, -SPAN / 2), "middle": (0, 0, 0), "high": (0, 0, SPAN / 2)}
+        ends = {"low": (0, 0, seats[0]), "middle": (0, 0, 0), "high": (0, 0, seats[1])}
         part = mech.add_rigid(name, mass=shaft.mass, at=(x, 0, SPAN / 2), markers=ends,
                               inertia=(shaft.across, shaft.across, shaft.about),
                               spin=unit.spins[k] * Z)  # fmt: skip
@@ -73,7 +76,7 @@ def as_mechanism(unit, oil=None, **more):
     mech.gear_mesh("mesh", pinion.marker("middle"), gear.marker("middle"), axis=Z, pair=mesh.pair,
                    stiffness=mesh.stiffness, correction=mesh.correction, damping=mesh.damping,
                    entry=0.0, conservative=False, cells=mesh.cells)  # fmt: skip
-    mech.bushing("coupling", mech.ground.marker((0, 0, 0)), pinion.marker("low"),
+    mech.bushing("coupling", mech.ground.marker((0, 0, SPAN / 2 + seats[0])), pinion.marker("low"),
                  stiffness=(0, 0, 0, 0, 0, unit.motor),
                  damping=(0, 0, 0, 0, 0, unit.loss * unit.motor))  # fmt: skip
     mech.torque("load", gear.marker("low"), unit.torque * Z)

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.geared_rotors import SPAN, as_mechanism, rigid_unit
+from cases.mbs.geared_rotors import SIZES, SPAN, as_mechanism, rigid_unit
 from rom.components.journal_bearing import Groove
 from rom.components.transmission import rest, whirl
 from rom.rotation import log
@@ -41,22 +41,44 @@ def test_shafts_rest_on_films_and_teeth_where_they_do_in_the_unit(more):
     assert_allclose(found, there.q, atol=1e-8 * np.abs(there.q).max())
 
 
-@pytest.mark.parametrize("beyond", [-90, 90, 150])
-def test_shafts_rest_on_films_that_conserve_their_oil_wherever_it_comes_in(beyond, recwarn):
-    """From the middle of the bushes, where films begin to fill; they are no unstable springs."""
-    unit = rigid_unit(gravity=(0.0, -9.81))
+def oiled(beyond, **more):
+    """The unit with films that conserve their oil; it comes in at an angle [deg] from the load."""
+    unit = rigid_unit(gravity=(0.0, -9.81), **more)
     push, rotors = rest(unit).forces.mesh.force, []
     for rotor, side in ((unit.pinion, 1), (unit.gear, -1)):
         at = np.arctan2(push[1], side * push[0]) + np.radians(beyond)
         inlet = [Groove(at, np.radians(20))]
-        oiled = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
-        rotors.append(replace(rotor, bearings=oiled))
-    unit = replace(unit, pinion=rotors[0], gear=rotors[1])
+        films = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
+        rotors.append(replace(rotor, bearings=films))
+    return replace(unit, pinion=rotors[0], gear=rotors[1])
+
+
+@pytest.mark.parametrize("beyond", [-90, 90, 150])
+def test_shafts_rest_on_films_that_conserve_their_oil_wherever_it_comes_in(beyond, recwarn):
+    """From the middle of the bushes, where films begin to fill; they are no unstable springs."""
+    unit = oiled(beyond)
     mech = as_mechanism(unit)
     found = coordinates(unit, rom.equilibrium(mech))
     wanted = rest(unit).q
     assert_allclose(found, wanted, atol=1e-7 * np.abs(wanted).max())
     assert not recwarn.list
+
+
+@pytest.mark.parametrize("beyond", [-60, -45])
+def test_wheels_beside_the_middle_find_their_films_where_oil_comes_in_before_the_load(beyond):
+    """From the middle they run dry on the way to the load. Near and far seats bear 7 to 3.
+
+    Within a hundredth, as teeth press harder on one end of their face.
+    """
+    seats, unit = (-0.06, 0.14), oiled(beyond, speed=60.0)
+    mech = as_mechanism(unit, seats=seats)
+    still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
+    for name, side, size in zip(("pinion", "gear"), (-1, 1), SIZES, strict=True):
+        near, far = (still.element(f"{name} {end}").force[0, 0, :2] for end in ("low", "high"))
+        teeth = still.element("mesh").force[0, 0, :2] * -side
+        weight = np.array([0.0, -9.81 * size[0]])
+        assert_allclose(near + far, -teeth - weight, rtol=1e-8)
+        assert_allclose(near, 0.7 * (near + far), atol=0.01 * np.hypot(*teeth))
 
 
 def test_helical_wheels_tilt_as_in_the_unit():

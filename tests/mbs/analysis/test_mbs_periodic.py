@@ -215,6 +215,10 @@ def test_a_driven_double_pendulum_has_the_multipliers_of_lagrange_s_equations():
     assert_allclose(fine.solution.joint("hinge 0").angle[0], y[0], rtol=1e-3)
     better = fine.multipliers + (fine.multipliers - coarse.multipliers) / 3
     assert_allclose(better, exact, atol=2e-6)
+    rough = rom.periodic_motion(double_pendulum(), period=T, steps=40).solution
+    assert_allclose(rough.v[-1], rough.v[0], atol=1e-9)  # across the joints, too
+    s = fine.solution
+    assert_allclose(s.reaction("hinge 0")[-1], s.reaction("hinge 0")[0], atol=1e-4)
     assert np.abs(fine.multipliers - exact).max() < 2e-3
 
 
@@ -356,3 +360,23 @@ def test_an_oscillator_with_gaps_has_the_motion_of_its_pieces():
     exact = run.sol(59 * T + found.solution.t)[0]
     assert_allclose(way(found), exact, atol=2e-4)
     assert way(found).min() < gap < way(found).max()
+
+
+def test_a_ball_that_rolls_has_more_free_positions_than_velocities():
+    """Seven fifths of its mass swing on a spring: rolling binds velocities alone."""
+    w, k, c, r = 1.3, 4.0, 0.4, 0.1
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    ball = mech.add_rigid("mass", mass=1.0, inertia=(0.4 * r**2,) * 3, at=(0, 0, r))
+    center = ball.marker(ORIGIN)
+    mech.rolling("roll", mech.ground.marker(ORIGIN), center, normal=Z, radius=r)
+    for name, side in (("west", -X), ("east", X), ("south", -Y), ("north", Y)):
+        end = mech.ground.marker(np.array([0, 0, r]) + 1e3 * side)
+        mech.spring_damper(name, end, center, stiffness=k / 2, damping=c / 2)
+    mech.force("push", center, lambda t: (0.02 * np.cos(w * t), 0, 0))
+    found = rom.periodic_motion(mech, period=2 * np.pi / w, steps=400)
+    amplitude = 0.02 / abs(k - 1.4 * w**2 + 1j * c * w)
+    assert np.ptp(way(found)) / 2 == pytest.approx(amplitude, rel=1e-3)
+    assert found.multipliers.size == 5 + 3
+    decay = np.exp(-c / 2.8 * found.period)
+    assert_allclose(np.sort(np.abs(found.multipliers))[:4], decay, rtol=3e-4)
+    assert_allclose(np.sort(np.abs(found.multipliers))[4:], 1.0, atol=2e-2)

@@ -2,5 +2,5 @@
 
 `flow` moves a mechanism through one period from many starts; `turns` looks at what advances by a
 symmetric angle as if it had not; `shooting` closes the motion by Newton's method, `motion` is the
-verb for one, `path` for a family of them. `repetition` refuses what cannot repeat.
+verb for one, `path` for a `family` of them. `repetition` refuses what cannot repeat.
 """

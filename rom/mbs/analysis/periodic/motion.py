@@ -21,7 +21,7 @@ from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.process.progress import line
 
-N_STEPS = 200  # per period
+N_STEPS, MAX_STEPS = 200, 100_000  # per period
 # the method forgets what a step does not resolve within a period; motions that keep their energy
 # must not lose it to the method
 RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
@@ -30,6 +30,8 @@ RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
 GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 MAX_PASSES = 60
+MAX_WEAK = 1.0  # rad or lengths of the mechanism of a correction in what a period hardly changes
+MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
 MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
 MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
 STABLE_TOL = 1e-6  # of the size of a multiplier: differences and round-off
@@ -177,7 +179,7 @@ class Shooting:
         free = self.period is None
         gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
         rate = found.rate if free else None
-        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap)[0], None
+        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap, most=MAX_WEAK)[0], None
         for _ in range(MAX_SHORTENINGS):
             try:
                 flow, y = found.flow, answer
@@ -252,8 +254,9 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         start: state, equilibrium or motion nearby from which it is looked for; None for where the
             bodies were added. A motion that nothing drives begins in a state that moves.
         turns: {joint or body: angle [rad]} by which it has advanced after the period when it looks
-            the same again, as a gear by one tooth pitch; None as the angle for a body that looks
-            the same after any. Whole turns need not be told.
+            the same again, as a gear by one tooth pitch, counted as the angle of the joint is, or
+            along its spin for a body without one; None as the angle for a body that looks the same
+            after any. Whole turns need not be told.
         steps: of generalised-alpha in a period.
         rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
             motion is conservative.
@@ -279,13 +282,22 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
 
     Source:
         Nayfeh and Balachandran, Applied Nonlinear Dynamics (1995).
+
+    Example:
+        >>> mech = rom.Mechanism(gravity=(0, 0, 0))
+        >>> ball = mech.add_rigid("b", mass=1, inertia=(1, 1, 1), at=(2, 0, 0)).marker((0, 0, 0))
+        >>> mech.spring_damper("s", mech.ground.marker((0, 0, 0)), ball, stiffness=4, damping=0.4)
+        >>> mech.force("push", ball, lambda t: (np.cos(t), 0, 0))
+        >>> q = rom.periodic_motion(mech, period=2 * np.pi).solution.q
+        >>> round(float(q[:, 0].max()) - 2, 3)  # 1 / sqrt(3^2 + 0.4^2)
+        0.33
     """
     if rho_inf is None:
         rho_inf = CONSERVATIVE_RHO_INF if conservative else RHO_INF
     shooting, flow, begin = prepared(
         mechanism, period, start, turns, steps, rho_inf, guess, t_start, tolerance, progress
     )
-    whole("settle", settle, 0, 10**6)
+    whole("settle", settle, 0, MAX_SETTLE)
     if conservative and period is not None:
         raise ConfigError("conservative is for motions that nothing drives; here period is given.")
     turning = turns_of(mechanism, turns, begin)
@@ -314,7 +326,7 @@ def prepared(  # noqa: PLR0913  the arguments of the verb
     state = start.state if isinstance(start, PeriodicMotion) else start
     if t_start is None:
         t_start = 0.0 if state is None else state.t
-    whole("steps", steps, 4, 10**7)
+    whole("steps", steps, 4, MAX_STEPS)
     positive("tolerance", tolerance)
     if not 0.0 <= number("rho_inf", rho_inf) <= 1.0:
         raise ConfigError(f"rho_inf = {rho_inf:g} is outside [0, 1].")

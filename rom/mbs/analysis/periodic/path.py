@@ -1,47 +1,40 @@
 """Motions that repeat, over a parameter: past folds, stable or not."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import trapezoid
 
 from rom.arguments import finite, positive, typed, whole
-from rom.errors import ConfigError, ModelError, SolverError, reached
+from rom.errors import ConfigError, SolverError, reached
 from rom.mbs.analysis.continuation.arc_length import Curve, Point
-from rom.mbs.analysis.periodic.flow import Flow, Start
+from rom.mbs.analysis.periodic.family import Family, Period, period_at
+from rom.mbs.analysis.periodic.flow import Flow
 from rom.mbs.analysis.periodic.motion import (
     N_STEPS,
     RHO_INF,
     STABLE_TOL,
     PeriodicMotion,
-    Shooting,
     periodic_motion,
 )
-from rom.mbs.analysis.periodic.shooting import Return, Tangent
-from rom.mbs.analysis.periodic.turns import Turns, turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
 from rom.process.progress import line
 
-PARAMETER_STEP = 1e-6  # of differences, of the span
 CLOSED_TOL = 1e-7  # corrections that count as none, of the size of the motion
-GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
-FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives are asked for
 FOLD_RTOL = 1e-3  # of a step; the parameter of a fold then errs by its square
+END_RTOL = 1e-9  # the same of the end of the span
+END_TOL = 1e-6  # of the span
 LOCATION_RTOL = 1e-4  # of a step: multipliers are differences
 LEAST_SIZE_RATIO = 0.1  # of the largest motion so far, below which steps do not shrink with it
-MAX_DIRECT = 4  # coordinates up to which derivatives are cheaper than passes that do without
-N_LOOKS = 24  # instants of a motion at which its size is measured
 MAX_POINTS = 100_000
 CROSSING_TOL = 1e-2  # of a multiplier from the unit circle at a motion that is critical
 REAL_TOL = 1e-6  # imaginary part of a multiplier that counts as none
-Period = float | Callable[[float], float] | None
 
 
 @dataclass(frozen=True)
@@ -148,13 +141,13 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
         raise ConfigError(f"span = ({first:g}, {last:g}) has no length.")
     whole("n", n, 2, MAX_POINTS)
     longest = positive("step", step)
-    T = _period_at(period, first)
+    T = period_at(period, first)
     begin = periodic_motion(
         build(first), period=T, start=start, turns=turns, steps=steps, rho_inf=rho_inf,
         guess=guess, settle=settle, progress=progress,
     )  # fmt: skip
     scale = Flow(begin.solution.mechanism, begin.state.t, begin.period, steps, rho_inf).probe
-    family = _Family(build, period, begin, turns, steps, rho_inf, abs(last - first), scale,
+    family = Family(build, period, begin, turns, steps, rho_inf, abs(last - first), scale,
                      0.0 * scale)  # fmt: skip
     march = _March(family, (first, last), progress)
     with reached(lambda: march.path):
@@ -162,188 +155,10 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     return march.path
 
 
-def _period_at(period: Period, p: float) -> float | None:
-    if period is None:
-        return None
-    return positive("period", period(p) if callable(period) else period)
-
-
-@dataclass(frozen=True)
-class _Member:
-    """A start and its period [s]."""
-
-    start: Start
-    period: float
-
-
-@dataclass
-class _Family:
-    """Motions over a parameter, as `arc_length` asks for them.
-
-    Steps are motions and changes of velocities, in rad or lengths of the mechanism and per radian
-    of the period, and the relative change of the period.
-
-    Attributes:
-        build, period, turns, steps, rho_inf: as the user has them.
-        first: the first motion.
-        span: change of the parameter that counts as one.
-        scale: (n,) motion of each coordinate that counts as one.
-        advance: (n,) mean velocities of the bodies in the last motion.
-        unit: size of the motion, in which steps are measured.
-        tangent, by_p: derivatives of the last motion that was differentiated, by its coordinates
-            and by the parameter.
-    """
-
-    build: Callable[[float], Mechanism]
-    period: Period
-    first: PeriodicMotion
-    turns: Mapping[str, float | None] | None
-    steps: int
-    rho_inf: float
-    span: float
-    scale: Array
-    advance: Array
-    unit: float = 1.0
-    tangent: Tangent | None = None
-    by_p: Array = field(default_factory=lambda: np.zeros(0))
-    gap: float = np.inf
-    last: Return | None = None
-    flows: dict[float, Flow] = field(default_factory=dict)
-
-    @property
-    def free(self) -> bool:
-        """Whether the period is found."""
-        return self.period is None
-
-    def shooting(self, flow: Flow) -> Shooting:
-        """How motions of a mechanism are looked for."""
-        T = None if self.free else flow.period
-        numbers = (flow.t0, self.steps, self.rho_inf, 1.0)
-        return Shooting(flow.mechanism, T, *numbers, self.turns)
-
-    def flow(self, p: float, period: float) -> Flow:
-        """The mechanism at a parameter; the last few are kept."""
-        if p not in self.flows:
-            T = _period_at(self.period, p)
-            t0 = self.first.state.t
-            made = Flow(self.build(p), t0, T or period, self.steps, self.rho_inf)
-            self._check_size(made, p)
-            self.flows[p] = made
-            for old in list(self.flows)[:-4]:
-                del self.flows[old]
-        flow = self.flows[p]
-        return flow if flow.period == period or not self.free else flow.lasting(period)
-
-    def _check_size(self, flow: Flow, p: float) -> None:
-        q = self.first.solution.q
-        if flow.packed.q.size != q.shape[1]:
-            raise ConfigError(f"the mechanism has other bodies at {p:g} than at the first value.")
-
-    def turning(self, flow: Flow, start: Start) -> Turns:
-        """What advances."""
-        return turns_of(flow.mechanism, self.turns, start.state)
-
-    def member(self, motion: PeriodicMotion, p: float) -> _Member:
-        """A motion that was found."""
-        flow = self.flow(p, motion.period)
-        return _Member(flow.begun(motion.state), motion.period)
-
-    def returned(self, at: _Member, p: float, basis: Any = None) -> Return:
-        """What comes of a start."""
-        flow = self.flow(p, at.period)
-        return Return.of(flow, self.turning(flow, at.start), at.start, basis)
-
-    def corrections(self, at: _Member, p: float) -> tuple[Array, Array]:
-        """Newton's correction, and the change of the motion per parameter."""
-        basis = None if self.tangent is None else self.tangent.around.chart
-        found = self.returned(at, p, basis)
-        self.last = found
-        fresh = found.open < FRESH_RATIO * self.unit <= self.gap
-        few = found.chart.size <= MAX_DIRECT
-        if self.tangent is None or few or fresh or not found.open < GOOD_RATIO * self.gap:
-            found = self.differentiate(replace(found, basis=None), p)
-        self.gap = found.open
-        assert self.tangent is not None
-        rate = found.rate if self.free else None
-        newton, slope = self.tangent.solved(rate, found.gap, self.by_p)
-        return self._step(found, newton), self._step(found, slope)
-
-    def differentiate(self, found: Return, p: float) -> Return:
-        """Take the derivatives at a motion."""
-        d = PARAMETER_STEP * self.span
-        T = found.flow.period if self.free else (_period_at(self.period, p + d) or 0.0)
-        chart, flow, still = found.chart, self.flow(p + d, T), 0.0 * found.start.state.v
-        start = flow.moved(found.start, still, self.faster(found.flow.period, T))
-        later = self.returned(_Member(start, T), p + d, chart)
-        moved = chart.of_state(later.turned) - chart.of_state(start.state) - chart.seen(
-            still, found.start.ahead)  # fmt: skip
-        self.tangent, self.by_p = found.tangent(), (moved - found.gap) / d
-        return found
-
-    def _step(self, found: Return, y: Array) -> Array:
-        """(2n + 1,) step of coordinates (f,) or (f + 1,)."""
-        chart = found.chart
-        dq, dv = chart.motion(y[: chart.size])
-        dT = y[-1] / (2 * np.pi) if self.free else 0.0
-        return np.concatenate([dq / self.scale, chart.time * dv / self.scale, [dT]])
-
-    def moved(self, at: _Member, step: Array, p: float) -> _Member:
-        """The start after a step.
-
-        Raises:
-            SolverError: if no state nearby satisfies the joints.
-        """
-        n = at.start.state.v.size
-        period = at.period * (1 + step[-1]) if self.free else (_period_at(self.period, p) or 0.0)
-        if not 0.5 * at.period < period < 2 * at.period:
-            raise SolverError("the period changes by too much in a step.")
-        flow = self.flow(p, period)
-        start, scale = at.start, self.scale
-        if self.last is not None:
-            start = replace(start, ahead=self.last.back.ahead, later=self.last.later)
-        dv = step[n : 2 * n] * scale / (at.period / (2 * np.pi))
-        dv = dv + self.faster(at.period, period)
-        try:
-            return _Member(flow.moved(start, step[:n] * scale, dv), period)
-        except ModelError as error:
-            raise SolverError(f"no start satisfies the joints: {error.message}") from error
-
-    def inner(self, a: Array, b: Array) -> float:
-        """Product of two steps, in sizes of the motion."""
-        return float(a @ b) / self.unit**2
-
-    def size(self, step: Array) -> float:
-        """Largest part of a step, in sizes of the motion."""
-        return float(np.abs(step).max(initial=0.0)) / self.unit
-
-    def mean_speed(self, motion: PeriodicMotion) -> Array:
-        """(n,) mean velocities of bodies that advance by as much in every period."""
-        s, bodies = motion.solution, motion.solution.packed.system.bodies
-        mean, out = trapezoid(s.v, s.t, axis=0) / motion.period, np.zeros_like(self.scale)
-        rigid = (bodies.v_at[:, None] + np.arange(6)).ravel()
-        out[rigid] = 0.0 if self.free else mean[rigid]
-        return out
-
-    def faster(self, before: float, after: float) -> Array:
-        """(n,) change of velocities with which bodies advance by as much in another period."""
-        return (before / after - 1.0) * self.advance
-
-    def measure(self, motion: PeriodicMotion, flow: Flow, turns: Turns) -> float:
-        """How far a motion goes from its start, in rad or lengths of the mechanism."""
-        s, scale, largest = motion.solution, self.scale, 0.0
-        for k in np.unique(np.linspace(0, s.t.size - 1, N_LOOKS).astype(int)):
-            part = (s.t[k] - s.t[0]) / motion.period
-            state = replace(motion.state, q=s.q[k], v=s.v[k])
-            state = turns.back(state, tuple(part * angle for angle in motion.turns))
-            away = flow.apart(motion.state, state) / scale
-            largest = max(largest, float(np.abs(away).max(initial=0.0)))
-        return largest
-
-
 class _March:
     """Motions of a path one after the other, and what happens between them."""
 
-    def __init__(self, family: _Family, span: tuple[float, float], progress: bool):
+    def __init__(self, family: Family, span: tuple[float, float], progress: bool):
         self.family, self.progress = family, progress
         self.first, self.last = span
         self.curve = Curve(family, family.span, CLOSED_TOL)
@@ -370,15 +185,14 @@ class _March:
         try:
             for one, h, two in self.curve.steps(point, longest):
                 bound = float(np.clip(two.p, low, high))
-                if two.p != bound:
-                    h, two = self.curve.located(
-                        one, h, lambda x: x.p - bound, LOCATION_RTOL)  # noqa: B023  # fmt: skip
-                before = self.motions[-1]
+                leaves = two.p != bound
+                if leaves:
+                    h, two = self.curve.located(one, h, lambda x: x.p - bound, END_RTOL)  # noqa: B023
+                if leaves and abs(two.p - bound) > END_TOL * family.span:
+                    return  # teeth that come or go between hide the way there
                 self.add(two)
-                self.between(one, h, two, before, self.motions[-1])
-                if bound in (low, high) and abs(two.p - bound) < 1e-4 * family.span:
-                    return
-                if len(self.motions) == n:
+                self.between(one, h, two, *self.motions[-2:])
+                if leaves or len(self.motions) == n:
                     return
         except SolverError as error:
             raise SolverError(
@@ -410,7 +224,7 @@ class _March:
         size = family.measure(motion, flow, family.turning(flow, point.at.start))
         most = LEAST_SIZE_RATIO * (family.unit if len(self.motions) > 1 else 0.0)
         family.unit, family.gap = max(size, most) or 1.0, np.inf
-        family.advance = family.mean_speed(motion)
+        family.advance = family.advanced(motion)
         if self.progress:
             word = "stable" if motion.stable else "unstable"
             line(f"motion {len(self.p)} at {point.p:.6g}: {word}")

@@ -58,7 +58,7 @@ def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, drive
             f"{signal.name!r} does not repeat with the period {flow.period:.9g} s: a period later "
             f"it differs by {np.abs(change).max():.3g}.",
             where=signal.name,
-            hint="Give the period of all drives and loads, and turns of what advances.",
+            hint="Give the period of all drives and loads; turns= says by how much joints advance.",
         )
     raise ModelError(
         f"{signal.name!r} changes with time, so that the period is not free.",

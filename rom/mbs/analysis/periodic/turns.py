@@ -25,10 +25,11 @@ class Turn:
     """A body that advances about an axis of its own.
 
     Attributes:
-        name: joint or body, as the user has it.
+        name: joint in which it turns, or the body where there is none.
         body: its number.
         axis: (3,) in its frame [1].
-        angle: by which it advances in a period [rad]; None for whatever it does.
+        angle: by which it advances in a period about the axis [rad]; None for whatever it does.
+        prescribed: the same as the angle of the joint counts.
         first, first_velocity: its places in q and v.
     """
 
@@ -36,6 +37,7 @@ class Turn:
     body: int
     axis: Array
     angle: float | None
+    prescribed: float | None
     first: int
     first_velocity: int
 
@@ -84,7 +86,7 @@ class Turns:
 
     def of(self, joint: str) -> float | None:
         """Angle by which the drive of a joint may advance; zero for others, None for any."""
-        found = [turn.angle for turn in self.every if turn.name == joint]
+        found = [turn.prescribed for turn in self.every if turn.name == joint]
         return found[0] if found else 0.0
 
 
@@ -97,14 +99,15 @@ def turns_of(mechanism: Mechanism, turns: Mapping[str, float | None] | None, sta
     """
     numbers = {name: k for k, name in enumerate(mechanism.parts)}
     found, places = [], _places(mechanism)
-    for name, angle in (turns or {}).items():
+    for given, angle in (turns or {}).items():
+        name = _joint_of(mechanism, given)
         body, axis, point, sign = _hinged(mechanism, name, state, places)
         if angle is not None and abs(_beyond_turns(angle)) < WHOLE_TURN_TOL:
             continue  # the same place
         part = mechanism.parts[body]
         _refuse_unequal(name, part, axis, point, angle)
         signed = None if angle is None else sign * angle
-        found.append(Turn(name, numbers[body], axis, signed, *places[body]))
+        found.append(Turn(name, numbers[body], axis, signed, angle, *places[body]))
     return Turns(tuple(found))
 
 
@@ -115,6 +118,13 @@ def _places(mechanism: Mechanism) -> dict[str, tuple[int, int]]:
         found[name] = (q, v)
         q, v = q + 7 + part.r, v + 6 + part.r
     return found
+
+
+def _joint_of(mechanism: Mechanism, name: str) -> str:
+    """The only joint with an angle in which a body turns; else what the user named."""
+    joints = mechanism.joints.values()
+    found = [x.name for x in joints if x.turn and name in [m.body for m in x.markers]]
+    return found[0] if name in mechanism.parts and len(found) == 1 else name
 
 
 def _beyond_turns(angle: float) -> float:

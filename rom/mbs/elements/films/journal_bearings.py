@@ -1,6 +1,7 @@
 """Journal bearings as elements: what users describe, and their arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy.typing as npt
 from rom.arguments import finite, number, positive
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
-from rom.mbs.elements.films.bearing import JournalBearing
+from rom.mbs.elements.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.mbs.elements.films.cells import CLEARANCE, cells_of
 from rom.mbs.elements.films.journals import (
     FIRST_CONTENT,
@@ -199,9 +200,21 @@ def _memory(one: OilFilm, known: float) -> Array:
     return memory
 
 
+@contextmanager
+def oil_everywhere(journals: Journals) -> Iterator[bool]:
+    """Films that conserve their oil find it everywhere: on the way to the load they may run dry."""
+    law = journals.films.law.copy()
+    journals.films.law[law == JFO] = REYNOLDS
+    try:
+        yield bool((law == JFO).any())
+    finally:
+        journals.films.law[:] = law
+
+
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
     complete=True, potential=False, answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
+    eased=oil_everywhere,
 )  # fmt: skip
