@@ -44,12 +44,13 @@ def between_springs(w):
     return mech
 
 
-def way(solution):
+def largest(solution):
+    """Amplitude of the mass [m]."""
     return np.abs(solution.position("mass")[:, 0]).max()
 
 
 curve = rom.periodic_path(between_springs, (0.7, 2.2), period=lambda w: 2 * np.pi / w)
-amplitude, folds = curve.of(way), [x.p for x in curve.critical]
+amplitude, folds = curve.of(largest), [x.p for x in curve.critical]
 say(f"{len(curve.p)} motions; the path turns back at {folds[0]:.4f} and {folds[1]:.4f} rad/s")
 
 # A simulation that begins on the branch between the folds leaves it for one of the others.
@@ -127,7 +128,7 @@ def branches(p, y, stable):
 spring = view.Panel(
     "A spring that hardens", "frequency of the force [rad/s]", "amplitude [m]",
     curves=branches(curve.p, amplitude, curve.stable),
-    points={"folds": (folds, [way(x.motion.solution) for x in curve.critical])},
+    points={"folds": (folds, [largest(x.motion.solution) for x in curve.critical])},
 )  # fmt: skip
 teeth = view.Panel(
     "A pair of gears", "speed of the pinion [rad/s]", "error of transmission [micrometre]",

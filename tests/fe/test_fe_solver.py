@@ -103,3 +103,13 @@ def test_the_certificate_estimates_what_it_cannot_afford(direct):
         assert estimated[name].value == pytest.approx(known[name].value, rel=1e-6)
         truth = known[f"{support}: worst error of 6 frequencies"].value
         assert estimated[name].value == pytest.approx(truth, rel=0.1)
+
+
+def test_modes_take_one_factor_and_one_to_count(direct):
+    from petsc4py import PETSc
+
+    PETSc.Log.begin()
+    numeric = PETSc.Log.Event("MatCholFctrNum")
+    before = numeric.getPerfInfo()["count"]
+    rom.modes(direct, 10)
+    assert numeric.getPerfInfo()["count"] - before == 2

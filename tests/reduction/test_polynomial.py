@@ -70,10 +70,10 @@ def test_functions_around_a_known_axis_hold_no_product_twice():
     """Nodes crowd on one side: their centroid lies beside the axis."""
     t, height = np.meshgrid(2 * np.pi * np.arange(24) / 24, [0.0, 0.1, 0.2, 0.3])
     angle = t.ravel() + 0.2 * np.cos(t.ravel())
-    x = TURN @ np.array([0.1 * np.cos(angle), 0.1 * np.sin(angle), height.ravel()])
-    centre = np.array([0.0, 0.0, 0.15])
+    middle = np.array([0.3, -0.2, 0.15])
+    x = TURN @ np.array([0.3 + 0.1 * np.cos(angle), 0.1 * np.sin(angle) - 0.2, height.ravel()])
     S = diags(np.ones(96)).tocsr()
-    bore = Interface("bore", np.arange(96), x.T, S, TURN @ centre, axis=TURN @ [0.0, 0.0, 1.0])
+    bore = Interface("bore", np.arange(96), x.T, S, TURN @ middle, axis=TURN @ [0.0, 0.0, 1.0])
     Q = interface_functions(rom.FourierLegendre(3, 2), bore)
     assert Q.shape == (96, (2 * 3 + 1) * (2 + 1))
     wave = np.cos(3 * angle) * height.ravel()

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from petsc4py import PETSc
 from slepc4py import SLEPc
 
 import numpy as np
@@ -45,7 +46,7 @@ def krylov_schur(
     transform = solver.getST()
     transform.setType(SLEPc.ST.Type.SINVERT)
     transform.setShift(sigma)
-    transform.setKSP(factor.ksp)
+    transform.setKSP(factor_at_hand(factor))
     solver.setInitialSpace([vector(ops.K, ops.fixed)])  # depends on the place, not on the rank
     if deflated.shape[1]:
         solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
@@ -53,6 +54,30 @@ def krylov_schur(
     pairs = mode_pairs(ops, solver, k)
     solver.destroy()  # it refers to the factor, which could not be freed
     return pairs
+
+
+def factor_at_hand(factor: Factor) -> PETSc.KSP:
+    """A solver that applies a factor; given the factor's own, SLEPc would factor K - sigma M again.
+
+    The second factor would cost as much as the first, and its work space would be what MUMPS
+    predicts, without what `Factor` offers when that is too small.
+    """
+    ksp = PETSc.KSP().create(factor.A.comm)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    ksp.getPC().setType(PETSc.PC.Type.PYTHON)
+    ksp.getPC().setPythonContext(_Applied(factor))
+    return ksp
+
+
+class _Applied:
+    """A factor as PETSc's preconditioner."""
+
+    def __init__(self, factor: Factor):
+        self.factor = factor.factor
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Solve A x = b."""
+        self.factor.solve(b, x)
 
 
 def vector(A: Any, values: Array) -> Any:

@@ -89,8 +89,7 @@ def equilibrium(
     found = search.start(state)
     with reached(lambda: found):
         nearby = search.eased(found, steps) if state is None else None
-        way = search.loaded(found, steps) if nearby is None else iter((nearby,))
-        for at_load in way:
+        for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
             found = at_load
         search.judge(found)
     return found

@@ -51,10 +51,6 @@ SKIPPED = {
     ("equilibrium", "steps"): {"million"},
     ("spin_up", "n_states"): {"million"},
     ("spin_up", "speed"): {"million"},
-    ("periodic_motion", "steps"): {"million"},
-    ("periodic_motion", "settle"): {"million"},
-    ("periodic_path", "steps"): {"million"},
-    ("periodic_path", "settle"): {"million"},
     ("simulate", "t_end"): {"million", "1e300", "1.5"},
 }
 

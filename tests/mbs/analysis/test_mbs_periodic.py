@@ -379,4 +379,8 @@ def test_a_ball_that_rolls_has_more_free_positions_than_velocities():
     assert found.multipliers.size == 5 + 3
     decay = np.exp(-c / 2.8 * found.period)
     assert_allclose(np.sort(np.abs(found.multipliers))[:4], decay, rtol=3e-4)
-    assert_allclose(np.sort(np.abs(found.multipliers))[4:], 1.0, atol=2e-2)
+    # where it is turned, and its spin about the normal: one follows the other, so that errors of
+    # differences move both apart by their root, and not in the mean
+    ones = found.multipliers[np.argsort(np.abs(found.multipliers))[4:]]
+    assert_allclose(ones, 1.0, atol=5e-3)
+    assert ones.mean() == pytest.approx(1.0, abs=3e-5)

@@ -10,14 +10,13 @@ from scipy.integrate import trapezoid
 from rom.arguments import positive
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.motion import PeriodicMotion, Shooting
+from rom.mbs.analysis.periodic.motion import GOOD_RATIO, PeriodicMotion, Shooting
 from rom.mbs.analysis.periodic.shooting import Return, Tangent
 from rom.mbs.analysis.periodic.turns import Turns, turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 PARAMETER_STEP = 1e-6  # of differences, of the span
-GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 FRESH_RATIO = 1e-3  # gap of a motion, of its size, where its own derivatives are asked for
 MAX_DIRECT = 4  # coordinates up to which derivatives are cheaper than passes that do without
 N_LOOKS = 24  # instants of a motion at which its size is measured

@@ -30,7 +30,6 @@ RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
 GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
 GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
 MAX_PASSES = 60
-MAX_WEAK = 1.0  # rad or lengths of the mechanism of a correction in what a period hardly changes
 MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
 MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
 MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
@@ -179,7 +178,7 @@ class Shooting:
         free = self.period is None
         gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
         rate = found.rate if free else None
-        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap, most=MAX_WEAK)[0], None
+        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap)[0], None
         for _ in range(MAX_SHORTENINGS):
             try:
                 flow, y = found.flow, answer
@@ -256,7 +255,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         turns: {joint or body: angle [rad]} by which it has advanced after the period when it looks
             the same again, as a gear by one tooth pitch, counted as the angle of the joint is, or
             along its spin for a body without one; None as the angle for a body that looks the same
-            after any. Whole turns need not be told.
+            after any. Whole turns need no mention.
         steps: of generalised-alpha in a period.
         rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
             motion is conservative.
@@ -276,7 +275,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     Raises:
         ConfigError: for a wrong argument, or a name that is neither a joint nor a body.
         ModelError: naming a drive or load that does not repeat with the period, or a body that
-            looks different after the turn that is told; or if joints contradict each other.
+            looks different after the turn that is given; or if joints contradict each other.
         SolverError: if a step fails, or no such motion is found; ``error.solution`` is then the
             last attempt.
 

@@ -26,7 +26,6 @@ from rom.model import Array
 # the deflection of teeth and races is still resolved
 PROBE_RTOL = 1e-7
 SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
-WEAK_RTOL = 1e-2  # singular values of motions that hardly decay or return in a period
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 
 
@@ -224,17 +223,12 @@ class Tangent:
         )
 
     def solved(
-        self,
-        rate: tuple[Array, Array] | None,
-        *sides: Array,
-        energy_gap: float | None = None,
-        most: float = np.inf,
+        self, rate: tuple[Array, Array] | None, *sides: Array, energy_gap: float | None = None
     ) -> list[Array]:
         """(f,) or (f + 1,) answers of (E - B) y + dT rate = -side; dT in radians of the period.
 
         Where the period is unknown the start moves across the motion, and by a gap of its energy
-        if that is told. A motion that a period does not change is not touched, one that it hardly
-        changes by ``most`` at the most, or by as much as others.
+        if that is given. A motion that a period does not change is not touched.
         """
         A, right = self.E - self.B, -np.array(sides).T
         if rate is not None:
@@ -245,19 +239,7 @@ class Tangent:
             miss = -energy_gap / np.linalg.norm(self.energy_slope)
             A = np.vstack([A, np.append(slope, 0.0)])
             right = np.vstack([right, np.full((1, right.shape[1]), miss)])
-        return list(_least(A, right, most).T)
-
-
-def _least(A: Array, right: Array, most: float) -> Array:
-    """Answers of least norm, limited in motions that a period hardly changes."""
-    if not A.size:
-        return np.zeros((A.shape[1], right.shape[1]))
-    U, s, V = np.linalg.svd(A, full_matrices=False)
-    known = s > SINGULAR_RTOL * s[0]
-    answer = np.where(known[:, None], U.T @ right, 0.0) / np.where(known, s, 1.0)[:, None]
-    weak = (s < WEAK_RTOL * s[0])[:, None]
-    largest = np.maximum(most, np.abs(np.where(weak, 0.0, answer)).max(axis=0, initial=0.0))
-    return np.asarray(V.T @ np.where(weak, np.clip(answer, -largest, largest), answer))
+        return list(np.linalg.lstsq(A, right, rcond=SINGULAR_RTOL)[0].T)
 
 
 def energy(mechanism: Mechanism, start: Start) -> float:
