@@ -68,7 +68,7 @@ def wire_stress(spring: HelicalSpring, force: Any, moment: Any) -> tuple[Array, 
         (...,) shear stress 8 K P D / (pi d^3) and (...,) bending stress 32 K M / (pi d^3) [Pa].
 
     Source:
-        Shigley, Mechanical Engineering Design, chapter 10.
+        Budynas, Nisbett, Shigley's Mechanical Engineering Design (2011), equations 10-7 and 10-44.
     """
     cube = np.pi * spring.wire**3
     shear = wahl(spring) * 8 * np.abs(force) * spring.diameter / cube
@@ -79,13 +79,13 @@ def wire_strength(spring: HelicalSpring) -> float:
     """Tensile strength of music wire of this diameter [Pa].
 
     Source:
-        Shigley, Mechanical Engineering Design, table 10-4, ASTM A228.
+        Budynas, Nisbett, Shigley's Mechanical Engineering Design (2011), table 10-4, ASTM A228.
     """
     return WIRE_STRENGTH / (spring.wire * 1e3) ** WIRE_EXPONENT
 
 
 def spring_loads(solution: Any, name: str, k: int) -> tuple[Array, Array]:
-    """Force along a spring (n_t,) [N] and moment that bends it (n_t,) [N m], the larger of both ends.
+    """(n_t,) force along a spring [N] and moment that bends it [N m], the larger of its ends.
 
     Args:
         solution: motion of a moving hand.
@@ -131,11 +131,16 @@ def stress_budget(
         motor: largest force of a motor [N].
         bone: strength of the phalanges [Pa].
         thickness: half that of the phalanges [m].
+
+    Source:
+        Shares of the strength: Budynas, Nisbett, Shigley's Mechanical Engineering Design (2011),
+        chapter 10.
     """
     rows: list[Row] = []
     for name, finger in fingers.items():
         for k, spring in enumerate(finger.springs, start=1):
-            shear, bending = (x.max() for x in wire_stress(spring, *spring_loads(solution, name, k)))
+            loads = spring_loads(solution, name, k)
+            shear, bending = (stress.max() for stress in wire_stress(spring, *loads))
             strength = wire_strength(spring)
             for what, stress, share in (("shear", shear, TORSION_SHARE),
                                         ("bending", bending, BENDING_SHARE)):  # fmt: skip

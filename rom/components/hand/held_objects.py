@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom.arguments import finite, positive, unit_vector
 from rom.errors import ConfigError
@@ -20,7 +19,7 @@ from rom.model import Array
 from rom.rotation import matrix
 
 # silicone of 0.6 MPa on round bars of 5 mm and 15 mm, after Hertz
-SKIN = Impact(5e4, damping=5.0, mu=0.8, transition_speed=2e-3)
+SKIN_CONTACT = Impact(5e4, damping=5.0, mu=0.8, transition_speed=2e-3)
 FOOT_RADIUS = 1e-3  # of the feet on which a bar stands [m]
 FEET_SHARE = 0.8  # of its radius, at which they are
 UPRIGHT_COSINE = 0.9  # between axis and gravity of a bar that stands
@@ -65,7 +64,7 @@ class Held:
         return np.array([-half, half])
 
 
-def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN,
+def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
          thickness: float = 5e-3) -> Part:  # fmt: skip
     """Put an object into a hand, with contacts named "index phalanx 1 on bar" and "palm on bar 1".
 
@@ -78,6 +77,9 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN,
 
     Raises:
         ConfigError: for an object that reaches into the hand, or a hand without phalanges.
+
+    Source:
+        Force of the contacts: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440.
     """
     positive("mass", held.mass)
     positive("radius", held.radius)
@@ -129,7 +131,7 @@ def _on_palm(mech: Mechanism, name: str, held: Held, made: Part, law: Impact) ->
 
 
 def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float = 0.1,
-          law: Impact = SKIN) -> Part:  # fmt: skip
+          law: Impact = SKIN_CONTACT) -> Part:  # fmt: skip
     """A table below an object, that goes down from a time on.
 
     Args:

@@ -29,7 +29,6 @@ from rom.names import offered
 
 PULL_SHARE = 0.9  # of the springs of a finger that a winch may take in
 TRANSITION_SPEED = 1e-3  # of cables in their holes [m/s], a fortieth of that of the winches
-MM = 1e-3  # m
 
 
 @dataclass(frozen=True)
@@ -65,10 +64,12 @@ class Seat:
 
 
 SEATS: Mapping[str, Seat] = {
-    "thumb": Seat((52 * MM, 0.0, 0.0), palmar=(-1.0, 0.0, 0.0)),
-    **{name: Seat((0.0, y * MM, 0.0)) for name, y in
-       (("index", 33), ("middle", 11), ("ring", -11), ("little", -33))},
-}  # fmt: skip
+    "thumb": Seat((52e-3, 0.0, 0.0), palmar=(-1.0, 0.0, 0.0)),
+    "index": Seat((0.0, 33e-3, 0.0)),
+    "middle": Seat((0.0, 11e-3, 0.0)),
+    "ring": Seat((0.0, -11e-3, 0.0)),
+    "little": Seat((0.0, -33e-3, 0.0)),
+}
 
 
 @dataclass(frozen=True)
@@ -170,6 +171,10 @@ def moving_hand(
 
     Raises:
         ConfigError: for a name that is no finger, or has no seat, and for what no drive can do.
+
+    Source:
+        Fingers that are driven one by one or together, after the idea of Potratz, Yang,
+        Abdel-Malek, Pena Pitarch and Grosland, J. Biomech. Eng. 127 (2005) 934; as mechanism ours.
     """
     fingers = hand(n=4) if fingers is None else fingers
     drives, seats = drives or {}, SEATS if seats is None else seats
@@ -273,8 +278,10 @@ def _cables(
         joint = f"{name} joint {k}"
         if joint in drives:
             if drives[joint].conduit:
-                raise ConfigError(f"the cable of {joint!r} alone runs in a sleeve: it has no "
-                                  "conduit on the palm.", hint="Give its sleeve a length.")  # fmt: skip
+                raise ConfigError(
+                    f"the cable of {joint!r} alone runs in a sleeve, not in a conduit on the palm.",
+                    hint="Give its sleeve a length.",
+                )
             _cable(made.mech, joint, drives[joint], holes[2 * k - 2 : 2 * k], (0.0, length))
 
 

@@ -8,11 +8,9 @@ import numpy.typing as npt
 from rom.components.hand.compliant_hand import Finger
 from rom.components.hand.moving_hand import Drive, Seat, moving_hand
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.mechanism import Mechanism
 from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.mechanism import Mechanism
 from rom.model import Array
-
-NAME = "finger"
 
 
 def one_finger(finger: Finger, tension: float = 0.0, load: Any = (0.0, 0.0, 0.0)) -> Mechanism:
@@ -23,12 +21,13 @@ def one_finger(finger: Finger, tension: float = 0.0, load: Any = (0.0, 0.0, 0.0)
         tension: of the cable [N].
         load: (3,) force on the tip, world [N], or a function of time.
     """
-    mech = moving_hand({NAME: finger}, seats={NAME: Seat()}, drives={NAME: Drive(tension=tension)})
+    drives = {"finger": Drive(tension=tension)}
+    mech = moving_hand({"finger": finger}, seats={"finger": Seat()}, drives=drives)
     mech.force("load", tip_marker(mech, finger), load)
     return mech
 
 
-def tip_marker(mech: Mechanism, finger: Finger, name: str = NAME) -> Any:
+def tip_marker(mech: Mechanism, finger: Finger, name: str = "finger") -> Any:
     """Marker of the tip of a finger."""
     return mech.parts[f"{name} phalanx {len(finger.phalanges)}"].marker("distal")
 
@@ -43,12 +42,14 @@ def deflections(
         direction: (3,) of the force, world [1].
         forces: (n,) [N].
         tension: of the cable, held [N].
+
+    Source:
+        In three directions as Potratz and others measured, J. Biomech. Eng. 127 (2005) 934.
     """
-    e = np.asarray(direction, dtype=float)
-    sizes = np.asarray(forces, dtype=float)
+    e, sizes = np.asarray(direction, dtype=float), np.asarray(forces, dtype=float)
+    times = np.arange(sizes.size, dtype=float)
     mech = one_finger(finger, tension, lambda t: np.interp(t, times, sizes) * e)
-    times, marker, found = np.arange(sizes.size, dtype=float), tip_marker(mech, finger), []
-    state = None
+    marker, found, state = tip_marker(mech, finger), [], None
     for t in times:
         state = equilibrium(mech, state, t=t)
         found.append(snapshot(mech, state).position(marker.body, "distal")[-1])

@@ -76,6 +76,10 @@ def winches(
 
     Raises:
         ConfigError: if fingers and commands differ in number.
+
+    Source:
+        Two signals of muscles that command five fingers: Potratz and others, J. Biomech. Eng. 127
+        (2005) 934.
     """
     commands = np.asarray(pulls, dtype=float)
     if commands.ndim != 2 or commands.shape[1] != len(names) or len(commands) < 2:

@@ -51,7 +51,7 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     for k, (axis, length) in enumerate(sizes, start=1):
         if number(f"length{k}", length) < 0.0 or (length > 0.0 and axis is None):
             raise ConfigError(
-                f"contact {name!r}: length{k} = {length:g} m with axis{k} = {axis!r} is no capsule.",
+                f"contact {name!r}: length{k} = {length:g} m with axis{k} = {axis!r} is no bar.",
                 hint="Give a positive length and an axis, or neither for a sphere.",
             )
     axes = [np.array([0.0, 0.0, 1.0]) if axis is None else axis for axis, _ in sizes]
