@@ -19,10 +19,10 @@ from rom.components.hand.grasp import Bar as Bar
 from rom.components.hand.grasp import grasp as grasp
 from rom.components.hand.held_objects import SKIN_CONTACT as SKIN_CONTACT
 from rom.components.hand.held_objects import Held as Held
+from rom.components.hand.held_objects import contact_forces as contact_forces
 from rom.components.hand.held_objects import grip as grip
 from rom.components.hand.held_objects import hold as hold
 from rom.components.hand.held_objects import table as table
-from rom.components.hand.held_objects import unbalanced as unbalanced
 from rom.components.hand.moving_hand import SEATS as SEATS
 from rom.components.hand.moving_hand import Build as Build
 from rom.components.hand.moving_hand import Drive as Drive
@@ -35,7 +35,7 @@ from rom.components.hand.solid_finger import solid_finger as solid_finger
 from rom.components.hand.solid_finger import tip_compliance as tip_compliance
 from rom.components.hand.tip_loads import deflections as deflections
 from rom.components.hand.winches import Motor as Motor
+from rom.components.hand.winches import motor_force as motor_force
 from rom.components.hand.winches import shaft as shaft
 from rom.components.hand.winches import shaft_moment as shaft_moment
-from rom.components.hand.winches import tension as tension
 from rom.components.hand.winches import winches as winches

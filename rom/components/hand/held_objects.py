@@ -14,7 +14,7 @@ from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.elements.contact.segments import distance
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.parts.bodies import Part
+from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 from rom.rotation import matrix
 
@@ -76,7 +76,8 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
         thickness: half that of the phalanges [m].
 
     Raises:
-        ConfigError: for an object that reaches into the hand, or a hand without phalanges.
+        ConfigError: for an object that reaches into the hand or that no finger reaches, or a
+            mechanism without fingers.
 
     Source:
         Force of the contacts: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440.
@@ -85,49 +86,63 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     positive("radius", held.radius)
     phalanges = [part for part in mech.parts.values() if "distal" in part.points]
     if not phalanges:
-        raise ConfigError(f"nothing can hold {name!r}: the mechanism has no phalanx.")
+        raise ConfigError(f"nothing can hold {name!r}: it has no finger of `moving_hand`.")
+    pieces = [(matrix(bone.p)[:, 2], float(np.linalg.norm(bone.points["distal"])))
+              for bone in phalanges]  # fmt: skip
+    face, normal = _palm_face(mech)
+    ends = np.asarray(held.centre) + held.ends
+    depths = {bone.name: thickness - _far(held, bone.at, *piece)
+              for bone, piece in zip(phalanges, pieces, strict=True)}  # fmt: skip
+    depths["palm"] = -((ends - mech.design_point(face)) @ normal).min()
+    for other, depth in depths.items():
+        inside = 1e3 * (depth + held.radius)
+        if inside > 0.0:
+            raise ConfigError(f"{name!r} reaches {inside:.3g} mm into {other!r} at the start.",
+                              hint="Move its centre away.")  # fmt: skip
+    _check_reach(mech, phalanges, name, held)
     made = mech.add_rigid(name, mass=held.mass, inertia=held.inertia, at=held.centre)
     middle = made.marker((0.0, 0.0, 0.0))
-    for bone in phalanges:
-        axis = matrix(bone.p)[:, 2]
-        length = 2.0 * float(np.linalg.norm(bone.points["distal"]))
-        _check_apart(bone, axis, 0.5 * length, thickness, name, held)
+    for bone, (axis, half) in zip(phalanges, pieces, strict=True):
         mech.capsule_on_capsule(
             f"{bone.name} on {name}", bone.marker((0.0, 0.0, 0.0)), middle, law,
-            radius1=thickness, axis1=axis, length1=length, radius2=held.radius, axis2=held.axis,
+            radius1=thickness, axis1=axis, length1=2.0 * half, radius2=held.radius, axis2=held.axis,
             length2=held.length,
         )  # fmt: skip
-    if "palm" in mech.parts:
-        _on_palm(mech, name, held, made, law)
+    for k, end in enumerate(held.ends, start=1):
+        mech.sphere_on_plane(f"palm on {name} {k}", face, made.marker(end), law, normal=normal,
+                             radius=held.radius)  # fmt: skip
     return made
 
 
-def _check_apart(bone: Part, axis: Array, half: float, thickness: float, name: str,
-                 held: Held) -> None:  # fmt: skip
-    """Refuse an object that reaches into a phalanx."""
-    e = np.array([0.0, 0.0, 1.0]) if held.axis is None else unit_vector("axis", held.axis)
-    gap = distance(np.asarray(held.centre) - bone.at, axis, e, half, 0.5 * held.length)
-    depth = thickness + held.radius - gap
-    if depth > 0.0:
-        raise ConfigError(f"{name!r} reaches {depth * 1e3:.3g} mm into {bone.name!r} at the start.",
-                          hint="Move its centre away.")  # fmt: skip
-
-
-def _on_palm(mech: Mechanism, name: str, held: Held, made: Part, law: Impact) -> None:
-    """Ends of the object against the plane through the first plates."""
+def _palm_face(mech: Mechanism) -> tuple[Marker, Array]:
+    """A point of the plane through the first plates, and its normal (3,)."""
     first = [joint.markers for key, joint in mech.joints.items() if key.endswith(" joint 1")]
     points = np.array([mech.design_point(pair[0]) for pair in first])
     axes = [matrix(mech.part(pair[1].body).p)[:, 2] for pair in first]
-    normal, palm = unit_vector("palm", np.mean(axes, axis=0)), mech.parts["palm"]
-    face = palm.marker(points.mean(axis=0) - palm.at)
-    for k, end in enumerate(held.ends, start=1):
-        depth = held.radius - float((np.asarray(held.centre) + end - mech.design_point(face)) @
-                                    normal)  # fmt: skip
-        if depth > 0.0:
-            raise ConfigError(f"{name!r} reaches {depth * 1e3:.3g} mm into the palm at the start.",
-                              hint="Move its centre away.")  # fmt: skip
-        mech.sphere_on_plane(f"palm on {name} {k}", face, made.marker(end), law, normal=normal,
-                             radius=held.radius)  # fmt: skip
+    palm = mech.parts["palm"]
+    return palm.marker(points.mean(axis=0) - palm.at), unit_vector("palm", np.mean(axes, axis=0))
+
+
+def _far(held: Held, place: Array, axis: Array, half: float) -> float:
+    """Distance of the middle line of an object from a straight piece [m]."""
+    e = np.array([0.0, 0.0, 1.0]) if held.axis is None else unit_vector("axis", held.axis)
+    gap = np.asarray(held.centre) - place
+    return float(distance(gap, axis, e, half, 0.5 * held.length))
+
+
+def _check_reach(mech: Mechanism, bones: list[Part], name: str, held: Held) -> None:
+    """Refuse an object that no finger reaches, however it bends."""
+    over = []
+    for key, joint in mech.joints.items():
+        if key.endswith(" joint 1"):
+            root = mech.design_point(joint.markers[0])
+            own = [one for one in bones if one.name.startswith(key.removesuffix("joint 1"))]
+            tips = [mech.design_point(one.marker("distal")) for one in own]
+            length = max(np.linalg.norm(tip - root) for tip in tips)
+            over.append(_far(held, root, np.array([1.0, 0.0, 0.0]), 0.0) - held.radius - length)
+    if min(over) > 0.0:
+        raise ConfigError(f"{name!r} is {min(over) * 1e3:.3g} mm beyond the reach of all fingers.",
+                          hint="Move its centre closer.")  # fmt: skip
 
 
 def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float = 0.1,
@@ -196,15 +211,6 @@ def contacts_of(mech: Mechanism, name: str) -> list[str]:
 def contact_forces(solution: Any, name: str) -> dict[str, Array]:
     """{contact: (n_t, 3) force on the object, world [N]}."""
     return {key: solution.element(key).force[:, 1] for key in contacts_of(solution.mechanism, name)}
-
-
-def unbalanced(solution: Any, name: str) -> Array:
-    """(n_t, 3) contact forces and weight of an object less mass times acceleration [N]."""
-    mech: Mechanism = solution.mechanism
-    part = mech.part(name)
-    at = solution.packed.system.bodies.v_at[solution.packed.names.index(name)]
-    total = sum(contact_forces(solution, name).values(), np.zeros((solution.t.size, 3)))
-    return total + part.mass * (np.asarray(mech.gravity) - solution.a[:, at : at + 3])
 
 
 def grip(solution: Any, name: str, fingers: Iterable[str]) -> dict[str, Array]:

@@ -64,7 +64,7 @@ class Seat:
 
 
 SEATS: Mapping[str, Seat] = {
-    "thumb": Seat((52e-3, 0.0, 0.0), palmar=(-1.0, 0.0, 0.0)),
+    "thumb": Seat((54e-3, 20e-3, 0.0), palmar=(-1.0, -0.25, 0.0)),
     "index": Seat((0.0, 33e-3, 0.0)),
     "middle": Seat((0.0, 11e-3, 0.0)),
     "ring": Seat((0.0, -11e-3, 0.0)),
@@ -164,7 +164,7 @@ def moving_hand(
     Args:
         fingers: {name: finger}; None for the five of `hand` with four segments a spring.
         drives: {name: drive} of cables, of fingers or of joints; without one there is no cable.
-        seats: {name: seat}; None for `SEATS`, a row of four and the thumb across.
+        seats: {name: seat}; None for `SEATS`, a row of four and the thumb opposite, aslant.
         build: masses and losses; None for `Build()`.
         gravity: (3,) [m/s^2].
         held: whether the palm is fixed to the ground by the joint "wrist"; else give it one.

@@ -126,11 +126,11 @@ def shaft_moment(solution: Any, radii: Mapping[str, float]) -> Array:
         solution: motion of a moving hand with drives of `shaft`.
         radii: as there.
     """
-    return sum((r * tension(solution, name) for name, r in radii.items()),
+    return sum((r * motor_force(solution, name) for name, r in radii.items()),
                np.zeros(solution.t.size))  # fmt: skip
 
 
-def tension(solution: Any, name: str) -> Array:
+def motor_force(solution: Any, name: str) -> Array:
     """(n_t,) tension of a cable at its first end, where the motor is [N].
 
     Args:

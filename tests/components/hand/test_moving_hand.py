@@ -8,7 +8,7 @@ import rom
 from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
 from rom.components.hand.moving_hand import SEATS, Build, Drive, Seat, moving_hand
 from rom.components.hand.tip_loads import deflections, one_finger
-from rom.components.hand.winches import shaft, shaft_moment, tension
+from rom.components.hand.winches import motor_force, shaft, shaft_moment
 from rom.errors import ConfigError, ModelError, SolverError
 
 MM = 1e-3
@@ -108,7 +108,7 @@ def test_a_winch_draws_in_what_the_finger_gives():
     mech = moving_hand({"index": finger}, seats={"index": Seat()},
                        drives={"index": Drive(pull=8 * MM, EA=1e5)})  # fmt: skip
     found = rom.snapshot(mech, rom.equilibrium(mech))
-    pulled = tension(found, "index")[0]
+    pulled = motor_force(found, "index")[0]
     stretch = pulled / 1e5 * (54 - 8) * MM
     at = close(finger, pull=8 * MM - stretch)
     assert_allclose(pulled, at.tension, rtol=1e-6)
@@ -168,7 +168,7 @@ def test_the_cable_in_a_sleeve_gives_way_like_a_spring_before_the_finger(sleeve)
     mech = moving_hand({"index": finger}, seats={"index": Seat()},
                        drives={"index": Drive(pull=pull, EA=EA, sleeve=sleeve)})  # fmt: skip
     found = rom.snapshot(mech, rom.equilibrium(mech))
-    pulled = tension(found, "index")[0]
+    pulled = motor_force(found, "index")[0]
     length = 54 * MM
     stretch = pulled / EA * (length - pull) * (length + sleeve) / length
     held = close(finger, pull=pull - stretch)

@@ -125,3 +125,31 @@ def test_momentum_and_energy_of_capsules_that_meet_in_space():
     assert_allclose(angular - angular[0], 0, atol=1e-10)
     assert sol.energy.damping[-1] > 1e-2
     assert_allclose(sol.energy.balance, 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 1.5])
+def test_a_clamped_bar_creeps_or_slips_as_the_law_says(share):
+    """Between two jaws: weight = share of the limit; creep v0 r / sqrt(1 - r^2), or falling."""
+    N, mu, v0 = 20.0, 0.5, 1e-2
+    weight = share * 2 * mu * N
+    k, radius = 1e5, 0.05
+    mech = Mechanism(gravity=(0, 0, -g))
+    depth = N / k
+    bar = mech.add_rigid("bar", mass=weight / g, inertia=(1.0,) * 3, at=(0, 0, 0))
+    for side in (-1, 1):
+        jaw = mech.ground.marker((0, side * (2 * radius - depth), 0))
+        mech.capsule_on_capsule(f"jaw {side}", jaw, bar.marker((0, 0, 0)),
+                                Impact(k, exponent=1.0, mu=mu, transition_speed=v0), radius1=radius,
+                                radius2=radius, axis1=X, axis2=Z, length1=0.4, length2=4.0)  # fmt: skip
+    sol = simulate(mech, t_end=0.1, dt=2e-4, rho_inf=0.5)
+    v = sol.velocity("bar")[:, 2]
+    if share < 1.0:
+        assert_allclose(v[-1], -v0 * share / np.sqrt(1 - share**2), rtol=1e-4)
+    else:
+        late = sol.t > 0.05
+        fall = -np.diff(v[late]).mean() / 2e-4
+        assert_allclose(fall, g * (1 - 1 / share), rtol=1e-3)
+    for jaw in ("jaw -1", "jaw 1"):
+        force = sol.element(jaw).force[-1, 1]
+        assert_allclose(abs(force[1]), N, rtol=1e-6)
+        assert_allclose(force[2], min(weight / 2, mu * N), rtol=1e-3)
