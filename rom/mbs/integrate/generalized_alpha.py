@@ -54,9 +54,6 @@ from rom.model import Array
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
 MAX_PASSES = 25
-# from this pass on every third increment is halved: iterates that jump to and fro about a force
-# that turns round within a step, as friction does, meet in the middle
-PASSES_BEFORE_HALVING, HALVING_PERIOD = 8, 3
 ROUND_OFF = 4e-16
 # share of the round-off of positions that increments are brought to: velocities and accelerations
 # feel an increment over the step and over its square, and their errors add up to momentum
@@ -216,12 +213,6 @@ def correct(s, W, step, rank):
         else:
             W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
-    passes = step.count[STEP_PASSES]
-    halved = passes >= PASSES_BEFORE_HALVING and passes % HALVING_PERIOD == 0
-    for i in range(n if halved else 0):
-        W.delta[i] *= 0.5
-    for k in range(step.lam.size if halved else 0):
-        W.dlam[k] *= 0.5
     for i in range(n):
         step.vd1[i] += mass_factor(step) / bh2 * W.delta[i]
         step.v1[i] += gamma / (beta * h) * W.delta[i]
@@ -240,8 +231,7 @@ def correct(s, W, step, rank):
     retract(s, step.q, step.psi, step.q1)
     step.count[STEP_PASSES] += 1
     step.count[ITERATIONS] += 1
-    answer = verdict(W, step, size, gap)
-    return UNFINISHED if halved and answer == CONVERGED else answer
+    return verdict(W, step, size, gap)
 
 
 @inner
