@@ -471,6 +471,8 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("felt", Quantity(), "Share of the rise that the film feels.", 0.5),
         Key("thermal_time", Quantity("s", positive=True), "Over which its temperature follows.",
             1.0),
+        Key("elastic_bush", Flag(), "Whether its pressure bends the bore, which has functions.",
+            False),
     ))),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,

@@ -71,6 +71,12 @@ class Cylinder:
         return (along[:, :, None] * around[:, None, :]).reshape(len(theta), -1)
 
 
+def deformable(part: Part, marker: Marker) -> Any:
+    """The interface behind a marker if it deforms; None of a rigid or averaged one."""
+    surface = part.moving.markers.get(marker.place) if part.flexible is not None else None
+    return surface if surface is not None and surface.patch is not None else None
+
+
 def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylinder | None:
     """The deformation of the surface behind a marker; None of a rigid one.
 
@@ -86,8 +92,8 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     Warns:
         RomWarning: if harmonics and polynomials miss more than 2 % of the deformation of a shape.
     """
-    surface = part.moving.markers.get(marker.place) if part.flexible is not None else None
-    if surface is None or surface.patch is None:
+    surface = deformable(part, marker)
+    if surface is None:
         return None
     patch, axes = surface.patch, np.array([across, np.cross(axis, across), axis])
     local = (patch.points - surface.point) @ axes.T

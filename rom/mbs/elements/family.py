@@ -231,9 +231,9 @@ class Family:
         name: of all of them, e.g. ``"springs"``.
         record: class of one of them.
         pack: ({name: record}, `Places`) -> table for compiled code.
-        residuals, tangents, energy, multiplier_columns: kernels, see
+        residuals, tangents, energy, multiplier_columns, pair_tangents: kernels, see
             `rom.mbs.kernels.element_calls`; None for forces that do not change, store no energy,
-            or do not depend on multipliers.
+            do not depend on multipliers, or whose tangents stay about the same over a step.
         ends: record -> the markers it acts on.
         outside: record -> whether it acts from outside even though no marker is on the ground.
         couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
@@ -260,6 +260,7 @@ class Family:
     tangents: ElementKernel | None = None
     energy: ElementKernel | None = None
     multiplier_columns: ElementKernel | None = None
+    pair_tangents: ElementKernel | None = None
     ends: Callable[[Any], tuple[Marker, ...]] = between
     outside: Callable[[Any], bool] = from_ground
     couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
@@ -276,12 +277,17 @@ class Family:
     @property
     def kernels(self) -> list[ElementKernel]:
         """Those it has."""
-        roles = self.residuals, self.tangents, self.energy, self.multiplier_columns
-        return [kernel for kernel in roles if kernel is not None]
+        return [kernel for kernel in self._roles if kernel is not None]
 
     def row(self, table: Table) -> list[int]:
         """Addresses of the table and of the kernels, which are compiled."""
-        return row_of(table, (self.residuals, self.tangents, self.energy, self.multiplier_columns))
+        return row_of(table, self._roles)
+
+    @property
+    def _roles(self) -> tuple[ElementKernel | None, ...]:
+        """All kernels in the order of their columns."""
+        forces = self.residuals, self.tangents, self.energy
+        return *forces, self.multiplier_columns, self.pair_tangents
 
     def pushes(self, element: Any) -> bool:
         """Whether an element changes the momentum of all bodies together."""

@@ -1,6 +1,6 @@
 """From the described mechanism to the flat arrays of compiled code."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,6 +9,7 @@ import numpy as np
 
 from rom.errors import ConfigError, warn
 from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of
+from rom.mbs.equations import renewal
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.kernels.element_calls import ROW_WORDS
 from rom.mbs.kernels.stages import STAGE_ADDRESSES
@@ -203,6 +204,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         integers(family.row(table) for family, table in elements.items()).reshape(-1, ROW_WORDS),
         int(any(family.loaded_rows(table).size for family, table in elements.items())),
         np.concatenate([np.zeros(0), *places.remembered.values()]),
+        _renewed(elements, sum(6 + part.r for part in parts)),
     )
     return Packed(
         system.replace(graph=graph_of(system, coupled_by(elements, markers.body), whole=whole)),
@@ -222,6 +224,18 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         ),
         places,
     )
+
+
+def _renewed(elements: Mapping[Family, Any], n: int) -> Index:
+    """(k, 2) markers of elements with tangents renewed in a step; none where it does not pay."""
+    pairs = [
+        np.column_stack([table.i, table.j])
+        for family, table in elements.items()
+        if family.pair_tangents
+    ]
+    found = np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs])
+    pays = n >= renewal.MIN_VELOCITIES and len(found) <= renewal.MAX_RENEWED
+    return found if pays else found[:0]
 
 
 def coupled_by(elements: dict[Family, Table], body: Index) -> list[Any]:

@@ -28,6 +28,7 @@ from rom.mbs.equations.linear_solve import (
     factorise_bordered,
     solve_bordered,
 )
+from rom.mbs.equations.renewal import add_renewed, keep_pair_tangents, renew_pair_tangents
 from rom.mbs.integrate.bdf import follow_increment, is_multistep, keep_past, predict_multistep
 from rom.mbs.integrate.index2 import close_gaps, fit_velocities, velocity_gaps
 from rom.mbs.kernels.algebra import dot, row, scale, spatial_tangent, unit, vec
@@ -38,6 +39,7 @@ from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, stage
 from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
 from rom.mbs.kernels.work import BOTH_LEVELS as BOTH_LEVELS
+from rom.mbs.kernels.work import FACTOR_USES as FACTOR_USES
 from rom.mbs.kernels.work import FACTORISATIONS as FACTORISATIONS
 from rom.mbs.kernels.work import HAS_FACTOR as HAS_FACTOR
 from rom.mbs.kernels.work import ITERATIONS as ITERATIONS
@@ -51,6 +53,9 @@ from rom.mbs.kernels.work import Step as Step
 from rom.mbs.kernels.work import Work
 from rom.model import Array
 
+# corrections in which a step ends with a fresh factorisation; where films are renewed in a large
+# matrix an old one is worth some more, as a correction grows with a lower power of the size
+FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
 MAX_PASSES = 25
@@ -108,9 +113,15 @@ def predict(s, step):
         predict_multistep(s, step)
     copy(step.lam, step.lam1)
     step.size[0] = step.size[4] = 0.0
-    if step.count[LAST_ITERATIONS] > 4:
+    if step.count[LAST_ITERATIONS] > most_corrections(s, step):
         step.count[HAS_FACTOR] = 0
     retract(s, step.q, step.psi, step.q1)
+
+
+@inner
+def most_corrections(s, step):
+    """Corrections of a step behind which the next one begins with a new factorisation."""
+    return FEW_CORRECTIONS + (step.v.size // CORRECTION_SIZE if s.renewed.shape[0] > 0 else 0)
 
 
 @inner
@@ -159,7 +170,7 @@ def factorise_step(s, W, step, rank):
     turn_columns(s, W, step, rank)
     load_columns(s, W, step.lam1, rank)
     step.count[FACTORISATIONS] += 1
-    step.count[HAS_FACTOR] = 1
+    step.count[HAS_FACTOR], step.count[FACTOR_USES] = 1, 0
     return factorise_bordered(s, W, rank)
 
 
@@ -213,6 +224,9 @@ def correct(s, W, step, rank):
         else:
             W.part[k] = -W.value[k] * (lead if s.rows.kind[k] == ROLL else 1.0)
     solve_bordered(s, W, rank, W.delta, W.dlam)
+    if s.renewed.shape[0] > 0 and step.count[FACTOR_USES] > 0:
+        add_renewed(s, W, W.delta, W.dlam)
+    step.count[FACTOR_USES] += 1
     for i in range(n):
         step.vd1[i] += mass_factor(step) / bh2 * W.delta[i]
         step.v1[i] += gamma / (beta * h) * W.delta[i]
@@ -319,11 +333,15 @@ def advance(s, W, step, rank, signals, every, out):
                 return NEEDS_LAWS
         step.count[LAWS_ASKED] = 0
         residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
+        if step.count[HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
+            step.count[HAS_FACTOR] = 1 if renew_pair_tangents(s, W, c[2], c[1], rank) else 0
         if step.count[HAS_FACTOR] == 0:
             tangents(s, W, step.v1, step.vd1, step.lam1, c)
             constraint_gradient(s, W)
             if not factorise_step(s, W, step, rank):
                 return SINGULAR
+            if s.renewed.shape[0] > 0:
+                keep_pair_tangents(s, W, c[2], c[1])
         answer = correct(s, W, step, rank)
         if answer > CONVERGED:
             return answer

@@ -20,7 +20,12 @@ from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
 # what belongs to the factorised iteration matrix, by blocks or whole
-FACTOR_FIELDS = ("by_blocks", "pivot", "scaling", "U_lu", "weight")
+FACTOR_FIELDS = (
+    *("by_blocks", "pivot", "scaling", "U_lu", "weight"),
+    *("pairs_lu", "approach", "response", "yielding", "has_response"),
+)
+# counts that say whether it goes on to be used
+FACTOR_COUNTS = (alpha.LAST_ITERATIONS, alpha.HAS_FACTOR, alpha.FACTOR_USES)
 # counts of a whole run
 RUN_COUNTS = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
 
@@ -60,7 +65,7 @@ def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tupl
             v = v + h**2 * across(record, W, state, shift_ahead(record, state, method, jerk))
         state = replace(state, algorithmic=before)
     copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
-    count, work = np.zeros(10, dtype=np.int64), np.zeros(3)
+    count, work = np.zeros(11, dtype=np.int64), np.zeros(3)
     count[alpha.USES_LAWS], count[alpha.BOTH_LEVELS] = bool(forces), settings.both
     power = _power(record, W, state, forces)
     past = np.zeros((2, weights.size - 2, n))
@@ -128,7 +133,7 @@ def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
         step.psi.copy(),
         step.past.copy(),
     )
-    arrays["count"] = step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]]
+    arrays["count"] = step.count[list(FACTOR_COUNTS)]
     arrays["work"], arrays["lost"] = step.work.copy(), step.lost.copy()
     arrays["counts"] = step.count[list(RUN_COUNTS)]
     origin = settings.t_start if settings.origin is None else settings.origin
@@ -141,7 +146,7 @@ def recall(memory: Memory, W: Work, step: Step) -> None:
     step.past[:] = memory.arrays.get("past", step.past)
     for name in (*FACTOR_FIELDS, "factor" if memory.arrays["by_blocks"][0] else "lu"):
         getattr(W, name)[:] = memory.arrays[name]
-    step.count[[alpha.LAST_ITERATIONS, alpha.HAS_FACTOR]] = memory.arrays["count"]
+    step.count[list(FACTOR_COUNTS)] = memory.arrays["count"]
 
 
 def go_on(memory: Memory, step: Step) -> None:

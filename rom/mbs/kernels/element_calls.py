@@ -19,7 +19,7 @@ from rom.mbs.kernels.system import System
 from rom.mbs.kernels.tables import TABLE_WORD, Table
 from rom.mbs.kernels.work import Work
 
-ROW_WORDS = 5  # of a family: its table, then its kernels in the order of their columns
+ROW_WORDS = 6  # of a family: its table, then its kernels in the order of their columns
 PYTHON_OBJECTS: dict[int, Any] = {}  # tables and kernels by address, where Python runs the kernels
 SYSTEM_TYPE, WORK_TYPE = System._numba_type_, Work._numba_type_
 
@@ -101,6 +101,10 @@ tangents = Role(2, types.void, REAL_VECTOR, types.float64, types.float64)
 energy = Role(3, types.float64, REAL_VECTOR, REAL_VECTOR)
 # (s, k, W, lam, rank): add to W.UG how the forces change with the multipliers
 multiplier_columns = Role(4, types.void, REAL_VECTOR, types.int64)
+# (s, k, W, ck, cc, first): write ck times the stiffness and cc times the damping that the motion of
+# marker i against j meets to W.pairs, element by element from place ``first``, right after the
+# residuals; how many they are
+pair_tangents = Role(5, types.int64, types.float64, types.float64, types.int64)
 
 
 def row_of(table: Table, kernels: tuple[ElementKernel | None, ...]) -> list[int]:

@@ -64,6 +64,9 @@ STAGE_NAMES = (
     "keep_past",
     "rolling_row",
     "rolling_stiffness",
+    "keep_pair_tangents",
+    "renew_pair_tangents",
+    "add_renewed",
 )
 STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked

@@ -156,6 +156,8 @@ class System(Table):
             `rom.mbs.kernels.element_calls`.
         by_multipliers: 1 if forces depend on the loads of joints.
         memory: (p,) what laws remember from one instant to the next, at the start.
+        renewed: (k, 2) markers i and j of elements whose tangents are renewed within a step,
+            see `rom.mbs.equations.renewal`.
     """
 
     stages: Address1
@@ -166,4 +168,5 @@ class System(Table):
     elements: Address2
     by_multipliers: int
     memory: Array1
+    renewed: Index2
     graph: Graph | None = None

@@ -21,7 +21,8 @@ LARGEST_WHOLE = 2000
     USES_LAWS,
     LAWS_ASKED,
     BOTH_LEVELS,
-) = range(10)
+    FACTOR_USES,
+) = range(11)
 
 
 @table
@@ -91,6 +92,15 @@ class Work(Table):
     UGT: Array2  # (m, n) the same in increments of the rotation vectors of a step
     remainder: Array2  # (n, m)
     part: Array1  # (m,)
+    pairs: Array3  # (e, 6, 6) renewed tangents of elements by the motion of i against j
+    pairs_lu: Array3  # (e, 6, 6) the same as it is in lu
+    approach: Array2  # (6 e, n) that motion per velocity, at the factorisation
+    response: Array2  # (6 e, n + m) solutions for its rows
+    yielding: Array2  # (6 e, 6 e) approach times response
+    renewal: Array2  # (6 e, 6 e) factors of 1 + (pairs - pairs_lu) yielding
+    renewal_pivot: Index1  # (6 e,)
+    renewal_part: Array1  # (6 e,)
+    has_response: Index1  # (1,) whether `response` belongs to the factor at hand
     delta: Array1  # (n,) increment
     dlam: Array1  # (m,) increment of the multipliers
 
@@ -105,10 +115,11 @@ class Step(Table):
         q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
         work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
         lost: (3,) the powers at the last accepted instant.
-        count: (10,) steps, iterations, factorisations, iterations of the last step, whether a
+        count: (11,) steps, iterations, factorisations, iterations of the last step, whether a
             factorisation is at hand, pass of the present step, steps when the present chunk
             began, whether Python forces are to be asked for, whether they have been, whether
-            constraints hold for positions and velocities both.
+            constraints hold for positions and velocities both, corrections with the factorisation
+            at hand.
         size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
             largest gap in a joint before the last increment.
         method: (5,) h, beta, gamma, alpha_m, alpha_f.
@@ -147,7 +158,7 @@ def workspace(system: System, n_signals: int) -> Work:
     b, k, m, c = bodies.mass.size, markers.body.size, rows.kind.size, system.coordinates.kind.size
     R, bent = bodies.K.shape[1], int((bodies.r * bodies.stiffened).max(initial=0))
     n = int(6 * b + bodies.r.sum())
-    square, wide, whole = (n, n), n, n + m
+    e, square, wide, whole = len(system.renewed), (n, n), n, n + m
     if system.graph.compact:
         square = (int(np.repeat(6 + bodies.r, np.diff(system.graph.first)).sum()), 6 + R)
         moved = system.graph.body
@@ -192,9 +203,15 @@ def workspace(system: System, n_signals: int) -> Work:
         "soft": (m,),
         "refined": (2, n + m),
         **dict.fromkeys(("U", "U_lu"), redundant),
+        **dict.fromkeys(("pairs", "pairs_lu"), (e, 6, 6)),
+        "approach": (6 * e, n),
+        "response": (6 * e, n + m),
+        **dict.fromkeys(("yielding", "renewal"), (6 * e, 6 * e)),
+        "renewal_part": (6 * e,),
     }
     arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
     arrays["load"][0] = 1.0
     arrays["base"][c:] = system.memory
-    whole_numbers = {"pivot": np.zeros(n + m, dtype=np.int64), "by_blocks": np.zeros(1, int)}
+    lengths = {"pivot": n + m, "by_blocks": 1, "renewal_pivot": 6 * e, "has_response": 1}
+    whole_numbers = {name: np.zeros(k, dtype=np.int64) for name, k in lengths.items()}
     return Work(**arrays, **whole_numbers)

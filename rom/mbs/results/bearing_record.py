@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.mbs.elements.films.cells import N_MOTIONS
+from rom.mbs.elements.films.journal_bearings import OilFilm
 from rom.mbs.elements.films.journals import (
     LARGEST,
     MOTION,
@@ -30,6 +31,8 @@ class BearingRecord:
         temperature: (n_t,) of the film [degrees Celsius]; NaN where its viscosity stays.
         power: (n_t,) that turns into heat [W].
         side_flow: (n_t,) oil that leaves at both ends [m^3/s].
+        opening: (n_t, nt, nz) by which an elastic bush widens the film in its cells [m], beyond the
+            mean motion of its bore; None of a rigid one.
     """
 
     t: Array
@@ -39,6 +42,7 @@ class BearingRecord:
     temperature: Array
     power: Array
     side_flow: Array
+    opening: Array | None = None
 
 
 def bearing_record(solution: Any, name: str) -> BearingRecord:
@@ -55,4 +59,13 @@ def bearing_record(solution: Any, name: str) -> BearingRecord:
         temperature,
         found[:, POWER],
         found[:, SIDE_FLOW],
+        _opening(solution, element),
     )
+
+
+def _opening(solution: Any, element: OilFilm) -> Array | None:
+    functions, amplitudes = element.bore
+    if not functions.size:
+        return None
+    moved = solution.elastic(element.j.body) @ amplitudes.T @ functions.T
+    return np.asarray(moved.reshape(len(moved), *element.bearing.cells))

@@ -91,6 +91,10 @@ class FourierLegendre:
 
     Raises:
         ConfigError: for a harmonic below one or an order below zero.
+
+    Example:
+        >>> rom.FourierLegendre(harmonics=4, order=2)  # of a bore that an oil film bends
+        FourierLegendre(harmonics=4, order=2)
     """
 
     harmonics: int

@@ -7,12 +7,18 @@ import rom
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-def held_rotor(bearing, load, *, speed, oil, mass=10.0, moves=None, **more):
-    """A rotor that a motor turns, free to move across its axis in one bearing on the ground.
+def held_rotor(bearing, load, *, speed, oil, mass=10.0, moves=None, body=None, **more):
+    """A rotor that a motor turns, free to move across its axis in one bearing.
 
-    ``moves`` are two functions of time that drive it along X and Y instead.
+    ``moves`` are two functions of time that drive it along X and Y instead. The bush is the ground,
+    or the "bore" of a flexible body whose "rim" the ground holds.
     """
     mech = rom.Mechanism(gravity=ORIGIN)
+    bush = mech.ground.marker(ORIGIN)
+    if body is not None:
+        part = mech.add_flexible("bush", body, at=ORIGIN)
+        mech.fixed("seat", bush, part.marker("rim"))
+        bush, more = part.marker("bore"), {"elastic_bush": True} | more
     x, y = (0.0, 0.0) if moves is None else (moves[0](0.0), moves[1](0.0))
     solid = {"mass": mass, "inertia": (0.1,) * 3}
     shaft = mech.add_rigid("shaft", at=(x, y, 0), omega=(0, 0, speed), **solid)
@@ -26,7 +32,7 @@ def held_rotor(bearing, load, *, speed, oil, mass=10.0, moves=None, **more):
     mech.drive("motor", "turn", lambda t: speed * t)
     for name, start, move in zip("xy", (x, y), moves or (), strict=False):
         mech.drive(f"move {name}", name, lambda t, move=move, start=start: move(t) - start)
-    mech.journal_bearing("film", ends[3], ends[0], axis=(0, 0, 1), bearing=bearing, oil=oil, **more)
+    mech.journal_bearing("film", ends[3], bush, axis=(0, 0, 1), bearing=bearing, oil=oil, **more)
     if np.any(load):
         mech.force("load", ends[3], (*load, 0.0))
     return mech

@@ -26,11 +26,11 @@ def brick(x, material):
     return K, M
 
 
-def tube(inner=0.02, outer=0.035, length=0.08, cells=(24, 2, 6), material=STEEL):
+def tube(inner=0.02, outer=0.035, length=0.08, cells=(24, 2, 6), material=STEEL, ends=1):
     """FEModel of a tube about the origin with the interfaces "rim", "bore", "low" and "high".
 
-    Rim and bore end a cell before the ends. Corners lie on circles whose polygons have the area of
-    the tube.
+    Rim and bore end so many cells before the ends. Corners lie on circles whose polygons have the
+    area of the tube.
     """
     n, n_r, n_z = cells
     theta = 2 * np.pi / n * np.arange(n)
@@ -44,7 +44,8 @@ def tube(inner=0.02, outer=0.035, length=0.08, cells=(24, 2, 6), material=STEEL)
     blocks = np.array([brick(points[corners], material) for corners in nodes])
     K, M = (_assembled(dofs, blocks[:, kind], points.size) for kind in (0, 1))
     turned = np.concatenate([number, number[:1]])
-    faces = {"rim": turned[:, -1, 1:-1], "bore": turned[:, 0, 1:-1], "low": turned[:, :, 0],
+    between = slice(ends, n_z + 1 - ends)
+    faces = {"rim": turned[:, -1, between], "bore": turned[:, 0, between], "low": turned[:, :, 0],
              "high": turned[:, :, -1]}  # fmt: skip
     outside = turned[:, -1], turned[:, ::-1, 0], turned[:, :, -1], turned[::-1, 0]
     interfaces = {name: _interface(name, x, points) for name, x in faces.items()}

@@ -153,7 +153,7 @@ ELEMENTS = {  # family -> what asks for it
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
 }
-KERNELS = ("residuals", "tangents", "energy", "multiplier_columns")
+KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
 
 STORAGE = {  # whether by blocks -> stages
     True: {"factorise_blocks", "fill_from_blocks", "solve_blocks"},
@@ -181,7 +181,7 @@ def hinge(mech, b):
 def test_a_mechanism_has_the_kernels_of_its_elements_and_no_others(name):
     """Without them it would move as if the elements were not there."""
     mech, a, b = pair()
-    assert pack(mech).system.elements.shape == (0, 5)
+    assert pack(mech).system.elements.shape == (0, 6)
     ELEMENTS[name](mech, a, b)
     packed = pack(mech)
     ((family, table),) = packed.elements.items()
@@ -239,7 +239,7 @@ def test_a_run_asks_for_the_stages_of_its_method(options, stages, monkeypatch):
 def test_every_stage_is_asked_for_by_all_mechanisms_or_by_some_part_or_a_method():
     mech, *_ = pair()
     sometimes = set().union(*map(str.split, ASKED), *STORAGE.values(), MULTISTEP, STABILISED)
-    sometimes |= {"advance"}
+    sometimes |= {"advance", "keep_pair_tangents", "renew_pair_tangents", "add_renewed"}  # of films
     assert set(STAGE_KERNELS) == set(STAGE_NAMES) == needed_by(pack(mech).system) | sometimes
 
 

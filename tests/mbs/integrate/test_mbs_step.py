@@ -35,7 +35,7 @@ def test_columns_of_rotations_count_in_increments_of_the_rotation_vector():
     n, m = packed.v.size, W.value.size
     psi = rng.normal(size=n)
     vectors = [np.zeros(k) for k in (packed.q.size, n, n, n, m, packed.q.size, n, n, m)]
-    counts = np.zeros(10, dtype=np.int64)
+    counts = np.zeros(11, dtype=np.int64)
     constants = (np.zeros(4), coefficients(1e-3, 0.9), np.zeros(3))
     history = np.zeros((2, 1, n)), np.zeros(n)
     T = Step(*vectors, psi, np.zeros(3), np.zeros(3), counts, *constants, *history)

@@ -17,6 +17,7 @@ from rom.mbs.kernels.tables import (
     Table,
     table,
 )
+from rom.model import Array
 
 N_MOTIONS = 4  # journal centre x, y and tilt about x, y
 N_ANSWERS = 5  # what works on them, and the friction torque
@@ -27,6 +28,8 @@ COS, SIN, BORE = range(3)
 BEHIND_FACE = 3
 # columns of Cells.state: motion, its rate, then
 SPIN_COLUMN, PASSED_TIME, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
+# column of Cells.slope where openings begin, and behind them their rates
+FIRST_OPENED = SPIN_COLUMN + 1
 
 
 @table
@@ -44,6 +47,8 @@ class Cells(Table):
         circle: (k, nt, 6) cosine, sine, bore at the centres of columns and at the faces behind.
         fixed: (k, n) 1 where a groove holds the pressure.
         inlet: (k, n) pressure there [Pa].
+        n_functions: (k,) number of functions by which a bore that deforms opens the film;
+            functions: (k, n, m) their values at the centres [1].
         state: (k, 11) motion (4,) and its rate [1/s], spin of the journal [rad/s], time that has
             passed since the filling was known [s], whether it is remembered.
         opening, opening_rate: (k, n) by which the bush gives way, in clearances; per second.
@@ -57,9 +62,12 @@ class Cells(Table):
         place: (k, nt) order of the columns.
         band: (k, n, 4 nz + 1) factors of the balances.
         unknown, P, fill: (k, n) of the balances; pressure; filling [1].
-        answer: (k, 5) forces that work on the motions, and friction torque.
-        weight: (k, n, 5) of the balances in each answer.
-        slope: (k, 5, 9) derivatives of the answers by motions, rates and spin.
+        answer: (k, 5 + m) forces that work on the motions, friction torque, forces that work on
+            the functions.
+        weight: (k, n, 5 + m) of the balances in each answer.
+        change: (k, 9 + 2 m) derivatives of the balance of one cell by motions, rates, spin,
+            openings and their rates.
+        slope: (k, 5 + m, 9 + 2 m) the same of the answers.
     """
 
     shape: Index2
@@ -68,6 +76,8 @@ class Cells(Table):
     circle: Array3
     fixed: Index2
     inlet: Array2
+    n_functions: Index1
+    functions: Array3
     state: Scratch2
     opening: Scratch2
     opening_rate: Scratch2
@@ -88,11 +98,20 @@ class Cells(Table):
     fill: Scratch2
     answer: Scratch2
     weight: Scratch3
+    change: Scratch2
     slope: Scratch3
 
 
-def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
-    """The cells of some bearings."""
+def cells_of(
+    bearings: Sequence[JournalBearing], functions: Sequence[Array | None] | None = None
+) -> Cells:
+    """The cells of some bearings.
+
+    Args:
+        bearings: k of them.
+        functions: (n, m) by which the bore of each opens the film in its cells; None of a rigid
+            one.
+    """
     k, grids = len(bearings), [one.grid for one in bearings]
     shapes = np.array([grid.fixed.shape for grid in grids], dtype=np.int64).reshape(-1, 2)
     nt, nz, n = int(shapes[:, 0].max()), int(shapes[:, 1].max()), int(shapes.prod(axis=1).max())
@@ -102,6 +121,12 @@ def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
         [b.radius, b.length, b.clearance, b.grid.slender, 1.0 + b.grid.half, b.grid.Z_face[0]]
         for b in bearings
     ]
+    given = [np.zeros((0, 0)) if one is None else one for one in functions or [None] * k]
+    counts = np.array([one.shape[1] for one in given], dtype=np.int64)
+    most = int(counts.max(initial=0))
+    opens = np.zeros((k, n, most))
+    for row, one in zip(opens, given, strict=True):
+        row[: one.shape[0], : one.shape[1]] = one
     widths = {"side": sides, "leaks": sides}
     scratch = {
         name: np.zeros((k, widths.get(name, n)))
@@ -115,13 +140,16 @@ def cells_of(bearings: Sequence[JournalBearing]) -> Cells:
         circle=_padded([np.concatenate([c[0], c[1]], axis=1) for c in circles], nt),
         fixed=_padded([grid.fixed.ravel() for grid in grids], n),
         inlet=_padded([grid.inlet.ravel() for grid in grids], n),
+        n_functions=counts,
+        functions=opens,
         state=np.zeros((k, CONTENT_KNOWN + 1)),
         active=np.ones((k, n), dtype=np.int64),
         place=np.zeros((k, nt), dtype=np.int64),
         band=np.zeros((k, n, 4 * nz + 1)),
-        answer=np.zeros((k, N_ANSWERS)),
-        weight=np.zeros((k, n, N_ANSWERS)),
-        slope=np.zeros((k, N_ANSWERS, SPIN_COLUMN + 1)),
+        answer=np.zeros((k, N_ANSWERS + most)),
+        weight=np.zeros((k, n, N_ANSWERS + most)),
+        change=np.zeros((k, FIRST_OPENED + 2 * most)),
+        slope=np.zeros((k, N_ANSWERS + most, FIRST_OPENED + 2 * most)),
         **scratch,
     )
 

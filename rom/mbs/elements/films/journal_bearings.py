@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,8 @@ from rom.arguments import finite, number, positive
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.films.bearing import JFO, REYNOLDS, JournalBearing
-from rom.mbs.elements.films.cells import CLEARANCE, cells_of
+from rom.mbs.elements.films.bores import bore_of
+from rom.mbs.elements.films.cells import CLEARANCE, N_ANSWERS, cells_of
 from rom.mbs.elements.films.journals import (
     FIRST_CONTENT,
     INLET,
@@ -19,6 +20,7 @@ from rom.mbs.elements.films.journals import (
     SETTLING_MARK,
     TEMPERATURE,
     Journals,
+    film_pair_tangents,
     film_tangents,
     film_wrenches,
 )
@@ -33,7 +35,10 @@ PARALLEL_COSINE = 0.9  # with X, beyond which angles do not count from there
 
 @dataclass(frozen=True, slots=True)
 class OilFilm:
-    """A film between a journal and a bush; axes (3, 3) and oil (9,) as in `Journals`."""
+    """A film between a journal and a bush; axes (3, 3) and oil (9,) as in `Journals`.
+
+    The bore (n, m), (m, r) is that of `bore_of`, without functions for a rigid one.
+    """
 
     i: Marker
     j: Marker
@@ -42,6 +47,7 @@ class OilFilm:
     liquid: Oil | float
     oil: tuple[float, ...]
     turning: float
+    bore: tuple[Array, Array] = (np.zeros((0, 0)), np.zeros((0, 0)))
 
 
 def journal_bearing(  # noqa: PLR0913  one keyword per property
@@ -59,6 +65,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     carried: float = 0.9,
     felt: float = 0.5,
     thermal_time: float = 1.0,
+    elastic_bush: bool = False,
 ) -> None:
     """Oil film between a journal and its bush, by Reynolds' equation.
 
@@ -82,10 +89,13 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
         carried: share of the heat that leaves with the oil [1].
         felt: share of the rise that the temperature of the film feels [1].
         thermal_time: over which that temperature follows [s].
+        elastic_bush: whether the pressure bends the bore, and the bent bore changes the film: the
+            bush is an interface of a reduced body with functions, as `rom.FourierLegendre`. Else
+            the film sees its mean motion alone.
 
     Raises:
         ConfigError: for a name in use, unknown markers, a journal that touches its bush at the
-            start, or numbers no film has.
+            start, numbers no film has, or an elastic bush without functions of this bore.
     """
     self.check_markers(name, journal, bush)
     if journal.body == bush.body:
@@ -105,6 +115,9 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
         )
     turning = self.part(journal.body).spin_about(name, axes[0])
     film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
+    if elastic_bush:
+        bore = bore_of(name, self.part(bush.body), bush, axes[1:], bearing)
+        film = replace(film, bore=bore)
     self.add(name, film, JOURNAL_BEARINGS_FAMILY)
 
 
@@ -174,7 +187,11 @@ def _heat(name: str, carried: float, felt: float, lag: float) -> tuple[float, fl
 def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
     """The films as arrays."""
     films = list(found.values())
-    k = len(films)
+    k, cells = len(films), cells_of([x.bearing for x in films], [x.bore[0] for x in films])
+    most = cells.functions.shape[2]
+    bores = np.zeros((k, most, places.R))
+    for row, one in zip(bores, films, strict=True):
+        row[: len(one.bore[1]), : one.bore[1].shape[1]] = one.bore[1]
     return Journals(
         integers(places.marker[one.i] for one in films),
         integers(places.marker[one.j] for one in films),
@@ -185,10 +202,12 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
             places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLING_MARK))
             for name, one in found.items()
         ),
-        cells_of([one.bearing for one in films]),
+        cells,
         np.array([one.bearing.scale for one in films]),
         np.array([one.turning for one in films], dtype=float),
-        *(np.zeros(k), np.zeros(k), np.zeros(k), np.zeros(5)),
+        *np.zeros((3, k)),
+        bores,
+        *(np.zeros((k, 2 * most)), np.zeros((most, 12)), np.zeros(N_ANSWERS + most)),
     )
 
 
@@ -213,7 +232,8 @@ def oil_everywhere(journals: Journals) -> Iterator[bool]:
 
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    complete=True, potential=False, answers=lambda journals: journals.largest,
+    pair_tangents=film_pair_tangents, complete=True, potential=False,
+    answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
     eased=oil_everywhere,

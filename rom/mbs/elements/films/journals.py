@@ -2,10 +2,19 @@
 
 import math
 
+from rom.mbs.elements.contact.points import COMPLEX_STEP
 from rom.mbs.elements.films.bearing import JFO
+from rom.mbs.elements.films.bores import (
+    add_bore_rows,
+    add_bore_tangents,
+    bend_bore,
+    bore_power,
+    open_film,
+)
 from rom.mbs.elements.films.cells import (
     CLEARANCE,
     CONTENT_KNOWN,
+    FIRST_OPENED,
     IMAGES,
     LENGTH,
     N_ANSWERS,
@@ -16,7 +25,9 @@ from rom.mbs.elements.films.cells import (
     Cells,
 )
 from rom.mbs.elements.films.kinematics import (
+    answer_unit,
     carried_stiffness,
+    film_forces,
     imaginary,
     journal_motion,
     journal_place,
@@ -25,11 +36,10 @@ from rom.mbs.elements.films.kinematics import (
 )
 from rom.mbs.elements.films.pressure import find_pressure, set_heights, set_supply
 from rom.mbs.elements.films.slopes import TORQUE_ANSWER, set_answers, set_slopes
-from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
-from rom.mbs.kernels.element_calls import residuals, tangents
-from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Table, table
+from rom.mbs.kernels.element_calls import pair_tangents, residuals, tangents
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scratch2, Table, table
 
 # columns of Journals.oil
 CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = range(9)
@@ -68,7 +78,10 @@ class Journals(Table):
         largest: (k,) pressure [Pa], not finite where there is no film.
         thinnest: (k,) film [m], which is below zero where the journal is beyond the bush.
         viscosity: (k,) at the last residual [Pa s].
-        change: (5,) imaginary steps of the answers.
+        bores: (k, m, R) amplitudes by which bushes open their films per elastic coordinate [m].
+        amplitude: (k, 2 m) of the functions, and their rates, in clearances.
+        pressed: (m, 12) changes of the forces on a bore by motions, or velocities, of both markers.
+        change: (5 + m,) imaginary steps of the answers.
     """
 
     i: Index1
@@ -83,6 +96,9 @@ class Journals(Table):
     largest: Scratch1
     thinnest: Scratch1
     viscosity: Scratch1
+    bores: Array3
+    amplitude: Scratch2
+    pressed: Scratch2
     change: Scratch1
 
 
@@ -93,15 +109,6 @@ def oil_viscosity(oil, celsius):
         return oil[CONSTANT]
     powers = oil[WALTHER_A] - oil[WALTHER_B] * math.log10(celsius + CELSIUS_ZERO)
     return 1e-6 * oil[DENSITY] * (10.0 ** (10.0**powers) - 0.7)
-
-
-@inner
-def answer_unit(journals, k, m):
-    """Answer m of film k over the dimensionless one [N s, N m s]."""
-    R, L, c = row(journals.films.size, k, RADIUS)
-    if m == TORQUE_ANSWER:
-        return journals.viscosity[k] * R**3 * L / c
-    return journals.viscosity[k] * R * L * (R / c) ** 2 * c / journals.scale[k, m]
 
 
 @inner
@@ -130,7 +137,7 @@ def lost_power(journals, k):
     for m in range(N_MOTIONS):
         force = answer_unit(journals, k, m) * films.answer[k, m]
         total -= force * journals.scale[k, m] * films.state[k, N_MOTIONS + m]
-    return total
+    return total - bore_power(journals, k)
 
 
 @inner
@@ -264,37 +271,26 @@ def film_of(s, W, journals, k):
     return True
 
 
-@inner
-def film_forces(journals, k):
-    """Forces that work on the motion, and the torque that brakes the spin."""
-    answer = journals.films.answer[k]
-    F = (
-        answer_unit(journals, k, 0) * answer[0],
-        answer_unit(journals, k, 1) * answer[1],
-        answer_unit(journals, k, 2) * answer[2],
-        answer_unit(journals, k, 3) * answer[3],
-    )
-    return F, answer_unit(journals, k, TORQUE_ANSWER) * answer[TORQUE_ANSWER]
-
-
 @residuals.of(Journals)
-def film_wrenches(s, W, journals, _q, _v, _lam):
-    """Add the films to the wrenches on the markers; add up the power lost."""
+def film_wrenches(s, W, journals, q, v, _lam):
+    """Add the films to the wrenches on the markers and bend bores; add up the power lost."""
     for k in range(journals.i.size):
         i, j = journals.i[k], journals.j[k]
         axes, relative = journal_place(W, i, j, journals.axes[k])
         set_state(journals, k, (axes, relative))
+        open_film(s, journals, k, q, v)
         if not film_of(s, W, journals, k):
             journals.largest[k] = math.nan
             W.wrench[i, 0] = math.nan
             continue
-        F, torque = film_forces(journals, k)
+        F, torque = film_forces(journals, k, journals.films.answer[k])
         force, on_journal, on_bush = journal_wrench(axes, relative[0], F, torque)
         for p in range(3):
             W.wrench[i, p] += force[p]
             W.wrench[i, 3 + p] += on_journal[p]
             W.wrench[j, p] -= force[p]
             W.wrench[j, 3 + p] += on_bush[p]
+        bend_bore(s, W, journals, k)
         W.power[2] += lost_power(journals, k)
         W.power[1] += torque * journals.turning[k]  # of what keeps it spinning
 
@@ -302,9 +298,9 @@ def film_wrenches(s, W, journals, _q, _v, _lam):
 @inner
 def changed_answers(journals, k, motion, rate, spin):
     """Forces and torque with the imaginary step that motion, rate and spin have."""
-    F, torque = film_forces(journals, k)
+    F, torque = film_forces(journals, k, journals.films.answer[k])
     change, slope = journals.change, journals.films.slope[k]
-    for m in range(N_ANSWERS):
+    for m in range(N_ANSWERS + journals.films.n_functions[k]):
         change[m] = 0.0
         for q in range(N_MOTIONS):
             change[m] += slope[m, q] * motion[q].imag / journals.scale[k, q]
@@ -321,7 +317,10 @@ def changed_answers(journals, k, motion, rate, spin):
 
 @inner
 def set_column(W, journals, k, p, by_position):
-    """Set column p of W.Q to minus the change of the wrenches in unit motion, or velocity, p."""
+    """Set column p of W.Q to minus the change of the wrenches in unit motion, or velocity, p.
+
+    Column p of journals.pressed is that of the forces on the bore.
+    """
     i, j = journals.i[k], journals.j[k]
     place = journal_place(W, i, j, journals.axes[k])
     axes, relative = stepped_place(p, by_position, place)
@@ -333,6 +332,8 @@ def set_column(W, journals, k, p, by_position):
         W.Q[3 + q, p] = -turned[q]
         W.Q[6 + q, p] = shove[q]
         W.Q[9 + q, p] = -back[q]
+    for f in range(journals.films.n_functions[k]):
+        journals.pressed[f, p] = journals.change[N_ANSWERS + f] / COMPLEX_STEP
 
 
 @inner
@@ -350,13 +351,36 @@ def film_tangents(s, W, journals, _lam, ck, cc):
         if not journals.largest[k] >= 0.0:
             continue
         pair = journals.i[k], journals.j[k]
+        by_rate = FIRST_OPENED + journals.films.functions.shape[2]
         set_slopes(journals.films, k)
         for p in range(12):
             set_column(W, journals, k, p, True)
         scale_pair(W, ck)
         pair_stiffness(s, W, *pair, W.Kt)
+        add_bore_tangents(s, W, journals, k, FIRST_OPENED, ck, W.Kt)
         for p in range(12):
             set_column(W, journals, k, p, False)
         carried_stiffness(s, W, pair, ck, W.Kt)
+        add_bore_rows(s, W, journals, k, -1, ck, W.Kt)
         scale_pair(W, cc)
         pair_stiffness(s, W, *pair, W.S)
+        add_bore_tangents(s, W, journals, k, by_rate, cc, W.S)
+
+
+@pair_tangents.of(Journals)
+def film_pair_tangents(_s, W, journals, ck, cc, first):
+    """Write what the motion of the journal against its bush changes to W.pairs.
+
+    Nothing of a film that bends its bore, which is more than that motion.
+    """
+    for k in range(journals.i.size):
+        W.pairs[first + k] = 0.0
+        if not journals.largest[k] >= 0.0 or journals.films.n_functions[k] > 0:
+            continue
+        set_slopes(journals.films, k)
+        for by_position in range(2):
+            for q in range(6):
+                set_column(W, journals, k, q, by_position == 1)
+                for p in range(6):
+                    W.pairs[first + k, p, q] += (ck if by_position == 1 else cc) * W.Q[p, q]
+    return journals.i.size

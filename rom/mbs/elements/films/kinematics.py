@@ -12,6 +12,8 @@ functions take real or complex numbers, for derivatives by imaginary steps as in
 """
 
 from rom.mbs.elements.contact.points import COMPLEX_STEP, stepped
+from rom.mbs.elements.films.cells import N_ANSWERS, RADIUS
+from rom.mbs.elements.films.slopes import TORQUE_ANSWER
 from rom.mbs.kernels.algebra import add, cross, dot, mv, row, scale, sub, turn, unit_twist
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import spread_pair
@@ -60,6 +62,28 @@ def journal_wrench(axes, D, F, torque):
     tilting = add(add(scale(A / nz, x), scale(B / nz, y)), scale(-(A * a + B * b) / nz, z))
     moment = sub(cross(n, tilting), scale(torque, z))
     return force, moment, scale(-1.0, add(moment, cross(D, force)))
+
+
+@inner
+def answer_unit(journals, k, m):
+    """Answer m of film k over the dimensionless one [N s, N m s]."""
+    R, L, c = row(journals.films.size, k, RADIUS)
+    if m == TORQUE_ANSWER:
+        return journals.viscosity[k] * R**3 * L / c
+    unit = journals.viscosity[k] * R * L * (R / c) ** 2
+    return unit if m >= N_ANSWERS else unit * c / journals.scale[k, m]
+
+
+@inner
+def film_forces(journals, k, answer):
+    """Forces that work on the motion, and the torque that brakes the spin."""
+    F = (
+        answer_unit(journals, k, 0) * answer[0],
+        answer_unit(journals, k, 1) * answer[1],
+        answer_unit(journals, k, 2) * answer[2],
+        answer_unit(journals, k, 3) * answer[3],
+    )
+    return F, answer_unit(journals, k, TORQUE_ANSWER) * answer[TORQUE_ANSWER]
 
 
 @inner

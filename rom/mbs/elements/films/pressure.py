@@ -50,6 +50,18 @@ def cell_size(films, k):
 
 
 @inner
+def column_before(i, nt):
+    """The column before column i of nt; quicker than a remainder."""
+    return i - 1 if i > 0 else nt - 1
+
+
+@inner
+def column_after(i, nt):
+    """The column behind column i of nt."""
+    return i + 1 if i < nt - 1 else 0
+
+
+@inner
 def per_motion(films, k, face, i, Z, m):
     """Film opened at column i by a unit of motion m; pressure times this is the force on it."""
     c, s = films.circle[k, i, face + COS], films.circle[k, i, face + SIN]
@@ -68,6 +80,13 @@ def line_of(films, k, face, i, at):
 
 
 @inner
+def at_side(nz, j, values):
+    """Value at side j of a column of cells: the mean of its neighbours, at the ends along them."""
+    near = min(max(j - 1, 0), nz - 2)
+    return values[near] + (j - near - 0.5) * (values[near + 1] - values[near])
+
+
+@inner
 def set_heights(films, k):
     """Set the film and the conductance of all faces; returns the thinnest film."""
     nt, nz = films.shape[k]
@@ -77,7 +96,7 @@ def set_heights(films, k):
         a, b = line_of(films, k, 0, i, 0)
         c, d = line_of(films, k, BEHIND_FACE, i, 0)
         a, c = a + films.circle[k, i, BORE], c + films.circle[k, i, BEHIND_FACE + BORE]
-        after = (i + 1) % nt
+        after = column_after(i, nt)
         for j in range(nz):
             cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
             gap = films.opening[k, cell]
@@ -86,8 +105,7 @@ def set_heights(films, k):
             films.conducts[k, cell] = h * h * h * dZ / dtheta
             low = min(low, min(h, films.middle[k, cell]))
         for j in range(nz + 1):
-            left, right = i * nz + max(j - 1, 0), i * nz + min(j, nz - 1)
-            gap = 0.5 * (films.opening[k, left] + films.opening[k, right])
+            gap = at_side(nz, j, films.opening[k, i * nz : (i + 1) * nz])
             face, h = i * (nz + 1) + j, a + (films.size[k, Z_FIRST] + j * dZ) * b + gap
             open_end = 2.0 if j in (0, nz) else 1.0
             if j == 0 and films.size[k, IMAGES] > 1.0:
@@ -135,7 +153,7 @@ def order(films, k):
     active, fixed, place = films.active[k], films.fixed[k], films.place[k]
     cut = -1
     for i in range(nt):
-        closed, after = True, (i + 1) % nt
+        closed, after = True, column_after(i, nt)
         for j in range(nz):
             cell, next_cell = i * nz + j, after * nz + j
             void = active[cell] == 0 and (active[next_cell] == 0 or fixed[next_cell] == 1)
@@ -152,15 +170,14 @@ def order(films, k):
 
 
 @inner
-def add_flow(films, k, a, row, own, other, w):
-    """Flow a (P - P_other) out of a cell; columns exist for cells that carry pressure."""
-    nz, band = films.shape[k, 1], films.band[k]
+def add_flow(films, k, a, places, own, other, w):
+    """Flow a (P - P_other) out of a cell; ``places`` are those of both in the equations."""
+    band, (row, column) = films.band[k], places
     if own == 1:
         band[row, w] += a
     if films.fixed[k, other] == 1:
         films.unknown[k, row] += a * films.supply[k, other]
     elif films.active[k, other] == 1:
-        column = films.place[k, other // nz] * nz + other % nz
         band[row, w + column - row] -= a
 
 
@@ -173,45 +190,44 @@ def assemble(films, k, w):
             films.band[k, row, m] = 0.0
     drag = 6 * cell_size(films, k)[1] * films.state[k, SPIN_COLUMN]
     for i in range(nt):
-        before, after = (i - 1) % nt, (i + 1) % nt
+        before, after = column_before(i, nt), column_after(i, nt)
         for j in range(nz):
             cell, row = i * nz + j, films.place[k, i] * nz + j
+            to_west, to_east = films.place[k, before] * nz + j, films.place[k, after] * nz + j
             if films.fixed[k, cell] == 1:
                 films.band[k, row, w], films.unknown[k, row] = 1.0, films.supply[k, cell]
                 continue
             own, east, west = films.active[k, cell], after * nz + j, before * nz + j
             away, into = drag * films.behind[k, cell], drag * films.behind[k, west]
             films.unknown[k, row] = into - away + films.gain[k, cell] - films.store[k, cell]
-            add_flow(films, k, films.conducts[k, cell], row, own, east, w)
-            add_flow(films, k, films.conducts[k, west], row, own, west, w)
+            add_flow(films, k, films.conducts[k, cell], (row, to_east), own, east, w)
+            add_flow(films, k, films.conducts[k, west], (row, to_west), own, west, w)
             side = i * (nz + 1) + j
             for end in range(2):
-                a, o = films.leaks[k, side + end], cell - 1 + 2 * end
-                if 0 <= j - 1 + 2 * end < nz:
-                    add_flow(films, k, a, row, own, o, w)
+                a, o = films.leaks[k, side + end], 2 * end - 1
+                if 0 <= j + o < nz:
+                    add_flow(films, k, a, (row, row + o), own, cell + o, w)
                 elif own == 1:
                     films.band[k, row, w] += a
             if films.law[k] == JFO:
-                add_filling(films, k, (cell, west, east), (into, away), w)
+                add_filling(films, k, (cell, west, east), (row, to_west, to_east), (into, away), w)
             elif own == 0:
                 films.band[k, row, w] = 1.0
 
 
 @inner
-def add_filling(films, k, cells, drags, w):
+def add_filling(films, k, cells, places, drags, w):
     """Oil that leaves a cell, and that which comes, where they are not full."""
     cell, west, east = cells
+    row, to_west, to_east = places
     into, away = drags
-    nz = films.shape[k, 1]
-    row = films.place[k, cell // nz] * nz + cell % nz
     if films.active[k, cell] == 0:
         out = max(away, -into)
         own = (1 + LEAKAGE_RTOL) * out + max(films.store[k, cell], -MAX_CLOSING * out)
         least = LEAST_FLOW * films.conducts[k, cell]
         films.band[k, row, w] += own if own > least else 1.0
-    upstream, flow = (west, into) if into > 0.0 else (east, -away)
+    upstream, column, flow = (west, to_west, into) if into > 0.0 else (east, to_east, -away)
     if films.fixed[k, upstream] == 0 and films.active[k, upstream] == 0 and flow != 0.0:
-        column = films.place[k, upstream // nz] * nz + upstream % nz
         films.band[k, row, w + column - row] -= flow
 
 

@@ -9,6 +9,7 @@ from rom.mbs.elements.films.band import back_substitute_transposed
 from rom.mbs.elements.films.bearing import JFO
 from rom.mbs.elements.films.cells import (
     BEHIND_FACE,
+    FIRST_OPENED,
     IMAGES,
     N_ANSWERS,
     N_MOTIONS,
@@ -16,7 +17,10 @@ from rom.mbs.elements.films.cells import (
     Z_FIRST,
 )
 from rom.mbs.elements.films.pressure import (
+    at_side,
     cell_size,
+    column_after,
+    column_before,
     find_pressure,
     has_memory,
     order,
@@ -37,19 +41,20 @@ def n_motions(films, k):
 
 @inner
 def set_answers(films, k):
-    """Forces on the motions; torque of sheared oil and of pressure on its slope."""
+    """Forces on motions and functions; torque of sheared oil and of pressure on its slope."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
     width = dZ * films.size[k, IMAGES]
-    for m in range(N_ANSWERS):
-        films.answer[k, m] = 0.0
+    films.answer[k, :] = 0.0
     for i in range(nt):
         for j in range(nz):
             cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
-            P, west = films.P[k, cell], (i - 1) % nt * nz + j
+            P, west = films.P[k, cell], column_before(i, nt) * nz + j
             for m in range(n_motions(films, k)):
                 opened = per_motion(films, k, 0, i, Z, m)
                 films.answer[k, m] += width * dtheta * P * opened
+            for f in range(films.n_functions[k]):
+                films.answer[k, N_ANSWERS + f] += width * dtheta * P * films.functions[k, cell, f]
             shear = (
                 films.state[k, SPIN_COLUMN] * films.fill[k, cell] / films.middle[k, cell] * dtheta
             )
@@ -59,13 +64,11 @@ def set_answers(films, k):
 
 @inner
 def set_slopes(films, k):
-    """Set the derivatives of the answers by motions, rates and spin; `find_pressure` first."""
+    """Set the derivatives of the answers; `find_pressure` first."""
     set_weights(films, k)
     w, n = order(films, k), films.shape[k, 0] * films.shape[k, 1]
     back_substitute_transposed(films.band[k], n, w, films.weight[k])
-    for m in range(N_ANSWERS):
-        for q in range(SPIN_COLUMN + 1):
-            films.slope[k, m, q] = 0.0
+    films.slope[k, :, :] = 0.0
     nt, nz = films.shape[k]
     for i in range(nt):
         for j in range(nz):
@@ -83,14 +86,16 @@ def set_weights(films, k):
     for i in range(nt):
         for j in range(nz):
             cell, row = i * nz + j, films.place[k, i] * nz + j
-            for m in range(N_ANSWERS):
-                films.weight[k, row, m] = 0.0
+            films.weight[k, row, :] = 0.0
             if films.fixed[k, cell] == 1:
                 continue
             if films.active[k, cell] == 1:
-                Z, west = films.size[k, Z_FIRST] + (j + 0.5) * dZ, (i - 1) % nt * nz + j
+                Z, west = films.size[k, Z_FIRST] + (j + 0.5) * dZ, column_before(i, nt) * nz + j
                 for m in range(n_motions(films, k)):
                     films.weight[k, row, m] = width * dtheta * per_motion(films, k, 0, i, Z, m)
+                for f in range(films.n_functions[k]):
+                    opened = films.functions[k, cell, f]
+                    films.weight[k, row, N_ANSWERS + f] = width * dtheta * opened
                 rise = films.behind[k, cell] - films.behind[k, west]
                 films.weight[k, row, TORQUE_ANSWER] = -0.5 * width * rise
             elif films.law[k] == JFO:
@@ -107,11 +112,17 @@ def add_shear_slopes(films, k, i, j):
     width, h = dZ * films.size[k, IMAGES], films.middle[k, cell]
     shear = width * dtheta * films.fill[k, cell] / h
     films.slope[k, TORQUE_ANSWER, SPIN_COLUMN] += shear
+    thinner, slanted = shear * films.state[k, SPIN_COLUMN] / h, 0.5 * width * films.P[k, cell]
     for m in range(n_motions(films, k)):
         rise = per_motion(films, k, BEHIND_FACE, i, Z, m)
-        rise -= per_motion(films, k, BEHIND_FACE, (i - 1) % nt, Z, m)
-        thinner = shear * films.state[k, SPIN_COLUMN] / h * per_motion(films, k, 0, i, Z, m)
-        films.slope[k, TORQUE_ANSWER, m] -= thinner + 0.5 * width * films.P[k, cell] * rise
+        rise -= per_motion(films, k, BEHIND_FACE, column_before(i, nt), Z, m)
+        opened = per_motion(films, k, 0, i, Z, m)
+        films.slope[k, TORQUE_ANSWER, m] -= thinner * opened + slanted * rise
+    east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
+    for f in range(films.n_functions[k]):
+        opened, g = films.functions[k, :, f], FIRST_OPENED + f
+        rise = 0.5 * (opened[east] - opened[west])
+        films.slope[k, TORQUE_ANSWER, g] -= thinner * opened[cell] + slanted * rise
 
 
 @inner
@@ -121,14 +132,18 @@ def carried(films, k, west, east):
 
 
 @inner
-def add_cell_slopes(films, k, i, j):
-    """Add the weights of a cell times the change of its balance."""
+def balance_slopes(films, k, i, j):
+    """Changes of the balance of a cell.
+
+    Returns:
+        By the film at the faces behind and before it, at its centre, at its two sides; by the rate
+        of the film; by the spin.
+    """
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    row, cell, Z = films.place[k, i] * nz + j, i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
-    before, P = (i - 1) % nt, films.P[k, cell]
-    east, west = (i + 1) % nt * nz + j, before * nz + j
-    h, h_west, spin = films.behind[k, cell], films.behind[k, west], films.state[k, SPIN_COLUMN]
+    cell, P, spin = i * nz + j, films.P[k, i * nz + j], films.state[k, SPIN_COLUMN]
+    east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
+    h, h_west = films.behind[k, cell], films.behind[k, west]
     away, into = 6 * dZ * carried(films, k, cell, east), 6 * dZ * carried(films, k, west, cell)
     by_east = 3 * films.conducts[k, cell] / h * (P - films.P[k, east]) + spin * away
     by_west = 3 * films.conducts[k, west] / h_west * (P - films.P[k, west]) - spin * into
@@ -138,26 +153,55 @@ def add_cell_slopes(films, k, i, j):
         by_rate = 0.0
     else:
         by_middle = 0.0
-    for m in range(n_motions(films, k)):
-        change = by_east * per_motion(films, k, BEHIND_FACE, i, Z, m)
-        change += by_west * per_motion(films, k, BEHIND_FACE, before, Z, m)
-        opened = per_motion(films, k, 0, i, Z, m)
-        change += by_middle * opened
-        for end in range(2):
-            face, o = i * (nz + 1) + j + end, j - 1 + 2 * end
-            drop = P - (films.P[k, cell - 1 + 2 * end] if 0 <= o < nz else 0.0)
-            by_side = 3 * films.leaks[k, face] / films.side[k, face] * drop
-            change += by_side * per_motion(films, k, 0, i, Z + (end - 0.5) * dZ, m)
-        add_change(films, k, row, m, change)
-        add_change(films, k, row, N_MOTIONS + m, by_rate * opened)
-    add_change(films, k, row, SPIN_COLUMN, h * away - h_west * into)
+    low, high = side_slope(films, k, i, j, 0), side_slope(films, k, i, j, 1)
+    return (by_east, by_west, by_middle, low, high), by_rate, h * away - h_west * into
 
 
 @inner
-def add_change(films, k, row, by, change):
-    """Subtract the weights of a row times a change of its balance."""
-    for m in range(N_ANSWERS):
-        films.slope[k, m, by] -= films.weight[k, row, m] * change
+def side_slope(films, k, i, j, end):
+    """Change of the flow through a side of a cell by the film there."""
+    nz = films.shape[k, 1]
+    cell, face, o = i * nz + j, i * (nz + 1) + j + end, j - 1 + 2 * end
+    drop = films.P[k, cell] - (films.P[k, cell - 1 + 2 * end] if 0 <= o < nz else 0.0)
+    return 3 * films.leaks[k, face] / films.side[k, face] * drop
+
+
+@inner
+def add_cell_slopes(films, k, i, j):
+    """Add the weights of a cell times the change of its balance."""
+    nt, nz = films.shape[k]
+    dZ = cell_size(films, k)[1]
+    row, cell, Z = films.place[k, i] * nz + j, i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
+    by_film, by_rate, by_spin = balance_slopes(films, k, i, j)
+    by_east, by_west, by_middle, low, high = by_film
+    for m in range(n_motions(films, k)):
+        opened = per_motion(films, k, 0, i, Z, m)
+        change = by_east * per_motion(films, k, BEHIND_FACE, i, Z, m) + by_middle * opened
+        change += by_west * per_motion(films, k, BEHIND_FACE, column_before(i, nt), Z, m)
+        change += low * per_motion(films, k, 0, i, Z - 0.5 * dZ, m)
+        change += high * per_motion(films, k, 0, i, Z + 0.5 * dZ, m)
+        films.change[k, m], films.change[k, N_MOTIONS + m] = change, by_rate * opened
+    east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
+    column = films.functions[k, i * nz : (i + 1) * nz]
+    for f in range(films.n_functions[k]):
+        g, opened = films.functions[k, :, f], films.functions[k, cell, f]
+        change = 0.5 * (by_east * (opened + g[east]) + by_west * (opened + g[west]))
+        change += by_middle * opened
+        change += low * at_side(nz, j, column[:, f]) + high * at_side(nz, j + 1, column[:, f])
+        films.change[k, FIRST_OPENED + f] = change
+        films.change[k, FIRST_OPENED + films.functions.shape[2] + f] = by_rate * opened
+    films.change[k, SPIN_COLUMN] = by_spin
+    add_change(films, k, row)
+
+
+@inner
+def add_change(films, k, row):
+    """Subtract the weights of a row times the changes of its balance."""
+    for m in range(N_ANSWERS + films.n_functions[k]):
+        weight, slope, change = films.weight[k, row, m], films.slope[k, m], films.change[k]
+        if weight != 0.0:
+            for q in range(change.size):
+                slope[q] -= weight * change[q]
 
 
 @kernel
