@@ -195,7 +195,7 @@ held = {
     "bar": Held((26 * MM, 0.0, 28 * MM), 20 * MM, 0.08, axis=(0, 1, 0), length=0.1),
     "ball": Held((26 * MM, 22 * MM, 32 * MM), 20 * MM, 0.03),
 }
-skin = replace(SKIN_CONTACT, transition_speed=5e-3)
+skin = replace(SKIN_CONTACT, transition_speed=1e-2)
 wrist = np.array([20 * MM, 0.0, -70 * MM])
 
 
@@ -216,7 +216,8 @@ def driven(what):
         drives = shaft(lambda t: motor.pull(t) / DRUM, dict.fromkeys(fingers, DRUM))
     else:
         drives = winches(pulls, dt)
-    return {name: replace(one, conduit=conduit(name)) for name, one in drives.items()}
+    return {name: replace(one, conduit=conduit(name), transition_speed=5e-3)
+            for name, one in drives.items()}  # fmt: skip
 
 
 motions = {}
@@ -279,7 +280,7 @@ def things_of(what, steps, aside=0.0):
     ends = [mech.parts[what].marker(end) for end in thing.ends]
     parts[what] = [tubes(lines_of(sol, ends, steps), lambda x: rounded(x, thing.radius))]
     top = sol.position("table")[steps]
-    plate = view.box((80 * MM, 4 * MM, 80 * MM), (0, -2 * MM, 0))
+    plate = view.box((28 * MM, 4 * MM, 28 * MM), (0, -2 * MM, 0))
     parts["table"] = [(top[:, None] + plate[0], plate[1])]
     palm = view.box((75 * MM, 90 * MM, 20 * MM), mech.parts["palm"].at)
     parts["palm"] = [(np.repeat(palm[0][None], len(steps), axis=0), palm[1])]
