@@ -92,14 +92,17 @@ def spring_loads(solution: Any, name: str, k: int) -> tuple[Array, Array]:
         name: of the finger.
         k: number of the joint, from 1.
     """
-    forces, moments = [], []
-    for joint in (f"{name} joint {k}", f"{name} plate {k}"):
-        load = solution.reaction(joint)
-        marker = solution.mechanism.joints[joint].markers[1]
-        axis = solution.axes(marker.body, marker)[:, :, 2]
-        forces.append(np.abs((load[:, :3] * axis).sum(axis=1)))
-        moments.append(np.linalg.norm(np.cross(axis, load[:, 3:]), axis=1))
-    return np.maximum(*forces), np.maximum(*moments)
+    ends = [_load_at(solution, f"{name} {kind} {k}") for kind in ("joint", "plate")]
+    return np.maximum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
+
+
+def _load_at(solution: Any, joint: str) -> tuple[Array, Array]:
+    """(n_t,) force along a finger and (n_t,) moment across it at a joint, sizes [N, N m]."""
+    load = solution.reaction(joint)
+    marker = solution.mechanism.joints[joint].markers[1]
+    axis = solution.axes(marker.body, marker)[:, :, 2]
+    along = np.abs((load[:, :3] * axis).sum(axis=1))
+    return along, np.linalg.norm(np.cross(axis, load[:, 3:]), axis=1)
 
 
 def phalanx_stress(solution: Any, name: str, k: int, thickness: float = 5e-3) -> float:
@@ -111,7 +114,7 @@ def phalanx_stress(solution: Any, name: str, k: int, thickness: float = 5e-3) ->
         k: number of the phalanx, from 1.
         thickness: its radius [m].
     """
-    moment = spring_loads(solution, name, k)[1].max()
+    moment = _load_at(solution, f"{name} plate {k}")[1].max()
     return float(4 * moment / (np.pi * thickness**3))
 
 

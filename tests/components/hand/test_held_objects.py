@@ -8,7 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from rom.components.hand.budgets import mass_budget, spring_loads, stress_budget, wire_stress
+from rom.components.hand.budgets import (
+    mass_budget,
+    phalanx_stress,
+    spring_loads,
+    stress_budget,
+    wire_stress,
+)
 from rom.components.hand.compliant_hand import HAND_SPRING, Finger, hand
 from rom.components.hand.control_chart import Chart
 from rom.components.hand.held_objects import (
@@ -21,6 +27,7 @@ from rom.components.hand.held_objects import (
     table,
 )
 from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand
+from rom.components.hand.tip_loads import one_finger, tip_marker
 from rom.components.hand.winches import Motor, winches
 from rom.errors import ConfigError
 
@@ -127,6 +134,38 @@ def test_springs_bear_the_cable_and_the_weight_that_hangs():
     shear, bending = wire_stress(HAND_SPRING, 1.0, 0.01)
     assert_allclose(shear, (39 / 36 + 0.0615) * 8 * 7e-3 / (np.pi * 0.7e-3**3))
     assert_allclose(bending, (4 * C**2 - C - 1) / (4 * C * (C - 1)) * 0.32 / (np.pi * 0.7e-3**3))
+
+
+def test_loads_across_the_tip_bend_the_last_spring_and_phalanx():
+    """Lever arms of 18 mm to the far end of the spring, 10 mm to its plate; a twist bends not."""
+    finger, F = Finger(n=4), 5e-3
+    mech = one_finger(finger, 0.0, (0.0, F, 0.0))
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    assert_allclose(spring_loads(found, "finger", 3)[1][-1], F * 18 * MM, rtol=3e-3)
+    stress = 4 * F * 10 * MM / (np.pi * (5 * MM) ** 3)
+    assert_allclose(phalanx_stress(found, "finger", 3), stress, rtol=3e-3)
+    mech = one_finger(finger)
+    mech.torque("twist", tip_marker(mech, finger), (0.0, 0.0, 1e-4))
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    assert spring_loads(found, "finger", 3)[1][-1] < 1e-7
+
+
+def test_wire_is_judged_by_shares_of_its_strength():
+    """Music wire of 0.7 mm: 2211 / 0.7^0.145 MPa; 45 % of it in shear, 75 % in bending."""
+    strength = 2211e6 / 0.7**0.145
+    mech = one_finger(Finger(n=2), 2.0)
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    said = {row.quantity: row.limit for row in stress_budget(
+        found, {"finger": Finger(n=2)}, motor=3.0, bone=5e7).rows}  # fmt: skip
+    for what, share in (("shear", 0.45), ("bending", 0.75)):
+        limit = said[f"finger spring 1, {what} of the wire [Pa]"]
+        assert_allclose(float(limit.removeprefix("<= ")), share * strength, rtol=1e-3)
+
+
+def test_inertia_of_what_is_held_is_that_of_balls_and_cylinders():
+    assert_allclose(BALL.inertia, 0.4 * 0.05 * 0.02**2 * np.eye(3))
+    along, across = 0.5 * 0.05 * 0.02**2, 0.05 * (0.02**2 / 4 + 0.1**2 / 12)
+    assert_allclose(BAR.inertia, np.diag([across, along, across]))
 
 
 def test_budgets_add_up_and_say_what_is_too_much():
