@@ -168,6 +168,30 @@ def test_inertia_of_what_is_held_is_that_of_balls_and_cylinders():
     assert_allclose(BAR.inertia, np.diag([across, along, across]))
 
 
+@pytest.mark.parametrize("axis", [(0, 1, 0), (0, -1, 0)])
+def test_a_bar_stands_on_its_lower_end_whichever_way_it_is_named(axis):
+    held, mech = replace(BAR, axis=axis), moving_hand({"index": Finger(n=2)}, gravity=(0, -g, 0))
+    hold(mech, "thing", held)
+    table(mech, "thing", held, leaves=1.0)
+    assert_allclose(mech.parts["table"].at, np.array(held.centre) - (0, 50 * MM, 0), atol=1e-12)
+    feet = [mech.design_point(mech.contacts[f"table on thing {k}"].j) for k in (1, 2, 3)]
+    assert_allclose(np.array(feet)[:, 1], held.centre[1] - 49 * MM)
+    assert_allclose(np.mean(feet, axis=0)[[0, 2]], np.array(held.centre)[[0, 2]])
+
+
+def test_palm_and_phalanges_weigh_as_blocks_and_bars():
+    """And a winch takes in nine tenths of the springs, not more."""
+    mech = moving_hand({"index": Finger(n=2)}, build=Build(palm=0.12, palm_size=(0.06, 0.08, 0.02)))
+    second = 0.01 * np.diag([0.06**2, 0.08**2, 0.02**2])  # integrals of rho x x^T
+    assert_allclose(mech.parts["palm"].second, second, atol=1e-12)
+    bone = mech.parts["index phalanx 1"]
+    m, r, h = 1200 * np.pi * 25e-6 * 0.018, 5e-3, 0.018
+    assert_allclose(bone.mass, m)
+    assert_allclose(bone.second, m * np.diag([r * r / 4, r * r / 4, h * h / 12]), atol=1e-15)
+    with pytest.raises(ConfigError, match=r"it takes in 0 to 0\.0216 m"):
+        moving_hand({"index": Finger(n=2)}, drives={"index": Drive(pull=22 * MM)})
+
+
 def test_budgets_add_up_and_say_what_is_too_much():
     """Masses of bars, wire and cable; limits of motor and bone that are exceeded."""
     finger = Finger(n=4)
