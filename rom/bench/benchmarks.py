@@ -318,24 +318,40 @@ def geared(steps: int = 20000) -> Iterator[Figure]:
         steps: of 1e-5 s.
     """
     from rom.bench.models import planetary_train
-    from rom.components.gear_mesh import Mesh
-    from rom.mbs.integrate.simulation import simulate
+    from rom.components.gear_mesh import Hertz, Mesh
 
-    mech, pair, stiffness = planetary_train()
-    simulate(mech, t_end=1e-3, dt=1e-5, save_every=100, progress=False)
-    start = process_time()
-    simulate(mech, t_end=1e-5 * steps, dt=1e-5, save_every=100, progress=False)
-    each = (process_time() - start) / steps
+    case = "planetary train, 6 meshes of 21 slices"
+    options: dict[str, dict[str, Any]] = {
+        "": {},
+        ", along involutes": {"conservative": False},
+        ", slices coupled": {"coupling": 2e-3},
+        ", contact by Hertz": {"hertz": Hertz((2e-3, 2e-3))},
+    }
+    for name, more in options.items():
+        mech, pair, stiffness = planetary_train(**more)
+        each = _seconds_per_step(mech, steps if not name else steps // 5)
+        yield Figure("geared", case + name, "steps per second of the processor", 1 / each, "1/s",
+                     "above 1000")  # fmt: skip
+        if not name:
+            whole = each
     plane, motion = Mesh(pair, stiffness), np.zeros(12)
     motion[5] = 1e-4
     start = process_time()
     for angle in np.linspace(0, 2 * pi, 200):
         plane.forces(motion, float(angle))
     one = (process_time() - start) / 200
-    case = "planetary train, 6 meshes of 21 slices"
-    yield Figure("geared", case, "steps per second of the processor", 1 / each, "1/s", "above 1000")
-    yield Figure("geared", case, "six meshes by the plane model, over a step", 6 * one / each, "",
+    yield Figure("geared", case, "six meshes by the plane model, over a step", 6 * one / whole, "",
                  "above 0.5")  # fmt: skip
+
+
+def _seconds_per_step(mech: Any, steps: int) -> float:
+    """Processor time of a step of 1e-5 s, the kernels compiled."""
+    from rom.mbs.integrate.simulation import simulate
+
+    simulate(mech, t_end=1e-3, dt=1e-5, save_every=100, progress=False)
+    start = process_time()
+    simulate(mech, t_end=1e-5 * steps, dt=1e-5, save_every=100, progress=False)
+    return (process_time() - start) / steps
 
 
 def transmission(
@@ -343,17 +359,28 @@ def transmission(
 ) -> Iterator[Figure]:
     """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
 
+    Then the unit of rigid shafts, by the program of its own and as a mechanism, and steps of two
+    stages of solids in their housing.
+
     Args:
         speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
         cells: of each film.
         ross: compare with ROSS, which is installed from the package index.
     """
-    from rom.bench.peers.films import coefficients_compared, speeds_run_through
+    from rom.bench.peers.films import (
+        coefficients_compared,
+        programs_compared,
+        speeds_run_through,
+    )
+    from rom.bench.two_stages import stages_run
 
     if ross:
         for row in coefficients_compared():
             yield Figure("transmission", *row)
-    for row in speeds_run_through(speeds, cells):
+    for rows in (speeds_run_through, programs_compared):
+        for row in rows(speeds, cells):
+            yield Figure("transmission", *row)
+    for row in stages_run():
         yield Figure("transmission", *row)
 
 

@@ -178,10 +178,13 @@ def shaft_in_films(cavitation: Any) -> Any:
     return mech
 
 
-def planetary_train() -> Any:
+def planetary_train(**more: Any) -> Any:
     """Three planets between a driven sun and a ring on springs; a wheel pair and its stiffness.
 
     The carrier is braked.
+
+    Args:
+        more: what else the meshes are given.
     """
     from rom.mbs.elements.gears.geometry import GearPair
     from rom.mbs.mechanism import Mechanism
@@ -189,7 +192,7 @@ def planetary_train() -> Any:
     sun_pair = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)
     ring_pair = GearPair((24, -72), 2e-3, 0.02, thinning=2e-5)
     mech, z, origin = Mechanism(gravity=(0, 0, 0)), (0, 0, 1), (0.0, 0.0, 0.0)
-    law: dict[str, Any] = {"stiffness": 1.3e10, "damping": 2e-5}
+    law: dict[str, Any] = {"stiffness": 1.3e10, "damping": 2e-5} | more
     wheels = {}
     for name, inertia in (("sun", 1e-4), ("ring", 2e-3), ("carrier", 5e-4)):
         part = mech.add_rigid(name, mass=0.2, inertia=(inertia,) * 3, at=origin)

@@ -170,8 +170,9 @@ def _gear_mesh(entry: Entry) -> None:
     from rom.mbs.elements.gears.corrections import Correction, flank_map
     from rom.mbs.elements.gears.geometry import GearPair
     from rom.mbs.elements.gears.hertz import Hertz
+    from rom.mbs.elements.gears.racks import RackPair
 
-    pair = {key: value for key, value in entry.values.pop("pair").items() if value is not None}
+    pair: Any = {key: value for key, value in entry.values.pop("pair").items() if value is not None}
     for key in ("teeth", "shift"):
         pair[key] = tuple(pair[key])
     correction, hertz = entry.values.pop("correction"), entry.values.pop("hertz", None)
@@ -183,9 +184,23 @@ def _gear_mesh(entry: Entry) -> None:
     pitch = [correction.pop(f"{wheel}_pitch", None) for wheel in ("pinion", "gear")]
     correction["pitch"] = tuple(() if errors is None else errors for errors in pitch)
     correction |= {key: tuple(correction[key]) for key in ("relief", "extent") if key in correction}
-    entry.values["pair"], entry.values["correction"] = GearPair(**pair), Correction(**correction)
+    if pair["teeth"][1] == 0:
+        _make_rack(entry.name, pair)
+    made: Any = RackPair if "pinion_teeth" in pair else GearPair
+    entry.values["pair"], entry.values["correction"] = made(**pair), Correction(**correction)
     entry.values["hertz"] = None if hertz is None else Hertz(**hertz)
     entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
+
+
+def _make_rack(name: str, pair: dict[str, Any]) -> None:
+    """Let the sizes of a pair be those of a pinion and a rack."""
+    (pinion, _), (shift, of_rack) = pair.pop("teeth"), pair["shift"]
+    if of_rack != 0.0:
+        raise ConfigError(
+            f"the rack of {name!r} has a profile shift of {of_rack:g}: where its reference line is "
+            "says centre_distance."
+        )
+    pair["pinion_teeth"], pair["shift"] = pinion, shift
 
 
 def _rolling_bearing(entry: Entry) -> None:

@@ -299,7 +299,8 @@ EVENTS = {
 }  # fmt: skip
 TWO = ((2,),)
 GEAR_PAIR = Table("A pair of involute wheels.", (
-    Key("teeth", Quantity("1", TWO), "Of pinion and gear.", ...),
+    Key("teeth", Quantity("1", TWO), "Of pinion and gear; below zero inside a ring, 0 of a rack.",
+        ...),
     Key("module", Quantity("m", positive=True), "Normal module.", ...),
     Key("width", Quantity("m", positive=True), "Common width of the faces.", ...),
     Key("helix", Quantity("rad"), "At the reference circle, positive for a right-handed pinion.",

@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom.bench.peers import films
+from rom.bench.units import RigidShaft
 from rom.components.journal_bearing import equilibrium
-from rom.components.transmission import rest
+from rom.components.transmission import Shaft, rest
 
 pytestmark = pytest.mark.once
 
@@ -48,3 +49,27 @@ def test_the_unit_that_runs_through_its_speeds_carries_its_load():
     assert given - taken - heat == pytest.approx(0, abs=1e-8 * given)
     assert taken == pytest.approx(300 * 100 * np.pi)
     assert all(0.2 < f.eccentricity < 0.95 for f in state.forces.films)
+
+
+@pytest.mark.long
+def test_the_unit_of_rigid_shafts_is_the_same_by_both_programs():
+    """They find the same largest forces on teeth but for what 60 steps leave."""
+    rows = {quantity: value for _, quantity, value, _, _ in films.programs_compared(2, (40, 4))}
+    own, mechanism = (
+        rows[f"a speed of a sweep {how}"] for how in ("by its own program", "as a mechanism")
+    )
+    assert rows["mechanism over its own program"] == pytest.approx(mechanism / own)
+    assert 0 < rows["load factors apart, middle of all speeds"] < 0.02
+    assert rows["rest as a mechanism"] > 0
+
+
+def test_a_shaft_without_elasticity_keeps_its_inertia():
+    """A steel rod of 50 mm and 200 mm length: pi / 4 d^2 L rho; m d^2 / 8; m (d^2 / 16 + L^2 / 12).
+
+    Beams of four elements have their mass at the nodes but for a part, which the middle feels.
+    """
+    found = RigidShaft.of(Shaft(np.linspace(0.1, 0.3, 5), 0.05))
+    mass = np.pi / 4 * 0.05**2 * 0.2 * 7850
+    assert found.mass == pytest.approx(mass, rel=1e-9) and found.span == pytest.approx(0.2)
+    assert found.about == pytest.approx(mass * 0.05**2 / 8, rel=1e-9)
+    assert found.across == pytest.approx(mass * (0.05**2 / 16 + 0.2**2 / 12), rel=1e-3)

@@ -97,6 +97,8 @@ ORDER = {
     ),
     "bench": (
         "models",
+        "units",
+        "two_stages",
         "peers",
         "loops",
         "first_use",

@@ -9,6 +9,7 @@ import pytest
 import rom
 from cases.mbs.drawn import lattice_bar, swinging
 from rom import view
+from rom.components.gear_mesh import RackPair
 from rom.errors import ConfigError
 from rom.view.canvas import symbols
 from rom.view.canvas.corner import BAR_SIZE, projected, scale
@@ -280,3 +281,20 @@ def test_a_cable_runs_along_tangents_and_arcs_at_all_instants():
         np.testing.assert_allclose(x[f, [1, -2]], [[-0.2, 0, 0], [0.2, 0, 0]], atol=1e-12)
         np.testing.assert_allclose(x[f, len(x[f]) // 2], [0, 0, 0.2], atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(circle.points, axis=2), 0.2)
+
+
+def test_the_circle_of_a_pinion_touches_the_line_of_its_rack_at_all_instants():
+    """Off its reference line by the profile shift; the line moves with the rack."""
+    pair = RackPair(26, 4e-3, 0.03, shift=0.3)
+    r, where = 0.052, (0.2 + pair.distance, 0, 0)
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(1e-3,) * 3, at=(0.2, 0, 0))
+    rack = mech.add_rigid("rack", mass=1.0, inertia=(1e-3,) * 3, at=where, velocity=(0, 0.4, 0))
+    ends = pinion.marker((0, 0, 0)), rack.marker((0, 0, 0))
+    mech.gear_mesh("mesh", *ends, axis=(0, 0, 1), pair=pair, stiffness=1e-9)
+    moved = rom.simulate(mech, t_end=0.1, dt=0.05, progress=False)
+    *_, circle, line = connections(moving(mech, moved, [0, 2], 1.0), {}, set(), UP)
+    np.testing.assert_allclose(np.linalg.norm(circle.points - [0.2, 0, 0], axis=2), r)
+    for f, y in enumerate((0.0, 0.04)):
+        ends = [[0.2 + r, y + side * np.pi * r, 0] for side in (-1, 1)]
+        np.testing.assert_allclose(line.points[f], ends, atol=1e-6)

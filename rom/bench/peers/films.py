@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rom.bench.peers.compare import CACHE_FOLDER, answer_of, interpreter
+from rom.bench.units import RigidShaft, as_mechanism, with_shafts
 from rom.components.gear_mesh import GearPair, Mesh, stiffness_table
 from rom.components.journal_bearing import (
     Groove,
@@ -23,7 +24,10 @@ from rom.components.journal_bearing import (
     equilibrium,
     iso_vg,
 )
-from rom.components.transmission import Disc, Rotor, Shaft, Transmission, sweep
+from rom.components.transmission import Disc, Rotor, Shaft, Transmission, rest, steady, sweep
+from rom.mbs import tooth_loads
+from rom.mbs.analysis.equilibrium import equilibrium as mechanism_at_rest
+from rom.mbs.analysis.periodic.motion import periodic_motion
 from rom.model import Array
 
 # of a wheel of charts that newer drawing libraries lack
@@ -37,6 +41,7 @@ FILM_CASE: dict[str, Any] = {
     "groove_deg": 20, "cells": (53, 8), "guess": (0.5, -0.7),
 }  # fmt: skip
 SOMMERFELD_NUMBER, N_REPEATS = 0.580, 20
+STEPS_PER_TOOTH = 60
 
 Row = tuple[str, str, float, str, str]
 
@@ -113,6 +118,42 @@ def gear_unit(cells: tuple[int, int] = (120, 8), torque: float = 300.0) -> Trans
     oil = float(iso_vg(46).viscosity(60.0))
     mesh, (pinion, gear) = Mesh(pair, k, damping=2e-6), rotors
     return Transmission(pinion, gear, mesh, 100 * np.pi, torque * 157 / 26, oil)
+
+
+def programs_compared(n: int, cells: tuple[int, int]) -> Iterator[Row]:
+    """Case, quantity, value, unit and aim: rigid shafts, by two programs.
+
+    That of the unit and a mechanism both find the motion that repeats with the mesh at n speeds,
+    2000 to 6000 rpm, each from the one before.
+    """
+    unit = gear_unit(cells)
+    shafts: tuple[Any, Any] = unit.pinion.shaft, unit.gear.shaft
+    unit = with_shafts(unit, (RigidShaft.of(shafts[0]), RigidShaft.of(shafts[1])))
+    case = f"rigid shafts, 4 films of {cells[0]} x {cells[1]} cells"
+    units = [replace(unit, speed=float(w)) for w in np.linspace(2000, 6000, n) * np.pi / 30]
+    one, own = _timed(rest, units[0])
+    two, mechanism = _timed(mechanism_at_rest, as_mechanism(units[0]))
+    yield case, "rest by its own program", 1e3 * one, "ms of the processor", ""
+    yield case, "rest as a mechanism", 1e3 * two, "ms of the processor", ""
+    taken, apart = np.zeros(2), np.zeros(n)
+    for k, unit in enumerate(units):
+        one, own = _timed(steady, replace(own, unit=unit), steps=STEPS_PER_TOOTH)
+        how = {"period": unit.mesh_period, "start": mechanism, "steps": STEPS_PER_TOOTH}
+        two, mechanism = _timed(periodic_motion, as_mechanism(unit), **how)
+        taken += one, two
+        teeth = [x.force.sum() for x in tooth_loads(mechanism.solution, "mesh")]
+        apart[k] = abs(np.max(teeth) / np.mean(teeth[1:]) / own.load_factor - 1.0)
+    yield case, "a speed of a sweep by its own program", taken[0] / n, "s of the processor", ""
+    yield case, "a speed of a sweep as a mechanism", taken[1] / n, "s of the processor", "below 3.6"
+    yield case, "mechanism over its own program", taken[1] / taken[0], "", "below 2"
+    yield case, "load factors apart, middle of all speeds", float(np.median(apart)), "", ""
+
+
+def _timed(work: Any, *arguments: Any, **named: Any) -> tuple[float, Any]:
+    """Processor time [s], and what came of it."""
+    start = process_time()
+    found = work(*arguments, **named)
+    return process_time() - start, found
 
 
 def speeds_run_through(n: int, cells: tuple[int, int]) -> Iterator[Row]:

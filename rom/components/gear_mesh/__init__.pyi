@@ -16,3 +16,4 @@ from rom.mbs.elements.gears.corrections import flank_map as flank_map
 from rom.mbs.elements.gears.geometry import GearPair as GearPair
 from rom.mbs.elements.gears.geometry import line_length as line_length
 from rom.mbs.elements.gears.hertz import Hertz as Hertz
+from rom.mbs.elements.gears.racks import RackPair as RackPair

@@ -104,13 +104,15 @@ def normal_section(pair: GearPair) -> GearPair:
     They have z / (cos^2 beta_b cos beta) teeth, which need not be a whole number.
 
     Raises:
-        ModelError: for internal gears, whose teeth these formulas are not for.
+        ModelError: for racks and internal gears, whose teeth these formulas are not for.
 
     Source:
         ISO 6336-1 and ISO 21771: virtual spur gears.
     """
-    if pair.internal:
-        raise ModelError("the compliance of internal teeth is not known here: give numbers.")
+    if not isinstance(pair, GearPair) or pair.internal:
+        raise ModelError(
+            "the compliance of racks and internal teeth is not known here: give numbers."
+        )
     if pair.helix == 0.0:
         return pair
     teeth: Any = tuple(z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)

@@ -26,7 +26,7 @@ from rom.mbs.elements.family import integers
 from rom.mbs.kernels.algebra import mtv, mv
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
-from rom.mbs.kernels.tables import Array1, Array4, Index2, Scratch2, Table, table
+from rom.mbs.kernels.tables import Array1, Array4, Index2, Scratch2, Scratch3, Table, table
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 
@@ -158,7 +158,7 @@ class Cylinders(Table):
         amplitude, rate: (c, 3 F) of the functions at the last residual, three directions each
             [m, m/s].
         load: (c, 3 F) sum of the forces times the functions [N].
-        basis: (2, F) functions at one place of either side.
+        basis: (m, 2, F) functions at places on either side.
         gradient: (4, 6 + R) motion along one and along another direction per velocity of a body,
             of both sides.
     """
@@ -172,17 +172,20 @@ class Cylinders(Table):
     amplitude: Scratch2
     rate: Scratch2
     load: Scratch2
-    basis: Scratch2
+    basis: Scratch3
     gradient: Scratch2
 
 
-def pack_cylinders(sides: Sequence[Sequence[tuple[Cylinder, float] | None]], R: int) -> Cylinders:
+def pack_cylinders(
+    sides: Sequence[Sequence[tuple[Cylinder, float] | None]], R: int, places: int
+) -> Cylinders:
     """The surfaces as arrays.
 
     Args:
         sides: of each element, the surface of both sides with the angle over which its forces are
             spread [rad]; None for a rigid one.
         R: largest number of elastic coordinates of a body.
+        places: that are loaded at a time.
     """
     found = [one for pair in sides for one in pair if one is not None]
     number = {id(one): c for c, one in enumerate(found)}
@@ -199,7 +202,7 @@ def pack_cylinders(sides: Sequence[Sequence[tuple[Cylinder, float] | None]], R: 
         np.array([width for _, width in found], dtype=float),
         shapes,
         *np.zeros((3, len(found), 3 * F)),
-        np.zeros((2, F)),
+        np.zeros((places, 2, F)),
         np.zeros((4, 6 + R)),
     )
 
@@ -220,12 +223,20 @@ def deform(s, cylinders, c, body, q, v):
 
 
 @inner
-def set_basis(cylinders, c, side, theta, z):
-    """Write the functions at a place, mean values over the angle of a force, to basis[side]."""
+def set_basis(cylinders, c, place, theta, z):
+    """Write the functions at a place, mean values over the angle of a force.
+
+    Args:
+        cylinders: the surfaces.
+        c: which.
+        place: its number and side.
+        theta: angle around the axis [rad].
+        z: along it, from the marker [m].
+    """
     harmonics, order = cylinders.size[c, 0], cylinders.size[c, 1]
     zeta = (z - cylinders.middle[c]) / cylinders.half_length[c]
     half, n_around = 0.5 * cylinders.width[c], 2 * harmonics + 1
-    basis = cylinders.basis[side]
+    basis = cylinders.basis[place]
     basis[0] = 1.0
     for n in range(1, harmonics + 1):
         share = math.sin(n * half) / (n * half) if half > 0.0 else 1.0
@@ -245,9 +256,9 @@ def n_functions(cylinders, c):
 
 
 @inner
-def at_place(W, cylinders, c, side, body, amplitude):
-    """Sum (3,) of amplitudes and functions at the place of basis[side], in the world."""
-    basis, x, y, z = cylinders.basis[side], 0.0, 0.0, 0.0
+def at_place(W, cylinders, c, place, body, amplitude):
+    """Sum (3,) of amplitudes and functions at a place, in the world."""
+    basis, x, y, z = cylinders.basis[place], 0.0, 0.0, 0.0
     for f in range(n_functions(cylinders, c)):
         x += basis[f] * amplitude[c, 3 * f]
         y += basis[f] * amplitude[c, 3 * f + 1]
@@ -256,9 +267,9 @@ def at_place(W, cylinders, c, side, body, amplitude):
 
 
 @inner
-def load_surface(W, cylinders, c, side, body, force):
-    """Let a force (3,) in the world act at the place of basis[side]."""
-    basis, local = cylinders.basis[side], mtv(W.A[body], force)
+def load_surface(W, cylinders, c, place, body, force):
+    """Let a force (3,) in the world act at a place."""
+    basis, local = cylinders.basis[place], mtv(W.A[body], force)
     for f in range(n_functions(cylinders, c)):
         for p in range(3):
             cylinders.load[c, 3 * f + p] += basis[f] * local[p]
@@ -282,12 +293,12 @@ def set_gradient(s, W, cylinders, place, marker, direction, lever):
     Args:
         s, W: system and work.
         cylinders: the surfaces.
-        place: row of the gradient, surface and side, whose basis is set; surface -1 of a rigid one.
+        place: row of the gradient; surface, -1 of a rigid one; number of the place and side.
         marker: on the body.
         direction: (3,) in the world.
         lever: (3,) what turns of the marker move along it.
     """
-    at, c, side = place
+    at, c, where, side = place
     b, gradient, H = s.markers.body[marker], cylinders.gradient, W.H
     if b < 0:
         return
@@ -301,7 +312,7 @@ def set_gradient(s, W, cylinders, place, marker, direction, lever):
         return
     x, shapes = mtv(W.A[b], direction), cylinders.shapes
     for f in range((2 * cylinders.size[c, 0] + 1) * (cylinders.size[c, 1] + 1)):
-        value = cylinders.basis[side, f]
+        value = cylinders.basis[where, side, f]
         for k in range(r):
             along = (
                 x[0] * shapes[c, f, 0, k] + x[1] * shapes[c, f, 1, k] + x[2] * shapes[c, f, 2, k]
@@ -310,8 +321,8 @@ def set_gradient(s, W, cylinders, place, marker, direction, lever):
 
 
 @inner
-def add_gradient_products(s, gradient, markers, factor, S):
-    """Add factor times gradient[one side] x gradient[2 + other side] of both bodies to S."""
+def add_gradient_products(s, gradient, rows, markers, factor, S):
+    """Add factor times gradient[rows of one side] x gradient[2 + other side] of bodies to S."""
     for row in range(2):
         for column in range(2):
             one, two = s.markers.body[markers[row]], s.markers.body[markers[column]]
@@ -320,6 +331,6 @@ def add_gradient_products(s, gradient, markers, factor, S):
             e = block_of(s.graph, one, two)
             first, left = s.graph.x[e], s.graph.y[e]
             for p in range(6 + s.bodies.r[one]):
-                value = factor * gradient[row, p]
+                value = factor * gradient[rows[row], p]
                 for q in range(6 + s.bodies.r[two]):
                     S[first + p, left + q] += value * gradient[2 + column, q]

@@ -98,6 +98,16 @@ def no_room(_: Any) -> Array:
     return np.zeros(0)
 
 
+def nothing_remembered(_: Any) -> Array:
+    """(0,) no element whose forces depend on its past."""
+    return np.zeros(0, dtype=bool)
+
+
+def no_phases(_: Any, _W: Any) -> Array:
+    """(0,) nothing that has to go on by whole numbers."""
+    return np.zeros(0)
+
+
 def nothing_eased(_: Table) -> AbstractContextManager[bool]:
     """Elements that come to rest as they are."""
     return nullcontext(False)
@@ -251,6 +261,9 @@ class Family:
             equilibrium may halve or double at most.
         eased: table -> context within which its elements find their equilibrium more easily, close
             to the one that is wanted; it says whether that changes anything.
+        remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
+        phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
+            motions that repeat [1].
     """
 
     name: str
@@ -273,6 +286,8 @@ class Family:
     lost: str = "the law of {} gives no finite number"
     room: Callable[[Any], Array] = no_room
     eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
+    remembers: Callable[[Any], Array] = nothing_remembered
+    phases: Callable[[Any, Any], Array] = no_phases
 
     @property
     def kernels(self) -> list[ElementKernel]:

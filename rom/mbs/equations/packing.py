@@ -122,6 +122,27 @@ class Packed:
             for name, left in zip(self.element_names[family], family.room(table), strict=False)
         }
 
+    @property
+    def remembering(self) -> tuple[str, ...]:
+        """Elements whose forces depend on the past, other than by angles that go on."""
+        found = [
+            name
+            for family, table in self.elements.items()
+            for name, does in zip(self.element_names[family], family.remembers(table), strict=False)
+            if does
+        ]
+        return tuple(found)
+
+    def phases(self, W: Any) -> dict[str, float]:
+        """Numbers at the last residual that go on by whole ones in motions that repeat [1]."""
+        return {
+            name: float(phase)
+            for family, table in self.elements.items()
+            for name, phase in zip(
+                self.element_names[family], family.phases(table, W), strict=False
+            )
+        }
+
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""
         return np.array([k for k, owner in enumerate(self.row_owner) if owner == joint], dtype=int)

@@ -31,8 +31,8 @@ class BearingRecord:
         temperature: (n_t,) of the film [degrees Celsius]; NaN where its viscosity stays.
         power: (n_t,) that turns into heat [W].
         side_flow: (n_t,) oil that leaves at both ends [m^3/s].
-        opening: (n_t, nt, nz) by which an elastic bush widens the film in its cells [m], beyond the
-            mean motion of its bore; None of a rigid one.
+        bore: (nt, nz, m) functions in the cells by which an elastic bush opens its film, and
+            (n_t, m) how far [m]; None of a rigid one.
     """
 
     t: Array
@@ -42,7 +42,12 @@ class BearingRecord:
     temperature: Array
     power: Array
     side_flow: Array
-    opening: Array | None = None
+    bore: tuple[Array, Array] | None = None
+
+    @property
+    def opening(self) -> Array | None:
+        """(n_t, nt, nz) by which an elastic bush opens the film, beyond its mean motion [m]."""
+        return None if self.bore is None else np.einsum("ijm,tm->tij", *self.bore)
 
 
 def bearing_record(solution: Any, name: str) -> BearingRecord:
@@ -59,13 +64,13 @@ def bearing_record(solution: Any, name: str) -> BearingRecord:
         temperature,
         found[:, POWER],
         found[:, SIDE_FLOW],
-        _opening(solution, element),
+        _bore(solution, element),
     )
 
 
-def _opening(solution: Any, element: OilFilm) -> Array | None:
+def _bore(solution: Any, element: OilFilm) -> tuple[Array, Array] | None:
     functions, amplitudes = element.bore
     if not functions.size:
         return None
-    moved = solution.elastic(element.j.body) @ amplitudes.T @ functions.T
-    return np.asarray(moved.reshape(len(moved), *element.bearing.cells))
+    moved = solution.elastic(element.j.body) @ amplitudes.T
+    return functions.reshape(*element.bearing.cells, -1), moved

@@ -74,8 +74,12 @@ def connections(
         for marker, axis in zip((film.i, film.j), film.axes[:2], strict=True):
             actors.append(_circle(places, marker, axis, film.bearing.radius))
     for mesh in mechanism.gear_meshes.values():
-        for marker, axis, radius in zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=True):
+        for marker, axis, radius in zip(
+            (mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=False
+        ):
             actors.append(_circle(places, marker, axis, float(radius)))
+        if not mesh.pair.teeth[1]:
+            actors.append(_rack(places, mesh))
     return actors + list(_contacts(scenery))
 
 
@@ -331,3 +335,12 @@ def _circle(places: Places, marker: Marker, axis: Array, radius: float) -> Actor
     local = np.column_stack(across(np.zeros(3), axis))
     pose = at(places.point(marker), places.pose(marker.body)[1] @ local)
     return lines(symbols.circle(radius), pose, width=LINE_WIDTH)
+
+
+def _rack(places: Places, mesh: Any) -> Actor:
+    """The line that the circle of a pinion rolls on, over one of its turns."""
+    normal, along, radius = mesh.axes[2], mesh.axes[3], float(mesh.pair.r[0])
+    middle = -(mesh.pair.distance - radius) * np.cross(along, normal)
+    points = middle + np.pi * radius * np.array([[-1.0], [1.0]]) * along
+    pose = at(places.point(mesh.j), places.pose(mesh.j.body)[1])
+    return lines((points, np.array([[0, 1]])), pose, width=LINE_WIDTH)

@@ -22,6 +22,32 @@ def shifted(packed, q, delta):
     return out
 
 
+def by_position(packed, W, q, v):
+    """Derivatives of the forces by the position: as the tangent has them, and by differences."""
+    zero, none = np.zeros(v.size), np.zeros(0)
+
+    def force(delta):
+        residual_at(packed.system, W, shifted(packed, q, delta), v, zero, none)
+        return W.residual.copy()
+
+    wanted = difference(force, v.size, 1e-9)
+    tangents_at(packed.system, W, q, v, zero, none, (0.0, 0.0, 1.0))
+    return W.Kt.copy(), wanted
+
+
+def by_velocity(packed, W, q, v):
+    """Derivatives of the forces by the velocity: as the tangent has them, and by differences."""
+    zero, none = np.zeros(v.size), np.zeros(0)
+
+    def force(delta):
+        residual_at(packed.system, W, q, v + delta, zero, none)
+        return W.residual.copy()
+
+    wanted = difference(force, v.size)
+    tangents_at(packed.system, W, q, v, zero, none, (0.0, 1.0, 0.0))
+    return W.S.copy(), wanted
+
+
 def check_tangents(packed, W, state, motions, tolerance):
     """Mass, velocity and position blocks along the columns of ``motions``.
 

@@ -72,12 +72,38 @@ def test_a_gear_pair_repeats_with_every_tooth():
                     atol=1e-4)  # fmt: skip
 
 
+@pytest.mark.parametrize("conservative", [False, True])
+def test_multipliers_of_three_teeth_are_those_of_one_to_the_third_power(conservative):
+    """But for the steps, by their square; motions beside begin so near that no line comes between.
+
+    A line that comes or goes at the end of a step between two motions that are compared bends
+    their difference: with forces that follow their energy 2.5 % were off.
+    """
+    speed, apart = 300.0, []
+    mech = geared(speed, conservative=conservative)
+    for steps in (120, 240):
+        one = rom.periodic_motion(mech, period=2 * np.pi / 26 / speed, turns=TURNS, steps=steps,
+                                  settle=10)  # fmt: skip
+        three = rom.periodic_motion(mech, period=3 * one.period, steps=3 * steps, start=one,
+                                    turns={k: 3 * x for k, x in TURNS.items()})  # fmt: skip
+        apart.append(np.abs(three.multipliers / one.multipliers**3).max() - 1)
+    assert apart[0] == pytest.approx(0.0, abs=3e-4)
+    assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.1)
+
+
 def test_angles_that_do_not_fit_the_teeth_are_refused():
     speed, turns = 300.0, {"pinion axle": 2 * np.pi / 26}
     with pytest.raises(ModelError, match="other forces act on"):
         rom.periodic_motion(geared(speed, damping=2e-5), period=2 * np.pi / 26 / speed, turns=turns)
     with pytest.raises(ModelError, match="'speed' does not repeat with the period"):
         rom.periodic_motion(geared(speed), period=2 * np.pi / 26 / speed)
+
+
+def test_turns_of_parts_of_teeth_are_refused():
+    speed, part = 300.0, 0.7
+    turns = {"pinion axle": part * 2 * np.pi / 26, "gear axle": -part * 2 * np.pi / 40}
+    with pytest.raises(ModelError, match=r"mesh 'mesh' has gone on by 0\.7 teeth"):
+        rom.periodic_motion(geared(speed), turns=turns, period=part * 2 * np.pi / 26 / speed)
 
 
 def test_a_wheel_that_looks_different_after_a_tooth_is_refused_and_takes_whole_turns():

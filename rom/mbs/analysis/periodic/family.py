@@ -9,9 +9,11 @@ from scipy.integrate import trapezoid
 
 from rom.arguments import positive
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.analysis.periodic.derivatives import Tangent, by_differences, by_steps, follows
 from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.motion import GOOD_RATIO, PeriodicMotion, Shooting
-from rom.mbs.analysis.periodic.shooting import Return, Tangent
+from rom.mbs.analysis.periodic.motion import PeriodicMotion
+from rom.mbs.analysis.periodic.search import GOOD_RATIO, Shooting
+from rom.mbs.analysis.periodic.shooting import Return
 from rom.mbs.analysis.periodic.turns import Turns, turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
@@ -143,7 +145,10 @@ class Family:
         later = self.returned(Member(start, T), p + d, chart)
         moved = chart.of_state(later.turned) - chart.of_state(start.state) - chart.seen(
             still, found.start.ahead)  # fmt: skip
-        self.tangent, self.by_p = found.tangent(), (moved - found.gap) / d
+        self.tangent, self.by_p = (
+            (by_steps if follows(found) else by_differences)(found),
+            (moved - found.gap) / d,
+        )
         return found
 
     def _step(self, found: Return, y: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rom import rotation
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, Instant
+from rom.mbs.analysis.periodic.beside import Beside
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.python_laws import apply_laws
@@ -67,11 +68,11 @@ class Flow:
         numbers = (t0, t0 + period, period / steps, steps, rho_inf, STEP_TOLERANCE, 1e-4, 1e-12)
         self.mechanism, self.t0, self.period, self.steps = mechanism, t0, period, steps
         self.settings = Settings(*numbers, progress=False)
-        self.runs = [0]
+        self.runs, self.failed = [0], [0]
         self._take(pack(mechanism))
 
     def lasting(self, period: float) -> "Flow":
-        """The same over another period; memory and count of runs are shared."""
+        """The same over another period; memory and counts are shared."""
         other, s = copy(self), self.settings
         other.period, end = period, s.t_start + period
         other.settings = replace(s, t_end=end, dt=period / self.steps)
@@ -162,28 +163,38 @@ class Flow:
         retract(self.packed.system, start.state.q, np.ascontiguousarray(dq), q)
         return self.at(q, start.state.v + dv, start)
 
-    def end(self, start: Start) -> State:
-        """The state a period later.
+    def end(self, start: Start, beside: Beside | None = None) -> State:
+        """The state a period later; small motions beside it go along.
 
         Raises:
             SolverError: if a step fails.
         """
-        step = self._reset(start)
+        step, table = self._reset(start), self.table[1:]
         out = space(self.W, step, 1)
-        rank = self.packed.rows_solved(start.state.rank)
-        answer, table = alpha.NEEDS_LAWS, self.table[1:]
-        alpha.advance.link()
-        while answer == alpha.NEEDS_LAWS:
-            answer = alpha.advance(self.packed.system, self.W, step, rank, table, self.steps, out)
-            taken = int(step.count[alpha.STEPS])
-            if answer == alpha.NEEDS_LAWS:
-                apply_laws(self.packed.asked, self.W, float(self.t[1 + taken]))
+        for signals in (table,) if beside is None else table[:, None]:
+            base = self.W.base.copy()
+            self._advance(start, step, signals, out)
+            if beside is not None:
+                beside.follow(step, base, signals[0])
         self.runs[0] += 1
-        if answer != alpha.CONVERGED:
-            raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))
         q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
         t, base = self.t0 + self.period, self.W.base.copy()
         return State(t, q, v, a, lam, start.state.rank, step.a.copy(), base)
+
+    def _advance(self, start: Start, step: Step, signals: Array, out: Any) -> None:
+        """Take a step for each row of signals (k, s, 3)."""
+        rank = self.packed.rows_solved(start.state.rank)
+        step.count[alpha.STEPS_BEFORE] = step.count[alpha.STEPS]
+        answer = alpha.NEEDS_LAWS
+        alpha.advance.link()
+        while answer == alpha.NEEDS_LAWS:
+            answer = alpha.advance(self.packed.system, self.W, step, rank, signals, self.steps, out)
+            taken = int(step.count[alpha.STEPS])
+            if answer == alpha.NEEDS_LAWS:
+                apply_laws(self.packed.asked, self.W, float(self.t[1 + taken]))
+        if answer != alpha.CONVERGED:
+            self.failed[0] += 1
+            raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))
 
     def _reset(self, start: Start) -> Step:
         """The step memory at a start."""
@@ -213,6 +224,11 @@ class Flow:
         now = self.now.at(state.t)
         now.remember(state)
         return now.residual(state.q, state.v, state.a, 0 * state.lam)
+
+    @property
+    def pressed(self) -> float:
+        """Largest force on a marker in what `forces` has looked at; they may all balance."""
+        return float(np.abs(self.now.W.wrench).max(initial=0.0))
 
     def apart(self, one: State, two: State) -> Array:
         """(n,) small motion from one position to another."""

@@ -1,7 +1,7 @@
 """A motion that repeats, with its multipliers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,33 +9,26 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import number, positive, typed, whole
-from rom.errors import ConfigError, ModelError, SolverError
+from rom.errors import ConfigError, SolverError
 from rom.mbs.analysis.linearize import linearize
-from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.repetition import refuse_other_forces, refuse_what_changes
-from rom.mbs.analysis.periodic.shooting import Return, Tangent, energy, moved_by
-from rom.mbs.analysis.periodic.turns import Turns, turns_of
-from rom.mbs.integrate.simulation import simulate
+from rom.mbs.analysis.periodic.derivatives import Derivatives, Tangent
+from rom.mbs.analysis.periodic.flow import Flow
+from rom.mbs.analysis.periodic.repetition import refuse_what_changes
+from rom.mbs.analysis.periodic.search import Shooting
+from rom.mbs.analysis.periodic.shooting import Return, energy
+from rom.mbs.analysis.periodic.turns import turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
-from rom.process.progress import line
 
 N_STEPS, MAX_STEPS = 200, 100_000  # per period
 # the method forgets what a step does not resolve within a period; motions that keep their energy
 # must not lose it to the method
 RHO_INF, CONSERVATIVE_RHO_INF = 0.8, 0.95
-# gap in rad or lengths of the mechanism; that which counts where it shrinks no more, of round-off
-# or of the energy that the method itself takes up
-GAP_TOL, STALLED_TOL, CONSERVATIVE_STALLED_TOL = 1e-10, 1e-8, 1e-6
-GOOD_RATIO = 0.1  # of gaps, up to which derivatives serve again
-MAX_PASSES = 60
+MAX_TRIALS = 3  # with one step more each time
+GAP_TOL = 1e-10  # in rad or lengths of the mechanism
 MAX_SETTLE = 100_000  # periods: minutes of the smallest mechanisms
-MAX_WAIT = 32  # periods through which time goes on at once where Newton's method came no closer
-MAX_SHORTENINGS = 6  # of a correction whose start cannot be moved
 STABLE_TOL = 1e-6  # of the size of a multiplier: differences and round-off
-MAX_PERIOD_CHANGE = 0.2  # of an unknown period in one pass
-REST_TOL = 1e-8  # rad or lengths of the mechanism that a motion moves per rad of its period
 
 
 @typed
@@ -53,6 +46,7 @@ class PeriodicMotion:
         passes: through the period until it closed, those for derivatives not counted.
         turns: (k,) angles by which what advances was turned back [rad].
         runs: all passes through the period.
+        derivatives: with which motions nearby are looked for.
     """
 
     solution: Solution
@@ -63,6 +57,7 @@ class PeriodicMotion:
     passes: int
     turns: tuple[float, ...] = ()
     runs: int = 0
+    derivatives: Derivatives | None = field(default=None, repr=False, compare=False)
 
     @property
     def state(self) -> State:
@@ -92,135 +87,14 @@ class PeriodicMotion:
         )
 
 
-@dataclass(frozen=True)
-class Shooting:
-    """How a motion is looked for.
-
-    Attributes:
-        mechanism, turns, steps, rho_inf, tolerance, progress: as the user has them.
-        period: None where it is unknown.
-        t0: time of the start [s].
-        energy: that the motion shall have; None where it is not free [J].
-    """
-
-    mechanism: Mechanism
-    period: float | None
-    t0: float
-    steps: int
-    rho_inf: float
-    tolerance: float
-    turns: Mapping[str, float | None] | None
-    progress: bool = False
-    energy: float | None = None
-
-    @property
-    def stalled(self) -> float:
-        """Gap that counts as closed where it shrinks no more."""
-        return STALLED_TOL if self.energy is None else CONSERVATIVE_STALLED_TOL
-
-    def flow(self, period: float) -> Flow:
-        """What moves the mechanism through a period."""
-        return Flow(self.mechanism, self.t0, period, self.steps, self.rho_inf)
-
-    def closed(self, flow: Flow, start: Start, turns: Turns) -> tuple[Tangent, int]:
-        """The motion that closes, with its derivatives, and the passes it took.
-
-        Where Newton's method does not come closer, time goes on from where it was for a period, as
-        it does in a machine, and for twice as many the next time.
-
-        Raises:
-            SolverError: if none is found; ``error.solution`` is the last attempt.
-        """
-        found, best, tangent, wait = Return.of(flow, turns, start), None, None, 1
-        for k in range(1, MAX_PASSES + 1):
-            self._say(f"pass {k}: gap {found.open:.2e}")
-            last = np.inf if best is None else best.open
-            if found.open < self.tolerance:
-                return self._done(found, tangent), k
-            stalled = found.open > 0.5 * last and min(found.open, last) < self.stalled
-            if best is not None and stalled:
-                return self._done(min(found, best, key=lambda x: x.open), tangent), k
-            if best is not None and found.open > last:
-                found, best, tangent = self._gone_on(best, wait), None, None
-                wait = min(2 * wait, MAX_WAIT)
-                continue
-            if tangent is None or found.open > GOOD_RATIO * last:
-                found = replace(found, basis=None)
-                tangent = found.tangent()
-            best, found = found, self._corrected(found, tangent)
-        raise self._lost(found)
-
-    def _gone_on(self, found: Return, periods: int) -> Return:
-        """What comes of a motion some periods later."""
-        for _ in range(periods):
-            found = Return.of(found.flow, found.turns, found.back)
-        return found
-
-    def _say(self, text: str) -> None:
-        if self.progress:
-            line(text)
-
-    def _done(self, found: Return, tangent: Tangent | None) -> Tangent:
-        """Derivatives at the motion that was found."""
-        self._say("")
-        if self.period is None and not max(map(np.linalg.norm, found.rate)) > REST_TOL:
-            raise SolverError(
-                "what was found is a state of rest, not a motion.",
-                hint="Begin with start= a state that moves, or nearer to the motion.",
-            )
-        refuse_other_forces(found)
-        if tangent is not None and tangent.around is found:
-            return tangent
-        return found.tangent()
-
-    def _corrected(self, found: Return, tangent: Tangent) -> Return:
-        """The next motion of Newton's method; shorter steps where one cannot be moved."""
-        free = self.period is None
-        gap = None if self.energy is None else energy(self.mechanism, found.start) - self.energy
-        rate = found.rate if free else None
-        answer, cause = tangent.solved(rate, found.gap, energy_gap=gap)[0], None
-        for _ in range(MAX_SHORTENINGS):
-            try:
-                flow, y = found.flow, answer
-                if free:
-                    change = np.clip(answer[-1] / (2 * np.pi), *(MAX_PERIOD_CHANGE * _SIDES))
-                    flow, y = flow.lasting(flow.period * (1 + float(change))), answer[:-1]
-                return Return.of(flow, found.turns, moved_by(found, y), tangent.around.chart)
-            except (SolverError, ModelError) as error:
-                answer, cause = answer / 2, error
-        raise self._lost(found) from cause
-
-    def _lost(self, found: Return) -> SolverError:
-        self._say("")
-        error = SolverError(
-            f"no motion repeats with the period {found.flow.period:.9g} s: "
-            f"{found.open:.2g} rad, or lengths of the mechanism, are left between its end and its "
-            "start.",
-            hint="Begin nearer to it (start=, settle=), take more steps per period, or simulate.",
-        )
-        error.solution = self.solution(found)
-        return error
-
-    def solution(self, found: Return) -> Solution:
-        """The motion over one period."""
-        flow, state = found.flow, found.flow.given(found.start)
-        h = flow.settings.h
-        return simulate(
-            self.mechanism, t_start=self.t0, t_end=self.t0 + flow.period, dt=h, state=state,
-            rho_inf=self.rho_inf, tolerance=1e-12,
-        )  # fmt: skip
-
-    def record(self, tangent: Tangent, passes: int) -> PeriodicMotion:
-        """What is handed to the user."""
-        found = tangent.around
-        angles = found.turns.angles(found.start.state, found.end)
-        return PeriodicMotion(
-            self.solution(found), found.flow.period, tangent.multipliers, self.period is None,
-            found.open, passes, angles, found.flow.runs[0],
-        )  # fmt: skip
-
-
-_SIDES = np.array([-1.0, 1.0])
+def recorded(shooting: Shooting, tangent: Tangent, passes: int) -> PeriodicMotion:
+    """What is handed to the user of a motion that was found."""
+    found = tangent.around
+    angles = found.turns.angles(found.start.state, found.end)
+    return PeriodicMotion(
+        shooting.solution(found), found.flow.period, tangent.multipliers, shooting.period is None,
+        found.open, passes, angles, found.flow.runs[0], tangent.kept,
+    )  # fmt: skip
 
 
 @typed
@@ -256,7 +130,8 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
             the same again, as a gear by one tooth pitch, counted as the angle of the joint is, or
             along its spin for a body without one; None as the angle for a body that looks the same
             after any. Whole turns need no mention.
-        steps: of generalised-alpha in a period.
+        steps: of generalised-alpha in a period; one or two more where one of them fails, as the one
+            at whose end a tooth leaves may.
         rho_inf: its spectral radius at infinite frequency [1]; None for 0.8, or 0.95 where the
             motion is conservative.
         guess: of an unknown period [s]; None for that of the fastest growing small motion about
@@ -293,20 +168,40 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     """
     if rho_inf is None:
         rho_inf = CONSERVATIVE_RHO_INF if conservative else RHO_INF
-    shooting, flow, begin = prepared(
-        mechanism, period, start, turns, steps, rho_inf, guess, t_start, tolerance, progress
-    )
     whole("settle", settle, 0, MAX_SETTLE)
     if conservative and period is not None:
         raise ConfigError("conservative is for motions that nothing drives; here period is given.")
-    turning = turns_of(mechanism, turns, begin)
-    at = flow.begun(begin)
-    refuse_what_changes(flow, turning, at, period is not None)
+    for more in range(MAX_TRIALS):
+        shooting, flow, begin = prepared(
+            mechanism, period, start, turns, steps + more, rho_inf, guess, t_start, tolerance,
+            progress,
+        )  # fmt: skip
+        known = start.derivatives if isinstance(start, PeriodicMotion) else None
+        try:
+            return _near(shooting, flow, begin, known, settle, conservative)
+        except SolverError:
+            if not flow.failed[0] or more == MAX_TRIALS - 1:
+                raise
+    raise AssertionError
+
+
+def _near(
+    shooting: Shooting,
+    flow: Flow,
+    begin: State,
+    known: Derivatives | None,
+    settle: int,
+    conservative: bool,
+) -> PeriodicMotion:
+    """The motion near a state."""
+    turning = turns_of(shooting.mechanism, shooting.turns, begin)
+    at = flow.begun(begin) if known is None else known.ready(flow.begun(begin))
+    refuse_what_changes(flow, turning, at, shooting.period is not None)
     for _ in range(settle):
         at = Return.of(flow, turning, at).back
     if conservative:
-        shooting = replace(shooting, energy=energy(mechanism, at))
-    return shooting.record(*shooting.closed(flow, at, turning))
+        shooting = replace(shooting, energy=energy(shooting.mechanism, at))
+    return recorded(shooting, *shooting.closed(flow, at, turning, known))
 
 
 def prepared(  # noqa: PLR0913  the arguments of the verb

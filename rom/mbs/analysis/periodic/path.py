@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rom.arguments import finite, positive, typed, whole
 from rom.errors import ConfigError, SolverError, reached
 from rom.mbs.analysis.continuation.arc_length import Curve, Point
+from rom.mbs.analysis.periodic.derivatives import confirmed
 from rom.mbs.analysis.periodic.family import Family, Period, period_at
 from rom.mbs.analysis.periodic.flow import Flow
 from rom.mbs.analysis.periodic.motion import (
@@ -19,6 +20,7 @@ from rom.mbs.analysis.periodic.motion import (
     STABLE_TOL,
     PeriodicMotion,
     periodic_motion,
+    recorded,
 )
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
@@ -212,8 +214,8 @@ class _March:
         family = self.family
         basis = None if family.tangent is None else family.tangent.around.chart
         family.last = found = family.returned(point.at, point.p, basis)
-        family.tangent = found.tangent()
-        return family.shooting(found.flow).record(family.tangent, point.passes)
+        family.tangent = confirmed(found)
+        return recorded(family.shooting(found.flow), family.tangent, point.passes)
 
     def add(self, point: Point) -> None:
         """Keep a point, and measure the next steps by its motion."""

@@ -10,11 +10,14 @@ from rom.mbs.analysis.periodic.shooting import Return
 from rom.mbs.analysis.periodic.turns import FULL_TURN, Turns
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.parts.signals import Signal
+from rom.mbs.results.state import State
 from rom.model import Array
 
 REPEAT_RTOL = 1e-6  # of the largest value: by which a function may differ a period later
 SHARES = np.array([0.0, 0.137, 0.291, 0.433, 0.618, 0.809])  # of the period, at which one looks
 FORCE_RTOL = 1e-6  # of all forces
+PHASE_TOL = 1e-5  # of a tooth
+MAX_POWER = 12  # of ten: so many periods later, what hardly changes in one must be the same
 LATER_RTOL = 1e-2  # the same at the end of a motion whose gap is closed: contact is stiff
 
 
@@ -30,11 +33,43 @@ def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) ->
     Raises:
         ModelError: naming the drive, load or law.
     """
+    _refuse_memory(flow)
     shift = flow.period if driven else flow.period * np.sqrt(2)  # no period of anything
     for signal in flow.packed.signals:
         if signal.name != "clock":
             _refuse_signal(flow, turns, signal, shift, driven)
     _refuse_forces(flow, start, shift, driven)
+    if driven:
+        later = replace(start.state, t=flow.t0 + shift)
+        _refuse_parts(_phases(flow, start.state), _phases(flow, later))
+
+
+def _refuse_memory(flow: Flow) -> None:
+    """Oil that is conserved fills films over revolutions, and heat slower: no unknowns here."""
+    for name in flow.packed.remembering:
+        raise ModelError(
+            f"{name!r} remembers its oil, or its heat, over more than a period.",
+            where=name,
+            hint="Give a film cavitation='reynolds' and a viscosity as its oil, or simulate.",
+        )
+
+
+def _phases(flow: Flow, state: State) -> dict[str, float]:
+    flow.forces(state)
+    return flow.now.packed.phases(flow.now.W)
+
+
+def _refuse_parts(one: dict[str, float], two: dict[str, float]) -> None:
+    """Refuse parts of a tooth: contact may be the same by chance at the instants that are seen."""
+    for name, phase in one.items():
+        passed = two[name] - phase
+        if abs(passed - round(passed)) > PHASE_TOL:
+            raise ModelError(
+                f"mesh {name!r} has gone on by {passed:.6g} teeth after the period: "
+                "no whole number.",
+                where=name,
+                hint="Give the period of the teeth, or a multiple; turns= of whole teeth.",
+            )
 
 
 def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, driven: bool) -> None:
@@ -51,6 +86,9 @@ def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, drive
         scale[1] += scale[0] / flow.period
     else:
         scale = np.abs(found).max()
+    still = np.abs(one[:, : change.shape[1]] - one[0, : change.shape[1]])
+    if np.all(still <= REPEAT_RTOL * np.maximum(scale, 1e-300)) and driven:
+        change = _much_later(flow, turns, signal, one[:1, : change.shape[1]])
     if np.all(np.abs(change) <= REPEAT_RTOL * np.maximum(scale, 1e-300)):
         return
     if driven:
@@ -67,8 +105,18 @@ def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, drive
     )
 
 
-def _beyond(flow: Flow, turns: Turns, name: str, change: Array) -> Array:
-    """What of the change of a drive is more than its joint may advance."""
+def _much_later(flow: Flow, turns: Turns, signal: Signal, now: Array) -> Array:
+    """(k, .) changes after many periods of what hardly changes in one: it may be far too short."""
+    n = 10.0 ** np.arange(MAX_POWER + 1)
+    t = flow.t0 + n * flow.period
+    change = signal.sample(t, (-np.inf, np.inf), flow.settings.spacing)[:, : now.shape[1]] - now
+    if signal.width == 1:
+        change[:, 0] = _beyond(flow, turns, signal.name, change[:, 0], n)
+    return np.where(np.isfinite(change), change, 0.0)  # where its table has ended
+
+
+def _beyond(flow: Flow, turns: Turns, name: str, change: Array, n: Array | float = 1.0) -> Array:
+    """What of the change of a drive in n periods is more than its joint may advance."""
     drive = flow.mechanism.drives.get(name)
     if drive is None:
         return change
@@ -78,15 +126,20 @@ def _beyond(flow: Flow, turns: Turns, name: str, change: Array) -> Array:
     prescribed = turns.of(drive.joint)
     if prescribed is None:
         return change - change[0]
-    return np.asarray((change - prescribed + np.pi) % FULL_TURN - np.pi)
+    return np.asarray((change - n * prescribed + np.pi) % FULL_TURN - np.pi)
 
 
 def _refuse_forces(flow: Flow, start: Start, shift: float, driven: bool) -> None:
     """Laws ask for the time by themselves: at one state forces must be the same later."""
-    for t in flow.t0 + SHARES * flow.period:
-        one, two = (flow.forces(replace(start.state, t=when)) for when in (t, t + shift))
+    times = flow.t0 + SHARES * flow.period
+    now = [flow.forces(replace(start.state, t=t)) for t in times]
+    later = times + shift
+    if max(np.abs(x - now[0]).max() for x in now) <= FORCE_RTOL * flow.pressed:
+        later = flow.t0 + shift * 10.0 ** np.linspace(0, MAX_POWER, SHARES.size).round()
+    for one, t in zip(now, later, strict=True):
+        two = flow.forces(replace(start.state, t=t))
         k = int(np.argmax(np.abs(two - one)))
-        if abs(two[k] - one[k]) <= FORCE_RTOL * np.abs(one).max():
+        if abs(two[k] - one[k]) <= FORCE_RTOL * max(np.abs(one).max(), flow.pressed):
             continue
         name = _body(flow, k)
         if driven:
@@ -113,10 +166,13 @@ def refuse_other_forces(found: Return) -> None:
     flow, end = found.flow, found.end
     later = replace(end, algorithmic=flow.forces(end))  # forces turn with the frames, as rates do
     two = found.turns.back(later, found.turns.angles(found.start.state, end)).algorithmic
+    passed = flow.now.packed.phases(flow.now.W)
     one = flow.forces(replace(found.turned, t=flow.t0, base=found.base))
+    _refuse_parts(flow.now.packed.phases(flow.now.W), passed)
     assert two is not None
     k = int(np.argmax(np.abs(two - one)))
-    if abs(two[k] - one[k]) > LATER_RTOL * max(np.abs(one).max(), np.abs(two).max()):
+    size = max(np.abs(one).max(), np.abs(two).max(), flow.pressed)
+    if abs(two[k] - one[k]) > LATER_RTOL * size:
         name = _body(flow, k)
         raise ModelError(
             f"after the period other forces act on {name!r} in the same place: "

@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom.mbs.analysis.local_equations import free_motions
 from rom.mbs.analysis.periodic.flow import Flow, Start
@@ -22,10 +21,6 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array
 
-# of a start, in rad or lengths of the mechanism: 1e-14 of round-off is 1e-7 of a derivative, and
-# the deflection of teeth and races is still resolved
-PROBE_RTOL = 1e-7
-SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
 
 
@@ -173,73 +168,6 @@ class Return:
         for state in (self.start.state, self.turned):
             found.append(self.chart.seen(time * state.v, time * state.a))
         return found[0], found[1]
-
-    def tangent(self) -> "Tangent":
-        """How the coordinates of starts and ends change, by central differences.
-
-        Raises:
-            SolverError: if a step fails.
-        """
-        chart, columns = self.chart, []
-        for e in np.eye(chart.size) * PROBE_RTOL:
-            one, two = (Return.of(self.flow, self.turns, chart.moved(x)) for x in (e, -e))
-            pairs = (one.start.state, two.start.state), (one.turned, two.turned)
-            columns.append([chart.of_state(x) - chart.of_state(y) for x, y in pairs])
-        both = np.array(columns).reshape(chart.size, 2, chart.size) / (2 * PROBE_RTOL)
-        return Tangent(self, both[:, 0].T, both[:, 1].T)
-
-
-@dataclass(frozen=True)
-class Tangent:
-    """Derivatives of the coordinates of start and end by what was varied.
-
-    Attributes:
-        around: the motion.
-        B, E: (f, f) of starts and of ends.
-    """
-
-    around: Return
-    B: Array
-    E: Array
-
-    @cached_property
-    def multipliers(self) -> npt.NDArray[np.complex128]:
-        """(f,) of Floquet, largest first."""
-        if not self.B.size:
-            return np.zeros(0, dtype=complex)
-        found = np.linalg.eigvals(np.linalg.solve(self.B.T, self.E.T).T).astype(complex)
-        return found[np.lexsort((-found.imag, -np.round(np.abs(found), 12)))]
-
-    @cached_property
-    def energy_slope(self) -> Array:
-        """(f,) derivative of the energy by the coordinates of the start [J]."""
-        chart, mechanism = self.around.chart, self.around.flow.mechanism
-        return np.array(
-            [
-                (energy(mechanism, chart.moved(e)) - energy(mechanism, chart.moved(-e)))
-                / (2 * PROBE_RTOL)
-                for e in np.eye(chart.size) * PROBE_RTOL
-            ]
-        )
-
-    def solved(
-        self, rate: tuple[Array, Array] | None, *sides: Array, energy_gap: float | None = None
-    ) -> list[Array]:
-        """(f,) or (f + 1,) answers of (E - B) y + dT rate = -side; dT in radians of the period.
-
-        Where the period is unknown the start moves across the motion, and by a gap of its energy
-        if that is given. A motion that a period does not change is not touched.
-        """
-        A, right = self.E - self.B, -np.array(sides).T
-        if rate is not None:
-            A = np.vstack([np.column_stack([A, rate[1]]), np.append(rate[0], 0.0)])
-            right = np.vstack([right, np.zeros((1, right.shape[1]))])
-        if energy_gap is not None:
-            slope = self.energy_slope / np.linalg.norm(self.energy_slope)
-            miss = -energy_gap / np.linalg.norm(self.energy_slope)
-            A = np.vstack([A, np.append(slope, 0.0)])
-            right = np.vstack([right, np.full((1, right.shape[1]), miss)])
-        return list(np.linalg.lstsq(A, right, rcond=SINGULAR_RTOL)[0].T)
 
 
 def energy(mechanism: Mechanism, start: Start) -> float:

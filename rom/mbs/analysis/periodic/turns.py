@@ -84,6 +84,19 @@ class Turns:
             state = turn.back(state, angle)
         return state
 
+    @property
+    def prescribed(self) -> bool:
+        """Whether all angles are given."""
+        return all(turn.angle is not None for turn in self.every)
+
+    def turned(self, change: Array, angles: tuple[float, ...]) -> Array:
+        """(n, f) small motions or changes of velocities after all was turned back."""
+        found = change.copy()
+        for turn, angle in zip(self.every, angles, strict=True):
+            rows = slice(turn.first_velocity + 3, turn.first_velocity + 6)
+            found[rows] = rotation.matrix(rotation.exp(angle * turn.axis)) @ found[rows]
+        return found
+
     def of(self, joint: str) -> float | None:
         """Angle by which the drive of a joint may advance; zero for others, None for any."""
         found = [turn.prescribed for turn in self.every if turn.name == joint]

@@ -14,6 +14,7 @@ from rom.mbs.elements.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.mbs.elements.films.bores import bore_of
 from rom.mbs.elements.films.cells import CLEARANCE, N_ANSWERS, cells_of
 from rom.mbs.elements.films.journals import (
+    CONSTANT,
     FIRST_CONTENT,
     INLET,
     KNOWN,
@@ -237,4 +238,5 @@ JOURNAL_BEARINGS_FAMILY = Family(
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
     lost="the journal touches its bush in {}, or its film finds no pressure",
     eased=oil_everywhere,
+    remembers=lambda journals: (journals.films.law == JFO) | (journals.oil[:, CONSTANT] == 0.0),
 )  # fmt: skip

@@ -37,7 +37,7 @@ from rom.mbs.elements.gears.table import (
 )
 from rom.mbs.kernels.compiled import inner
 
-MAX_PASSES = 60  # of sets that shrink monotonically, and of a Newton method that doubles its digits
+MAX_PASSES = 60  # of a Newton method that doubles its digits
 BENT_RTOL = 1e-14  # of the deepest slice: the last digit of deflections
 RIGID_STIFFNESS = 1e30  # stiffness of teeth that do not bend beside their contact [N/m^2]
 
@@ -111,20 +111,21 @@ def pressure(slices, count, cell):
 
 @inner
 def press_stiff_contact(slices, count):
-    """Deflections and forces; slices touch where they are pressed, and the others are clear."""
+    """Deflections and forces; slices touch where they are pressed, and the others are clear.
+
+    A slice that would be pulled lifts off, which lowers the forces beside it: those that touch
+    become fewer until none is pulled.
+    """
     for cell in range(count):
         slices[cell, TOUCHES] = 1.0 if slices[cell, DEPTH] > 0.0 else 0.0
-    for _ in range(MAX_PASSES):
+    for _ in range(count):
         bend(slices, count, DEPTH, True)
         changed = False
         for cell in range(count):
             one = slices[cell]
-            touched = one[TOUCHES] > 0.0
-            force = pressure(slices, count, cell) if touched else 0.0
-            touches = force > 0.0 if touched else one[BENT] < one[DEPTH]
-            one[FORCE] = max(force, 0.0)
-            changed = changed or touches != touched
-            one[TOUCHES] = 1.0 if touches else 0.0
+            one[FORCE] = pressure(slices, count, cell) if one[TOUCHES] > 0.0 else 0.0
+            if one[FORCE] < 0.0:
+                one[FORCE], one[TOUCHES], changed = 0.0, 0.0, True
         if not changed:
             break
 

@@ -7,8 +7,9 @@ An internal gear has a negative number of teeth, and with it negative radii and 
 distance, as in ISO 21771: then all formulas are those of external gears.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,18 @@ from rom.model import Array
 def involute(angle: npt.ArrayLike) -> Array:
     """Tan a - a of a pressure angle [rad]."""
     return np.tan(angle) - np.asarray(angle, dtype=float)
+
+
+def check_numbers(pair: Any) -> None:
+    """Refuse sizes of a pair that are no finite numbers.
+
+    Raises:
+        ModelError: for the first of them.
+    """
+    for field in fields(pair):
+        value = getattr(pair, field.name)
+        if value is not None and not np.isfinite(value).all():
+            raise ModelError(f"{field.name} = {value} of a pair of gears is no finite number.")
 
 
 @dataclass(frozen=True)
@@ -59,6 +72,7 @@ class GearPair:
     gear_helix: float | None = None
 
     def __post_init__(self) -> None:
+        check_numbers(self)
         if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
             raise ModelError(
                 f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."
@@ -83,6 +97,36 @@ class GearPair:
             )
         if self.centre_distance is not None and not self.centre_distance > 0:
             raise ModelError(f"a centre distance of {self.centre_distance} m is not above zero.")
+        self._check_teeth()
+        if not self.cos_working < 1:
+            raise ModelError(
+                f"the backlash is closed: at a centre distance of {abs(self.distance) * 1e3:.4f} "
+                "mm the base circles of the wheels have no common tangent.",
+                hint=f"Without backlash it is {abs(self.tight_distance) * 1e3:.4f} mm.",
+            )
+        if self.backlash < -1e-12:
+            limit = "Up to" if self.internal else "From"
+            raise ModelError(
+                f"the backlash is closed: at a centre distance of {abs(self.distance) * 1e3:.4f} "
+                f"mm the teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
+                hint=f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash.",
+            )
+        self._check_contact()
+        if self.internal and self.tip_clearance < 0:
+            raise ModelError(
+                f"the teeth interfere: away from the path of contact tips of the pinion of "
+                f"{self.teeth[0]} teeth pass through those of the gear of {-self.teeth[1]}.",
+                hint="Let their numbers differ by more, or lower the addendum.",
+            )
+
+    def _check_teeth(self) -> None:
+        """Refuse teeth that lose their involutes to the tool, and that end in a point."""
+        if self.internal and not self.ra[1] <= self.rb[1]:
+            raise ModelError(
+                f"the teeth of the gear reach below its base circle, where no involute is: tips at "
+                f"{-self.ra[1] * 1e3:.4g} mm, a base circle of {-self.rb[1] * 1e3:.4g} mm.",
+                hint="Lower the addendum, or take more teeth for the gear.",
+            )
         names = ("pinion",) if self.internal else ("pinion", "gear")
         cut = zip(self.teeth, self.shift, names, strict=False)
         for z, x, name in cut:
@@ -99,14 +143,6 @@ class GearPair:
                     f"the teeth of the {name} are pointed: their flanks meet below the tip.",
                     hint="Lower the addendum or the profile shift, or take more teeth.",
                 )
-        if self.cos_working >= 1 or self.backlash < -1e-12:
-            limit = "Up to" if self.internal else "From"
-            raise ModelError(
-                f"the backlash is closed: at a centre distance of {abs(self.distance) * 1e3:.4f} "
-                f"mm the teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
-                hint=f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash.",
-            )
-        self._check_contact()
 
     def _check_contact(self) -> None:
         """Refuse tips that reach below the involutes, and pairs that part before the next touch."""
@@ -240,6 +276,22 @@ class GearPair:
         """(2,) transverse thickness of the teeth at their tips [m]."""
         at_base = self.base_thickness / (2 * self.rb)
         return 2 * self.ra * (at_base - involute(np.arccos(self.rb / self.ra)))
+
+    @property
+    def tip_clearance(self) -> float:
+        """Angle on a ring by which tips of its pinion pass its own, away from their path [rad].
+
+        Source:
+            Kohara, Gear Technical Reference: trochoid interference of internal gears.
+        """
+        (r, R), a = np.abs(self.ra), abs(self.distance)
+        leaves = (R**2 - r**2 - a**2) / (2 * a * r)  # cosine of where both tip circles cross
+        if not abs(leaves) < 1:
+            return float("inf")
+        enters = (a**2 + R**2 - r**2) / (2 * a * R)
+        one, two = involute(np.arccos(self.rb / self.ra)) - involute(self.alpha)
+        turned = -(np.arccos(leaves) + one) * self.teeth[0] / self.teeth[1]
+        return float(turned - two - np.arccos(enters))
 
 
 def path_of_contact(pair: GearPair, alpha: float) -> tuple[float, float]:

@@ -7,11 +7,10 @@ import numpy as np
 
 from rom.errors import ModelError
 from rom.mbs.elements.gears.geometry import GearPair
+from rom.mbs.elements.gears.racks import RackPair
 from rom.model import Array
 
-MIN_CURVATURE_RTOL = (
-    1e-6  # curvature radius over the distance of the tangent points: at these it is zero
-)
+MIN_CURVATURE_RTOL = 1e-6  # radius over the path of contact: at the tangent points it is zero
 N_PLACES = 41  # of the table along the path: its constant is a logarithm and changes slowly
 
 
@@ -38,7 +37,7 @@ class Hertz:
         """C = (1 - nu^2) / (pi E) [m^2/N]."""
         return (1 - self.nu**2) / (np.pi * self.E)
 
-    def constants(self, pair: GearPair) -> Array:
+    def constants(self, pair: GearPair | RackPair) -> Array:
         """(n,) C of ``d = c F (C - 2 ln F)`` from first to last contact, F in N/m [1].
 
         With a^2 = A F the half width of the contact squared, C is the logarithm of
@@ -58,9 +57,9 @@ class Hertz:
         share = np.linspace(0, 1, N_PLACES)
         h = np.stack([np.interp(share, np.linspace(0, 1, len(h)), column) for column in h.T])
         s = pair.path[0] + share * (pair.path[1] - pair.path[0])
-        least = MIN_CURVATURE_RTOL * abs(pair.tangents)
+        least = MIN_CURVATURE_RTOL * pair.path[1]
         one = np.maximum(s, least) / np.cos(pair.base_helix)
         two = pair.tangents - s
         two = np.where(np.abs(two) < least, least, two) / np.cos(pair.base_helix)
-        A = 8 * self.compliance * one * two / (one + two)
+        A = 8 * self.compliance * one / (1 + one / two)
         return np.asarray(2 * np.log(4 * h[0] * h[1] / A) - 2 * self.nu / (1 - self.nu))

@@ -14,7 +14,16 @@ from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.gears.corrections import Correction, checked_map
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.hertz import Hertz
-from rom.mbs.elements.gears.table import COORDINATES, DAMPING, PITCH, SLICE_COLUMNS, SPEED, Meshes
+from rom.mbs.elements.gears.racks import RackPair
+from rom.mbs.elements.gears.table import (
+    COORDINATES,
+    DAMPING,
+    PITCH,
+    RB_1,
+    SLICE_COLUMNS,
+    SPEED,
+    Meshes,
+)
 from rom.mbs.elements.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
@@ -38,7 +47,7 @@ class GearMesh:
 
     i: Marker
     j: Marker
-    pair: GearPair
+    pair: GearPair | RackPair
     stiffness: Array
     correction: Correction
     numbers: tuple[float, ...]
@@ -60,7 +69,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     wheel_b: Marker,
     *,
     axis: npt.ArrayLike,
-    pair: GearPair,
+    pair: GearPair | RackPair,
     stiffness: npt.ArrayLike,
     correction: Correction | None = None,
     damping: float = 0.0,
@@ -83,9 +92,10 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     Args:
         name: name of the mesh.
         wheel_a: middle of the face of the pinion, on its axis.
-        wheel_b: that of the gear.
+        wheel_b: that of the gear, or the point of the reference line of a rack opposite to it.
         axis: (3,) of the pinion, in the world at the start.
-        pair: `rom.components.gear_mesh.GearPair`, at whose distance the wheels stand.
+        pair: `rom.components.gear_mesh.GearPair`, at whose distance the wheels stand, or
+            `rom.components.gear_mesh.RackPair`, whose rack runs across axis and distance.
         stiffness: of one pair of teeth per length of contact line [N/m^2]: a number, or (n,) values
             from first to last contact, as `rom.components.gear_mesh.stiffness_table` has them.
         correction: `rom.components.gear_mesh.Correction` of the working flanks.
@@ -127,7 +137,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     _check_place(name, pair, D, z)
     c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
     turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
-    axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], -c @ turned[1]])
+    along = np.cross(z, c) if isinstance(pair, RackPair) else -c
+    axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], along @ turned[1]])
     if not 1 <= cells <= MAX_CELLS:
         raise ConfigError(f"cells = {cells} of mesh {name!r}: it has from 1 to {MAX_CELLS}.")
     follows = _follows_energy(name, pair, entry, conservative)
@@ -153,17 +164,24 @@ def _rims(
     parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
 ) -> tuple[tuple[Cylinder, float] | None, ...]:
     """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
-    found = []
+    found: list[tuple[Cylinder, float] | None] = []
     for side in range(2):
+        if not pair.teeth[side]:
+            found.append(None)
+            continue
         rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
         found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
     return tuple(found)
 
 
-def _spins(name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair) -> tuple[float, float]:
+def _spins(
+    name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair | RackPair
+) -> tuple[float, float]:
     """Of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]."""
     one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
     z, w = pair.teeth
+    if two and not w:
+        raise ConfigError(f"the rack of {name!r} spins at {two:.9g} rad/s: only wheels do.")
     if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
         raise ConfigError(
             f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
@@ -172,7 +190,9 @@ def _spins(name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair) -> 
     return one, two
 
 
-def _follows_energy(name: str, pair: GearPair, entry: Any, conservative: bool | None) -> float:
+def _follows_energy(
+    name: str, pair: GearPair | RackPair, entry: Any, conservative: bool | None
+) -> float:
     """1 for forces that follow the energy along the path, 0 for those along involutes."""
     if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
         raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
@@ -186,7 +206,7 @@ def _follows_energy(name: str, pair: GearPair, entry: Any, conservative: bool | 
     return float(not jumps if conservative is None else conservative)
 
 
-def _coupling(name: str, length: Any, pair: GearPair) -> float:
+def _coupling(name: str, length: Any, pair: GearPair | RackPair) -> float:
     """Length over which slices carry each other [m]."""
     if not 0.0 <= number("coupling", length) <= pair.width:
         raise ConfigError(
@@ -197,14 +217,15 @@ def _coupling(name: str, length: Any, pair: GearPair) -> float:
     return float(length)
 
 
-def _check_place(name: str, pair: GearPair, D: Array, z: Array) -> None:
+def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> None:
     """Refuse wheels that do not stand as the pair says."""
     distance = float(np.linalg.norm(D - (D @ z) * z))
     if not abs(distance - abs(pair.distance)) <= DISTANCE_RTOL * pair.module:
         raise ConfigError(
             f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair "
             f"{abs(pair.distance) * 1e3:.6g} mm.",
-            hint="Move a body, or give the pair this centre_distance.",
+            hint="Move a body, or give the pair this centre_distance; the marker of a rack is "
+            "beside the axis of its pinion.",
         )
     if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
         raise ConfigError(
@@ -239,7 +260,7 @@ def _stiffness(name: str, given: Any) -> Array:
     return k
 
 
-def _check_correction(name: str, pair: GearPair, correction: Correction) -> None:
+def _check_correction(name: str, pair: GearPair | RackPair, correction: Correction) -> None:
     """Refuse errors and maps of other wheels."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
         if len(errors) not in (0, abs(z)):
@@ -248,6 +269,8 @@ def _check_correction(name: str, pair: GearPair, correction: Correction) -> None
             )
         if not np.isfinite(np.asarray(errors, dtype=float)).all():
             raise ConfigError(f"pitch errors of {name!r} are not all finite numbers.")
+    if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:
+        raise ConfigError(f"the rack of {name!r} does not turn: it has no run-out.")
     for amount, direction in correction.run_out:
         ends = finite("run_out", (amount, direction), (2,))
         if not abs(ends[0]) <= MAX_RUN_OUT * pair.module:
@@ -258,7 +281,7 @@ def _check_correction(name: str, pair: GearPair, correction: Correction) -> None
     _maps(pair, correction, name)
 
 
-def _maps(pair: GearPair, correction: Correction, name: str) -> list[Array]:
+def _maps(pair: GearPair | RackPair, correction: Correction, name: str) -> list[Array]:
     """Maps of the working flanks of pinion and gear, and of their back flanks."""
     kinds = ("working", correction.maps), ("back", correction.back_maps)
     return [
@@ -276,7 +299,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
     return Meshes(
         *map(integers, markers),
         rows_of((mesh.axes.ravel() for mesh in found), 12),
-        rows_of((_sizes(mesh) for mesh in found), 13),
+        rows_of((_sizes(mesh) for mesh in found), 15),
         rows_of((_flanks(mesh, maps[4 * k : 4 * k + 4]) for k, mesh in enumerate(found)), 13),
         rows_of((mesh.numbers for mesh in found), 6),
         rows_of((mesh.spins for mesh in found), 2),
@@ -293,7 +316,7 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         np.zeros(len(found)),
         np.zeros((len(found), max(map(_most_slices, found)), 5)),
         np.zeros(len(found)),
-        pack_cylinders([mesh.rims for mesh in found], places.R),
+        pack_cylinders([mesh.rims for mesh in found], places.R, max(mesh.cells for mesh in found)),
         np.zeros(2),
         np.zeros((max(mesh.cells for mesh in found), SLICE_COLUMNS)),
         *np.zeros((2, COORDINATES)),
@@ -325,9 +348,11 @@ def _from_lowest(errors: Any) -> Array:
 
 def _sizes(mesh: GearMesh) -> list[float]:
     pair = mesh.pair
+    rack = (pair.distance, pair.tip) if isinstance(pair, RackPair) else (0.0, 0.0)
+    tips = (pair.wheel.ra[0], 0.0) if isinstance(pair, RackPair) else pair.ra
     return [
-        *pair.rb, *pair.ra, pair.base_helix, pair.base_pitch, pair.base_thickness[0], pair.backlash,
-        pair.alpha, pair.width, mesh.offset, mesh.phase, mesh.entry,
+        *pair.rb, *tips, pair.base_helix, pair.base_pitch, pair.base_thickness[0], pair.backlash,
+        pair.alpha, pair.width, mesh.offset, mesh.phase, mesh.entry, *rack,
     ]  # fmt: skip
 
 
@@ -350,8 +375,16 @@ def _room(meshes: Meshes) -> Array:
     return room
 
 
+def _passed(meshes: Meshes, W: Any) -> Array:
+    """(k,) teeth of the pinions that have gone by."""
+    turned = W.fresh[meshes.remembered] + meshes.spin[:, 0] * W.signal[meshes.clock[0], 0]
+    teeth: Array = meshes.size[:, RB_1] / meshes.size[:, PITCH] * turned
+    return teeth
+
+
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
     by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
     lost="the wheels of {} are so close that they have no common tangent", room=_room,
+    phases=_passed,
 )  # fmt: skip

@@ -7,7 +7,6 @@ from rom.mbs.elements.gears.rims import (
     closing_of_rims,
     has_rims,
     load_rims,
-    place_on_rims,
 )
 from rom.mbs.elements.gears.table import (
     COORDINATES,
@@ -72,45 +71,43 @@ def add_force(wrench, arm, force):
 
 
 @inner
-def damp(s, W, meshes, k, one, place):
+def damp(s, W, meshes, k, cell, place):
     """Rate at which the flanks of a slice close, and what damping adds over its elastic force.
 
     Flanks do not pull, and their force does not jump as they touch: it is at most the elastic one.
     """
-    rate, damping, (side, state) = 0.0, meshes.law[k, DAMPING], place
+    rate, damping, (side, state), one = 0.0, meshes.law[k, DAMPING], place, meshes.line[cell]
     if damping == 0.0:
         return 0.0, 0.0
     for a in range(COORDINATES):
         rate += one[FIRST_GRADIENT + a] * meshes.speed[a]
     if has_rims(meshes, k):
-        arms, n, _ = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
-        place_on_rims(s, W, meshes, k, arms[0], state[0])
-        rate += closing_of_rims(s, W, meshes, k, n, meshes.rims.rate)
+        _, n, _ = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
+        rate += closing_of_rims(s, W, meshes, (k, cell), n, meshes.rims.rate)
     return rate, min(max(damping * rate / one[DEPTH], -1.0), 1.0)
 
 
 @inner
-def sliding_speed(s, W, meshes, k, directions, axes):
+def sliding_speed(s, W, meshes, at, directions, axis):
     """Speed at which flanks slide, and the part of wheels that spin in their frames."""
-    arms, _, across = directions
-    spinning = meshes.spin[k, 0] * dot(across, cross(axes[2], arms[0]))
-    spinning -= meshes.spin[k, 1] * dot(across, cross(axes[2], arms[1]))
+    (arms, _, across), (k, _) = directions, at
+    spinning = meshes.spin[k, 0] * dot(across, cross(axis, arms[0]))
+    spinning -= meshes.spin[k, 1] * dot(across, cross(axis, arms[1]))
     i, j = meshes.i[k], meshes.j[k]
     slide = add(row(W.V, i, 0), cross(row(W.V, i, 3), arms[0]))
     slide = sub(slide, add(row(W.V, j, 0), cross(row(W.V, j, 3), arms[1])))
     speed = dot(across, slide) + spinning
     if has_rims(meshes, k):
-        place_on_rims(s, W, meshes, k, arms[0], axes)
-        speed += closing_of_rims(s, W, meshes, k, across, meshes.rims.rate)
+        speed += closing_of_rims(s, W, meshes, at, across, meshes.rims.rate)
     return speed, spinning
 
 
 @inner
-def rub(s, W, meshes, k, what, one, place):
+def rub(s, W, meshes, k, what, cell, place):
     """Let one slice rub, and press rims that deform, or add the tangents of that."""
-    law, (side, state) = meshes.law[k], place
+    law, (side, state), one, at = meshes.law[k], place, meshes.line[cell], (k, cell)
     directions = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
-    speed, spinning = sliding_speed(s, W, meshes, k, directions, state[0])
+    speed, spinning = sliding_speed(s, W, meshes, at, directions, state[0][2])
     load = one[FORCE] + one[LOSS]
     turned = math.tanh(speed / law[SPEED])
     grip = law[FRICTION] * turned
@@ -119,14 +116,14 @@ def rub(s, W, meshes, k, what, one, place):
         force = scale(load * grip, across)
         add_force(W.wrench[meshes.i[k]], arms[0], scale(-1.0, force))
         add_force(W.wrench[meshes.j[k]], arms[1], force)
-        load_rims(s, W, meshes, k, add(scale(load, n), force))
+        load_rims(s, W, meshes, at, add(scale(load, n), force))
         W.power[2] += load * grip * speed
         W.power[1] += load * grip * spinning
         return
     stick = law[FRICTION] * load * (1.0 - turned * turned) / law[SPEED]
     if has_rims(meshes, k):
         along, factors = (n, add(n, scale(grip, across)), across), (one[STEEP], one[VISCOUS], stick)
-        add_rim_tangent(s, W, meshes, k, factors, along, arms)
+        add_rim_tangent(s, W, meshes, at, factors, along, arms)
     else:
         add_friction(meshes, one, directions, grip, stick)
 

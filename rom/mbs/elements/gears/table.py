@@ -15,7 +15,7 @@ from rom.mbs.kernels.tables import (
 
 # columns of Meshes.size, Meshes.flank and Meshes.law
 RB_1, RB_2, RA_1, RA_2, HELIX, PITCH, THICKNESS = range(7)
-BACKLASH, ALPHA, WIDTH, OFFSET, PHASE, ENTRY = range(7, 13)
+BACKLASH, ALPHA, WIDTH, OFFSET, PHASE, ENTRY, RACK, TIP = range(7, 15)
 RELIEF_1, RELIEF_2, EXTENT_1, EXTENT_2, POWER, CROWNING, SLOPE = range(7)
 RUN_OUT_1, RUN_OUT_2, TOWARDS_1, TOWARDS_2, LEAST, LEAST_BACK = range(7, 13)
 DAMPING, FRICTION, SPEED, FOLLOWS, COUPLING, HERTZ = range(6)
@@ -52,10 +52,10 @@ class Meshes(Table):
         i, j: (k,) markers of pinion and gear.
         axes: (k, 12) axis of the pinion, a direction across it, the same of the gear, in the axes
             of their markers.
-        size: (k, 13) base radii, tip radii [m], base helix [rad], base pitch, thickness of the
+        size: (k, 15) base radii, tip radii [m], base helix [rad], base pitch, thickness of the
             pinion's teeth on the base circle, backlash [m], working pressure angle at the datum
             [rad], width, offset of the faces [m], angle of the pinion at the datum [rad], length
-            of entry [m].
+            of entry [m]; distance of a rack, 0 for gears, and height of its teeth [m].
         flank: (k, 13) tip relief of pinion and gear, their extents [m], power, crowning, slope,
             eccentricities of the wheels [m], their directions [rad], least gaps of working and
             back flanks [m].

@@ -2,7 +2,8 @@
 
 Coordinates are the turns theta_1 and theta_2 of the wheels about the axis z of the pinion, against
 the line of centres c; their distance a; the shift o of the gear along z; and the tilt z x n of its
-axis n, along c and t = z x c. With D from the pinion to the gear, D = a c + o z.
+axis n, along c and t = z x c. With D from the pinion to the gear, D = a c + o z. A rack has its
+travel along t, across which c is, in the place of a turn: D = a c + y t + o z.
 """
 
 import math
@@ -13,6 +14,7 @@ from rom.mbs.elements.gears.table import (
     DISTANCE,
     OFFSET,
     PHASE,
+    RACK,
     RB_1,
     RB_2,
     SHIFT,
@@ -58,14 +60,42 @@ def line_of_centres(W, meshes, k, z):
 
 
 @inner
+def rack_frame(W, meshes, k):
+    """Axes c, t, z; distance and travel of a rack, and shift along the axis."""
+    z, _, _, u = wheel_axes(W, meshes, k)
+    flat = sub(u, scale(dot(u, z), z))
+    t = scale(1.0 / math.sqrt(dot(flat, flat)), flat)
+    c, D = cross(t, z), sub(row(W.P, meshes.j[k], 0), row(W.P, meshes.i[k], 0))
+    return (c, t, z), dot(D, c), dot(D, t), dot(D, z)
+
+
+@inner
+def set_rack(s, W, meshes, k):
+    """Frame and state of mesh k with a rack, as `set_frame` has them."""
+    _, e1, n, u = wheel_axes(W, meshes, k)
+    size = meshes.size[k]
+    (c, t, z), distance, travel, shift = rack_frame(W, meshes, k)
+    turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
+    turn_1 += meshes.spin[k, 0] * W.signal[meshes.clock[0], 0]
+    W.fresh[meshes.remembered[k] + 1] = meshes.start[k, 1]
+    rolled = size[RB_1] * turn_1 + size[RB_2] * travel
+    opened = (distance - size[RACK]) * math.sin(size[ALPHA])
+    forward = size[RB_1] * (size[PHASE] + turn_1)
+    lean = shift - size[OFFSET], -dot(n, t), dot(n, c)
+    return (c, t, z, e1, n, u), size[ALPHA], (rolled, opened, forward), lean, (distance, travel)
+
+
+@inner
 def set_frame(s, W, meshes, k):
     """Frame and state of mesh k.
 
     Returns:
         Axes c, t, z, and e1, n2, e2 of `wheel_axes`; pressure angle, NaN without a common tangent;
         what rolled together, what the flanks opened, and where a working line begins [m]; shift
-        along the axis [m] and tilt of the gear along c and t; distance [m].
+        along the axis [m] and tilt of the gear along c and t; distance and travel [m].
     """
+    if meshes.size[k, RACK] > 0.0:
+        return set_rack(s, W, meshes, k)
     z, e1, n2, e2 = wheel_axes(W, meshes, k)
     size = meshes.size[k]
     (c, t, z), distance, shift = line_of_centres(W, meshes, k, z)
@@ -79,7 +109,7 @@ def set_frame(s, W, meshes, k):
     opened = both * (involute(alpha) - involute(size[ALPHA]))
     forward = size[RB_1] * (size[PHASE] + turn_1 + alpha - size[ALPHA])
     lean = shift - size[OFFSET], -dot(n2, t), dot(n2, c)
-    return (c, t, z, e1, n2, e2), alpha, (rolled, opened, forward), lean, distance
+    return (c, t, z, e1, n2, e2), alpha, (rolled, opened, forward), lean, (distance, 0.0)
 
 
 @inner
@@ -96,6 +126,9 @@ def set_rates(W, meshes, k):
 
     The line of centres turns about z by chi = (t . dD + o c . dphi_1) / a; both turns fall by it.
     """
+    if meshes.size[k, RACK] > 0.0:
+        set_rack_rates(W, meshes, k)
+        return
     z, _, n, e = wheel_axes(W, meshes, k)
     (c, t, z), a, o = line_of_centres(W, meshes, k, z)
     rates, none, lag = meshes.rates, (0.0, 0.0, 0.0), o / a
@@ -112,6 +145,29 @@ def set_rates(W, meshes, k):
     put_rate(rates, TILT_C, scale(n_c, chi), scale(n_c * lag - n_z, c), scale(-1.0, cross(n, t)))
     twisted = sub(scale(n_t * lag, c), scale(n_z, t))
     put_rate(rates, TILT_T, scale(n_t, chi), twisted, cross(n, c))
+
+
+@inner
+def set_rack_rates(W, meshes, k):
+    """Write the derivatives of the coordinates of a rack.
+
+    As it turns by dphi_2, and u along it leans to z, t goes towards c by omega = (dphi_2 . (u x c)
+    - (u . z) dphi_1 . t) / |u - (u . z) z|.
+    """
+    _, _, n, u = wheel_axes(W, meshes, k)
+    (c, t, z), a, y, o = rack_frame(W, meshes, k)
+    rates, none, leans = meshes.rates, (0.0, 0.0, 0.0), dot(u, z)
+    flat = math.sqrt(1.0 - leans * leans)
+    one, two = scale(-leans / flat, t), scale(1.0 / flat, cross(u, c))
+    n_c, n_t, n_z = dot(n, c), dot(n, t), dot(n, z)
+    put_rate(rates, TURN_1, none, add(z, one), two)
+    put_rate(rates, TURN_2, t, add(scale(a, one), scale(o, c)), scale(a, two))
+    put_rate(rates, DISTANCE, c, sub(scale(-y, one), scale(o, t)), scale(-y, two))
+    put_rate(rates, SHIFT, z, sub(scale(a, t), scale(y, c)), none)
+    put_rate(rates, TILT_C, none, sub(scale(-n_c, one), scale(n_z, c)),
+             sub(scale(-n_c, two), cross(n, t)))  # fmt: skip
+    put_rate(rates, TILT_T, none, sub(scale(-n_t, one), scale(n_z, t)),
+             sub(cross(n, c), scale(n_t, two)))  # fmt: skip
 
 
 @inner
@@ -156,10 +212,10 @@ def stiffen_wheels(meshes):
 
 @inner
 def turn_forces(meshes, axes, distance):
-    """Add how forces turn with the line of centres, and shifts with the axis of the pinion.
+    """Add how forces turn with the line of centres.
 
     With h = dE / d(theta_1 + theta_2) the second derivatives by the way of the gear are
-    h (c t + t c) / a^2 + dE/da t t / a; by it and the turn of the pinion dE/do (t c - c t).
+    h (c t + t c) / a^2 + dE/da t t / a.
     """
     (c, t), gradient, tangent = (axes[0], axes[1]), meshes.gradient, meshes.tangent
     about = (gradient[TURN_1] + gradient[TURN_2]) / (distance * distance)
@@ -168,10 +224,6 @@ def turn_forces(meshes, axes, distance):
             turning = (
                 about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
             )
-            lean = gradient[SHIFT] * (t[p] * c[q] - c[p] * t[q])
             for side in range(2):
-                sign = 2.0 * side - 1.0
                 tangent[0, 6 * side + p, 6 * side + q] += turning
                 tangent[0, 6 * side + p, 6 - 6 * side + q] -= turning
-                tangent[0, 3 + p, 6 * side + q] += sign * lean
-                tangent[0, 6 * side + q, 3 + p] += sign * lean

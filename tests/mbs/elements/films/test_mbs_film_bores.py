@@ -70,6 +70,32 @@ def test_a_bush_that_is_stiff_enough_is_a_rigid_one():
     assert film.opening is None
 
 
+def test_a_film_opens_by_what_nodes_under_its_cells_move_outwards():
+    """Angles count from Y, heights upwards; what the bore does on the whole is no opening."""
+    body, b = (
+        bush(rom.FourierLegendre(2, 1)),
+        JournalBearing(DIAMETER, 0.03, CLEARANCE, cells=(24, 3)),
+    )
+    mech = rom.Mechanism(gravity=ORIGIN)
+    part = mech.add_flexible("bush", body, at=ORIGIN)
+    mech.journal_bearing("film", mech.ground.marker(ORIGIN), part.marker("bore"), axis=(0, 0, 1),
+                         reference=(0, 1, 0), bearing=b, oil=OIL, elastic_bush=True)  # fmt: skip
+    bore, functions = body.markers["bore"], mech.journal_bearings["film"].bore
+    q = np.random.default_rng(1).normal(size=part.r)
+    x, moved = bore.patch.points, (bore.patch.shapes @ bore.hold[:, 6:] @ q).reshape(-1, 3)
+    moved -= bore.translation @ q + np.cross(bore.rotation @ q, x - bore.point)
+    theta = np.pi / 2 + 2 * np.pi / 24 * np.arange(24)
+    at = np.stack([DIAMETER / 2 * np.cos(theta), DIAMETER / 2 * np.sin(theta)], axis=1)
+    places = np.array([[*xy, z] for xy in at for z in (-0.01, 0.0, 0.01)])
+    apart = np.linalg.norm(places[:, None] - x, axis=2)
+    assert apart.min(axis=1).max() < 0.01 * DIAMETER
+    near = apart.argmin(axis=1)
+    outwards = np.einsum("na,na->n", moved[near, :2], np.repeat(at, 3, axis=0)) / (DIAMETER / 2)
+    opened = functions[0] @ functions[1] @ q
+    assert_allclose(opened, outwards, atol=1e-6 * np.abs(outwards).max())
+    assert np.ptp(outwards.reshape(24, 3), axis=1).max() > 0.1 * np.abs(outwards).max()
+
+
 # --- tangents and energy ---
 
 
@@ -360,20 +386,31 @@ t_end = 1
 """
 
 
-@pytest.mark.parametrize("kind", [rom.FourierLegendre(1, 1), "rbe2"])
-def test_a_file_asks_for_an_elastic_bush(kind, tmp_path):
-    rom.save(bush(kind, SOFT, (16, 1, 6)), tmp_path / "bush.rom.npz")
+def test_a_file_asks_for_an_elastic_bush(tmp_path):
+    body = bush(rom.FourierLegendre(1, 1), SOFT, (16, 1, 6))
+    rom.save(body, tmp_path / "bush.rom.npz")
     (tmp_path / "m.toml").write_text(ENTRY)
-    if kind == "rbe2":
-        with pytest.raises(ConfigError, match=r"the bush of bearing 'film'.* has no functions"):
-            read_mechanism(tmp_path / "m.toml").mechanism()
-        return
     made = read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
     mech = rom.Mechanism()
-    part = mech.add_flexible("bush", bush(kind, SOFT, (16, 1, 6)), at=ORIGIN)
+    part = mech.add_flexible("bush", body, at=ORIGIN)
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
     mech.journal_bearing("film", shaft.marker(ORIGIN), part.marker("bore"), axis=(0, 0, 1),
                          bearing=bearing((120, 8)), oil=OIL, elastic_bush=True)  # fmt: skip
     same = mech.journal_bearings["film"].bore
     assert_allclose(made.bore[0] @ made.bore[1], same[0] @ same[1], atol=1e-12)
     assert np.abs(same[0] @ same[1]).max() > 1e-6
+
+
+@pytest.mark.parametrize(("kind", "given", "instead", "words"), [
+    ("rbe2", "", "", "m.toml:10: the bush of bearing 'film'.* has no functions"),
+    (None, "[0, 0, 1]", "[1, 0, 0]", "m.toml:10: the bush of bearing 'film'.* is no bore of it"),
+    (None, "40 mm", "50 mm", "m.toml:10: the bush of bearing 'film'.* a radius of 25 mm"),
+    (None, "40 um", "-40 um", "m.toml:15: journal_bearings.film.bearing.clearance = '-40 um'"),
+    (None, "true", '"yes"', "m.toml:14: journal_bearings.film.elastic_bush = 'yes' is not true"),
+])  # fmt: skip
+def test_a_file_that_asks_in_vain_is_told_where(kind, given, instead, words, tmp_path):
+    kind = kind or rom.FourierLegendre(1, 1)
+    rom.save(bush(kind, SOFT, (16, 1, 6)), tmp_path / "bush.rom.npz")
+    (tmp_path / "m.toml").write_text(ENTRY.replace(given, instead, 1) if given else ENTRY)
+    with pytest.raises(ConfigError, match=words):
+        read_mechanism(tmp_path / "m.toml").mechanism()

@@ -204,8 +204,8 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
         assert_allclose(found, known, rtol=1e-10, atol=1e-10)
     # a bump where the film is thin changes the load, one whose cells have no pressure does not
     # of one column: its neighbours see half of it at the faces between
-    bump = np.zeros((60, 8))
-    bump[7] = 0.05
+    bump, grid = np.zeros((60, 8)), bearing().grid
+    bump[7] = 0.05 * (1 + grid.Z)
     angle, h = bearing().grid.angle, {}
     films = cells_of([bearing()])
     films.opening[0], films.state[0, :4], films.state[0, SPIN_COLUMN] = bump.ravel(), motion, 1.0
@@ -213,8 +213,12 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
     for face, cells in ((0, films.middle), (1, films.behind)):
         c, s, Z = angle[face, :, :1], angle[face, :, 1:], bearing().grid.Z
         h[face] = cells[0].reshape(60, 8) - (1 - (0.4 - 0.2 * Z) * c - (0.3 - 0.1 * Z) * s)
-    assert_allclose(h[0][6:9, 0], [0, 0.05, 0], atol=1e-14)
-    assert_allclose(h[1][5:9, 0], [0, 0.025, 0.025, 0], atol=1e-14)
+    assert_allclose(h[0][6:9], bump[6:9], atol=1e-14)
+    assert_allclose(h[1][5:9], [0 * grid.Z, bump[7] / 2, bump[7] / 2, 0 * grid.Z], atol=1e-14)
+    # and its slope along the width goes on to the ends
+    (c, s), Z = grid.angle[0, 7], grid.Z_face
+    side = films.side[0].reshape(60, 9)[7] - (1 - (0.4 - 0.2 * Z) * c - (0.3 - 0.1 * Z) * s)
+    assert_allclose(side, 0.05 * (1 + Z), atol=1e-14)
 
 
 # --- tangents ---

@@ -5,9 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.mechanisms import prepared, residual_at, stored_at, tangents_at
-from cases.mbs.tangents import difference, shifted
+from cases.mbs.mechanisms import prepared, residual_at, stored_at
+from cases.mbs.tangents import by_position, by_velocity, difference, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
+from rom.mbs.elements.films.bearing import Groove, JournalBearing
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
@@ -52,8 +53,8 @@ def wheels(kind, options, **more):
     pair, mech = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0))
     ends = [mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(x, 0, 0)).marker(ORIGIN)
             for name, x in (("pinion", 0.0), ("gear", pair.distance))]  # fmt: skip
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=TABLE, entry=0.1, cells=7,
-                   **OPTIONS[options] | more)  # fmt: skip
+    given = {"stiffness": TABLE, "entry": 0.1, "cells": 7} | OPTIONS[options] | more
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **given)
     return mech
 
 
@@ -94,21 +95,35 @@ def test_forces_are_the_gradient_of_the_energy(kind, options, back):
 @pytest.mark.parametrize(("kind", "options"), [c for c in CASES if c[1] != "measured"])
 @pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
 def test_tangents_are_differences_of_forces(kind, options, losses):
-    """But for how directions of forces turn, and gaps are curved: to the deflection over radii."""
-    packed, W = prepared(wheels(kind, options, **losses))
-    q, none = placed(packed, PAIRS[kind], False, 1), np.zeros(0)
+    """But for how gaps are curved, and how tilts turn the forces: to the deflection over radii."""
+    fast = {"transition_speed": 1e-3} if losses else {}
+    packed, W = prepared(wheels(kind, options, **losses | fast))
+    q = placed(packed, PAIRS[kind], False, 1)
     v = 1e-3 * np.random.default_rng(5).normal(size=12)
+    found, stiff = by_position(packed, W, q, v)
+    assert_allclose(found, stiff, atol=1e-3 * np.abs(stiff).max())
+    found, loss = by_velocity(packed, W, q, v)
+    assert_allclose(found, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
 
-    def force(dq, dv):
-        residual_at(packed.system, W, shifted(packed, q, dq), v + dv, 0 * v, none)
-        return W.residual.copy()
 
-    stiff = difference(lambda x: force(x, 0 * v), 12, 1e-9)
-    loss = difference(lambda x: force(0 * v, x), 12)
-    tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 0.0, 1.0))
-    assert_allclose(W.Kt, stiff, atol=1e-3 * np.abs(stiff).max())
-    tangents_at(packed.system, W, q, v, 0 * v, none, (0.0, 1.0, 0.0))
-    assert_allclose(W.S, loss, atol=1e-6 * max(np.abs(loss).max(), 1.0))
+STEEP = Hertz(((1e-4, 1e-4), (5e-3, 5e-3), (1e-4, 5e-4)))
+
+
+@pytest.mark.parametrize("kind", ["spur", "helical", "internal"])
+@pytest.mark.parametrize("more", [{}, {"hertz": STEEP}], ids=["linear", "hertz"])
+def test_tangents_without_tilts_know_how_forces_turn(kind, more):
+    """All of them, of ways of the wheels in space and turns about their axes.
+
+    What ways in the plane do to the moments that tilt the pinion is small of second order.
+    """
+    packed, W = prepared(wheels(kind, "plain", entry=0.5, **more))
+    q, moves = placed(packed, PAIRS[kind], False, 1, tilts=0.0), [0, 1, 2, 5, 6, 7, 8, 11]
+    found, stiff = by_position(packed, W, q, np.zeros(12))
+    size = np.where(np.arange(12) % 6 < 3, 1.0, 1 / PAIRS[kind].rb[0])
+    error = np.outer(size, size) * np.abs(found - stiff) / np.abs(stiff[:3]).max()
+    limit = 2e-4 if kind == "helical" else 5e-5
+    assert error[np.ix_(moves, moves)].max() < limit
+    assert error[np.ix_([3, 4], [0, 1, 6, 7])].max() < limit
 
 
 def thrown(kind, spin=(0.5, 0.0), t_end=6e-4, **more):
@@ -138,5 +153,36 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
     assert np.abs(sol.energy.balance).max() < 1e-6 * strain
     for of_all in sol.momentum:  # [N s, N m s]; a blow passes 1e-3 from one wheel to the other
         assert np.ptp(of_all, axis=0).max() < 1e-13
+    report = rom.audit(sol)
+    assert report.ok, report
+
+
+def test_a_pinion_in_oil_films_whose_teeth_rub_hit_and_part_keeps_the_energy():
+    """Works of weight and motor, losses in films and on flanks, energy in teeth, in one balance."""
+    pair, mech = GearPair((26, 40), 4e-3, 0.03, 0.2, thinning=5e-6), rom.Mechanism()
+    pinion = mech.add_rigid("pinion", mass=4.0, inertia=(8e-3, 8e-3, 5e-3), at=ORIGIN,
+                            omega=(0, 0, 100.0))  # fmt: skip
+    gear = mech.add_rigid("gear", mass=9.0, inertia=(0.02,) * 3, at=(pair.distance, 0, 0),
+                          omega=(0, 0, 3.0 - 65.0))  # fmt: skip
+    film = JournalBearing(0.04, 0.02, 8e-5, [Groove(np.pi / 2, 0.3)], cells=(24, 4))
+    for name, z in (("front", -0.03), ("back", 0.03)):
+        ends = pinion.marker((0, 0, z)), mech.ground.marker((0, 0, z))
+        mech.journal_bearing(name, *ends, axis=Z, bearing=film, oil=0.02)
+    ends = pinion.marker(ORIGIN), gear.marker(ORIGIN)
+    mech.bushing("thrust", mech.ground.marker(ORIGIN), ends[0], stiffness=(0, 0, 1e6, 0, 0, 0))
+    mech.revolute("axle", mech.ground.marker((pair.distance, 0, 0)), ends[1], axis=Z)
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K, cells=7, entry=0.1, **LOSSES)
+    mech.torque("motor", ends[0], (0, 0, 20.0))
+    sol = rom.simulate(mech, t_end=8e-4, dt=2e-6, method="dop853", rtol=1e-9, progress=False)
+    load = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
+    touching, energy = load > 0, sol.energy
+    assert np.flatnonzero(np.diff(touching)).size >= 6
+    assert load.max() > 5000
+    assert np.abs(sol.element("front").force[:, 0]).max() > 50
+    lost = np.diff(energy.damping)
+    apart = ~(touching[1:] | touching[:-1])
+    assert lost[~apart].mean() > 1.2 * lost[apart].mean() > 0
+    for part in (energy.strain, energy.damping, energy.forces, energy.kinetic):
+        assert np.abs(energy.balance).max() < 1e-6 * np.ptp(part)
     report = rom.audit(sol)
     assert report.ok, report

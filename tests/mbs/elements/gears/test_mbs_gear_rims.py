@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from scipy.sparse.linalg import splu
 
 import rom
-from cases.mbs.mechanisms import prepared, residual_at, stored_at, tangents_at
-from cases.mbs.tangents import difference, shifted
+from cases.mbs.mechanisms import prepared, residual_at, stored_at
+from cases.mbs.tangents import by_position, by_velocity, difference, shifted
 from cases.mbs.tubes import tube
-from rom.components.gear_mesh import GearPair
+from rom.components.gear_mesh import GearPair, RackPair
 from rom.errors import ConfigError, RomWarning
 from rom.mbs.elements.cylinders import cylinder_of, pack_cylinders, set_basis
 from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
@@ -120,13 +120,13 @@ def test_a_force_is_spread_over_the_angle_of_a_tooth():
     part = mech.add_flexible("pinion", reduced(rom.FourierLegendre(3, 2)), at=(0, 0, 0))
     rim = cylinder_of(part, part.marker("rim"), np.eye(3)[2], np.eye(3)[0])
     rim = replace(rim, middle=0.003)
-    rims = pack_cylinders([((rim, width), None)], part.r)
-    place = njit(lambda rims, theta, z: set_basis(rims, 0, 0, theta, z))
+    rims = pack_cylinders([((rim, width), None)], part.r, 1)
+    place = njit(lambda rims, theta, z: set_basis(rims, 0, (0, 0), theta, z))
     for theta, z in ((0.3, 0.01), (-2.5, -0.02)):
         place(rims, theta, z)
         around = theta + width * ((np.arange(500) + 0.5) / 500 - 0.5)
         wanted = rim.functions(around, np.full(500, z)).mean(axis=0)
-        assert_allclose(rims.basis[0], wanted, atol=1e-6)
+        assert_allclose(rims.basis[0, 0], wanted, atol=1e-6)
         assert np.abs(wanted - rim.functions(np.array([theta]), np.array([z]))[0]).max() > 1e-3
 
 
@@ -218,30 +218,37 @@ def test_forces_on_rims_are_the_gradient_of_the_energy():
     assert_allclose(found, gradient, atol=2e-3 * np.abs(gradient).max())
 
 
-def test_tangents_of_rims_are_differences_of_their_forces():
-    _, packed, W, q, v = pressed(damping=1e-5, friction=0.1)
-    none, table = np.zeros(0), packed.elements[GEAR_MESHES_FAMILY]
-
-    def force(dq, dv):
-        residual_at(packed.system, W, shifted(packed, q, dq), v + dv, 0 * v, none)
-        return W.residual.copy()
-
-    def both():
-        found = []
-        for c in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)):
-            tangents_at(packed.system, W, q, v, 0 * v, none, c)
-            found.append((W.Kt if c[2] else W.S).copy())
-        return found
-
-    stiff = difference(lambda x: force(x, 0 * v), v.size, 1e-9)
-    loss = difference(lambda x: force(0 * v, x), v.size)
-    K_found, D_found = both()
-    table.stiffness[:] = 0.0
-    K_body, D_body = both()
-    teeth = np.abs(K_found - K_body).max()
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_tangents_of_rims_are_differences_of_their_forces(friction):
+    _, packed, W, q, v = pressed(damping=1e-5, friction=friction)
+    (K, stiff), (D, loss) = by_position(packed, W, q, v), by_velocity(packed, W, q, v)
+    packed.elements[GEAR_MESHES_FAMILY].stiffness[:] = 0.0
+    K_body, D_body = by_position(packed, W, q, v)[0], by_velocity(packed, W, q, v)[0]
+    teeth = np.abs(K - K_body).max()
     assert teeth > 1e6
-    assert_allclose(K_found, stiff, atol=5e-3 * teeth)
-    assert_allclose(D_found, loss, atol=1e-5 * np.abs(D_found - D_body).max())
+    assert_allclose(K, stiff, atol=5e-3 * teeth)
+    assert_allclose(D, loss, atol=1e-5 * np.abs(D - D_body).max())
+
+
+def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
+    """Forces and torque on the body of the pinion, as by a gear of 1e5 teeth."""
+    found = []
+    for pair in (RackPair(26, 3e-3, 0.06), GearPair((26, 100_000), 3e-3, 0.06)):
+        mech = rom.Mechanism(gravity=(0, 0, 0))
+        wheel = mech.add_flexible("pinion", reduced(rom.FourierLegendre(2, 2)), at=(0, 0, 0))
+        other = mech.add_rigid("other", mass=1.0, inertia=(1.0,) * 3, at=(pair.distance, 0, 0))
+        mech.gear_mesh("mesh", wheel.marker("rim"), other.marker((0, 0, 0)), axis=(0, 0, 1),
+                       pair=pair, stiffness=K, phase=PHASE, cells=5)  # fmt: skip
+        packed, W = prepared(mech)
+        delta = np.zeros(packed.v.size)
+        r = packed.system.bodies.r[0]
+        delta[5], delta[6 : 6 + r] = 3e-4, 1e-9 * np.random.default_rng(3).normal(size=r)
+        q = shifted(packed, packed.q, delta)
+        residual_at(packed.system, W, q, 0 * delta, 0 * delta, np.zeros(0))
+        found.append(W.residual[: 6 + r].copy())
+    assert np.abs(found[0]).max() > 1e3
+    for part in (slice(0, 6), slice(6, None)):
+        assert_allclose(found[0][part], found[1][part], atol=1e-3 * np.abs(found[1][part]).max())
 
 
 def test_free_wheels_with_soft_rims_keep_momentum_and_energy():

@@ -1,0 +1,34 @@
+"""The machine whose steps are measured carries its load through both stages."""
+
+import numpy as np
+import pytest
+
+import rom
+from rom.bench import two_stages
+
+pytestmark = [pytest.mark.fenicsx, pytest.mark.long]
+
+
+def test_two_stages_carry_the_torque_and_the_weight():
+    """Moments about the shafts are as the numbers of teeth, but for what the films take."""
+    mech = two_stages.machine(two_stages.bodies("rbe3"), (60, 4))
+    still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
+    films = sum(still.journal_bearing(name).power[0] for name in mech.journal_bearings)
+    output, ratio = two_stages.INPUT_TORQUE, 1.0
+    for name, pair in zip(mech.gear_meshes, two_stages.WHEEL_PAIRS.values(), strict=True):
+        force = rom.mbs.tooth_loads(still, name)[0].force.sum()
+        ratio *= pair.teeth[0] / pair.teeth[1]
+        moment = force * pair.rb[1] * ratio
+        lost = films / two_stages.SHAFT_SPEED
+        assert -1e-6 * output < moment - output < lost
+    assert 10.0 < films < 2000.0
+
+
+def test_its_steps_are_counted(monkeypatch):
+    monkeypatch.setattr(two_stages, "N_TEETH", 1)
+    rows = list(two_stages.stages_run())
+    found = {(case, quantity): value for case, quantity, value, _, _ in rows}
+    assert len(found) == len(rows) == 8
+    assert all(np.isfinite(value) and value > 0 for value in found.values())
+    per_step = [value for (_, name), value in found.items() if name == "factorisations per step"]
+    assert max(per_step) < 0.5  # films are renewed, not the whole matrix

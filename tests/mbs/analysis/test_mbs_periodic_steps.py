@@ -1,0 +1,137 @@
+"""Derivatives that come with the tangents of time steps, against differences of whole motions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.geared_rotors import rigid_unit
+from rom.bench.units import as_mechanism
+from rom.components.journal_bearing import iso_vg
+from rom.errors import ModelError
+from rom.mbs.analysis.periodic.derivatives import by_differences, by_steps, confirmed, follows
+from rom.mbs.analysis.periodic.flow import Flow
+from rom.mbs.analysis.periodic.shooting import Return
+from rom.mbs.analysis.periodic.turns import Turns, turns_of
+
+X, Y, Z = np.eye(3)
+ORIGIN = (0, 0, 0)
+
+
+def swung(mechanism, period, steps=40, turns=None):
+    """A period from where bodies were added, after one that has brought the method there."""
+    flow = Flow(mechanism, 0.0, period, steps, 0.8)
+    start = flow.begun(flow.initial())
+    turning = turns_of(mechanism, turns, start.state) if turns else Turns()
+    return Return.of(flow, turning, Return.of(flow, turning, start).back)
+
+
+def assert_same(one, two, atol=1e-5):
+    size = np.abs(two.E).max(axis=0)
+    assert_allclose(one.B, two.B, atol=1e-7)
+    assert_allclose(one.E / size, two.E / size, atol=atol)
+
+
+def chain(n=3, joint="spherical", again=False):
+    """Links that tumble in space; joints on demand held twice."""
+    mech, end = rom.Mechanism(gravity=(0, 0, -9.81)), None
+    for k in range(n):
+        link = mech.add_rigid(f"link {k}", mass=1.0, inertia=(0.02, 0.05, 0.06), at=(k, 0.1 * k, 0),
+                              omega=(0.3, -1.0, 0.2 * k),
+                              markers={"a": (-0.5, 0, 0), "b": (0.5, 0.1, 0)})  # fmt: skip
+        end = mech.ground.marker((-0.5, 0, 0)) if end is None else end
+        for twice in range(1 + again):
+            pin = f"pin {k} {twice}"
+            if joint == "spherical":
+                mech.spherical(pin, end, link.marker("a"))
+            else:
+                mech.revolute(pin, end, link.marker("a"), axis=(Y, Z)[k % 2])
+        end = link.marker("b")
+    return mech
+
+
+@pytest.mark.parametrize("more", [{}, {"joint": "revolute", "n": 5}, {"again": True}], ids=str)
+def test_links_that_tumble_in_space_have_the_derivatives_of_differences(more):
+    found = swung(chain(**more), 0.6)
+    assert found.chart.size > 8
+    assert_same(by_steps(found), by_differences(found))
+
+
+def test_a_body_that_advances_is_turned_back_with_its_small_motions():
+    """A round disc on springs that has advanced by a part of a turn."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    disc = mech.add_rigid("disc", mass=1.0, inertia=(0.2, 0.2, 0.3), at=(0.05, 0.02, 0),
+                          omega=(0.1, 0.2, 9.0))  # fmt: skip
+    mech.bushing("shaft", mech.ground.marker(ORIGIN), disc.marker(ORIGIN),
+                 stiffness=(900, 700, 400, 0, 0, 0), damping=(3, 2, 4, 0, 0, 0))  # fmt: skip
+    found = swung(mech, 0.3, turns={"disc": 9.0 * 0.3})
+    assert found.chart.size == 12
+    assert_same(by_steps(found), by_differences(found), atol=2e-4)
+
+
+@pytest.fixture(scope="module")
+def geared():
+    """Films and teeth of a unit through a tooth, from its rest."""
+    unit = rigid_unit(speed=400.0)
+    mech = as_mechanism(unit)
+    flow = Flow(mech, 0.0, unit.mesh_period, 60, 0.8)
+    return Return.of(flow, Turns(), flow.begun(rom.equilibrium(mech)))
+
+
+def test_films_and_teeth_have_the_derivatives_of_differences(geared):
+    """Films are so thin that differences have to be finer; teeth leave out how forces turn."""
+    wanted = by_differences(geared, 1e-8)
+    assert_same(by_steps(geared), wanted, atol=0.03)
+    found = np.sort(np.abs(confirmed(geared).multipliers))
+    assert_allclose(found, np.sort(np.abs(wanted.multipliers)), atol=3e-4)
+    assert follows(geared) and confirmed(geared).carried
+
+
+def lagging(t, parameters, motion, memory, out):
+    """A force that follows the place by what it remembers."""
+    out.memory[0] = memory[0] + 0.2 * (motion.position[0, 0] - memory[0])
+    out.force[0, 0] = -3.0 * memory[0]
+
+
+def test_what_steps_do_not_know_is_noticed():
+    """Memory goes on from step to step without a tangent: then all derivatives are differences."""
+    mech = chain(2)
+    found = swung(mech, 0.5)
+    assert confirmed(found).carried
+    mech.law("lag", lagging, mech.part("link 1").marker("b"), memory=(0.0,))
+    found = swung(mech, 0.5)
+    exact = by_differences(found)
+    assert np.abs(by_steps(found).E - exact.E).max() > 0.03 * np.abs(exact.E).max()
+    assert not confirmed(found).carried
+    assert_allclose(confirmed(found).E, exact.E, atol=1e-5)
+
+
+def unit_with(**films):
+    """The unit with other films, and its rest."""
+    unit = rigid_unit(speed=500.0)
+    shafts = [
+        replace(rotor, bearings={k: replace(b, **films) for k, b in rotor.bearings.items()})
+        for rotor in (unit.pinion, unit.gear)
+    ]
+    return replace(unit, pinion=shafts[0], gear=shafts[1])
+
+
+def test_films_that_remember_are_refused_by_name():
+    """Their filling goes around with the oil, over revolutions; heat takes longer still."""
+    unit = rigid_unit(speed=500.0)
+    for mech in (as_mechanism(unit_with(cavitation="jfo")),
+                 as_mechanism(unit, oil=iso_vg(46), inlet=50.0)):  # fmt: skip
+        with pytest.raises(ModelError, match="'pinion low' remembers its oil, or its heat"):
+            rom.periodic_motion(mech, period=unit.mesh_period, start=rom.equilibrium(mech))
+
+
+@pytest.mark.parametrize("teeth", [1.1, 0.5])
+def test_a_period_of_parts_of_teeth_is_refused(teeth):
+    """Contact may be the same by chance wherever one looks."""
+    unit = rigid_unit(speed=600.0, torque=30.0)
+    mech = as_mechanism(unit)
+    begin = {"period": teeth * unit.mesh_period, "start": rom.equilibrium(mech)}
+    with pytest.raises(ModelError, match=r"do not repeat|has gone on by 1\.1 teeth"):
+        rom.periodic_motion(mech, **begin)

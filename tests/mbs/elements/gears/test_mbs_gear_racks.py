@@ -1,0 +1,233 @@
+"""A pinion on a rack."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.mechanisms import prepared, residual_at, stored_at
+from cases.mbs.tangents import by_position, by_velocity, difference, shifted
+from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
+from rom.config.mechanism import read_mechanism
+from rom.errors import ConfigError, ModelError
+from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
+
+ORIGIN, X, Y, Z, K = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1.3e10
+LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
+SPUR = RackPair(26, 4e-3, 0.03, thinning=5e-5)
+HELICAL = RackPair(26, 4e-3, 0.04, helix=0.35, shift=0.1, thinning=5e-5)
+
+
+def free(pair, **more):
+    """A free pinion and a free rack."""
+    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x in (("pinion", 0.0), ("rack", pair.distance)):
+        part = mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(x, 0, 0))
+        ends.append(part.marker(ORIGIN))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K * np.array([0.6, 1.1, 0.7]),
+                   entry=0.1, cells=7, **more)  # fmt: skip
+    return mech
+
+
+def placed(packed, pair, back, seed):
+    """Rolled, shifted, tilted and turned, working or back flanks loaded."""
+    rng, delta = np.random.default_rng(seed), np.zeros(12)
+    delta[[0, 1, 2, 6, 8]] = 2e-5 * rng.normal(size=5)
+    delta[[3, 4, 9, 10, 11]] = 3e-4 * rng.normal(size=5)
+    turn = 0.3 * rng.random()
+    delta[5], delta[7] = turn, pair.r[0] * turn
+    delta[5] += -1e-3 - pair.backlash / pair.rb[0] if back else 1e-3
+    delta[5] += delta[11]
+    return shifted(packed, packed.q, delta)
+
+
+FLANKS = Correction((15e-6, 10e-6), (4e-3, 3e-3), 1.5, 4e-6, 5e-6, run_out=((2e-6, 0.3), (0, 0)),
+                    maps=(1e-6 * np.eye(3), 1e-6 * np.eye(4)))  # fmt: skip
+
+
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+@pytest.mark.parametrize("back", [False, True], ids=["working", "back"])
+@pytest.mark.parametrize("more", [{}, {"correction": FLANKS, "hertz": Hertz((4e-3, 3e-3))}],
+                         ids=["plain", "all"])  # fmt: skip
+def test_forces_on_a_rack_are_the_gradient_of_the_energy(pair, back, more):
+    packed, W = prepared(free(pair, **more))
+    none, mesh = np.zeros(12), packed.elements[GEAR_MESHES_FAMILY]
+    for seed in range(3):
+        q = placed(packed, pair, back, seed)
+
+        def energy(delta, q=q):
+            return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
+
+        gradient = difference(energy, 12, 1e-8)[0]
+        residual_at(packed.system, W, q, none, none, np.zeros(0))
+        assert mesh.load[0] > 1e3
+        assert_allclose(W.residual, gradient, atol=1e-6 * np.abs(gradient).max())
+        one, two = W.wrench[mesh.i[0]], W.wrench[mesh.j[0]]
+        apart = W.P[mesh.j[0]] - W.P[mesh.i[0]]
+        assert_allclose(one[:3] + two[:3], 0.0, atol=1e-12 * np.abs(one[:3]).max())
+        moment = one[3:] + two[3:] + np.cross(apart, two[:3])
+        assert_allclose(moment, 0.0, atol=1e-11 * np.abs(one[3:]).max())
+
+
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+def test_tangents_of_a_rack_are_differences(pair):
+    packed, W = prepared(free(pair, **LOSSES))
+    q = placed(packed, pair, False, 1)
+    v = 1e-3 * np.random.default_rng(5).normal(size=12)
+    found, stiff = by_position(packed, W, q, v)
+    assert_allclose(found, stiff, atol=2e-3 * np.abs(stiff).max())
+    found, loss = by_velocity(packed, W, q, v)
+    assert_allclose(found, loss, atol=1e-6 * np.abs(loss).max())
+
+
+def test_a_rack_that_leans_is_felt_however_far_it_has_travelled():
+    """Turned by 1e-4 about the line of centres, 2 m from its middle; not by its other end."""
+    packed, W = prepared(free(replace(HELICAL, thinning=2e-4)))
+    mesh, none, loads, y = packed.elements[GEAR_MESHES_FAMILY], np.zeros(12), [], 2.0
+    gap = 0.5e-4 * y * np.tan(HELICAL.base_helix)  # half of what it closes, in the plane
+    mesh.start[0, 0] = (gap - y * np.cos(HELICAL.alpha)) / HELICAL.rb[0]  # turns before
+    for lean in (1e-4, -1e-4):
+        delta = np.zeros(12)
+        delta[7], delta[9] = y, lean
+        residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
+        loads.append(mesh.load[0])
+    depth = gap * np.cos(HELICAL.base_helix)
+    assert min(loads) == 0.0
+    line = max(loads) / (K * HELICAL.width * depth)  # of the lines together, over the width
+    assert 0.8 < line < 2.2
+
+
+def test_a_rack_is_a_gear_without_end():
+    """Path, backlash and forces as of a gear of 1e5 teeth; loads along it fall as 1 / z."""
+    z = 100_000
+    gear = GearPair((26, z), 4e-3, 0.03, thinning=5e-5)
+    assert_allclose(SPUR.path, gear.path, rtol=3e-4)
+    assert SPUR.contact_ratio == pytest.approx(gear.contact_ratio, rel=1e-4)
+    away = replace(SPUR, centre_distance=SPUR.distance + 1e-4)
+    apart = replace(gear, centre_distance=gear.distance + 1e-4)
+    assert away.backlash == pytest.approx(apart.backlash, rel=2e-3)  # by inv alpha, of 2nd order
+    packed, W = prepared(free(SPUR, phase=0.3))
+    table = K * np.array([0.6, 1.1, 0.7])
+    wanted = Mesh(gear, table, cells=7)
+    q, delta = np.zeros(12), np.zeros(12)
+    q[5] = delta[5] = 1e-4
+    residual_at(packed.system, W, shifted(packed, packed.q, delta), q * 0, q * 0, np.zeros(0))
+    mesh = packed.elements[GEAR_MESHES_FAMILY]
+    assert W.wrench[mesh.j[0], 1] == pytest.approx(wanted.forces(q, 0.3).force[7], rel=1e-3)
+    assert W.wrench[mesh.j[0], 0] == pytest.approx(wanted.forces(q, 0.3).force[6], rel=1e-3)
+
+
+def guided(pair, **more):
+    """A pinion on an axle and a rack in a guide along y."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN)
+    rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(pair.distance, 0, 0))
+    mech.revolute("axle", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN), axis=Z)
+    mech.prismatic("guide", mech.ground.marker((pair.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
+    mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=pair,
+                   stiffness=K, **more)  # fmt: skip
+    return mech
+
+
+def test_a_pinion_drives_its_rack_with_its_rolling_circle():
+    """v = omega d / 2, over three turns, against a brake."""
+    pair = replace(HELICAL, centre_distance=HELICAL.distance + 1e-4)
+    mech = guided(pair, damping=2e-5)
+    mech.drive("speed", "axle", lambda t: 60.0 * t, rate=lambda t: 60.0 + 0 * t)
+    r = 26 * 4e-3 / np.cos(0.35) / 2  # whatever the distance
+    mech.motor("brake", "guide", lambda t, x, v: -2000.0 - 1000.0 * (v - 60.0 * r))
+    sol = rom.simulate(mech, t_end=6 * np.pi / 60, dt=5e-5, progress=False, save_every=5)
+    turned, travel = sol.joint("axle").angle, sol.joint("guide").displacement
+    assert turned[-1] == pytest.approx(6 * np.pi)
+    assert travel[-1] == pytest.approx(6 * np.pi * r, abs=2e-5)
+    late = slice(len(sol.t) // 2, None)
+    assert sol.velocity("rack")[late, 1].mean() == pytest.approx(60.0 * r, rel=1e-4)
+    assert abs(sol.drive_load("speed")[late].mean()) == pytest.approx(2000.0 * r, rel=1e-2)
+
+
+@pytest.mark.parametrize("helix", [0.0, 0.35, -0.35])
+@pytest.mark.parametrize("torque", [40.0, -40.0])
+def test_a_torque_rests_on_the_rack_along_the_normal_of_its_teeth(helix, torque):
+    """Along the rack T / r, across it |T| / r tan(alpha_t), along the axis -T / r tan(beta)."""
+    pair = replace(SPUR, helix=helix, thinning=0.0, centre_distance=None)
+    mech = guided(pair, phase=0.2, entry=0.0, conservative=False)
+    mech.torque("motor", mech.parts["pinion"].marker(ORIGIN), (0, 0, torque))
+    mech.spring_damper("brake", mech.ground.marker((pair.distance, -1, 0)),
+                mech.parts["rack"].marker(ORIGIN), stiffness=1e7)  # fmt: skip
+    still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
+    along = torque / (26 * 4e-3 / np.cos(helix) / 2)
+    across, slope = np.tan(np.radians(20)) / np.cos(helix), np.tan(helix)
+    wanted = np.array([abs(along) * across, along, -along * slope])
+    load = still.element("mesh").force
+    assert_allclose(load[0, 1], wanted, atol=1e-6 * abs(along))
+    assert_allclose(load[0, 0], -wanted, atol=1e-6 * abs(along))
+    held = still.reaction("guide")[0, :3]
+    assert_allclose(held, [-wanted[0], 0.0, -wanted[2]], atol=1e-6 * abs(along))
+
+
+@pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
+@pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
+def test_a_pinion_and_a_rack_that_hit_and_part_keep_energy_and_momentum(pair, losses):
+    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
+    for name, x, v, w in (("pinion", 0.0, 0.0, 40.0), ("rack", pair.distance, 1.9, 0.0)):
+        part = mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
+                              velocity=(0, v, 0), omega=(0, 0, w))  # fmt: skip
+        ends.append(part.marker(ORIGIN))
+    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K * np.array([0.6, 1.1, 0.7]),
+                   cells=7, phase=0.1, correction=FLANKS, **losses)  # fmt: skip
+    sol = rom.simulate(mech, t_end=6e-4, method="dop853", rtol=1e-10, dt=2e-6, progress=False)
+    force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
+    assert force.max() > 300
+    assert (force == 0).any()
+    assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.strain.max()
+    for of_all in sol.momentum:
+        assert np.ptp(of_all, axis=0).max() < 1e-12
+    report = rom.audit(sol)
+    assert report.ok, report
+
+
+def test_a_pinion_that_spins_in_its_frame_drives_its_rack():
+    """Its frame stands still; the rack follows its material, and what spins it does the work."""
+    mech, r, speed = rom.Mechanism(gravity=(0, 0, 0)), SPUR.r[0], 30.0
+    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, spin=(0, 0, speed))
+    rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(SPUR.distance, 0, 0),
+                          velocity=(0, speed * r, 0))  # fmt: skip
+    mech.fixed("seat", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN))
+    mech.prismatic("guide", mech.ground.marker((SPUR.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
+    mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=SPUR,
+                   stiffness=K, entry=0.2)  # fmt: skip
+    mech.motor("brake", "guide", lambda t, x, v: -500.0 - 1000.0 * (v - speed * r))
+    sol = rom.simulate(mech, t_end=0.1, dt=2e-5, progress=False, save_every=5)
+    assert sol.joint("guide").displacement[-1] == pytest.approx(speed * r * 0.1, abs=2e-5)
+    assert np.abs(sol.energy.balance).max() < 1e-4 * 500.0 * speed * r * 0.1
+
+
+def test_what_a_rack_does_not_have_is_refused():
+    with pytest.raises(ConfigError, match="rack of 'mesh' does not turn"):
+        free(SPUR, correction=Correction(run_out=((0, 0), (1e-6, 0))))
+    with pytest.raises(ModelError, match="racks are elements"):
+        Mesh(SPUR, K)
+    with pytest.raises(ModelError, match="racks and internal teeth is not known"):
+        stiffness_table(SPUR, force=1e5)
+
+
+def test_files_give_a_rack_no_teeth(tmp_path):
+    (tmp_path / "m.toml").write_text("""
+[simulation]
+t_end = 1e-3
+dt = 1e-4
+[bodies.a]
+mass = 1
+inertia = [1, 1, 1]
+at = [0, 0, 0]
+markers = { p = [0, 0, 0] }
+[gear_meshes.m]
+between = ["a.p", { ground = ["52.4 mm", 0, 0] }]
+axis = [0, 0, 1]
+stiffness = "13 GPa"
+pair = { teeth = [26, 0], module = "4 mm", width = "3 cm", shift = [0.1, 0] }
+""")
+    mesh = read_mechanism(tmp_path / "m.toml").mechanism().gear_meshes["m"]
+    assert mesh.pair == RackPair(26, 4e-3, 0.03, shift=0.1)

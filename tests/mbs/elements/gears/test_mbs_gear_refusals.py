@@ -1,0 +1,135 @@
+"""Wheels that do not mesh are refused with their names, from Python and from files."""
+
+import numpy as np
+import pytest
+
+import rom
+from rom.components.gear_mesh import GearPair, RackPair
+from rom.config.mechanism import read_mechanism
+from rom.errors import ConfigError, ModelError
+
+SIZES = {"teeth": [26, 40], "module": 4e-3, "width": 0.03}
+MESH = {"axis": [0, 0, 1], "stiffness": 1.3e10}
+WRONG = {  # sizes of the pair, keys of the mesh, where the other wheel stands [m], and the message
+    "wheels too far apart for their teeth": (
+        {"centre_distance": 0.135}, {}, 0.135, r"contact is lost: .* ratio of 0\.978"),
+    "wheels that do not reach each other": (
+        {"centre_distance": 0.2}, {}, 0.2, "contact is lost: .* ratio of -"),
+    "wheels too close for their teeth": (
+        {"centre_distance": 0.1319}, {}, 0.1319,
+        r"backlash is closed: at a centre distance of 131\.9000 mm .* From 132\.0000 mm"),
+    "wheels inside each other": (
+        {"centre_distance": 0.1}, {}, 0.1,
+        r"at a centre distance of 100\.0000 mm the base circles .* no common tangent"),
+    "another ratio than the distance": (
+        {"teeth": [26, 42]}, {}, 0.132, "'m' stand 132 mm apart, those of its pair 136 mm"),
+    "undercut": ({"teeth": [12, 40]}, {}, 0.104, r"pinion are undercut: .* at least 0\.298 mod"),
+    "undercut gear": ({"teeth": [26, 12]}, {}, 0.076, "teeth of the gear are undercut"),
+    "interference": ({"teeth": [20, -62]}, {}, 0.084, "interfere: tips of the gear .* from -"),
+    "interference beside the path": (
+        {"teeth": [40, -46]}, {}, 0.012, "interfere: away from the path .* 40.* through .* 46"),
+    "ring without involutes": ({"teeth": [24, -30]}, {}, 0.012, "below its base circle, where no"),
+    "pointed": ({"teeth": [18, 40], "shift": [1.2, 0]}, {}, 0.12, "teeth of the pinion are point"),
+    "hand": ({"helix": 0.3, "gear_helix": 0.3}, {}, 0.138,
+             r"helix 17\.19 degrees does not mesh with a pinion of 17\.19 .*-17\.19 degrees"),
+    "hand in a ring": ({"teeth": [24, -72], "helix": 0.3, "gear_helix": -0.3}, {}, 0.1,
+                       r"in a ring gear they are the same. The gear here needs 17\.19 degrees"),
+    "ring smaller than its pinion": ({"teeth": [26, -20]}, {}, 0.01, "no pinion of 26.* turns"),
+    "ring as pinion": ({"teeth": [-72, 24]}, {}, 0.1, "no pinion of -72.* teeth"),
+    "half a tooth": ({"teeth": [26.5, 40]}, {}, 0.133, "26.5, 40.* teeth: whole numbers"),
+    "few teeth": ({"teeth": [3, 40]}, {}, 0.1, r"no gears have \(3.*, 40.*\) teeth"),
+    "degrees": ({"helix": 15.0}, {}, 0.1, "helix 15.0 and pressure angle .* are in radians"),
+    "faces": ({}, {}, (0.132, 0, 0.01), "faces of mesh 'm' are 10 mm beside each other"),
+    "axis": ({}, {"axis": [1, 0, 0]}, 0.132, "'m' stand 0 mm apart"),
+    "pull": ({}, {"stiffness": -1.0}, 0.132, "stiffness of the teeth of 'm' must be positive"),
+    "driving": ({}, {"damping": -1e-6}, 0.132, "damping of mesh 'm' is -1e-06: it must not drive"),
+    "friction": ({}, {"friction": 0.1}, 0.132, "mesh 'm' has friction, but no transition_speed"),
+    "entry": ({}, {"entry": 0.7}, 0.132, "entry = 0.7 of mesh 'm' is a share from 0 to 0.5"),
+    "rack too close": ({"teeth": [26, 0], "centre_distance": 0.0519}, {}, 0.0519,
+                       r"backlash is closed: 51\.9000 mm .*From 52\.0000 mm"),
+    "rack too far": ({"teeth": [26, 0], "centre_distance": 0.057}, {}, 0.057, "contact is lost"),
+    "undercut pinion of a rack": ({"teeth": [12, 0]}, {}, 0.024, "pinion are undercut"),
+    "ring on a rack": ({"teeth": [-26, 0]}, {}, 0.052, "no pinion of -26.* turns on a rack.*outsi"),
+    "half a tooth on a rack": ({"teeth": [26.5, 0]}, {}, 0.053, "26.5, 0.* teeth: whole numbers"),
+    "hand of a rack": ({"teeth": [26, 0], "helix": 0.3, "gear_helix": 0.3}, {}, 0.0544,
+                       r"rack of helix 17\.19 degrees does not mesh.*opposite: -17\.19 degrees"),
+    "steep rack": ({"teeth": [26, 0], "pressure_angle": 0.67}, {}, 0.052, "the rack are pointed"),
+    "rack beside its pinion": ({"teeth": [26, 0]}, {}, (0.052, 0.03, 0),
+                               "marker of a rack is beside the axis of its pinion"),
+    "rack along the axis": ({"teeth": [26, 0]}, {"axis": [1, 0, 0]}, 0.052, "'m' stand 0 mm apart"),
+}  # fmt: skip
+
+
+def place(where):
+    """(3,) of the other wheel."""
+    return (where, 0, 0) if np.isscalar(where) else where
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_does_not_mesh_is_refused(case):
+    sizes, more, where, message = WRONG[case]
+    sizes = SIZES | sizes
+    teeth = sizes.pop("teeth")
+    mech = rom.Mechanism()
+    pinion = mech.add_rigid("a", mass=1.0, inertia=(1.0,) * 3, at=(0, 0, 0))
+    ends = pinion.marker((0, 0, 0)), mech.ground.marker(place(where))
+    with pytest.raises((ConfigError, ModelError), match=f"(?s){message}"):
+        pair = GearPair(tuple(teeth), **sizes) if teeth[1] else RackPair(teeth[0], **sizes)
+        mech.gear_mesh("m", *ends, pair=pair, **MESH | more)
+
+
+FILE = """
+[simulation]
+t_end = 1e-3
+[bodies.a]
+mass = 1
+inertia = [1, 1, 1]
+at = [0, 0, 0]
+markers = {{ p = [0, 0, 0] }}
+[gear_meshes.m]
+between = ["a.p", {{ ground = {where} }}]
+{mesh}
+[gear_meshes.m.pair]
+{pair}
+"""
+
+
+def lines(values):
+    return "\n".join(f"{key} = {value}" for key, value in values.items())
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_files_with_what_does_not_mesh_are_refused_where_the_mesh_is(case, tmp_path):
+    sizes, more, where, message = WRONG[case]
+    path = tmp_path / "m.toml"
+    path.write_text(FILE.format(where=list(place(where)), mesh=lines(MESH | more),
+                                pair=lines(SIZES | sizes)))  # fmt: skip
+    with pytest.raises((ConfigError, ModelError), match=f"(?s){message}") as refused:
+        read_mechanism(path).mechanism()
+    line = path.read_text().split("\n").index("[gear_meshes.m]") + 1
+    assert f"m.toml:{line}:" in str(refused.value)
+
+
+def test_a_rack_has_no_profile_shift(tmp_path):
+    path = tmp_path / "m.toml"
+    sizes = {**SIZES, "teeth": [26, 0], "shift": [0.1, 0.2]}
+    path.write_text(FILE.format(where=[0.0524, 0, 0], mesh=lines(MESH), pair=lines(sizes)))
+    with pytest.raises(ConfigError, match=r"rack of 'm' has a profile shift of 0\.2: .*centre_dis"):
+        read_mechanism(path).mechanism()
+
+
+@pytest.mark.parametrize("size", ["module", "width", "helix", "pressure_angle", "centre_distance",
+                                  "thinning", "addendum", "dedendum", "fillet"])  # fmt: skip
+@pytest.mark.parametrize(("made", "teeth"), [(GearPair, (26, 40)), (RackPair, 26)])
+def test_sizes_that_are_no_numbers_are_named(made, teeth, size):
+    with pytest.raises(ModelError, match=f"{size} = nan of a pair of gears is no finite number"):
+        made(teeth, **{"module": 4e-3, "width": 0.03, size: np.nan})
+
+
+def test_a_rack_does_not_spin():
+    pair, mech = RackPair(26, 4e-3, 0.03), rom.Mechanism()
+    pinion = mech.add_rigid("a", mass=1.0, inertia=(1.0,) * 3, at=(0, 0, 0))
+    rack = mech.add_rigid("b", mass=1.0, inertia=(1.0,) * 3, at=(pair.distance, 0, 0),
+                          spin=(0, 0, 3.0))  # fmt: skip
+    with pytest.raises(ConfigError, match="the rack of 'm' spins at 3 rad/s"):
+        mech.gear_mesh("m", pinion.marker((0, 0, 0)), rack.marker((0, 0, 0)), pair=pair, **MESH)
