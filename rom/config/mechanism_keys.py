@@ -206,6 +206,14 @@ CONTACTS = {
         Key("radius2", RADIUS, "Of the sphere.", ...),
         Key("inside", Flag(), "Whether it is in the bore.", False), *IMPACT,
     )),
+    "capsule_on_capsule": Table("Round bars with round ends about both markers, or spheres.", (
+        BETWEEN, Key("radius1", RADIUS, "First one.", ...),
+        Key("radius2", RADIUS, "Second one.", ...),
+        Key("axis1", DIRECTION, "Of the first one, world at the start; missing for a sphere."),
+        Key("axis2", DIRECTION, "Of the second one."),
+        Key("length1", Quantity("m"), "Between the middles of its ends.", 0.0),
+        Key("length2", Quantity("m"), "Of the second one.", 0.0), *IMPACT,
+    )),
     "surface_on_plane": Table("The surface of a body on a plane through the marker.", (
         *COVER, Key("normal", DIRECTION, "Towards the body, world at the start.", ...),
     )),

@@ -25,7 +25,7 @@ from rom.mbs.elements import (
     springs,
     stops,
 )
-from rom.mbs.elements.contact import points, surfaces
+from rom.mbs.elements.contact import capsules, points, surfaces
 from rom.mbs.elements.family import Family, check_family
 from rom.mbs.elements.films import journal_bearings
 from rom.mbs.elements.gears import meshes
@@ -181,6 +181,7 @@ class Mechanism:
     disc_on_plane = points.disc_on_plane
     sphere_on_sphere = points.sphere_on_sphere
     sphere_on_cylinder = points.sphere_on_cylinder
+    capsule_on_capsule = capsules.capsule_on_capsule
     surface_on_plane = surfaces.surface_on_plane
     surface_on_sphere = surfaces.surface_on_sphere
     surface_on_cylinder = surfaces.surface_on_cylinder

@@ -105,6 +105,8 @@ ENTRIES = {  # method: an entry that calls it
     "radius1 = 0.1\nradius2 = 0.1\n",
     "sphere_on_cylinder": f'[contacts.new]\nkind = "sphere_on_cylinder"\n{ENDS}{AXIS}{IMPACT}'
     "radius1 = 0.1\nradius2 = 0.1\n",
+    "capsule_on_capsule": f'[contacts.new]\nkind = "capsule_on_capsule"\n{ENDS}{IMPACT}'
+    "radius1 = 0.1\nradius2 = 0.1\naxis1 = [1, 0, 0]\nlength1 = 0.5\n",
     "surface_on_plane": f'[contacts.new]\nkind = "surface_on_plane"\n{COVER}{NORMAL}',
     "surface_on_sphere": f'[contacts.new]\nkind = "surface_on_sphere"\n{COVER}{RADIUS}',
     "surface_on_cylinder": f'[contacts.new]\nkind = "surface_on_cylinder"\n{COVER}{AXIS}{RADIUS}'

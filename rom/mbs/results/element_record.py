@@ -23,6 +23,8 @@ from rom.mbs.results.recomputed import evaluate_at
 from rom.model import Array, Index
 from rom.names import offered
 
+INSTANT_SPACING = 1e-6  # of differences of drives about a single instant [s]
+
 
 @dataclass(frozen=True)
 class ElementRecord:
@@ -162,9 +164,10 @@ def along_coordinate(wrench, gradient):
 def _sampled(solution: Any, places: Places) -> Array:
     """(n_t, s, 3) the functions of time that were asked for once more."""
     t, new = solution.t, tuple(places.signals[len(solution.packed.signals) :])
+    if t.size == 1:
+        return sample_all(new, t, (-np.inf, np.inf), INSTANT_SPACING)
     span = (float(t.min()), float(t.max()))
-    spacing = 0.01 * (span[1] - span[0]) / max(t.size - 1, 1)
-    return sample_all(new, t, span, spacing)
+    return sample_all(new, t, span, 0.01 * (span[1] - span[0]) / (t.size - 1))
 
 
 def coordinate_row(mechanism: Any, element: Any) -> Row | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.mbs.elements.contact.points import BORE, CYLINDER, DISC, PLANE
+from rom.mbs.elements.contact.points import BORE, CAPSULE, CYLINDER, DISC, PLANE
 from rom.mbs.elements.tendons.paths import Place, path_through, points_along
 from rom.mbs.kernels.system import NORMAL
 from rom.mbs.parts.bodies import GROUND, Marker
@@ -13,7 +13,7 @@ from rom.model import Array
 from rom.rotation import matrix
 from rom.view.canvas import symbols
 from rom.view.canvas.scene import Actor
-from rom.view.canvas.solids import Mesh, across
+from rom.view.canvas.solids import Mesh, across, cylinder, ellipsoid, joined
 from rom.view.scenes.ground import (
     JOINT_COLOUR,
     Scenery,
@@ -293,6 +293,7 @@ def _contacts(scenery: Scenery) -> Iterator[Actor]:
     """Planes, bores and cylinders that bodies touch, each one once, and rims of discs."""
     planes: dict[Any, list[tuple[Marker, float]]] = {}
     rounds: set[Any] = set()
+    capsules: set[Any] = set()
     for contact in scenery.places.mechanism.contacts.values():
         key = contact.i, tuple(np.asarray(contact.e).tolist())
         if contact.kind in (PLANE, DISC):
@@ -301,12 +302,33 @@ def _contacts(scenery: Scenery) -> Iterator[Actor]:
                 yield _circle(scenery.places, contact.j, contact.s, contact.radius[0])
         elif contact.kind in (CYLINDER, BORE):
             rounds.add((*key, contact.radius[1]))
+        elif contact.kind == CAPSULE:
+            ends = zip((contact.j, contact.i), (contact.s, contact.e), strict=True)
+            capsules |= {
+                (marker, tuple(np.asarray(axis).tolist()), radius, half)
+                for (marker, axis), radius, half in zip(
+                    ends, contact.radius, contact.half, strict=True
+                )
+            }
+            continue
         if contact.radius[0] and contact.kind != DISC and contact.j.body not in scenery.solid:
             yield from _ball(scenery.places, contact.j, contact.radius[0])
     for (marker, normal), touching in planes.items():
         yield from plane(scenery, marker, np.array(normal), touching)
     for marker, axis, radius in rounds:
         yield _circle(scenery.places, marker, np.array(axis), radius)
+    for one in capsules:
+        yield from _capsule(scenery.places, *one)
+
+
+def _capsule(
+    places: Places, marker: Marker, axis: Any, radius: float, half: float
+) -> Iterator[Actor]:
+    end = half * np.array(axis)
+    balls = [ellipsoid((radius,) * 3, x) for x in (-end, end)[: 2 if half else 1]]
+    shape = joined([*balls, cylinder(-end, end, 2 * radius)]) if half else balls[0]
+    pose = at(places.point(marker), places.pose(marker.body)[1])
+    yield from solid(shape, pose, ROD_COLOUR, 0.6)
 
 
 def _circle(places: Places, marker: Marker, axis: Array, radius: float) -> Actor:

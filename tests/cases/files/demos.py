@@ -28,7 +28,7 @@ LEFT_BEHIND = {
     "demo_best_matching": {"best_matching.png"},
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
-    "demo_hand": {"hand.png", "hand_control.png"},
+    "demo_hand": {"hand.png", "hand_control.png", "hand_grasp.gif", "hand_grasp.png"},
     "demo_exchange": {
         "beam.SID_FEM", "beam.csv", "beam.dat", "beam.dmig", "beam.fem", "beam.glb", "beam.inp",
         "beam.mat", "beam.op4", "beam.py", "beam.vtu", "exchange.png",

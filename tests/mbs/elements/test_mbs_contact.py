@@ -27,7 +27,7 @@ from rom.mbs.results.audit import audit
 X, Y, Z = np.eye(3)
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
 g = 9.81
-KINDS = ("plane", "disc", "sphere", "cylinder", "bore")
+KINDS = ("plane", "disc", "sphere", "cylinder", "bore", "capsules", "ends")
 
 
 @njit
@@ -43,6 +43,10 @@ def touching(kind, mech, m1, m2, law):
         mech.disc_on_plane("c", m1, m2, law, normal=TILTED, axis=X, radius=15.0)
     elif kind == "sphere":
         mech.sphere_on_sphere("c", m1, m2, law, radius1=7.0, radius2=5.0)
+    elif kind in ("capsules", "ends"):  # which touch along them, and where both end
+        length1, length2 = (40.0, 30.0) if kind == "capsules" else (0.5, 0.3)
+        mech.capsule_on_capsule("c", m1, m2, law, radius1=7.0, radius2=5.0, axis1=TILTED, axis2=X,
+                                length1=length1, length2=length2)  # fmt: skip
     else:
         inside = kind == "bore"
         radii = {"radius1": 0.4, "radius2": 0.3} if inside else {"radius1": 9.0, "radius2": 6.0}
@@ -285,6 +289,10 @@ WRONG = {
                                                        radius2=1, inside=True), "does not fit"),
     "itself": (lambda m, a, b: m.sphere_on_sphere("s", b, b, Impact(1), radius1=1, radius2=1),
                "with itself"),
+    "no capsule": (lambda m, a, b: m.capsule_on_capsule("s", a, b, Impact(1), radius1=1, radius2=1,
+                                                        length1=2), "length1 = 2 m with axis1"),
+    "crossing": (lambda m, a, b: m.capsule_on_capsule("s", a, b, Impact(1), radius1=1, radius2=1),
+                 "the axes cross"),
     "soft": (lambda m, a, b: hertz_stiffness(0, 0.3, 1, 0.3, 1), "E1 = 0"),
     "gas": (lambda m, a, b: hertz_stiffness(1, 0.6, 1, 0.3, 1), "nu1 = 0.6"),
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Contact of spheres and discs with planes, spheres and cylinders, with damping and friction.
+"""Contact of spheres, discs and capsules, planes and cylinders, with damping and friction.
 
 All functions of one contact take real or complex numbers: the tangents are imaginary parts after
 an imaginary step, exact to round-off.
@@ -18,6 +18,7 @@ from rom import rotation
 from rom.arguments import positive, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact, checked_law
+from rom.mbs.elements.contact.segments import across_of
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
 from rom.mbs.kernels.compiled import inner
@@ -29,13 +30,13 @@ from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
 # kinds of contacts
-PLANE, SPHERE, CYLINDER, BORE, DISC = range(5)
+PLANE, SPHERE, CYLINDER, BORE, DISC, CAPSULE = range(6)
 COMPLEX_STEP = 1e-30
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A sphere or disc on j against something on i; numbers as in `Contacts`."""
+    """A sphere, disc or capsule on j against something on i; numbers as in `Contacts`."""
 
     kind: int
     i: Marker
@@ -44,6 +45,7 @@ class Contact:
     s: Array
     radius: tuple[float, float]
     law: Impact
+    half: tuple[float, float] = (0.0, 0.0)
 
 
 def sphere_on_plane(
@@ -70,7 +72,7 @@ def sphere_on_plane(
         ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
             `rom.mbs.Impact`, or no direction.
     """
-    _touch(self, name, PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
+    enter_contact(self, name, PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
 
 
 def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
@@ -99,7 +101,7 @@ def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
         ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
             `rom.mbs.Impact`, or no direction.
     """
-    _touch(self, name, DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
+    enter_contact(self, name, DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
 
 
 def sphere_on_sphere(
@@ -119,7 +121,7 @@ def sphere_on_sphere(
             `rom.mbs.Impact`, or a radius not above zero.
     """
     radii = positive("radius2", radius2), positive("radius1", radius1)
-    _touch(self, name, SPHERE, (m1, m2), law, (None, None), radii)
+    enter_contact(self, name, SPHERE, (m1, m2), law, (None, None), radii)
 
 
 def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
@@ -158,12 +160,20 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
             f"contact {name!r}: a sphere of {radii[0]:g} m does not fit into a bore of "
             f"{radii[1]:g} m."
         )
-    _touch(self, name, BORE if inside else CYLINDER, (m1, m2), law, (axis, None), radii)
+    enter_contact(self, name, BORE if inside else CYLINDER, (m1, m2), law, (axis, None), radii)
 
 
-def _touch(
-    self: Whole, name: str, kind: int, markers: Any, law: Impact, axes: Any, radius: Any
+def enter_contact(  # noqa: PLR0913  what the record holds
+    self: Whole,
+    name: str,
+    kind: int,
+    markers: Any,
+    law: Impact,
+    axes: Any,
+    radius: Any,
+    half: tuple[float, float] = (0.0, 0.0),
 ) -> None:
+    """Add a contact whose axes are given in the world at the start; None where it has none."""
     if markers[0].body == markers[1].body:
         raise ConfigError(f"contact {name!r} is of body {markers[0].body!r} with itself.")
     positive("radius", radius[0])
@@ -175,19 +185,19 @@ def _touch(
     ]
     i, j = markers
     e, s = directions
-    self.add(name, Contact(kind, i, j, e, s, radius, checked_law(name, law)), CONTACTS_FAMILY)
+    self.add(name, Contact(kind, i, j, e, s, radius, checked_law(name, law), half), CONTACTS_FAMILY)
 
 
 @table
 class Contacts(Table):
-    """A sphere or disc on marker j that touches something on marker i.
+    """A sphere, disc or capsule on marker j that touches something on marker i.
 
     Attributes:
-        kind: (c,) PLANE, SPHERE, CYLINDER, BORE or DISC.
+        kind: (c,) PLANE, SPHERE, CYLINDER, BORE, DISC or CAPSULE.
         i, j: (c,) markers.
-        e: (c, 3) normal of the plane or axis of the cylinder in the axes of i.
-        s: (c, 3) axis of the disc in the axes of j.
-        radius: (c, 2) on j, and on i [m].
+        e: (c, 3) normal of the plane, or axis of what is on i, in the axes of i.
+        s: (c, 3) axis of what is on j in the axes of j.
+        size: (c, 4) radius on j, and on i, half the length of a capsule on j, and on i [m].
         law: (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over
             which friction changes its sign [m/s].
     """
@@ -197,7 +207,7 @@ class Contacts(Table):
     j: Index1
     e: Array2
     s: Array2
-    radius: Array2
+    size: Array2
     law: Array2
 
 
@@ -212,31 +222,34 @@ def pack(contacts: Any, places: Places) -> Contacts:
         integers(places.marker[c.j] for c in found),
         rows_of((c.e for c in found), 3),
         rows_of((c.s for c in found), 3),
-        rows_of((c.radius for c in found), 2),
+        rows_of(((*c.radius, *c.half) for c in found), 4),
         rows_of(numbers, 5),
     )
 
 
 @inner
-def touch(kind, radius, gap, e, s):
+def touch(kind, size, gap, e, s):
     """Normal from i to j, depth of penetration, and vector from P_j to the touching point."""
     if kind == PLANE:
-        return e, radius[0] - dot(e, gap), scale(-radius[0], e)
+        return e, size[0] - dot(e, gap), scale(-size[0], e)
     if kind == DISC:
         c = dot(e, s)
         w = np.sqrt(1.0 - c * c)
-        down = scale(radius[0] / w, sub(scale(c, s), e))
-        return e, radius[0] * w - dot(e, gap), down
-    if kind == SPHERE:
+        down = scale(size[0] / w, sub(scale(c, s), e))
+        return e, size[0] * w - dot(e, gap), down
+    out = scale(0.0, gap)
+    if kind == CAPSULE:
+        across, out = across_of(gap, e, s, size[3], size[2])
+    elif kind == SPHERE:
         across = gap
     else:
         across = sub(gap, scale(dot(e, gap), e))
     far = np.sqrt(dot(across, across))
     if kind == BORE:
         n = scale(-1.0 / far, across)
-        return n, far + radius[0] - radius[1], scale(-radius[0], n)
+        return n, far + size[0] - size[1], scale(-size[0], n)
     n = scale(1.0 / far, across)
-    return n, radius[0] + radius[1] - far, scale(-radius[0], n)
+    return n, size[0] + size[1] - far, sub(out, scale(size[0], n))
 
 
 @inner
@@ -271,7 +284,7 @@ def contact_wrenches(_s, W, contacts, _q, _v, _lam):
     """Add the contacts to the wrenches on the markers; add up the power lost."""
     for k in range(contacts.kind.size):
         e, axle, motion = contact_state(contacts, k, W)
-        n, depth, down = touch(contacts.kind[k], contacts.radius[k], motion[0], e, axle)
+        n, depth, down = touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)
         if not depth > 0.0:
             continue
         force, elastic, closing, u = contact_force(contacts.law[k], n, depth, down, motion)
@@ -305,7 +318,7 @@ def contact_column(contacts, W, k, p, by_position, c):
     gap = stepped(gap, scale(move, sub(vj, vi)))
     slide = stepped(slide, scale(rush, sub(vj, vi)))
     motion = gap, slide, stepped(Oi, scale(rush, wi)), stepped(Oj, scale(rush, wj))
-    n, depth, down = touch(contacts.kind[k], contacts.radius[k], gap, normal, spin)
+    n, depth, down = touch(contacts.kind[k], contacts.size[k], gap, normal, spin)
     force, _, _, _ = contact_force(contacts.law[k], n, depth, down, motion)
     at_j, at_i = cross(down, force), cross(add(gap, down), force)
     for q in range(3):
@@ -320,7 +333,7 @@ def contact_tangents(s, W, contacts, _lam, ck, cc):
     """Add the stiffness (times ck) and damping (times cc) of all contacts to W.Kt and W.S."""
     for k in range(contacts.kind.size):
         e, axle, motion = contact_state(contacts, k, W)
-        if not touch(contacts.kind[k], contacts.radius[k], motion[0], e, axle)[1] > 0.0:
+        if not touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)[1] > 0.0:
             continue
         W.Q[:] = 0.0
         for p in range(12):
@@ -339,7 +352,7 @@ def contact_energy(_s, W, contacts, _q, _v):
     for k in range(contacts.kind.size):
         e, axle, motion = contact_state(contacts, k, W)
         depth, law = (
-            touch(contacts.kind[k], contacts.radius[k], motion[0], e, axle)[1],
+            touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)[1],
             contacts.law[k],
         )
         if depth > 0.0:

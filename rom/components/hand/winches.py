@@ -1,0 +1,163 @@
+"""From commands of the control chart to winches: motors that follow at a limited speed.
+
+Either each cable has a motor, or the drums of one shaft draw in several.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+from rom.arguments import positive
+from rom.components.hand.moving_hand import Drive
+from rom.errors import ConfigError
+from rom.model import Array
+
+FINGERS = ("thumb", "index", "middle", "ring", "little")  # columns of `Commands.fingers`
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A winch that follows a command, never faster than it can.
+
+    Attributes:
+        rate: fastest change of the pull [m/s].
+        lag: time constant with which it follows [s].
+    """
+
+    rate: float = 0.04
+    lag: float = 0.02
+
+    def follow(self, pulls: npt.ArrayLike, dt: float) -> Array:
+        """Pull that the winch reaches.
+
+        The speed is that of a first-order lag, cut off at the rate: s' = (command - s) / lag.
+
+        Args:
+            pulls: (n, k) commands [m].
+            dt: between samples [s].
+
+        Returns:
+            (n, k) [m], at rest at the first command.
+
+        Raises:
+            ConfigError: for numbers that no motor has.
+        """
+        commands = np.asarray(pulls, dtype=float)
+        lag = max(positive("lag", self.lag), positive("dt", dt))
+        step = positive("rate", self.rate) * dt
+        reached = np.empty_like(commands)
+        reached[0] = now = commands[0]
+        for k, command in enumerate(commands[1:], start=1):
+            now = now + np.clip((command - now) * dt / lag, -step, step)
+            reached[k] = now
+        return reached
+
+
+def winches(
+    pulls: npt.ArrayLike,
+    dt: float,
+    *,
+    motor: Motor | None = None,
+    drive: Drive | None = None,
+    names: Sequence[str] = FINGERS,
+) -> Mapping[str, Drive]:
+    """Drives of a moving hand that follow commands over time, and hold the last one.
+
+    Args:
+        pulls: (n, k) commands of k fingers [m], as of `Commands.fingers`.
+        dt: between samples [s].
+        motor: that follows; None for `Motor()`.
+        drive: cable, conduit and the rest; None for `Drive()`.
+        names: (k,) of the fingers.
+
+    Raises:
+        ConfigError: if fingers and commands differ in number.
+
+    Source:
+        Two signals of muscles that command five fingers: Potratz and others, J. Biomech. Eng. 127
+        (2005) 934.
+    """
+    commands = np.asarray(pulls, dtype=float)
+    if commands.ndim != 2 or commands.shape[1] != len(names) or len(commands) < 2:
+        raise ConfigError(
+            f"commands of shape {commands.shape} are none for the {len(names)} fingers "
+            f"{', '.join(names)} at two instants or more."
+        )
+    reached = (motor or Motor()).follow(commands, dt)
+    t = dt * np.arange(len(reached))
+    base = drive or Drive()
+    return {
+        name: replace(base, tension=None, pull=_Held(PchipInterpolator(t, y), t[-1]))
+        for name, y in zip(names, reached.T, strict=True)
+    }
+
+
+def shaft(
+    angle: Callable[[float], float],
+    radii: Mapping[str, float],
+    *,
+    drive: Drive | None = None,
+) -> Mapping[str, Drive]:
+    """Drives of fingers whose cables run onto drums of one shaft.
+
+    Args:
+        angle: of the shaft as a function of time [rad].
+        radii: {finger: radius of its drum} [m].
+        drive: cable, conduit and the rest; None for `Drive()`.
+
+    Raises:
+        ConfigError: for a radius that is none.
+    """
+    base = drive or Drive()
+    return {
+        name: replace(base, tension=None, pull=_Drum(angle, positive(f"radius of {name}", r)))
+        for name, r in radii.items()
+    }
+
+
+def shaft_moment(solution: Any, radii: Mapping[str, float]) -> Array:
+    """(n_t,) moment with which a motor holds the shaft of drums, sum of radius times tension [N m].
+
+    Args:
+        solution: motion of a moving hand with drives of `shaft`.
+        radii: as there.
+    """
+    return sum((r * motor_force(solution, name) for name, r in radii.items()),
+               np.zeros(solution.t.size))  # fmt: skip
+
+
+def motor_force(solution: Any, name: str) -> Array:
+    """(n_t,) tension of a cable at its first end, where the motor is [N].
+
+    Args:
+        solution: motion of a moving hand.
+        name: of the finger, or of the joint, whose cable it is.
+    """
+    first: Array = solution.element(f"{name} cable").force[:, 0]
+    return np.linalg.norm(first, axis=1)
+
+
+@dataclass(frozen=True)
+class _Drum:
+    """What runs onto a drum of a shaft."""
+
+    angle: Callable[[float], float]
+    radius: float
+
+    def __call__(self, t: float) -> float:
+        return self.radius * self.angle(t)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A pull over time that stays what it was at the end."""
+
+    curve: PchipInterpolator
+    last: float
+
+    def __call__(self, t: float) -> float:
+        return float(self.curve(min(max(t, 0.0), self.last)))

@@ -1,0 +1,237 @@
+"""The hand as a mechanism: postures of the finger by itself, coils, friction, bad input."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
+from rom.components.hand.moving_hand import SEATS, Build, Drive, Seat, moving_hand
+from rom.components.hand.tip_loads import deflections, one_finger
+from rom.components.hand.winches import motor_force, shaft, shaft_moment
+from rom.errors import ConfigError, ModelError, SolverError
+
+MM = 1e-3
+INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull [mm]; machines by shooting
+    0.5: (7.0250, 12.872, 61.210, 2.783),
+    2.0: (28.6334, 40.801, 36.008, 11.331),
+    2.5: (35.6785, 44.192, 24.965, 14.129),
+}
+
+
+def tip_of(solution, name="finger"):
+    return solution.position(f"{name} phalanx 3", "distal")[-1]
+
+
+def cable_length(solution, name="finger"):
+    """(n_t,) of the cable along its path."""
+    stations = solution.mechanism.tendons[f"{name} cable"].stations
+    x = [solution.position(one.marker.body, one.marker) for one in stations]
+    return np.linalg.norm(np.diff(x, axis=0), axis=2).sum(axis=0)
+
+
+def angle_of(solution, name, k):
+    """Between the plates of a spring [rad]."""
+    last = len(solution.mechanism.nonlinear[f"{name} spring {k}"].parts) - 1
+    a, b = (solution.axes(f"{name} spring {k}", at)[-1] for at in (0, last))
+    return np.arccos(0.5 * (np.trace(a.T @ b) - 1.0))
+
+
+@pytest.mark.parametrize("tension", INDEX)
+def test_a_finger_in_a_mechanism_has_the_postures_of_the_boundary_value_problem(tension):
+    angle, x, z, pull = INDEX[tension]
+    mech = one_finger(Finger(n=16), tension)
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    assert_allclose([np.degrees(angle_of(found, "finger", k)) for k in (1, 2, 3)], 3 * [angle],
+                    rtol=3e-4)  # fmt: skip
+    assert_allclose(tip_of(found) / MM, [x, 0, z], rtol=5e-4, atol=1e-9)
+    assert_allclose(54 * MM - cable_length(found)[-1], pull * MM, rtol=5e-4)
+
+
+@pytest.mark.parametrize(("stiffener", "load"), [(1.0, (0.03, 0.01, 0.0)), (12.0, (0.0, 0.1, 0.0))])
+def test_a_finger_in_a_mechanism_gives_way_as_by_itself(stiffener, load):
+    finger = Finger(n=4, stiffener=stiffener)
+    alone = close(finger, tension=1.5, load=load)
+    mech = one_finger(finger, 1.5, load)
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    assert_allclose(tip_of(found), alone.tip, atol=1e-6 * LENGTHS["index"])
+    angles = [angle_of(found, "finger", k) for k in (1, 2, 3)]
+    assert_allclose(angles, alone.angles, rtol=1e-6)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_loads_on_the_tip_and_deflections_in_three_directions(axis):
+    forces, finger = [-0.05, 0.05], Finger(n=4, stiffener=10.0)
+    start, e = close(finger, tension=1.0), np.eye(3)[axis]
+    alone = [close(finger, tension=1.0, load=f * e, start=start).tip - start.tip for f in forces]
+    assert_allclose(deflections(finger, e, forces, tension=1.0), alone, atol=1e-8)
+    soft = deflections(Finger(n=4), e, forces, tension=1.0)
+    gain = np.abs(soft[1, axis]) / np.abs(alone[1][axis])
+    assert gain > 8.0 if axis == 1 else abs(gain - 1.0) < 1e-3
+
+
+@pytest.mark.parametrize("load", [(0.0, 0.0, 0.0), (0.0, 0.02, 0.0)])
+def test_coils_that_touch_stop_a_moving_finger_where_they_stop_it_at_rest(load):
+    """Beyond 2.65 N; with a load across, their plates turn about more than one axis."""
+    finger, state = Finger(n=4), None
+    for pulled in (2.5, 2.6, 2.7, 3.0, 3.5, 4.0):
+        mech = one_finger(finger, pulled, load)
+        state = rom.equilibrium(mech, state)
+    alone = close(finger, tension=4.0, load=load)
+    assert alone.bound.all()
+    found = rom.snapshot(mech, state)
+    assert_allclose(tip_of(found), alone.tip, atol=1e-6 * LENGTHS["index"])
+    moving = one_finger(finger, lambda t: 4.0 * min(t / 0.2, 1.0), load)
+    sol = rom.simulate(moving, t_end=1.2, dt=5e-4, rho_inf=0.5)
+    assert_allclose(tip_of(sol), alone.tip, atol=1e-4 * LENGTHS["index"])
+    assert rom.audit(sol).ok, rom.audit(sol)
+
+
+def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
+    """The balance of the energies, and the friction of the cable alone as what springs keep not."""
+    mu = 0.3
+    lost = []
+    for friction in (0.0, mu):
+        drive = Drive(pull=lambda t: 9 * MM * np.sin(np.pi / 2 * min(t / 0.3, 1.0)) ** 2, EA=2e3)
+        mech = moving_hand({"index": Finger(n=2, friction=friction)}, seats={"index": Seat()},
+                           drives={"index": drive})  # fmt: skip
+        sol = rom.simulate(mech, t_end=0.3, dt=1e-4, rho_inf=0.8)
+        assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.drives[-1]
+        lost.append(sol.energy.damping[-1])
+    # where the cable turns by psi at each of five inner holes it loses 1 - exp(-mu psi) of its pull
+    assert 0.05 * sol.energy.drives[-1] < lost[1] - lost[0] < mu * 2.0 * sol.energy.drives[-1]
+
+
+def test_a_winch_draws_in_what_the_finger_gives():
+    finger = Finger(n=4)
+    alone = close(finger, pull=8 * MM)
+    mech = moving_hand({"index": finger}, seats={"index": Seat()},
+                       drives={"index": Drive(pull=8 * MM, EA=1e5)})  # fmt: skip
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    pulled = motor_force(found, "index")[0]
+    stretch = pulled / 1e5 * (54 - 8) * MM
+    at = close(finger, pull=8 * MM - stretch)
+    assert_allclose(pulled, at.tension, rtol=1e-6)
+    assert_allclose(tip_of(found, "index"), at.tip, atol=1e-6 * LENGTHS["index"])
+    assert stretch < 1e-3 * MM + 1e-5 and at.tension < alone.tension
+
+
+def test_a_seat_turns_a_finger_and_nothing_else():
+    finger = Finger(n=4)
+    seat = Seat((0.1, -0.2, 0.3), along=(1.0, 2.0, -1.0), palmar=(0.5, 1.0, 3.0))
+    mech = moving_hand({"thumb": finger}, seats={"thumb": seat},
+                       drives={"thumb": Drive(tension=1.0)})  # fmt: skip
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    alone = close(finger, tension=1.0).tip
+    assert_allclose(seat.axes.T @ seat.axes, np.eye(3), atol=1e-14)
+    assert_allclose(np.linalg.det(seat.axes), 1.0)
+    assert_allclose(tip_of(found, "thumb"), seat.at + seat.axes @ alone, atol=1e-8)
+    assert (seat.axes @ [1, 0, 0]) @ [0.5, 1.0, 3.0] > 0
+
+
+def test_a_conduit_that_bends_takes_its_share_of_the_force():
+    """Capstan, over the angles by which the cable turns in the motion that was found."""
+    mu, R = 0.3, 20 * MM
+    quarter = np.linspace(np.pi / 2, 0, 9)
+    arc = [(4.5 * MM + R * (1 - np.cos(a)), 0.0, -10 * MM - R * np.sin(a)) for a in quarter]
+    drive = Drive(tension=lambda t: 40.0 * t, conduit=tuple(arc), transition_speed=1e-8)
+    mech = moving_hand({"index": Finger(n=3, friction=mu)}, seats={"index": Seat()},
+                       drives={"index": drive})  # fmt: skip
+    sol = rom.simulate(mech, t_end=0.01, dt=1e-4, rho_inf=0.5)
+    force = np.linalg.norm(sol.element("index cable").force[-1], axis=1)
+    stations = sol.mechanism.tendons["index cable"].stations
+    x = np.array([sol.position(one.marker.body, one.marker)[-1] for one in stations])
+    e = np.diff(x, axis=0) / np.linalg.norm(np.diff(x, axis=0), axis=1)[:, None]
+    turned = np.arccos(np.clip((e[1:] * e[:-1]).sum(axis=1), -1, 1))
+    assert np.pi / 2 - 0.15 < turned[:8].sum() < np.pi / 2
+    assert_allclose(force[0], 0.4, rtol=1e-12)
+    assert_allclose(force[-1] / force[0], np.exp(-mu * turned.sum()), rtol=1e-6)
+
+
+def test_a_joint_that_is_drawn_alone_bends_alone():
+    """As a finger of that joint only; rigid bodies before and behind it."""
+    finger = Finger(n=16)
+    mech = moving_hand({"index": finger}, seats={"index": Seat()},
+                       drives={"index joint 2": Drive(tension=1.0)})  # fmt: skip
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    angles = [angle_of(found, "index", k) for k in (1, 2, 3)]
+    assert_allclose(np.degrees(angles), [0, 14.2067, 0], rtol=3e-4, atol=1e-6)
+    plate = found.position("index phalanx 2", "proximal")[-1]
+    along = np.array([np.sin(angles[1]), 0, np.cos(angles[1])])
+    assert_allclose(tip_of(found, "index"), plate + (12 + 8 + 10) * MM * along, atol=1e-8)
+
+
+@pytest.mark.parametrize("sleeve", [0.0, 0.3])
+def test_the_cable_in_a_sleeve_gives_way_like_a_spring_before_the_finger(sleeve):
+    """Work of the winch = energy of springs and cable; stretch = tension times length over EA."""
+    finger, EA, pull = Finger(n=4), 2e2, 4 * MM
+    mech = moving_hand({"index": finger}, seats={"index": Seat()},
+                       drives={"index": Drive(pull=pull, EA=EA, sleeve=sleeve)})  # fmt: skip
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    pulled = motor_force(found, "index")[0]
+    length = 54 * MM
+    stretch = pulled / EA * (length - pull) * (length + sleeve) / length
+    held = close(finger, pull=pull - stretch)
+    assert_allclose(pulled, held.tension, rtol=1e-6)
+
+
+def test_five_fingers_close_in_time():
+    """Each as its tension says, where it sits; the energy of the cables goes where it is booked."""
+    fingers = hand(n=2)
+    drives = {name: Drive(tension=lambda t: 1.2 * min(t / 0.2, 1.0)) for name in fingers}
+    mech = moving_hand(fingers, drives=drives, build=Build(loss=0.02))
+    sol = rom.simulate(mech, t_end=0.8, dt=5e-4, rho_inf=0.5)
+    for name in fingers:
+        alone, seat = close(fingers[name], tension=1.2).tip, SEATS[name]
+        assert_allclose(tip_of(sol, name), seat.at + seat.axes @ alone, atol=1e-6)
+    assert np.abs(sol.energy.balance).max() < 1e-5 * sol.energy.forces[-1]
+
+
+def test_one_shaft_draws_five_cables():
+    """The moment of its motor is that of five fingers by themselves, and its work their energy."""
+    fingers = hand(n=2)
+    radii = {"thumb": 3 * MM, "index": 4 * MM, "middle": 5 * MM, "ring": 4.5 * MM, "little": 2 * MM}
+    drives = shaft(lambda t: 1.5 * np.sin(np.pi / 2 * min(t / 0.5, 1.0)) ** 2, radii,
+                   drive=Drive(EA=1e5))  # fmt: skip
+    mech = moving_hand(fingers, drives=drives, build=Build(loss=0.02))
+    sol = rom.simulate(mech, t_end=1.0, dt=1e-3, rho_inf=0.5)
+    alone = {name: close(fingers[name], pull=1.5 * r) for name, r in radii.items()}
+    moment = sum(r * alone[name].tension for name, r in radii.items())
+    found = shaft_moment(sol, radii)
+    assert_allclose(found[-1], moment, rtol=1e-3)  # the cables stretch by a few hundredths of a mm
+    angle = np.array([1.5 * np.sin(np.pi / 2 * min(t / 0.5, 1.0)) ** 2 for t in sol.t])
+    work = np.sum(0.5 * (found[1:] + found[:-1]) * np.diff(angle))
+    assert_allclose(work, sol.energy.drives[-1], rtol=1e-4)
+    kept = sol.energy.strain[-1] + sol.energy.damping[-1] + sol.energy.kinetic[-1]
+    assert_allclose(kept, sol.energy.drives[-1], rtol=1e-5)
+
+
+def test_what_no_hand_can_do_is_named():
+    finger = {"index": Finger(n=2)}
+    with pytest.raises(ConfigError, match="drive of 'toe'"):
+        moving_hand(finger, drives={"toe": Drive(tension=1.0)})
+    with pytest.raises(ConfigError, match="seat of 'toe'"):
+        moving_hand({"toe": Finger(n=2)})
+    with pytest.raises(ConfigError, match="either a tension or a pull"):
+        moving_hand(finger, drives={"index": Drive()})
+    with pytest.raises(ConfigError, match="either a tension or a pull"):
+        moving_hand(finger, drives={"index": Drive(tension=1.0, pull=1 * MM)})
+    with pytest.raises(ConfigError, match=r"winch of 'index' is to take in 0\.03 m"):
+        moving_hand(finger, drives={"index": Drive(pull=30 * MM)})
+    with pytest.raises(ConfigError, match="cannot close towards"):
+        moving_hand(finger, seats={"index": Seat(palmar=(0.0, 0.0, 2.0))})
+    with pytest.raises(ConfigError, match="'index cable' are at one point: it would be a knot"):
+        moving_hand(finger, drives={"index": Drive(tension=1.0, conduit=2 * ((0.0, 0.0, -0.1),))})
+    with pytest.raises(ModelError, match="'index' ends in a bare plate"):
+        moving_hand({"index": Finger(phalanges=(0.02, 0.02, 0.0), n=2)})
+    with pytest.raises(ConfigError, match="thickness = 0"):
+        moving_hand(finger, build=Build(thickness=0.0))
+    with pytest.raises(ConfigError, match="not in a conduit on the palm"):
+        moving_hand(finger, drives={"index joint 1": Drive(tension=1.0, conduit=((0, 0, -0.1),))})
+    with pytest.raises(ConfigError, match="drive of 'index joint 4'"):
+        moving_hand(finger, drives={"index joint 4": Drive(tension=1.0)})
+    with pytest.raises(ConfigError, match=r"sleeve of 'index' is -0\.1 m"):
+        moving_hand(finger, drives={"index": Drive(pull=0.0, sleeve=-0.1)})
+    mech = moving_hand(finger, drives={"index": Drive(pull=lambda t: 400.0 * t * t)})
+    with pytest.raises((ConfigError, SolverError), match=r"winch of 'index' is to take in 0\.02"):
+        rom.simulate(mech, t_end=0.1, dt=1e-3)
