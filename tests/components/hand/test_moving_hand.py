@@ -2,14 +2,18 @@
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 
 import rom
+from rom import rotation
 from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
 from rom.components.hand.moving_hand import SEATS, Build, Drive, Seat, moving_hand
 from rom.components.hand.tip_loads import deflections, one_finger
 from rom.components.hand.winches import motor_force, shaft, shaft_moment
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.elements.rods.bodies import POSE_SIZE
+from rom.mbs.elements.rods.coils import add_bending, bend_of
 
 MM = 1e-3
 INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull [mm]; machines by shooting
@@ -85,6 +89,33 @@ def test_coils_that_touch_stop_a_moving_finger_where_they_stop_it_at_rest(load):
     sol = rom.simulate(moving, t_end=1.2, dt=5e-4, rho_inf=0.5)
     assert_allclose(tip_of(sol), alone.tip, atol=1e-4 * LENGTHS["index"])
     assert rom.audit(sol).ok, rom.audit(sol)
+
+
+@njit
+def bent(poses, K):
+    """Axis of the bend of two plates; its derivatives in K."""
+    angle, axis = bend_of(poses, 1)
+    add_bending(2, angle, axis, 1.0, K)
+    return axis
+
+
+def test_the_axis_of_a_bend_turns_with_its_plates_as_differences_say():
+    """Turns of either plate in its own axes."""
+    rng, h = np.random.default_rng(4), 1e-6
+    p = [rotation.exp(phi) for phi in rng.normal(size=(2, 3))]
+
+    def axis(turned, phi, K):
+        q = [rotation.multiply(one, rotation.exp(phi * (k == turned))) for k, one in enumerate(p)]
+        poses = np.zeros((2, POSE_SIZE))
+        poses[:, 3:7] = q
+        return np.array(bent(poses.ravel(), K))
+
+    K, spare = np.zeros((12, 12)), np.zeros((12, 12))
+    axis(0, np.zeros(3), K)
+    for plate, columns in ((0, slice(3, 6)), (1, slice(9, 12))):
+        slopes = [axis(plate, h * e, spare) - axis(plate, -h * e, spare) for e in np.eye(3)]
+        assert_allclose(K[3:6, columns], np.array(slopes).T / (2 * h), atol=1e-8)
+        assert_allclose(K[9:12, columns], -K[3:6, columns])
 
 
 def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
