@@ -41,6 +41,7 @@ from rom.mbs.kernels.system import ALONG, DISTANCE, POINT, ROLL, TOUCH, System
 from rom.mbs.kernels.work import BOTH_LEVELS as BOTH_LEVELS
 from rom.mbs.kernels.work import FACTOR_USES as FACTOR_USES
 from rom.mbs.kernels.work import FACTORISATIONS as FACTORISATIONS
+from rom.mbs.kernels.work import HALVINGS as HALVINGS
 from rom.mbs.kernels.work import HAS_FACTOR as HAS_FACTOR
 from rom.mbs.kernels.work import ITERATIONS as ITERATIONS
 from rom.mbs.kernels.work import LAST_ITERATIONS as LAST_ITERATIONS
@@ -59,6 +60,7 @@ FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
 MAX_PASSES = 25
+MAX_HALVINGS = 24  # of a correction, from the size of a mechanism down to an oil film
 ROUND_OFF = 4e-16
 # share of the round-off of positions that increments are brought to: velocities and accelerations
 # feel an increment over the step and over its square, and their errors add up to momentum
@@ -175,6 +177,21 @@ def factorise_step(s, W, step, rank):
 
 
 @inner
+def has_matrix(s, W, step, rank, c):
+    """Renew the matrix at hand, or factorise a new one; False when it is singular."""
+    if step.count[HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
+        step.count[HAS_FACTOR] = 1 if renew_pair_tangents(s, W, c[2], c[1], rank) else 0
+    if step.count[HAS_FACTOR] == 1:
+        return True
+    tangents(s, W, step.v1, step.vd1, step.lam1, c)
+    constraint_gradient(s, W)
+    found = factorise_step(s, W, step, rank)
+    if s.renewed.shape[0] > 0:
+        keep_pair_tangents(s, W, c[2], c[1])
+    return found
+
+
+@inner
 def mass_factor(step):
     """Derivative of beta h^2 times the acceleration by the increment."""
     return (1 - step.method[3]) / (1 - step.method[4])
@@ -246,6 +263,47 @@ def correct(s, W, step, rank):
     step.count[STEP_PASSES] += 1
     step.count[ITERATIONS] += 1
     return verdict(W, step, size, gap)
+
+
+@inner
+def may_halve(step):
+    """Whether the last correction, or the prediction, is at hand and can be shortened."""
+    return step.count[BOTH_LEVELS] == 0 and step.count[HALVINGS] < MAX_HALVINGS
+
+
+@inner
+def all_finite(x):
+    """Whether no entry is infinite or NaN."""
+    for i in range(x.size):
+        if not math.isfinite(x[i]):
+            return False
+    return True
+
+
+@inner
+def halve_correction(s, W, step):
+    """Take half of the last correction back, or of what was predicted beyond the velocity.
+
+    It led where forces have no value: through an oil film.
+    """
+    h, beta, gamma, _, _ = step.method
+    if step.count[STEP_PASSES] == 0 and step.count[HALVINGS] == 0:
+        W.dlam[:] = 0.0
+        for i in range(step.v.size):
+            W.delta[i] = step.psi[i] - h * step.v[i]
+    for i in range(step.v.size):
+        W.delta[i] *= 0.5
+        step.vd1[i] -= mass_factor(step) / (beta * h * h) * W.delta[i]
+        step.v1[i] -= gamma / (beta * h) * W.delta[i]
+        step.psi[i] -= W.delta[i]
+    for k in range(step.lam.size):
+        W.dlam[k] *= 0.5
+        step.lam1[k] -= W.dlam[k] / (beta * h * h)
+    step.count[HALVINGS] += 1
+    step.count[HAS_FACTOR] = 0
+    if is_multistep(step):
+        follow_increment(s, step)
+    retract(s, step.q, step.psi, step.q1)
 
 
 @inner
@@ -324,7 +382,7 @@ def advance(s, W, step, rank, signals, every, out):
     c = (mass_factor(step), gamma * h, beta * h * h)
     while step.count[STEPS] - step.count[STEPS_BEFORE] < signals.shape[0]:
         if step.count[LAWS_ASKED] == 0:
-            if step.count[STEP_PASSES] == 0:
+            if step.count[STEP_PASSES] + step.count[HALVINGS] == 0:
                 copy(signals[step.count[STEPS] - step.count[STEPS_BEFORE]], W.signal)
                 predict(s, step)
             evaluate(s, W, step.q1, step.v1)
@@ -333,15 +391,12 @@ def advance(s, W, step, rank, signals, every, out):
                 return NEEDS_LAWS
         step.count[LAWS_ASKED] = 0
         residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
-        if step.count[HAS_FACTOR] == 1 and s.renewed.shape[0] > 0:
-            step.count[HAS_FACTOR] = 1 if renew_pair_tangents(s, W, c[2], c[1], rank) else 0
-        if step.count[HAS_FACTOR] == 0:
-            tangents(s, W, step.v1, step.vd1, step.lam1, c)
-            constraint_gradient(s, W)
-            if not factorise_step(s, W, step, rank):
-                return SINGULAR
-            if s.renewed.shape[0] > 0:
-                keep_pair_tangents(s, W, c[2], c[1])
+        if may_halve(step) and not all_finite(W.residual):
+            halve_correction(s, W, step)
+            continue
+        step.count[HALVINGS] = 0
+        if not has_matrix(s, W, step, rank, c):
+            return SINGULAR
         answer = correct(s, W, step, rank)
         if answer > CONVERGED:
             return answer

@@ -65,7 +65,7 @@ def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tupl
             v = v + h**2 * across(record, W, state, shift_ahead(record, state, method, jerk))
         state = replace(state, algorithmic=before)
     copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
-    count, work = np.zeros(11, dtype=np.int64), np.zeros(3)
+    count, work = np.zeros(12, dtype=np.int64), np.zeros(3)
     count[alpha.USES_LAWS], count[alpha.BOTH_LEVELS] = bool(forces), settings.both
     power = _power(record, W, state, forces)
     past = np.zeros((2, weights.size - 2, n))

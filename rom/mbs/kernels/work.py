@@ -22,7 +22,8 @@ LARGEST_WHOLE = 2000
     LAWS_ASKED,
     BOTH_LEVELS,
     FACTOR_USES,
-) = range(11)
+    HALVINGS,
+) = range(12)
 
 
 @table
@@ -115,11 +116,11 @@ class Step(Table):
         q1, v1, vd1, lam1: the trial values; psi: (n,) increment of the step.
         work: (3,) work done since the start, by drives, by applied forces, lost in dampers.
         lost: (3,) the powers at the last accepted instant.
-        count: (11,) steps, iterations, factorisations, iterations of the last step, whether a
+        count: (12,) steps, iterations, factorisations, iterations of the last step, whether a
             factorisation is at hand, pass of the present step, steps when the present chunk
             began, whether Python forces are to be asked for, whether they have been, whether
             constraints hold for positions and velocities both, corrections with the factorisation
-            at hand.
+            at hand, halvings of the last correction.
         size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
             largest gap in a joint before the last increment.
         method: (5,) h, beta, gamma, alpha_m, alpha_f.

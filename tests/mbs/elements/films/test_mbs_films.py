@@ -356,3 +356,27 @@ def test_no_film_carries_more_than_there_is_room_for():
     with pytest.raises((SolverError, ModelError), match="gap of 'film' open"):
         rom.equilibrium(held_rotor(bearing(grooves=()), (-1e12, 0), speed=SPEED, oil=1e-6),
                         spin={"turn": SPEED})  # fmt: skip
+
+
+@pytest.mark.parametrize("more", [{"dt": 1e-4}, {"dt": 2e-5, "method": "bdf"}], ids=str)
+def test_steps_predicted_through_the_bush_are_shortened(more):
+    """A light shaft under a sudden load, which would move it by more than its play in a step."""
+    b = JournalBearing(0.04, 0.04, 4e-5, cells=(60, 8))
+    load, mass, speed = (0.0, -5e4), 0.1, 300.0
+    assert 0.5 * load[1] / mass * 2e-5**2 < -b.clearance
+    mech = held_rotor(b, load, speed=speed, oil=0.02, mass=mass)
+    moved = rom.simulate(mech, t_end=0.03, **more)
+    rests = rom.equilibrium(mech, spin={"turn": speed})
+    assert_allclose(moved.q[-1][:2], rests.q[:2], atol=1e-4 * b.clearance)
+    film = moved.journal_bearing("film")
+    assert film.thinnest.min() > 0.0
+
+
+def test_a_journal_that_is_shot_through_its_bush_is_named():
+    mech = rom.Mechanism(gravity=ORIGIN)
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.01,) * 3, at=ORIGIN,
+                           velocity=(1e4, 0, 0))  # fmt: skip
+    mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN),
+                         axis=(0, 0, 1), bearing=bearing(), oil=1e-6)  # fmt: skip
+    with pytest.raises(SolverError, match="'mainbearing'"):
+        rom.simulate(mech, t_end=1e-3, dt=1e-4)
