@@ -68,7 +68,8 @@ def _slider_crank() -> None:
 
 
 def _elements() -> None:
-    """All stages, the kernels of all families of elements, and a law of a user."""
+    """All stages, the kernels of all families of elements, a law of a user, and bars that touch."""
+    from rom.mbs.elements.contact.impact import Impact
     from rom.mbs.kernels.stages import STAGE_KERNELS
     from rom.mbs.mechanism import FAMILIES
 
@@ -80,6 +81,9 @@ def _elements() -> None:
     mech = pendulum()
     mech.law("law", lambda t, parameters, motion, memory, out: None, mech.ground.marker(ORIGIN))
     mech.rotational_spring("turn", "hinge", stiffness=1.0)
+    above = mech.ground.marker((0.0, 0.0, 9.0))
+    mech.capsule_on_capsule("bars", above, mech.part("bob").marker(ORIGIN), Impact(1e3),
+                            radius1=0.1, radius2=0.1)  # fmt: skip
     _move(mech).element("turn")
 
 

@@ -94,6 +94,13 @@ def test_renewed_stiffness_lacks_only_what_turns_with_the_shaft(cavitation):
     assert np.abs(renewed - new).max() < 0.02 * np.abs(old - new).max()
 
 
+def test_renewed_stiffness_is_not_its_transpose():
+    """Films push across the way of the journal: alone their stiffness is not symmetric."""
+    old, renewed, new = solutions(shaft(), (1.0, 0.0, 0.25 * STEP**2))
+    assert np.abs(old - new).max() > 1e-3 * np.abs(new).max()
+    assert np.abs(renewed - new).max() < 0.02 * np.abs(old - new).max()
+
+
 @pytest.mark.parametrize("cavitation", ["reynolds", "jfo"])
 def test_motions_are_those_without_renewal(cavitation, monkeypatch):
     renewed = rom.simulate(shaft(cavitation), t_end=0.02, dt=STEP)
