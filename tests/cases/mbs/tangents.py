@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from cases.mbs.mechanisms import residual_at, tangents_at
+from cases.mbs.mechanisms import residual_at, stored_at, tangents_at
 from rom.mbs.elements import rotational_springs, springs
 from rom.mbs.equations.equations import retract
 
@@ -20,6 +20,24 @@ def shifted(packed, q, delta):
     out = np.empty_like(q)
     retract(packed.system, q, delta, out)
     return out
+
+
+def assert_forces_are_the_gradient(packed, W, mesh, q):
+    """The forces of one mesh of two bodies follow from its energy, and leave nothing over."""
+    none = np.zeros(12)
+
+    def energy(delta):
+        return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
+
+    gradient = difference(energy, 12, 1e-8)[0]
+    residual_at(packed.system, W, q, none, none, np.zeros(0))
+    assert mesh.load[0] > 1e3
+    assert_allclose(W.residual, gradient, atol=1e-6 * np.abs(gradient).max())
+    one, two = W.wrench[mesh.i[0]], W.wrench[mesh.j[0]]
+    apart = W.P[mesh.j[0]] - W.P[mesh.i[0]]
+    assert_allclose(one[:3] + two[:3], 0.0, atol=1e-12 * np.abs(one[:3]).max())
+    moment = one[3:] + two[3:] + np.cross(apart, two[:3])
+    assert_allclose(moment, 0.0, atol=1e-11 * np.abs(one[3:]).max())
 
 
 def by_position(packed, W, q, v):
