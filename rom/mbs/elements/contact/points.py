@@ -277,7 +277,7 @@ def touch(kind, size, gap, e, s):
 
 @inner
 def contact_force(law, bristle, n, depth, down, motion):
-    """Force on j, elastic force, closing speed, velocity of j over i at the touching point, stretch.
+    """Force on j, elastic force, closing speed, velocity of j over i where they touch, stretch.
 
     ``motion`` is the gap of the markers, their relative velocity, both angular velocities, and how
     far the ends of the spring of friction are apart.

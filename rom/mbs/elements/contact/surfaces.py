@@ -2,9 +2,9 @@
 
 Each point of the surface carries the law of penetration times the area that belongs to it, so
 that a finer mesh gives the same pressure. ``law`` is an `Impact` whose stiffness is per area,
-[N/m^exponent/m^2], as are those of a spring of its friction, which acts at each point. The reaction acts on the body of m1, and
-``solution.interface_loads`` has its sum about m1. Cost grows with the number of points: choose
-by ``where`` the part of the surface that may touch.
+[N/m^exponent/m^2], as are stiffness and damping of its friction, which acts at each point. The
+reaction acts on the body of m1, and ``solution.interface_loads`` has its sum about m1. Cost grows
+with the number of points: choose by ``where`` the part of the surface that may touch.
 
 Source:
     Johnson, Contact Mechanics (1985), section 4.3 (elastic foundation).
