@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 
 import rom
-from cases.mbs.mechanisms import residual_at
+from cases.mbs.mechanisms import residual_at, tangents_at
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.equations.packing import pack
@@ -246,6 +246,24 @@ def test_what_parts_forgets():
             W.base[W.x.size :] = W.fresh
         clamp = 1e3 * (0.0199 - 0.01) / 0.0199
         assert_allclose(W.residual[6], 2e-6 * (held + clamp), rtol=1e-6)
+        assert_allclose(packed.kept(W.base[None]), 0.5 * held * 2e-6**2, rtol=1e-6, atol=1e-30)
+        q[9] += 1e-3
+        residual_at(packed.system, W, q, none, none, np.zeros(0))
+        W.base[W.x.size :] = W.fresh
+        assert packed.kept(W.base[None]) == 0.0
+
+
+def test_what_slid_to_the_limit_sticks_there_when_it_is_looked_at_again():
+    """Stiff whichever way it slid; and the same force."""
+    for angle in np.linspace(0.0, 6.0, 30):
+        packed, W = remembered(pair(LAW))
+        none, q = np.zeros(packed.v.size), packed.q.copy()
+        q[7:9] += 2e-3 * np.array([np.cos(angle), np.sin(angle)])
+        residual_at(packed.system, W, q, none, none, np.zeros(0))
+        slid, W.base[W.x.size :] = W.residual.copy(), W.fresh
+        tangents_at(packed.system, W, q, none, none, np.zeros(0), (0.0, 0.0, 1.0))
+        assert_allclose(W.residual, slid, rtol=1e-12, atol=1e-14)
+        assert np.linalg.eigvalsh(W.Kt[6:8, 6:8])[0] > 0.9 * STIFFNESS
 
 
 @pytest.mark.parametrize(("wrong", "words"), [
