@@ -212,7 +212,7 @@ def remembered(mech):
     packed = pack(mech)
     W = workspace(packed.system, len(packed.signals))
     none = np.zeros(packed.v.size)
-    residual_at(packed.system, W, packed.q, none, none, np.zeros(0))
+    residual_at(packed.system, W, packed.q, none, none, np.zeros(W.value.size))
     W.base[W.x.size :] = W.fresh
     return packed, W
 
@@ -264,6 +264,17 @@ def test_what_slid_to_the_limit_sticks_there_when_it_is_looked_at_again():
         tangents_at(packed.system, W, q, none, none, np.zeros(0), (0.0, 0.0, 1.0))
         assert_allclose(W.residual, slid, rtol=1e-12, atol=1e-14)
         assert np.linalg.eigvalsh(W.Kt[6:8, 6:8])[0] > 0.9 * STIFFNESS
+
+
+def test_the_limit_is_that_of_the_whole_pressure_while_bodies_meet():
+    """mu k depth (1 + damping v), on a ball that comes down while it slides."""
+    load, v = 10.0, 0.1
+    packed, W = remembered(sled(LAW, load))
+    q, down, none = packed.q.copy(), -v * np.eye(6)[2], np.zeros(6)
+    q[0] += 1e-2
+    residual_at(packed.system, W, q, down, none, np.zeros(5))
+    pressure = load * (1 + LAW.damping * v)
+    assert_allclose(W.residual[:3], [MU * pressure, 0.0, -pressure], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(("wrong", "words"), [
