@@ -61,15 +61,23 @@ def block_moved(sol):
 
 
 def test_equilibria_rest_where_springs_are_remembered():
-    """From where bodies were added, the same place; from the end of a run, that end."""
-    mech = block(0.15)
+    """From where bodies were added, the same place; from the end of a run, that end; pushed from
+    there, further by force over stiffness."""
+    mech, push = block(0.15), 1.0
+    mech.force("push", mech.part("block").marker((0, 0, -HEIGHT)),
+               lambda t: (push if t > 2.0 else 0.0, 0.0, 0.0))  # fmt: skip
     sol = rom.simulate(mech, t_end=0.6, dt=1e-3)
     for start in (None, sol.final):
         assert_allclose(rom.equilibrium(mech, state=start).q[:3], sol.q[-1, :3], atol=2e-9)
-    slid = rom.simulate(mech, state=block_moved(sol), t_end=1.2, dt=1e-3).final
+    moved = rom.simulate(mech, state=block_moved(sol), t_end=1.2, dt=1e-3)
+    assert_allclose([moved.energy.damping[0], moved.energy.balance[0]], 0.0, atol=1e-15)
+    slid = moved.final
     again = rom.equilibrium(mech, state=slid)
     assert slid.q[0] > 1e-3
     assert_allclose(again.q[:3], slid.q[:3], atol=1e-9)
+    pushed = rom.snapshot(mech, rom.equilibrium(mech, state=slid, t=3.0))
+    way = sum(pushed.position("block", foot) - moved.position("block", foot)[-1] for foot in FEET)
+    assert_allclose(way[0, 0] / 3, push / (3 * STIFFNESS), rtol=1e-4)
     lowest = rom.linearize(mech, again).frequencies[0]
     assert lowest > 5.0  # held in all directions
 
