@@ -72,13 +72,13 @@ def test_what_is_held_rests_by_the_balance_of_forces_and_moments(motion, held, u
     assert set(forces) == set(contacts_of(sol.mechanism, "thing"))
     grips, weight = sum(np.linalg.norm(f[-1]) for f in forces.values()), held.mass * g
     assert grips > 1.5 * weight
-    assert_allclose(sum(forces.values())[-1], weight * np.eye(3)[up], atol=1e-7 * grips)
+    assert_allclose(sum(forces.values())[-1], weight * np.eye(3)[up], atol=1e-8 * grips)
     moment = np.zeros(3)
     for key in forces:
         said = sol.element(key)
         arm = sol.position("thing", said.markers[1])[-1] - sol.position("thing")[-1]
         moment += said.moment[-1, 1] + np.cross(arm, said.force[-1, 1])
-    assert_allclose(moment, 0.0, atol=1e-7 * grips * held.radius)
+    assert_allclose(moment, 0.0, atol=1e-8 * grips * held.radius)
     assert_allclose(sol.velocity("thing")[-1], 0.0, atol=1e-8)
 
 
