@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.films import ORIGIN, Pair, held_rotor, resting
+from cases.mbs.films import NONE, ORIGIN, Pair, held_rotor, resting
+from cases.mbs.mechanisms import tangents_at
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg, multilobe
@@ -77,6 +78,30 @@ def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
         ratios.append(np.divide(*off))
     assert_allclose(np.median(ratios, axis=0), [4.0, 8.0], rtol=0.15)
     assert np.median(share) < 0.05
+
+
+def test_slopes_of_all_answers_are_those_of_the_table():
+    """Forces, moments and torque by motions, rates and the spin, in clearances."""
+    b, rng, d = bearing(), np.random.default_rng(8), 1e-5
+    for _ in range(3):
+        motion, rate, spin = random_state(rng, 0.2)
+        x, scale = np.array([*motion, *rate, spin]), np.array([*b.scale, *b.scale, 1.0])
+
+        def answers(state):
+            pair = Pair(b, motion=state[:4], tabulated=True)
+            v = pair.velocities(state[4:8], state[8])
+            pair.loads(v)
+            return pair, v, pair.table.films.answer[0].copy()
+
+        steps = np.diag(d * scale * [1, 1, 1, 1, 100, 100, 100, 100, 100])
+        found = [(answers(x + e)[2] - answers(x - e)[2]) / (2 * e.sum()) for e in steps]
+        pair, v, _ = answers(x)
+        tangents_at(pair.packed.system, pair.W, pair.packed.q, v, 0 * v, NONE, (0.0, 1.0, 1.0))
+        known = pair.table.films.slope[0, :, :9]
+        for columns in (slice(4), slice(4, 8), slice(8, 9)):
+            part = (np.array(found).T * scale)[:, columns]
+            largest = np.abs(part).max(axis=1, keepdims=True)
+            assert_allclose(known[:, columns] / largest, part / largest, atol=1e-5)
 
 
 def test_an_end_that_comes_too_close_leaves_the_table():
