@@ -27,7 +27,7 @@ class Impact:
         impact_speed: at which that holds [m/s].
         mu: coefficient of friction at the touching point [1].
         transition_speed: sliding speed over which friction changes its sign [m/s]; implicit steps
-            that change the sliding speed by much more do not converge.
+            that change the sliding speed by much more take many corrections.
 
     Raises:
         ConfigError: for numbers no contact has.
