@@ -147,11 +147,13 @@ def _rod_alone() -> None:
 
 def _oil_film() -> None:
     from rom.components.journal_bearing import Groove, JournalBearing, film
+    from rom.mbs.elements.films.tabulated import table_of
 
     for law in ("reynolds", "jfo"):
         groove = [Groove(np.pi, 0.35)]
         bearing = JournalBearing(0.1, 0.05, 1e-4, groove, cavitation=law, aligned=True)
         film(bearing, (5e-5, 1e-5), speed=300.0, viscosity=0.03)
+    table_of("film", JournalBearing(0.1, 0.05, 1e-4, cells=(12, 2)))
 
 
 def _loops() -> None:

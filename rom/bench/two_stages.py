@@ -70,7 +70,7 @@ def bodies(rim: Any) -> dict[str, Any]:
     return found
 
 
-def machine(parts: dict[str, Any], cells: tuple[int, int]) -> Mechanism:
+def machine(parts: dict[str, Any], cells: tuple[int, int], *, tabulated: bool = False) -> Mechanism:
     """The mechanism of these bodies, driven by an elastic coupling."""
     mech, y = Mechanism(gravity=(0, 0, -9.81)), np.array([0.0, 1.0, 0.0])
     housing = parts["housing"]
@@ -87,7 +87,8 @@ def machine(parts: dict[str, Any], cells: tuple[int, int]) -> Mechanism:
         for journal, side in (("journal_a", "front"), ("journal_b", "back")):
             mech.journal_bearing(f"{name} {side}", shaft.marker(journal),
                                  case.marker(f"{name}_{side}"), axis=np.sign(speed) * y,
-                                 reference=(1, 0, 0), bearing=film, oil=OIL_VISCOSITY)  # fmt: skip
+                                 reference=(1, 0, 0), bearing=film, oil=OIL_VISCOSITY,
+                                 tabulated=tabulated)  # fmt: skip
         end, drive = shaft.marker("end_a"), 2e4 if name == "input" else 0.0
         mech.bushing(f"end of {name}", mech.ground.marker(mech.design_point(end)), end,
                      stiffness=(0, 1e8, 0, 0, drive, 0),
@@ -104,18 +105,25 @@ def machine(parts: dict[str, Any], cells: tuple[int, int]) -> Mechanism:
 def stages_run(cells: tuple[int, int] = (60, 4)) -> Iterator[Row]:
     """Case, quantity, value, unit and aim: from rest through some teeth of the first stage.
 
-    With rims that stay round, and with rims that deform.
+    With rims that stay round, and with rims that deform; with films that are solved and films that
+    are read from tables.
     """
-    dt = 2 * np.pi / (SHAFT_SPEED * 25) / STEPS_PER_TOOTH
     for rim, label in (("rbe3", "stiff rims"), (FourierLegendre(1, 2), "elastic rims")):
-        mech = machine(bodies(rim), cells)
-        start = process_time()
-        rest = equilibrium(mech)
-        case = f"two stages, {rest.v.size} velocities, {label}, 6 films of {cells[0]} x {cells[1]}"
-        yield case, "equilibrium", process_time() - start, "s of the processor", ""
-        warm = simulate(mech, state=rest, t_end=2 * dt, dt=dt).final
-        start, n = process_time(), N_TEETH * STEPS_PER_TOOTH
-        run = simulate(mech, state=warm, t_end=(2 + n) * dt, dt=dt)
-        yield case, "steps", n / (process_time() - start), "1/s of the processor", "above 1000"
-        for name in ("iterations", "factorisations"):
-            yield case, f"{name} per step", run.statistics[name] / n, "", ""
+        parts = bodies(rim)
+        for tabulated, how in ((False, f"of {cells[0]} x {cells[1]}"), (True, "from tables")):
+            mech = machine(parts, cells, tabulated=tabulated)
+            yield from _steps(mech, f"{label}, 6 films {how}")
+
+
+def _steps(mech: Mechanism, label: str) -> Iterator[Row]:
+    dt = 2 * np.pi / (SHAFT_SPEED * 25) / STEPS_PER_TOOTH
+    start = process_time()
+    rest = equilibrium(mech)
+    case = f"two stages, {rest.v.size} velocities, {label}"
+    yield case, "equilibrium", process_time() - start, "s of the processor", ""
+    warm = simulate(mech, state=rest, t_end=2 * dt, dt=dt).final
+    start, n = process_time(), N_TEETH * STEPS_PER_TOOTH
+    run = simulate(mech, state=warm, t_end=(2 + n) * dt, dt=dt)
+    yield case, "steps", n / (process_time() - start), "1/s of the processor", "above 1000"
+    for name in ("iterations", "factorisations"):
+        yield case, f"{name} per step", run.statistics[name] / n, "", ""

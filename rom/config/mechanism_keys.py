@@ -474,6 +474,7 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
             1.0),
         Key("elastic_bush", Flag(), "Whether its pressure bends the bore, which has functions.",
             False),
+        Key("tabulated", Flag(), "Whether it is read from a table.", False),
     ))),
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,

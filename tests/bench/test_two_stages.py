@@ -9,9 +9,10 @@ from rom.bench import two_stages
 pytestmark = [pytest.mark.fenicsx, pytest.mark.long]
 
 
-def test_two_stages_carry_the_torque_and_the_weight():
+@pytest.mark.parametrize("tabulated", [False, True])
+def test_two_stages_carry_the_torque_and_the_weight(tabulated):
     """Moments about the shafts are as the numbers of teeth, but for what the films take."""
-    mech = two_stages.machine(two_stages.bodies("rbe3"), (60, 4))
+    mech = two_stages.machine(two_stages.bodies("rbe3"), (60, 4), tabulated=tabulated)
     still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
     films = sum(still.journal_bearing(name).power[0] for name in mech.journal_bearings)
     output, ratio = two_stages.INPUT_TORQUE, 1.0
@@ -28,7 +29,7 @@ def test_its_steps_are_counted(monkeypatch):
     monkeypatch.setattr(two_stages, "N_TEETH", 1)
     rows = list(two_stages.stages_run())
     found = {(case, quantity): value for case, quantity, value, _, _ in rows}
-    assert len(found) == len(rows) == 8
+    assert len(found) == len(rows) == 16
     assert all(np.isfinite(value) and value > 0 for value in found.values())
     per_step = [value for (_, name), value in found.items() if name == "factorisations per step"]
     assert max(per_step) < 0.5  # films are renewed, not the whole matrix

@@ -517,7 +517,9 @@ JOIN_OWN = {
     ("rolling_bearing", "bearing"): lambda mech: rom.mbs.BallBearing(9, 0.0127, 0.065),
     ("journal_bearing", "journal"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),
     ("journal_bearing", "bush"): lambda mech: mech.ground.marker((0, 0, -0.5)),
-    ("journal_bearing", "bearing"): lambda mech: rom.mbs.JournalBearing(0.1, 0.05, 1e-4),
+    ("journal_bearing", "bearing"): lambda mech: rom.mbs.JournalBearing(
+        0.1, 0.05, 1e-4, cells=(12, 2)
+    ),
     ("journal_bearing", "oil"): lambda mech: 0.03,
     ("tendon", "path"): lambda mech: [mech.ground.marker((0, 0, k)) for k in range(2)],
     ("tendon", "EA"): lambda mech: 1.0,

@@ -26,9 +26,10 @@ from rom.mbs.elements.films.journals import (
     film_wrenches,
 )
 from rom.mbs.elements.films.oil import Oil
+from rom.mbs.elements.films.tabulated import N_READ, N_VALUES, table_of
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.whole import Whole
-from rom.model import Array
+from rom.model import Array, Index
 from rom.rotation import matrix
 
 PARALLEL_COSINE = 0.9  # with X, beyond which angles do not count from there
@@ -38,7 +39,8 @@ PARALLEL_COSINE = 0.9  # with X, beyond which angles do not count from there
 class OilFilm:
     """A film between a journal and a bush; axes (3, 3) and oil (9,) as in `Journals`.
 
-    The bore (n, m), (m, r) is that of `bore_of`, without functions for a rigid one.
+    The bore (n, m), (m, r) is that of `bore_of`, without functions for a rigid one; the table that
+    of `table_of`, None for a film that is solved.
     """
 
     i: Marker
@@ -49,6 +51,7 @@ class OilFilm:
     oil: tuple[float, ...]
     turning: float
     bore: tuple[Array, Array] = (np.zeros((0, 0)), np.zeros((0, 0)))
+    table: Array | None = None
 
 
 def journal_bearing(  # noqa: PLR0913  one keyword per property
@@ -67,6 +70,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     felt: float = 0.5,
     thermal_time: float = 1.0,
     elastic_bush: bool = False,
+    tabulated: bool = False,
 ) -> None:
     """Oil film between a journal and its bush, by Reynolds' equation.
 
@@ -116,6 +120,13 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
         )
     turning = self.part(journal.body).spin_about(name, axes[0])
     film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
+    if elastic_bush and tabulated:
+        raise ConfigError(
+            f"the bush of bearing {name!r} bends: its film has no table of places.",
+            hint="Leave out elastic_bush or tabulated.",
+        )
+    if tabulated:
+        film = replace(film, table=table_of(name, bearing))
     if elastic_bush:
         bore = bore_of(name, self.part(bush.body), bush, axes[1:], bearing)
         film = replace(film, bore=bore)
@@ -209,7 +220,18 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
         *np.zeros((3, k)),
         bores,
         *(np.zeros((k, 2 * most)), np.zeros((most, 12)), np.zeros(N_ANSWERS + most)),
+        *_tables(films),
+        np.zeros((N_READ, N_VALUES)),
+        *np.zeros((2, k)),
     )
+
+
+def _tables(films: list[OilFilm]) -> tuple[Index, Array]:
+    """Number of the table of each film, -1 where it has none, and the tables."""
+    found = {id(one.table): one.table for one in films if one.table is not None}
+    numbers = {key: number for number, key in enumerate(found)}
+    nodes = np.array(list(found.values())) if found else np.zeros((0, 0, N_VALUES))
+    return integers(numbers.get(id(one.table), -1) for one in films), nodes
 
 
 def _memory(one: OilFilm, known: float) -> Array:
@@ -236,7 +258,7 @@ JOURNAL_BEARINGS_FAMILY = Family(
     pair_tangents=film_pair_tangents, complete=True, potential=False,
     answers=lambda journals: journals.largest,
     room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
-    lost="the journal touches its bush in {}, or its film finds no pressure",
+    lost="the journal touches its bush in {}, its film finds no pressure or leaves its table",
     eased=oil_everywhere,
     remembers=lambda journals: (journals.films.law == JFO) | (journals.oil[:, CONSTANT] == 0.0),
 )  # fmt: skip

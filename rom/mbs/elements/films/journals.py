@@ -34,8 +34,9 @@ from rom.mbs.elements.films.kinematics import (
     journal_wrench,
     stepped_place,
 )
-from rom.mbs.elements.films.pressure import find_pressure, set_heights, set_supply
+from rom.mbs.elements.films.pressure import find_pressure, outflow, peak, set_heights, set_supply
 from rom.mbs.elements.films.slopes import TORQUE_ANSWER, set_answers, set_slopes
+from rom.mbs.elements.films.tabulated import in_table, read_answers, read_slopes, thinnest_of
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import pair_tangents, residuals, tangents
@@ -82,6 +83,10 @@ class Journals(Table):
         amplitude: (k, 2 m) of the functions, and their rates, in clearances.
         pressed: (m, 12) changes of the forces on a bore by motions, or velocities, of both markers.
         change: (5 + m,) imaginary steps of the answers.
+        number: (k,) of the table that the film is read from; -1 of one that is solved.
+        nodes: (n_tables, n, 12) of the tables.
+        read: (4, 12) what was read last, and its derivatives.
+        flow, peak: (k,) oil that leaves and largest pressure, in units of the film.
     """
 
     i: Index1
@@ -100,6 +105,11 @@ class Journals(Table):
     amplitude: Scratch2
     pressed: Scratch2
     change: Scratch1
+    number: Index1
+    nodes: Array3
+    read: Scratch2
+    flow: Scratch1
+    peak: Scratch1
 
 
 @inner
@@ -114,15 +124,8 @@ def oil_viscosity(oil, celsius):
 @inner
 def side_flow(journals, k):
     """Oil that leaves at the ends [m^3/s]."""
-    films = journals.films
-    nt, nz = films.shape[k]
-    total = 0.0
-    for i in range(nt):
-        face = i * (nz + 1)
-        total += films.leaks[k, face] * films.P[k, i * nz]
-        total += films.leaks[k, face + nz] * films.P[k, i * nz + nz - 1]
-    size = films.size[k]
-    return total * size[IMAGES] * size[CLEARANCE] * size[RADIUS] * size[LENGTH] / 12
+    size = journals.films.size[k]
+    return journals.flow[k] * size[IMAGES] * size[CLEARANCE] * size[RADIUS] * size[LENGTH] / 12
 
 
 @inner
@@ -160,11 +163,16 @@ def warming(journals, k):
 @inner
 def solved(journals, k, celsius):
     """Solve film k at a temperature; says whether there is one."""
+    films = journals.films
     journals.viscosity[k] = oil_viscosity(journals.oil[k], celsius)
-    set_supply(journals.films, k, journals.viscosity[k])
-    if find_pressure(journals.films, k) < 0:
+    if journals.number[k] >= 0:
+        read_answers(journals, k)
+        return True
+    set_supply(films, k, journals.viscosity[k])
+    if find_pressure(films, k) < 0:
         return False
-    set_answers(journals.films, k)
+    set_answers(films, k)
+    journals.flow[k], journals.peak[k] = outflow(films, k), peak(films, k)
     return True
 
 
@@ -245,19 +253,28 @@ def set_state(journals, k, place):
 @inner
 def largest_pressure(journals, k):
     """Largest pressure of film k [Pa]."""
-    films, top = journals.films, 0.0
-    for cell in range(films.shape[k, 0] * films.shape[k, 1]):
-        top = max(top, films.P[k, cell])
-    return top * journals.viscosity[k] * (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
+    films = journals.films
+    unit = journals.viscosity[k] * (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
+    return journals.peak[k] * unit
+
+
+@inner
+def set_thinnest(journals, k):
+    """Set the thinnest film of film k; says whether it is one, and in its table if it has one."""
+    films = journals.films
+    if journals.number[k] >= 0:
+        thinnest, known = thinnest_of(films, k), in_table(films, k)
+    else:
+        thinnest, known = set_heights(films, k), True
+    journals.thinnest[k] = films.size[k, CLEARANCE] * thinnest
+    return known and journals.thinnest[k] > journals.oil[k, ROUGHNESS]
 
 
 @inner
 def film_of(s, W, journals, k):
     """Solve film k where its journal is now; says whether there is one."""
     celsius = recall(s, W, journals, k)
-    thinnest = journals.films.size[k, CLEARANCE] * set_heights(journals.films, k)
-    journals.thinnest[k] = thinnest
-    if not thinnest > journals.oil[k, ROUGHNESS]:
+    if not set_thinnest(journals, k):
         return False
     if celsius == celsius:  # it remembers one
         found = solved(journals, k, celsius)
@@ -344,6 +361,15 @@ def scale_pair(W, c):
             W.Q[p, q] *= c
 
 
+@inner
+def set_film_slopes(journals, k):
+    """Set the derivatives of the answers of film k."""
+    if journals.number[k] >= 0:
+        read_slopes(journals, k)
+    else:
+        set_slopes(journals.films, k)
+
+
 @tangents.of(Journals)
 def film_tangents(s, W, journals, _lam, ck, cc):
     """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
@@ -352,7 +378,7 @@ def film_tangents(s, W, journals, _lam, ck, cc):
             continue
         pair = journals.i[k], journals.j[k]
         by_rate = FIRST_OPENED + journals.films.functions.shape[2]
-        set_slopes(journals.films, k)
+        set_film_slopes(journals, k)
         for p in range(12):
             set_column(W, journals, k, p, True)
         scale_pair(W, ck)
@@ -377,7 +403,7 @@ def film_pair_tangents(_s, W, journals, ck, cc, first):
         W.pairs[first + k] = 0.0
         if not journals.largest[k] >= 0.0 or journals.films.n_functions[k] > 0:
             continue
-        set_slopes(journals.films, k)
+        set_film_slopes(journals, k)
         for by_position in range(2):
             for q in range(6):
                 set_column(W, journals, k, q, by_position == 1)

@@ -284,3 +284,24 @@ def set_pressure(films, k):
             carries = films.active[k, cell] == 1 or films.fixed[k, cell] == 1
             films.P[k, cell] = u if carries else 0.0
             films.fill[k, cell] = 1.0 if carries or films.law[k] != JFO else 1.0 + u
+
+
+@inner
+def outflow(films, k):
+    """Oil that leaves at the ends, in units of the film."""
+    nt, nz = films.shape[k]
+    total = 0.0
+    for i in range(nt):
+        face = i * (nz + 1)
+        total += films.leaks[k, face] * films.P[k, i * nz]
+        total += films.leaks[k, face + nz] * films.P[k, i * nz + nz - 1]
+    return total
+
+
+@inner
+def peak(films, k):
+    """Largest pressure, in units of the film."""
+    top = 0.0
+    for cell in range(films.shape[k, 0] * films.shape[k, 1]):
+        top = max(top, films.P[k, cell])
+    return top

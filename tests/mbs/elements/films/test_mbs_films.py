@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 import rom
-from cases.mbs.films import held_rotor
+from cases.mbs.films import MOTION, NONE, ORIGIN, RATE, SPEED, VISCOSITY, Pair, held_rotor
 from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.tangents import difference, shifted
 from rom.components.journal_bearing import film
@@ -17,12 +17,7 @@ from rom.mbs.elements.films.journals import FIRST_CONTENT, KNOWN, TIME
 from rom.mbs.elements.films.slopes import solve_film
 from rom.rotation import matrix
 
-ORIGIN, NONE, UPRIGHT = (0.0, 0.0, 0.0), np.zeros(0), np.eye(3)
 GROOVES = [Groove(1.2, 0.3, 1e5, share=0.7)]
-VISCOSITY, SPEED = 0.03, 100.0
-MOTION = np.array([0.4e-4, 0.3e-4, 1e-4, -2e-4])
-RATE = np.array([5e-4, 2e-4, -0.3e-2, 0.4e-2])
-STILL = np.zeros(6)
 LAWS = ["none", "reynolds", "jfo"]
 
 
@@ -35,52 +30,6 @@ def turned_by(vector):
     angle = np.linalg.norm(vector)
     axis = np.asarray(vector) / angle if angle else np.array([0.0, 0.0, 1.0])
     return matrix([np.cos(angle / 2), *np.sin(angle / 2) * axis])
-
-
-def leaning(motion):
-    """(3, 3) axes of a journal, with the slopes that the motion says."""
-    a, b = motion[3], -motion[2]
-    n = np.array([a, b, 1.0]) / np.linalg.norm([a, b, 1.0])
-    x = np.array([1.0, 0.0, 0.0]) - n[0] * n
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(n, x), n])
-
-
-class Pair:
-    """Journal and bush free in space; the journal moves in the bush as told."""
-
-    def __init__(self, b, A=UPRIGHT, at=ORIGIN, motion=MOTION, along=0.0, **more):
-        mech = rom.Mechanism(gravity=ORIGIN)
-        own = {"mass": 2.0, "inertia": (0.01, 0.02, 0.03)}
-        self.A, self.at, self.B = A, np.asarray(at), A @ leaning(motion)
-        self.arm = A @ [*motion[:2] + along * motion[[3, 2]] * [1, -1], along]
-        journal = mech.add_rigid("journal", at=at + self.arm, orientation=self.B, **own)
-        bush = mech.add_rigid("bush", at=at, orientation=A, **own)
-        given = {"axis": A[:, 2], "reference": A[:, 0], "bearing": b, "oil": VISCOSITY} | more
-        mech.journal_bearing("film", journal.marker(ORIGIN), bush.marker(ORIGIN), **given)
-        # the axis of the journal is not that of the bush: as if the bodies had come there later
-        element = mech.journal_bearings["film"]
-        element.axes[0] = [0.0, 0.0, 1.0]
-        self.mech, self.motion, self.along = mech, motion, along
-        self.packed, self.W = prepared(mech)
-        (self.table,) = self.packed.elements.values()
-
-    def velocities(self, rate=RATE, spin=SPEED, bush=STILL):
-        """(12,) of journal and bush, the latter with (6,) velocity and angular velocity."""
-        n, da, db = self.B[:, 2], rate[3], -rate[2]
-        slope = np.array([self.motion[3], -self.motion[2], 1.0])
-        dn = np.array([da, db, 0.0]) - (slope @ [da, db, 0.0]) / (slope @ slope) * slope
-        omega = np.cross(n, self.A @ dn / np.linalg.norm(slope))
-        omega += (spin - omega @ self.A[:, 2]) / (n @ self.A[:, 2]) * n
-        move = self.A @ [*rate[:2] + self.along * np.array([da, db]), 0.0]
-        v, w = bush[:3], bush[3:]
-        move, omega = v + np.cross(w, self.arm) + move, w + omega
-        return np.concatenate([move, self.B.T @ omega, v, self.A.T @ w])
-
-    def loads(self, v):
-        """(2, 6) loads on journal and bush, world, and the power lost."""
-        residual_at(self.packed.system, self.W, self.packed.q, v, 0 * v, NONE)
-        return self.W.wrench[[self.table.i[0], self.table.j[0]]].copy(), self.W.power[2]
 
 
 # --- the film of the component, seen from anywhere ---
@@ -224,13 +173,15 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
 # --- tangents ---
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [*LAWS, "table"])
 @pytest.mark.parametrize("spin", [SPEED, -SPEED])
 @pytest.mark.parametrize("passed", [0.0, 1e-3])
 def test_tangents_are_the_derivatives(law, spin, passed):
     """Of positions and velocities, for a bush that moves and turns, with and without memory."""
     rng = np.random.default_rng(3)
-    pair = Pair(bearing(law), turned_by(rng.normal(size=3)), (0.3, -0.2, 0.1), along=0.01)
+    b = bearing("none", (40, 3), [Groove(1.2)]) if law == "table" else bearing(law)
+    pair = Pair(b, turned_by(rng.normal(size=3)), (0.3, -0.2, 0.1), along=0.01,
+                tabulated=law == "table")  # fmt: skip
     v = pair.velocities(spin=spin, bush=0.2 * rng.normal(size=6))
     packed, W = pair.packed, pair.W
     pair.loads(v)

@@ -1,0 +1,201 @@
+"""Films read from tables: as those that are solved, to what tables and small tilts leave out."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.films import ORIGIN, Pair, held_rotor, resting
+from rom.config.mechanism import read_mechanism
+from rom.errors import ConfigError, SolverError
+from rom.mbs import Groove, JournalBearing, iso_vg, multilobe
+from rom.mbs.elements.films.tabulated import MAX_TILT_SHARE
+
+SIDES = [Groove(np.pi / 2, 0.35), Groove(-np.pi / 2, 0.35)]
+SPEED, OIL, CLEARANCE = 100.0, 0.03, 1e-4
+
+
+def bearing(law="reynolds", grooves=SIDES, **more):
+    return JournalBearing(0.1, 0.05, CLEARANCE, grooves, law, cells=(60, 4), **more)
+
+
+def loads(b, motion, rate, spin, **more):
+    """(6,) of the journal that moves so, the power, and what belongs to the film."""
+    pair = Pair(b, motion=motion, **more)
+    (found, _), power = pair.loads(pair.velocities(rate, spin))
+    return found, power, pair.table
+
+
+def random_state(rng, tilt):
+    """Motion, rate and spin; tilts close an end by that share of the film at most."""
+    e, around = np.sqrt(rng.uniform(0, 0.9**2)), rng.uniform(0, 2 * np.pi)
+    lean = 2 * tilt * (1 - e) * CLEARANCE / 0.05
+    turn = rng.uniform(0, 2 * np.pi)
+    place = e * CLEARANCE * np.array([np.cos(around), np.sin(around)])
+    rate = np.array([*rng.normal(size=2) * 5e-3, *rng.normal(size=2) * tilt * 5e-2])
+    motion = np.array([*place, lean * np.cos(turn), lean * np.sin(turn)])
+    return motion, rate, rng.normal() * SPEED
+
+
+@pytest.mark.parametrize("b", [bearing(), bearing("none", aligned=True)], ids=["wide", "aligned"])
+def test_a_table_has_the_film_that_is_solved(b):
+    """Forces, friction and power; oil that leaves, and the largest pressure but for some places."""
+    rng, off, peaks = np.random.default_rng(4), [], []
+    for _ in range(40):
+        state = random_state(rng, 0.0)
+        known, lost, solved = loads(b, *state)
+        found, power, read = loads(b, *state, tabulated=True)
+        scale = [np.linalg.norm(known[:2])] * 2 + [abs(known[5])]
+        off.append(np.abs(known - found)[[0, 1, 5]] / scale)
+        assert power == pytest.approx(lost, rel=5e-3)
+        assert read.thinnest[0] == pytest.approx(solved.thinnest[0], rel=0.05)  # between cells
+        peaks.append(abs(read.largest[0] / solved.largest[0] - 1))
+        assert read.flow[0] == pytest.approx(solved.flow[0], rel=1e-2)
+    off = np.array(off)
+    assert np.median(off, axis=0).max() < 1e-3
+    assert off.max() < 1e-2
+    # one peak takes over from another
+    assert np.median(peaks) < 5e-3 and max(peaks) < 0.15
+
+
+def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
+    """Forces by the square of a tilt, moments by its cube."""
+    b, ratios, share = bearing("none"), [], []
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        motion, rate, spin = random_state(rng, 0.2)
+        off = []
+        for tilt in (1.0, 0.5):
+            state = motion * [1, 1, tilt, tilt], rate * [1, 1, tilt, tilt], spin
+            upright = motion * [1, 1, 0, 0], rate * [1, 1, 0, 0], spin
+            known, flat = (loads(b, *one)[0] for one in (state, upright))
+            found = loads(b, *state, tabulated=True)[0]
+            off.append([np.linalg.norm(known[:2] - flat[:2]),
+                        np.linalg.norm((known - found)[3:5])])  # fmt: skip
+            share.append(np.linalg.norm((known - found)[3:5]) / np.linalg.norm(known[3:5]))
+            assert_allclose(found[:2], flat[:2], atol=2e-3 * np.linalg.norm(flat[:2]))
+        ratios.append(np.divide(*off))
+    assert_allclose(np.median(ratios, axis=0), [4.0, 8.0], rtol=0.15)
+    assert np.median(share) < 0.05
+
+
+def test_an_end_that_comes_too_close_leaves_the_table():
+    """By the share of the film at its middle that is said, and beyond an eccentricity of 0.99."""
+    lean = 2 * CLEARANCE / 0.05 * (1 - 0.5)
+    for share in (0.98 * MAX_TILT_SHARE, 1.02 * MAX_TILT_SHARE):
+        motion = np.array([0.5 * CLEARANCE, 0.0, 0.0, share * lean])
+        found, _, film = loads(bearing(), motion, np.zeros(4), SPEED, tabulated=True)
+        assert np.isfinite(found).all() == (share < MAX_TILT_SHARE)
+        assert film.thinnest[0] == pytest.approx(0.5 * CLEARANCE * (1 - share), rel=1e-9)
+    mech = held_rotor(bearing(), (1e5, 0.0), speed=SPEED, oil=1e-3, tabulated=True)
+    with pytest.raises(SolverError, match=r"'film'.* leaves its table"):
+        rom.simulate(mech, t_end=0.1, dt=1e-4, progress=False)
+
+
+def test_a_rotor_rests_and_is_stiff_as_on_the_film_that_is_solved():
+    """Lund and Thomsen's bearing of two grooves: their table is held by the film itself."""
+    for W in (300.0, 3000.0, 2e4):
+        b, found = bearing(aligned=True), []
+        for tabulated in (False, True):
+            mech = held_rotor(b, (W, 0.0), speed=SPEED, oil=OIL, tabulated=tabulated)
+            state, K, C = resting(mech, SPEED)
+            found.append((state.q[:2] / CLEARANCE, K * CLEARANCE / W, C * CLEARANCE * SPEED / W))
+        (place, K, C), (same, K_table, C_table) = found
+        assert_allclose(same, place, atol=4e-3)
+        # whose slopes jump as cells lose their pressure, by more than they are off from fine cells
+        assert_allclose(K_table, K, atol=0.03 * np.abs(K).max())
+        assert_allclose(C_table, C, atol=0.06 * np.abs(C).max())
+
+
+def test_a_motion_is_that_of_the_film_that_is_solved():
+    """A rotor that is let go beside its rest, to a thousandth of the clearance."""
+    moved = []
+    for tabulated in (False, True):
+        mech = held_rotor(bearing(), (3000.0, 0.0), speed=SPEED, oil=OIL, tabulated=tabulated)
+        sol = rom.simulate(mech, t_end=0.2, dt=2e-4, progress=False)
+        moved.append(sol.journal_bearing("film"))
+    assert np.ptp(moved[0].motion[:, 1]) > 0.2 * CLEARANCE
+    assert_allclose(moved[1].motion, moved[0].motion, atol=2e-3 * CLEARANCE)
+    assert_allclose(moved[1].power, moved[0].power, rtol=3e-3)
+
+
+def test_what_leaves_two_bodies_turns_into_heat():
+    """Momentum stays, and what they lose is what the table says of the power."""
+    mech = rom.Mechanism(gravity=ORIGIN)
+    own = {"mass": 2.0, "inertia": (0.01, 0.02, 0.03)}
+    journal = mech.add_rigid("journal", at=(0.3e-4, 0, 0), omega=(0, 0, 100.0), **own)
+    bush = mech.add_rigid("bush", at=ORIGIN, omega=(0, 0, -20.0), **own)
+    mech.journal_bearing("film", journal.marker(ORIGIN), bush.marker(ORIGIN), axis=(0, 0, 1),
+                         bearing=bearing(), oil=0.01, tabulated=True)  # fmt: skip
+    sol = rom.simulate(mech, t_end=0.02, dt=1e-5, method="bdf", save_every=20, progress=False)
+    p, L = sol.momentum
+    assert_allclose(p, 0.0, atol=1e-10)
+    assert_allclose(L, np.tile(L[0], (len(L), 1)), atol=1e-6 * np.abs(L[0]).max())
+    assert sol.energy.damping[-1] > 1.0
+    E = sol.energy.kinetic + sol.energy.damping
+    assert_allclose(E, E[0], rtol=1e-6)
+
+
+def test_the_temperature_is_that_of_the_film_that_is_solved():
+    oil, found = iso_vg(46), []
+    for tabulated in (False, True):
+        mech = held_rotor(bearing(), (3000.0, 0.0), speed=300.0, oil=oil, inlet=40.0,
+                          tabulated=tabulated)  # fmt: skip
+        state = rom.equilibrium(mech, spin={"turn": 300.0})
+        found.append(rom.mbs.snapshot(mech, state).journal_bearing("film"))
+    assert found[0].temperature[0] > 42.0
+    assert found[1].temperature[0] == pytest.approx(found[0].temperature[0], abs=0.02)
+
+
+# --- what is refused ---
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    ({"bearing": bearing("jfo")}, "'main' conserves its oil"),
+    ({"bearing": bearing(grooves=[Groove(0.0, 0.3, 1e5)])}, "'main' has grooves with pressure"),
+    ({"bearing": bearing(preload=0.3)}, "'main' has a bore that is not round"),
+    ({"bearing": bearing(bore=multilobe(3, 0.2))}, "'main' has a bore that is not round"),
+    ({"bearing": bearing(bore=lambda angle: 0.9 + 0 * angle)}, "'main' has a bore that is not"),
+    ({"elastic_bush": True}, "bush of bearing 'main' bends"),
+])  # fmt: skip
+def test_films_that_are_more_than_a_table_are_refused(given, words):
+    mech = rom.Mechanism(gravity=ORIGIN)
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
+    with pytest.raises(ConfigError, match=words):
+        mech.journal_bearing("main", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN),
+                             axis=(0, 0, 1), oil=OIL, tabulated=True,
+                             **{"bearing": bearing()} | given)  # fmt: skip
+
+
+FILE = """
+[bodies.shaft]
+mass = 1
+inertia = [0.1, 0.1, 0.1]
+at = [0, 0, 0]
+markers = { middle = [0, 0, 0] }
+[journal_bearings.film]
+between = ["shaft.middle", { ground = [0, 0, 0] }]
+axis = [0, 0, 1]
+oil = { viscosity = 0.03 }
+tabulated = true
+bearing = { diameter = "0.1 m", length = "50 mm", clearance = "0.1 mm", cells_around = 60, \
+cells_along = 4, cavitation = "reynolds", grooves = { one = { angle = 1.5707963267948966, \
+width = 0.35 }, two = { angle = -1.5707963267948966, width = 0.35 } } }
+[simulation]
+t_end = 1
+"""
+
+
+def test_a_file_asks_for_a_table(tmp_path):
+    """The same as from Python, for a bearing of twice the size, too; and with its line if not."""
+    (tmp_path / "m.toml").write_text(FILE)
+    made = read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
+    mech = rom.Mechanism(gravity=ORIGIN)
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
+    twice = JournalBearing(0.2, 0.1, 1e-4, SIDES, cells=(60, 4))
+    mech.journal_bearing("film", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN), axis=(0, 0, 1),
+                         bearing=twice, oil=OIL, tabulated=True)  # fmt: skip
+    assert_allclose(made.table, mech.journal_bearings["film"].table, rtol=1e-9, atol=1e-12)
+    (tmp_path / "m.toml").write_text(FILE.replace('"reynolds"', '"jfo"'))
+    with pytest.raises(ConfigError, match=r"m.toml:7: bearing 'film' conserves its oil"):
+        read_mechanism(tmp_path / "m.toml").mechanism()
