@@ -11,7 +11,7 @@ from scipy.optimize import fsolve
 from scipy.special import mathieu_a, mathieu_b
 
 import rom
-from rom.errors import ConfigError, SolverError
+from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.periodic.family import Family
 from rom.mbs.analysis.periodic.flow import Flow
 
@@ -182,6 +182,7 @@ def test_limit_cycles_are_followed_with_their_periods():
     assert path.p[-1] == pytest.approx(1.5)
     assert path.period[-1] == pytest.approx(period, rel=2e-3)
     assert path.stable.all() and all(x.free for x in path.motions) and not path.critical
+    assert max(x.gap for x in path.motions) < 2e-5
 
 
 def swinging(torque):
@@ -240,6 +241,19 @@ def test_a_step_that_halves_or_doubles_an_unknown_period_is_refused(change):
         family.moved(at, step, 1.0)
 
 
+def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
+    """As the path is followed, where shorter ones are tried then."""
+    family, motion = family_at(3.0)
+    at = family.member(motion, 3.0)
+
+    def torn(*_):
+        raise ModelError("joints contradict each other.")
+
+    monkeypatch.setattr(Flow, "moved", torn)
+    with pytest.raises(SolverError, match="no start satisfies the joints: joints contradict"):
+        family.moved(at, np.zeros(2 * family.scale.size + 1), 3.0)
+
+
 @pytest.mark.parametrize(("x", "which"), [(0.0, 0), (1.0, -1)])
 def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which):
     """After some periods from there; the smallest and the largest of harmonic balance."""
@@ -247,11 +261,11 @@ def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which)
     begun = rom.simulate(across(w), t_end=1e-6, dt=1e-7).final
     q = begun.q + np.array([x, 0, 0, 0, 0, 0, 0])
     start = replace(begun, t=0.0, q=q, v=0 * begun.v, algorithmic=None, memory=None)
-    path = rom.periodic_path(across, (w, 1.51), period=lambda w: 2 * np.pi / w, steps=100,
+    path = rom.periodic_path(across, (w, 1.6), period=lambda w: 2 * np.pi / w, steps=100,
                              start=start, settle=25, n=2)  # fmt: skip
     phases = CubicSpline(exact.x, exact(exact.x)[:, 0] - w).roots(extrapolate=False)
     amplitudes = np.sort(exact(phases)[:, 1])
-    assert len(amplitudes) == 3 and path.stable[0]
+    assert len(amplitudes) == 3 and path.stable[0] and len(path.p) == 2
     assert path.of(amplitude)[0] == pytest.approx(amplitudes[which], rel=0.06)
 
 
