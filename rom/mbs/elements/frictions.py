@@ -50,8 +50,8 @@ def friction(  # noqa: PLR0913  one keyword per property
     Args:
         name: name of the friction.
         joint: joint with a coordinate.
-        transition_speed: speed over which the sign changes [m/s or rad/s]; implicit steps that
-            change the speed by much more do not converge.
+        transition_speed: speed over which the sign changes [m/s or rad/s]; implicit steps
+            that change the speed by much more take many corrections.
         coulomb: level that is always there [N or N m].
         mu: coefficient of friction [1].
         radius: at which friction acts on an angle, that of the pin [m]; none for a

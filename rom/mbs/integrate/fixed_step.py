@@ -181,7 +181,7 @@ def _state(record: Record, W: Work, step: Step) -> State:
 def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> SolverError:
     """The error that says why a step did not succeed."""
     what = {
-        alpha.FAILED: f"Newton did not converge in {alpha.MAX_PASSES} corrections",
+        alpha.FAILED: f"Newton did not converge in {step.count[alpha.STEP_PASSES]} corrections",
         alpha.NOT_FINITE: "the motion is no longer finite",
         alpha.SINGULAR: "the iteration matrix is singular",
     }[int(answer)]

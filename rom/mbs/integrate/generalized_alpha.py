@@ -60,6 +60,10 @@ FEW_CORRECTIONS, CORRECTION_SIZE = 4, 60
 # what a corrector pass says
 UNFINISHED, CONVERGED, FAILED, NOT_FINITE, SINGULAR, NEEDS_LAWS = 0, 1, 2, 3, 4, 5
 MAX_PASSES = 25
+# passes behind these, in which a correction is halved as long as it leaves forces and gaps more out
+# of balance than before: where friction turns round, and teeth, stops or films come and go, whole
+# ones go round in a circle. Share of what they promise by which they have to improve it
+MAX_CAUTIOUS_PASSES, BALANCE_SHARE = 35, 1e-4
 MAX_HALVINGS = 24  # of a correction, from the size of a mechanism down to an oil film
 ROUND_OFF = 4e-16
 # share of the round-off of positions that increments are brought to: velocities and accelerations
@@ -228,6 +232,8 @@ def correct(s, W, step, rank):
     """One Newton correction for the residual at hand; says how it went."""
     h, beta, gamma, _, _ = step.method
     n, bh2, lead = step.v.size, beta * h * h, beta * h / gamma
+    if step.count[STEP_PASSES] >= MAX_PASSES:
+        step.size[5] = imbalance(s, W, step)
     for i in range(n):
         W.rhs[i] = -bh2 * W.residual[i]
     if step.count[BOTH_LEVELS] == 1:
@@ -272,6 +278,40 @@ def may_halve(step):
 
 
 @inner
+def imbalance(s, W, step):
+    """Increment of free masses under the forces left over, and the largest gap.
+
+    Relative to the size of the mechanism, as `increment_norm`.
+    """
+    total, gap, bh2 = 0.0, 0.0, step.method[1] * step.method[0] ** 2
+    for i in range(W.residual.size):
+        if W.weight[i] > 0.0:  # forces may take energy up as fast as inertia
+            total += W.residual[i] ** 2 / W.weight[i]
+    for k in range(step.lam.size):
+        gap = max(gap, row_gap(s, W, step, k))
+    return bh2 * math.sqrt(total) / (mass_factor(step) * step.size[3] * step.size[1]) + gap
+
+
+@inner
+def most_passes(step):
+    """Corrections behind which a step fails."""
+    return MAX_PASSES + (MAX_CAUTIOUS_PASSES if may_halve(step) else 0)
+
+
+@inner
+def overshoots(s, W, step):
+    """Whether one correction more than usual left more out of balance than it found.
+
+    Source:
+        Armijo, Pacific J. Math. 16 (1966) 1.
+    """
+    if step.count[STEP_PASSES] <= MAX_PASSES:
+        return False
+    part = 0.5 ** step.count[HALVINGS]
+    return imbalance(s, W, step) > (1.0 - BALANCE_SHARE * part) * step.size[5]
+
+
+@inner
 def all_finite(x):
     """Whether no entry is infinite or NaN."""
     for i in range(x.size):
@@ -284,7 +324,7 @@ def all_finite(x):
 def halve_correction(s, W, step):
     """Take half of the last correction back, or of what was predicted beyond the velocity.
 
-    It led where forces have no value: through an oil film.
+    It led where forces have no value, as through an oil film, or are farther from balance.
     """
     h, beta, gamma, _, _ = step.method
     if step.count[STEP_PASSES] == 0 and step.count[HALVINGS] == 0:
@@ -331,9 +371,9 @@ def verdict(W, step, size, gap):
         return CONVERGED
     if shrink > 0.5 and size < 100 * floor and step.count[STEP_PASSES] > 3:
         return CONVERGED
-    if step.count[STEP_PASSES] >= MAX_PASSES:
+    if step.count[STEP_PASSES] >= most_passes(step):
         return FAILED
-    if last > 0.0 and shrink > 0.2:
+    if (last > 0.0 and shrink > 0.2) or step.count[STEP_PASSES] >= MAX_PASSES:
         step.count[HAS_FACTOR] = 0
     return UNFINISHED
 
@@ -391,9 +431,12 @@ def advance(s, W, step, rank, signals, every, out):
                 return NEEDS_LAWS
         step.count[LAWS_ASKED] = 0
         residual(s, W, step.q1, step.v1, step.vd1, step.lam1)
-        if may_halve(step) and not all_finite(W.residual):
-            halve_correction(s, W, step)
-            continue
+        if not all_finite(W.residual) or overshoots(s, W, step):
+            if may_halve(step):
+                halve_correction(s, W, step)
+                continue
+            if step.count[STEP_PASSES] > MAX_PASSES:
+                return FAILED
         step.count[HALVINGS] = 0
         if not has_matrix(s, W, step, rank, c):
             return SINGULAR

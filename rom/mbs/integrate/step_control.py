@@ -49,7 +49,9 @@ TOO_SHORT, SINGULAR_MOTION, CONTRADICTED = 10, 11, 12
 MAX_STEP_GROWTH, MIN_STEP_GROWTH, ERROR_AIM = 2.0, 0.2, 0.8
 ERROR_MARGIN = 3.0  # errors of early steps grow on the way to the end
 MIN_WORTHWHILE_GROWTH = 1.3  # of a step that justifies a new factorisation
-MIN_STEP_RATIO = 1e-12  # of the smallest step to the duration
+# of the smallest step to the time reached, beside which shorter ones have no digits; at the start,
+# where a first step may be as much too long, its square to the duration
+MIN_STEP_RATIO = 1e-12
 LEAST_ERROR = 1e-6  # that the next length is chosen by
 MAX_INTERVAL = 1 << 62  # in steps, of what the method itself is to save: nothing
 
@@ -315,7 +317,8 @@ def reject(now, back):
     count[ANSWER], count[ROW], count[KNOWN], count[REJECTED] = answer, row, known, rejected + 1
     number[ERROR], number[FASTEST], count[AT_HAND] = error, fastest, 0
     ask_for(now, h * max(MIN_STEP_GROWTH, ERROR_AIM / math.sqrt(error)), TRIES)
-    return TOO_SHORT if number[WANTED] < MIN_STEP_RATIO * number[DURATION] else CONVERGED
+    least = MIN_STEP_RATIO * max(abs(number[TIME]), MIN_STEP_RATIO * number[DURATION])
+    return TOO_SHORT if number[WANTED] < least else CONVERGED
 
 
 @inner

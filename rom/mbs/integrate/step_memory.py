@@ -48,7 +48,8 @@ def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tupl
     elif not goes_on and (bdf or state.algorithmic is None):
         state, jerk = measured(record, W, state, forces, h)
     zeros = [np.zeros(k) for k in (state.q.size, n, n, state.lam.size, n)]
-    size = np.array([0.0, record.packed.length, settings.tolerance, record.packed.mass, 0.0])
+    size = np.zeros(6)
+    size[1:4] = record.packed.length, settings.tolerance, record.packed.mass
     v, before, rise = state.v, state.algorithmic, np.zeros(n) if jerk is None else jerk
     if goes_on:
         before = v

@@ -121,8 +121,9 @@ class Step(Table):
             began, whether Python forces are to be asked for, whether they have been, whether
             constraints hold for positions and velocities both, corrections with the factorisation
             at hand, halvings of the last correction.
-        size: (5,) norm of the last increment, length of the mechanism, tolerance, total mass,
-            largest gap in a joint before the last increment.
+        size: (6,) norm of the last increment, length of the mechanism, tolerance, total mass,
+            largest gap in a joint before the last increment, imbalance before it once there were
+            many.
         method: (5,) h, beta, gamma, alpha_m, alpha_f.
         bdf: (order + 1,) weights of the present, last and earlier values in the derivative of
             BDF, three zeros for generalised-alpha. With three weights ``a`` is the last but one

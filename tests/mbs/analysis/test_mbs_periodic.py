@@ -111,6 +111,13 @@ def test_the_limit_cycle_of_van_der_pol():
     assert_allclose(cycle.y[:2, -1], run.y[:, -1], atol=1e-8)
 
 
+@pytest.mark.parametrize("guess", [5.0, 10.0])
+def test_a_period_that_is_guessed_badly_is_approached_in_parts(guess):
+    """Whole corrections would make it negative."""
+    motion = rom.periodic_motion(cycling(1.0), guess=guess, steps=100)
+    assert motion.period == pytest.approx(6.6632868593, rel=1e-3)
+
+
 def pendulum(angle=0.0, shaken=None, damping=0.0, gravity=9.81):
     """A point mass on a rod of 1 m, its pivot shaken along z by a function."""
     mech = rom.Mechanism(gravity=(0, 0, -gravity))

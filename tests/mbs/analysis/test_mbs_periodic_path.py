@@ -1,5 +1,7 @@
 """Paths of motions that repeat, against harmonic balance and the borders of stability."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +11,9 @@ from scipy.optimize import fsolve
 from scipy.special import mathieu_a, mathieu_b
 
 import rom
-from rom.errors import ConfigError, SolverError
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.analysis.periodic.family import Family
+from rom.mbs.analysis.periodic.flow import Flow
 
 X, Y, Z = np.eye(3)
 ORIGIN = (0, 0, 0)
@@ -178,6 +182,91 @@ def test_limit_cycles_are_followed_with_their_periods():
     assert path.p[-1] == pytest.approx(1.5)
     assert path.period[-1] == pytest.approx(period, rel=2e-3)
     assert path.stable.all() and all(x.free for x in path.motions) and not path.critical
+    assert max(x.gap for x in path.motions) < 2e-5
+
+
+def swinging(torque):
+    """A pendulum of which a torque makes a swing, with moments of its pin."""
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0, 0, -1),
+                         markers={"pin": (0, 0, 1)})  # fmt: skip
+    base = mech.ground.marker(ORIGIN)
+    mech.revolute("hinge", base, bob.marker("pin"), axis=Y)
+    mech.bushing("loss", base, bob.marker("pin"), stiffness=np.zeros(6),
+                 damping=(0, 0, 0, 0, 0.5, 0))  # fmt: skip
+    mech.torque("drive", bob.marker("pin"), lambda t: (0, torque * np.cos(2.0 * t), 0))
+    return mech
+
+
+def family_at(p, span=0.5):
+    """Motions of the pendulum near a torque, and the one there."""
+    motion = rom.periodic_motion(swinging(p), period=np.pi, steps=60)
+    scale = Flow(swinging(p), 0.0, np.pi, 60, 0.8).probe
+    still = 0.0 * scale
+    return Family(swinging, np.pi, motion, None, 60, 0.8, span, scale, still), motion
+
+
+def test_motions_change_with_the_parameter_as_differences_of_them_do():
+    (family, motion), d = family_at(3.0), 1e-4
+    newton, slope = family.corrections(family.member(motion, 3.0), 3.0)
+    one, two = (rom.periodic_motion(swinging(3.0 + x), period=np.pi, steps=60, start=motion).state
+                for x in (-d, d))  # fmt: skip
+    moved = family.flow(3.0, np.pi).apart(one, two) / (2 * d)
+    faster = (two.v - one.v) / (2 * d) * np.pi / (2 * np.pi)
+    turn, n = 4, moved.size  # about the hinge: the free one, of which the others follow
+    assert_allclose(slope[:n] * family.scale, moved, atol=1e-4 * np.abs(moved).max())
+    assert slope[n + turn] * family.scale[turn] == pytest.approx(faster[turn], rel=2e-3)
+    assert np.abs(moved[turn]) > 0.05 and np.abs(faster[turn]) > 0.02
+    assert np.abs(newton).max() < 1e-5 and slope[-1] == 0.0
+
+
+def test_steps_count_in_sizes_of_the_motion():
+    family, _ = family_at(3.0)
+    family.unit, step = 0.2, np.array([0.1, -0.3, 0.0])
+    assert family.size(step) == pytest.approx(1.5)
+    assert family.inner(step, 2 * step) == pytest.approx(2 * (0.5**2 + 1.5**2))
+
+
+@pytest.mark.parametrize("change", [-0.6, 1.2])
+def test_a_step_that_halves_or_doubles_an_unknown_period_is_refused(change):
+    motion = rom.periodic_motion(self_excited(1.0), guess=6.6, steps=60)
+    scale = Flow(self_excited(1.0), 0.0, motion.period, 60, 0.8).probe
+    family = Family(self_excited, None, motion, None, 60, 0.8, 1.0, scale, 0.0 * scale)
+    step = np.zeros(2 * scale.size + 1)
+    at = family.member(motion, 1.0)
+    step[-1] = 0.1
+    assert family.moved(at, step, 1.0).period == pytest.approx(1.1 * motion.period)
+    step[-1] = change
+    with pytest.raises(SolverError, match="period changes by too much"):
+        family.moved(at, step, 1.0)
+
+
+def test_a_step_that_no_joint_allows_is_one_that_is_too_long(monkeypatch):
+    """As the path is followed, where shorter ones are tried then."""
+    family, motion = family_at(3.0)
+    at = family.member(motion, 3.0)
+
+    def torn(*_):
+        raise ModelError("joints contradict each other.")
+
+    monkeypatch.setattr(Flow, "moved", torn)
+    with pytest.raises(SolverError, match="no start satisfies the joints: joints contradict"):
+        family.moved(at, np.zeros(2 * family.scale.size + 1), 3.0)
+
+
+@pytest.mark.parametrize(("x", "which"), [(0.0, 0), (1.0, -1)])
+def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which):
+    """After some periods from there; the smallest and the largest of harmonic balance."""
+    w = 1.5
+    begun = rom.simulate(across(w), t_end=1e-6, dt=1e-7).final
+    q = begun.q + np.array([x, 0, 0, 0, 0, 0, 0])
+    start = replace(begun, t=0.0, q=q, v=0 * begun.v, algorithmic=None, memory=None)
+    path = rom.periodic_path(across, (w, 1.6), period=lambda w: 2 * np.pi / w, steps=100,
+                             start=start, settle=25, n=2)  # fmt: skip
+    phases = CubicSpline(exact.x, exact(exact.x)[:, 0] - w).roots(extrapolate=False)
+    amplitudes = np.sort(exact(phases)[:, 1])
+    assert len(amplitudes) == 3 and path.stable[0] and len(path.p) == 2
+    assert path.of(amplitude)[0] == pytest.approx(amplitudes[which], rel=0.06)
 
 
 @pytest.mark.parametrize(("span", "more", "message"), [

@@ -12,6 +12,7 @@ from cases.mbs.geared_rotors import rigid_unit
 from rom.bench.units import as_mechanism
 from rom.components.journal_bearing import iso_vg
 from rom.errors import ModelError
+from rom.mbs.analysis.periodic import search
 from rom.mbs.analysis.periodic.derivatives import by_differences, by_steps, confirmed, follows
 from rom.mbs.analysis.periodic.flow import Flow
 from rom.mbs.analysis.periodic.shooting import Return
@@ -174,3 +175,85 @@ def test_derivatives_of_a_neighbour_count_in_the_coordinates_of_a_motion():
     assert kept.around(stranger) is None
     turned = replace(kept, Zq=np.roll(kept.Zq, 1, axis=0), Zv=np.roll(kept.Zv, 1, axis=0))
     assert turned.around(found) is None
+
+
+STIFFNESS, DAMPING, RATE = 4.0, 0.4, 1.3
+
+
+def pushed(force=1.0):
+    """A ball on springs in all directions, pushed along x."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
+    mech.bushing("springs", mech.ground.marker(ORIGIN), ball, stiffness=6 * (STIFFNESS,),
+                 damping=6 * (DAMPING,))  # fmt: skip
+    mech.force("push", ball, lambda t: (force * np.cos(RATE * t), 0, 0))
+    return mech
+
+
+def assert_closed_form(motion, force=1.0):
+    """The amplitude of a driven linear oscillator."""
+    wanted = force / np.hypot(STIFFNESS - RATE**2, DAMPING * RATE)
+    found = np.abs(motion.solution.position("ball")[:, 0]).max()
+    assert found == pytest.approx(wanted, rel=2e-3) and motion.gap < 1e-10
+
+
+def far(derivatives, factor):
+    """Derivatives with which corrections are longer by a factor, or lead away."""
+    B, E = derivatives.B, derivatives.E
+    return replace(derivatives, E=B + (E - B) / factor)
+
+
+def test_derivatives_of_steps_that_lead_away_give_way_to_differences(monkeypatch):
+    asked = []
+
+    def wrong(found):
+        asked.append(found)
+        return far(by_steps(found), -1.0)
+
+    monkeypatch.setattr(search, "by_steps", wrong)
+    assert_closed_form(rom.periodic_motion(pushed(), period=2 * np.pi / RATE, steps=100))
+    assert len(asked) == 1
+
+
+def limited(longest):
+    """Motions whose start cannot be moved by more, as where no state satisfies the joints."""
+    lengths, moved_by = [], search.moved_by
+
+    def move(found, y):
+        lengths.append(float(np.abs(y).max()))
+        if lengths[-1] > longest:
+            raise ModelError("too far.")
+        return moved_by(found, y)
+
+    return lengths, move
+
+
+def test_a_correction_whose_start_cannot_be_moved_is_halved(monkeypatch):
+    lengths, move = limited(0.05)
+    monkeypatch.setattr(search, "moved_by", move)
+    assert_closed_form(rom.periodic_motion(pushed(), period=2 * np.pi / RATE, steps=100))
+    assert lengths[0] > 0.1 and lengths[1] == pytest.approx(lengths[0] / 2)
+
+
+def test_derivatives_of_a_neighbour_that_lead_to_no_motion_are_renewed(monkeypatch):
+    T = 2 * np.pi / RATE
+    near = rom.periodic_motion(pushed(), period=T, steps=100)
+    near = replace(near, derivatives=far(near.derivatives, 1e6))
+    lengths, move = limited(1.0)
+    monkeypatch.setattr(search, "moved_by", move)
+    assert_closed_form(rom.periodic_motion(pushed(1.5), period=T, steps=100, start=near), 1.5)
+    assert min(lengths[: search.MAX_SHORTENINGS]) > 1.0
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0])
+def test_derivatives_of_a_neighbour_serve_as_long_as_they_lead_closer(monkeypatch, factor):
+    """Those of another force are exact, as springs are straight; then those of steps come first."""
+    asked, T = [], 2 * np.pi / RATE
+    near = rom.periodic_motion(pushed(), period=T, steps=100)
+    for name in ("by_steps", "by_differences"):
+        way = getattr(search, name)
+        monkeypatch.setattr(search, name, lambda x, way=way: asked.append((way, x.open)) or way(x))
+    start = replace(near, derivatives=far(near.derivatives, factor))
+    assert_closed_form(rom.periodic_motion(pushed(1.5), period=T, steps=100, start=start), 1.5)
+    assert asked[0][0] is by_steps
+    assert (asked[0][1] < 1e-5) == (factor == 1.0)

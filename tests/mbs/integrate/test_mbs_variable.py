@@ -20,6 +20,7 @@ from rom.mbs.integrate.simulation import simulate
 from rom.mbs.integrate.step_control import LENGTH, increment
 from rom.mbs.integrate.step_memory import across, shift_ahead
 from rom.mbs.kernels.work import workspace
+from rom.mbs.mechanism import Mechanism
 
 IMPLICIT = ["generalized-alpha", "bdf"]
 
@@ -212,3 +213,19 @@ def test_a_force_that_jumps_all_the_time_makes_the_step_too_small(method):
     ) as caught:
         simulate(mech, t_end=1.0, method=method, rtol=1e-6)
     assert caught.value.solution.t[-1] < 1.0
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_a_first_step_that_is_far_too_long_is_shortened_until_it_fits(method):
+    """A vibration of a millisecond in a run of a day: exp(-w D t) times a sine."""
+    w, D, x0, day = 1e4, 0.9, 0.2, 86400.0
+    mech = Mechanism(gravity=(0, 0, 0))
+    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=(1 + x0, 0, 0)).marker((0, 0, 0))
+    base = mech.ground.marker((0, 0, 0))
+    mech.prismatic("guide", base, mass, axis=(1, 0, 0))
+    mech.spring_damper("spring", base, mass, stiffness=w**2, damping=2 * D * w, free_length=1.0)
+    sol = simulate(mech, t_end=day, method=method, rtol=1.0, save_every=20)
+    fast, t = w * np.sqrt(1 - D**2), sol.t
+    exact = x0 * np.exp(-D * w * t) * (np.cos(fast * t) + D * w / fast * np.sin(fast * t))
+    assert_allclose(sol.position("mass")[:, 0] - 1.0, exact, atol=1e-6 * x0)
+    assert sol.statistics["shortest"] < 1e-12 * day

@@ -27,7 +27,7 @@ class Impact:
         impact_speed: at which that holds [m/s].
         mu: coefficient of friction at the touching point [1].
         transition_speed: sliding speed over which friction changes its sign [m/s]; implicit steps
-            that change the sliding speed by much more do not converge. Without effect with:
+            that change the sliding speed by much more take many corrections. Without effect with:
         tangential_stiffness: force of friction per way before it slips [N/m]; then what sticks
             rests, and remembers where. None for friction by the sliding speed alone.
         tangential_damping: of that spring [N s/m].
