@@ -16,7 +16,7 @@ import numpy as np
 import rom
 from rom import view
 from rom.components.gear_mesh import Correction, GearPair, stiffness_table
-from rom.components.journal_bearing import Groove, JournalBearing, film
+from rom.components.journal_bearing import Groove, JournalBearing
 
 options = argparse.ArgumentParser(description="two stages of gears on oil films")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
@@ -175,77 +175,23 @@ say(rom.audit(motion))
 
 # ## The pictures
 
-
-def on_path(stage):
-    """Where teeth touch: line by line, places (k, 3) and load per length (k,)."""
-    pair, x = PAIRS[stage], teeth[stage]
-    z, at = (Y, "input") if stage == "first stage" else (-Y, "middle")
-    right = np.array([1.0, 0, 0])
-    up = np.cross(z, right)
-    s, c = np.sin(pair.alpha), np.cos(pair.alpha)
-    middle = np.array([PLACE[at], -MIDDLE + (0.105 if at == "input" else 0.17), HEIGHT])
-    start = middle + pair.rb[0] * (c * right - s * up)
-    n = s * right + c * up
-    for place in np.unique(x.place.round(9)):
-        use = np.abs(x.place - place) < 1e-8
-        order = np.argsort(x.height[use])
-        height, load = (v[use][order] for v in (x.height, x.force / x.length))
-        yield start + place * n + height[:, None] * z, load
-
-
-def fence(line, heights, way):
-    """A wall on a line (k, 3) with heights (k,) [m] along a direction (3,) or (k, 3)."""
-    k = len(line)
-    top = line + heights[:, None] * way
-    quad = np.arange(k - 1)
-    triangles = [np.column_stack(x) for x in ((quad, quad + 1, quad + k),
-                                              (quad + 1, quad + k + 1, quad + k))]  # fmt: skip
-    return np.vstack([line, top]), np.vstack(triangles)
-
-
-def pressure(name):
-    """The oil pressure around a bush, outwards from it, and its largest [MPa]."""
-    shaft = FILMS[name]
-    bush, sign = BUSHES[shaft], np.sign(SPINS[shaft])
-    p = film(bush, films[name].motion[0], speed=abs(SPINS[shaft]), viscosity=OIL).pressure
-    p = p[:, p.shape[1] // 2]
-    angle = 2 * np.pi * np.arange(p.size + 1) / p.size
-    way = np.column_stack([np.cos(angle), 0 * angle, -sign * np.sin(angle)])
-    y = 0.101 * (1 if name.endswith("back") else -1)
-    line = np.array([PLACE[shaft], y, HEIGHT]) + (0.5 * DIAMETER[shaft] + 0.002) * way
-    return fence(line, 0.012e-6 * np.append(p, p[0]), way)
-
-
-def solid(name, turned=0.0):
-    """A shaft with its wheels."""
-    axis = (PLACE[name], -MIDDLE, HEIGHT)
-    end = np.add(axis, (0, LENGTH, 0))
-    parts = [view.cylinder(axis, end, DIAMETER[name])]
-    for wheel, (teeth, module, width, z) in WHEELS[name].items():
-        points, triangles = view.gear(teeth, module, width)
-        drives = name == "input" or wheel == "wheel_2"
-        turn = turned + (np.pi / teeth if drives else np.pi)
-        c, s = np.cos(turn), np.sin(turn)
-        points = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ ALONG_Y.T
-        parts.append((points + np.add(axis, (0, z, 0)), triangles))
-    return view.joined(parts)
-
-
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
-    walls = [fence(line, 3e-6 * load, np.array([0, 0, 1.0]))
-             for stage in PAIRS for line, load in on_path(stage)]  # fmt: skip
+    walls = [view.tooth_walls(still, stage, scale=3e-6, direction=(0, 0, 1)) for stage in PAIRS]
+    oil = [view.film_wall(still, f"{name} {side}", scale=0.018e-6, gap=0.002,
+                          shift=out * np.sign(SPINS[name]))
+           for name in PLACE for side, out in (("front", -0.016), ("back", 0.016))]  # fmt: skip
     case = view.meshed(housing_model)["_surface"]
     lower = case.cells[case.points[case.cells, 2].mean(axis=1) < HEIGHT]
     things = {
         "_housing": view.Thing(
             case.points, lower, "#c9d1da", opacity=0.35, edges=np.zeros((0, 2), dtype=int)
         ),
-        **{f"{name} shaft": solid(name) for name in PLACE},
+        **{f"{name} shaft": view.toothed_shaft(mech, name) for name in PLACE},
         "load on the teeth": view.Thing(*view.joined(walls), "#edae49"),
-        "oil pressure": view.Thing(*view.joined([pressure(x) for x in FILMS]), "#66a182"),
+        "oil pressure": view.Thing(*view.joined(oil), "#66a182"),
     }
-    scene = view.Scene("The machine at rest in its films", things, view=(-0.8, -0.55, 0.75),
+    scene = view.Scene("The machine at rest in its films", things, view=(0.55, -0.8, 0.5),
                        up=(0, 0, 1))  # fmt: skip
     turn = np.linspace(0, 2 * np.pi, 100)
     place = [x.motion[0, :2] / BUSHES[FILMS[name]].clearance * (1, -np.sign(SPINS[FILMS[name]]))
@@ -254,8 +200,7 @@ if first:
         "Journals in their bushes", "x / clearance", "z / clearance",
         {"_clearance": (np.cos(turn), np.sin(turn))},
         points={"_at rest": tuple(np.transpose(place))}, equal=True,
-        notes={"input": (-0.5, 0.14), "middle": tuple(place[3] + (0.1, 0)),
-               "output": tuple(place[5])},
+        notes={"input": (-0.4, 0.12), "middle": (-0.35, -0.42), "output": (0.05, 0.35)},
     )  # fmt: skip
     some = motion.t > 8 * period
     ms = 1e3 * (motion.t[some] - motion.t[some][0])

@@ -51,9 +51,9 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "Results": (
         "What a mechanism answers without moving, and what a motion holds.",
-        """mbs.Solution mbs.Energy mbs.Occurrences mbs.ToothLoads mbs.tooth_loads snapshot
-        equilibrium continuation mbs.EquilibriumPath inverse_dynamics linearize mbs.Linearization
-        campbell mbs.Campbell
+        """mbs.Solution mbs.Energy mbs.Occurrences mbs.ToothLoads mbs.tooth_loads
+        mbs.film_pressures snapshot equilibrium continuation mbs.EquilibriumPath inverse_dynamics
+        linearize mbs.Linearization campbell mbs.Campbell
         frequency_response transmissibility mbs.FrequencyResponse steady_motion SteadyMotion
         periodic_motion mbs.PeriodicMotion periodic_path mbs.PeriodicPath mbs.CriticalMotion
         equilibrium_sensitivity frequency_sensitivity motion_sensitivity mbs.Sensitivity
@@ -67,6 +67,7 @@ TASKS: dict[str, tuple[str, str]] = {
         view.Thing view.Scene view.meshed view.wheel view.plates view.film view.posed
         view.Film view.plotter view.bar view.box view.cylinder view.ring view.tube view.coil
         view.wound view.ellipsoid view.extruded view.gear view.joined view.sleeves
+        view.toothed_shaft view.tooth_walls view.film_wall
         write_animation write_report""",
     ),
     "Files": (

@@ -180,6 +180,9 @@ IMPACT = (
     Key("impact_speed", Quantity("m/s", positive=True), "At which restitution holds."),
     Key("mu", Quantity("1"), "Coefficient of friction.", 0.0),
     Key("transition_speed", Quantity("m/s", positive=True), "Over which friction turns.", 1e-3),
+    Key("tangential_stiffness", Quantity("1", positive=True),
+        "Of a spring by which friction holds, in SI; friction by the speed alone if missing."),
+    Key("tangential_damping", Quantity("1"), "Of that spring, a plain number in SI.", 0.0),
 )  # fmt: skip
 RADIUS = Quantity("m", positive=True)
 FLEXIBLE = Key("body", Text(), "Flexible body that carries a surface.", ...)

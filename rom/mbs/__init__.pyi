@@ -47,6 +47,7 @@ from rom.mbs.parts.signals import Signal as Signal
 from rom.mbs.results.audit import audit as audit
 from rom.mbs.results.checkpoint import load_state as load_state
 from rom.mbs.results.checkpoint import save_state as save_state
+from rom.mbs.results.film_pressures import film_pressures as film_pressures
 from rom.mbs.results.solution import Energy as Energy
 from rom.mbs.results.solution import Occurrences as Occurrences
 from rom.mbs.results.solution import Solution as Solution

@@ -160,6 +160,7 @@ def made_of(soft, tmp_path, more):
 def test_elastic_coordinates_surfaces_and_spread_loads_are_those_of_python(soft, tmp_path):
     more = ENTRIES["add_flexible"] + ENTRIES["spread_load"].replace("new", "spread")
     more += ENTRIES["surface_on_plane"].replace("new", "k") + "exponent = 1\n"
+    more += "mu = 0.2\ntangential_stiffness = 2e6\ntangential_damping = 1e3\n"
     made = made_of(soft, tmp_path, more)
     body, mech = rom.load(soft), rom.Mechanism()
     mech.add_rigid("a", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
@@ -168,12 +169,15 @@ def test_elastic_coordinates_surfaces_and_spread_loads_are_those_of_python(soft,
     q = np.zeros(7)
     q[6] = 1e-6
     mech.add_flexible("new", body, q=q, qd=2 * q)
-    law = rom.mbs.Impact(stiffness=1e6, exponent=1.0)
+    law = rom.mbs.Impact(stiffness=1e6, exponent=1.0, mu=0.2, tangential_stiffness=2e6,
+                         tangential_damping=1e3)  # fmt: skip
     mech.surface_on_plane("k", mech.ground.marker((0, 0, 0)), part, law, normal=(0, 0, 1))
     load = rom.surface_load(body, traction=(0, 1e3, 0))
     mech.spread_load("spread", part, load, lambda t: 2 * t, frame="world")
     assert_array_equal(made.parts["new"].q, q)
     assert_array_equal(made.parts["new"].qd, 2 * q)
+    laws = [next(iter(m.contacts.values())).law for m in (made, mech)]
+    assert laws[0] == laws[1]
     sol, same = (rom.simulate(m, t_end=2e-3, dt=1e-4) for m in (made, mech))
     assert_allclose(sol.q, same.q, rtol=0, atol=1e-12)
     assert np.abs(sol.elastic("soft")).max() > 1e-9

@@ -16,7 +16,7 @@ from rom.errors import ConfigError
 from rom.model import SurfaceMesh
 from rom.view.canvas.scene import aimed
 from rom.view.figures.curves import LINES
-from rom.view.figures.things import COLOURS, actors_of
+from rom.view.figures.things import COLOURS, _seen, actors_of
 from rom.view.scenes.meshes import in_sight
 
 X = np.linspace(0.0, 1.0, 20)
@@ -232,3 +232,11 @@ def test_an_interface_on_the_far_side_is_said_to_be_turned_away():
     assert all(in_sight(unknown, n, face) for n in ("root", "tip") for face in faces.values())
     figure = view.mesh(model, view=(-1, 0.2, 0.1), up=(0, 0, 1))
     assert f"{far} (turned away)" in [text.get_text() for text in figure.texts]
+
+
+def test_cameras_do_not_look_at_points_between_which_nothing_is():
+    points, triangles = BOX
+    beside = np.vstack([points, [[9.0, 9.0, 9.0]]])
+    alone, more = (_seen(actors_of(view.Scene("A box", {"_a": (X, triangles)})))
+                   for X in (points, beside))  # fmt: skip
+    assert np.abs(more).max() == np.abs(alone).max() < 1.0

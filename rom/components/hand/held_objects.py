@@ -18,8 +18,9 @@ from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 from rom.rotation import matrix
 
-# silicone of 0.6 MPa on round bars of 5 mm and 15 mm, after Hertz
-SKIN_CONTACT = Impact(5e4, damping=5.0, mu=0.8, transition_speed=2e-3)
+# silicone of 0.6 MPa on round bars of 5 mm and 15 mm, after Hertz; along the surface two thirds of
+# its stiffness under 1 N, after Mindlin, and a third of the critical damping of a phalanx of 2 g
+SKIN_CONTACT = Impact(5e4, damping=5.0, mu=0.8, tangential_stiffness=1.4e3, tangential_damping=1.0)
 FOOT_RADIUS = 1e-3  # of the feet on which a bar stands [m]
 FEET_SHARE = 0.8  # of its radius, at which they are
 UPRIGHT_COSINE = 0.9  # between axis and gravity of a bar that stands
@@ -80,7 +81,8 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
             mechanism without fingers.
 
     Source:
-        Force of the contacts: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440.
+        Force of the contacts: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440; stiffness along the
+        surface: Mindlin, J. Appl. Mech. 16 (1949) 259.
     """
     positive("mass", held.mass)
     positive("radius", held.radius)

@@ -126,8 +126,9 @@ class _Search:
                 f"constraints; this mechanism has {packed.q.size} and {first.lam.size}."
             )
         self.now.remember(state)
+        base = first.base if state.base is None else packed.places.settled(state.base)
         q = assembled(packed, W, np.asarray(state.q, dtype=float))
-        return self.spins.steady(self.now, replace(first, q=q, lam=state.lam.copy()))
+        return self.spins.steady(self.now, replace(first, q=q, lam=state.lam.copy(), base=base))
 
     def eased(self, state: State, steps: int) -> State | None:
         """Equilibrium where some elements come to rest more easily in another form.

@@ -94,7 +94,9 @@ class Instant:
         residual(self.system, self.W, q, v, a, lam)
         if self.packed.broken_laws:
             what = f"no forces at t = {self.t:.9g} s{self.packed.broken_laws}."
-            raise SolverError(what, hint="rom.check_law looks for what is wrong with it.")
+            raise SolverError(
+                what, hint="Begin closer; what is wrong with a law of yours rom.check_law finds."
+            )
         return self.W.residual.copy()
 
     def gradient(self, q: Array, v: Array) -> tuple[Array, Any, Any]:

@@ -103,6 +103,11 @@ def nothing_remembered(_: Any) -> Array:
     return np.zeros(0, dtype=bool)
 
 
+def nothing_kept(_: Any, memory: Array) -> Array:
+    """(n_t,) no energy in what gives way for good beyond a limit [J]."""
+    return np.zeros(len(memory))
+
+
 def no_phases(_: Any, _W: Any) -> Array:
     """(0,) nothing that has to go on by whole numbers."""
     return np.zeros(0)
@@ -262,6 +267,8 @@ class Family:
         eased: table -> context within which its elements find their equilibrium more easily, close
             to the one that is wanted; it says whether that changes anything.
         remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
+        kept: (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power
+            lost when they are stretched [J].
         phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
             motions that repeat [1].
     """
@@ -287,6 +294,7 @@ class Family:
     room: Callable[[Any], Array] = no_room
     eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
     remembers: Callable[[Any], Array] = nothing_remembered
+    kept: Callable[[Any, Array], Array] = nothing_kept
     phases: Callable[[Any, Any], Array] = no_phases
 
     @property

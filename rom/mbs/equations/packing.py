@@ -133,6 +133,14 @@ class Packed:
         ]
         return tuple(found)
 
+    def kept(self, base: Array) -> Array:
+        """(n_t,) energy that springs which slip keep of the work lost, for `Solution.base` [J]."""
+        memory = base[:, self.system.coordinates.kind.size :]
+        return sum(
+            (family.kept(table, memory) for family, table in self.elements.items()),
+            np.zeros(len(base)),
+        )
+
     def phases(self, W: Any) -> dict[str, float]:
         """Numbers at the last residual that go on by whole ones in motions that repeat [1]."""
         return {

@@ -2,6 +2,6 @@
 
 `state` is one instant, `solution` all of them, with `interpolation` between; `recomputed` and
 `interface_loads`, the `element_record` of a force element, the `law_record` of a law, the
-`bearing_record` of a journal bearing, the `tooth_loads` of gears and the `joint_motion` of a joint
-follow from it; `audit` and `validity` judge it, `checkpoint` saves it.
+`bearing_record` and the `film_pressures` of a journal bearing, the `tooth_loads` of gears and the
+`joint_motion` of a joint follow from it; `audit` and `validity` judge it, `checkpoint` saves it.
 """

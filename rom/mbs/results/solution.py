@@ -401,6 +401,8 @@ class Solution:
         """Energies and works over time."""
         energy = self._follow().energy
         works = {name: self.work[:, k] for k, name in enumerate(WORK)}
+        kept = self.packed.kept(self.base)
+        works["damping"] = works["damping"] - (kept - kept[0])
         return Energy(energy[:, 0], energy[:, 1], energy[:, 2], **works)
 
     @cached_property

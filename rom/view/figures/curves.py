@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH, PANEL_HEIGHT, BESIDE_WIDTH, SCENE_GAP = 1400, 330, 440, 45  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
-MARKERS = ("o", "s", "^", "D", "v", "x")
+# one more than colours, so that series beyond these look different, too
+MARKERS = ("o", "s", "^", "D", "v", "x", "P")
 GREY = "#5c636e"
 LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"

@@ -275,7 +275,9 @@ def _limits(actors: Sequence[Actor]) -> tuple[float, float]:
 
 
 def _seen(actors: Sequence[Actor]) -> Array:
-    return np.concatenate([actor.points.reshape(-1, 3) for actor in actors])
+    """(n, 3) points of cells: others may belong to what is left out."""
+    seen = [actor.points[:, np.unique(actor.cells)].reshape(-1, 3) for actor in actors]
+    return np.concatenate(seen)
 
 
 def _below(

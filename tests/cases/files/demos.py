@@ -67,7 +67,7 @@ LEFT_BEHIND = {
     "demo_wind_turbine": {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
     },
-    "demo_transmission": {"transmission.png", "transmission_fields.png"},
+    "demo_transmission": {"transmission.png"},
     "demo_two_stage": {"two_stage.png"},
 }  # fmt: skip
 

@@ -125,7 +125,7 @@ def test_films_that_remember_are_refused_by_name():
     unit = rigid_unit(speed=500.0)
     for mech in (as_mechanism(unit_with(cavitation="jfo")),
                  as_mechanism(unit, oil=iso_vg(46), inlet=50.0)):  # fmt: skip
-        with pytest.raises(ModelError, match="'pinion low' remembers its oil, or its heat"):
+        with pytest.raises(ModelError, match="'pinion low' remembers its oil, its heat"):
             rom.periodic_motion(mech, period=unit.mesh_period, start=rom.equilibrium(mech))
 
 

@@ -82,12 +82,20 @@ def test_forces_without_loss_are_the_gradient_of_the_energy(kind):
     assert_allclose(with_contact - W.residual, gradient, atol=2e-7 * np.abs(gradient).max())
 
 
+BRISTLES = {"slides": {}, "holds": {"tangential_stiffness": 0.5, "tangential_damping": 0.05},
+            "slips": {"tangential_stiffness": 5e3, "tangential_damping": 0.05}}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", BRISTLES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_tangents_are_derivatives_of_the_forces(kind):
+def test_tangents_are_derivatives_of_the_forces(kind, how):
     """With friction and damping; the velocity of the markers is held in the position block."""
-    law = Impact(3.0, damping=0.02, mu=0.4, transition_speed=0.5)
+    law = Impact(3.0, damping=0.02, mu=0.4, transition_speed=0.5, **BRISTLES[how])
     packed, W, (q, v, a, lam) = random_contact(kind, law)
     s = packed.system
+    residual_at(s, W, q, v, a, lam)
+    W.base[:] = W.fresh  # it touched there before
+    q = shifted(packed, q, 0.01 * np.random.default_rng(7).normal(size=v.size))
 
     def at(dq, dv):
         residual_at(s, W, shifted(packed, q, dq), v + dv, a, lam)

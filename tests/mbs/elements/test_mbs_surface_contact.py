@@ -29,11 +29,11 @@ def brick():
     return rom.reduce(model, method=rom.CraigBampton(2), interfaces=kinds, certify=False)
 
 
-def on_floor(brick, **start):
+def on_floor(brick, law=LAW, **start):
     mech = rom.Mechanism(gravity=(0, 0, -G))
     part = mech.add_flexible("brick", brick, **start)
     floor = mech.ground.marker((0.0, 0.0, 0.0))
-    mech.surface_on_plane("floor", floor, part, LAW, normal=(0, 0, 1), where=below)
+    mech.surface_on_plane("floor", floor, part, law, normal=(0, 0, 1), where=below)
     return mech, part
 
 
@@ -91,6 +91,25 @@ def test_a_sliding_brick_slows_down_by_friction(brick):
     assert_allclose(load[:, 0].mean(), 0.3 * WEIGHT, rtol=0.01)
     lost = sol.energy.damping[-1]
     assert_allclose(lost, 0.5 * WEIGHT / G * (1 - speed[-1] ** 2), rtol=0.01)
+
+
+def test_a_brick_pushed_along_the_floor_rests_by_springs_per_area(brick):
+    """Their way, averaged over the area, is F / (k_t A), however it tilts."""
+    mech, part = on_floor(brick)
+    guide(mech, part)
+    q, F = rom.equilibrium(mech).q, 0.1 * WEIGHT
+    law = replace(LAW, tangential_stiffness=2e8, tangential_damping=1e6)
+    mech, part = on_floor(brick, law, at=q[:3], orientation=q[3:7], q=q[7:])
+    mech.force("push", part.marker("root"), (F, 0.0, 0.0))
+    areas, start = brick.surface_areas(below), rom.simulate(mech, t_end=1e-9, dt=1e-9)
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    way = sum(
+        areas[k] * (sol.position("brick", Marker("brick", surface_place(int(k))))[0, 0] * sign)
+        for sol, sign in ((found, 1), (start, -1)) for k in np.flatnonzero(areas)
+    ) / areas.sum()  # fmt: skip
+    assert_allclose(way, F / (2e8 * 0.12), rtol=1e-4)
+    dropped = rom.simulate(mech, t_end=0.1, dt=5e-4, rho_inf=0.5)
+    assert_allclose(dropped.velocity("brick")[-1], 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["sphere", "cylinder", "bore"])

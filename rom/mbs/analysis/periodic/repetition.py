@@ -48,7 +48,7 @@ def _refuse_memory(flow: Flow) -> None:
     """Oil that is conserved fills films over revolutions, and heat slower: no unknowns here."""
     for name in flow.packed.remembering:
         raise ModelError(
-            f"{name!r} remembers its oil, or its heat, over more than a period.",
+            f"{name!r} remembers its oil, its heat, or where friction held, beyond a period.",
             where=name,
             hint="Give a film cavitation='reynolds' and a viscosity as its oil, or simulate.",
         )

@@ -27,7 +27,10 @@ class Impact:
         impact_speed: at which that holds [m/s].
         mu: coefficient of friction at the touching point [1].
         transition_speed: sliding speed over which friction changes its sign [m/s]; implicit steps
-            that change the sliding speed by much more take many corrections.
+            that change the sliding speed by much more take many corrections. Without effect with:
+        tangential_stiffness: force of friction per way before it slips [N/m]; then what sticks
+            rests, and remembers where. None for friction by the sliding speed alone.
+        tangential_damping: of that spring [N s/m].
 
     Raises:
         ConfigError: for numbers no contact has.
@@ -43,16 +46,19 @@ class Impact:
     impact_speed: float | None = None
     mu: float = 0.0
     transition_speed: float = 1e-3
+    tangential_stiffness: float | None = None
+    tangential_damping: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "exponent", "transition_speed"):
             positive(name, getattr(self, name))
-        for name in ("damping", "mu"):
+        for name in ("damping", "mu", "tangential_damping"):
             if number(name, getattr(self, name)) < 0.0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
         warn_outside(FRICTION, self.mu)
         if self.exponent < 1.0:
             raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
+        self._check_spring()
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
                 f"restitution = {self.restitution} needs the impact speed at which it holds, "
@@ -63,6 +69,17 @@ class Impact:
                 raise ConfigError(f"damping = {self.damping:g} and restitution exclude each other.")
             factor = damping_of(self.restitution, positive("impact_speed", self.impact_speed))
             object.__setattr__(self, "damping", factor)
+
+    def _check_spring(self) -> None:
+        """Refuse a spring of friction without friction, and its damping without a spring."""
+        k, c = self.tangential_stiffness, self.tangential_damping
+        if k is None and c:
+            raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
+        if k is not None and positive("tangential_stiffness", k) and not self.mu:
+            raise ConfigError(
+                f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
+                hint="Give mu above zero, or no tangential_stiffness.",
+            )
 
 
 def checked_law(name: str, law: Any) -> Impact:

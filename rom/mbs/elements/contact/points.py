@@ -17,6 +17,14 @@ import numpy.typing as npt
 from rom import rotation
 from rom.arguments import positive, unit_vector
 from rom.errors import ConfigError
+from rom.mbs.elements.contact.bristles import (
+    N_REMEMBERED,
+    STORED,
+    ends_of_spring,
+    forget_spring,
+    keep_spring,
+    spring_and_slider,
+)
 from rom.mbs.elements.contact.impact import Impact, checked_law
 from rom.mbs.elements.contact.segments import across_of
 from rom.mbs.elements.family import Family, Places, integers, rows_of
@@ -200,6 +208,8 @@ class Contacts(Table):
         size: (c, 4) radius on j, and on i, half the length of a capsule on j, and on i [m].
         law: (c, 5) stiffness, exponent, damping factor [s/m], friction coefficient, speed over
             which friction changes its sign [m/s].
+        bristle: (c, 2) stiffness [N/m] and damping [N s/m] of friction that holds, zeros for none.
+        remembered: (c,) first of the numbers that it remembers.
     """
 
     kind: Index1
@@ -209,6 +219,8 @@ class Contacts(Table):
     s: Array2
     size: Array2
     law: Array2
+    bristle: Array2
+    remembered: Index1
 
 
 def pack(contacts: Any, places: Places) -> Contacts:
@@ -224,7 +236,18 @@ def pack(contacts: Any, places: Places) -> Contacts:
         rows_of((c.s for c in found), 3),
         rows_of(((*c.radius, *c.half) for c in found), 4),
         rows_of(numbers, 5),
+        rows_of(((x.tangential_stiffness or 0.0, x.tangential_damping) for x in laws), 2),
+        integers(
+            places.memory(name, np.zeros(N_REMEMBERED)) if c.law.tangential_stiffness else -1
+            for name, c in contacts.items()
+        ),
     )
+
+
+def kept(contacts: "Contacts", memory: Array) -> Array:
+    """(n_t,) energy in springs of friction, from what is remembered (n_t, p) [J]."""
+    total: Array = memory[:, contacts.remembered[contacts.remembered >= 0] + STORED].sum(axis=1)
+    return total
 
 
 @inner
@@ -253,47 +276,64 @@ def touch(kind, size, gap, e, s):
 
 
 @inner
-def contact_force(law, n, depth, down, motion):
-    """Force on j, elastic force, closing speed, and velocity of j over i at the touching point.
+def contact_force(law, bristle, n, depth, down, motion):
+    """Force on j, elastic force, closing speed, velocity of j over i where they touch, stretch.
 
-    ``motion`` is the gap of the markers, their relative velocity and both angular velocities.
+    ``motion`` is the gap of the markers, their relative velocity, both angular velocities, and how
+    far the ends of the spring of friction are apart.
     """
-    gap, slide, Oi, Oj = motion
+    gap, slide, Oi, Oj, apart = motion
     u = add(slide, sub(cross(Oj, down), cross(Oi, add(gap, down))))
     closing = -dot(n, u)
     elastic = law[0] * depth ** law[1]
     normal = elastic * (1.0 + law[2] * closing)
     if normal.real < 0.0:
         normal = 0.0 * normal
-    across = add(u, scale(closing, n))
-    drag = law[3] * normal / np.sqrt(dot(across, across) + law[4] * law[4])
-    return sub(scale(normal, n), scale(drag, across)), elastic, closing, u
+    across, stretch = add(u, scale(closing, n)), sub(apart, scale(dot(n, apart), n))
+    if bristle[0] > 0.0:
+        friction, stretch = spring_and_slider(bristle, law[3] * normal, stretch, across)
+    else:
+        drag = law[3] * normal / np.sqrt(dot(across, across) + law[4] * law[4])
+        friction = scale(-drag, across)
+    return add(scale(normal, n), friction), elastic, closing, u, stretch
 
 
 @inner
 def contact_state(contacts, k, W):
-    """Axes of contact k in the world, and the relative motion of its markers."""
+    """Axes of contact k in the world, relative motion of its markers, ends of its spring."""
     i, j = contacts.i[k], contacts.j[k]
     e, axle = turn(W.E, i, row(contacts.e, k, 0)), turn(W.E, j, row(contacts.s, k, 0))
     gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), row(W.V, i, 0))
-    return e, axle, (gap, slide, row(W.V, i, 3), row(W.V, j, 3))
+    held, on_i, on_j = 0.0, e, e
+    if contacts.remembered[k] >= 0:
+        held, on_i, on_j = ends_of_spring(W, W.x.size + contacts.remembered[k], i, j)
+    apart = scale(held, sub(add(gap, on_j), on_i))
+    return e, axle, (gap, slide, row(W.V, i, 3), row(W.V, j, 3), apart), (held, on_i, on_j)
 
 
 @residuals.of(Contacts)
 def contact_wrenches(_s, W, contacts, _q, _v, _lam):
     """Add the contacts to the wrenches on the markers; add up the power lost."""
     for k in range(contacts.kind.size):
-        e, axle, motion = contact_state(contacts, k, W)
+        i, j, at = contacts.i[k], contacts.j[k], contacts.remembered[k]
+        e, axle, motion, _ = contact_state(contacts, k, W)
         n, depth, down = touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)
         if not depth > 0.0:
+            if at >= 0:
+                forget_spring(W, at)
             continue
-        force, elastic, closing, u = contact_force(contacts.law[k], n, depth, down, motion)
-        at_j, at_i = cross(down, force), cross(add(motion[0], down), force)
+        bristle, arms = contacts.bristle[k], (add(motion[0], down), down)
+        force, elastic, closing, u, stretch = contact_force(
+            contacts.law[k], bristle, n, depth, down, motion
+        )
+        if at >= 0:
+            keep_spring(W, at, (i, j), arms, stretch, bristle[0])
+        at_i, at_j = cross(arms[0], force), cross(arms[1], force)
         for p in range(3):
-            W.wrench[contacts.j[k], p] += force[p]
-            W.wrench[contacts.j[k], 3 + p] += at_j[p]
-            W.wrench[contacts.i[k], p] -= force[p]
-            W.wrench[contacts.i[k], 3 + p] -= at_i[p]
+            W.wrench[j, p] += force[p]
+            W.wrench[j, 3 + p] += at_j[p]
+            W.wrench[i, p] -= force[p]
+            W.wrench[i, 3 + p] -= at_i[p]
         W.power[2] -= dot(force, u) + elastic * closing
 
 
@@ -310,16 +350,18 @@ def stepped(x, dx):
 @inner
 def contact_column(contacts, W, k, p, by_position, c):
     """Add c times the change of the wrenches in unit motion p, or unit velocity p, to W.Q."""
-    e, axle, (gap, slide, Oi, Oj) = contact_state(contacts, k, W)
+    e, axle, (gap, slide, Oi, Oj, apart), (held, on_i, on_j) = contact_state(contacts, k, W)
     vi, wi, vj, wj = unit_twist(p)
     move, rush = (1.0, 0.0) if by_position else (0.0, 1.0)
+    moved = sub(add(vj, cross(wj, on_j)), add(vi, cross(wi, on_i)))
     normal = stepped(e, scale(move, cross(wi, e)))
     spin = stepped(axle, scale(move, cross(wj, axle)))
     gap = stepped(gap, scale(move, sub(vj, vi)))
     slide = stepped(slide, scale(rush, sub(vj, vi)))
-    motion = gap, slide, stepped(Oi, scale(rush, wi)), stepped(Oj, scale(rush, wj))
+    apart = stepped(apart, scale(move * held, moved))
+    motion = gap, slide, stepped(Oi, scale(rush, wi)), stepped(Oj, scale(rush, wj)), apart
     n, depth, down = touch(contacts.kind[k], contacts.size[k], gap, normal, spin)
-    force, _, _, _ = contact_force(contacts.law[k], n, depth, down, motion)
+    force, _, _, _, _ = contact_force(contacts.law[k], contacts.bristle[k], n, depth, down, motion)
     at_j, at_i = cross(down, force), cross(add(gap, down), force)
     for q in range(3):
         W.Q[q, p] -= c / COMPLEX_STEP * force[q].imag
@@ -332,7 +374,7 @@ def contact_column(contacts, W, k, p, by_position, c):
 def contact_tangents(s, W, contacts, _lam, ck, cc):
     """Add the stiffness (times ck) and damping (times cc) of all contacts to W.Kt and W.S."""
     for k in range(contacts.kind.size):
-        e, axle, motion = contact_state(contacts, k, W)
+        e, axle, motion, _ = contact_state(contacts, k, W)
         if not touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)[1] > 0.0:
             continue
         W.Q[:] = 0.0
@@ -347,19 +389,21 @@ def contact_tangents(s, W, contacts, _lam, ck, cc):
 
 @energy.of(Contacts)
 def contact_energy(_s, W, contacts, _q, _v):
-    """Elastic energy in contacts."""
+    """Elastic energy in contacts, and in springs of their friction."""
     total = 0.0
     for k in range(contacts.kind.size):
-        e, axle, motion = contact_state(contacts, k, W)
-        depth, law = (
-            touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)[1],
-            contacts.law[k],
-        )
-        if depth > 0.0:
-            total += law[0] * depth ** (law[1] + 1.0) / (law[1] + 1.0)
+        e, axle, motion, _ = contact_state(contacts, k, W)
+        n, depth, down = touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)
+        if not depth > 0.0:
+            continue
+        law, bristle = contacts.law[k], contacts.bristle[k]
+        stretch = contact_force(law, bristle, n, depth, down, motion)[4]
+        total += law[0] * depth ** (law[1] + 1.0) / (law[1] + 1.0)
+        total += 0.5 * bristle[0] * dot(stretch, stretch)
     return total
 
 
 CONTACTS_FAMILY = Family(
-    "contacts", Contact, pack, contact_wrenches, contact_tangents, contact_energy
+    "contacts", Contact, pack, contact_wrenches, contact_tangents, contact_energy,
+    remembers=lambda contacts: contacts.remembered >= 0, kept=kept,
 )  # fmt: skip

@@ -2,9 +2,9 @@
 
 Each point of the surface carries the law of penetration times the area that belongs to it, so
 that a finer mesh gives the same pressure. ``law`` is an `Impact` whose stiffness is per area,
-[N/m^exponent/m^2]; its friction acts at each point. The reaction acts on the body of m1, and
-``solution.interface_loads`` has its sum about m1. Cost grows with the number of points: choose
-by ``where`` the part of the surface that may touch.
+[N/m^exponent/m^2], as are stiffness and damping of its friction, which acts at each point. The
+reaction acts on the body of m1, and ``solution.interface_loads`` has its sum about m1. Cost grows
+with the number of points: choose by ``where`` the part of the surface that may touch.
 
 Source:
     Johnson, Contact Mechanics (1985), section 4.3 (elastic foundation).
@@ -129,7 +129,7 @@ def _cover(
     if axis is not None:
         world = unit_vector(f"axis of {name}", axis)
         e = rotation.matrix(self.part(m1.body).p).T @ world
-    areas = part.flexible.surface_areas(where)
+    areas, spring = part.flexible.surface_areas(where), law.tangential_stiffness
     for k in np.flatnonzero(areas):
         own = Impact(
             stiffness=float(law.stiffness * areas[k]),
@@ -137,6 +137,8 @@ def _cover(
             damping=law.damping,
             mu=law.mu,
             transition_speed=law.transition_speed,
+            tangential_stiffness=None if spring is None else float(spring * areas[k]),
+            tangential_damping=float(law.tangential_damping * areas[k]),
         )
         marker = Marker(part.name, surface_place(int(k)))
         key = f"{name} {k}"

@@ -97,10 +97,15 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
         elastic_bush: whether the pressure bends the bore, and the bent bore changes the film: the
             bush is an interface of a reduced body with functions, as `rom.FourierLegendre`. Else
             the film sees its mean motion alone.
+        tabulated: whether the film is read from a table of its equation's solutions, which takes
+            seconds to make, once for each shape of bearing, and microseconds to read; for round
+            bores with grooves at ambient pressure. Forces are those of a journal that does not
+            tilt, moments those of small tilts; an end may come closer by 0.3 of the film.
 
     Raises:
         ConfigError: for a name in use, unknown markers, a journal that touches its bush at the
-            start, numbers no film has, or an elastic bush without functions of this bore.
+            start, numbers no film has, an elastic bush without functions of this bore, or a film
+            that is more than a table.
     """
     self.check_markers(name, journal, bush)
     if journal.body == bush.body:

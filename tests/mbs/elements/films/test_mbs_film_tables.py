@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.films import ORIGIN, Pair, held_rotor, resting
+from cases.mbs.films import NONE, ORIGIN, Pair, held_rotor, resting
+from cases.mbs.mechanisms import prepared, residual_at, tangents_at
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg, multilobe
@@ -79,6 +80,66 @@ def test_what_a_table_leaves_out_of_tilts_falls_with_their_square():
     assert np.median(share) < 0.05
 
 
+def test_slopes_of_all_answers_are_those_of_the_table():
+    """Forces, moments and torque by motions, rates and the spin, in clearances."""
+    b, rng, d = bearing(), np.random.default_rng(8), 1e-5
+    for _ in range(3):
+        motion, rate, spin = random_state(rng, 0.2)
+        x, scale = np.array([*motion, *rate, spin]), np.array([*b.scale, *b.scale, 1.0])
+
+        def answers(state):
+            pair = Pair(b, motion=state[:4], tabulated=True)
+            v = pair.velocities(state[4:8], state[8])
+            pair.loads(v)
+            return pair, v, pair.table.films.answer[0].copy()
+
+        steps = np.diag(d * scale * [1, 1, 1, 1, 100, 100, 100, 100, 100])
+        found = [(answers(x + e)[2] - answers(x - e)[2]) / (2 * e.sum()) for e in steps]
+        pair, v, _ = answers(x)
+        tangents_at(pair.packed.system, pair.W, pair.packed.q, v, 0 * v, NONE, (0.0, 1.0, 1.0))
+        known = pair.table.films.slope[0, :, :9]
+        for columns in (slice(4), slice(4, 8), slice(8, 9)):
+            part = (np.array(found).T * scale)[:, columns]
+            largest = np.abs(part).max(axis=1, keepdims=True)
+            assert_allclose(known[:, columns] / largest, part / largest, atol=1e-5)
+
+
+def test_a_full_film_is_that_of_the_cells_up_to_the_last_node():
+    """Where it is a spline of few waves: along the axes of the table 1e-4 up to 0.985."""
+    b = bearing("none", aligned=True)
+    for e, off in ((0.9, 2e-5), (0.985, 3e-4), (0.9893, 3e-3)):
+        for angle in np.pi / 2 * np.arange(4):
+            motion = e * CLEARANCE * np.array([np.cos(angle), np.sin(angle), 0, 0])
+            state = motion, 1e-3 * np.array([0.6, 0.8, 0, 0]), 20.0
+            known, found = (loads(b, *state, tabulated=t)[0][:2] for t in (False, True))
+            assert_allclose(found, known, atol=off * np.linalg.norm(known))
+    # the place is stretched by a series near the middle: no step where it ends
+    near, far = (
+        loads(b, np.array([e * CLEARANCE, 0, 0, 0]), np.zeros(4), SPEED, tabulated=True)[0][:2]
+        for e in (0.009999999, 0.010000001)
+    )
+    assert_allclose(far, near, atol=5e-6 * np.linalg.norm(near))
+
+
+def test_every_film_has_its_own_table():
+    """A wide and a narrow bearing of one mechanism, as each alone."""
+    wide, narrow = bearing(), JournalBearing(0.1, 0.03, CLEARANCE, SIDES, cells=(40, 3))
+    found = []
+    for some in ((wide,), (narrow,), (wide, narrow)):
+        mech = rom.Mechanism(gravity=ORIGIN)
+        for k, b in enumerate(some):
+            shaft = mech.add_rigid(f"shaft {k}", mass=1.0, inertia=(1.0,) * 3,
+                                   at=(0.4 * CLEARANCE, 0, 0), omega=(0, 0, SPEED))  # fmt: skip
+            mech.journal_bearing(f"film {k}", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN),
+                                 axis=(0, 0, 1), bearing=b, oil=OIL, tabulated=True)  # fmt: skip
+        packed, W = prepared(mech)
+        residual_at(packed.system, W, packed.q, packed.v, 0 * packed.v, NONE)
+        (table,) = packed.elements.values()
+        found.append(W.wrench[table.i].copy())
+    assert_allclose(found[2], np.vstack(found[:2]), rtol=1e-12, atol=1e-12)
+    assert np.linalg.norm(found[0] - found[1]) > 0.1 * np.linalg.norm(found[0])
+
+
 def test_an_end_that_comes_too_close_leaves_the_table():
     """By the share of the film at its middle that is said, and beyond an eccentricity of 0.99."""
     lean = 2 * CLEARANCE / 0.05 * (1 - 0.5)
@@ -87,6 +148,10 @@ def test_an_end_that_comes_too_close_leaves_the_table():
         found, _, film = loads(bearing(), motion, np.zeros(4), SPEED, tabulated=True)
         assert np.isfinite(found).all() == (share < MAX_TILT_SHARE)
         assert film.thinnest[0] == pytest.approx(0.5 * CLEARANCE * (1 - share), rel=1e-9)
+    for e in (0.989, 0.991):
+        motion = np.array([0.0, e * CLEARANCE, 0.0, 0.0])
+        found, _, film = loads(bearing(), motion, np.zeros(4), SPEED, tabulated=True)
+        assert np.isfinite(found).all() == (e < 0.99)
     mech = held_rotor(bearing(), (1e5, 0.0), speed=SPEED, oil=1e-3, tabulated=True)
     with pytest.raises(SolverError, match=r"'film'.* leaves its table"):
         rom.simulate(mech, t_end=0.1, dt=1e-4, progress=False)

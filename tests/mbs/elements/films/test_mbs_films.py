@@ -179,7 +179,7 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
 def test_tangents_are_the_derivatives(law, spin, passed):
     """Of positions and velocities, for a bush that moves and turns, with and without memory."""
     rng = np.random.default_rng(3)
-    b = bearing("none", (40, 3), [Groove(1.2)]) if law == "table" else bearing(law)
+    b = bearing("reynolds", (40, 3), [Groove(1.2)]) if law == "table" else bearing(law)
     pair = Pair(b, turned_by(rng.normal(size=3)), (0.3, -0.2, 0.1), along=0.01,
                 tabulated=law == "table")  # fmt: skip
     v = pair.velocities(spin=spin, bush=0.2 * rng.normal(size=6))
