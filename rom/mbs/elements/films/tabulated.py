@@ -32,6 +32,7 @@ from rom.mbs.elements.films.pressure import outflow, peak
 from rom.mbs.elements.films.slopes import TORQUE_ANSWER, solve_film
 from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array
+from rom.process.progress import stages
 
 N_PLACES, N_DIRECTIONS = 29, 36  # nodes along each stretched axis; around
 FURTHEST_PLACE = 2.65  # stretched place of the last node: eccentricity 0.99
@@ -80,9 +81,13 @@ def _table(bearing: JournalBearing) -> Array:
     states = np.zeros((far.size, SPIN_COLUMN + 1))
     states[:, 0], states[:, 1] = closer * ux, closer * uy
     states[:, N_MOTIONS], states[:, N_MOTIONS + 1] = np.cos(direction), np.sin(direction)
-    values = np.zeros((far.size, N_VALUES))
-    if not solve_nodes(cells_of([bearing]), states, values):
-        raise ModelError("a film of this bearing finds no pressure; refine its cells.")
+    values, cells, (nt, nz) = np.zeros((far.size, N_VALUES)), cells_of([bearing]), bearing.cells
+    with stages(N_PLACES) as begin:
+        for some in np.split(np.arange(far.size), N_PLACES):
+            begin(f"table of a film of {nt} x {nz} cells")
+            part = slice(some[0], some[-1] + 1)
+            if not solve_nodes(cells, states[part], values[part]):
+                raise ModelError("a film of this bearing finds no pressure; refine its cells.")
     values *= (1 - e**2)[:, None] ** 2
     values = values.reshape(N_PLACES, N_PLACES, N_DIRECTIONS, N_VALUES)
     A, B = _natural(N_PLACES), _periodic(N_DIRECTIONS)
