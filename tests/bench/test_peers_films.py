@@ -61,6 +61,8 @@ def test_the_unit_of_rigid_shafts_is_the_same_by_both_programs():
     assert rows["mechanism over its own program"] == pytest.approx(mechanism / own)
     assert 0 < rows["load factors apart, middle of all speeds"] < 0.02
     assert rows["rest as a mechanism"] > 0
+    assert rows["to make the tables"] > 0 and rows["steady motion at 2 speeds"] > 0
+    assert 1.0 < rows["largest load factor"] < 3.0
 
 
 def test_a_shaft_without_elasticity_keeps_its_inertia():

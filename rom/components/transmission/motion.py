@@ -213,7 +213,7 @@ class Step:
         old, size, now = -self.alpha * before.sum(axis=0), np.abs(before).max(), 1 + self.alpha
         ahead = guess - q0 if guess is not None else dt * self.v + dt**2 / 4 * self.a
         q = q0 + unit.allowed(q0, ahead) * ahead
-        for _ in range(MAX_ITERATIONS):
+        for k in range(MAX_ITERATIONS):
             v, a = self._rates(dt, q - q0, self.v, self.a)
             self.now = unit.forces(q, v, theta, self.now.films)
             R = now * (unit.load + self.now.force - self.K @ q - self.C @ v) + old - self.M @ a
@@ -221,7 +221,9 @@ class Step:
             if np.abs(R).max() < self.enough * size:
                 break
             d = np.linalg.solve(self._jacobian(dt), R)
-            q = q + unit.allowed(q, d) * d
+            # where teeth or voids come and go, whole corrections may go round in a circle
+            share = 1.0 if k < MAX_ITERATIONS // 2 else 0.5
+            q = q + share * unit.allowed(q, d) * d
         else:
             raise SolverError(
                 f"a step to {theta:.4f} rad fails: {np.abs(R).max():.3g} N are left.",

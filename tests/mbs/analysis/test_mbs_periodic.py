@@ -320,6 +320,20 @@ def test_a_law_that_does_not_repeat_is_named_by_its_body():
         rom.periodic_motion(mech, guess=1.0)
 
 
+def pulse(t, parameters, motion, memory, out):
+    phase = (t / parameters[0]) % 1.0
+    if 1e-6 < phase < 0.1:
+        out.force[0, 0] = np.sin(np.pi * phase / 0.1)
+
+
+def test_a_law_is_not_refused_for_the_digits_of_a_late_time():
+    """A million million periods later round-off alone has led into the pulse."""
+    period = next(T for T in 0.5 + 0.01 * np.arange(1, 99) if 1e-6 < (1e12 * T / T) % 1.0 < 1e-3)
+    mech, mass = slider()
+    mech.law("pulse", pulse, mass, parameters=(period,))
+    assert rom.periodic_motion(mech, period=period).stable
+
+
 def test_a_start_of_another_mechanism_is_refused():
     other = rom.equilibrium(double_pendulum())
     with pytest.raises(ConfigError, match=r"the start has 14 coordinates.*this mechanism has 7"):
