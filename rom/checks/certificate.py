@@ -46,11 +46,16 @@ def certify_body(
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     constrained = basis.labels[: len(connection.labels)] == connection.labels
     inner = connection.ops.hold(connection.boundary) if statics and constrained else None
+    static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
             support = " + ".join(fixed) + " held" if fixed else "free"
             begin(f"compare with the full model, {support}")
-            table = compared(connection, ops, body, (basis, inner), fixed)
+            held = None
+            if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
+                held = connection.ops.hold(connection.held(fixed))  # once, for loads and modes
+                static = _static_row(connection, body, held)
+            table = compared(connection, ops, body, (basis, inner), fixed, held)
             if table["reduced"]:
                 comparison[support] = table
     if not connection.ops.affordable:
@@ -58,7 +63,7 @@ def certify_body(
     for support, table in comparison.items():
         rows += frequency_rows(support, table) if table["full"] else []
         rows += _estimate_rows(support, table)
-    rows += _static_row(connection, body) if statics else []
+    rows += static
     rows += rigid_rows(ops, body, elastic)
     rows += _matrix_rows(connection, basis, body)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
@@ -71,8 +76,12 @@ def compared(
     body: FlexibleBody,
     reduction: tuple[Basis, Held | None],
     fixed: tuple[str, ...],
+    held: Held | None = None,
 ) -> dict[str, list[float]]:
-    """Frequencies of both models in one support, their errors, and the agreement of shapes."""
+    """Frequencies of both models in one support, their errors, and the agreement of shapes.
+
+    The full model may be ``held`` there already; its factor is used up.
+    """
     omega_r = body.modes(fixed=fixed)[0]
     n_rigid = int(np.count_nonzero(omega_r == 0.0))
     n = min(N_COMPARED, omega_r.size - n_rigid)
@@ -88,7 +97,8 @@ def compared(
         found = residual_errors(connection.ops, inner, shapes[:, n_rigid:])
         table["estimated"] = found.tolist()
     if connection.ops.affordable:
-        omega, Phi = connection.ops.modes(connection.held(fixed), n + n_rigid)
+        support = connection.held(fixed) if held is None else held
+        omega, Phi = connection.ops.modes(support, n + n_rigid, finished=True)
         omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
         agreement = mac(ops, Phi, connection.ops.expand(shapes))
         table["full"] = (omega / (2 * np.pi)).tolist()
@@ -139,14 +149,11 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     return [worst, row(f"{support}: largest error over its estimate", ratio, MAX_ERROR_RATIO)]
 
 
-def _static_row(connection: Connection, body: FlexibleBody) -> list[Row]:
+def _static_row(connection: Connection, body: FlexibleBody, held: Held) -> list[Row]:
     """Deflection under unit loads on the other interfaces, the first one held; exact for CB."""
     names = tuple(connection.parts)
-    if len(names) < 2:
-        return []
     ops, first = connection.ops, names[0]
     loaded = connection.held(names[1:])
-    held = ops.hold(connection.held((first,)))
     F = np.zeros((ops.n_local, loaded.size))
     mine = (loaded >= ops.first) & (loaded < ops.first + ops.n_local)
     F[loaded[mine] - ops.first, np.flatnonzero(mine)] = 1.0

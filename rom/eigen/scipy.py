@@ -20,6 +20,7 @@ from rom.errors import (
 )
 from rom.model import Array, Index
 from rom.names import named
+from rom.process.stopwatch import FACTORISATIONS, SEARCHES, piece
 
 PIVOT_RTOL = 1e-13  # smallest over largest pivot below which K_ii counts as singular
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
@@ -179,9 +180,7 @@ class SciPyOperators:
             return np.zeros(0), np.zeros((self.n, 0))
         if sigma is None:
             sigma = -0.05 * self._first_elastic(R)
-        lu = splu(
-            csc_matrix(self.K - sigma * self.M), options={"SymmetricMode": True}, **SYMMETRIC_LU
-        )
+        lu = _symmetric_lu(self.K - sigma * self.M)
         MR = self.M @ R
 
         def inverse(x: Array) -> Array:
@@ -191,9 +190,10 @@ class SciPyOperators:
         k = min(m + N_SPARE_MODES, self.n - R.shape[1] - 1)
         start = np.sin(1.0 + np.arange(self.n))
         operator = LinearOperator(self.K.shape, matvec=inverse)
-        lam, Phi = eigsh(
-            self.K, k, self.M, sigma, OPinv=operator, v0=start - R @ (MR.T @ start), tol=0.0
-        )
+        with piece(SEARCHES):
+            lam, Phi = eigsh(
+                self.K, k, self.M, sigma, OPinv=operator, v0=start - R @ (MR.T @ start), tol=0.0
+            )
         order = np.argsort(lam)
         lam, Phi = lam[order], Phi[:, order]
         lam[np.abs(lam) < RIGID_RTOL * self._largest()] = 0.0
@@ -209,9 +209,7 @@ class SciPyOperators:
     def _first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
         shift = 1e-6 * self._largest()
-        lu = splu(
-            csc_matrix(self.K + shift * self.M), options={"SymmetricMode": True}, **SYMMETRIC_LU
-        )
+        lu = _symmetric_lu(self.K + shift * self.M)
         X = np.sin(np.outer(1.0 + np.arange(self.n), 1.0 + np.arange(8.0)))
         for _ in range(4):
             X = lu.solve(np.ascontiguousarray(self.M @ (X - R @ (R.T @ (self.M @ X)))))
@@ -260,11 +258,17 @@ def _symmetric(name: str, A: Any) -> csr_matrix:
     return A
 
 
+def _symmetric_lu(A: Any) -> SuperLU:
+    """Factors of a symmetric matrix with pivots on its diagonal where that is possible."""
+    with piece(FACTORISATIONS):
+        return splu(csc_matrix(A), options={"SymmetricMode": True}, **SYMMETRIC_LU)
+
+
 def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
     advice = f"K_ii is singular: the {n_held} boundary dofs leave a rigid motion free."
     cure = "Fix at least three nodes that do not lie on one line, or use a free-interface basis."
     try:
-        lu = splu(csc_matrix(K_ii), options={"SymmetricMode": True}, **SYMMETRIC_LU)
+        lu = _symmetric_lu(K_ii)
     except RuntimeError as error:
         raise InterfaceError(advice, hint=cure) from error
     pivots = np.abs(lu.U.diagonal())
@@ -279,7 +283,8 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
 
 def _shifted(K_ii: csr_matrix, M_ii: csr_matrix, shift: float) -> SuperLU:
     try:
-        return splu(csc_matrix(K_ii - shift * M_ii))  # indefinite: with pivoting
+        with piece(FACTORISATIONS):
+            return splu(csc_matrix(K_ii - shift * M_ii))  # indefinite: with pivoting
     except RuntimeError as error:
         raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.") from error
 
@@ -318,7 +323,8 @@ def _lowest(K: csr_matrix, M: csr_matrix, lu: SuperLU, m: int) -> tuple[Array, A
         return _dense_modes(K, M, m)
     inverse = LinearOperator(K.shape, matvec=lu.solve)
     start = np.sin(1.0 + np.arange(n))
-    lam, Phi = eigsh(K, m + N_SPARE_MODES, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
+    with piece(SEARCHES):
+        lam, Phi = eigsh(K, m + N_SPARE_MODES, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
     order = np.argsort(lam)
     lam, Phi = lam[order], Phi[:, order]
     _verify_count(K, M, lam, m)
@@ -341,7 +347,7 @@ def _verify_count(K: csr_matrix, M: csr_matrix, lam: Array, m: int) -> None:
 
 def negative_count(A: Any) -> int:
     """Number of negative eigenvalues of a symmetric matrix, from its pivots (Sylvester)."""
-    lu = splu(csc_matrix(A), options={"SymmetricMode": True}, **SYMMETRIC_LU)
+    lu = _symmetric_lu(A)
     if not np.array_equal(lu.perm_r, lu.perm_c):
         return int(np.count_nonzero(eigvalsh(A.toarray()) < 0))
     return int(np.count_nonzero(lu.U.diagonal() < 0))

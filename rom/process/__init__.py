@@ -2,7 +2,7 @@
 
 `launcher` tells ranks and threads, `mpirun` starts ranks, `interruption` makes signals exceptions,
 `child` starts every other process by way of `child_entry`, `memory` says what may be taken.
-Processes that would make the same file take `turns`, `patience` says how long a user waits and
-`progress` how far work is.
+Processes that would make the same file take `turns`, `patience` says how long a user waits,
+`progress` how far work is and `stopwatch` where its time goes.
 Nothing is imported here: the package comes by before the working folder is off the path of modules.
 """

@@ -11,6 +11,7 @@ from rom.config.document import read_document
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Report, Row
 from rom.process.child import scratch
+from rom.process.stopwatch import FACTORISATIONS, REST, SEARCHES, SOLUTIONS
 from rom.report import html
 from rom.report.run import RECORD_FILE, SCENE_FILE, Run, run, versions
 from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
@@ -203,7 +204,32 @@ def _provenance(body: "FlexibleBody") -> list[str]:
     if not known:
         return [html.paragraph("The body file does not say what it was made from.")]
     rows = [(key, _plain(value)) for key, value in known.items()]
-    return [html.table(("", "made from"), rows, "What the body file says of its origin.")]
+    origin = html.table(("", "made from"), rows, "What the body file says of its origin.")
+    return [origin, *_stages(body.provenance.get("stages", {}))]
+
+
+def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
+    """Where the time of the reduction went."""
+    pieces = (FACTORISATIONS, SOLUTIONS, SEARCHES, REST)
+    rows = [
+        (stage, f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces),
+         f"{found['MB']:.0f}")
+        for stage, found in stages.items()
+    ]  # fmt: skip
+    header = ("stage", "seconds", *pieces, "memory [MB]")
+    caption = (
+        "Where the time of the reduction went, in seconds of one process, and in brackets how "
+        "often; the memory is the largest of that process so far."
+    )
+    return [html.table(header, rows, caption)] if rows else []
+
+
+def _piece(stage: dict[str, float], name: str) -> str:
+    """Seconds of a piece and its number."""
+    if name not in stage:
+        return ""
+    number = stage.get(f"number of {name}")
+    return f"{stage[name]:.2f}" + (f" ({number:g})" if number else "")
 
 
 def _plain(value: Any) -> str:

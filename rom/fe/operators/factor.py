@@ -8,6 +8,7 @@ from rom.errors import SolverError
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
+from rom.process.stopwatch import FACTORISATIONS, SOLUTIONS, piece
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
 PIVOT_THRESHOLD = 0.01  # the default of MUMPS
@@ -72,8 +73,9 @@ class Factor:
             ResourceError: if MUMPS runs out of memory.
         """
         self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
-        self.ksp.setUp()
-        self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
+        with piece(FACTORISATIONS):
+            self.ksp.setUp()
+            self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
         code = self.factor.getMumpsInfog(1)
         if code in MEMORY_ERRORS and self.workspace < self.allowed:
             self.release()
@@ -90,10 +92,11 @@ class Factor:
         X = np.empty(F.shape)
         for first in range(0, F.shape[1], BLOCK_SIZE):
             columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
-            B, Y = dense(F[:, columns], self.A), dense(np.zeros_like(F[:, columns]), self.A)
-            self.factor.matSolve(B, Y)
-            X[:, columns] = Y.getDenseArray()
-            B.destroy(), Y.destroy()
+            with piece(SOLUTIONS):
+                B, Y = dense(F[:, columns], self.A), dense(np.zeros_like(F[:, columns]), self.A)
+                self.factor.matSolve(B, Y)
+                X[:, columns] = Y.getDenseArray()
+                B.destroy(), Y.destroy()
         return X
 
     def release(self) -> None:

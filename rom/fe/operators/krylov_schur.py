@@ -10,6 +10,7 @@ import numpy as np
 from rom.errors import SolverError
 from rom.fe.operators.factor import Factor
 from rom.model import Array
+from rom.process.stopwatch import SEARCHES, SOLUTIONS, piece
 
 EIGENVALUE_RTOL = 1e-11  # SLEPc's residual, of the eigenvalue
 MAX_RESTARTS = 500
@@ -50,7 +51,8 @@ def krylov_schur(
     solver.setInitialSpace([vector(ops.K, ops.fixed)])  # depends on the place, not on the rank
     if deflated.shape[1]:
         solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
-    solver.solve()
+    with piece(SEARCHES):
+        solver.solve()
     pairs = mode_pairs(ops, solver, k)
     solver.destroy()  # it refers to the factor, which could not be freed
     return pairs
@@ -77,7 +79,8 @@ class _Applied:
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve A x = b."""
-        self.factor.solve(b, x)
+        with piece(SOLUTIONS):
+            self.factor.solve(b, x)
 
 
 def vector(A: Any, values: Array) -> Any:

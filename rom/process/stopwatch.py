@@ -1,0 +1,109 @@
+"""Where the time of long work goes: seconds by stages, and by pieces of work within them."""
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from time import perf_counter
+from typing import Any
+
+# pieces that stages have in common; the rest of a stage belongs to none
+FACTORISATIONS, SOLUTIONS, SEARCHES, REST = "factorisations", "solutions", "searches", "rest"
+MEGABYTE_SIZE = 1e6  # [bytes]
+
+
+class Stopwatch:
+    """Seconds of stages that follow each other, and of pieces within each.
+
+    Attributes:
+        stages: {stage: {piece: seconds}}; what lies within another piece counts there alone.
+        counts: {stage: {piece: how often}}.
+        peaks: {stage: largest memory of the process so far, at its end [MB]}.
+    """
+
+    def __init__(self) -> None:
+        self.stages: dict[str, dict[str, float]] = {}
+        self.counts: dict[str, dict[str, int]] = {}
+        self.peaks: dict[str, float] = {}
+        self._stage, self._pieces, self._since = "", [REST], perf_counter()
+
+    def begin(self, stage: str) -> None:
+        """End the stage before and begin another, or one of that name once more."""
+        self._charge()
+        self._end()
+        self._stage = stage
+        self.stages.setdefault(stage, {})
+        self.counts.setdefault(stage, {})
+
+    def end(self) -> None:
+        """End the last stage."""
+        self._charge()
+        self._end()
+        self._stage = ""
+
+    def enter(self, piece: str) -> None:
+        """From here on time belongs to this piece of the stage."""
+        self._charge()
+        self._pieces.append(piece)
+        if self._stage:
+            counts = self.counts[self._stage]
+            counts[piece] = counts.get(piece, 0) + 1
+
+    def leave(self) -> None:
+        """From here on time belongs to what was under way before."""
+        self._charge()
+        self._pieces.pop()
+
+    def table(self) -> dict[str, dict[str, float]]:
+        """{stage: {"seconds", "MB", and per piece its seconds}}, as provenance keeps it."""
+        return {
+            stage: {
+                "seconds": round(sum(pieces.values()), 4),
+                "MB": round(self.peaks[stage], 1),
+                **{piece: round(seconds, 4) for piece, seconds in pieces.items()},
+                **{f"number of {piece}": n for piece, n in self.counts[stage].items()},
+            }
+            for stage, pieces in self.stages.items()
+        }
+
+    def _charge(self) -> None:
+        now = perf_counter()
+        if self._stage:
+            pieces = self.stages[self._stage]
+            pieces[self._pieces[-1]] = pieces.get(self._pieces[-1], 0.0) + now - self._since
+        self._since = now
+
+    def _end(self) -> None:
+        if self._stage:
+            # Linux counts in units of 1024 bytes
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / MEGABYTE_SIZE
+            self.peaks[self._stage] = peak
+
+
+_running: ContextVar[Stopwatch | None] = ContextVar("stopwatch", default=None)
+
+
+@contextmanager
+def stopwatch() -> Iterator[Stopwatch]:
+    """Around work whose pieces are timed; one within another has its own."""
+    watch = Stopwatch()
+    before = _running.set(watch)
+    try:
+        yield watch
+    finally:
+        watch.end()
+        _running.reset(before)
+
+
+@contextmanager
+def piece(name: str) -> Iterator[Any]:
+    """Around a piece of work, wherever it is called from; nothing happens where nobody times."""
+    watch = _running.get()
+    if watch is None:
+        yield
+        return
+    watch.enter(name)
+    try:
+        yield
+    finally:
+        watch.leave()
