@@ -20,7 +20,7 @@ from rom.errors import (
 )
 from rom.model import Array, Index
 from rom.names import named
-from rom.process.stopwatch import FACTORISATIONS, SEARCHES, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, SEARCH_PIECE, piece
 
 PIVOT_RTOL = 1e-13  # smallest over largest pivot below which K_ii counts as singular
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
@@ -190,7 +190,7 @@ class SciPyOperators:
         k = min(m + N_SPARE_MODES, self.n - R.shape[1] - 1)
         start = np.sin(1.0 + np.arange(self.n))
         operator = LinearOperator(self.K.shape, matvec=inverse)
-        with piece(SEARCHES):
+        with piece(SEARCH_PIECE):
             lam, Phi = eigsh(
                 self.K, k, self.M, sigma, OPinv=operator, v0=start - R @ (MR.T @ start), tol=0.0
             )
@@ -260,7 +260,7 @@ def _symmetric(name: str, A: Any) -> csr_matrix:
 
 def _symmetric_lu(A: Any) -> SuperLU:
     """Factors of a symmetric matrix with pivots on its diagonal where that is possible."""
-    with piece(FACTORISATIONS):
+    with piece(FACTORISATION_PIECE):
         return splu(csc_matrix(A), options={"SymmetricMode": True}, **SYMMETRIC_LU)
 
 
@@ -283,7 +283,7 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
 
 def _shifted(K_ii: csr_matrix, M_ii: csr_matrix, shift: float) -> SuperLU:
     try:
-        with piece(FACTORISATIONS):
+        with piece(FACTORISATION_PIECE):
             return splu(csc_matrix(K_ii - shift * M_ii))  # indefinite: with pivoting
     except RuntimeError as error:
         raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.") from error
@@ -323,7 +323,7 @@ def _lowest(K: csr_matrix, M: csr_matrix, lu: SuperLU, m: int) -> tuple[Array, A
         return _dense_modes(K, M, m)
     inverse = LinearOperator(K.shape, matvec=lu.solve)
     start = np.sin(1.0 + np.arange(n))
-    with piece(SEARCHES):
+    with piece(SEARCH_PIECE):
         lam, Phi = eigsh(K, m + N_SPARE_MODES, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
     order = np.argsort(lam)
     lam, Phi = lam[order], Phi[:, order]

@@ -8,7 +8,12 @@ from time import perf_counter
 from typing import Any
 
 # pieces that stages have in common; the rest of a stage belongs to none
-FACTORISATIONS, SOLUTIONS, SEARCHES, REST = "factorisations", "solutions", "searches", "rest"
+FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE = (
+    "factorisations",
+    "solutions",
+    "searches",
+    "rest",
+)
 MEGABYTE_SIZE = 1e6  # [bytes]
 
 
@@ -25,7 +30,7 @@ class Stopwatch:
         self.stages: dict[str, dict[str, float]] = {}
         self.counts: dict[str, dict[str, int]] = {}
         self.peaks: dict[str, float] = {}
-        self._stage, self._pieces, self._since = "", [REST], perf_counter()
+        self._stage, self._pieces, self._since = "", [REST_PIECE], perf_counter()
 
     def begin(self, stage: str) -> None:
         """End the stage before and begin another, or one of that name once more."""

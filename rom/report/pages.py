@@ -11,7 +11,7 @@ from rom.config.document import read_document
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Report, Row
 from rom.process.child import scratch
-from rom.process.stopwatch import FACTORISATIONS, REST, SEARCHES, SOLUTIONS
+from rom.process.stopwatch import FACTORISATION_PIECE, REST_PIECE, SEARCH_PIECE, SOLUTION_PIECE
 from rom.report import html
 from rom.report.run import RECORD_FILE, SCENE_FILE, Run, run, versions
 from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
@@ -210,7 +210,7 @@ def _provenance(body: "FlexibleBody") -> list[str]:
 
 def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
     """Where the time of the reduction went."""
-    pieces = (FACTORISATIONS, SOLUTIONS, SEARCHES, REST)
+    pieces = (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE)
     rows = [
         (stage, f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces),
          f"{found['MB']:.0f}")

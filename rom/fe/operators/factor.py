@@ -8,7 +8,7 @@ from rom.errors import SolverError
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
-from rom.process.stopwatch import FACTORISATIONS, SOLUTIONS, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, SOLUTION_PIECE, piece
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
 PIVOT_THRESHOLD = 0.01  # the default of MUMPS
@@ -73,7 +73,7 @@ class Factor:
             ResourceError: if MUMPS runs out of memory.
         """
         self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
-        with piece(FACTORISATIONS):
+        with piece(FACTORISATION_PIECE):
             self.ksp.setUp()
             self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
         code = self.factor.getMumpsInfog(1)
@@ -92,7 +92,7 @@ class Factor:
         X = np.empty(F.shape)
         for first in range(0, F.shape[1], BLOCK_SIZE):
             columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
-            with piece(SOLUTIONS):
+            with piece(SOLUTION_PIECE):
                 B, Y = dense(F[:, columns], self.A), dense(np.zeros_like(F[:, columns]), self.A)
                 self.factor.matSolve(B, Y)
                 X[:, columns] = Y.getDenseArray()

@@ -10,7 +10,7 @@ import numpy as np
 from rom.errors import SolverError
 from rom.fe.operators.factor import Factor
 from rom.model import Array
-from rom.process.stopwatch import SEARCHES, SOLUTIONS, piece
+from rom.process.stopwatch import SEARCH_PIECE, SOLUTION_PIECE, piece
 
 EIGENVALUE_RTOL = 1e-11  # SLEPc's residual, of the eigenvalue
 MAX_RESTARTS = 500
@@ -51,7 +51,7 @@ def krylov_schur(
     solver.setInitialSpace([vector(ops.K, ops.fixed)])  # depends on the place, not on the rank
     if deflated.shape[1]:
         solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
-    with piece(SEARCHES):
+    with piece(SEARCH_PIECE):
         solver.solve()
     pairs = mode_pairs(ops, solver, k)
     solver.destroy()  # it refers to the factor, which could not be freed
@@ -79,7 +79,7 @@ class _Applied:
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve A x = b."""
-        with piece(SOLUTIONS):
+        with piece(SOLUTION_PIECE):
             self.factor.solve(b, x)
 
 

@@ -30,7 +30,7 @@ from rom.fe.operators.memory import check_factor_memory, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
-from rom.process.stopwatch import SEARCHES, piece
+from rom.process.stopwatch import SEARCH_PIECE, piece
 
 N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
 MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
@@ -310,7 +310,7 @@ class PETScOperators:
             return davidson(self, factor, deflated, k)
         if not in_blocks and isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)
-        with piece(SEARCHES):
+        with piece(SEARCH_PIECE):
             space = BlockLanczos(self, factor, sigma, deflated, k, min(N_SPARE_MODES, k - 1))
             space.solve()
             return space.pairs()
