@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from time import perf_counter
 from typing import Any, overload
 
 import numpy as np
@@ -37,6 +36,7 @@ from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.kinds import by_name
 from rom.reduction.interfaces.order import with_orders
+from rom.reduction.interfaces.records import Connection
 
 log = logging.getLogger("rom")
 ENOUGH_MODES = CraigBampton()  # as many as the certificate needs
@@ -266,7 +266,6 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     certify: bool,
 ) -> FlexibleBody:
     """The body of `reduce`, whose stages are timed; `further` are stress and stiffening."""
-    clock = perf_counter()
     watch.begin("interfaces")
     bare, ops = mesh_operators(model), operators(model)
     interfaces, method = with_orders(ops, model, by_name(interfaces), method)
@@ -278,10 +277,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         connection = connect(ops, model, method.kinds(connection, interfaces))
         method = method.method
         say("full interfaces follow %d coordinates", connection.boundary.size)
-    chosen = judged_in(method, tuple(connection.parts.values()))
-    if isinstance(chosen, AssumedModes):
-        origins = {name: model.interfaces[name].origin for name in connection.parts}
-        chosen = obeying(chosen, connection, origins, reference)
+    chosen = _chosen(method, model, connection, reference)
     with _on_interfaces(interfaces), stages(2, long=ops.n > MANY_DOFS) as begin:
         watch.begin("shapes")
         begin(f"shapes of {ops.n} dofs")
@@ -311,7 +307,8 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     ).with_reference(reference)
     if damping is not None:
         body = damped(body, damping)
-    body.provenance["seconds to reduce"] = round(perf_counter() - clock, 3)
+    watch.end()
+    body.provenance["seconds to reduce"] = round(watch.seconds, 3)
     if not certify:
         return body
     watch.begin("comparison")
@@ -320,6 +317,15 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
+
+
+def _chosen(method: Any, model: FEModel, connection: Connection, reference: Any) -> Any:
+    """The method, with what it has to know of the supports or of the frame."""
+    chosen = judged_in(method, tuple(connection.parts.values()))
+    if isinstance(chosen, AssumedModes):
+        origins = {name: model.interfaces[name].origin for name in connection.parts}
+        chosen = obeying(chosen, connection, origins, reference)
+    return chosen
 
 
 def judged_in(method: Any, supports: tuple[Index, ...]) -> Any:

@@ -4,7 +4,6 @@ Each benchmark is a function that yields figures; ``BENCHMARKS`` lists them, ``r
 them.
 """
 
-import resource
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import pi
@@ -29,6 +28,7 @@ from rom.bench.models import (
     top,
 )
 from rom.model import FEModel
+from rom.process.memory import peak_bytes
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators, reduce
@@ -77,7 +77,7 @@ def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
         yield Figure("reduction", case, "factorisation of K_ii", bare, "s")
         yield Figure("reduction", case, "whole reduction", whole, "s")
         yield Figure("reduction", case, "whole over factorisation", whole / bare, "", "below 3")
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+        peak = peak_bytes() / 1024**3
         yield Figure("reduction", case, "peak memory of the process", peak, "GiB", "below 12")
 
 

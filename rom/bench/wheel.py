@@ -1,6 +1,5 @@
 """Modes of a bladed disk by one reduced sector, one full sector, and the whole wheel."""
 
-import resource
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import process_time
@@ -13,6 +12,7 @@ from rom.cyclic.reduced import reduce_sector
 from rom.cyclic.sector import CyclicSector
 from rom.eigen.scipy import SciPyOperators
 from rom.model import Array
+from rom.process.memory import peak_bytes
 from rom.reduction.interfaces.polynomial import Polynomial
 
 WHEEL_SIZES = {
@@ -81,4 +81,4 @@ def _below_the_next(sector: CyclicSector, f: Array) -> Array:
 
 def _peak() -> float:
     """Largest memory of the process so far [GiB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+    return peak_bytes() / 1024**3

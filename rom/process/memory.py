@@ -31,6 +31,11 @@ def free_bytes() -> float:
     return min(machine_free_bytes(), *map(group_bytes, _groups()), address_bytes())
 
 
+def peak_bytes() -> int:
+    """Largest memory of this process so far [bytes]; Linux counts in units of 1024."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
 def machine_free_bytes() -> float:
     """What the machine has free; where it does not tell, no limit."""
     try:

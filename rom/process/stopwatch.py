@@ -1,11 +1,12 @@
 """Where the time of long work goes: seconds by stages, and by pieces of work within them."""
 
-import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from time import perf_counter
 from typing import Any
+
+from rom.process.memory import peak_bytes
 
 # pieces that stages have in common; the rest of a stage belongs to none
 FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE = (
@@ -34,16 +35,16 @@ class Stopwatch:
 
     def begin(self, stage: str) -> None:
         """End the stage before and begin another, or one of that name once more."""
-        self._charge()
-        self._end()
+        self.end()
         self._stage = stage
         self.stages.setdefault(stage, {})
         self.counts.setdefault(stage, {})
 
     def end(self) -> None:
-        """End the last stage."""
+        """End the stage under way, if there is one."""
         self._charge()
-        self._end()
+        if self._stage:
+            self.peaks[self._stage] = peak_bytes() / MEGABYTE_SIZE
         self._stage = ""
 
     def enter(self, piece: str) -> None:
@@ -58,6 +59,11 @@ class Stopwatch:
         """From here on time belongs to what was under way before."""
         self._charge()
         self._pieces.pop()
+
+    @property
+    def seconds(self) -> float:
+        """Of all stages so far [s]."""
+        return sum(sum(pieces.values()) for pieces in self.stages.values())
 
     def table(self) -> dict[str, dict[str, float]]:
         """{stage: {"seconds", "MB", and per piece its seconds}}, as provenance keeps it."""
@@ -77,12 +83,6 @@ class Stopwatch:
             pieces = self.stages[self._stage]
             pieces[self._pieces[-1]] = pieces.get(self._pieces[-1], 0.0) + now - self._since
         self._since = now
-
-    def _end(self) -> None:
-        if self._stage:
-            # Linux counts in units of 1024 bytes
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / MEGABYTE_SIZE
-            self.peaks[self._stage] = peak
 
 
 _running: ContextVar[Stopwatch | None] = ContextVar("stopwatch", default=None)

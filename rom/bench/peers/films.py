@@ -138,16 +138,22 @@ def programs_compared(n: int, cells: tuple[int, int]) -> Iterator[Row]:
     taken, apart = np.zeros(2), np.zeros(n)
     for k, unit in enumerate(units):
         one, own = _timed(steady, replace(own, unit=unit), steps=STEPS_PER_TOOTH)
-        how = {"period": unit.mesh_period, "start": mechanism, "steps": STEPS_PER_TOOTH}
-        two, mechanism = _timed(periodic_motion, as_mechanism(unit), **how)
+        two, mechanism, factor = _repeating(unit, mechanism)
         taken += one, two
-        teeth = [x.force.sum() for x in tooth_loads(mechanism.solution, "mesh")]
-        apart[k] = abs(np.max(teeth) / np.mean(teeth[1:]) / own.load_factor - 1.0)
+        apart[k] = abs(factor / own.load_factor - 1.0)
     yield case, "a speed of a sweep by its own program", taken[0] / n, "s of the processor", ""
     yield case, "a speed of a sweep as a mechanism", taken[1] / n, "s of the processor", "below 3.6"
     yield case, "mechanism over its own program", taken[1] / taken[0], "", "below 2"
     yield case, "load factors apart, middle of all speeds", float(np.median(apart)), "", ""
     yield from _read_from_tables(units, f"{case}, from tables")
+
+
+def _repeating(unit: Transmission, start: Any, **films: Any) -> tuple[float, Any, float]:
+    """Seconds for the motion of the unit as a mechanism that repeats, it, and its load factor."""
+    how = {"period": unit.mesh_period, "start": start, "steps": STEPS_PER_TOOTH}
+    seconds, found = _timed(periodic_motion, as_mechanism(unit, **films), **how)
+    teeth = [x.force.sum() for x in tooth_loads(found.solution, "mesh")]
+    return seconds, found, float(np.max(teeth) / np.mean(teeth[1:]))
 
 
 def _read_from_tables(units: list[Transmission], case: str) -> Iterator[Row]:
@@ -157,19 +163,12 @@ def _read_from_tables(units: list[Transmission], case: str) -> Iterator[Row]:
     rest_time, found = _timed(mechanism_at_rest, first)
     factors, taken = [], rest_time
     for unit in units:
-        how = {"period": unit.mesh_period, "start": found, "steps": STEPS_PER_TOOTH}
-        one, found = _timed(periodic_motion, as_mechanism(unit, tabulated=True), **how)
-        teeth = [x.force.sum() for x in tooth_loads(found.solution, "mesh")]
-        factors.append(np.max(teeth) / np.mean(teeth[1:]))
+        one, found, factor = _repeating(unit, found, tabulated=True)
+        factors.append(factor)
         taken += one
-    yield (
-        case,
-        f"steady motion at {len(units)} speeds",
-        taken / 60,
-        "min of the processor",
-        "below 6",
-    )
-    yield case, "largest load factor", float(max(factors)), "", ""
+    speeds = f"steady motion at {len(units)} speeds"
+    yield case, speeds, taken / 60, "min of the processor", "below 6"
+    yield case, "largest load factor", max(factors), "", ""
 
 
 def _timed(work: Any, *arguments: Any, **named: Any) -> tuple[float, Any]:
