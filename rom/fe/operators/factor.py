@@ -8,7 +8,7 @@ from rom.errors import SolverError
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
-from rom.process.stopwatch import FACTORISATION_PIECE, SOLUTION_PIECE, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SOLUTION_PIECE, note, piece
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
 PIVOT_THRESHOLD = 0.01  # the default of MUMPS
@@ -86,6 +86,7 @@ class Factor:
             raise too_large(self.A.getSize()[0], need, self.allowed * self.A.comm.size)
         else:
             self.ok = code >= 0
+            note(FLOPS_NOTE, self.factor.getMumpsRinfog(3))
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""

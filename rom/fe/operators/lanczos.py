@@ -14,14 +14,13 @@ from rom.eigen.completeness import miss_probability
 from rom.errors import SolverError
 from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
-from rom.process.stopwatch import note
+from rom.process.stopwatch import MISS_NOTE, note
 
 BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
 MAX_MISS_PROBABILITY = 1e-9
-MISS_PROBABILITY = "probability of a missed mode"
 EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
 SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
 
@@ -124,7 +123,7 @@ class BlockLanczos:
         for _ in range(MAX_FURTHER_BLOCKS):
             chance = miss_probability(self.T, self.start, self._residuals(), m)
             if chance <= MAX_MISS_PROBABILITY:
-                note(MISS_PROBABILITY, chance)
+                note(MISS_NOTE, chance)
                 return True
             if chance == 1.0 or self.size + BLOCK_SIZE > self.V.shape[1]:
                 break
