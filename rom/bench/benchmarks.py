@@ -77,7 +77,11 @@ def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
         model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
         connection = connect(operators(model), model, KINDS)
         bare = _seconds(connection.ops.hold, connection.boundary)
-        kept = {"method": CraigBampton(20), "interfaces": KINDS, "reference": "root"}
+        kept: dict[str, Any] = {
+            "method": CraigBampton(20),
+            "interfaces": KINDS,
+            "reference": "root",
+        }
         whole = _seconds(reduce, model, **kept, certify=False)
         certified = reduce(model, **kept)
         case = f"{model.n_dofs} dofs"
