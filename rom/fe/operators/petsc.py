@@ -22,11 +22,12 @@ from rom.errors import ConfigError, ModelError, SolverError
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
+from rom.fe.operators.foreseen import check_factor_memory
 from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
 from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.lanczos import BlockLanczos, capacity
-from rom.fe.operators.memory import check_factor_memory, give_back
+from rom.fe.operators.memory import give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
@@ -274,8 +275,7 @@ class PETScOperators:
             if near_null is None:
                 raise ConfigError("the iterative solver needs the coordinates of the nodes.")
             return multigrid(A, near_null)
-        if self.solver == DIRECT_SOLVER:
-            check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
+        check_factor_memory(A, n_columns, self.solver)
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
 
