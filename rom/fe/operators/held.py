@@ -70,19 +70,19 @@ class HeldPETSc:
         return InterfaceError(
             f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free."
             + place,
-            hint="Fix at least three nodes that do not lie on one line, or hold another interface.",
+            hint="Fix at least three nodes that do not lie on one line, or hold another interface; "
+            "a part of the mesh that hangs on a point or on a line moves alone.",
         )
 
     def _refuse_free_motion(self) -> None:
         """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
-        ops, stiffness, place = self.ops, 0.0, ""
+        ops, stiffness, X = self.ops, 0.0, np.zeros((self.mine.size, 1))
         if self.factor.ok:
             R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
             X = self.factor.solve(ops.apply_M(R)[self.mine])
-            place = moves_most(ops, X, self.mine)
             if ops.all_finite(X):
                 K = self.inner.gram(X, self.inner.apply_K(X))
                 M = self.inner.gram(X, self.inner.apply_M(X))
                 stiffness = (np.diag(K) / np.diag(M)).min()
         if not stiffness > RIGID_RTOL * self.inner.largest():
-            raise self._singular(place)
+            raise self._singular(moves_most(ops, X, self.mine))
