@@ -96,7 +96,7 @@ class Factor:
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
-        X = np.empty(F.shape)
+        X = np.empty(F.shape, order="F")
         for first in range(0, F.shape[1], BLOCK_SIZE):
             columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
             with piece(SOLUTION_PIECE):
@@ -140,7 +140,7 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
         return _column_by_column(A, X)
     B = dense(X, A)
     Y = A.matMult(B)
-    out = Y.getDenseArray().copy()
+    out = Y.getDenseArray().copy(order="F")
     B.destroy(), Y.destroy()
     return out
 
