@@ -23,11 +23,13 @@ from rom.errors import ConfigError, ModelError, SolverError
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
+from rom.fe.operators.foreseen import check_factor_memory
 from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
 from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.lanczos import BlockLanczos, capacity
-from rom.fe.operators.memory import check_factor_memory, give_back
+from rom.fe.operators.memory import give_back
+from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
@@ -283,16 +285,16 @@ class PETScOperators:
             inverse = self.inverse(self.shifted(sigma), self.rigid)
             lam, Phi = self.lowest(m + N_SPARE_MODES, sigma, inverse, R)
             inverse.release()  # counting needs its memory
-            self._refuse_mechanisms(lam, n_rigid)
+            self._refuse_mechanisms(lam, Phi, n_rigid)
             verify_count(self, lam, m, n_rigid)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
-    def _refuse_mechanisms(self, lam: Array, n_rigid: int) -> None:
-        n_zero = int(np.count_nonzero(np.abs(lam) < RIGID_RTOL * self.largest()))
-        if n_rigid and n_zero:
+    def _refuse_mechanisms(self, lam: Array, Phi: Array, n_rigid: int) -> None:
+        loose = np.abs(lam) < RIGID_RTOL * self.largest()
+        if n_rigid and loose.any():
             raise ModelError(
-                f"at least {n_zero} more motions without stiffness than the six of a connected "
-                "body.",
+                f"at least {loose.sum()} more motions without stiffness than the six of a "
+                f"connected body.{moves_most(self, Phi[:, loose])}",
                 hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
             )
 
@@ -312,8 +314,7 @@ class PETScOperators:
             if near_null is None:
                 raise ConfigError("the iterative solver needs the coordinates of the nodes.")
             return multigrid(A, near_null)
-        if self.solver == DIRECT_SOLVER:
-            check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
+        check_factor_memory(A, n_columns, self.solver)
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
 

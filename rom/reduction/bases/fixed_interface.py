@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import Held, Operators
+from rom.eigen.verbs import Held, Operators, column_blocks
 from rom.model import Array, Basis
 
 
@@ -60,8 +60,10 @@ def fixed_interface(ops: Operators, boundary: npt.ArrayLike, n_modes: int) -> Ba
 
 def constraint_modes(ops: Operators, held: Held, boundary: npt.NDArray[np.int64]) -> Array:
     """(n_local, n_b) static shapes: one boundary dof moved by one, the other boundary dofs held."""
-    E = unit_motions(ops, boundary)
-    return E - held(ops.apply_K(E))
+    Psi = unit_motions(ops, boundary)
+    for some in column_blocks(boundary.size):
+        Psi[:, some] -= held(ops.apply_K(Psi[:, some]))
+    return Psi
 
 
 def unit_motions(ops: Operators, boundary: npt.NDArray[np.int64]) -> Array:
