@@ -1,6 +1,7 @@
 """Eigenvalue problems, written on verbs of operators.
 
 `verbs` are what reductions need of K and M, `scipy` does them with SciPy on one process,
+`substructuring` finds all modes up to a frequency, on `fronts` of a tree that `dissection` cuts;
 `attachments` adds masses and springs at nodes, `supports` says what is held.
 """
 

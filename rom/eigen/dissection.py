@@ -1,12 +1,16 @@
 """Nested dissection: the dofs of sparse matrices cut into a tree of substructures."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from rom.model import Array, Index
+from rom.model import Index
+
+Chosen = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +82,7 @@ def _cut(graph: csr_matrix, size: Index, nodes: Index, largest: int, pieces: lis
         pieces.append(nodes)
 
 
-def _half(graph: csr_matrix, size: Index) -> Array:
+def _half(graph: csr_matrix, size: Index) -> Chosen:
     """(n,) whether a node lies nearer to one of two far ends; half the dofs do."""
     one_end = int(np.argmax(_distances(graph, 0)))
     from_one = _distances(graph, one_end)
@@ -101,7 +105,7 @@ def _distances(graph: csr_matrix, start: int) -> Index:
     return distance
 
 
-def _separator(graph: csr_matrix, half: Array) -> Array:
+def _separator(graph: csr_matrix, half: Chosen) -> Chosen:
     """(n,) fewest nodes that touch all edges between the halves, by Koenig's theorem."""
     left, right = np.flatnonzero(half), np.flatnonzero(~half)
     edges = csr_matrix(graph[left][:, right])
@@ -127,7 +131,7 @@ def _coupled(A: csr_matrix, ends: Index) -> list[Substructure]:
     owner = np.repeat(np.arange(ends.size - 1), np.diff(ends))
     handed: list[list[Index]] = [[] for _ in ends[1:]]
     found = []
-    for k, (first, end) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+    for k, (first, end) in enumerate(pairwise(ends)):
         near = np.unique(np.concatenate([A[first:end].indices, *handed[k]]))
         boundary = near[near >= end].astype(np.int64)
         parent = int(owner[boundary[0]]) if boundary.size else -1

@@ -99,14 +99,14 @@ class SubstructuredBody:
         """
         A, n_negative = Extended(csr_matrix(self.K - shift * self.M), self.parts), 0
         for k in range(len(self.parts)):
-            D, B, rest = A.front(k)
+            D, B, C = A.front(k)
             pivots, kinds, X, info = dsysv(D, B, lower=1)
             if info:
                 raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
             single = kinds > 0  # the others are pivots of two rows, one negative, one positive
             n_negative += int(np.count_nonzero(np.diag(pivots)[single] < 0))
             n_negative += int(np.count_nonzero(~single)) // 2
-            A.hand_on(k, rest - B.T @ X)
+            A.hand_on(k, C - B.T @ X)
         return n_negative
 
     def _backwards(self, *blocks: list[Any]) -> Iterator[Any]:

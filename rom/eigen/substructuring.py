@@ -5,54 +5,38 @@ modes up to a cut-off, and Rayleigh and Ritz do the rest. Inverse iteration on t
 modes then takes most of the error away, and shows by its step how much there was.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import eigh, qr
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, issparse
 
 from rom.arguments import positive
 from rom.eigen.fronts import SubstructuredBody
-from rom.eigen.scipy import RIGID_RTOL, SciPyOperators
+from rom.eigen.scipy import RIGID_RTOL, SciPyOperators, dof_set
 from rom.eigen.verbs import canonical_signs, orthonormal
-from rom.errors import ConfigError, ModelError, ModesMissedError
-from rom.model import Array
+from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
+from rom.model import Array, Modes
 
-CUTOFF_RATIO = 9.0  # largest eigenvalue of a substructure that is kept, over the last one sought
-SPARE_RATIO = 1.3  # eigenvalues up to here are sought beside those asked for, to find a gap
+CUTOFF_RATIOS = (9.0, 36.0)  # eigenvalues of substructures kept up to, over the last one sought
+COUNT_RATIOS = (1.1, 1.3)  # eigenvalues, over the last one sought, between which they are counted
+SPARE_RATIO = 1.6  # eigenvalues of substructuring up to here are taken along: they are too high
 SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
-MAX_STEPS = 8  # of inverse iteration; one or two are usual
+SHIFT_RTOL = 1e-11  # of the largest eigenvalue of the mesh: a smaller shift would be round-off
+MAX_STEPS = 4  # of inverse iteration; one or two are usual
 ROUND_OFF = 1e-13  # of the last eigenvalue: what sums over the dofs leave uncertain
 STIFF_ROUND_OFF = 1e-15  # of the largest eigenvalue of the mesh, likewise in solutions
 
 
-@dataclass(frozen=True, slots=True)
-class BoundedModes:
-    """Modes with bounds of their errors.
-
-    Attributes:
-        omega: (m,) circular frequencies, ascending, none below that of the matrices [rad/s].
-        shapes: (n, m) mass-normalised shapes, largest entry positive [kg^-1/2].
-        error: (m,) at most this share [1] of a frequency is error.
-        n_kept: number of modes of substructures that were kept.
-        n_steps: steps of inverse iteration after that.
-    """
-
-    omega: Array
-    shapes: Array
-    error: Array
-    n_kept: int
-    n_steps: int
-
-
 def substructured_modes(
-    K: Any, M: Any, f_max: float, *, rigid: Array | None = None, tol: float = 1e-4
-) -> BoundedModes:
+    K: Any, M: Any, f_max: float, *, rigid: Array | None = None, tol: float = 1e-3
+) -> Modes:
     """All modes up to a frequency, by automated multilevel substructuring.
 
-    For hundreds to thousands of modes. Frequencies are those of Rayleigh and Ritz. A number counted
-    by inertia proves that none is missed, and makes the bounds of Lehmann for the errors strict.
+    For hundreds to thousands of modes. Frequencies are those of Rayleigh and Ritz. A count by
+    inertia proves that none is missed, and makes the bounds of Lehmann for their errors strict.
 
     Args:
         K: (n, n) stiffness [N/m], symmetric.
@@ -61,55 +45,88 @@ def substructured_modes(
         rigid: (n, 6) rigid motions of a free body, kept exactly; None if the body is held.
         tol: largest error of a frequency [1], by its bound.
 
+    Returns:
+        Modes with their bounds ``error``; the true frequencies lie between
+        (1 - error) omega and omega [rad/s].
+
     Raises:
+        ConfigError: if the frequency or the tolerance is out of range.
         InterfaceError: if a body that should be held is free.
-        ModesMissedError: if the inertia count differs, or the bounds stay above the tolerance.
+        ModelError: if a free body has other motions without stiffness.
+        ModesMissedError: if the inertia count differs.
+        SolverError: if the bounds stay above the tolerance.
 
     Source:
         Bennighof and Lehoucq, An automated multilevel substructuring method for eigenspace
         computation in linear elastodynamics, SIAM J. Sci. Comput. 25 (2004) 2084; Gao, Li, Yang
-        and Bai, ACM Trans. Math. Softw. 34 (2008) 20; bounds: Lehmann, Z. Angew. Math. Mech. 29
-        (1949) 341.
+        and Bai, ACM Trans. Math. Softw. 34 (2008) 20.
+
+    Example:
+        >>> K = np.diag(np.full(9, 2.0)) - np.eye(9, k=1) - np.eye(9, k=-1)  # held chain
+        >>> found = rom.eigen.substructured_modes(K, np.eye(9), f_max=0.1)
+        >>> np.round(found.omega, 6)  # 2 sin(k pi / 20)
+        array([0.312869, 0.618034])
     """
     if not 0 < tol < 1:
         raise ConfigError(f"tol = {tol!r} is a relative error between 0 and 1.")
     ops = SciPyOperators(K, M, rigid)
     last = (2 * np.pi * positive("f_max", f_max)) ** 2
-    shift = 0.0 if rigid is None else SHIFT_SHARE * last
-    iteration = _Iteration(ops, last, shift)
-    for _ in range(MAX_STEPS):
-        iteration.step()
-        found = iteration.found()
-        if found is not None and (found.error <= tol).all():
-            return found
+    for ratio in CUTOFF_RATIOS:
+        search = _Search(ops, last, ratio)
+        for _ in range(MAX_STEPS):
+            search.step()
+            if search.complete and (found := search.modes()).error.max(initial=0.0) <= tol:
+                return found
+    if search.complete:
+        raise SolverError(
+            f"the frequencies up to {f_max:g} Hz are known within {found.error.max():.2g} only.",
+            hint=f"Allow a larger error than tol = {tol:g}.",
+        )
     raise ModesMissedError(
-        f"the modes up to {f_max:g} Hz are not certain within {tol:g} after {MAX_STEPS} steps.",
-        hint="Allow a larger error, or change the frequency a little.",
+        f"{search.n_found} modes were found below {np.sqrt(search.rho) / (2 * np.pi):.6g} Hz, but "
+        f"the inertia of K - sigma M counts {search.n_below}.",
+        hint="Change f_max a little.",
     )
 
 
-class _Iteration:
+def modes_up_to(ops: Any, held: npt.ArrayLike, f_max: float, tol: float) -> Modes:
+    """`substructured_modes` with some dofs held, of operators in one process."""
+    if ops.n_local != ops.n:
+        raise ParallelError(
+            "modes up to a frequency are computed in one process.",
+            hint="Ask for a number of modes, or run without mpirun.",
+        )
+    K, M = (A if issparse(A) else ops.gathered(A) for A in (ops.K, ops.M))
+    free = np.setdiff1d(np.arange(ops.n), dof_set(held, ops.n))
+    whole = free.size == ops.n
+    rigid = ops.rigid if whole else None
+    found = substructured_modes(K[free][:, free], M[free][:, free], f_max, rigid=rigid, tol=tol)
+    Phi = np.zeros((ops.n, found.omega.size))
+    Phi[free] = found.shapes
+    return replace(found, shapes=Phi)
+
+
+class _Search:
     """Inverse iteration on a block of modes, from those of substructures.
 
     Z solves (K + shift M) Z = M X, so that three Gram matrices tell how far Z is from an
     invariant space, in the norm of M^-1 of what is left of K z - lambda M z.
     """
 
-    def __init__(self, ops: SciPyOperators, last: float, shift: float):
-        self.ops, self.last, self.shift = ops, last, shift
-        self.limit = SPARE_RATIO * last + shift
+    def __init__(self, ops: SciPyOperators, last: float, cutoff_ratio: float):
+        self.ops, self.last = ops, last
+        self.shift = shift = 0.0 if ops.rigid is None else _shift(ops, last)
+        limit = SPARE_RATIO * last + shift
         none = np.zeros((ops.n, 0))
         self.R = none if ops.rigid is None else orthonormal(ops, ops.rigid)
         self.MR = ops.M @ self.R
         K = csr_matrix(ops.K + shift * ops.M)
-        self.body = SubstructuredBody(K, ops.M, CUTOFF_RATIO * self.limit)
+        self.body = SubstructuredBody(K, ops.M, cutoff_ratio * last + shift)
         mu, Y = none[0], none[:0]
         if self.body.mass.size:
-            interval = (1.0 / self.limit, np.inf)
+            interval = (1.0 / limit, np.inf)
             mu, Y = eigh(self.body.mass, subset_by_value=interval, driver="evr")
         self.X = self._elastic(self.body.expand((Y / np.sqrt(mu))[:, ::-1]))
-        self.theta = 1.0 / mu
-        self.rho = 0.0
         self.n_steps = 0
 
     def _elastic(self, X: Array) -> Array:
@@ -139,31 +156,35 @@ class _Iteration:
 
     def _count(self) -> None:
         """Count the eigenvalues up to the widest gap behind the last one asked for."""
-        last = self.last + self.shift
-        between = self.theta[(self.theta > last) & (self.theta < self.limit)]
-        edges = np.array([last, *between, self.limit])
+        first, last = (ratio * self.last + self.shift for ratio in COUNT_RATIOS)
+        between = self.theta[(self.theta > first) & (self.theta < last)]
+        edges = np.array([first, *between, last])
         widest = int(np.argmax(np.diff(edges)))
         self.rho = float(0.5 * (edges[widest] + edges[widest + 1]))
         self.n_below = self.body.count(self.rho) - self.R.shape[1]
 
-    def found(self) -> BoundedModes | None:
-        """The modes asked for; None as long as their number is not the one counted."""
-        below = self.theta < self.rho
-        if np.count_nonzero(below) != self.n_below:
-            return None
-        lam, largest = self.theta[below] - self.shift, self.ops._largest()
+    @property
+    def n_found(self) -> int:
+        """Number of modes below the place of the count, rigid motions left out."""
+        return int(np.count_nonzero(self.theta < self.rho))
+
+    @property
+    def complete(self) -> bool:
+        """Whether as many modes were found as there are."""
+        return self.n_found == self.n_below
+
+    def modes(self) -> Modes:
+        """The modes asked for, and bounds of their errors, valid when they are complete."""
+        lam, largest = self.theta[: self.n_below] - self.shift, self.ops.largest()
         self._refuse_loose(lam, largest)
         lower = lehmann_bounds(self.theta, self.residual, self.rho) - self.shift
         lower -= ROUND_OFF * self.rho + STIFF_ROUND_OFF * largest
-        asked = lam <= self.last
-        error = 1.0 - np.sqrt(np.maximum(lower, 0.0) / lam)
-        n_rigid = self.R.shape[1]
-        return BoundedModes(
-            np.concatenate([np.zeros(n_rigid), np.sqrt(lam[asked])]),
-            np.hstack([self.R, canonical_signs(self.X[:, : self.n_below][:, asked])]),
-            np.concatenate([np.zeros(n_rigid), error[asked]]),
-            self.body.mass.shape[0],
-            self.n_steps,
+        m, still = np.searchsorted(lam, self.last, side="right"), np.zeros(self.R.shape[1])
+        error = 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
+        return Modes(
+            np.concatenate([still, np.sqrt(lam[:m])]),
+            np.hstack([self.R, canonical_signs(self.X[:, :m].copy())]),
+            error=np.concatenate([still, error]),
         )
 
     def _refuse_loose(self, lam: Array, largest: float) -> None:
@@ -175,6 +196,10 @@ class _Iteration:
                 hint="Hold the body, or give the rigid motions of a free one; parts of the mesh "
                 "may not be connected, or joined at a point or an edge only.",
             )
+
+
+def _shift(ops: SciPyOperators, last: float) -> float:
+    return max(SHIFT_SHARE * last, SHIFT_RTOL * ops.largest())
 
 
 def lehmann_bounds(theta: Array, residual: Array, rho: float) -> Array:
