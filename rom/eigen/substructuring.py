@@ -47,7 +47,7 @@ def substructured_modes(
 
     Returns:
         Modes with their bounds ``error``; the true frequencies lie between
-        (1 - error) omega and omega [rad/s].
+        (1 - error) omega and omega [rad/s]. The last may lie above f_max by as much.
 
     Raises:
         ConfigError: if the frequency or the tolerance is out of range.
@@ -179,7 +179,7 @@ class _Search:
         self._refuse_loose(lam, largest)
         lower = lehmann_bounds(self.theta, self.residual, self.rho) - self.shift
         lower -= ROUND_OFF * self.rho + STIFF_ROUND_OFF * largest
-        m, still = np.searchsorted(lam, self.last, side="right"), np.zeros(self.R.shape[1])
+        m, still = np.count_nonzero(lower <= self.last), np.zeros(self.R.shape[1])
         error = 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
         return Modes(
             np.concatenate([still, np.sqrt(lam[:m])]),
