@@ -20,12 +20,13 @@ from rom.eigen.verbs import canonical_signs, orthonormal
 from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
 from rom.model import Array, Modes
 
-CUTOFF_RATIOS = (9.0, 36.0)  # eigenvalues of substructures kept up to, over the last one sought
+CUTOFF_RATIOS = (6.0, 24.0)  # eigenvalues of substructures kept up to, over the last one sought
 COUNT_RATIOS = (1.1, 1.3)  # eigenvalues, over the last one sought, between which they are counted
 SPARE_RATIO = 1.6  # eigenvalues of substructuring up to here are taken along: they are too high
 SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
 SHIFT_RTOL = 1e-11  # of the largest eigenvalue of the mesh: a smaller shift would be round-off
 MAX_STEPS = 4  # of inverse iteration; one or two are usual
+N_COLUMNS = 256  # solved together: more take memory, fewer make products of matrices slow
 ROUND_OFF = 1e-13  # of the last eigenvalue: what sums over the dofs leave uncertain
 STIFF_ROUND_OFF = 1e-15  # of the largest eigenvalue of the mesh, likewise in solutions
 
@@ -75,11 +76,11 @@ def substructured_modes(
         search = _Search(ops, last, ratio)
         for _ in range(MAX_STEPS):
             search.step()
-            if search.complete and (found := search.modes()).error.max(initial=0.0) <= tol:
-                return found
+            if search.complete and (worst := search.bounds()[1].max(initial=0.0)) <= tol:
+                return search.modes()
     if search.complete:
         raise SolverError(
-            f"the frequencies up to {f_max:g} Hz are known within {found.error.max():.2g} only.",
+            f"the frequencies up to {f_max:g} Hz are known within {worst:.2g} only.",
             hint=f"Allow a larger error than tol = {tol:g}.",
         )
     raise ModesMissedError(
@@ -126,33 +127,43 @@ class _Search:
         if self.body.mass.size:
             interval = (1.0 / limit, np.inf)
             mu, Y = eigh(self.body.mass, subset_by_value=interval, driver="evr")
-        self.X = self._elastic(self.body.expand((Y / np.sqrt(mu))[:, ::-1]))
+        self.X, self.gram = self._elastic(self.body.expand((Y / np.sqrt(mu))[:, ::-1]))
         self.n_steps = 0
 
-    def _elastic(self, X: Array) -> Array:
-        """X without the columns that are nearest to rigid motions, and without these."""
+    def _elastic(self, X: Array) -> tuple[Array, Array]:
+        """X without rigid motions and the columns that are nearest to them, and X^T M X."""
         B = self.MR.T @ X
         if self.R.size:
             leading = qr(B, mode="r", pivoting=True)[1][: self.R.shape[1]]
             X, B = np.delete(X, leading, axis=1), np.delete(B, leading, axis=1)
-        return X - self.R @ B
+            X -= self.R @ B
+        return X, np.eye(X.shape[1]) - B.T @ B
 
     def step(self) -> None:
         """Solve with the block, and take the best modes in the space of the solutions."""
-        MX = self.ops.M @ self.X
-        Z = self.body.solve(MX)
-        Z -= self.R @ (self.MR.T @ Z)
-        MZ = self.ops.M @ Z
-        scale = 1.0 / np.sqrt(np.einsum("ij,ij->j", Z, MZ))
-        for columns in (self.X, MX, Z, MZ):
-            columns *= scale
-        A0, A1, A2 = Z.T @ MZ, Z.T @ MX, self.X.T @ MX  # z^T M z, z^T K z, (K z)^T M^-1 K z
+        Z, A0, A1 = self._solutions()
+        scale = 1.0 / np.sqrt(np.diag(A0))
+        A0, A1, A2 = (A * np.outer(scale, scale) for A in (A0, A1, self.gram))
         self.theta, C = _eigh(A1, A0)
         self.residual = C.T @ A2 @ C - np.diag(self.theta**2)
-        self.X = Z @ C
+        self.X, self.gram = Z @ (scale[:, None] * C), C.T @ A0 @ C
         self.n_steps += 1
         if self.n_steps == 1:
             self._count()
+
+    def _solutions(self) -> tuple[Array, Array, Array]:
+        """Z with (K + shift M) Z = M X, and its products with M and with K + shift M."""
+        n, k = self.X.shape
+        Z, A0, A1 = np.empty((n, k), order="F"), np.zeros((k, k)), np.zeros((k, k))
+        for start in range(0, k, N_COLUMNS):
+            new = slice(start, min(start + N_COLUMNS, k))
+            MX = self.ops.M @ self.X[:, new]
+            Z_new = self.body.solve(MX)
+            Z[:, new] = Z_new - self.R @ (self.MR.T @ Z_new)
+            for A, load in ((A0, self.ops.M @ Z[:, new]), (A1, MX)):
+                A[: new.stop, new] = Z[:, : new.stop].T @ load
+        A0, A1 = (np.triu(A) + np.triu(A, 1).T for A in (A0, A1))
+        return Z, A0, A1
 
     def _count(self) -> None:
         """Count the eigenvalues up to the widest gap behind the last one asked for."""
@@ -173,17 +184,24 @@ class _Search:
         """Whether as many modes were found as there are."""
         return self.n_found == self.n_below
 
-    def modes(self) -> Modes:
-        """The modes asked for, and bounds of their errors, valid when they are complete."""
+    def bounds(self) -> tuple[Array, Array]:
+        """Eigenvalues asked for, rigid motions left out, and errors that bound their roots.
+
+        Valid when they are complete.
+        """
         lam, largest = self.theta[: self.n_below] - self.shift, self.ops.largest()
         self._refuse_loose(lam, largest)
         lower = lehmann_bounds(self.theta, self.residual, self.rho) - self.shift
         lower -= ROUND_OFF * self.rho + STIFF_ROUND_OFF * largest
-        m, still = np.count_nonzero(lower <= self.last), np.zeros(self.R.shape[1])
-        error = 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
+        m = np.count_nonzero(lower <= self.last)
+        return lam[:m], 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
+
+    def modes(self) -> Modes:
+        """The modes asked for, rigid motions first."""
+        (lam, error), still = self.bounds(), np.zeros(self.R.shape[1])
         return Modes(
-            np.concatenate([still, np.sqrt(lam[:m])]),
-            np.hstack([self.R, canonical_signs(self.X[:, :m].copy())]),
+            np.concatenate([still, np.sqrt(lam)]),
+            np.hstack([self.R, canonical_signs(self.X[:, : lam.size])]),
             error=np.concatenate([still, error]),
         )
 

@@ -18,8 +18,9 @@ ROUND_OFF = 1e-10  # of frequencies of dense solutions, 1e-16 times the ratio of
 
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch):
-    """Parts of sixty dofs, so that small bodies have trees of several levels."""
+    """Parts of sixty dofs, so that small bodies have trees of several levels, and few columns."""
     monkeypatch.setattr(fronts, "MAX_PART_DOFS", 60)
+    monkeypatch.setattr(substructuring, "N_COLUMNS", 16)
 
 
 def body(size, cells, held=False):
