@@ -2,8 +2,7 @@
 
 `models` are the components, `units` a gear unit for two programs, `two_stages` one of solids,
 `loops`, `wheel` and `many_modes` large measurements, `first_use` what compiles when it is used
-first, `peers`
-the other programs; `benchmarks` lists them all for ``rom bench``.
+first, `peers` the other programs; `benchmarks` lists them all for ``rom bench``.
 """
 
 from rom.lazy import front
