@@ -5,7 +5,8 @@ TASKS: dict[str, tuple[str, str]] = {
     "From geometry to matrices": (
         "A mesh and its materials become stiffness and mass.",
         """Material Orthotropic Layered fe.model fe.assemble read_component Region Interface
-        Attachment SurfaceMesh FEModel mass_properties modes Modes""",
+        Attachment SurfaceMesh FEModel mass_properties modes Modes
+        eigen.substructured_modes""",
     ),
     "Reduce": (
         "A method and kinds of interfaces make a small body of a large model.",

@@ -261,11 +261,14 @@ class Modes:
             of an assembly; whatever coordinates the maker of the modes names.
         residual: (m,) relative residual norm(K phi - lambda M phi) / norm(K phi); None where the
             modes are those of small matrices, solved to round-off.
+        error: (m,) at most this share [1] of a frequency is error of the search, none is too low;
+            None where the search went down to round-off.
     """
 
     omega: Array
     shapes: Any
     residual: Any = None
+    error: Any = None
 
     @property
     def frequencies(self) -> Array:
@@ -292,6 +295,8 @@ class Modes:
         columns, names = [self.frequencies], ["frequency [Hz]"]
         if self.residual is not None:
             columns, names = [*columns, self.residual], [*names, "residual"]
+        if self.error is not None:
+            columns, names = [*columns, self.error], [*names, "error below"]
         rows = zip(range(1, self.omega.size + 1), *columns, strict=True)
         return html_table(f"Modes: {self._said}", ("mode", *names), rows)
 

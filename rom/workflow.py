@@ -23,6 +23,7 @@ from rom.cyclic.sector import CyclicSector
 from rom.deprecated import renamed
 from rom.eigen.attachments import added_mass
 from rom.eigen.scipy import SciPyOperators
+from rom.eigen.substructuring import modes_up_to
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
@@ -101,17 +102,21 @@ def mass_properties(model: FEModel) -> MassProperties:
 @typed
 def modes(
     model: FEModel,
-    n: int,
+    n: int | None = None,
     *,
+    f_max: float | None = None,
     fixed: Fixed = (),
     springs: Springs | None = None,
     interfaces: dict[str, Any] | None = None,
+    tol: float = 1e-3,
 ) -> Modes:
-    """Lowest natural modes of the full model.
+    """Lowest natural modes of the full model, so many or up to a frequency.
 
     Args:
         model: the body.
         n: number of modes; without support the six rigid motions come first and count.
+        f_max: alternatively, all modes up to this frequency [Hz], by
+            `rom.eigen.substructured_modes`, for hundreds to thousands of them in one process.
         fixed: names of the interfaces held, or {name: directions}: {"root": "yz"} slides along x,
             {"cut": "x"} on a plane normal to x is one of symmetry; "xyz rx" with rotations where
             the interface is rigid or averaged.
@@ -119,12 +124,15 @@ def modes(
             [N/m, N m/rad], on its mean motion unless it is rigid.
         interfaces: {name: kind} to give interfaces the kind they have in a reduced body, so that
             like is compared with like; an interface that is only held keeps all its dofs.
+        tol: with f_max, how large the bound ``error`` of a frequency may be [1]; with n the search
+            goes down to round-off.
 
     Raises:
         InterfaceError: if an interface is unknown, or has no such coordinates; naming the motion
             that supports leave to the whole body.
-        ConfigError: if n is not a positive number of modes.
+        ConfigError: if not one of n and f_max is given, or it is not positive.
         ModesMissedError: if a count says that a mode was skipped.
+        ParallelError: with f_max under mpirun.
 
     Example:
         >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
@@ -133,7 +141,10 @@ def modes(
         >>> round(float(found[0]))
         25
     """
-    whole("n", n, 1)
+    if (n is None) == (f_max is None):
+        raise ConfigError("modes takes n, a number of modes, or f_max, the last frequency [Hz].")
+    if n is not None:
+        whole("n", n, 1)
     kinds = by_name(interfaces or {})
     stiffness = spring_matrices(springs, model.interfaces, "the model")
     kinds = dict.fromkeys(stiffness, "rbe3") | kinds
@@ -145,11 +156,15 @@ def modes(
     else:
         refuse_loose(connection.ops, held)
     with stages(2, long=connection.ops.n > MANY_DOFS) as begin:
-        begin(f"{n} modes of {connection.ops.n} dofs")
-        omega, Phi = connection.ops.modes(held, n)
-        begin(f"residuals of {n} modes")
-        residual = _residual(connection.ops, held, omega, Phi)
-    return Modes(omega, connection.ops.expand(Phi), residual)
+        sought = f"{n} modes" if f_max is None else f"modes up to {f_max:g} Hz"
+        begin(f"{sought} of {connection.ops.n} dofs")
+        if f_max is None:
+            found = Modes(*connection.ops.modes(held, n))
+        else:
+            found = modes_up_to(connection.ops, held, f_max, tol)
+        begin(f"residuals of {found.omega.size} modes")
+        residual = _residual(connection.ops, held, *found)
+    return replace(found, shapes=connection.ops.expand(found.shapes), residual=residual)
 
 
 def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:

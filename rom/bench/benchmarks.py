@@ -108,6 +108,21 @@ def large_reduction() -> Iterator[Figure]:
     yield from reduction((300e3,))
 
 
+def many_modes(size: float = 30e3, counts: tuple[int, ...] = (100, 300)) -> Iterator[Figure]:
+    """Modes of the beam held at its root, by substructuring and by block Lanczos: processor time.
+
+    Args:
+        size: number of dofs aimed at.
+        counts: numbers of modes; a thousand take Lanczos a quarter of an hour.
+    """
+    from rom.bench.many_modes import measured
+    from rom.fe import model as read_model
+
+    model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
+    for row in measured(model, counts):
+        yield Figure("many-modes", *row)
+
+
 def integrator(turns: int = 40) -> Iterator[Figure]:
     """A slider-crank whose connecting rod has 20 fixed-interface modes, 1000 steps a turn.
 
@@ -457,6 +472,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "loops": loops,
     "reduction": reduction,
     "large-reduction": large_reduction,
+    "many-modes": many_modes,
     "wheel": wheel,
     "peers": peers,
     "motion": motion,

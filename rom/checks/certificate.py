@@ -9,7 +9,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
 from rom.eigen.condensed import Condensed, condensed
-from rom.eigen.verbs import Operators, given_rigid_motions, mac, residual_errors
+from rom.eigen.verbs import Operators, given_rigid_motions, mac, quadratic, residual_errors
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.bases.fixed_interface import constraint_modes
@@ -133,8 +133,7 @@ def condensed_model(connection: Connection, basis: Basis) -> Condensed:
 
 def basis_matrices(ops: Operators, basis: Basis) -> tuple[Array, Array]:
     """(r, r) stiffness and mass of the basis as they come, not made symmetric."""
-    Psi = basis.Psi
-    return ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+    return quadratic(ops, ops.apply_K, basis.Psi), quadratic(ops, ops.apply_M, basis.Psi)
 
 
 def full_support(connection: Connection, parts: Condensed | None, fixed: tuple[str, ...]) -> Any:

@@ -41,7 +41,9 @@ class Condensed:
             InterfaceError: if a motion other than the six of the free body has no stiffness.
         """
         free = np.flatnonzero(~np.isin(self.boundary, dofs))
-        scale = 1.0 / np.sqrt(np.diag(self.S)[free])
+        stiffness = np.diag(self.S)[free]
+        stiffness = np.maximum(stiffness, LEAST_STIFFNESS * stiffness.max(initial=1.0))
+        scale = 1.0 / np.sqrt(stiffness)
         S = scale[:, None] * self.S[np.ix_(free, free)] * scale
         if not dofs.size and self.ops.rigid is not None:
             R = self.ops.rows(self.ops.rigid, self.boundary) / scale[:, None]

@@ -197,7 +197,7 @@ class SciPyOperators:
             )
         order = np.argsort(lam)
         lam, Phi = lam[order], Phi[:, order]
-        lam[np.abs(lam) < RIGID_RTOL * self._largest()] = 0.0
+        lam[np.abs(lam) < RIGID_RTOL * self.largest()] = 0.0
         if R.shape[1] and lam[0] == 0.0:
             raise ModelError(
                 f"at least {np.count_nonzero(lam == 0.0)} more motions without stiffness than the "
@@ -209,7 +209,7 @@ class SciPyOperators:
 
     def _first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
-        shift = 1e-6 * self._largest()
+        shift = 1e-6 * self.largest()
         lu = _symmetric_lu(self.K + shift * self.M)
         X = np.sin(np.outer(1.0 + np.arange(self.n), 1.0 + np.arange(8.0)))
         for _ in range(4):
@@ -218,10 +218,10 @@ class SciPyOperators:
         X -= R @ (R.T @ (self.M @ X))
         lam = eigh(X.T @ (self.K @ X), X.T @ (self.M @ X), eigvals_only=True)
         return float(
-            max(lam[np.argmax(lam > RIGID_RTOL * self._largest())], RIGID_RTOL * self._largest())
+            max(lam[np.argmax(lam > RIGID_RTOL * self.largest())], RIGID_RTOL * self.largest())
         )
 
-    def _largest(self) -> float:
+    def largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals."""
         return float(np.max(self.K.diagonal() / self.M.diagonal()))
 

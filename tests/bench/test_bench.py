@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.paths import ROOT
-from rom.bench import benchmarks, wheel
+from rom.bench import benchmarks, many_modes, wheel
 from rom.bench.models import planetary_train, shaft_in_films
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ResourceError
@@ -148,6 +148,14 @@ def test_other_programs_reduce_the_same_model(bar, tmp_path):
     body = rom.reduce(bar, method=rom.CraigBampton(8), interfaces=benchmarks.KINDS, certify=False)
     assert_allclose(found["frequencies"], body.frequencies()[6:16], rtol=1e-8)
     assert found["seconds"] > 0.0
+
+
+def test_many_modes_are_the_same_both_ways(bar):
+    rows = {quantity: value for _, quantity, value, _, _ in many_modes.measured(bar, (40,))}
+    assert 1e-9 < rows["largest error"] < rows["largest bound"] < 1e-3
+    assert rows["largest error over its bound"] < 1.0
+    ratio = rows["block Lanczos"] / rows["substructuring"]
+    assert rows["Lanczos over substructuring"] == pytest.approx(ratio)
 
 
 @pytest.mark.long

@@ -103,6 +103,7 @@ ORDER = {
         "loops",
         "first_use",
         "wheel",
+        "many_modes",
         "benchmarks",
     ),
     "cli": (

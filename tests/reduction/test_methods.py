@@ -198,3 +198,29 @@ def test_modes_that_spend_the_flexibility_of_the_interface_are_refused():
     b = boundary_of_faces(model)
     with pytest.raises(InterfaceError, match="residual flexibility of the 24 boundary dofs"):
         rom.Rubin(model.n_dofs - 6).basis(ops, b, ("",) * 24)
+
+
+def test_modes_by_substructures_are_those_by_lanczos(ops, model):
+    b = boundary(model)
+    known = rom.CraigBampton(n_modes=40).basis(ops, b, ("",) * b.size)
+    f_max = float(known.omega[30] + known.omega[31]) / (4 * np.pi)
+    found = rom.CraigBampton(f_max=f_max, search="substructures").basis(ops, b, ("",) * b.size)
+    assert found.omega.size == 31
+    assert_allclose(found.omega, known.omega[:31], rtol=1e-3)
+    Phi, Psi = (basis.Psi[:, b.size : b.size + 31] for basis in (known, found))
+    S = ops.gram(Phi, ops.apply_M(Psi))
+    assert_allclose(np.linalg.svd(S, compute_uv=False), 1.0, atol=1e-4)
+    assert_allclose(found.Psi[:, : b.size], known.Psi[:, : b.size], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"f_max": 1e3, "search": "arnoldi"}, "search"),
+        ({"n_modes": 3, "search": "substructures"}, "up to f_max"),
+        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "without tol"),
+    ],
+)
+def test_a_search_that_does_not_suit_is_refused(given, said):
+    with pytest.raises(ConfigError, match=said):
+        rom.CraigBampton(**given)

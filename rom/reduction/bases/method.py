@@ -5,7 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from rom.arguments import typed, whole
+from rom.arguments import one_of, typed, whole
+from rom.eigen.substructuring import modes_up_to
 from rom.eigen.verbs import Held, Operators, whole_clusters
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
@@ -15,6 +16,8 @@ from rom.rows import FREQUENCY_RTOL
 
 FIRST_BATCH = 16  # modes computed first where their number is looked for
 ENOUGH_RTOL = 0.5 * FREQUENCY_RTOL  # the estimate is none below half the limit of certificates
+LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH = "lanczos", "substructures"
+SUBSTRUCTURE_RTOL = 1e-3  # of frequencies, by their bounds; most are a hundred times better
 
 
 class Method(Protocol):
@@ -58,22 +61,26 @@ class CraigBampton:
         tol: keep instead the fewest modes whose estimated error [1] of every natural frequency of
             the free body up to f_max is at most this, e.g. 1e-3; without f_max, of the lowest
             six in every support, 5e-4 if not given.
+        search: how modes up to f_max are found: "lanczos", to round-off, or "substructures", for
+            hundreds to thousands of them, with frequencies within 1e-3; in one process.
         supports: columns of the interfaces that are held for this, which `rom.reduce` fills in.
 
     Raises:
-        ConfigError: if both n_modes and f_max are given, or for numbers out of range.
+        ConfigError: if both n_modes and f_max are given, for numbers out of range, or for
+            substructures without f_max or with tol.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
 
     Example:
         >>> rom.CraigBampton(f_max=3e3, tol=1e-3)  # as few modes as that takes
-        CraigBampton(n_modes=None, f_max=3000.0, tol=0.001)
+        CraigBampton(n_modes=None, f_max=3000.0, tol=0.001, search='lanczos')
     """
 
     n_modes: int | None = None
     f_max: float | None = None
     tol: float | None = None
+    search: str = LANCZOS_SEARCH
     supports: tuple[Index, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -87,6 +94,10 @@ class CraigBampton:
             raise ConfigError(
                 f"tol = {self.tol!r} is a relative error between 0 and 1, in place of n_modes."
             )
+
+        one_of("search", self.search, (LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH))
+        if self.search == SUBSTRUCTURE_SEARCH and (self.f_max is None or self.tol is not None):
+            raise ConfigError('search="substructures" finds modes up to f_max, without tol.')
 
     @property
     def chooses(self) -> bool:
@@ -111,7 +122,7 @@ class CraigBampton:
         if self.chooses:
             omega, Phi = enough_modes(ops, held, Psi_b, self._wanted(), FIRST_BATCH)
         else:
-            omega, Phi = self._normal_modes(ops, held)
+            omega, Phi = self._normal_modes(ops, held, boundary)
         normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
         return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal), held)
 
@@ -120,7 +131,10 @@ class CraigBampton:
             return Wanted(self.tol, 2 * np.pi * self.f_max)
         return Wanted(ENOUGH_RTOL if self.tol is None else self.tol, supports=self.supports)
 
-    def _normal_modes(self, ops: Operators, held: Held) -> tuple[Array, Array]:
+    def _normal_modes(self, ops: Operators, held: Held, boundary: Index) -> tuple[Array, Array]:
+        if self.search == SUBSTRUCTURE_SEARCH and self.f_max is not None:
+            found = modes_up_to(ops, boundary, self.f_max, SUBSTRUCTURE_RTOL)
+            return found.omega, found.shapes
         if self.n_modes is not None:
             if self.n_modes > held.n_free:
                 raise ConfigError(

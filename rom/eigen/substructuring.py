@@ -1,0 +1,242 @@
+"""All modes up to a frequency by automated multilevel substructuring, with bounds of their errors.
+
+The matrices are cut into a tree of substructures, each block of the eliminated stiffness gives its
+modes up to a cut-off, and Rayleigh and Ritz do the rest. Inverse iteration on the whole block of
+modes then takes most of the error away, and shows by its step how much there was.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eigh, qr
+from scipy.sparse import csr_matrix, issparse
+
+from rom.arguments import positive
+from rom.eigen.fronts import SubstructuredBody
+from rom.eigen.scipy import RIGID_RTOL, SciPyOperators, dof_set
+from rom.eigen.verbs import canonical_signs, orthonormal
+from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
+from rom.model import Array, Modes
+
+CUTOFF_RATIOS = (6.0, 24.0)  # eigenvalues of substructures kept up to, over the last one sought
+COUNT_RATIOS = (1.1, 1.3)  # eigenvalues, over the last one sought, between which they are counted
+SPARE_RATIO = 1.6  # eigenvalues of substructuring up to here are taken along: they are too high
+SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
+SHIFT_RTOL = 1e-11  # of the largest eigenvalue of the mesh: a smaller shift would be round-off
+MAX_STEPS = 4  # of inverse iteration; one or two are usual
+N_COLUMNS = 256  # solved together: more take memory, fewer make products of matrices slow
+ROUND_OFF = 1e-13  # of the last eigenvalue: what sums over the dofs leave uncertain
+STIFF_ROUND_OFF = 1e-15  # of the largest eigenvalue of the mesh, likewise in solutions
+
+
+def substructured_modes(
+    K: Any, M: Any, f_max: float, *, rigid: Array | None = None, tol: float = 1e-3
+) -> Modes:
+    """All modes up to a frequency, by automated multilevel substructuring.
+
+    For hundreds to thousands of modes. Frequencies are those of Rayleigh and Ritz. A count by
+    inertia proves that none is missed, and makes the bounds of Lehmann for their errors strict.
+
+    Args:
+        K: (n, n) stiffness [N/m], symmetric.
+        M: (n, n) mass [kg], symmetric positive definite.
+        f_max: the last frequency [Hz].
+        rigid: (n, 6) rigid motions of a free body, kept exactly; None if the body is held.
+        tol: largest error of a frequency [1], by its bound.
+
+    Returns:
+        Modes with their bounds ``error``; the true frequencies lie between
+        (1 - error) omega and omega [rad/s]. The last may lie above f_max by as much.
+
+    Raises:
+        ConfigError: if the frequency or the tolerance is out of range.
+        InterfaceError: if a body that should be held is free.
+        ModelError: if a free body has other motions without stiffness.
+        ModesMissedError: if the inertia count differs.
+        SolverError: if the bounds stay above the tolerance.
+
+    Source:
+        Bennighof and Lehoucq, An automated multilevel substructuring method for eigenspace
+        computation in linear elastodynamics, SIAM J. Sci. Comput. 25 (2004) 2084; Gao, Li, Yang
+        and Bai, ACM Trans. Math. Softw. 34 (2008) 20.
+
+    Example:
+        >>> K = np.diag(np.full(9, 2.0)) - np.eye(9, k=1) - np.eye(9, k=-1)  # held chain
+        >>> found = rom.eigen.substructured_modes(K, np.eye(9), f_max=0.1)
+        >>> np.round(found.omega, 6)  # 2 sin(k pi / 20)
+        array([0.312869, 0.618034])
+    """
+    if not 0 < tol < 1:
+        raise ConfigError(f"tol = {tol!r} is a relative error between 0 and 1.")
+    ops = SciPyOperators(K, M, rigid)
+    last = (2 * np.pi * positive("f_max", f_max)) ** 2
+    for ratio in CUTOFF_RATIOS:
+        search = _Search(ops, last, ratio)
+        for _ in range(MAX_STEPS):
+            search.step()
+            if search.complete and (worst := search.bounds()[1].max(initial=0.0)) <= tol:
+                return search.modes()
+    if search.complete:
+        raise SolverError(
+            f"the frequencies up to {f_max:g} Hz are known within {worst:.2g} only.",
+            hint=f"Allow a larger error than tol = {tol:g}.",
+        )
+    raise ModesMissedError(
+        f"{search.n_found} modes were found below {np.sqrt(search.rho) / (2 * np.pi):.6g} Hz, but "
+        f"the inertia of K - sigma M counts {search.n_below}.",
+        hint="Change f_max a little.",
+    )
+
+
+def modes_up_to(ops: Any, held: npt.ArrayLike, f_max: float, tol: float) -> Modes:
+    """`substructured_modes` with some dofs held, of operators in one process."""
+    if ops.n_local != ops.n:
+        raise ParallelError(
+            "modes up to a frequency are computed in one process.",
+            hint="Ask for a number of modes, or run without mpirun.",
+        )
+    K, M = (A if issparse(A) else ops.gathered(A) for A in (ops.K, ops.M))
+    free = np.setdiff1d(np.arange(ops.n), dof_set(held, ops.n))
+    whole = free.size == ops.n
+    rigid = ops.rigid if whole else None
+    found = substructured_modes(K[free][:, free], M[free][:, free], f_max, rigid=rigid, tol=tol)
+    Phi = np.zeros((ops.n, found.omega.size))
+    Phi[free] = found.shapes
+    return replace(found, shapes=Phi)
+
+
+class _Search:
+    """Inverse iteration on a block of modes, from those of substructures.
+
+    Z solves (K + shift M) Z = M X, so that three Gram matrices tell how far Z is from an
+    invariant space, in the norm of M^-1 of what is left of K z - lambda M z.
+    """
+
+    def __init__(self, ops: SciPyOperators, last: float, cutoff_ratio: float):
+        self.ops, self.last = ops, last
+        self.shift = shift = 0.0 if ops.rigid is None else _shift(ops, last)
+        limit = SPARE_RATIO * last + shift
+        none = np.zeros((ops.n, 0))
+        self.R = none if ops.rigid is None else orthonormal(ops, ops.rigid)
+        self.MR = ops.M @ self.R
+        K = csr_matrix(ops.K + shift * ops.M)
+        self.body = SubstructuredBody(K, ops.M, cutoff_ratio * last + shift)
+        mu, Y = none[0], none[:0]
+        if self.body.mass.size:
+            interval = (1.0 / limit, np.inf)
+            mu, Y = eigh(self.body.mass, subset_by_value=interval, driver="evr")
+        self.X, self.gram = self._elastic(self.body.expand((Y / np.sqrt(mu))[:, ::-1]))
+        self.n_steps = 0
+
+    def _elastic(self, X: Array) -> tuple[Array, Array]:
+        """X without rigid motions and the columns that are nearest to them, and X^T M X."""
+        B = self.MR.T @ X
+        if self.R.size:
+            leading = qr(B, mode="r", pivoting=True)[1][: self.R.shape[1]]
+            X, B = np.delete(X, leading, axis=1), np.delete(B, leading, axis=1)
+            X -= self.R @ B
+        return X, np.eye(X.shape[1]) - B.T @ B
+
+    def step(self) -> None:
+        """Solve with the block, and take the best modes in the space of the solutions."""
+        Z, A0, A1 = self._solutions()
+        scale = 1.0 / np.sqrt(np.diag(A0))
+        A0, A1, A2 = (A * np.outer(scale, scale) for A in (A0, A1, self.gram))
+        self.theta, C = _eigh(A1, A0)
+        self.residual = C.T @ A2 @ C - np.diag(self.theta**2)
+        self.X, self.gram = Z @ (scale[:, None] * C), C.T @ A0 @ C
+        self.n_steps += 1
+        if self.n_steps == 1:
+            self._count()
+
+    def _solutions(self) -> tuple[Array, Array, Array]:
+        """Z with (K + shift M) Z = M X, and its products with M and with K + shift M."""
+        n, k = self.X.shape
+        Z, A0, A1 = np.empty((n, k), order="F"), np.zeros((k, k)), np.zeros((k, k))
+        for start in range(0, k, N_COLUMNS):
+            new = slice(start, min(start + N_COLUMNS, k))
+            MX = self.ops.M @ self.X[:, new]
+            Z_new = self.body.solve(MX)
+            Z[:, new] = Z_new - self.R @ (self.MR.T @ Z_new)
+            for A, load in ((A0, self.ops.M @ Z[:, new]), (A1, MX)):
+                A[: new.stop, new] = Z[:, : new.stop].T @ load
+        A0, A1 = (np.triu(A) + np.triu(A, 1).T for A in (A0, A1))
+        return Z, A0, A1
+
+    def _count(self) -> None:
+        """Count the eigenvalues up to the widest gap behind the last one asked for."""
+        first, last = (ratio * self.last + self.shift for ratio in COUNT_RATIOS)
+        between = self.theta[(self.theta > first) & (self.theta < last)]
+        edges = np.array([first, *between, last])
+        widest = int(np.argmax(np.diff(edges)))
+        self.rho = float(0.5 * (edges[widest] + edges[widest + 1]))
+        self.n_below = self.body.count(self.rho) - self.R.shape[1]
+
+    @property
+    def n_found(self) -> int:
+        """Number of modes below the place of the count, rigid motions left out."""
+        return int(np.count_nonzero(self.theta < self.rho))
+
+    @property
+    def complete(self) -> bool:
+        """Whether as many modes were found as there are."""
+        return self.n_found == self.n_below
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Eigenvalues asked for, rigid motions left out, and errors that bound their roots.
+
+        Valid when they are complete.
+        """
+        lam, largest = self.theta[: self.n_below] - self.shift, self.ops.largest()
+        self._refuse_loose(lam, largest)
+        lower = lehmann_bounds(self.theta, self.residual, self.rho) - self.shift
+        lower -= ROUND_OFF * self.rho + STIFF_ROUND_OFF * largest
+        m = np.count_nonzero(lower <= self.last)
+        return lam[:m], 1.0 - np.sqrt(np.maximum(lower[:m], 0.0) / lam[:m])
+
+    def modes(self) -> Modes:
+        """The modes asked for, rigid motions first."""
+        (lam, error), still = self.bounds(), np.zeros(self.R.shape[1])
+        return Modes(
+            np.concatenate([still, np.sqrt(lam)]),
+            np.hstack([self.R, canonical_signs(self.X[:, : lam.size])]),
+            error=np.concatenate([still, error]),
+        )
+
+    def _refuse_loose(self, lam: Array, largest: float) -> None:
+        n_loose = int(np.count_nonzero(lam < RIGID_RTOL * largest))
+        if n_loose:
+            raise ModelError(
+                f"{n_loose} motions without stiffness"
+                + (" more than the six of a connected body." if self.R.size else "."),
+                hint="Hold the body, or give the rigid motions of a free one; parts of the mesh "
+                "may not be connected, or joined at a point or an edge only.",
+            )
+
+
+def _shift(ops: SciPyOperators, last: float) -> float:
+    return max(SHIFT_SHARE * last, SHIFT_RTOL * ops.largest())
+
+
+def lehmann_bounds(theta: Array, residual: Array, rho: float) -> Array:
+    """(m,) lower bounds of the eigenvalues below rho, whose number is that of the theta below.
+
+    Args:
+        theta: (k,) Ritz values of mass-normalised vectors x, ascending [rad^2/s^2].
+        residual: (k, k) scalar products of K x - theta M x in M^-1 [rad^4/s^4].
+        rho: no eigenvalue, so that as many lie below it as Ritz values [rad^2/s^2].
+
+    Source:
+        Lehmann, Optimale Eigenwerteinschliessungen, Numer. Math. 5 (1963) 246.
+    """
+    tau = _eigh(np.diag(theta - rho), np.diag((theta - rho) ** 2) + residual)[0]
+    return rho + 1.0 / tau[tau < 0][::-1]
+
+
+def _eigh(A: Array, B: Array) -> tuple[Array, Array]:
+    """All pairs of a symmetric pencil, also of none."""
+    if not A.size:
+        return np.zeros(0), np.zeros((0, 0))
+    return eigh(0.5 * (A + A.T), 0.5 * (B + B.T))

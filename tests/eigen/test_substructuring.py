@@ -1,0 +1,233 @@
+"""Modes by substructuring: none missed, and every frequency within the bound stated with it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+from scipy.sparse import block_diag, csr_matrix, diags, random
+
+import rom
+from rom.bench.models import bar
+from rom.eigen import dissection, fronts, substructuring
+from rom.eigen.substructuring import lehmann_bounds, substructured_modes
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
+
+ROUND_OFF = 1e-10  # of frequencies of dense solutions, 1e-16 times the ratio of the extremes
+
+
+@pytest.fixture(autouse=True)
+def small_parts(monkeypatch):
+    """Parts of sixty dofs, so that small bodies have trees of several levels, and few columns."""
+    monkeypatch.setattr(fronts, "MAX_PART_DOFS", 60)
+    monkeypatch.setattr(substructuring, "N_COLUMNS", 16)
+
+
+def body(size, cells, held=False):
+    """Stiffness, mass and rigid motions of a bar, held at its root or free."""
+    model = bar(size, cells)
+    if not held:
+        return model.K, model.M, rigid_motions(model.points)
+    root = 3 * model.interfaces["root"].nodes[:, None] + np.arange(3)
+    free = np.setdiff1d(np.arange(model.n_dofs), root)
+    return model.K[free][:, free], model.M[free][:, free], None
+
+
+def exact(K, M, rigid):
+    """All circular frequencies by LAPACK, those of rigid motions zero."""
+    lam = eigh(K.toarray(), M.toarray(), eigvals_only=True)
+    lam[: 0 if rigid is None else 6] = 0.0
+    return np.sqrt(lam)
+
+
+def certain(K, M, rigid, f_max, **more):
+    """The modes up to a frequency, with all that is said of them compared with LAPACK."""
+    found = substructured_modes(K, M, f_max, rigid=rigid, **more)
+    omega = exact(K, M, rigid)
+    asked = np.count_nonzero(omega <= 2 * np.pi * f_max)
+    assert found.omega.size >= asked
+    assert np.all((1 - found.error[asked:]) * found.omega[asked:] <= 2 * np.pi * f_max)
+    omega = omega[: found.omega.size]
+    assert np.all(found.omega >= (1 - ROUND_OFF) * omega)
+    assert np.all((1 - found.error) * found.omega <= (1 + ROUND_OFF) * omega)
+    assert found.error.max(initial=0.0) <= more.get("tol", 1e-3)
+    assert_allclose(found.shapes.T @ (M @ found.shapes), np.eye(omega.size), atol=1e-9)
+    energy = np.einsum("ij,ij->j", found.shapes, K @ found.shapes)
+    assert_allclose(
+        energy, found.omega**2, rtol=1e-8, atol=1e-15 * (K.diagonal() / M.diagonal()).max()
+    )
+    return found
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_bodies_of_any_size_keep_their_bounds(seed):
+    rng = np.random.default_rng(seed)
+    cells = tuple(rng.integers(1, [7, 3, 3], endpoint=True))
+    K, M, rigid = body(tuple(rng.uniform(0.05, 0.3, 3)), cells, held=seed % 2 == 0)
+    omega = exact(K, M, rigid)
+    last = rng.integers(8, max(9, omega.size // 8))
+    f_max = 0.5 * (omega[last] + omega[last + 1]) / (2 * np.pi)
+    certain(K, M, rigid, f_max, tol=10.0 ** rng.uniform(-5, -1))
+
+
+@pytest.mark.parametrize("ratio", [2.5, 4.0, 25.0])
+def test_bounds_hold_for_any_cutoff(monkeypatch, ratio):
+    """The cut-off decides what is found after how many steps, and never what is true."""
+    monkeypatch.setattr(substructuring, "CUTOFF_RATIOS", (ratio, 36.0))
+    K, M, rigid = body((0.3, 0.07, 0.05), (7, 3, 2))
+    certain(K, M, rigid, exact(K, M, rigid)[45] * 1.003 / (2 * np.pi))
+
+
+def test_one_and_a_half_times_the_band_is_certain_too():
+    K, M, rigid = body((0.3, 0.07, 0.05), (8, 3, 2), held=True)
+    f_max = exact(K, M, rigid)[30] * 1.001 / (2 * np.pi)
+    lower, upper = certain(K, M, rigid, f_max), certain(K, M, rigid, 1.5 * f_max)
+    assert upper.omega.size > 1.5 * lower.omega.size
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize(("size", "cells"), [((0.3, 0.05, 0.05), (6, 2, 2)), ((1,) * 3, (3,) * 3)])
+def test_symmetric_bodies_keep_all_their_equal_modes(size, cells, held):
+    K, M, rigid = body(size, cells, held)
+    omega = exact(K, M, rigid)
+    found = certain(K, M, rigid, omega[36] * 1.002 / (2 * np.pi))
+    apart = np.diff(found.omega[6:]) / found.omega[7:]
+    assert np.count_nonzero(apart < 2e-3) >= 5
+
+
+def test_equal_bodies_that_do_not_touch_have_every_mode_twice():
+    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
+    K, M = block_diag([K] * 2, "csr"), block_diag([M] * 2, "csr")
+    found = certain(K, M, None, exact(K, M, None)[25] * 1.001 / (2 * np.pi))
+    assert_allclose(found.omega[::2], found.omega[1::2], rtol=2e-3)
+
+
+def test_a_stiff_spring_moves_no_other_frequency_out_of_its_bound():
+    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
+    stiff = np.zeros(K.shape[0])
+    stiff[[100, 200]] = 1e14
+    certain(csr_matrix(K + diags(stiff)), M, None, 3e4)
+
+
+def test_rigid_motions_stay_exact():
+    K, M, rigid = body((0.2, 0.05, 0.04), (4, 2, 1))
+    found = substructured_modes(K, M, 2e4, rigid=rigid)
+    assert np.all(found.omega[:6] == 0.0) and np.all(found.error[:6] == 0.0)
+    assert found.omega[6] > 0.0
+    R, Phi = rigid, found.shapes[:, :6]
+    assert_allclose(Phi @ (Phi.T @ (M @ R)), R, atol=1e-10)
+
+
+def test_a_band_without_modes_is_empty():
+    assert certain(*body((0.2, 0.05, 0.04), (4, 2, 1), held=True), 10.0).omega.size == 0
+    assert certain(*body((0.2, 0.05, 0.04), (4, 2, 1)), 10.0).omega.size == 6
+
+
+def test_all_modes_of_a_small_body():
+    K, M, rigid = body((0.2, 0.05, 0.04), (2, 1, 1), held=True)
+    found = certain(K, M, rigid, 1e7)
+    assert found.omega.size == K.shape[0]
+
+
+@pytest.mark.parametrize("shift", [0.3, 0.999, 1.001, 3.0, 30.0])
+def test_the_inertia_counts(shift):
+    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
+    lam = exact(K, M, None) ** 2
+    counted = fronts.SubstructuredBody(K, M, 0.0).count(shift * lam[20])
+    assert counted == np.count_nonzero(lam < shift * lam[20])
+
+
+def test_the_transformed_body_is_the_body():
+    """With all modes of all substructures, statics, mass and stiffness are as before."""
+    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
+    whole = fronts.SubstructuredBody(K, M, 1e30)
+    T = whole.expand(np.eye(K.shape[0]))
+    assert len(whole.parts) > 6
+    assert_allclose(T.T @ (K @ T), np.eye(K.shape[0]), atol=1e-9)
+    assert_allclose(T.T @ (M @ T), whole.mass, atol=1e-12 * whole.mass.max())
+    F = np.random.default_rng(0).normal(size=(K.shape[0], 3))
+    assert_allclose(K @ whole.solve(F), F, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_comes_later_separates_what_comes_first(seed):
+    """No two parts are coupled unless one is on the boundary of the other; any graph."""
+    rng = np.random.default_rng(seed)
+    A = abs(random(300, 300, 10.0 ** rng.uniform(-3, -1), random_state=seed))
+    A = csr_matrix(A + A.T + diags(np.ones(300)))
+    order, parts = dissection.dissected(A, 40)
+    assert np.array_equal(np.sort(order), np.arange(300))
+    A = A[order][:, order]
+    assert [p.first for p in parts[1:]] == [p.end for p in parts[:-1]]
+    for p in parts:
+        later = np.unique(A[p.first : p.end].indices)
+        assert set(later[later >= p.end]) <= set(p.boundary)
+        assert p.parent == -1 or parts[p.parent].first <= p.boundary[0] < parts[p.parent].end
+        assert p.parent == -1 or set(p.boundary) <= set(parts[p.parent].places)
+
+
+def test_a_strip_is_cut_across():
+    """Separators of a strip of 60 x 4 nodes have four nodes, by Koenig's theorem the fewest."""
+    x, y = (a.ravel() for a in np.meshgrid(np.arange(60), np.arange(4), indexing="ij"))
+    near = np.maximum(abs(x[:, None] - x), abs(y[:, None] - y)) <= 1
+    parts = dissection.dissected(csr_matrix(near.astype(float)), 30)[1]
+    assert max(p.size for p in parts) <= 30
+    assert max(p.boundary.size for p in parts) <= 8
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_lower_bounds_are_bounds_and_sharp(seed):
+    rng = np.random.default_rng(seed)
+    lam = np.sort(rng.uniform(1, 30, 40))
+    lam[13:] += 1.0
+    rho = 0.5 * (lam[12] + lam[13])
+    X = np.linalg.qr(np.eye(40)[:, :16] + 0.001 * rng.normal(size=(40, 16)))[0]
+    theta, C = np.linalg.eigh(X.T @ (lam[:, None] * X))
+    X = X @ C
+    rest = lam[:, None] * X - X * theta
+    lower = lehmann_bounds(theta, rest.T @ rest, rho)
+    assert np.all(lower <= lam[:13] + 1e-12)
+    assert np.all(lower >= lam[:13] - 0.5)
+    assert_allclose(lehmann_bounds(lam[:16], np.zeros((16, 16)), rho), lam[:13])
+
+
+def test_the_tool_takes_a_band_in_place_of_a_number():
+    model = bar((0.3, 0.07, 0.05), (6, 2, 1))
+    for fixed in ((), ("root",), {"root": "xyz", "tip": "yz"}):
+        by_number = rom.modes(model, 40, fixed=fixed)
+        f_max = float(by_number.frequencies[30])
+        by_band = rom.modes(model, f_max=f_max, fixed=fixed)
+        n = np.count_nonzero(by_number.frequencies <= f_max)
+        assert by_band.omega.size in (n, n + 1)
+        n = by_band.omega.size
+        gap = by_band.omega - by_number.omega[:n]
+        assert np.all(gap <= by_band.error * by_band.omega + 1e-6)
+        assert np.all(gap >= -1e-6 * by_number.omega[:n])
+        assert by_band.residual.shape == (n,) and "error below" in by_band._repr_html_()
+    assert by_number.error is None
+
+
+@pytest.mark.parametrize("wrong", [{"n": 3, "f_max": 100.0}, {}, {"f_max": -1.0}, {"n": 0}])
+def test_a_number_or_a_band(wrong):
+    with pytest.raises(ConfigError, match=r"n\b|f_max"):
+        rom.modes(bar((0.2, 0.05, 0.04), (2, 1, 1)), **wrong)
+
+
+def test_what_does_not_suit_is_refused():
+    K, M, rigid = body((0.2, 0.05, 0.04), (3, 2, 1))
+    with pytest.raises((InterfaceError, ModelError), match="rigid motions"):
+        substructured_modes(K, M, 1e4)
+    with pytest.raises(ConfigError, match="tol = 2"):
+        substructured_modes(K, M, 1e4, rigid=rigid, tol=2)
+    with pytest.raises(SolverError, match="are known within"):
+        substructured_modes(K, M, 2e4, rigid=rigid, tol=1e-15)
+    two = block_diag([K] * 2, "csr"), block_diag([M] * 2, "csr")
+    with pytest.raises(ModelError, match="6 motions without stiffness more"):
+        substructured_modes(*two, 1e4, rigid=np.vstack([rigid] * 2))
+
+
+def test_a_mode_that_is_missed_is_said(monkeypatch):
+    monkeypatch.setattr(fronts.SubstructuredBody, "count", lambda body, shift: 99)
+    K, M, rigid = body((0.2, 0.05, 0.04), (3, 2, 1))
+    with pytest.raises(ModesMissedError, match="counts 93"):
+        substructured_modes(K, M, 1e4, rigid=rigid)
