@@ -10,6 +10,7 @@ from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
 from rom.eigen.condensed import Condensed, condensed
 from rom.eigen.verbs import Operators, given_rigid_motions, mac, quadratic, residual_errors
+from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.bases.fixed_interface import constraint_modes
@@ -57,7 +58,7 @@ def certify_body(
             begin(f"compare with the full model, {support}")
             held = full_support(connection, parts, fixed)
             if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
-                held = held if parts else connection.ops.hold(held)  # once, for loads and modes
+                held = connection.ops.hold(held) if isinstance(held, np.ndarray) else held
                 static = _static_row(connection, body, held)
             table = compared(connection, ops, body, (basis, parts, matrices), fixed, held)
             if table["reduced"]:
@@ -139,7 +140,10 @@ def basis_matrices(ops: Operators, basis: Basis) -> tuple[Array, Array]:
 def full_support(connection: Connection, parts: Condensed | None, fixed: tuple[str, ...]) -> Any:
     """The full model in one support: dof numbers, or what solves for it without a new factor."""
     dofs = connection.held(fixed)
-    return dofs if parts is None else parts.support(dofs)
+    try:
+        return dofs if parts is None else parts.support(dofs)
+    except InterfaceError:  # a motion without stiffness, which the whole body names better
+        return dofs
 
 
 def reduced_shapes(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigh
 
-from rom.eigen.verbs import Held, Operators
+from rom.eigen.verbs import Held, Operators, quadratic, unit_motions
 from rom.errors import InterfaceError
 from rom.model import Array, Index
 
@@ -23,6 +23,7 @@ class Condensed:
         boundary: (n_b,) dof numbers of the interface coordinates.
         Psi: (n_local, n_b) constraint modes.
         S: (n_b, n_b) condensed stiffness.
+        alone: (n_b,) stiffness of each coordinate while nothing else moves.
     """
 
     ops: Operators
@@ -30,6 +31,7 @@ class Condensed:
     boundary: Index
     Psi: Array
     S: Array
+    alone: Array
 
     def support(self, dofs: Index) -> "Supported":
         """The body with some interface coordinates held, or with none.
@@ -41,9 +43,7 @@ class Condensed:
             InterfaceError: if a motion other than the six of the free body has no stiffness.
         """
         free = np.flatnonzero(~np.isin(self.boundary, dofs))
-        stiffness = np.diag(self.S)[free]
-        stiffness = np.maximum(stiffness, LEAST_STIFFNESS * stiffness.max(initial=1.0))
-        scale = 1.0 / np.sqrt(stiffness)
+        scale = 1.0 / np.sqrt(self.alone[free])
         S = scale[:, None] * self.S[np.ix_(free, free)] * scale
         if not dofs.size and self.ops.rigid is not None:
             R = self.ops.rows(self.ops.rigid, self.boundary) / scale[:, None]
@@ -99,5 +99,6 @@ def condensed(ops: Operators, held: Held, boundary: Index, Psi: Array) -> Conden
         boundary: (n_b,) dof numbers of the interface coordinates.
         Psi: (n_local, n_b) constraint modes.
     """
-    S = ops.gram(Psi, ops.apply_K(Psi))
-    return Condensed(ops, held, boundary, Psi, 0.5 * (S + S.T))
+    S = quadratic(ops, ops.apply_K, Psi)
+    alone = np.diag(quadratic(ops, ops.apply_K, unit_motions(ops, boundary)))
+    return Condensed(ops, held, boundary, Psi, 0.5 * (S + S.T), alone)

@@ -243,6 +243,14 @@ def quadratic(ops: Operators, apply: Callable[[Array], Array], X: Array) -> Arra
     return np.hstack([ops.gram(X, apply(X[:, some])) for some in column_blocks(X.shape[1])])
 
 
+def unit_motions(ops: Operators, boundary: Index) -> Array:
+    """(n_local, n_b) columns of the identity: one boundary dof moved, everything else at rest."""
+    E = np.zeros((ops.n_local, boundary.size))
+    mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
+    E[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
+    return E
+
+
 def orthonormal(ops: Mass, X: Array) -> Array:
     """M-orthonormal columns with the span of X, in the order given.
 

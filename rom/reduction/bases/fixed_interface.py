@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import Held, Operators, column_blocks
+from rom.eigen.verbs import Held, Operators, column_blocks, unit_motions
 from rom.model import Array, Basis
 
 
@@ -64,11 +64,3 @@ def constraint_modes(ops: Operators, held: Held, boundary: npt.NDArray[np.int64]
     for some in column_blocks(boundary.size):
         Psi[:, some] -= held(ops.apply_K(Psi[:, some]))
     return Psi
-
-
-def unit_motions(ops: Operators, boundary: npt.NDArray[np.int64]) -> Array:
-    """(n_local, n_b) columns of the identity: one boundary dof moved, everything else at rest."""
-    E = np.zeros((ops.n_local, boundary.size))
-    mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
-    E[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
-    return E
