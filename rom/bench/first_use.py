@@ -115,8 +115,10 @@ def _rod() -> None:
 
 
 def _wind() -> None:
+    from rom.components.wind.blading import blading, rotor_load
     from rom.components.wind.whole_turbine import turbine
 
+    rotor_load(blading(), 8.0, 1.0, n_azimuths=3)
     _move(turbine(2, tower_segments=0, wind=8.0).mechanism)
 
 

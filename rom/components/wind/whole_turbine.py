@@ -19,13 +19,16 @@ from rom import rotation
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
 from rom.components.wind.wind_turbine import (
+    CONE_ANGLE,
     GEAR_RATIO,
     GENERATOR_INERTIA,
     HUB_INERTIA,
     HUB_OVERHANG,
     N_BLADES,
     SHAFT_DAMPING,
+    SHAFT_HEIGHT,
     SHAFT_STIFFNESS,
+    SHAFT_TILT,
     TOWER_HEIGHT,
     blade,
     tower,
@@ -39,9 +42,6 @@ from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
 
-SHAFT_HEIGHT = 1.96256  # from the top of the tower [m]
-SHAFT_TILT = np.radians(5.0)  # nose up [rad]
-CONE_ANGLE = np.radians(2.5)  # blades upwind, away from the tower [rad]
 HUB_MASS = 56_780.0  # kg
 NACELLE_MASS, NACELLE_CENTRE = 240_000.0, (1.9, 0.0, 1.75)  # kg, m from the top of the tower
 NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
@@ -134,6 +134,7 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     cone: float = CONE_ANGLE,
     damped: bool = True,
     wind: float | None = None,
+    pitch: float = 0.0,
     speed: float = 0.0,
     shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
     shear: float = 1.0,
@@ -149,7 +150,8 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         cone: of the blades, upwind [rad].
         damped: whether blades have the viscosity of the definition.
         wind: its speed along the first axis [m/s], see `rom.components.wind.blade_element`; None:
-            still.
+            still. The tower dams it.
+        pitch: of all blades, leading edge into the wind [rad].
         speed: with which the rotor starts to turn [rad/s].
         shaft: torsional stiffness [N m/rad] and damping [N m s/rad].
         shear: factor of this rigidity of blades and tower [1]; with a thousand they are the
@@ -172,8 +174,10 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     nacelle = _nacelle(mech, top)
     turning = _train(mech, nacelle, (lean, hub, axis), shaft, speed)
     one = body(blade(segments, damped=damped, **factors))
-    one = one if wind is None else in_wind(one, (wind, 0.0, 0.0))
-    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(N_BLADES))
+    if wind is not None:
+        one = in_wind(one, (wind, 0.0, 0.0), axis=axis, cone=cone, tower=True)
+    place = lean, hub, cone, pitch, speed
+    blades = tuple(_blade(mech, k, one, turning, place) for k in range(N_BLADES))
     return Turbine(mech, blades, standing, axis, hub)
 
 
@@ -234,9 +238,10 @@ def _train(
 
 def _blade(mech: Mechanism, k: int, one: Any, hub: Part, place: Any) -> Assembly:
     """Blade k on the hub."""
-    lean, centre, cone, speed = place
+    lean, centre, cone, pitch, speed = place
     round_ = rotation.matrix(rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0]))
     A = lean @ round_ @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
+    A = A @ rotation.matrix(rotation.exp([0.0, 0.0, -pitch]))
     turning = A.T @ lean @ [speed, 0.0, 0.0]
     added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
     root = rotation.matrix(hub.p).T @ (mech.design_point(added.marker("start")) - centre)
