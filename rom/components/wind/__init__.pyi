@@ -13,6 +13,8 @@ from rom.components.wind.control import power_curve as power_curve
 from rom.components.wind.control import steady as steady
 from rom.components.wind.drivetrain import Rotor as Rotor
 from rom.components.wind.drivetrain import rotor as rotor
+from rom.components.wind.operation import Operation as Operation
+from rom.components.wind.operation import operate as operate
 from rom.components.wind.profiles import Profile as Profile
 from rom.components.wind.profiles import profile as profile
 from rom.components.wind.profiles import profiles as profiles

@@ -207,8 +207,8 @@ def turn(strips, tables, counts, shape, angles, motion, tower, out):  # noqa: PL
             x = lift * ct + r * c * st
             v[0], v[1], v[2] = wind, 0.0, 0.0
             wind_at(tower, x, -r * s, height - lift * st + r * c * ct, v)
-            n, e = v[0] * ct - v[2] * st, c * (v[0] * st + v[2] * ct) - s * v[1]
-            ahead = -c * v[1] - s * (v[0] * st + v[2] * ct)  # with the motion of the blade
+            n, e = v[0] * ct, c * v[0] * st - s * v[1]
+            ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
             theta = axial[j] + pitch
             flow = induced(strips[j], tables[j], counts[j], theta, cc * n + sc * e,
                            speed * r - ahead)  # fmt: skip

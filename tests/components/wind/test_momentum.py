@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rom import rotation
 from rom.components.wind.blading import BETZ_LIMIT, CHORD, blading, rotor_load
 from rom.components.wind.inflow import TOWER_TUBE, slope_of_wind, wind_at
 from rom.components.wind.profiles import profile, profiles
@@ -134,6 +135,14 @@ def test_a_rotor_of_one_shape_has_coefficients_of_the_ratio_alone():
     assert_allclose(other.thrust / one.thrust, 16.0, rtol=1e-9)
 
 
+def test_a_blade_that_is_pitched_once_round_is_the_same():
+    """Flow from behind and from all sides: tables go round."""
+    for pitch in np.radians((-150.0, -90.0, 100.0, 170.0)):
+        one, other = (rotor_load(blading(), 8.0, 1.0, p) for p in (pitch, pitch + 2 * np.pi))
+        here, there = (np.delete(x.strip, 4, axis=2) for x in (one, other))  # but for the attack
+        assert_allclose(here, there, rtol=1e-6, atol=1e-7 * np.abs(here).max())
+
+
 def test_tilt_and_cone_lower_the_power_by_the_wind_that_they_miss():
     """cos^3 of the tilt times cos^2 of the cone: 0.989 and 0.998 of the power."""
     speed = tip_ratio(DESIGN_RATIO)
@@ -161,6 +170,29 @@ def test_a_blade_passes_the_dam_of_the_tower():
     on_face = np.array([8.0, 0.0, 0.0])
     WIND_AT(TOWER_TUBE, 0.0, 3.0 - 1.065 * 40.0 / 87.6, 40.0, on_face)
     assert_allclose(on_face, [16.0, 0.0, 0.0])  # beside a cylinder air has twice the speed
+
+
+def test_every_strip_meets_the_wind_of_its_place():
+    """Places and directions by matrices; the air far away from what momentum left of it."""
+    tilt, cone, speed = np.radians(8.0), np.radians(4.0), 1.0
+    blades = blading(tilt, cone)
+    load = rotor_load(blades, 9.0, speed, tower=True, n_azimuths=12)
+    lean, back = (rotation.matrix(rotation.exp(x)) for x in ([0, tilt, 0], [0, -cone, 0]))
+    hub = np.array([0.0, 0.0, 87.6 + 1.96256]) - 5.0191 * lean[:, 0]
+    for i in range(12):
+        A = lean @ rotation.matrix(rotation.exp([load.azimuth[i], 0.0, 0.0])) @ back
+        for j in (9, 14):
+            place = hub + A @ [0.0, 0.0, blades.radius[j]]
+            v = np.array([9.0, 0.0, 0.0])
+            WIND_AT(TOWER_TUBE, *place, v)
+            moved = np.cross(speed * lean[:, 0], place - hub)
+            _, driving, through, across, _, a = load.strip[i, j]
+            axial, tangential = (A[:, k] @ (v - moved) for k in (0, 1))
+            assert_allclose(through / (1 - a), axial, rtol=1e-9)
+            c, r = np.cos(cone), blades.radius[j] * np.cos(cone)
+            F = loss(r, np.arctan2(through, across), R=63.0 * c, hub=1.5 * c)
+            around = 3 * driving / (4 * np.pi * r * 1.225 * through * F)
+            assert_allclose(across - around, tangential, rtol=1e-7)
 
 
 def test_the_dammed_wind_has_no_source_and_no_swirl():
