@@ -8,9 +8,11 @@ from scipy.linalg import eigh, null_space
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
-from rom.eigen.verbs import Held, Operators, given_rigid_motions, mac, residual_errors
+from rom.eigen.condensed import Condensed, condensed
+from rom.eigen.verbs import Operators, given_rigid_motions, mac, residual_errors
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
+from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
@@ -20,6 +22,7 @@ ASYMMETRY_RTOL = 1e-6
 MIN_JUDGED_ERROR = 1e-6  # frequency error above which the estimate is compared with it
 MAX_ERROR_RATIO = 2.0  # frequency error over its estimate
 ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
+STATIC_RTOL = 1e-6  # of the largest stiffness: what keeps a shape from being a constraint mode
 CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
 
 
@@ -45,17 +48,17 @@ def certify_body(
     statics = body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     constrained = basis.labels[: len(connection.labels)] == connection.labels
-    inner = connection.ops.hold(connection.boundary) if statics and constrained else None
+    parts = condensed_model(connection, basis) if statics and constrained else None
     static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
             support = " + ".join(fixed) + " held" if fixed else "free"
             begin(f"compare with the full model, {support}")
-            held = None
+            held = full_support(connection, parts, fixed)
             if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
-                held = connection.ops.hold(connection.held(fixed))  # once, for loads and modes
+                held = held if parts else connection.ops.hold(held)  # once, for loads and modes
                 static = _static_row(connection, body, held)
-            table = compared(connection, ops, body, (basis, inner), fixed, held)
+            table = compared(connection, ops, body, (basis, parts), fixed, held)
             if table["reduced"]:
                 comparison[support] = table
     if not connection.ops.affordable:
@@ -74,13 +77,19 @@ def compared(
     connection: Connection,
     ops: Operators,
     body: FlexibleBody,
-    reduction: tuple[Basis, Held | None],
+    reduction: tuple[Basis, Condensed | None],
     fixed: tuple[str, ...],
-    held: Held | None = None,
+    support: Any,
 ) -> dict[str, list[float]]:
     """Frequencies of both models in one support, their errors, and the agreement of shapes.
 
-    The full model may be ``held`` there already; its factor is used up.
+    Args:
+        connection: the full model in interface coordinates.
+        ops: the full model in nodal dofs.
+        body: the reduced body.
+        reduction: its basis, and the full model condensed to the interfaces where that is known.
+        fixed: interfaces that are held.
+        support: the same as `full_support` has it for the full model.
     """
     omega_r = body.modes(fixed=fixed)[0]
     n_rigid = int(np.count_nonzero(omega_r == 0.0))
@@ -89,21 +98,41 @@ def compared(
     if n <= 0 or n_rigid not in (0, 6):
         return table
     # the reduced shapes again, as combinations of the columns of the basis
-    basis, inner = reduction
+    basis, parts = reduction
     shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)
     table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
-    if inner and not any(label.startswith("enhanced") for label in basis.labels):
+    if parts and not any(label.startswith("enhanced") for label in basis.labels):
         # constraint modes leave no residual on interfaces: one inverse serves every support
-        found = residual_errors(connection.ops, inner, shapes[:, n_rigid:])
+        found = residual_errors(connection.ops, parts.held, shapes[:, n_rigid:])
         table["estimated"] = found.tolist()
     if connection.ops.affordable:
-        support = connection.held(fixed) if held is None else held
         omega, Phi = connection.ops.modes(support, n + n_rigid, finished=True)
         omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
         agreement = mac(ops, Phi, connection.ops.expand(shapes))
         table["full"] = (omega / (2 * np.pi)).tolist()
         table["mac"] = _cluster_mac(agreement, omega_r[: n + n_rigid]).tolist()
     return table
+
+
+def condensed_model(connection: Connection, basis: Basis) -> Condensed:
+    """The full model condensed to its interfaces, with what the reduction has found if it fits.
+
+    It fits where the first columns of the basis are constraint modes of this very model.
+    """
+    ops, boundary = connection.ops, connection.boundary
+    held = basis.held if basis.held is not None else ops.hold(boundary)
+    Psi = basis.Psi[:, : boundary.size]
+    parts = condensed(ops, held, boundary, Psi)
+    forces = ops.rows(ops.apply_K(Psi), boundary)
+    if np.abs(parts.S - forces).max() > STATIC_RTOL * np.abs(parts.S).max():
+        parts = condensed(ops, held, boundary, constraint_modes(ops, held, boundary))
+    return parts
+
+
+def full_support(connection: Connection, parts: Condensed | None, fixed: tuple[str, ...]) -> Any:
+    """The full model in one support: dof numbers, or what solves for it without a new factor."""
+    dofs = connection.held(fixed)
+    return dofs if parts is None else parts.support(dofs)
 
 
 def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
@@ -149,7 +178,7 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     return [worst, row(f"{support}: largest error over its estimate", ratio, MAX_ERROR_RATIO)]
 
 
-def _static_row(connection: Connection, body: FlexibleBody, held: Held) -> list[Row]:
+def _static_row(connection: Connection, body: FlexibleBody, held: Any) -> list[Row]:
     """Deflection under unit loads on the other interfaces, the first one held; exact for CB."""
     names = tuple(connection.parts)
     ops, first = connection.ops, names[0]

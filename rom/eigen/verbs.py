@@ -102,7 +102,7 @@ class Operators(Protocol):
         with omega exactly zero.
 
         Args:
-            held: (k,) dof numbers, or what `hold` returned.
+            held: (k,) dof numbers, what `hold` returned, or a support of a condensed body.
             m: number of modes.
             sigma: shift [rad^2/s^2]; chosen from the model when not given.
             finished: nobody else will use the factor.
@@ -112,7 +112,7 @@ class Operators(Protocol):
             positive [kg^-1/2].
 
         Raises:
-            ModesMissedError: if the inertia count says a mode was skipped.
+            ModesMissedError: if an inertia count says a mode was skipped.
         """
 
     def transform(self, T: Any, rigid: Array) -> "Operators":

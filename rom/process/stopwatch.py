@@ -31,6 +31,7 @@ class Stopwatch:
         self.stages: dict[str, dict[str, float]] = {}
         self.counts: dict[str, dict[str, int]] = {}
         self.peaks: dict[str, float] = {}
+        self.notes: dict[str, dict[str, float]] = {}
         self._stage, self._pieces, self._since = "", [REST_PIECE], perf_counter()
 
     def begin(self, stage: str) -> None:
@@ -60,6 +61,12 @@ class Stopwatch:
         self._charge()
         self._pieces.pop()
 
+    def note(self, name: str, value: float) -> None:
+        """Keep a number with the stage under way, the largest of that name."""
+        if self._stage:
+            notes = self.notes.setdefault(self._stage, {})
+            notes[name] = max(notes.get(name, value), value)
+
     @property
     def seconds(self) -> float:
         """Of all stages so far [s]."""
@@ -73,6 +80,7 @@ class Stopwatch:
                 "MB": round(self.peaks[stage], 1),
                 **{piece: round(seconds, 4) for piece, seconds in pieces.items()},
                 **{f"number of {piece}": n for piece, n in self.counts[stage].items()},
+                **self.notes.get(stage, {}),
             }
             for stage, pieces in self.stages.items()
         }
@@ -112,3 +120,10 @@ def piece(name: str) -> Iterator[Any]:
         yield
     finally:
         watch.leave()
+
+
+def note(name: str, value: float) -> None:
+    """Keep a number with the stage under way, where somebody times."""
+    watch = _running.get()
+    if watch is not None:
+        watch.note(name, value)

@@ -34,7 +34,7 @@ def craig_bampton(K: Any, M: Any, boundary: npt.ArrayLike, n_modes: int) -> Basi
     Raises:
         ConfigError: if the dof numbers or m do not fit the matrices.
         InterfaceError: if K_ii is singular.
-        ModesMissedError: if the inertia count says that a mode was skipped.
+        ModesMissedError: if a count says that a mode was skipped.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
